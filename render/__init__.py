@@ -1,0 +1,1 @@
+"""Light before any camera: spectra, scenes, the rendering engine, relighting, photometry."""

@@ -1,0 +1,31 @@
+"""The one exception for bad input: a single line with the name, the value, what is allowed and the likely fix."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from math import isfinite
+
+
+class InputError(ValueError):
+    """Bad input from the caller. The message is one line; the command line prints it and exits with code 2."""
+
+
+def unknown(what: str, value: object, allowed: Iterable[str]) -> InputError:
+    """Build the error for a name that is not in a list, naming the nearest one that is."""
+    names = sorted(allowed)
+    near = get_close_matches(str(value), names, n=1, cutoff=0.4)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return InputError(f"{what}: {value!r} is unknown; allowed: {', '.join(names)}{hint}")
+
+
+def require_range(name: str, value: float, low: float, high: float, fix: str) -> None:
+    """Raise `InputError` unless `value` is finite and ``low <= value <= high``."""
+    if not (isfinite(value) and low <= value <= high):
+        raise InputError(f"{name}: {value!r} is outside {low:g} to {high:g}; {fix}")
+
+
+def require_keys(what: str, given: Iterable[str], allowed: Iterable[str]) -> None:
+    """Raise `InputError` for the first key of `given` that is not in `allowed`."""
+    allowed = list(allowed)
+    for key in given:
+        if key not in allowed:
+            raise unknown(what, key, allowed)

@@ -1,0 +1,1 @@
+"""What is looked at: one builder a file, a catalogue, light levels with their sources."""

@@ -1,0 +1,1 @@
+"""From radiance to raw data: optics, colour filter arrays, noise, readout, presets."""

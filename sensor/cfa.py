@@ -1,0 +1,52 @@
+"""Colour filter arrays: a tile of letters, repeated over the sensor."""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.errors import InputError
+
+Tile: TypeAlias = tuple[str, ...]
+
+RGBW: Tile = ("RG", "BW")  # Parmar & Wandell 2009, Figure 2
+BAYER: Tile = ("RG", "GB")
+
+
+def check_tile(tile: Sequence[str]) -> Tile:
+    """Return `tile` as a tuple of rows, or raise `InputError` where it is not a rectangle of letters."""
+    rows = tuple(tile)
+    if isinstance(tile, str) or not rows or not all(isinstance(row, str) and row.isalpha() for row in rows):
+        raise InputError(f"cfa: {tile!r} is not a tile; allowed: rows of letters such as {RGBW}; give a tuple of rows")
+    if len({len(row) for row in rows}) != 1:
+        raise InputError(f"cfa: rows of {rows!r} differ in length; allowed: a rectangle; pad or cut the rows")
+    return rows
+
+
+def channels(tile: Tile) -> tuple[str, ...]:
+    """Letters of a tile, each once: R, G, B, W first in this order, any others as they appear row by row."""
+    present = dict.fromkeys("".join(tile))
+    return tuple(letter for letter in "RGBW" if letter in present) + tuple(x for x in present if x not in "RGBW")
+
+
+def letter_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
+    """Letter of each pixel, shape `shape`."""
+    cells = np.array([list(row) for row in tile])
+    repeats = (-(-shape[0] // cells.shape[0]), -(-shape[1] // cells.shape[1]))
+    return np.tile(cells, repeats)[: shape[0], : shape[1]]
+
+
+def mask(tile: Tile, letter: str, shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Where the mosaic samples `letter`: S_i of eq. (1), shape `shape`."""
+    return np.asarray(letter_map(tile, shape) == letter)
+
+
+def check_covers(tile: Tile, shape: tuple[int, ...]) -> None:
+    """Raise `InputError` unless a frame of `shape` is 2-D and holds every letter of the tile."""
+    height, width = len(tile), len(tile[0])
+    if len(shape) != 2 or shape[0] < height or shape[1] < width:
+        raise InputError(
+            f"mosaic: shape {tuple(shape)} doesn't fit the tile {tile}; allowed: (h, w) of at least {height}x{width}; "
+            "pass one raw frame that holds a whole tile"
+        )

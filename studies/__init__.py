@@ -1,0 +1,1 @@
+"""Questions asked of the chain: demo sweep, metrics, report, command line."""
