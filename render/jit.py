@@ -54,18 +54,20 @@ LIBLLVM = find_llvm()
 # Without a usable library Dr.Jit would search by itself and may load one that aborts the process: name one that isn't.
 os.environ["DRJIT_LIBLLVM_PATH"] = str(LIBLLVM) if LIBLLVM else "/nonexistent/libLLVM.so"
 
-import drjit  # noqa: E402  (the environment variable above must come first)
+import drjit as dr  # noqa: E402  (the environment variable above must come first)
 import drjit.scalar  # noqa: E402
 
-Matrix4 = drjit.scalar.Matrix4f64  # a 4x4 transform as `mitsuba.load_dict` takes it in every variant
+__all__ = ["LIBLLVM", "Matrix4", "arrays", "backend", "dr", "find_llvm", "llvm_version"]
+
+Matrix4 = dr.scalar.Matrix4f64  # a 4x4 transform as `mitsuba.load_dict` takes it in every variant
 
 
 @cache
 def backend() -> Backend:
     """Where kernels run: ``cuda`` where a device answers, else ``llvm``, else ``numpy``."""
-    if drjit.has_backend(drjit.JitBackend.CUDA):
+    if dr.has_backend(dr.JitBackend.CUDA):
         return "cuda"
-    return "llvm" if LIBLLVM and drjit.has_backend(drjit.JitBackend.LLVM) else "numpy"
+    return "llvm" if LIBLLVM and dr.has_backend(dr.JitBackend.LLVM) else "numpy"
 
 
 def arrays() -> Any:

@@ -1,0 +1,159 @@
+"""Path integrator that carries every wavelength band along each path.
+
+Stock spectral integrators give four wavelengths to a path, so that a narrow band gets few samples. Here a path is
+traced once, and emission and BSDF are evaluated for all bands along it, four at a time: every band gets every path.
+Band wavelengths are jittered by one common offset a path, which makes each band an unbiased band average.
+
+Mitsuba is handed in by `render.loader`, which alone (with `render.engine`) imports it.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from render.jit import dr
+
+LANES = 4  # wavelengths of a spectral variant's `Spectrum`
+RR_DEPTH = 5  # Russian roulette from this depth on, as Mitsuba's `path`
+# Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
+# lobes by wavelength and one path can't serve all bands.
+PDF_TOLERANCE = 1e-3
+
+
+def dense_path(mi: Any) -> Any:
+    """Build the integrator class for the variant that is set; register it as ``densepath``.
+
+    Properties of the plug-in: ``wavelength_nm`` and ``width_nm`` (comma-separated), ``max_depth``. Channels after the
+    first (alpha-less luminance film) hold the bands, and one more the share of paths whose BSDF chose by wavelength.
+    """
+
+    class DensePath(mi.SamplingIntegrator):  # type: ignore[misc]
+        def __init__(self, props: Any) -> None:
+            super().__init__(props)
+            self.max_depth = int(props.get("max_depth", 8))
+            self.centres = np.array([float(x) for x in str(props["wavelength_nm"]).split(",")])
+            self.widths = np.array([float(x) for x in str(props["width_nm"]).split(",")])
+
+        def aov_names(self) -> list[str]:
+            return [f"band{i:04d}" for i in range(self.centres.size)] + ["wavelength_dependent_choice"]
+
+        def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:  # noqa: ARG002
+            wavelengths = _band_wavelengths(mi, self.centres, self.widths, sampler.next_1d(active))
+            result, chosen = _trace(mi, scene, sampler, ray, wavelengths, self.max_depth, mi.Bool(active))
+            bands = [value for group in result for value in group][: self.centres.size]
+            return mi.Spectrum(0.0), mi.Bool(True), [*bands, dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
+
+    return DensePath
+
+
+def _band_wavelengths(mi: Any, centres: Any, widths: Any, sample: Any) -> list[Any]:
+    """Wavelengths of a path, four bands an entry; the last entry is filled up with the last band."""
+    padded = np.concatenate([np.arange(centres.size), np.full(-centres.size % LANES, centres.size - 1)])
+    offset = sample - 0.5
+    lanes = [dr.fma(offset, float(widths[i]), float(centres[i])) for i in padded]
+    return [mi.Spectrum(*lanes[i : i + LANES]) for i in range(0, len(lanes), LANES)]
+
+
+def _power_heuristic(a: Any, b: Any) -> Any:
+    return dr.select(a > 0, dr.square(a) / (dr.square(a) + dr.square(b)), 0)
+
+
+def _emission(emitter: Any, interaction: Any, wavelengths: list[Any]) -> list[Any]:
+    """Evaluate an emitter at all wavelengths within one virtual call."""
+    values = []
+    for group in wavelengths:
+        interaction.wavelengths = group
+        values.append(emitter.eval(interaction))
+    return values
+
+
+def _emission_towards(emitter: Any, interaction: Any, direction: Any, wavelengths: list[Any]) -> list[Any]:
+    values = []
+    for group in wavelengths:
+        interaction.wavelengths = group
+        values.append(emitter.eval_direction(interaction, direction))
+    return values
+
+
+def _scatter(
+    bsdf: Any, context: Any, interaction: Any, towards_light: Any, lobe: Any, angle: Any, wavelengths: list[Any]
+) -> tuple[list[Any], Any, Any, list[Any], Any]:
+    """Evaluate and sample a BSDF at all wavelengths within one virtual call: shared terms are then computed once."""
+    values, weights = [], []
+    pdf, sample, chosen = None, None, None
+    for group in wavelengths:
+        interaction.wavelengths = group
+        value, group_pdf, group_sample, weight = bsdf.eval_pdf_sample(context, interaction, towards_light, lobe, angle)
+        values.append(value)
+        weights.append(weight)
+        if pdf is None:
+            pdf, sample, chosen = group_pdf, group_sample, group_pdf != group_pdf
+        else:
+            chosen |= abs(group_pdf - pdf) > PDF_TOLERANCE * pdf
+            chosen |= abs(group_sample.pdf - sample.pdf) > PDF_TOLERANCE * sample.pdf
+            chosen |= group_sample.sampled_component != sample.sampled_component
+    return values, pdf, sample, weights, chosen
+
+
+def _largest(groups: list[Any]) -> Any:
+    top = dr.max(groups[0])
+    for group in groups[1:]:
+        top = dr.maximum(top, dr.max(group))
+    return top
+
+
+@dr.syntax
+def _trace(
+    mi: Any, scene: Any, sampler: Any, camera_ray: Any, wavelengths: list[Any], max_depth: int, active: Any
+) -> tuple[list[Any], Any]:
+    """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``)."""
+    context = mi.BSDFContext()
+    ray = mi.Ray3f(camera_ray)
+    ray.wavelengths = wavelengths[0]
+    throughput = [mi.Spectrum(1.0) for _ in wavelengths]
+    result = [mi.Spectrum(0.0) for _ in wavelengths]
+    eta, depth = mi.Float(1.0), mi.UInt32(0)
+    previous = dr.zeros(mi.SurfaceInteraction3f)
+    previous_pdf, previous_delta = mi.Float(1.0), mi.Bool(True)
+    chosen = mi.Bool(False)
+    while dr.hint(active, label="dense path"):
+        si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
+        seen = mi.DirectionSample3f(scene, si, previous)
+        light_pdf = scene.pdf_emitter_direction(previous, seen, ~previous_delta)
+        share = dr.select(previous_delta, 1.0, _power_heuristic(previous_pdf, light_pdf))
+        emitted = dr.dispatch(seen.emitter, _emission, si, wavelengths)
+        for g in range(len(wavelengths)):
+            result[g] += throughput[g] * emitted[g] * share
+
+        go_on = (depth + 1 < max_depth) & si.is_valid()
+        bsdf = si.bsdf(ray)
+        lit = go_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        si.wavelengths = wavelengths[0]
+        ds, arriving = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
+        lit &= (ds.pdf != 0) & dr.any(arriving != 0)
+        towards_light = si.to_local(ds.d)
+        lobe, angle = sampler.next_1d(), sampler.next_2d()
+        values, pdf, sample, weights, by_wavelength = dr.dispatch(
+            bsdf, _scatter, context, si, towards_light, lobe, angle, wavelengths
+        )
+        chosen |= go_on & by_wavelength
+        factor = dr.select(lit, dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, pdf)) / ds.pdf, 0.0)
+        direct = dr.dispatch(ds.emitter, _emission_towards, si, ds, wavelengths)
+        for g in range(len(wavelengths)):
+            result[g] += dr.select(lit, throughput[g] * values[g] * direct[g] * factor, 0.0)
+            throughput[g] = throughput[g] * weights[g]
+
+        ray = si.spawn_ray(si.to_world(sample.wo))
+        ray.wavelengths = wavelengths[0]
+        eta *= sample.eta
+        previous, previous_pdf = dr.detach(si), sample.pdf
+        previous_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+        depth[si.is_valid()] += 1
+        brightest = _largest(throughput)
+        survival = dr.minimum(brightest * dr.square(eta), 0.95)
+        roulette = depth >= RR_DEPTH
+        survives = sampler.next_1d() < survival
+        for g in range(len(wavelengths)):
+            throughput[g][roulette] *= dr.rcp(survival)
+        active = go_on & (~roulette | survives) & (brightest != 0)
+    return result, chosen

@@ -1,0 +1,243 @@
+"""Rendering a scene's transport: independent passes, their scatter as the error, and the rule that stops them."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from render.cache import load_transport, save_transport
+from render.errors import InputError, require_range
+from render.loader import Film, integrator_name, load_direct, load_unit, mitsuba_module, variant
+from render.scene import Scene
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
+from render.transport import Stop, Transport, relative_error
+
+Planes = NDArray[np.float32]  # (band, h, w)
+Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
+
+DEFAULT_SPP = 64
+PASSES = 8  # scatter of fewer passes says little about the error
+PASS_SPP = 16  # samples a pixel and pass where only an error or a time is asked for
+MOST_SPP = 1 << 16  # ceiling where only an error is asked for
+VISIBLE_SPP = 16  # samples a pixel to find where a light is seen directly
+
+
+@dataclass
+class _Sums:
+    """Running sums of one group's passes (Welford), planes of (band, h, w); the only mutable state of a render."""
+
+    mean: Planes
+    scatter: Planes
+    signed: Planes
+    plane: Floats | None = None
+    passes: int = 0
+    drawn: int = field(default=0)
+
+    def add(self, planes: Planes) -> None:
+        self.passes += 1
+        delta = planes - self.mean
+        self.mean += delta / np.float32(self.passes)
+        self.scatter += delta * (planes - self.mean)
+        self.signed += planes if self.passes % 2 else -planes
+
+    @property
+    def variance(self) -> Planes:
+        """Variance of the mean."""
+        return self.scatter / np.float32((self.passes - 1) * self.passes)
+
+
+def render(
+    scene: Scene,
+    size: tuple[int, int],
+    *,
+    wavelength_nm: ArrayLike | None = None,
+    width_nm: ArrayLike | None = None,
+    spp: int | None = None,
+    noise: float | None = None,
+    max_seconds: float | None = None,
+    max_depth: int = 8,
+    seed: int = 0,
+    cache: str | Path | None = None,
+    progress: Progress | None = None,
+) -> Transport:
+    """Render each light group of a scene at unit spectral emission.
+
+    Stops at whichever comes first of `spp`, `noise` and `max_seconds`; with none of them after 64 samples a pixel.
+
+    Parameters
+    ----------
+    scene : Scene
+    size : (int, int)
+        Height and width in pixels.
+    wavelength_nm, width_nm : (band,) array_like, optional
+        Band centres and widths; 40 bands of 10 nm over 380-780 nm by default.
+    spp : int, optional
+        Samples a pixel, rounded up to what the passes and the stratified sampler can hold.
+    noise : float, optional
+        Relative Monte Carlo error (median over pixels and bands, scene's own lights) to reach.
+    max_seconds : float, optional
+        Time to keep; at least two passes are made.
+    max_depth : int
+        Longest path in segments; 2 is direct light.
+    seed : int
+        The same seed gives the same bits on one machine, variant and LLVM, whatever the number of threads.
+    cache : path, optional
+        Folder of finished renders; an unreadable entry is rendered again.
+    progress : callable, optional
+        Called after each pass with the share done and the error so far.
+
+    Returns
+    -------
+    Transport
+
+    Raises
+    ------
+    InputError
+        For a bad size, band or limit, a scene without light, or a material that picks lobes by wavelength.
+    """
+    film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
+    _check_limits(spp, noise, max_seconds, seed)
+    settings = {"spp": spp, "noise": noise, "max_seconds": max_seconds, "seed": seed}
+    if cache is not None and (found := load_transport(Path(cache), scene, film, settings)) is not None:
+        return found
+    transport = _render(scene, film, spp, noise, max_seconds, seed, progress or (lambda done, error: None))
+    if cache is not None:
+        save_transport(Path(cache), scene, film, settings, transport)
+    return transport
+
+
+def _checked_film(
+    scene: Scene, size: tuple[int, int], wavelength_nm: ArrayLike | None, width_nm: ArrayLike | None, max_depth: int
+) -> Film:
+    if not scene.groups:
+        raise InputError(f"scene {scene.name}: it has no light; allowed: one light group or more; add one")
+    if len(size) != 2 or not all(isinstance(n, int | np.integer) and 1 <= n <= 1 << 15 for n in size):
+        raise InputError(f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768")
+    require_range("max_depth", max_depth, 2, 1 << 16, "2 is direct light")
+    nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)
+    return Film((int(size[0]), int(size[1])), nm, band_widths(nm, width_nm), int(max_depth))
+
+
+def _check_limits(spp: int | None, noise: float | None, max_seconds: float | None, seed: int) -> None:
+    if spp is not None:
+        require_range("spp", spp, 1, MOST_SPP, "give samples per pixel")
+    if noise is not None:
+        require_range("noise", noise, 1e-6, 10.0, "give a relative error such as 0.02")
+    if max_seconds is not None:
+        require_range("max_seconds", max_seconds, 1e-3, 1e7, "give seconds")
+    require_range("seed", seed, 0, 2**63, "give a whole number")
+
+
+def _render(
+    scene: Scene,
+    film: Film,
+    spp: int | None,
+    noise: float | None,
+    max_seconds: float | None,
+    seed: int,
+    progress: Progress,
+) -> Transport:
+    start = time.perf_counter()
+    limit = spp or (MOST_SPP if noise or max_seconds else DEFAULT_SPP)
+    pass_spp = max(1, -(-limit // PASSES)) if spp or limit == DEFAULT_SPP else PASS_SPP
+    loaded = [load_unit(scene, group, film) for group in scene.groups]
+    shape = (film.wavelength_nm.size, *film.size)
+    sums = [_Sums(*(np.zeros(shape, dtype=np.float32) for _ in range(3))) for _ in loaded]
+    stopped_by: Stop = "samples"
+    for done in _pairs(loaded, sums, film, pass_spp, seed):
+        seconds = time.perf_counter() - start
+        error = _own_error(scene, film, sums)
+        drawn = sums[0].drawn
+        share = max(drawn / limit, seconds / max_seconds if max_seconds else 0.0, (noise / error) ** 2 if noise and error else 0.0)
+        progress(min(share, 1.0), error)
+        if drawn >= limit:
+            break
+        if noise is not None and done >= PASSES and error <= noise:
+            stopped_by = "noise"
+            break
+        if max_seconds is not None and seconds * (1 + 2 / done) > max_seconds:  # the next pair would end after it
+            stopped_by = "seconds"
+            break
+    return Transport(
+        radiance=np.stack([s.mean for s in sums]),
+        half_difference=np.stack([s.signed / np.float32(s.passes) for s in sums]),
+        variance=np.stack([s.variance for s in sums]),
+        irradiance=None if sums[0].plane is None else np.stack([s.plane / s.passes for s in sums if s.plane is not None]),
+        emitter_visible=_emitter_visible(scene, film, seed),
+        groups=dict(scene.groups),
+        wavelength_nm=film.wavelength_nm,
+        width_nm=film.width_nm,
+        spp=sums[0].drawn,
+        passes=sums[0].passes,
+        stopped_by=stopped_by,
+        seconds=time.perf_counter() - start,
+        integrator=integrator_name(),
+        variant=variant(),
+    )
+
+
+def _pairs(loaded: list[Any], sums: list[_Sums], film: Film, pass_spp: int, seed: int) -> Iterator[int]:
+    """Add passes two by two, so that even and odd halves stay equal; yields the passes done."""
+    done = 0
+    while True:
+        for _ in range(2):
+            for index, (mi_scene, total) in enumerate(zip(loaded, sums, strict=True)):
+                total.drawn += _one_pass(mi_scene, total, film, pass_spp, _pass_seed(seed, index, done))
+            done += 1
+        yield done
+
+
+def _one_pass(mi_scene: Any, total: _Sums, film: Film, pass_spp: int, seed: int) -> int:
+    """Add one pass to the sums; gives the samples a pixel that the sampler really drew."""
+    sensors = mi_scene.sensors()
+    total.add(_bands(mi_scene, sensors[0], film, pass_spp, seed))
+    if len(sensors) > 1:
+        meter = _bands(mi_scene, sensors[1], film, pass_spp, seed).mean(axis=(1, 2), dtype=np.float64)
+        if variant() != "scalar_spectral":
+            meter *= np.pi  # the meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels
+        total.plane = meter if total.plane is None else total.plane + meter
+    return int(sensors[0].sampler().sample_count())
+
+
+def _bands(mi_scene: Any, sensor: Any, film: Film, spp: int, seed: int) -> Planes:
+    """Render one sensor: band averages, shape (band, h, w)."""
+    mi = mitsuba_module()
+    image = np.asarray(mi.render(mi_scene, sensor=sensor, spp=spp, seed=seed), dtype=np.float32)
+    if variant() == "scalar_spectral":  # specfilm integrates over the band
+        return np.ascontiguousarray(np.moveaxis(image / film.width_nm.astype(np.float32), -1, 0))
+    planes = np.ascontiguousarray(np.moveaxis(image, -1, 0))
+    if planes[-1].any():
+        raise InputError(
+            "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
+            "allowed: materials whose sampling doesn't depend on wavelength; replace it"
+        )
+    return planes[-1 - film.wavelength_nm.size : -1]
+
+
+def _emitter_visible(scene: Scene, film: Film, seed: int) -> NDArray[np.bool_]:
+    """Pixels in which a light is seen directly, shape (h, w)."""
+    loaded = load_direct(scene, film)
+    one_band = Film(film.size, film.wavelength_nm[:1], film.width_nm[:1], 1)
+    planes = _bands(loaded, loaded.sensors()[0], one_band, VISIBLE_SPP, _pass_seed(seed, len(scene.groups), 0))
+    return np.asarray(planes[0] > 0)
+
+
+def _pass_seed(seed: int, group: int, index: int) -> int:
+    """Seed of one pass of one group, from its coordinates alone."""
+    return int(np.random.SeedSequence([seed, group, index]).generate_state(1)[0])
+
+
+def _own_error(scene: Scene, film: Film, sums: list[_Sums]) -> float:
+    """Relative error under the scene's own lights."""
+    values = np.zeros_like(sums[0].mean)
+    variance = np.zeros_like(values)
+    for group, total in zip(scene.groups.values(), sums, strict=True):
+        emission = (group.spectrum * group.power).band_average(film.wavelength_nm, film.width_nm)
+        emission = emission.astype(np.float32)[:, None, None]
+        values += emission * total.mean
+        variance += emission**2 * total.variance
+    return relative_error(values, variance)

@@ -1,0 +1,48 @@
+"""Placing things: 4x4 transforms as NumPy arrays, and as the plain value that a scene's dict holds."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from render.jit import Matrix4
+from render.spectrum import Floats
+
+
+def translate(x: float, y: float, z: float) -> Floats:
+    """Shift by (x, y, z) [m]."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = x, y, z
+    return matrix
+
+
+def scale(x: float, y: float, z: float) -> Floats:
+    """Stretch along each axis."""
+    return np.diag([x, y, z, 1.0])
+
+
+def rotate(axis: Sequence[float], degrees: float) -> Floats:
+    """Turn about an axis through the origin, right-handed (Rodrigues)."""
+    x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    angle = np.radians(degrees)
+    matrix = np.eye(4)
+    matrix[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return matrix
+
+
+def look_at(origin: Sequence[float], target: Sequence[float], up: Sequence[float] = (0.0, 1.0, 0.0)) -> Floats:
+    """Place a camera (or anything that faces +z) at `origin`, turned towards `target`."""
+    start = np.asarray(origin, dtype=np.float64)
+    forward = np.asarray(target, dtype=np.float64) - start
+    forward /= np.linalg.norm(forward)
+    left = np.cross(up, forward)
+    left /= np.linalg.norm(left)
+    matrix = np.eye(4)
+    matrix[:3] = np.stack([left, np.cross(forward, left), forward, start], axis=1)
+    return matrix
+
+
+def to_world(*transforms: Floats) -> Any:
+    """Product of transforms, the last applied first, as `mitsuba.load_dict` takes it in every variant."""
+    return Matrix4(np.linalg.multi_dot([*transforms, np.eye(4)]).tolist())

@@ -1,0 +1,77 @@
+"""Spectral radiance of an image: what a camera looks at."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.errors import InputError, require_range
+from render.photometry import luminance
+from render.spectrum import Floats, band_widths
+
+
+@dataclass(frozen=True)
+class SpectralRadiance:
+    """Radiance per pixel and wavelength band.
+
+    Attributes
+    ----------
+    values : (h, w, band) floating
+        Band means [W m^-2 sr^-1 nm^-1], finite and not negative.
+    wavelength_nm : (band,) float64
+        Band centres, increasing.
+    relative_mc_error : float
+        Median over pixels and bands of the Monte Carlo standard error over the mean; 0 where nothing was rendered.
+    width_nm : (band,) float64
+        Band widths; left out, the spacing of evenly spaced centres.
+
+    Raises
+    ------
+    InputError
+        Where the shape is wrong or a value is negative, NaN or infinite (its position is named).
+    """
+
+    values: NDArray[np.floating]
+    wavelength_nm: Floats
+    relative_mc_error: float = 0.0
+    width_nm: Floats | None = None
+
+    def __post_init__(self) -> None:
+        values = np.asarray(self.values)
+        if not np.issubdtype(values.dtype, np.floating):
+            values = values.astype(np.float64)
+        centres = np.array(self.wavelength_nm, dtype=np.float64)
+        widths = band_widths(centres, self.width_nm)
+        if values.ndim != 3 or values.shape[2] != centres.size or 0 in values.shape:
+            raise InputError(f"radiance: shape {values.shape} is not (h, w, {centres.size}); give one value a band")
+        check_values("radiance", values)
+        require_range("relative_mc_error", self.relative_mc_error, 0.0, np.inf, "give a standard error over the mean")
+        object.__setattr__(self, "values", values)
+        object.__setattr__(self, "wavelength_nm", centres)
+        object.__setattr__(self, "width_nm", widths)
+
+    @property
+    def widths_nm(self) -> Floats:
+        """Width of each band, shape (band,)."""
+        return band_widths(self.wavelength_nm, self.width_nm)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width in pixels."""
+        return self.values.shape[0], self.values.shape[1]
+
+    def luminance(self) -> NDArray[np.float64]:
+        """Luminance of each pixel [cd m^-2], shape (h, w)."""
+        return luminance(self.values, self.wavelength_nm, self.widths_nm)
+
+
+def check_values(name: str, values: NDArray[np.floating]) -> None:
+    """Raise `InputError` at the first value of (h, w, band) that is negative, NaN or infinite."""
+    least, most = float(values.min()), float(values.max())  # two passes without a temporary; NaN carries through
+    if least >= 0 and most < np.inf:
+        return
+    row, column, band = (int(i) for i in np.argwhere(~(np.isfinite(values) & (values >= 0)))[0])
+    raise InputError(
+        f"{name}: {values[row, column, band]} at row {row}, column {column}, band {band}; "
+        "allowed: finite numbers >= 0; repair or mask that pixel"
+    )

@@ -1,0 +1,136 @@
+"""A scene as plain data: what `mitsuba.load_dict` takes, its light groups, and where illuminance is measured."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+from render.errors import InputError, unknown
+from render.spectrum import Spectrum
+
+Node: TypeAlias = dict[str, Any]
+
+# Emitter plug-ins whose light is one spectrum, and the parameter that holds it: only these can be relit.
+EMISSION_PARAMETER = {
+    "area": "radiance",
+    "constant": "radiance",
+    "point": "intensity",
+    "spot": "intensity",
+    "directional": "irradiance",
+}
+_OTHER_EMITTERS = {"envmap", "sunsky", "sky", "sun", "projector", "directionalarea", "timedsunsky"}
+
+
+@dataclass(frozen=True)
+class LightGroup:
+    """Emitters that share one spectrum and are dimmed together.
+
+    Attributes
+    ----------
+    emitters : tuple of str
+        Where they stand in the scene's dict: ``"sun"``, or ``"panel/emitter"`` for one inside a shape.
+    spectrum : Spectrum
+        Emission at power 1: W m^-2 sr^-1 nm^-1 for ``area`` and ``constant``, per m^2 less for the others.
+    power : float
+        Factor on the spectrum.
+    """
+
+    emitters: tuple[str, ...]
+    spectrum: Spectrum
+    power: float = 1.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scene without light, and its lights.
+
+    Attributes
+    ----------
+    name : str
+    geometry : dict
+        `mitsuba.load_dict` input with a perspective ``sensor``; emitters lack their spectrum. Lengths in metres.
+    groups : mapping of str to LightGroup
+        All of the scene's lights, each in one group.
+    reference_plane : str or None
+        Key of the shape on whose front illuminance is measured.
+
+    Raises
+    ------
+    InputError
+        Where a light is missing, of a kind that can't be relit, or in no group; or the plane isn't in the scene.
+    """
+
+    name: str
+    geometry: Node
+    groups: Mapping[str, LightGroup]
+    reference_plane: str | None = None
+
+    def __post_init__(self) -> None:
+        grouped = [path for group in self.groups.values() for path in group.emitters]
+        present = _emitter_paths(self.geometry)
+        for path in grouped:
+            if path not in present:
+                raise unknown(f"scene {self.name}: emitter", path, present)
+        for path, kind in present.items():
+            if kind not in EMISSION_PARAMETER:
+                raise InputError(
+                    f"scene {self.name}: emitter {path!r} of type {kind!r} can't be relit; "
+                    f"allowed: {', '.join(EMISSION_PARAMETER)}; replace it by one of these"
+                )
+            if grouped.count(path) != 1:
+                raise InputError(
+                    f"scene {self.name}: emitter {path!r} is in {grouped.count(path)} light groups; put it in one"
+                )
+        if self.reference_plane is not None and self.reference_plane not in self.geometry:
+            raise unknown(f"scene {self.name}: reference_plane", self.reference_plane, self.geometry)
+
+    @property
+    def description(self) -> Node:
+        """Plain dict for `mitsuba.load_dict`, every light at its own spectrum and power."""
+        return self.lit({name: spectrum_node(group.spectrum * group.power) for name, group in self.groups.items()})
+
+    def lit(self, emission: Mapping[str, Node]) -> Node:
+        """Plain dict with the named groups at the given emission (a Mitsuba spectrum); other groups are removed."""
+        result: Node = dict(self.geometry)
+        for name, group in self.groups.items():
+            for path in group.emitters:
+                _replace_emitter(result, path.split("/"), emission.get(name))
+        return result
+
+
+def spectrum_node(spectrum: Spectrum) -> Node:
+    """Write a spectrum as Mitsuba's ``irregular`` plug-in: the same points, linear between them."""
+    return {
+        "type": "irregular",
+        "wavelengths": ",".join(map(repr, spectrum.wavelength_nm.tolist())),
+        "values": ",".join(map(repr, spectrum.values.tolist())),
+    }
+
+
+def uniform_node(value: float) -> Node:
+    """Write a spectrum of one value at every wavelength as Mitsuba's ``uniform`` plug-in."""
+    return {"type": "uniform", "value": value}
+
+
+def _emitter_paths(node: Node, prefix: str = "") -> dict[str, str]:
+    """Path and type of each emitter in a scene's dict."""
+    found: dict[str, str] = {}
+    for key, value in node.items():
+        if not isinstance(value, dict):
+            continue
+        path, kind = f"{prefix}{key}", value.get("type")
+        if kind in EMISSION_PARAMETER or kind in _OTHER_EMITTERS:
+            found[path] = str(kind)
+        found |= _emitter_paths(value, f"{path}/")
+    return found
+
+
+def _replace_emitter(node: Node, path: list[str], emission: Node | None) -> None:
+    """Give the emitter at `path` its emission, or remove it; copies each dict on the way, so that none is shared."""
+    key = path[0]
+    if len(path) > 1:
+        node[key] = dict(node[key])
+        _replace_emitter(node[key], path[1:], emission)
+    elif emission is None:
+        del node[key]
+    else:
+        node[key] = {**node[key], EMISSION_PARAMETER[node[key]["type"]]: emission}

@@ -1,0 +1,99 @@
+"""Spectra as piecewise linear functions, and their averages over wavelength bands."""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from render.errors import InputError
+
+Floats: TypeAlias = NDArray[np.float64]
+
+VISIBLE_NM = (380.0, 780.0)
+DEFAULT_WAVELENGTH_NM: Floats = np.arange(385.0, 780.0, 10.0)  # centres of 40 bands that fill 380-780 nm
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """A function of wavelength: linear between its points, zero outside them.
+
+    Attributes
+    ----------
+    wavelength_nm : (n,) float64
+        Strictly increasing.
+    values : (n,) float64
+        Finite and not negative; the unit is the owner's (reflectance, W m^-2 sr^-1 nm^-1, ...).
+
+    Raises
+    ------
+    InputError
+        Where the points are not as above.
+    """
+
+    wavelength_nm: Floats
+    values: Floats
+
+    def __post_init__(self) -> None:
+        nm = np.array(self.wavelength_nm, dtype=np.float64)
+        values = np.array(self.values, dtype=np.float64)
+        if nm.ndim != 1 or nm.size < 2 or not np.all(np.diff(nm) > 0):
+            raise InputError(f"wavelength_nm: {nm.tolist()!r} is not allowed; give two or more strictly increasing [nm]")
+        if values.shape != nm.shape or not np.all(np.isfinite(values) & (values >= 0)):
+            raise InputError(f"spectrum values: allowed are {nm.size} finite numbers >= 0, one a wavelength; correct them")
+        object.__setattr__(self, "wavelength_nm", nm)
+        object.__setattr__(self, "values", values)
+
+    def __mul__(self, factor: float) -> "Spectrum":
+        """Return the spectrum times a number."""
+        return Spectrum(self.wavelength_nm, self.values * factor)
+
+    def band_average(self, wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
+        """Mean over each band ``wavelength_nm +- width_nm / 2``, shape of `wavelength_nm`; exact for the linear pieces."""
+        centre, half = np.asarray(wavelength_nm, dtype=np.float64), np.asarray(width_nm, dtype=np.float64) / 2
+        return (self._integral_to(centre + half) - self._integral_to(centre - half)) / (2 * half)
+
+    def _integral_to(self, nm: Floats) -> Floats:
+        """Integral from the first point to `nm`."""
+        at = np.clip(nm, self.wavelength_nm[0], self.wavelength_nm[-1])
+        steps = np.diff(self.wavelength_nm) * (self.values[1:] + self.values[:-1]) / 2
+        before = np.concatenate([[0.0], np.cumsum(steps)])
+        left = np.clip(np.searchsorted(self.wavelength_nm, at, side="right") - 1, 0, steps.size - 1)
+        height = (np.interp(at, self.wavelength_nm, self.values) + self.values[left]) / 2
+        return np.asarray(before[left] + height * (at - self.wavelength_nm[left]))
+
+
+def flat(value: float = 1.0) -> Spectrum:
+    """Spectrum of one value over 300-1100 nm: wider than any band the project uses."""
+    return Spectrum(np.array([300.0, 1100.0]), np.array([value, value]))
+
+
+def band_widths(wavelength_nm: ArrayLike, width_nm: ArrayLike | None = None) -> Floats:
+    """Width of each band [nm]: as given, or the spacing of evenly spaced centres.
+
+    Raises
+    ------
+    InputError
+        Where centres don't increase, widths aren't positive, or the spacing isn't even and no widths are given.
+    """
+    nm = np.asarray(wavelength_nm, dtype=np.float64)
+    if nm.ndim != 1 or nm.size == 0 or not np.all(np.isfinite(nm)) or np.any(np.diff(nm) <= 0) or nm[0] <= 0:
+        raise InputError(f"wavelength_nm: {nm.tolist()!r} is not allowed; give increasing band centres in nm")
+    if width_nm is not None:
+        widths = np.broadcast_to(np.asarray(width_nm, dtype=np.float64), nm.shape).copy()
+        if not np.all(np.isfinite(widths) & (widths > 0)):
+            raise InputError(f"width_nm: {widths.tolist()!r} is not allowed; give positive band widths in nm")
+        return widths
+    steps = np.diff(nm)
+    if nm.size == 1 or not np.allclose(steps, steps[0], rtol=1e-6):
+        raise InputError(f"wavelength_nm: {nm.size} bands without even spacing have no width; give width_nm as well")
+    return np.full(nm.shape, steps.mean())
+
+
+def black_body(temperature_k: float) -> Spectrum:
+    """Planck's law over 300-1100 nm, relative to its value at 560 nm."""
+    second_radiation_constant_nm_k = 1.438776877e7  # CODATA 2018, exact SI: h c / k
+    nm = np.arange(300.0, 1101.0, 5.0)
+    exponent = second_radiation_constant_nm_k / temperature_k
+    relative = (560.0 / nm) ** 5 * np.expm1(exponent / 560.0) / np.expm1(exponent / nm)
+    return Spectrum(nm, relative)
