@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from render.errors import InputError, unknown
 from render.spectrum import Spectrum
 
@@ -98,12 +100,15 @@ class Scene:
 
 
 def spectrum_node(spectrum: Spectrum) -> Node:
-    """Write a spectrum as Mitsuba's ``irregular`` plug-in: the same points, linear between them."""
-    return {
-        "type": "irregular",
-        "wavelengths": ",".join(map(repr, spectrum.wavelength_nm.tolist())),
-        "values": ",".join(map(repr, spectrum.values.tolist())),
-    }
+    """Write a spectrum for Mitsuba: the same points, linear between them.
+
+    Evenly spaced points become ``regular``, whose look-up is far cheaper than ``irregular``'s search; and materials
+    on one common grid compile to one piece of code, which keeps a scene of fifty materials from taking minutes.
+    """
+    nm, values = spectrum.wavelength_nm, ",".join(map(repr, spectrum.values.tolist()))
+    if np.allclose(np.diff(nm), nm[1] - nm[0], rtol=1e-9):
+        return {"type": "regular", "wavelength_min": float(nm[0]), "wavelength_max": float(nm[-1]), "values": values}
+    return {"type": "irregular", "wavelengths": ",".join(map(repr, nm.tolist())), "values": values}
 
 
 def uniform_node(value: float) -> Node:

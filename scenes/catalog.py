@@ -1,0 +1,43 @@
+"""The scenes that rodcone ships, by name."""
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from render.errors import require_keys, unknown
+from render.scene import Scene
+from scenes.color_checker import color_checker
+from scenes.flat_field import flat_field
+from scenes.still_life import still_life
+
+_BUILDERS: dict[str, Callable[..., Scene]] = {
+    "color_checker": color_checker,
+    "flat_field": flat_field,
+    "still_life": still_life,
+}
+
+
+def names() -> tuple[str, ...]:
+    """Names that `load` knows, in alphabetical order."""
+    return tuple(sorted(_BUILDERS))
+
+
+def load(name: str, **options: Any) -> Scene:
+    """Build a scene by name.
+
+    Parameters
+    ----------
+    name : str
+        One of `names()`.
+    **options
+        The builder's own parameters, such as ``light="A"``.
+
+    Raises
+    ------
+    InputError
+        For an unknown name or option; the nearest allowed one is named.
+    """
+    if name not in _BUILDERS:
+        raise unknown("scene", name, _BUILDERS)
+    require_keys(f"scene {name}: option", options, inspect.signature(_BUILDERS[name]).parameters)
+    return _BUILDERS[name](**options)

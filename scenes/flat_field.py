@@ -1,0 +1,30 @@
+"""A grey wall under an even sky: every pixel has the same, known radiance."""
+
+from render.geometry import look_at, to_world
+from render.illuminants import illuminant
+from render.scene import LightGroup, Scene
+from scenes.materials import matte, panel
+from scenes.reflectances import grey
+
+SKY_LUMINANCE_CD_M2 = 100.0
+
+
+def flat_field(reflectance: float = 0.5, light: str = "D65") -> Scene:
+    """Lambertian wall of one reflectance; its radiance is `reflectance` times the sky's, exactly.
+
+    Parameters
+    ----------
+    reflectance : float
+        0 to 1, at every wavelength.
+    light : str
+        Illuminant of the sky, whose luminance is 100 cd/m^2.
+    """
+    camera = {"type": "perspective", "fov": 30.0, "to_world": to_world(look_at((0, 0, 3), (0, 0, 0)))}
+    geometry = {
+        "type": "scene",
+        "sensor": camera,
+        "wall": panel(look_at((0, 0, 0), (0, 0, 1)), 20.0, 20.0, matte(grey(reflectance))),
+        "sky": {"type": "constant"},
+    }
+    groups = {"sky": LightGroup(("sky",), illuminant(light), SKY_LUMINANCE_CD_M2)}
+    return Scene("flat_field", geometry, groups, reference_plane="wall")

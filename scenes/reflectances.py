@@ -1,0 +1,32 @@
+"""Spectral reflectances: the ColorChecker, and smooth curves for everything else."""
+
+from functools import cache
+
+import numpy as np
+
+from render.spectrum import Spectrum
+from render.tables import colour_science
+
+_NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all materials keeps scenes quick to compile
+
+
+@cache
+def color_checker() -> tuple[tuple[str, Spectrum], ...]:
+    """Name and reflectance of the 24 patches, row by row, 380-780 nm (Ohta 1997, as colour-science holds them)."""
+    table = colour_science().SDS_COLOURCHECKERS["cc_ohta"]
+    return tuple((name, Spectrum(curve.wavelengths, np.clip(curve.values, 0, 1))) for name, curve in table.items())
+
+
+def grey(reflectance: float) -> Spectrum:
+    """Same reflectance at every wavelength."""
+    return Spectrum(_NM, np.full_like(_NM, reflectance))
+
+
+def edge(centre_nm: float, width_nm: float, low: float, high: float) -> Spectrum:
+    """Reflectance that rises smoothly from `low` to `high` around `centre_nm`: yellows, oranges, reds (falls if swapped)."""
+    return Spectrum(_NM, low + (high - low) / (1 + np.exp(-(_NM - centre_nm) / width_nm)))
+
+
+def band(centre_nm: float, width_nm: float, low: float, high: float) -> Spectrum:
+    """Reflectance with one Gaussian bump of standard deviation `width_nm`: greens, blues."""
+    return Spectrum(_NM, low + (high - low) * np.exp(-0.5 * ((_NM - centre_nm) / width_nm) ** 2))
