@@ -1,0 +1,67 @@
+"""Random numbers by coordinates: key, row, column and term decide a draw, so tiling and threads don't.
+
+Philox4x32-10 is the counter-based generator of Salmon et al., "Parallel random numbers: as easy as 1, 2, 3" (SC 2011).
+"""
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.errors import InputError
+
+_U32 = np.uint64(0xFFFFFFFF)
+_MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
+_WEYL = (0x9E3779B9, 0xBB67AE85)
+_ROUNDS = 10
+
+
+class Term(IntEnum):
+    """Noise term of a draw: one independent stream each."""
+
+    PRNU = 1
+    DSNU = 2
+    SHOT = 3
+    READ = 4
+
+
+def draw_key(rng: np.random.Generator) -> int:
+    """One 64-bit key from a generator; all draws of a device or an exposure derive from it."""
+    if not isinstance(rng, np.random.Generator):
+        raise InputError(f"rng: {rng!r} is not a NumPy Generator; allowed: numpy.random.default_rng(seed); pass one")
+    return int(rng.integers(0, 2**64, dtype=np.uint64))
+
+
+def philox(counter: tuple[NDArray[np.uint64], ...], key: int) -> tuple[NDArray[np.uint64], ...]:
+    """Four 32-bit words (in uint64) for each counter of four 32-bit words, under a 64-bit key."""
+    c0, c1, c2, c3 = counter
+    k0, k1 = key & 0xFFFFFFFF, key >> 32
+    for _ in range(_ROUNDS):
+        first, second = c0 * _MULTIPLIERS[0], c2 * _MULTIPLIERS[1]
+        c0, c1, c2, c3 = (
+            (second >> np.uint64(32)) ^ c1 ^ np.uint64(k0),
+            second & _U32,
+            (first >> np.uint64(32)) ^ c3 ^ np.uint64(k1),
+            first & _U32,
+        )
+        k0, k1 = (k0 + _WEYL[0]) & 0xFFFFFFFF, (k1 + _WEYL[1]) & 0xFFFFFFFF
+    return c0, c1, c2, c3
+
+
+def normals(key: int, term: Term, shape: tuple[int, int]) -> NDArray[np.float64]:
+    """Standard normal draw for each pixel, shape `shape` (Box-Muller on two 53-bit uniforms)."""
+    rows, columns = (index.astype(np.uint64) for index in np.indices(shape, dtype=np.uint32))
+    words = philox((columns, rows, np.full(shape, term, dtype=np.uint64), np.zeros(shape, dtype=np.uint64)), key)
+    first, second = (
+        (((a << np.uint64(32)) | b) >> np.uint64(11)).astype(np.float64) * 2.0**-53 for a, b in (words[:2], words[2:])
+    )
+    return np.asarray(np.sqrt(-2.0 * np.log1p(-first)) * np.cos(2.0 * np.pi * second))
+
+
+def poisson(key: int, term: Term, mean: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Exact Poisson draw for each pixel of `mean` (h, w); one stream a row."""
+    draws = np.empty(mean.shape, dtype=np.int64)
+    for row, row_mean in enumerate(mean):
+        stream = np.random.Philox(key=[key, 0], counter=[0, 0, row, int(term)])
+        draws[row] = np.random.Generator(stream).poisson(row_mean)
+    return draws
