@@ -1,4 +1,4 @@
-"""A table with fruit, metal, cloth and charts beside a softbox and a paper lantern: colours, texture, light and shade."""
+"""A table with fruit, metal, cloth and charts under one softbox: colours, texture, light and shade."""
 
 from math import cos, pi, sin
 
@@ -10,18 +10,18 @@ from scenes.color_checker import chart
 from scenes.materials import checks, floor, glossy, matte, metal, panel
 from scenes.reflectances import band, edge, grey
 
-LIGHT_LUMINANCE_CD_M2 = 1000.0  # softbox and lantern
+LIGHT_LUMINANCE_CD_M2 = 1000.0
 BLACK, WHITE = grey(0.04), grey(0.85)
 SPOKES, BARS = 36, 33
 
 
 def still_life(light: str = "D65") -> Scene:
-    """Still life about 0.9 m wide, lit by a 1 m softbox from the left and a lantern that stands in the picture.
+    """Still life about 0.9 m wide, lit by a large softbox from the left.
 
     Parameters
     ----------
     light : str
-        Illuminant of softbox, lantern and room (one light group, ``studio``).
+        Illuminant of the softbox, the only light (group ``softbox``).
     """
     camera = {
         "type": "perspective",
@@ -30,8 +30,7 @@ def still_life(light: str = "D65") -> Scene:
         "to_world": to_world(look_at((0.0, 0.52, 2.05), (0.0, 0.21, 0.0))),
     }
     geometry: Node = {"type": "scene", "sensor": camera, **_room(), **_things(), **_lights()}
-    emitters = ("softbox/emitter", "fill/emitter", "lantern/emitter")
-    groups = {"studio": LightGroup(emitters, illuminant(light), LIGHT_LUMINANCE_CD_M2)}
+    groups = {"softbox": LightGroup(("softbox/emitter",), illuminant(light), LIGHT_LUMINANCE_CD_M2)}
     return Scene("still_life", geometry, groups, reference_plane="meter_card")
 
 
@@ -62,14 +61,8 @@ def _things() -> dict[str, Node]:
 
 
 def _lights() -> dict[str, Node]:
-    dark = matte(BLACK)
-    softbox = look_at((-1.35, 1.35, 1.05), (0.0, 0.1, 0.05))
-    fill = look_at((2.2, 1.9, 1.6), (0.0, 0.1, 0.0))
-    return {
-        "softbox": panel(softbox, 1.2, 1.2, dark, emitter={"type": "area"}),
-        "fill": panel(fill, 0.8, 0.8, dark, emitter={"type": "area"}),
-        "lantern": _ball(0.42, 0.46, -0.28, 0.045, dark) | {"emitter": {"type": "area"}},
-    }
+    place = look_at((-1.5, 1.75, 1.35), (0.05, 0.15, -0.05))
+    return {"softbox": panel(place, 1.7, 1.7, matte(BLACK), emitter={"type": "area"})}
 
 
 def _ball(x: float, y: float, z: float, radius: float, bsdf: Node) -> Node:

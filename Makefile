@@ -1,0 +1,75 @@
+# Two commands: `make demo` and `make test`. `make` alone prints the targets.
+# The only needs are make, a package index, Python 3.11 or newer with its venv module, and on Linux libatomic (Dr.Jit's).
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+# Holds the folder that the environment was made in, since scripts in it name that folder. It is taken away while pip
+# is at work, so an interrupted set-up leaves none and the next run makes the environment anew.
+COMPLETE := $(VENV)/complete
+DEMO_OUT ?= out/demo
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test verify lint clean FORCE
+
+help:
+	@echo "make demo    set up $(VENV), render the still life from moonlight to daylight, write $(DEMO_OUT)/report.html"
+	@echo "make test    set up $(VENV), lint, types, import contracts and every test that is not slow"
+	@echo "make verify  the slow tests (minutes long)"
+	@echo "make lint    ruff, mypy and the import contracts alone"
+	@echo "make clean   remove all that these targets make: $(VENV), out, build and caches"
+	@echo "Another Python: make PYTHON=python3.12 test"
+
+demo: $(VENV)/installed
+	@$(BIN)/rodcone demo -o "$(DEMO_OUT)"
+	@echo "Report: $(abspath $(DEMO_OUT))/report.html (open it in a browser)"
+
+test: lint
+	@$(BIN)/python -m pytest -m "not slow"
+
+verify: $(VENV)/installed-dev
+	@$(BIN)/python -m pytest -m slow
+
+lint: $(VENV)/installed-dev
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports
+
+clean:
+	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache *.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# One line that says what is missing, empty where nothing is. It is expanded before a recipe's first command runs.
+hint = install Python 3.11 or newer with its venv module (Debian: apt install python3-venv libatomic1), or name one: make PYTHON=python3.12
+problem = $(if $(shell command -v "$(PYTHON)"),$(old_python),$(PYTHON) is not found; $(hint))
+old_python = $(if $(shell "$(PYTHON)" -c 'import sys; sys.version_info >= (3, 11) and print("new")' 2>&1 | grep -x new),$(no_venv),$(PYTHON) is older than 3.11 or does not start; $(hint))
+no_venv = $(if $(shell "$(PYTHON)" -c 'import ensurepip, venv; print("there")' 2>/dev/null),$(no_atomic),$(PYTHON) has no venv or ensurepip module; $(hint))
+no_atomic = $(if $(shell "$(PYTHON)" -c '$(load_atomic)' 2>/dev/null),,libatomic.so.1 is absent and Dr.Jit can not start without it; install it (Debian: apt install libatomic1))
+load_atomic = import ctypes, platform; platform.system() == "Linux" and ctypes.CDLL("libatomic.so.1"); print("there")
+
+# $(call set-up,what pip installs,stamps to touch)
+define set-up
+$(if $(problem),$(error $(problem)))
+@if [ "$$(cat $(COMPLETE) 2>/dev/null)" != "$$(pwd -P)" ] || ! $(BIN)/python -c "" 2>/dev/null; then \
+	echo "Making $(VENV) with $$("$(PYTHON)" --version)" && rm -rf $(VENV) && "$(PYTHON)" -m venv $(VENV); fi
+@rm -f $(COMPLETE)
+@echo "Installing rodcone and its libraries into $(VENV): once, minutes at most, some 300 MB to download"
+@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable "$(1)"
+@pwd -P > $(COMPLETE) && touch $(2)
+@echo "Installed."
+endef
+
+# Made anew also where the folder was moved or the Python behind the environment is gone.
+ifneq ($(shell $(BIN)/python -c "" 2>/dev/null && cat $(COMPLETE) 2>/dev/null),$(shell pwd -P))
+UNUSABLE := FORCE
+endif
+
+$(VENV)/installed: pyproject.toml Makefile $(UNUSABLE)
+	$(call set-up,.,$@)
+
+$(VENV)/installed-dev: pyproject.toml Makefile $(UNUSABLE)
+	$(call set-up,.[dev],$@ $(VENV)/installed)
+
+FORCE:

@@ -1,0 +1,130 @@
+"""The interleaved reconstruction as the paper writes it, in NumPy and double precision.
+
+Parmar & Wandell, "Interleaved imaging", Proc. SPIE 7250, 2009, eqs. (1)-(6). Slow and plain: what the kernel is tested
+against, and what runs where Dr.Jit can't.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
+
+from isp.planes import Plane, planes
+from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Reconstruction, Settings
+from isp.similarity import noise_distance, saturated_fraction
+from sensor.cfa import channels, mask
+from sensor.raw import RawImage
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """What eqs. (1)-(6) read: electrons, the channel sampled at each pixel, padded planes, alpha, noise distance, W."""
+
+    electrons: Plane
+    channel: NDArray[np.intp]
+    h: Plane
+    alpha: Plane
+    noise: list[Plane]
+    white: int | None
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Sums over y for each (x, channel), in units of exp(largest log weight so far)."""
+
+    largest: Plane
+    weight: Plane
+    square: Plane
+    value: Plane
+
+
+def reconstruct_reference(
+    raw: RawImage,
+    *,
+    neighbourhood: int = NEIGHBOURHOOD,
+    patch: int = PATCH,
+    sigma_d: float = SIGMA_D,
+    sigma_s: float = SIGMA_S,
+) -> NDArray[np.float64]:
+    """Reconstruct every channel at every pixel: `isp.interleaved.reconstruct` in float64.
+
+    Returns
+    -------
+    (h, w, channel) float64
+        f_i(x) [e-], channels in the order of `sensor.cfa.channels`.
+
+    Raises
+    ------
+    InputError
+        As `isp.settings.Settings`.
+    """
+    settings = Settings(neighbourhood, patch, sigma_d, sigma_s)
+    return np.asarray(reference_with_noise(raw, settings).estimate, dtype=np.float64)
+
+
+def reference_with_noise(raw: RawImage, settings: Settings) -> Reconstruction:
+    """Estimate and noise gain in float64, one offset of the neighbourhood after the other."""
+    settings.check_reaches(raw.cfa)
+    inputs = _inputs(raw, settings)
+    shape = (*raw.shape, len(inputs.h))
+    sums = _Sums(np.full(shape, -np.inf), np.zeros(shape), np.zeros(shape), np.zeros(shape))
+    reach = range(-settings.reach, settings.reach + 1)
+    for row in (d for d in reach if abs(d) < raw.shape[0]):
+        for column in (d for d in reach if abs(d) < raw.shape[1]):
+            _add_offset(sums, inputs, settings, (row, column))
+    return Reconstruction(sums.value / sums.weight, sums.square / sums.weight**2, "numpy")
+
+
+def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
+    letters, half = channels(raw.cfa), settings.patch // 2
+    return _Inputs(
+        electrons=raw.electrons,
+        channel=np.argmax([mask(raw.cfa, letter, raw.shape) for letter in letters], axis=0),
+        h=np.pad(planes(raw), ((0, 0), (half, half), (half, half)), mode="reflect"),
+        alpha=saturated_fraction(raw, settings.patch),
+        noise=[noise_distance(raw.cfa, letter, settings.patch, settings.reach) for letter in letters],
+        white=letters.index("W") if "W" in letters else None,
+    )
+
+
+def _add_offset(sums: _Sums, inputs: _Inputs, settings: Settings, offset: tuple[int, int]) -> None:
+    """Add y = x + offset to the sums of each x whose y lies in the frame."""
+    shape = inputs.electrons.shape
+    x = tuple(np.arange(max(-d, 0), size - max(d, 0)) for d, size in zip(offset, shape, strict=True))
+    y = tuple(line + d for line, d in zip(x, offset, strict=True))
+    distance = [_distance(inputs, i, settings, x, offset) for i in range(len(inputs.h))]
+    log_spatial = -(offset[0] ** 2 + offset[1] ** 2) / (2.0 * settings.sigma_d**2)  # eqs. (2), (4)
+    channel, alpha, electrons = (a[np.ix_(*y)] for a in (inputs.channel, inputs.alpha, inputs.electrons))
+    for i in range(len(inputs.h)):
+        at = np.nonzero(channel == i)  # S_i(y) of eq. (1)
+        white = i if inputs.white is None else inputs.white
+        beta_s = alpha[at] * np.sqrt(distance[i][at]) + (1.0 - alpha[at]) * np.sqrt(distance[white][at])  # eq. (5)
+        log_weight = log_spatial - beta_s**2 / (2.0 * settings.sigma_s**2)
+        _accumulate(sums, (x[0][at[0]], x[1][at[1]], np.full(at[0].shape, i)), log_weight, electrons[at])
+
+
+def _distance(
+    inputs: _Inputs, channel: int, settings: Settings, x: tuple[NDArray[np.intp], ...], offset: tuple[int, int]
+) -> Plane:
+    """Squared distance of h_i(x) and h_i(x + offset) over what noise alone makes, 0 or more, for a grid of x."""
+    half = settings.patch // 2
+    # The patch around (r, c) of the frame is [r, r + patch) x [c, c + patch) of the padded plane.
+    grown = [np.arange(line[0], line[-1] + 2 * half + 1) for line in x]
+    h = inputs.h[channel]
+    squares = (h[np.ix_(*grown)] - h[np.ix_(grown[0] + offset[0], grown[1] + offset[1])]) ** 2
+    for axis in (0, 1):
+        squares = convolve1d(squares, np.ones(settings.patch), axis, mode="constant")
+    total = squares[half : half + len(x[0]), half : half + len(x[1])]
+    noise = inputs.noise[channel][:, :, offset[0] + settings.reach, offset[1] + settings.reach]
+    return np.asarray(np.maximum(total - noise[np.ix_(x[0] % noise.shape[0], x[1] % noise.shape[1])], 0.0))
+
+
+def _accumulate(sums: _Sums, at: tuple[NDArray[np.intp], ...], log_weight: Plane, value: Plane) -> None:
+    """Add one weighted sample to the sums of eqs. (1) and (3); the largest weight stays 1, so W_y is never 0."""
+    largest = np.maximum(sums.largest[at], log_weight)
+    old, new = np.exp(sums.largest[at] - largest), np.exp(log_weight - largest)
+    sums.value[at] = sums.value[at] * old + new * value
+    sums.weight[at] = sums.weight[at] * old + new
+    sums.square[at] = sums.square[at] * old**2 + new**2
+    sums.largest[at] = largest

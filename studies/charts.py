@@ -1,0 +1,213 @@
+"""Geometry of the report's line charts: values in, coordinates of an inline SVG out. The template draws them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import ceil, floor, isfinite, log10
+
+WIDTH, HEIGHT = 400.0, 240.0
+LEFT, RIGHT, TOP, BOTTOM = 58.0, 92.0, 14.0, 40.0
+# Two direct labels closer than this would overprint (12 px type).
+LABEL_GAP = 15.0
+LABEL_LENGTH = 12
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A position along an axis in SVG units, and its text."""
+
+    at: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Point:
+    """A mark in SVG units, with the words that a pointer brings up."""
+
+    x: float
+    y: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Line:
+    """What is to be drawn: a name and one value (or None) for each position."""
+
+    name: str
+    values: Sequence[float | None]
+    texts: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Series:
+    """A line ready to draw; `slot` picks colour, dash and mark."""
+
+    name: str
+    label: str
+    slot: int
+    path: str
+    points: tuple[Point, ...]
+    label_y: float
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Everything the template needs to draw one chart."""
+
+    title: str
+    description: str
+    x_ticks: tuple[Tick, ...]
+    y_ticks: tuple[Tick, ...]
+    guides: tuple[float, ...]
+    series: tuple[Series, ...]
+    rule: Tick | None
+    width: float = WIDTH
+    height: float = HEIGHT
+    left: float = LEFT
+    right: float = WIDTH - RIGHT
+    top: float = TOP
+    bottom: float = HEIGHT - BOTTOM
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A linear or logarithmic map from `low`..`high` to SVG units `start`..`stop`."""
+
+    low: float
+    high: float
+    start: float
+    stop: float
+    log: bool = False
+
+    def at(self, value: float) -> float:
+        """Return the position of `value`, held inside the axis."""
+        held = min(max(value, self.low), self.high)
+        low, high, here = (log10(v) for v in (self.low, self.high, held)) if self.log else (self.low, self.high, held)
+        return round(self.start + (here - low) / (high - low) * (self.stop - self.start), 2)
+
+
+def tick_text(value: float) -> str:
+    """Write a tick without exponent or trailing zeros, thousands apart."""
+    text = f"{value:,.6f}".rstrip("0").rstrip(".").replace(",", "\N{NARROW NO-BREAK SPACE}")
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
+def linear_ticks(low: float, high: float, count: int = 5) -> list[float]:
+    """Return about `count` round values that enclose `low`..`high`."""
+    span = (high - low) or max(abs(high), 1.0)
+    raw = span / count
+    power = 10.0 ** floor(log10(raw))
+    step = next(factor * power for factor in (1, 2, 2.5, 5, 10) if factor * power >= raw * 0.999)
+    first, last = floor(low / step + 1e-9), ceil(high / step - 1e-9)
+    return [round(step * index, 9) for index in range(first, max(last, first + 1) + 1)]
+
+
+def decades(low: float, high: float) -> list[float]:
+    """Return the powers of ten within `low`..`high`; every second one where they would crowd."""
+    exponents = range(ceil(log10(low) - 1e-9), floor(log10(high) + 1e-9) + 1)
+    return [10.0**exponent for exponent in exponents[:: 2 if len(exponents) > 6 else 1]]
+
+
+def line_path(points: Sequence[Point | None]) -> str:
+    """Join points with straight lines; a missing one leaves a gap."""
+    parts: list[str] = []
+    pen = "M"
+    for point in points:
+        if point is None:
+            pen = "M"
+            continue
+        parts.append(f"{pen}{point.x:g} {point.y:g}")
+        pen = "L"
+    return " ".join(parts)
+
+
+def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list[float]:
+    """Move label positions apart until neighbours are `gap` from each other, within `low`..`high` where that fits."""
+    order = sorted(range(len(wanted)), key=lambda index: wanted[index])
+    placed = list(wanted)
+    for before, after in pairwise(order):
+        placed[after] = max(placed[after], placed[before] + gap)
+    over = max((placed[index] for index in order), default=low) - high
+    if over > 0:
+        placed = [position - over for position in placed]
+        for before, after in pairwise(order[::-1]):
+            placed[after] = min(max(wanted[after], low), placed[before] - gap)
+    return placed
+
+
+def _value_axis(values: Sequence[float], log: bool) -> tuple[Scale, list[float]]:
+    """Choose the value axis: round bounds, and its ticks."""
+    start, stop = HEIGHT - BOTTOM, TOP
+    if not log:
+        ticks = linear_ticks(min(values, default=0.0), max(values, default=1.0))
+        return Scale(ticks[0], ticks[-1], start, stop), ticks
+    positive = [value for value in values if value > 0] or [1.0]
+    low, high = 10.0 ** floor(log10(min(positive))), 10.0 ** ceil(log10(max(positive)))
+    if low == high:
+        high = low * 10
+    return Scale(low, high, start, stop, log=True), decades(low, high)
+
+
+def _series(slot: int, line: Line, order: Sequence[int], xs: Sequence[float], scale: Scale) -> Series:
+    """Place one line's points, from left to right."""
+    placed: list[Point | None] = []
+    for index in order:
+        value = line.values[index]
+        known = value is not None and isfinite(value)
+        placed.append(Point(xs[index], scale.at(value or 0.0), line.texts[index]) if known else None)
+    points = tuple(point for point in placed if point is not None)
+    label = line.name if len(line.name) <= LABEL_LENGTH else line.name[: LABEL_LENGTH - 1] + "…"
+    return Series(line.name, label, slot, line_path(placed), points, points[-1].y if points else TOP)
+
+
+def line_chart(
+    title: str,
+    description: str,
+    x: Sequence[float],
+    lines: Sequence[Line],
+    *,
+    log_y: bool = False,
+    percent: bool = False,
+    shared: Sequence[float | None] = (),
+    rule: tuple[float, str] | None = None,
+) -> Chart:
+    """Lay out one chart over a logarithmic x axis.
+
+    Parameters
+    ----------
+    title, description : str
+        What a screen reader says instead of the picture.
+    x : sequence of float
+        Positive positions (luminance in cd/m²), one for each value of every line.
+    lines : sequence of Line
+        What to draw; None and values that are not finite leave a gap.
+    log_y, percent : bool
+        Logarithmic value axis; ticks written as per cent.
+    shared : sequence of float or None
+        Further values the value axis has to hold, so that neighbouring charts share one scale.
+    rule : (value, text), optional
+        A horizontal line to judge the values against.
+
+    Returns
+    -------
+    Chart
+        Coordinates in SVG units.
+    """
+    given = [*(value for line in lines for value in line.values), *shared, rule[0] if rule else None]
+    scale, ticks = _value_axis([value for value in given if value is not None and isfinite(value)], log_y)
+    # A margin of 40 % of the value keeps the outermost marks off the frame.
+    across = Scale(min(x) / 1.4, max(x) * 1.4, LEFT, WIDTH - RIGHT, log=True)
+    xs = [across.at(position) for position in x]
+    order = sorted(range(len(x)), key=lambda index: x[index])
+    series = [_series(slot, line, order, xs, scale) for slot, line in enumerate(lines)]
+    labels = spread([one.label_y for one in series], LABEL_GAP, TOP, HEIGHT - BOTTOM)
+    write = (lambda value: tick_text(100 * value) + "\N{NO-BREAK SPACE}%") if percent else tick_text
+    return Chart(
+        title=title,
+        description=description,
+        x_ticks=tuple(Tick(across.at(value), tick_text(value)) for value in decades(across.low, across.high)),
+        y_ticks=tuple(Tick(scale.at(value), write(value)) for value in ticks),
+        guides=tuple(xs),
+        series=tuple(replace(one, label_y=round(y, 2)) for one, y in zip(series, labels, strict=True)),
+        rule=Tick(scale.at(rule[0]), rule[1]) if rule else None,
+    )

@@ -1,0 +1,279 @@
+"""The reconstruction: closed forms, a transcription of eqs. (1)-(6), and the kernel against the reference."""
+
+import math
+from itertools import product
+
+import numpy as np
+import pytest
+
+from isp.interleaved import reconstruct, reconstruct_with_noise
+from isp.reference import reconstruct_reference, reference_with_noise
+from isp.settings import SIGMA_D, Settings
+from isp.similarity import noise_distance, saturated_fraction
+from isp.tiles import make_grid, sort_work
+from render.errors import InputError
+from render.jit import backend, dr
+from sensor.cfa import BAYER, RGBW, channels, letter_map
+from sensor.raw import RawImage
+
+RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
+RGBW_PHASES = [("RG", "BW"), ("GR", "WB"), ("BW", "RG"), ("WB", "GR")]
+BAYER_PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
+BLACK, FULL = 100.0, 4000.0
+
+
+def raw_image(electrons, tile=RGBW, read_noise_e=2.0):
+    dn = np.clip(np.round(electrons + BLACK), 0, 65535).astype(np.uint16)
+    return RawImage(dn, tile, BLACK, BLACK + FULL, 1.0, read_noise_e, 0.0, 0.0, 0.01)
+
+
+def scene(shape, level, tile=RGBW, seed=0):
+    """A noisy frame with edges and texture; W's mean is `level`, the colours' a sixth to a tenth of it."""
+    rng = np.random.default_rng(seed)
+    y, x = np.indices(shape)
+    base = 1.0 + 0.5 * np.sin(x / 3.0) * np.cos(y / 5.0) + 0.8 * ((x // 7 + y // 9) % 2)
+    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(letter_map(tile, shape))
+    electrons = np.minimum(rng.poisson(level * base * response), FULL)
+    return raw_image(electrons + rng.normal(0.0, 2.0, shape), tile)
+
+
+@pytest.mark.parametrize("function", [reconstruct, reconstruct_reference])
+@pytest.mark.parametrize("tile", RGBW_PHASES + BAYER_PHASES)
+def test_flat_field_stays_flat_to_the_border(tile, function):
+    result = function(raw_image(np.full((11, 14), 900.0), tile))
+    assert result.shape == (11, 14, len(channels(tile)))
+    assert np.abs(result / 900.0 - 1.0).max() < 1e-6
+
+
+@pytest.mark.parametrize("sigma_d", [1.5, 4.0, math.inf])
+@pytest.mark.parametrize("tile", [RGBW, BAYER])
+def test_without_similarity_an_impulse_is_the_spatial_weight_in_closed_form(tile, sigma_d):
+    shape, place, height = (15, 18), (6, 9), 1000.0
+    electrons = np.zeros(shape)
+    electrons[place] = height
+    result = reconstruct_with_noise(raw_image(electrons, tile), sigma_d=sigma_d, sigma_s=math.inf, neighbourhood=9)
+    letters = letter_map(tile, shape)
+    for i, letter in enumerate(channels(tile)):
+        for x in np.ndindex(shape):
+            omega = [
+                y for y in np.ndindex(shape) if letters[y] == letter and max(abs(y[0] - x[0]), abs(y[1] - x[1])) <= 4
+            ]
+            weights = {y: math.exp(-(math.dist(x, y) ** 2) / (2 * sigma_d**2)) for y in omega}
+            total = sum(weights.values())
+            assert result.estimate[(*x, i)] == pytest.approx(
+                height * weights.get(place, 0.0) / total, rel=2e-6, abs=1e-9
+            )
+            assert result.noise_gain[(*x, i)] == pytest.approx(sum(w**2 for w in weights.values()) / total**2, rel=2e-6)
+
+
+def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
+    """Log weights and samples of eq. (1) by pixel and channel, from eqs. (2) to (6); for RGBW in a 2x2 tile alone."""
+    height, width = raw.shape
+    letters, half, reach = letter_map(raw.cfa, raw.shape), patch // 2, neighbourhood // 2
+    stable = 2 * np.sqrt(np.maximum(raw.electrons + 3 / 8 + raw.dark_noise_e**2, 0))
+
+    def plane(values, letter, y):
+        if letters[y] == letter:
+            return values[y]
+        total = weight = 0.0
+        for a in product((-1, 0, 1), repeat=2):
+            s = (y[0] + a[0], y[1] + a[1])
+            if 0 <= s[0] < height and 0 <= s[1] < width and letters[s] == letter:
+                w = (2 - abs(a[0])) * (2 - abs(a[1]))
+                total, weight = total + w * values[s], weight + w
+        return total / weight
+
+    h = {i: {y: plane(stable, i, y) for y in np.ndindex(raw.shape)} for i in "RGBW"}
+    white = {y: plane(raw.electrons, "W", y) for y in np.ndindex(raw.shape)}
+    steps = list(product(range(-half, half + 1), repeat=2))
+    noise = {i: noise_distance(raw.cfa, i, patch, reach) for i in "RGBW"}
+
+    def reflect(k, size):
+        while not 0 <= k < size:
+            k = -k if k < 0 else 2 * (size - 1) - k
+        return k
+
+    def distance(i, x, y):
+        at = lambda p, a: h[i][reflect(p[0] + a[0], height), reflect(p[1] + a[1], width)]  # noqa: E731
+        total = sum((at(x, a) - at(y, a)) ** 2 for a in steps)
+        bias = noise[i][x[0] % 2, x[1] % 2, y[0] - x[0] + reach, y[1] - x[1] + reach]
+        return math.sqrt(max(total - bias, 0.0))
+
+    def alpha(y):
+        near = [white[s] >= raw.saturation_e for a in steps if (s := (y[0] + a[0], y[1] + a[1])) in white]
+        return sum(near) / len(near)
+
+    for x in np.ndindex(raw.shape):
+        for k, i in enumerate("RGBW"):
+            log_weights, values = [], []
+            for y in np.ndindex(raw.shape):
+                if letters[y] == i and max(abs(y[0] - x[0]), abs(y[1] - x[1])) <= reach:
+                    beta_s = alpha(y) * distance(i, x, y) + (1 - alpha(y)) * distance("W", x, y)
+                    log_weights.append(-(math.dist(x, y) ** 2) / (2 * sigma_d**2) - beta_s**2 / (2 * sigma_s**2))
+                    values.append(raw.electrons[y])
+            yield (*x, k), np.array(log_weights), np.array(values)
+
+
+@pytest.mark.parametrize(("patch", "sigma_s"), [(1, 3.0), (5, 2.0)])
+def test_the_reference_is_the_paper_pixel_by_pixel(patch, sigma_s):
+    raw = scene((7, 8), 2500.0)  # partly saturated
+    assert 0 < raw.saturated.mean() < 0.5
+    got = reconstruct_reference(raw, neighbourhood=7, patch=patch, sigma_d=2.5, sigma_s=sigma_s)
+    for place, log_weights, values in transcription(raw, 7, patch, 2.5, sigma_s):
+        weights = np.exp(log_weights - log_weights.max())
+        expected = (weights * values).sum() / weights.sum()
+        assert got[place] == pytest.approx(expected, rel=1e-10)
+
+
+KERNEL_CASES = [
+    (shape, tile, level, seed)
+    for tile, shapes in {
+        RGBW: [(2, 2), (3, 2), (23, 34), (40, 31)],
+        ("WB", "GR"): [(17, 26)],
+        BAYER: [(2, 3), (21, 30)],
+        RGBW_4X4: [(4, 4), (19, 30)],
+    }.items()
+    for seed, shape in enumerate(shapes)
+    for level in (1.0, 60.0, 2500.0, 1e7)  # dark, ordinary, partly saturated, all saturated
+]
+
+
+@pytest.mark.parametrize("sigma_s", [0.1, 4.0])
+@pytest.mark.parametrize(("shape", "tile", "level", "seed"), KERNEL_CASES)
+def test_kernel_is_the_reference_in_single_precision(shape, tile, level, seed, sigma_s):
+    raw = scene(shape, level, tile, seed)
+    kernel = reconstruct_with_noise(raw, sigma_s=sigma_s)
+    reference = reference_with_noise(raw, Settings(21, 5, 6.0, sigma_s))
+    assert kernel.engine == backend()
+    assert np.abs(kernel.estimate - reference.estimate).max() < 1e-4 * FULL
+    assert np.abs(kernel.noise_gain - reference.noise_gain).max() < 2e-3
+
+
+def test_all_three_ways_to_judge_occur_in_the_partly_saturated_frames():
+    alpha = saturated_fraction(scene((40, 31), 2500.0, seed=3), 5)
+    assert (alpha == 0.0).any()
+    assert ((alpha > 0.0) & (alpha < 1.0)).any()
+    assert (alpha == 1.0).any()
+
+
+def half_saturated(turns=0):
+    """Bright left, saturated right, or turned: wide enough that one plane judges in some lanes and two in others."""
+    electrons = np.random.default_rng(4).uniform(3000.0, 3900.0, (20, 120))
+    electrons[:, 60:] = FULL
+    return raw_image(np.rot90(electrons, turns))
+
+
+@pytest.mark.parametrize("turns", [0, 1, 2, 3])
+def test_lanes_of_every_regime_are_the_reference(turns):
+    raw, settings = half_saturated(turns), Settings(21, 5, 6.0, 20.0)  # so large that both halves count
+    alpha, grid = saturated_fraction(raw, 5), make_grid(RGBW, 5)
+    one, two = sort_work(alpha, RGBW, grid, settings.reach)
+    judged = set(zip(one.channel.tolist(), one.planes[0].tolist(), strict=True))
+    assert judged == {(0, 0), (1, 1), (2, 2), (0, 3), (1, 3), (2, 3), (3, 3)}
+    assert set(two.channel.tolist()) == {0, 1, 2}
+    error = np.abs(reconstruct(raw, sigma_s=20.0) - reconstruct_reference(raw, sigma_s=20.0))
+    assert error.max() < 1e-6 * FULL
+
+
+@pytest.mark.skipif(backend() == "numpy", reason="nothing is compiled without Dr.Jit")
+def test_other_sizes_sigmas_and_phases_run_the_kernels_that_are_compiled_already():
+    reconstruct(half_saturated())
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        for turns, sigma in ((1, 3.0), (3, math.inf)):
+            reconstruct(half_saturated(turns), sigma_d=sigma, sigma_s=2.0 * sigma)
+        reconstruct(scene((33, 65), 2500.0, ("WB", "GR")), neighbourhood=15)
+        history = [kernel for kernel in dr.kernel_history() if "cache_hit" in kernel]
+    assert len(history) > 6
+    assert all(kernel["cache_hit"] for kernel in history)
+
+
+def test_the_result_does_not_depend_on_the_number_of_threads():
+    raw, threads = half_saturated(), dr.thread_count()
+    first = reconstruct_with_noise(raw)
+    try:
+        dr.set_thread_count(1)
+        second = reconstruct_with_noise(raw)
+    finally:
+        dr.set_thread_count(threads)
+    assert np.array_equal(first.estimate, second.estimate)
+    assert np.array_equal(first.noise_gain, second.noise_gain)
+
+
+EXTREME_FRAMES = {
+    "zeros": np.full((9, 11), -BLACK),
+    "one bright pixel": np.where(np.indices((9, 11)).sum(0) == 0, 60000.0, 0.0),
+    "bright and dark": np.random.default_rng(1).choice([-BLACK, FULL, 60000.0], (9, 11)),
+}
+
+
+@pytest.mark.parametrize("function", [reconstruct_with_noise, "reference"])
+@pytest.mark.parametrize("sigma", [1e-3, 1e6, math.inf])
+@pytest.mark.parametrize("name", EXTREME_FRAMES)
+def test_extreme_input_gives_finite_results_within_the_range_of_the_samples(name, sigma, function):
+    raw = raw_image(EXTREME_FRAMES[name])
+    for sigma_d, sigma_s in ((sigma, 4.0), (6.0, sigma), (sigma, sigma)):
+        if function == "reference":
+            result = reference_with_noise(raw, Settings(21, 5, sigma_d, sigma_s))
+        else:
+            result = function(raw, sigma_d=sigma_d, sigma_s=sigma_s)
+        letters, electrons = letter_map(RGBW, raw.shape), raw.electrons
+        for i, letter in enumerate(channels(RGBW)):
+            samples = electrons[letters == letter]
+            slack = 1e-5 * np.abs(samples).max()  # a weighted mean in single precision
+            assert (result.estimate[..., i] >= samples.min() - slack).all()
+            assert (result.estimate[..., i] <= samples.max() + slack).all()
+        assert (result.noise_gain > 0.0).all()
+        assert (result.noise_gain <= 1.0 + 1e-5).all()
+
+
+@pytest.mark.parametrize("sigma_s", [1e-3, 1e-2])
+def test_with_a_tiny_sigma_the_result_lies_among_the_samples_that_tie_for_the_best(sigma_s):
+    """Single precision can't tell log weights apart that differ by its rounding: any mean of those samples is right."""
+    raw = scene((8, 9), 2500.0)
+    result = reconstruct(raw, neighbourhood=11, sigma_s=sigma_s)
+    largest = 2 * math.sqrt(raw.electrons.max() + raw.dark_noise_e**2 + 3 / 8)
+    for place, log_weights, values in transcription(raw, 11, 5, SIGMA_D, sigma_s):
+        distance = -log_weights.max() * 2 * sigma_s**2
+        # Rounding of 25 squares and their sum, and of the planes they come from: 2 d (delta x - delta y).
+        rounding = (32 * distance + 2 * math.sqrt(25 * distance) * 2 * largest) * 2.0**-24 / (2 * sigma_s**2)
+        tied = values[log_weights >= log_weights.max() - 2 * rounding - 20.0]  # 20: a weight of 2e-9 is nothing
+        slack = 1e-5 * np.abs(values).max()
+        assert tied.min() - slack <= result[place] <= tied.max() + slack
+
+
+@pytest.mark.parametrize("function", [reconstruct, reconstruct_reference])
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"neighbourhood": 20}, r"neighbourhood: 20 isn't allowed"),
+        ({"neighbourhood": -3}, r"neighbourhood: -3 isn't allowed"),
+        ({"neighbourhood": 1}, r"neighbourhood: 1 may miss a letter"),
+        ({"patch": 4}, r"patch: 4 isn't allowed"),
+        ({"patch": 0}, r"patch: 0 isn't allowed"),
+        ({"patch": 5.0}, r"patch: 5.0 isn't allowed"),
+        ({"sigma_d": 0.0}, r"sigma_d: 0.0 isn't allowed"),
+        ({"sigma_d": math.nan}, r"sigma_d: nan isn't allowed"),
+        ({"sigma_s": -1.0}, r"sigma_s: -1.0 isn't allowed"),
+        ({"sigma_s": 1e-9}, r"sigma_s: 1e-09 isn't allowed"),
+    ],
+)
+def test_bad_parameters_are_one_line_of_advice(wrong, message, function):
+    with pytest.raises(InputError, match=message) as caught:
+        function(raw_image(np.zeros((6, 6))), **wrong)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_wide_tile_needs_a_wide_neighbourhood():
+    raw = raw_image(np.full((4, 4), 300.0), RGBW_4X4)
+    with pytest.raises(InputError, match="odd numbers from 7"):
+        reconstruct(raw, neighbourhood=5)
+    assert np.abs(reconstruct(raw, neighbourhood=7) / 300.0 - 1.0).max() < 1e-6
+
+
+def test_without_dr_jit_the_reference_runs_and_the_result_says_so(monkeypatch):
+    monkeypatch.setattr("isp.interleaved.backend", lambda: "numpy")
+    raw = scene((9, 8), 300.0)
+    result = reconstruct_with_noise(raw)
+    assert result.engine == "numpy"
+    assert np.array_equal(result.estimate, reconstruct_reference(raw))
+    assert reconstruct(raw).dtype == np.float32
