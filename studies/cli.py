@@ -1,0 +1,120 @@
+"""The command `rodcone`. Results on stdout, progress and errors on stderr; bad input exits with code 2."""
+
+import sys
+from importlib import metadata
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, CycloptsError, Parameter
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+# Packages named render, sensor, ... exist in other distributions: `doctor` tells which ones Python finds, and must
+# come so far. So nothing of them is imported at the top.
+
+BAD_INPUT = 2
+
+app = App(
+    name="rodcone",
+    help="Camera simulation from spectral scene to developed picture: interleaved RGBW beside Bayer.",
+    version=lambda: metadata.version("rodcone"),
+)
+
+
+@app.command
+def demo(
+    *,
+    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("out/demo"),
+    scene: str = "still_life",
+    size: int = 256,
+    sensor: Annotated[list[str] | None, Parameter(negative_iterable=())] = None,
+    level: Annotated[list[str] | None, Parameter(negative_iterable=())] = None,
+    longest_exposure_s: float = 0.066,
+    spp: int = 256,
+    max_seconds: float = 60.0,
+    seed: int = 0,
+) -> None:
+    """Photograph one scene from moonlight to daylight with both cameras and write a report.
+
+    Parameters
+    ----------
+    out
+        Folder for report.html, results.json and overview.png.
+    scene
+        Scene by name: color_checker, flat_field or still_life.
+    size
+        Side of the picture in pixels.
+    sensor
+        Sensor preset; may be given several times (table1_output and low_noise by default).
+    level
+        Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); may be given
+        several times (seven levels from moonlight to daylight by default).
+    longest_exposure_s
+        Longest exposure time in seconds.
+    spp
+        Samples a pixel of the render, at most.
+    max_seconds
+        Time for the render, at most.
+    seed
+        Seed of the render, the chips and the exposures.
+    """
+    from studies import demo as job
+
+    defaults = job.Demo()
+    task = job.Demo(
+        scene=scene,
+        size=size,
+        sensors=tuple(sensor) if sensor else defaults.sensors,
+        levels=tuple(level) if level else None,
+        longest_s=longest_exposure_s,
+        seed=seed,
+        spp=spp,
+        max_seconds=max_seconds,
+    )
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        line = bar.add_task("start", total=1.0)
+        outcome = job.run(task, lambda what, share: bar.update(line, description=what, completed=share))
+    print(job.write(outcome, out))
+
+
+@app.command
+def doctor() -> int:
+    """Print versions, the LLVM library, the engine, and whether rodcone's packages are its own; exit 1 if not."""
+    from studies.doctor import report
+
+    found = report()
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for row in found.rows:
+        table.add_row(row.name, escape(row.value) if row.ok else f"[red]{escape(row.value)}[/red]")
+    Console().print(table)
+    return 0 if found.ok else 1
+
+
+def main(arguments: list[str] | None = None) -> Any:
+    """Run the command; one line on stderr and exit code 2 for bad input, 1 for a file that can't be written."""
+    try:
+        code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+    except CycloptsError as error:
+        fail(" ".join(str(error).split()), BAD_INPUT)
+    except OSError as error:
+        fail(f"{error.filename or 'file'}: {error.strerror or error}; choose another place with --out", 1)
+    except ValueError as error:
+        from render.errors import InputError  # late, so that a foreign `render` doesn't keep the doctor from starting
+
+        if not isinstance(error, InputError):
+            raise
+        fail(str(error), BAD_INPUT)
+    except KeyboardInterrupt:
+        fail("stopped; nothing was written", 130)
+    sys.exit(code or 0)
+
+
+def fail(message: str, code: int) -> None:
+    """Print one line on stderr and exit."""
+    print(f"rodcone: {message}", file=sys.stderr)
+    sys.exit(code)

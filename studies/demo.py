@@ -1,0 +1,298 @@
+"""The main job: one scene, one render, light levels in; two cameras' pictures and a report out."""
+
+import json
+import os
+import platform
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.colour import encode_srgb
+from render.engine import render
+from render.errors import InputError, require_range
+from render.jit import LIBLLVM, backend, dr
+from render.loader import variant
+from render.radiance import SpectralRadiance
+from render.transport import Transport
+from scenes.catalog import load
+from scenes.levels import DEMO_LEVELS, LightLevel
+from sensor.optics import LEFT_OUT, form_image
+from sensor.presets import preset
+from sensor.response import expected_electrons
+from studies.budget import monte_carlo_share
+from studies.camera import CAMERAS, Camera, Shot, build_camera, mean_electrons, photograph
+from studies.exposure import LONGEST_S, RULE, auto_exposure_s
+from studies.levels import parse_level, resolve_level
+from studies.pictures import contact_sheet, to_bytes
+from studies.report import render_report
+from studies.truth import Light, light_in_bands, true_srgb
+
+# 20 bands of 20 nm: every spectrum in the demo is smooth, and the render costs half of 40 bands.
+WAVELENGTH_NM = np.arange(390.0, 780.0, 20.0)
+WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # the scene's 99th percentile of luminance is shown at 90 % of white
+
+Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
+
+
+@dataclass(frozen=True)
+class Demo:
+    """What to run: scene, picture size, sensors, light levels (None: moonlight to daylight) and the render's limits."""
+
+    scene: str = "still_life"
+    size: int = 256
+    sensors: tuple[str, ...] = ("table1_output", "low_noise")
+    levels: tuple[str, ...] | None = None
+    longest_s: float = LONGEST_S
+    seed: int = 0
+    spp: int = 256
+    max_seconds: float = 60.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Results as `results.json` holds them, picture files by name, and the overview sheet."""
+
+    results: dict[str, Any]
+    pictures: Mapping[str, bytes]
+    overview: bytes
+
+
+class _Clock:
+    """Seconds of each stage, added up."""
+
+    def __init__(self) -> None:
+        self.stages: dict[str, float] = {}
+
+    def add(self, stage: str, seconds: float) -> None:
+        self.stages[stage] = self.stages.get(stage, 0.0) + seconds
+
+
+def check(demo: Demo) -> None:
+    """Raise `InputError` for anything in `demo` that can be told before the render."""
+    require_range("size", demo.size, 16, 4096, "give the picture's side in pixels")
+    require_range("seed", demo.seed, 0, 2**31, "give a whole number")
+    require_range("longest exposure", demo.longest_s, 1e-9, 1e4, "give seconds above 0")
+    for name in demo.sensors:
+        preset(name)
+    for level in demo.levels or ():
+        parse_level(level)
+    for given in (demo.sensors, demo.levels or ("",)):
+        if not given or len(set(given)) != len(given):
+            raise InputError(f"demo: {given!r} is not allowed; give sensors and levels, each once")
+
+
+def run(demo: Demo, step: Step = lambda what, share: None) -> Outcome:
+    """Render once, then photograph every level with every camera.
+
+    Raises
+    ------
+    InputError
+        For an unknown scene, sensor or unit, or a value out of range; before anything is rendered.
+    """
+    check(demo)
+    scene, clock = load(demo.scene), _Clock()
+    step("render", 0.0)
+    transport = render(
+        scene,
+        (demo.size, demo.size),
+        wavelength_nm=WAVELENGTH_NM,
+        spp=demo.spp,
+        max_seconds=demo.max_seconds,
+        seed=demo.seed,
+        progress=lambda share, error: step(f"render, relative error {error:.3f}", 0.6 * share),
+    )
+    clock.add("render", transport.seconds)
+    levels = DEMO_LEVELS if demo.levels is None else [resolve_level(level, transport) for level in demo.levels]
+    first = next(iter(scene.groups.values()))
+    light = light_in_bands(first.spectrum, transport.wavelength_nm, transport.width_nm)
+    cameras = _cameras(demo, light)
+    cells: list[dict[str, Any]] = []
+    encoded: dict[str, NDArray[np.float64]] = {}
+    for index, level in enumerate(levels):
+        step(f"photographs at {level.name}", 0.6 + 0.35 * index / len(levels))
+        for cell, picture in _photograph_level(demo, transport, light, cameras, index, level, clock):
+            cells.append(cell)
+            encoded[cell["picture"]] = picture
+    step("report", 0.95)
+    truth = _truth(transport.relight(luminance_cd_m2=levels[0].luminance_cd_m2), transport, light)
+    pictures = {name: to_bytes(picture) for name, picture in {**encoded, "truth": truth}.items()}
+    results = _results(demo, transport, levels, cells, clock)
+    sheet = [[encoded[_name(i, demo.sensors[0], camera)] for i in range(len(levels))] for camera in CAMERAS]
+    return Outcome(results, pictures, to_bytes(contact_sheet(sheet), "PNG"))
+
+
+def write(outcome: Outcome, folder: Path) -> Path:
+    """Write ``report.html``, ``results.json`` and ``overview.png``; each appears whole or not at all."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = {
+        "results.json": (json.dumps(outcome.results, indent=1, allow_nan=False) + "\n").encode(),
+        "overview.png": outcome.overview,
+        "report.html": render_report(outcome.results, outcome.pictures).encode(),
+    }
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".part-") as parts:
+        for name, content in files.items():
+            (Path(parts) / name).write_bytes(content)
+        for name in files:
+            os.replace(Path(parts) / name, folder / name)
+    return folder / "report.html"
+
+
+def _name(level: int, sensor: str, camera: str) -> str:
+    return f"{level}/{sensor}/{camera}"
+
+
+def _cameras(demo: Demo, light: Light) -> list[Camera]:
+    """Every camera with its chip; the chip's patterns come from the seed and its place alone."""
+    return [
+        build_camera(name, sensor, light, (demo.size, demo.size), np.random.default_rng([demo.seed, s, c, 0]))
+        for s, sensor in enumerate(demo.sensors)
+        for c, name in enumerate(CAMERAS)
+    ]
+
+
+def _white_cd_m2(radiance: SpectralRadiance, transport: Transport) -> float:
+    """Luminance that is shown as white."""
+    luminance = radiance.luminance()[~transport.emitter_visible]
+    return float(np.percentile(luminance, WHITE_PERCENTILE)) / WHITE_AT
+
+
+def _truth(radiance: SpectralRadiance, transport: Transport, light: Light) -> NDArray[np.float64]:
+    return encode_srgb(true_srgb(radiance, light, _white_cd_m2(radiance, transport)))
+
+
+def _photograph_level(
+    demo: Demo,
+    transport: Transport,
+    light: Light,
+    cameras: Sequence[Camera],
+    index: int,
+    level: LightLevel,
+    clock: _Clock,
+) -> list[tuple[dict[str, Any], NDArray[np.float64]]]:
+    """Cell and encoded picture of each camera at one level; all look at the same radiance."""
+    started = time.perf_counter()
+    radiance = transport.relight(luminance_cd_m2=level.luminance_cd_m2)
+    halves = transport.relight_halves(luminance_cd_m2=level.luminance_cd_m2)
+    white, truth = _white_cd_m2(radiance, transport), _truth(radiance, transport, light)
+    clock.add("relight", time.perf_counter() - started)
+    made = []
+    for place, camera in enumerate(cameras):
+        started = time.perf_counter()
+        irradiance = form_image(radiance, camera.sensor)
+        exposure_s = auto_exposure_s(irradiance, camera.sensor, demo.longest_s)
+        expected_e = expected_electrons(irradiance, camera.sensor, exposure_s)
+        clock.add("form image", time.perf_counter() - started)
+        rng = np.random.default_rng([demo.seed, *divmod(place, len(CAMERAS)), 1, index])
+        shot = photograph(camera, expected_e, truth, light, white, exposure_s, rng)
+        for stage, seconds in (
+            ("capture", shot.capture_s),
+            (f"develop {camera.name}", shot.develop_s),
+            ("metrics", shot.measure_s),
+        ):
+            clock.add(stage, seconds)
+        share = monte_carlo_share(expected_e, halves, camera.sensor, exposure_s)
+        made.append((_cell(camera, shot, expected_e, index, share), shot.encoded))
+    return made
+
+
+def _cell(
+    camera: Camera, shot: Shot, expected_e: NDArray[np.float64], level: int, mc_share: float
+) -> dict[str, Any]:
+    snr = shot.picture.snr
+    return {
+        "level": level,
+        "sensor": camera.sensor_name,
+        "camera": camera.name,
+        "exposure_s": shot.raw.exposure_s,
+        **asdict(shot.quality),
+        "mc_share": mc_share,
+        "snr_db": 20 * float(np.log10(snr)) if snr is not None and snr > 0 else None,
+        "substitution": shot.picture.substituted,
+        "balance": dict(shot.picture.balance),
+        "saturated": float(shot.raw.saturated.mean()),
+        "mean_electrons": mean_electrons(camera, expected_e),
+        "seconds": {"capture": shot.capture_s, "develop": shot.develop_s},
+        "picture": _name(level, camera.sensor_name, camera.name),
+    }
+
+
+def _results(
+    demo: Demo, transport: Transport, levels: Sequence[LightLevel], cells: list[dict[str, Any]], clock: _Clock
+) -> dict[str, Any]:
+    own = transport.relight()
+    return {
+        "rodcone": metadata.version("rodcone"),
+        "seed": demo.seed,
+        "scene": demo.scene,
+        "size": [demo.size, demo.size],
+        "environment": environment(),
+        "render": {
+            "integrator": transport.integrator,
+            "variant": transport.variant,
+            "seconds": transport.seconds,
+            "spp": transport.spp,
+            "passes": transport.passes,
+            "stopped_by": transport.stopped_by,
+            "relative_mc_error": own.relative_mc_error,
+            "bands": transport.wavelength_nm.size,
+            "first_nm": float(transport.wavelength_nm[0]),
+            "last_nm": float(transport.wavelength_nm[-1]),
+            "width_nm": float(transport.width_nm[0]),
+        },
+        "exposure_rule": RULE.format(longest=demo.longest_s * 1e3),
+        "display_white": "the scene's 99th percentile of luminance, visible lamps excluded, is shown at 90 % of white",
+        "levels": [
+            {**asdict(level), "illuminance_lux": transport.illuminance_lux(level.luminance_cd_m2)} for level in levels
+        ],
+        "sensors": [_sensor(name) for name in demo.sensors],
+        "cameras": list(CAMERAS),
+        "cells": cells,
+        "stages": [{"name": name, "seconds": seconds} for name, seconds in clock.stages.items()],
+        "left_out": list(LEFT_OUT),
+        "notes": _notes(),
+    }
+
+
+def _sensor(name: str) -> dict[str, Any]:
+    sensor = preset(name)
+    pixel = sensor.pixel
+    return {
+        "name": name,
+        "read_noise_e": pixel.read_noise_e,
+        "dsnu_e": pixel.dsnu_e,
+        "full_well_e": pixel.full_well_e,
+        "prnu": pixel.prnu,
+        "pitch_um": pixel.pitch_um,
+        "f_number": sensor.lens.f_number,
+        "bits": sensor.bits,
+    }
+
+
+def environment() -> dict[str, Any]:
+    """Versions and engine that made the numbers."""
+    packages = {name: metadata.version(name) for name in ("mitsuba", "drjit", "numpy", "scipy", "scikit-image")}
+    return {
+        "python": platform.python_version(),
+        **packages,
+        "llvm": LIBLLVM.name if LIBLLVM else "none",
+        "variant": variant(),
+        "engine": backend(),
+        "threads": dr.thread_count() if backend() == "llvm" else 1,
+        "platform": platform.platform(),
+    }
+
+
+def _notes() -> list[str]:
+    if backend() == "numpy":
+        return [
+            "Neither LLVM nor CUDA answered: stock path + specfilm rendered in scalar_spectral, and the reconstruction "
+            "ran its NumPy form."
+        ]
+    return []
