@@ -41,7 +41,9 @@ class Balance:
     sources: tuple[BalanceSource, ...]
 
 
-def gray_world(planes: Image, usable: NDArray[np.bool_], standard_errors: Floats, neutral: Floats, green: int) -> Balance:
+def gray_world(
+    planes: Image, usable: NDArray[np.bool_], standard_errors: Floats, neutral: Floats, green: int
+) -> Balance:
     """Gains that make the mean of each channel equal to green's (Buchsbaum 1980).
 
     Parameters
@@ -126,7 +128,9 @@ def _band_last(name: str, values: ArrayLike, bands: int) -> NDArray[np.float64]:
         return array
     if array.ndim == 2 and array.shape[0] == bands:
         return array.T
-    raise InputError(f"{name}: shape {array.shape} doesn't fit {bands} wavelengths; give (n, {bands}), one column a band")
+    raise InputError(
+        f"{name}: shape {array.shape} doesn't fit {bands} wavelengths; give (n, {bands}), one column a band"
+    )
 
 
 def xyz_from_xy(xy: Floats) -> Floats:

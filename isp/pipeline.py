@@ -102,9 +102,7 @@ def picture_interleaved(
 ) -> Picture:
     """As `develop_interleaved`, with the decisions: eqs. (1)-(6), Gray World, matrix, luminance substitution."""
     letters = _require(raw, ("R", "G", "B", "W"))
-    result = reconstruct_with_noise(
-        raw, neighbourhood=neighbourhood, patch=patch, sigma_d=sigma_d, sigma_s=sigma_s
-    )
+    result = reconstruct_with_noise(raw, neighbourhood=neighbourhood, patch=patch, sigma_d=sigma_d, sigma_s=sigma_s)
     planes = np.asarray(result.estimate, dtype=np.float64)
     balance = _balance(raw, planes, neutral)
     balanced = _clip_highlights(raw, planes * balance.gains)
@@ -141,22 +139,39 @@ def _require(raw: RawImage, letters: tuple[str, ...]) -> tuple[str, ...]:
 def _checked(matrix: ArrayLike) -> Image:
     array = np.asarray(matrix, dtype=np.float64)
     if array.shape != (3, 3) or not np.all(np.isfinite(array)):
-        raise InputError(f"matrix: shape {array.shape} is not allowed; give 3x3 finite numbers, as fit_matrix makes them")
+        raise InputError(
+            f"matrix: shape {array.shape} is not allowed; give 3x3 finite numbers, as fit_matrix makes them"
+        )
     return array
 
 
 def _balance(raw: RawImage, planes: Image, neutral: ArrayLike | None) -> Balance:
-    """Gray World over the pixels that have no saturated colour sample nearby."""
-    letters, count = channels(raw.cfa), letter_map(raw.cfa, raw.shape)
+    """Gray World: colours over the pixels without a saturated colour sample nearby, W over those it leaves as well.
+
+    W saturates first; taking its pixels out of the colours' means too would leave them the dark part of the scene.
+    """
+    letters = channels(raw.cfa)
     calibrated = neutral_response(letters) if neutral is None else np.asarray(neutral, dtype=np.float64)
     if calibrated.shape != (len(letters),) or not np.all(calibrated > 0):
-        raise InputError(f"neutral: {calibrated.tolist()!r} is not allowed; give a positive response for each of {letters}")
-    usable = ~_saturated_nearby(raw, "".join(letters))
-    share = max(usable.mean(), 1.0 / usable.size)
-    samples = np.array([(count == letter).sum() * share for letter in letters])
-    means = np.maximum(planes.mean(axis=(0, 1)), 0.0)
-    errors = np.sqrt((means + raw.dark_noise_e**2) / samples)
-    return gray_world(planes, usable, errors, calibrated, letters.index("G"))
+        raise InputError(
+            f"neutral: {calibrated.tolist()!r} is not allowed; give a positive response for each of {letters}"
+        )
+    colours = ~_saturated_nearby(raw, "RGB")
+    balance = _gray_world(raw, planes, calibrated, "RGB", colours)
+    if "W" not in letters:
+        return balance
+    white = _gray_world(raw, planes, calibrated, "GW", colours & ~_saturated_nearby(raw, "W"))
+    return Balance(np.append(balance.gains, white.gains[1]), (*balance.sources, white.sources[1]))
+
+
+def _gray_world(raw: RawImage, planes: Image, calibrated: Image, letters: str, usable: NDArray[np.bool_]) -> Balance:
+    """Gray World among some of the channels."""
+    index = [channels(raw.cfa).index(letter) for letter in letters]
+    sites = letter_map(raw.cfa, raw.shape)
+    samples = np.array([max((usable & (sites == letter)).sum(), 1) for letter in letters])
+    means = planes[usable].mean(axis=0) if usable.any() else np.zeros(planes.shape[-1])
+    errors = np.sqrt((np.maximum(means[index], 0.0) + raw.dark_noise_e**2) / samples)
+    return gray_world(planes[..., index], usable, errors, calibrated[index], letters.index("G"))
 
 
 def _saturated_nearby(raw: RawImage, letters: str) -> NDArray[np.bool_]:

@@ -37,7 +37,7 @@ def dense_path(mi: Any) -> Any:
         def aov_names(self) -> list[str]:
             return [f"band{i:04d}" for i in range(self.centres.size)] + ["wavelength_dependent_choice"]
 
-        def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:  # noqa: ARG002
+        def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
             wavelengths = _band_wavelengths(mi, self.centres, self.widths, sampler.next_1d(active))
             result, chosen = _trace(mi, scene, sampler, ray, wavelengths, self.max_depth, mi.Bool(active))
             bands = [value for group in result for value in group][: self.centres.size]

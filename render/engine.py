@@ -152,7 +152,11 @@ def _render(
         seconds = time.perf_counter() - start
         error = _own_error(scene, film, sums)
         drawn = sums[0].drawn
-        share = max(drawn / limit, seconds / max_seconds if max_seconds else 0.0, (noise / error) ** 2 if noise and error else 0.0)
+        share = max(
+            drawn / limit,
+            seconds / max_seconds if max_seconds else 0.0,
+            (noise / error) ** 2 if noise and error else 0.0,
+        )
         progress(min(share, 1.0), error)
         if drawn >= limit:
             break
@@ -166,7 +170,9 @@ def _render(
         radiance=np.stack([s.mean for s in sums]),
         half_difference=np.stack([s.signed / np.float32(s.passes) for s in sums]),
         variance=np.stack([s.variance for s in sums]),
-        irradiance=None if sums[0].plane is None else np.stack([s.plane / s.passes for s in sums if s.plane is not None]),
+        irradiance=None
+        if sums[0].plane is None
+        else np.stack([s.plane / s.passes for s in sums if s.plane is not None]),
         emitter_visible=_emitter_visible(scene, film, seed),
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,

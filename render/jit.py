@@ -7,6 +7,8 @@ library of version 17 or more.
 
 import os
 import re
+import sys
+import warnings
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -15,7 +17,13 @@ from typing import Any, Literal
 Backend = Literal["cuda", "llvm", "numpy"]
 
 OLDEST_LLVM = 17  # 15 and 16 abort with "Cannot select: fmaximum" at the first kernel (measured with Dr.Jit 1.5)
-_SYSTEM_DIRECTORIES = ("/usr/lib", "/usr/lib64", "/usr/local/lib", "/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu")
+_SYSTEM_DIRECTORIES = (
+    "/usr/lib",
+    "/usr/lib64",
+    "/usr/local/lib",
+    "/usr/lib/x86_64-linux-gnu",
+    "/usr/lib/aarch64-linux-gnu",
+)
 _LIBRARY_NAME = re.compile(r"libLLVM(?:-(\d+)\.so(?:\.\d+)*|\.so\.(\d+)(?:\.\d+)*)$")
 
 
@@ -50,7 +58,24 @@ def find_llvm() -> Path | None:
     return Path(own) if own else _wheel_library() or _system_library()
 
 
+def _loaded_too_early() -> Path | None:
+    """LLVM library of less than 17 that an earlier `import drjit` has already loaded; it can't be replaced."""
+    maps = Path("/proc/self/maps")
+    if "drjit" not in sys.modules or not maps.is_file():
+        return None
+    paths = {Path(line.split()[-1]) for line in maps.read_text().splitlines() if "libLLVM" in line}
+    return next((path for path in paths if (llvm_version(path) or OLDEST_LLVM) < OLDEST_LLVM), None)
+
+
 LIBLLVM = find_llvm()
+if _early := _loaded_too_early():
+    warnings.warn(
+        f"Dr.Jit was imported before rodcone and loaded {_early}, which aborts: rendering and reconstruction run their "
+        f"slow forms; import rodcone's modules first, or set DRJIT_LIBLLVM_PATH={LIBLLVM}",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+    LIBLLVM = None
 # Without a usable library Dr.Jit would search by itself and may load one that aborts the process: name one that isn't.
 os.environ["DRJIT_LIBLLVM_PATH"] = str(LIBLLVM) if LIBLLVM else "/nonexistent/libLLVM.so"
 

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-import mitsuba
-
 from render.dense import dense_path
 from render.errors import InputError
 from render.jit import backend
@@ -25,6 +23,8 @@ def variant() -> str:
 @cache
 def mitsuba_module() -> Any:
     """Mitsuba with its variant set and the dense integrator registered."""
+    import mitsuba  # only now: its import loads Dr.Jit, which must find the LLVM that `render.jit` has chosen
+
     mitsuba.set_variant(variant())
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
     if backend() != "numpy":

@@ -38,9 +38,13 @@ class Spectrum:
         nm = np.array(self.wavelength_nm, dtype=np.float64)
         values = np.array(self.values, dtype=np.float64)
         if nm.ndim != 1 or nm.size < 2 or not np.all(np.diff(nm) > 0):
-            raise InputError(f"wavelength_nm: {nm.tolist()!r} is not allowed; give two or more strictly increasing [nm]")
+            raise InputError(
+                f"wavelength_nm: {nm.tolist()!r} is not allowed; give two or more strictly increasing [nm]"
+            )
         if values.shape != nm.shape or not np.all(np.isfinite(values) & (values >= 0)):
-            raise InputError(f"spectrum values: allowed are {nm.size} finite numbers >= 0, one a wavelength; correct them")
+            raise InputError(
+                f"spectrum values: allowed are {nm.size} finite numbers >= 0, one a wavelength; correct them"
+            )
         object.__setattr__(self, "wavelength_nm", nm)
         object.__setattr__(self, "values", values)
 

@@ -161,7 +161,9 @@ class Transport:
     def _mean_luminance(self, coefficients: Floats) -> float:
         kept = ~self.emitter_visible
         if not kept.any():
-            raise InputError("luminance_cd_m2: every pixel sees a light directly; give illuminance_lux or powers instead")
+            raise InputError(
+                "luminance_cd_m2: every pixel sees a light directly; give illuminance_lux or powers instead"
+            )
         mean = self.radiance[:, :, kept].mean(axis=2, dtype=np.float64)
         return float(luminance((coefficients * mean).sum(axis=0), self.wavelength_nm, self.width_nm))
 
@@ -175,7 +177,9 @@ class Transport:
         """Sum over groups, shape (band, h, w); in float64 band by band, rounded once."""
         result = np.empty(planes.shape[1:], dtype=np.float32)
         for band in range(result.shape[0]):
-            result[band] = sum(c * p.astype(np.float64) for c, p in zip(coefficients[:, band], planes[:, band], strict=True))
+            result[band] = sum(
+                c * p.astype(np.float64) for c, p in zip(coefficients[:, band], planes[:, band], strict=True)
+            )
         return result
 
     def _as_radiance(self, planes: NDArray[np.float32], error: float = 0.0) -> SpectralRadiance:

@@ -39,7 +39,12 @@ def checks(first: Spectrum, second: Spectrum, columns: float, rows: float) -> No
 
 def panel(place: Floats, width_m: float, height_m: float, bsdf: Node, **more: Node) -> Node:
     """Rectangle centred on the origin of `place`, facing its +z."""
-    return {"type": "rectangle", "to_world": to_world(place, scale(width_m / 2, height_m / 2, 1.0)), "bsdf": bsdf, **more}
+    return {
+        "type": "rectangle",
+        "to_world": to_world(place, scale(width_m / 2, height_m / 2, 1.0)),
+        "bsdf": bsdf,
+        **more,
+    }
 
 
 def floor(x: float, y: float, z: float) -> Floats:

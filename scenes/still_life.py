@@ -85,7 +85,9 @@ def _star(x: float, y: float, z: float, radius: float) -> dict[str, Node]:
     for index in range(SPOKES):
         angle = 360.0 * index / SPOKES
         middle = 0.58 * radius
-        place = translate(x + middle * cos(angle * pi / 180), y + middle * sin(angle * pi / 180), z) @ rotate((0, 0, 1), angle)
+        place = translate(x + middle * cos(angle * pi / 180), y + middle * sin(angle * pi / 180), z) @ rotate(
+            (0, 0, 1), angle
+        )
         nodes[f"spoke{index:02d}"] = panel(place, 0.84 * radius, width, matte(BLACK))
     return nodes
 

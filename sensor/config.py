@@ -111,7 +111,9 @@ class SensorConfig:
         if self.bits != int(self.bits):
             raise InputError(f"bits: {self.bits!r} is not a whole number; allowed: 1 to 16; round it")
         if self.black_level_dn is not None:
-            require_range("black_level_dn", self.black_level_dn, 0.0, self.white_dn - 0.5, "give DN under the white level")
+            require_range(
+                "black_level_dn", self.black_level_dn, 0.0, self.white_dn - 0.5, "give DN under the white level"
+            )
         low, high = self.window_nm
         if not 0 < low < high < inf:
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give (shortest, longest) in nm")

@@ -84,8 +84,12 @@ def read_csv(path: str | Path) -> Responses:
             header, *rows = [row for row in csv.reader(file) if row]
         table = np.array([[float(cell) for cell in row] for row in rows], dtype=np.float64)
     except (OSError, ValueError) as error:
-        raise InputError(f"responses: {str(path)!r} can't be read ({error}); give a CSV of numbers with a header") from error
+        raise InputError(
+            f"responses: {str(path)!r} can't be read ({error}); give a CSV of numbers with a header"
+        ) from error
     names = [name.strip() for name in header]
     if names[0] != "wavelength_nm" or table.ndim != 2 or table.shape[1] != len(names) or len(names) < 2:
-        raise InputError(f"responses: {str(path)!r} has header {names}; allowed: wavelength_nm and one letter a column; add it")
+        raise InputError(
+            f"responses: {str(path)!r} has header {names}; allowed: wavelength_nm and one letter a column; add it"
+        )
     return Responses({letter: Spectrum(table[:, 0], table[:, i + 1]) for i, letter in enumerate(names[1:])})

@@ -68,4 +68,6 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig) -> SpectralIrra
     A box-filtered render pixel already holds the pixel's aperture, and becomes one sensor pixel.
     """
     factor = radiance.values.dtype.type(camera_equation(sensor.lens))
-    return SpectralIrradiance(radiance.values * factor, radiance.wavelength_nm, sensor.pixel.pitch_um, radiance.widths_nm)
+    return SpectralIrradiance(
+        radiance.values * factor, radiance.wavelength_nm, sensor.pixel.pitch_um, radiance.widths_nm
+    )

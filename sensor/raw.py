@@ -48,7 +48,9 @@ class RawImage:
         check_covers(self.cfa, np.shape(self.dn))
         require_range("gain_e_per_dn", self.gain_e_per_dn, 1e-12, 1e12, "give electrons per digital number")
         if not self.black_dn < self.white_dn:
-            raise InputError(f"black_dn: {self.black_dn!r} is not under white_dn {self.white_dn!r}; swap or correct them")
+            raise InputError(
+                f"black_dn: {self.black_dn!r} is not under white_dn {self.white_dn!r}; swap or correct them"
+            )
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -11,7 +11,9 @@ from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
 
 
-def electrons_per_irradiance(sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats, exposure_s: float) -> Floats:
+def electrons_per_irradiance(
+    sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats, exposure_s: float
+) -> Floats:
     """Electrons of each channel per unit irradiance in each band, shape (channel, band).
 
     Response x photons per joule x band width (its part inside the camera's window) x collecting area x time.

@@ -20,7 +20,10 @@ from studies.metrics import Quality, measure
 from studies.truth import Light, green_scale, neutral_electrons
 
 Develop = Callable[..., Picture]
-CAMERAS: dict[str, tuple[str, Develop]] = {"interleaved": ("rgbw", picture_interleaved), "bayer": ("bayer", picture_bayer)}
+CAMERAS: dict[str, tuple[str, Develop]] = {
+    "interleaved": ("rgbw", picture_interleaved),
+    "bayer": ("bayer", picture_bayer),
+}
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,8 @@ def demo(
     sensor: Annotated[list[str] | None, Parameter(negative_iterable=())] = None,
     level: Annotated[list[str] | None, Parameter(negative_iterable=())] = None,
     longest_exposure_s: float = 0.066,
-    spp: int = 256,
-    max_seconds: float = 60.0,
+    spp: int = 512,
+    max_seconds: float = 75.0,
     seed: int = 0,
 ) -> None:
     """Photograph one scene from moonlight to daylight with both cameras and write a report.
@@ -73,7 +73,12 @@ def demo(
         spp=spp,
         max_seconds=max_seconds,
     )
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         line = bar.add_task("start", total=1.0)
         outcome = job.run(task, lambda what, share: bar.update(line, description=what, completed=share))

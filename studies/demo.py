@@ -51,8 +51,8 @@ class Demo:
     levels: tuple[str, ...] | None = None
     longest_s: float = LONGEST_S
     seed: int = 0
-    spp: int = 256
-    max_seconds: float = 60.0
+    spp: int = 512
+    max_seconds: float = 75.0
 
 
 @dataclass(frozen=True)
@@ -202,9 +202,7 @@ def _photograph_level(
     return made
 
 
-def _cell(
-    camera: Camera, shot: Shot, expected_e: NDArray[np.float64], level: int, mc_share: float
-) -> dict[str, Any]:
+def _cell(camera: Camera, shot: Shot, expected_e: NDArray[np.float64], level: int, mc_share: float) -> dict[str, Any]:
     snr = shot.picture.snr
     return {
         "level": level,

@@ -40,6 +40,4 @@ def measure(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> Quality
         win_size=min(11, (min(picture.shape[:2]) - 1) // 2 * 2 + 1),
     )
     delta_e = deltaE_ciede2000(rgb2lab(picture), rgb2lab(truth))
-    return Quality(
-        psnr_db(picture, truth), float(ssim), float(np.median(delta_e)), float(np.percentile(delta_e, 95))
-    )
+    return Quality(psnr_db(picture, truth), float(ssim), float(np.median(delta_e)), float(np.percentile(delta_e, 95)))
