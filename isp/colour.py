@@ -61,12 +61,13 @@ def gray_world(
     """
     calibrated = neutral[green] / neutral
     if not usable.any():
-        return Balance(calibrated, ("calibrated",) * len(neutral))
+        return Balance(calibrated, tuple("calibrated" for _ in neutral))
     means = planes[usable].mean(axis=0)
     certain = (means >= LEAST_STANDARD_ERRORS * standard_errors) & (means > 0)
     certain &= bool(certain[green])
     gains = np.where(certain, means[green] / np.where(certain, means, 1.0), calibrated)
-    return Balance(gains, tuple("gray world" if sure else "calibrated" for sure in certain))
+    sources: list[BalanceSource] = ["gray world" if sure else "calibrated" for sure in certain]
+    return Balance(gains, tuple(sources))
 
 
 def neutral_response(letters: Sequence[str]) -> Floats:

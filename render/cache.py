@@ -26,7 +26,7 @@ def load_transport(folder: Path, scene: Scene, film: Film, settings: Mapping[str
     path = _path(folder, scene, film, settings)
     try:
         with np.load(path, allow_pickle=False) as entry:
-            arrays = {name: entry[name] if name in entry else None for name in _ARRAYS}
+            arrays: dict[str, Any] = {name: entry.get(name) for name in _ARRAYS}
             values = json.loads(str(entry["values"]))
             return Transport(
                 **arrays,

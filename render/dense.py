@@ -79,27 +79,28 @@ def _scatter(
     bsdf: Any, context: Any, interaction: Any, towards_light: Any, lobe: Any, angle: Any, wavelengths: list[Any]
 ) -> tuple[list[Any], Any, Any, list[Any], Any]:
     """Evaluate and sample a BSDF at all wavelengths within one virtual call: shared terms are then computed once."""
-    values, weights = [], []
-    pdf, sample, chosen = None, None, None
+    drawn = []
     for group in wavelengths:
         interaction.wavelengths = group
-        value, group_pdf, group_sample, weight = bsdf.eval_pdf_sample(context, interaction, towards_light, lobe, angle)
-        values.append(value)
-        weights.append(weight)
-        if pdf is None:
-            pdf, sample, chosen = group_pdf, group_sample, group_pdf != group_pdf
-        else:
-            chosen |= abs(group_pdf - pdf) > PDF_TOLERANCE * pdf
-            chosen |= abs(group_sample.pdf - sample.pdf) > PDF_TOLERANCE * sample.pdf
-            chosen |= group_sample.sampled_component != sample.sampled_component
-    return values, pdf, sample, weights, chosen
+        drawn.append(bsdf.eval_pdf_sample(context, interaction, towards_light, lobe, angle))
+    _, pdf, sample, _ = drawn[0]
+    chosen = dr.zeros(dr.mask_t(pdf))
+    for _, group_pdf, group_sample, _ in drawn[1:]:
+        chosen |= abs(group_pdf - pdf) > PDF_TOLERANCE * pdf
+        chosen |= abs(group_sample.pdf - sample.pdf) > PDF_TOLERANCE * sample.pdf
+        chosen |= group_sample.sampled_component != sample.sampled_component
+    return [value for value, *_ in drawn], pdf, sample, [weight for *_, weight in drawn], chosen
 
 
-def _largest(groups: list[Any]) -> Any:
-    top = dr.max(groups[0])
-    for group in groups[1:]:
-        top = dr.maximum(top, dr.max(group))
-    return top
+def _roulette(throughput: list[Any], eta: Any, depth: Any, sample: Any) -> tuple[list[Any], Any]:
+    """Russian roulette by the brightest wavelength, so that one decision serves all; gives the survivors."""
+    brightest = dr.max(throughput[0])
+    for group in throughput[1:]:
+        brightest = dr.maximum(brightest, dr.max(group))
+    survival = dr.minimum(brightest * dr.square(eta), 0.95)
+    plays = depth >= RR_DEPTH
+    factor = dr.select(plays, dr.rcp(survival), 1.0)
+    return [group * factor for group in throughput], (~plays | (sample < survival)) & (brightest != 0)
 
 
 @dr.syntax
@@ -149,11 +150,6 @@ def _trace(
         previous, previous_pdf = dr.detach(si), sample.pdf
         previous_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
         depth[si.is_valid()] += 1
-        brightest = _largest(throughput)
-        survival = dr.minimum(brightest * dr.square(eta), 0.95)
-        roulette = depth >= RR_DEPTH
-        survives = sampler.next_1d() < survival
-        for g in range(len(wavelengths)):
-            throughput[g][roulette] *= dr.rcp(survival)
-        active = go_on & (~roulette | survives) & (brightest != 0)
+        throughput, survives = _roulette(throughput, eta, depth, sampler.next_1d())
+        active = go_on & survives
     return result, chosen

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,59 @@ MOST_SPP = 1 << 16  # ceiling where only an error is asked for
 VISIBLE_SPP = 16  # samples a pixel to find where a light is seen directly
 
 
+@dataclass(frozen=True)
+class Limits:
+    """When a render stops: at whichever comes first; with none of the three after `DEFAULT_SPP` samples a pixel.
+
+    Attributes
+    ----------
+    spp : int or None
+    noise : float or None
+        Relative Monte Carlo error to reach.
+    max_seconds : float or None
+    seed : int
+    """
+
+    spp: int | None
+    noise: float | None
+    max_seconds: float | None
+    seed: int
+
+    def __post_init__(self) -> None:
+        if self.spp is not None:
+            require_range("spp", self.spp, 1, MOST_SPP, "give samples per pixel")
+        if self.noise is not None:
+            require_range("noise", self.noise, 1e-6, 10.0, "give a relative error such as 0.02")
+        if self.max_seconds is not None:
+            require_range("max_seconds", self.max_seconds, 1e-3, 1e7, "give seconds")
+        require_range("seed", self.seed, 0, 2**63, "give a whole number")
+
+    @property
+    def most_spp(self) -> int:
+        """Samples a pixel after which the render stops in any case."""
+        return self.spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
+
+    @property
+    def pass_spp(self) -> int:
+        """Samples a pixel of each pass."""
+        return PASS_SPP if self.most_spp == MOST_SPP else -(-self.most_spp // PASSES)
+
+    def stop(self, drawn: int, passes: int, error: float, seconds: float) -> Stop | None:
+        """Which limit is reached, None while none is."""
+        if drawn >= self.most_spp:
+            return "samples"
+        if self.noise is not None and passes >= PASSES and error <= self.noise:
+            return "noise"
+        if self.max_seconds is not None and seconds * (1 + 2 / passes) > self.max_seconds:
+            return "seconds"  # the next pair of passes would end after it
+        return None
+
+    def share(self, drawn: int, error: float, seconds: float) -> float:
+        """Share of the work done, 0 to 1: by the limit that is nearest."""
+        by_noise = (self.noise / error) ** 2 if self.noise and error else 0.0
+        return min(max(drawn / self.most_spp, seconds / (self.max_seconds or np.inf), by_noise), 1.0)
+
+
 @dataclass
 class _Sums:
     """Running sums of one group's passes (Welford), planes of (band, h, w); the only mutable state of a render."""
@@ -35,7 +88,7 @@ class _Sums:
     signed: Planes
     plane: Floats | None = None
     passes: int = 0
-    drawn: int = field(default=0)
+    drawn: int = 0
 
     def add(self, planes: Planes) -> None:
         self.passes += 1
@@ -100,13 +153,12 @@ def render(
         For a bad size, band or limit, a scene without light, or a material that picks lobes by wavelength.
     """
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
-    _check_limits(spp, noise, max_seconds, seed)
-    settings = {"spp": spp, "noise": noise, "max_seconds": max_seconds, "seed": seed}
-    if cache is not None and (found := load_transport(Path(cache), scene, film, settings)) is not None:
+    limits = Limits(spp, noise, max_seconds, seed)
+    if cache is not None and (found := load_transport(Path(cache), scene, film, asdict(limits))) is not None:
         return found
-    transport = _render(scene, film, spp, noise, max_seconds, seed, progress or (lambda done, error: None))
+    transport = _render(scene, film, limits, progress or (lambda done, error: None))
     if cache is not None:
-        save_transport(Path(cache), scene, film, settings, transport)
+        save_transport(Path(cache), scene, film, asdict(limits), transport)
     return transport
 
 
@@ -122,77 +174,47 @@ def _checked_film(
     return Film((int(size[0]), int(size[1])), nm, band_widths(nm, width_nm), int(max_depth))
 
 
-def _check_limits(spp: int | None, noise: float | None, max_seconds: float | None, seed: int) -> None:
-    if spp is not None:
-        require_range("spp", spp, 1, MOST_SPP, "give samples per pixel")
-    if noise is not None:
-        require_range("noise", noise, 1e-6, 10.0, "give a relative error such as 0.02")
-    if max_seconds is not None:
-        require_range("max_seconds", max_seconds, 1e-3, 1e7, "give seconds")
-    require_range("seed", seed, 0, 2**63, "give a whole number")
-
-
-def _render(
-    scene: Scene,
-    film: Film,
-    spp: int | None,
-    noise: float | None,
-    max_seconds: float | None,
-    seed: int,
-    progress: Progress,
-) -> Transport:
+def _render(scene: Scene, film: Film, limits: Limits, progress: Progress) -> Transport:
     start = time.perf_counter()
-    limit = spp or (MOST_SPP if noise or max_seconds else DEFAULT_SPP)
-    pass_spp = max(1, -(-limit // PASSES)) if spp or limit == DEFAULT_SPP else PASS_SPP
     loaded = [load_unit(scene, group, film) for group in scene.groups]
     shape = (film.wavelength_nm.size, *film.size)
-    sums = [_Sums(*(np.zeros(shape, dtype=np.float32) for _ in range(3))) for _ in loaded]
-    stopped_by: Stop = "samples"
-    for done in _pairs(loaded, sums, film, pass_spp, seed):
-        seconds = time.perf_counter() - start
-        error = _own_error(scene, film, sums)
-        drawn = sums[0].drawn
-        share = max(
-            drawn / limit,
-            seconds / max_seconds if max_seconds else 0.0,
-            (noise / error) ** 2 if noise and error else 0.0,
-        )
-        progress(min(share, 1.0), error)
-        if drawn >= limit:
-            break
-        if noise is not None and done >= PASSES and error <= noise:
-            stopped_by = "noise"
-            break
-        if max_seconds is not None and seconds * (1 + 2 / done) > max_seconds:  # the next pair would end after it
-            stopped_by = "seconds"
+    sums = [
+        _Sums(np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32)) for _ in loaded
+    ]
+    stopped_by: Stop | None = None
+    for done in _pairs(loaded, sums, film, limits):
+        seconds, error = time.perf_counter() - start, _own_error(scene, film, sums)
+        progress(limits.share(sums[0].drawn, error, seconds), error)
+        stopped_by = limits.stop(sums[0].drawn, done, error, seconds)
+        if stopped_by:
             break
     return Transport(
         radiance=np.stack([s.mean for s in sums]),
         half_difference=np.stack([s.signed / np.float32(s.passes) for s in sums]),
         variance=np.stack([s.variance for s in sums]),
-        irradiance=None
-        if sums[0].plane is None
-        else np.stack([s.plane / s.passes for s in sums if s.plane is not None]),
-        emitter_visible=_emitter_visible(scene, film, seed),
+        irradiance=np.stack([s.plane / s.passes for s in sums if s.plane is not None])
+        if scene.reference_plane
+        else None,
+        emitter_visible=_emitter_visible(scene, film, limits.seed),
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,
         width_nm=film.width_nm,
         spp=sums[0].drawn,
         passes=sums[0].passes,
-        stopped_by=stopped_by,
+        stopped_by=stopped_by or "samples",
         seconds=time.perf_counter() - start,
         integrator=integrator_name(),
         variant=variant(),
     )
 
 
-def _pairs(loaded: list[Any], sums: list[_Sums], film: Film, pass_spp: int, seed: int) -> Iterator[int]:
+def _pairs(loaded: list[Any], sums: list[_Sums], film: Film, limits: Limits) -> Iterator[int]:
     """Add passes two by two, so that even and odd halves stay equal; yields the passes done."""
     done = 0
     while True:
         for _ in range(2):
             for index, (mi_scene, total) in enumerate(zip(loaded, sums, strict=True)):
-                total.drawn += _one_pass(mi_scene, total, film, pass_spp, _pass_seed(seed, index, done))
+                total.drawn += _one_pass(mi_scene, total, film, limits.pass_spp, _pass_seed(limits.seed, index, done))
             done += 1
         yield done
 
@@ -242,8 +264,8 @@ def _own_error(scene: Scene, film: Film, sums: list[_Sums]) -> float:
     values = np.zeros_like(sums[0].mean)
     variance = np.zeros_like(values)
     for group, total in zip(scene.groups.values(), sums, strict=True):
-        emission = (group.spectrum * group.power).band_average(film.wavelength_nm, film.width_nm)
-        emission = emission.astype(np.float32)[:, None, None]
+        spectrum = (group.spectrum * group.power).band_average(film.wavelength_nm, film.width_nm)
+        emission = spectrum.astype(np.float32)[:, None, None]
         values += emission * total.mean
         variance += emission**2 * total.variance
     return relative_error(values, variance)

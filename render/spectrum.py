@@ -53,7 +53,7 @@ class Spectrum:
         return Spectrum(self.wavelength_nm, self.values * factor)
 
     def band_average(self, wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
-        """Mean over each band ``wavelength_nm +- width_nm / 2``, shape of `wavelength_nm`; exact for the linear pieces."""
+        """Mean over each band ``wavelength_nm +- width_nm / 2``, shape (band,); exact for the linear pieces."""
         centre, half = np.asarray(wavelength_nm, dtype=np.float64), np.asarray(width_nm, dtype=np.float64) / 2
         return (self._integral_to(centre + half) - self._integral_to(centre - half)) / (2 * half)
 

@@ -119,7 +119,7 @@ class Transport:
         return even, odd
 
     def illuminance_lux(self, luminance_cd_m2: float) -> float | None:
-        """Illuminance on the reference plane when the scene's own lights give a mean luminance; None without a plane."""
+        """Illuminance on the reference plane at a mean luminance under the scene's own lights; None without a plane."""
         if self.irradiance is None:
             return None
         coefficients = self._coefficients(None, None)
@@ -176,10 +176,8 @@ class Transport:
     def _combine(coefficients: Floats, planes: NDArray[np.float32]) -> NDArray[np.float32]:
         """Sum over groups, shape (band, h, w); in float64 band by band, rounded once."""
         result = np.empty(planes.shape[1:], dtype=np.float32)
-        for band in range(result.shape[0]):
-            result[band] = sum(
-                c * p.astype(np.float64) for c, p in zip(coefficients[:, band], planes[:, band], strict=True)
-            )
+        for band, factors in enumerate(coefficients.T):
+            result[band] = sum(c * plane.astype(np.float64) for c, plane in zip(factors, planes[:, band], strict=True))
         return result
 
     def _as_radiance(self, planes: NDArray[np.float32], error: float = 0.0) -> SpectralRadiance:

@@ -23,7 +23,7 @@ def grey(reflectance: float) -> Spectrum:
 
 
 def edge(centre_nm: float, width_nm: float, low: float, high: float) -> Spectrum:
-    """Reflectance that rises smoothly from `low` to `high` around `centre_nm`: yellows, oranges, reds (falls if swapped)."""
+    """Reflectance that rises smoothly from `low` to `high` around `centre_nm`: yellows, oranges, reds."""
     return Spectrum(_NM, low + (high - low) / (1 + np.exp(-(_NM - centre_nm) / width_nm)))
 
 

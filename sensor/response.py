@@ -33,7 +33,7 @@ def channel_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, expo
     planes = np.moveaxis(irradiance.values, -1, 0)
     flat = planes.reshape(planes.shape[0], -1)  # a view where the memory is band-planar
     electrons = weights.astype(flat.dtype) @ flat
-    return np.moveaxis(electrons.reshape(-1, *planes.shape[1:]), 0, -1).astype(np.float64)
+    return np.asarray(np.moveaxis(electrons.reshape(-1, *planes.shape[1:]), 0, -1), dtype=np.float64)
 
 
 def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:

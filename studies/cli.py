@@ -73,6 +73,8 @@ def demo(
         spp=spp,
         max_seconds=max_seconds,
     )
+    job.check(task)
+    out.mkdir(parents=True, exist_ok=True)  # a place that can't be written is told before the render, not after
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

@@ -76,9 +76,12 @@ class _Clock:
 
 def check(demo: Demo) -> None:
     """Raise `InputError` for anything in `demo` that can be told before the render."""
+    load(demo.scene)
     require_range("size", demo.size, 16, 4096, "give the picture's side in pixels")
     require_range("seed", demo.seed, 0, 2**31, "give a whole number")
     require_range("longest exposure", demo.longest_s, 1e-9, 1e4, "give seconds above 0")
+    require_range("spp", demo.spp, 1, 1 << 16, "give samples per pixel")
+    require_range("max_seconds", demo.max_seconds, 1e-3, 1e7, "give seconds")
     for name in demo.sensors:
         preset(name)
     for level in demo.levels or ():

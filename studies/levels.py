@@ -7,7 +7,7 @@ from render.transport import Transport
 from scenes.levels import LightLevel
 
 UNITS = ("cd/m2", "lux")
-_FORM = re.compile(r"\s*([-+0-9.eE]+)\s*(.*?)\s*$")
+_FORM = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 
 
 def parse_level(text: str) -> tuple[float, str]:
@@ -19,12 +19,9 @@ def parse_level(text: str) -> tuple[float, str]:
         For a missing number, an unknown unit, or a level that is not above 0.
     """
     match = _FORM.match(text)
-    try:
-        value = float(match[1]) if match else float("nan")
-    except ValueError:
-        value = float("nan")
-    if match is None or value != value:
+    if match is None:
         raise InputError(f"level: {text!r} is not a light level; allowed: a number and a unit; write 25cd/m2 or 500lux")
+    value = float(match[1])
     unit = match[2].replace("²", "2")
     if unit not in UNITS:
         raise unknown("level: unit", unit, UNITS)
