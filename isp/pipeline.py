@@ -54,6 +54,7 @@ def develop_interleaved(
     patch: int = PATCH,
     sigma_d: float = SIGMA_D,
     sigma_s: float = SIGMA_S,
+    substitution_snr: float = SUBSTITUTION_SNR,
 ) -> Image:
     """Develop an interleaved RGBW raw image; `picture_interleaved` gives the decisions beside the picture.
 
@@ -68,6 +69,8 @@ def develop_interleaved(
         too dark for Gray World. The project's own curves under D65 by default.
     neighbourhood, patch, sigma_d, sigma_s
         Of `isp.interleaved.reconstruct`.
+    substitution_snr : float
+        W replaces the luminance where the frame's green SNR is under it; 0 never, inf always.
 
     Returns
     -------
@@ -87,6 +90,7 @@ def develop_interleaved(
         patch=patch,
         sigma_d=sigma_d,
         sigma_s=sigma_s,
+        substitution_snr=substitution_snr,
     ).rgb
 
 
@@ -99,6 +103,7 @@ def picture_interleaved(
     patch: int = PATCH,
     sigma_d: float = SIGMA_D,
     sigma_s: float = SIGMA_S,
+    substitution_snr: float = SUBSTITUTION_SNR,
 ) -> Picture:
     """As `develop_interleaved`, with the decisions: eqs. (1)-(6), Gray World, matrix, luminance substitution."""
     letters = _require(raw, ("R", "G", "B", "W"))
@@ -108,7 +113,7 @@ def picture_interleaved(
     balanced = _clip_highlights(raw, planes * balance.gains)
     rgb = balanced[..., :3] @ _checked(matrix).T
     snr = green_snr(raw, planes)
-    substituted = snr < SUBSTITUTION_SNR
+    substituted = snr < substitution_snr
     if substituted:
         rgb = substitute_luminance(rgb, balanced[..., 3], ~_saturated_nearby(raw, "W"))
     return Picture(rgb, dict(zip(letters, balance.sources, strict=True)), snr, substituted, result.engine)

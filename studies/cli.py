@@ -47,7 +47,7 @@ def demo(
     size
         Side of the picture in pixels.
     sensor
-        Sensor preset; may be given several times (table1_output and low_noise by default).
+        Sensor preset; may be given several times (low_noise and table1_output by default).
     level
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); may be given
         several times (seven levels from moonlight to daylight by default).

@@ -47,7 +47,7 @@ class Demo:
 
     scene: str = "still_life"
     size: int = 256
-    sensors: tuple[str, ...] = ("table1_output", "low_noise")
+    sensors: tuple[str, ...] = ("low_noise", "table1_output")
     levels: tuple[str, ...] | None = None
     longest_s: float = LONGEST_S
     seed: int = 0
@@ -127,7 +127,9 @@ def run(demo: Demo, step: Step = lambda what, share: None) -> Outcome:
     truth = _truth(transport.relight(luminance_cd_m2=levels[0].luminance_cd_m2), transport, light)
     pictures = {name: to_bytes(picture) for name, picture in {**encoded, "truth": truth}.items()}
     results = _results(demo, transport, levels, cells, clock)
-    sheet = [[encoded[_name(i, demo.sensors[0], camera)] for i in range(len(levels))] for camera in CAMERAS]
+    sheet = [
+        [encoded[_name(i, sensor, camera)] for i in range(len(levels))] for sensor in demo.sensors for camera in CAMERAS
+    ]
     return Outcome(results, pictures, to_bytes(contact_sheet(sheet), "PNG"))
 
 
