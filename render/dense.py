@@ -23,8 +23,9 @@ PDF_TOLERANCE = 1e-3
 def dense_path(mi: Any) -> Any:
     """Build the integrator class for the variant that is set; register it as ``densepath``.
 
-    Properties of the plug-in: ``wavelength_nm`` and ``width_nm`` (comma-separated), ``max_depth``. Channels after the
-    first (alpha-less luminance film) hold the bands, and one more the share of paths whose BSDF chose by wavelength.
+    Properties of the plug-in: ``wavelength_nm`` and ``width_nm`` (comma-separated, a multiple of four), ``max_depth``.
+    Channels after the first (alpha-less luminance film) hold the bands, and one more the share of paths whose BSDF
+    chose by wavelength.
     """
 
     class DensePath(mi.SamplingIntegrator):  # type: ignore[misc]
@@ -35,22 +36,22 @@ def dense_path(mi: Any) -> Any:
             self.widths = np.array([float(x) for x in str(props["width_nm"]).split(",")])
 
         def aov_names(self) -> list[str]:
-            return [f"band{i:04d}" for i in range(self.centres.size)] + ["wavelength_dependent_choice"]
+            return [*(f"band{i:04d}" for i in range(self.centres.size)), "wavelength_dependent_choice"]
 
         def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
             wavelengths = _band_wavelengths(mi, self.centres, self.widths, sampler.next_1d(active))
             result, chosen = _trace(mi, scene, sampler, ray, wavelengths, self.max_depth, mi.Bool(active))
-            bands = [value for group in result for value in group][: self.centres.size]
+            bands = [value for group in result for value in group]
             return mi.Spectrum(0.0), mi.Bool(True), [*bands, dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
 
     return DensePath
 
 
 def _band_wavelengths(mi: Any, centres: Any, widths: Any, sample: Any) -> list[Any]:
-    """Wavelengths of a path, four bands an entry; the last entry is filled up with the last band."""
-    padded = np.concatenate([np.arange(centres.size), np.full(-centres.size % LANES, centres.size - 1)])
+    """Wavelengths of a path, four bands an entry. They reach the kernel as data: other bands don't compile it anew."""
     offset = sample - 0.5
-    lanes = [dr.fma(offset, float(widths[i]), float(centres[i])) for i in padded]
+    pairs = zip(centres.tolist(), widths.tolist(), strict=True)
+    lanes = [dr.fma(offset, dr.opaque(mi.Float, width), dr.opaque(mi.Float, centre)) for centre, width in pairs]
     return [mi.Spectrum(*lanes[i : i + LANES]) for i in range(0, len(lanes), LANES)]
 
 

@@ -4,7 +4,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from render.dense import dense_path
+import numpy as np
+from numpy.typing import NDArray
+
+from render.dense import LANES, dense_path
 from render.errors import InputError
 from render.jit import backend
 from render.scene import Node, Scene, uniform_node
@@ -69,7 +72,6 @@ def load_unit(scene: Scene, group: str, film: Film) -> Any:
             "sampler": {"type": "multijitter"},
         }
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
-    description["integrator"] = _integrator(film)
     try:
         return mi.load_dict(description)
     except RuntimeError as error:
@@ -83,7 +85,6 @@ def load_direct(scene: Scene, film: Film) -> Any:
     description = scene.lit({name: uniform_node(1.0) for name in scene.groups})
     recorder = _recorder(one_band, film.size)
     description["sensor"] = {**description["sensor"], "film": recorder, "sampler": {"type": "multijitter"}}
-    description["integrator"] = _integrator(one_band)
     return mitsuba_module().load_dict(description)
 
 
@@ -99,12 +100,27 @@ def _recorder(film: Film, size: tuple[int, int]) -> Node:
     return node
 
 
-def _integrator(film: Film) -> Node:
+def integrators(film: Film, most_bands: int) -> list[Any]:
+    """Integrators that together give all bands in order, each at most `most_bands` (a multiple of four).
+
+    Compile time grows faster than the number of bands, and parts of one size share a kernel. A part is filled up to a
+    multiple of four by repeating its last band; `parts` tells how many count.
+    """
+    mi = mitsuba_module()
     if backend() == "numpy":
-        return {"type": "path", "max_depth": film.max_depth}
-    return {
-        "type": "densepath",
-        "max_depth": film.max_depth,
-        "wavelength_nm": ",".join(map(repr, film.wavelength_nm.tolist())),
-        "width_nm": ",".join(map(repr, film.width_nm.tolist())),
-    }
+        return [mi.load_dict({"type": "path", "max_depth": film.max_depth})]
+    made = []
+    for part in parts(film, most_bands):
+        padded = np.concatenate([part, np.full(-part.size % LANES, part[-1])])
+        bands = {
+            name: ",".join(map(repr, values[padded].tolist()))
+            for name, values in (("wavelength_nm", film.wavelength_nm), ("width_nm", film.width_nm))
+        }
+        made.append(mi.load_dict({"type": "densepath", "max_depth": film.max_depth, **bands}))
+    return made
+
+
+def parts(film: Film, most_bands: int) -> list[NDArray[np.int64]]:
+    """Indices of the bands in each part, as even as can be: their sizes differ by one at most."""
+    count = film.wavelength_nm.size
+    return np.array_split(np.arange(count), -(-count // most_bands))

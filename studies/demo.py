@@ -2,7 +2,6 @@
 
 import json
 import os
-import platform
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -17,8 +16,6 @@ from numpy.typing import NDArray
 from isp.colour import encode_srgb
 from render.engine import render
 from render.errors import InputError, require_range
-from render.jit import LIBLLVM, backend, dr
-from render.loader import variant
 from render.radiance import SpectralRadiance
 from render.transport import Transport
 from scenes.catalog import load
@@ -32,6 +29,7 @@ from studies.exposure import LONGEST_S, RULE, auto_exposure_s
 from studies.levels import parse_level, resolve_level
 from studies.pictures import contact_sheet, to_bytes
 from studies.report import render_report
+from studies.results import environment, level_facts, notes, render_facts, sensor_facts
 from studies.truth import Light, light_in_bands, true_srgb
 
 # 20 bands of 20 nm: every spectrum in the demo is smooth, and the render costs half of 40 bands.
@@ -52,7 +50,7 @@ class Demo:
     longest_s: float = LONGEST_S
     seed: int = 0
     spp: int = 512
-    max_seconds: float = 75.0
+    max_seconds: float = 65.0
 
 
 @dataclass(frozen=True)
@@ -229,73 +227,20 @@ def _cell(camera: Camera, shot: Shot, expected_e: NDArray[np.float64], level: in
 def _results(
     demo: Demo, transport: Transport, levels: Sequence[LightLevel], cells: list[dict[str, Any]], clock: _Clock
 ) -> dict[str, Any]:
-    own = transport.relight()
     return {
         "rodcone": metadata.version("rodcone"),
         "seed": demo.seed,
         "scene": demo.scene,
         "size": [demo.size, demo.size],
         "environment": environment(),
-        "render": {
-            "integrator": transport.integrator,
-            "variant": transport.variant,
-            "seconds": transport.seconds,
-            "spp": transport.spp,
-            "passes": transport.passes,
-            "stopped_by": transport.stopped_by,
-            "relative_mc_error": own.relative_mc_error,
-            "bands": transport.wavelength_nm.size,
-            "first_nm": float(transport.wavelength_nm[0]),
-            "last_nm": float(transport.wavelength_nm[-1]),
-            "width_nm": float(transport.width_nm[0]),
-        },
+        "render": render_facts(transport),
         "exposure_rule": RULE.format(longest=demo.longest_s * 1e3),
         "display_white": "the scene's 99th percentile of luminance, visible lamps excluded, is shown at 90 % of white",
-        "levels": [
-            {**asdict(level), "illuminance_lux": transport.illuminance_lux(level.luminance_cd_m2)} for level in levels
-        ],
-        "sensors": [_sensor(name) for name in demo.sensors],
+        "levels": level_facts(levels, transport),
+        "sensors": [sensor_facts(name) for name in demo.sensors],
         "cameras": list(CAMERAS),
         "cells": cells,
         "stages": [{"name": name, "seconds": seconds} for name, seconds in clock.stages.items()],
         "left_out": list(LEFT_OUT),
-        "notes": _notes(),
+        "notes": notes(),
     }
-
-
-def _sensor(name: str) -> dict[str, Any]:
-    sensor = preset(name)
-    pixel = sensor.pixel
-    return {
-        "name": name,
-        "read_noise_e": pixel.read_noise_e,
-        "dsnu_e": pixel.dsnu_e,
-        "full_well_e": pixel.full_well_e,
-        "prnu": pixel.prnu,
-        "pitch_um": pixel.pitch_um,
-        "f_number": sensor.lens.f_number,
-        "bits": sensor.bits,
-    }
-
-
-def environment() -> dict[str, Any]:
-    """Versions and engine that made the numbers."""
-    packages = {name: metadata.version(name) for name in ("mitsuba", "drjit", "numpy", "scipy", "scikit-image")}
-    return {
-        "python": platform.python_version(),
-        **packages,
-        "llvm": LIBLLVM.name if LIBLLVM else "none",
-        "variant": variant(),
-        "engine": backend(),
-        "threads": dr.thread_count() if backend() == "llvm" else 1,
-        "platform": platform.platform(),
-    }
-
-
-def _notes() -> list[str]:
-    if backend() == "numpy":
-        return [
-            "Neither LLVM nor CUDA answered: stock path + specfilm rendered in scalar_spectral, and the reconstruction "
-            "ran its NumPy form."
-        ]
-    return []

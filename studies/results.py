@@ -1,0 +1,75 @@
+"""What a study found, as plain data: the content of `results.json`, and what the report shows."""
+
+import platform
+from collections.abc import Sequence
+from dataclasses import asdict
+from importlib import metadata
+from typing import Any
+
+from render.jit import LIBLLVM, backend, dr
+from render.loader import variant
+from render.transport import Transport
+from scenes.levels import LightLevel
+from sensor.presets import preset
+
+
+def render_facts(transport: Transport) -> dict[str, Any]:
+    """How the render was made, and the error it reached under the scene's own lights."""
+    return {
+        "integrator": transport.integrator,
+        "variant": transport.variant,
+        "seconds": transport.seconds,
+        "spp": transport.spp,
+        "passes": transport.passes,
+        "stopped_by": transport.stopped_by,
+        "relative_mc_error": transport.relight().relative_mc_error,
+        "bands": transport.wavelength_nm.size,
+        "first_nm": float(transport.wavelength_nm[0]),
+        "last_nm": float(transport.wavelength_nm[-1]),
+        "width_nm": float(transport.width_nm[0]),
+    }
+
+
+def level_facts(levels: Sequence[LightLevel], transport: Transport) -> list[dict[str, Any]]:
+    """Each level in cd/m^2 and, where the scene states a plane, in lux."""
+    return [{**asdict(level), "illuminance_lux": transport.illuminance_lux(level.luminance_cd_m2)} for level in levels]
+
+
+def sensor_facts(name: str) -> dict[str, Any]:
+    """The numbers of a preset that a reader of the report wants."""
+    sensor = preset(name)
+    pixel = sensor.pixel
+    return {
+        "name": name,
+        "read_noise_e": pixel.read_noise_e,
+        "dsnu_e": pixel.dsnu_e,
+        "full_well_e": pixel.full_well_e,
+        "prnu": pixel.prnu,
+        "pitch_um": pixel.pitch_um,
+        "f_number": sensor.lens.f_number,
+        "bits": sensor.bits,
+    }
+
+
+def environment() -> dict[str, Any]:
+    """Versions and engine that made the numbers."""
+    packages = {name: metadata.version(name) for name in ("mitsuba", "drjit", "numpy", "scipy", "scikit-image")}
+    return {
+        "python": platform.python_version(),
+        **packages,
+        "llvm": LIBLLVM.name if LIBLLVM else "none",
+        "variant": variant(),
+        "engine": backend(),
+        "threads": dr.thread_count() if backend() == "llvm" else 1,
+        "platform": platform.platform(),
+    }
+
+
+def notes() -> list[str]:
+    """What fell back, in words."""
+    if backend() == "numpy":
+        return [
+            "Neither LLVM nor CUDA answered: stock path + specfilm rendered in scalar_spectral, and the reconstruction "
+            "ran its NumPy form."
+        ]
+    return []
