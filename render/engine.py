@@ -67,13 +67,13 @@ class Limits:
         """Samples a pixel of each pass."""
         return PASS_SPP if self.most_spp == MOST_SPP else -(-self.most_spp // PASSES)
 
-    def stop(self, drawn: int, passes: int, error: float, seconds: float) -> Stop | None:
+    def stop(self, drawn: int, passes: int, error: float, seconds: float, pass_seconds: float) -> Stop | None:
         """Which limit is reached, None while none is."""
         if drawn >= self.most_spp:
             return "samples"
         if self.noise is not None and passes >= PASSES and error <= self.noise:
             return "noise"
-        if self.max_seconds is not None and seconds * (1 + 2 / passes) > self.max_seconds:
+        if self.max_seconds is not None and seconds + 2 * pass_seconds > self.max_seconds:
             return "seconds"  # the next pair of passes would end after it
         return None
 
@@ -186,10 +186,10 @@ def _render(scene: Scene, film: Film, limits: Limits, progress: Progress) -> Tra
         _Sums(np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32)) for _ in loaded
     ]
     stopped_by: Stop | None = None
-    for done in _pairs(loaded, sums, film, limits):
+    for done, pass_seconds in _pairs(loaded, sums, film, limits):
         seconds, error = time.perf_counter() - start, _own_error(scene, film, sums)
         progress(limits.share(sums[0].drawn, error, seconds), error)
-        stopped_by = limits.stop(sums[0].drawn, done, error, seconds)
+        stopped_by = limits.stop(sums[0].drawn, done, error, seconds, pass_seconds)
         if stopped_by:
             break
     return Transport(
@@ -212,15 +212,19 @@ def _render(scene: Scene, film: Film, limits: Limits, progress: Progress) -> Tra
     )
 
 
-def _pairs(loaded: list[Any], sums: list[_Sums], film: Film, limits: Limits) -> Iterator[int]:
-    """Add passes two by two, so that even and odd halves stay equal; yields the passes done."""
+def _pairs(loaded: list[Any], sums: list[_Sums], film: Film, limits: Limits) -> Iterator[tuple[int, float]]:
+    """Add passes two by two, so that even and odd halves stay equal.
+
+    Yields the passes done, and the seconds of the last one: the second of a pair, which compiles nothing.
+    """
     done = 0
     while True:
         for _ in range(2):
+            start = time.perf_counter()
             for index, (mi_scene, total) in enumerate(zip(loaded, sums, strict=True)):
                 total.drawn += _one_pass(mi_scene, total, film, limits.pass_spp, _pass_seed(limits.seed, index, done))
             done += 1
-        yield done
+        yield done, time.perf_counter() - start
 
 
 def _one_pass(mi_scene: Any, total: _Sums, film: Film, pass_spp: int, seed: int) -> int:
