@@ -92,7 +92,7 @@ class Scene:
 
     def lit(self, emission: Mapping[str, Node]) -> Node:
         """Plain dict with the named groups at the given emission (a Mitsuba spectrum); other groups are removed."""
-        result: Node = dict(self.geometry)
+        result: Node = _copy(self.geometry)
         for name, group in self.groups.items():
             for path in group.emitters:
                 _replace_emitter(result, path.split("/"), emission.get(name))
@@ -129,13 +129,19 @@ def _emitter_paths(node: Node, prefix: str = "") -> dict[str, str]:
     return found
 
 
+def _copy(value: Any) -> Any:
+    """Copy nested dicts and lists, so that a description shares none with its scene."""
+    if isinstance(value, dict):
+        return {key: _copy(item) for key, item in value.items()}
+    return list(value) if isinstance(value, list) else value
+
+
 def _replace_emitter(node: Node, path: list[str], emission: Node | None) -> None:
-    """Give the emitter at `path` its emission, or remove it; copies each dict on the way, so that none is shared."""
-    key = path[0]
-    if len(path) > 1:
-        node[key] = dict(node[key])
-        _replace_emitter(node[key], path[1:], emission)
-    elif emission is None:
+    """Give the emitter at `path` its emission, or remove it."""
+    *way, key = path
+    for step in way:
+        node = node[step]
+    if emission is None:
         del node[key]
     else:
-        node[key] = {**node[key], EMISSION_PARAMETER[node[key]["type"]]: emission}
+        node[key][EMISSION_PARAMETER[node[key]["type"]]] = emission

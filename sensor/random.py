@@ -61,7 +61,8 @@ def normals(key: int, term: Term, shape: tuple[int, int]) -> NDArray[np.float64]
 def poisson(key: int, term: Term, mean: NDArray[np.float64]) -> NDArray[np.int64]:
     """Exact Poisson draw for each pixel of `mean` (h, w); one stream a row."""
     draws = np.empty(mean.shape, dtype=np.int64)
+    words = np.array([key, 0], dtype=np.uint64)  # a plain list with a large integer would go through float64
     for row, row_mean in enumerate(mean):
-        stream = np.random.Philox(key=[key, 0], counter=[0, 0, row, int(term)])
+        stream = np.random.Philox(key=words, counter=np.array([0, 0, row, int(term)], dtype=np.uint64))
         draws[row] = np.random.Generator(stream).poisson(row_mean)
     return draws

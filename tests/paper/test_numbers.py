@@ -1,0 +1,120 @@
+"""The numbers that Parmar & Wandell (2009) give, and what is exact about them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from sensor.cfa import RGBW, mask
+from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.device import Device
+from sensor.optics import form_image
+from sensor.readout import read_out
+from sensor.response import channel_electrons, expected_electrons
+
+MOONLIGHT_CD_M2 = 0.036
+FIGURE_2_NM = np.arange(400.0, 701.0, 10.0)  # 400-700 nm, where the paper shows its curves
+
+
+def camera(pitch_um, f_number):
+    pixel = PixelConfig(pitch_um, 1.0, full_well_e=1e6, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
+    return SensorConfig(pixel, LensConfig(f_number))
+
+
+def scene(light, luminance_cd_m2, nm=FIGURE_2_NM, shape=(2, 2)):
+    values = illuminant(light).band_average(nm, np.full(nm.size, nm[1] - nm[0]))
+    values = np.broadcast_to(values, (*shape, nm.size))
+    unit = SpectralRadiance(values, nm).luminance()[0, 0]
+    return SpectralRadiance(values * (luminance_cd_m2 / unit), nm)
+
+
+def decibels(ratio):
+    return 20 * np.log10(ratio)
+
+
+def test_moonlight_through_f_5_6_is_10_photons_a_square_micrometre_and_second():
+    photons = form_image(scene("D65", MOONLIGHT_CD_M2), camera(2.0, 5.6)).photons()[0, 0]
+    assert photons == pytest.approx(10.0, rel=5e-3)  # exact: 9.97; 0.0361 cd/m^2 would be 10.00
+
+
+def test_moonlight_is_one_photon_in_2_um_and_25_ms():
+    photons = form_image(scene("D65", MOONLIGHT_CD_M2), camera(2.0, 5.6)).photons()[0, 0]
+    assert photons * 2.0**2 * 0.025 == pytest.approx(1.0, rel=5e-3)
+
+
+def test_1000_photons_are_30_db_in_closed_form():
+    assert decibels(1000 / np.sqrt(1000)) == pytest.approx(30.0, rel=1e-12)
+
+
+def test_1000_electrons_read_out_have_30_db():
+    sensor, shape = replace(camera(2.0, 4.0), bits=16), (512, 512)
+    flat = Device(np.ones(shape), np.zeros(shape))
+    rng = np.random.default_rng(1)
+    sensor = replace(sensor, pixel=replace(sensor.pixel, full_well_e=2000.0))  # 33 DN an electron: no rounding to see
+    first, second = (read_out(np.full(shape, 1000.0), sensor, flat, 0.01, rng).electrons for _ in range(2))
+    snr = (first.mean() + second.mean()) / 2 / (np.std(first - second) / np.sqrt(2))
+    # the spread of n differences has the relative error 1/sqrt(2 n); 4 of them: false-alarm rate 6.3e-5
+    assert snr == pytest.approx(np.sqrt(1000), rel=4 / np.sqrt(2 * first.size) + 1e-5)
+
+
+def test_6_um_against_2_um_is_9_54_db_in_closed_form():
+    assert decibels(np.sqrt(6.0**2 / 2.0**2)) == pytest.approx(9.542425, abs=1e-6)
+
+
+@pytest.mark.parametrize("letter", "RGBW")
+def test_6_um_against_2_um_is_9_54_db_of_two_sensors_at_100_cd_m2_and_f_4(letter):
+    # Figure 1b. Shot noise alone: the SNR is the root of the electrons.
+    radiance = scene("D65", 100.0)
+    large, small = (
+        expected_electrons(form_image(radiance, sensor), sensor, 0.01)[mask(RGBW, letter, (2, 2))][0]
+        for sensor in (camera(6.0, 4.0), camera(2.0, 4.0))
+    )
+    assert decibels(np.sqrt(large) / np.sqrt(small)) == pytest.approx(9.542425, abs=1e-6)
+
+
+def test_6_um_against_2_um_is_9_54_db_as_read_out():
+    shape, rng, snr = (512, 512), np.random.default_rng(2), []
+    for pitch_um in (6.0, 2.0):
+        sensor = camera(pitch_um, 4.0)
+        one_tile = expected_electrons(form_image(scene("D65", 100.0), sensor), sensor, 0.01)
+        green_e = float(one_tile[mask(RGBW, "G", (2, 2))][0])
+        sensor = replace(sensor, bits=16, pixel=replace(sensor.pixel, full_well_e=2 * green_e))
+        flat = Device(np.ones(shape), np.zeros(shape))
+        first, second = (read_out(np.full(shape, green_e), sensor, flat, 0.01, rng).electrons for _ in range(2))
+        snr.append((first.mean() + second.mean()) / np.sqrt(2) / np.std(first - second))
+    # two spreads, each with the relative error 1/sqrt(2 n): 4 of their quadrature in dB, false-alarm rate 6.3e-5
+    assert decibels(snr[0] / snr[1]) == pytest.approx(9.542425, abs=decibels(1 + 4 / np.sqrt(shape[0] * shape[1])))
+
+
+def ratios(light, nm):
+    """Electrons of W over those of R, G and B."""
+    sensor = camera(2.0, 4.0)
+    red, green, blue, white = channel_electrons(form_image(scene(light, 1.0, nm), sensor), sensor, 1.0)[0, 0]
+    return white / red, white / green, white / blue
+
+
+@pytest.mark.parametrize(
+    ("light", "nm", "exact"),  # band means; the published curves give these ratios
+    [
+        ("E", np.arange(380.5, 780.0), (10.16, 5.85, 13.81)),
+        ("D65", np.arange(380.5, 780.0), (9.80, 4.88, 10.84)),
+        ("D65", np.arange(400.5, 700.0), (7.90, 3.93, 8.76)),
+    ],
+    ids=["E 380-780 nm", "D65 380-780 nm", "D65 400-700 nm"],
+)
+def test_w_gathers_the_exact_multiple_of_each_colour(light, nm, exact):
+    np.testing.assert_allclose(ratios(light, nm), exact, rtol=0.03)
+
+
+def test_about_6_times_g_and_10_times_r_and_b_is_the_electron_ratio_in_equal_energy_light():
+    red, green, blue = ratios("E", np.arange(380.5, 780.0))
+    assert round(green) == 6  # exact: 5.85
+    assert round(red) == 10  # exact: 10.16
+    assert 10 < blue < 14.3  # "about 10" understates it: exact 13.81, and 10.84 in daylight
+
+
+def test_where_shot_noise_rules_w_s_snr_is_2_to_3_7_times_a_colour_s():
+    roots = np.sqrt([ratios("D65", np.arange(400.5, 700.0)), ratios("E", np.arange(380.5, 780.0))])
+    np.testing.assert_allclose(roots, [[2.81, 1.98, 2.96], [3.19, 2.42, 3.72]], rtol=0.015)  # half of 3 per cent

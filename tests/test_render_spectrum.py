@@ -1,0 +1,143 @@
+"""Spectra: exact averages of linear pieces, and one-line complaints about bad points and bands."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from render.errors import InputError
+from render.photometry import LIGHT_M_S, PLANCK_J_S
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, black_body, flat
+
+BOLTZMANN_J_K = 1.380649e-23  # exact, SI 2019
+WIEN_NM_K = 2.897771955e6  # CODATA 2018
+TENT = Spectrum(np.array([400.0, 500.0, 700.0]), np.array([0.0, 1.0, 0.0]))
+
+
+def complaint(call, *args):
+    with pytest.raises(InputError) as caught:
+        call(*args)
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+@pytest.mark.parametrize(
+    ("centre", "width", "mean"),
+    [
+        (450.0, 100.0, 0.5),  # the rising side alone
+        (450.0, 20.0, 0.5),
+        (425.0, 1e-6, 0.25),  # a point
+        (600.0, 200.0, 0.5),  # the falling side alone
+        (650.0, 50.0, 0.25),
+        (500.0, 20.0, (0.95 + 0.975) / 2),  # over the top: a mean of two trapezoids
+        (550.0, 300.0, 0.5),  # all of it: area 150
+        (400.0, 100.0, 0.125),  # half outside: area 12.5 over 100
+        (400.0, 400.0, (50 + 75) / 400),
+        (1000.0, 1400.0, (75.0 + 25.0 + 12.5 + 37.5 - 50.0 + 50.0) / 1400),  # wider than the spectrum: area 150
+        (350.0, 100.0, 0.0),  # ends where it starts
+        (200.0, 50.0, 0.0),
+        (900.0, 50.0, 0.0),
+    ],
+)
+def test_a_band_average_of_linear_pieces_is_exact(centre, width, mean):
+    assert TENT.band_average(centre, width) == pytest.approx(mean, rel=1e-8, abs=1e-13)
+
+
+def test_a_band_across_a_point_of_uneven_spacing_weighs_its_pieces_by_width():
+    spectrum = Spectrum(np.array([400.0, 403.0, 410.0, 500.0]), np.array([2.0, 8.0, 1.0, 1.0]))
+    area = 5.0 * 3 + 4.5 * 7 + 1.0 * 10  # trapezoids up to 420 nm
+    assert spectrum.band_average(410.0, 20.0) == pytest.approx(area / 20, rel=1e-14)
+
+
+@given(
+    start=st.floats(200, 500),
+    steps=st.lists(st.floats(0.01, 200), min_size=1, max_size=12),
+    seed=st.integers(0, 2**32 - 1),
+    cuts=st.integers(1, 40),
+)
+@settings(deadline=None, derandomize=True, max_examples=200)
+def test_bands_that_fill_the_spectrum_sum_to_its_integral(start, steps, seed, cuts):
+    nm = start + np.concatenate([[0.0], np.cumsum(steps)])
+    values = np.random.default_rng(seed).uniform(0, 3, nm.size)
+    edges = np.linspace(nm[0] - 7.0, nm[-1] + 11.0, cuts + 1)
+    averages = Spectrum(nm, values).band_average((edges[1:] + edges[:-1]) / 2, np.diff(edges))
+    assert (averages * np.diff(edges)).sum() == pytest.approx(np.trapezoid(values, nm), rel=1e-10, abs=1e-9)
+
+
+def test_a_band_average_has_the_shape_of_the_bands_and_one_width_serves_all():
+    assert flat(3.0).band_average(DEFAULT_WAVELENGTH_NM, 10.0) == pytest.approx(np.full(40, 3.0), rel=1e-13)
+    assert TENT.band_average([], []).shape == (0,)
+
+
+def test_default_bands_fill_the_visible_range():
+    assert (DEFAULT_WAVELENGTH_NM[0] - 5, DEFAULT_WAVELENGTH_NM[-1] + 5) == (380.0, 780.0)
+    assert DEFAULT_WAVELENGTH_NM.size == 40
+
+
+def test_a_spectrum_times_a_number_keeps_its_points():
+    assert np.array_equal((TENT * 2.5).values, [0.0, 2.5, 0.0])
+    assert np.array_equal((TENT * 2.5).wavelength_nm, TENT.wavelength_nm)
+
+
+def test_a_spectrum_holds_its_own_copy_of_the_points():
+    nm, values = np.array([400.0, 500.0]), np.array([1.0, 1.0])
+    spectrum = Spectrum(nm, values)
+    values[:], nm[:] = 7.0, [1.0, 2.0]
+    assert spectrum.band_average(450.0, 10.0) == 1.0
+
+
+@pytest.mark.parametrize("nm", [[500.0], [500.0, 500.0], [500.0, 400.0], [[400.0, 500.0]], [400.0, np.nan], []])
+def test_wavelengths_that_do_not_increase_are_refused_with_their_values(nm):
+    text = complaint(Spectrum, np.array(nm), np.ones_like(np.array(nm)))
+    assert text.startswith(f"wavelength_nm: {nm!r} is not allowed; give two or more strictly increasing")
+
+
+@pytest.mark.parametrize("values", [[1.0], [1.0, -0.1], [1.0, np.nan], [np.inf, 1.0], [1.0, 1.0, 1.0]])
+def test_values_that_are_not_finite_positive_or_one_a_wavelength_are_refused(values):
+    text = complaint(Spectrum, np.array([400.0, 500.0]), np.array(values))
+    assert "spectrum values" in text
+    assert "2 finite numbers >= 0, one a wavelength; correct them" in text
+
+
+def test_band_widths_are_the_spacing_of_even_centres():
+    assert np.array_equal(band_widths(np.arange(400.0, 701.0, 10.0), None), np.full(31, 10.0))
+    assert np.array_equal(band_widths([500.0, 540.0], None), [40.0, 40.0])
+
+
+def test_band_widths_given_are_kept_and_one_width_serves_all():
+    assert np.array_equal(band_widths([400.0, 500.0, 650.0], [1.0, 2.0, 3.0]), [1.0, 2.0, 3.0])
+    assert np.array_equal(band_widths([400.0, 500.0, 650.0], 5.0), [5.0, 5.0, 5.0])
+
+
+@pytest.mark.parametrize("nm", [[500.0], [400.0, 410.0, 425.0]])
+def test_bands_without_even_spacing_need_a_width(nm):
+    text = complaint(band_widths, nm, None)
+    assert f"{len(nm)} bands" in text
+    assert "give width_nm as well" in text
+
+
+@pytest.mark.parametrize("nm", [[], [500.0, 400.0], [500.0, 500.0], [-10.0, 10.0], [0.0, 10.0], [400.0, np.inf]])
+def test_centres_that_do_not_increase_from_above_zero_are_refused_with_their_values(nm):
+    assert complaint(band_widths, nm, 10.0).startswith(f"wavelength_nm: {nm!r} is not allowed; give increasing")
+
+
+@pytest.mark.parametrize("width", [0.0, -1.0, np.nan, np.inf])
+def test_widths_that_are_not_positive_are_refused_with_their_values(width):
+    assert complaint(band_widths, [400.0, 500.0], [10.0, width]).startswith(f"width_nm: {[10.0, width]!r} is not")
+
+
+@pytest.mark.parametrize("temperature_k", [2856.0, 4200.0, 6504.0])
+def test_a_black_body_follows_plancks_law_with_si_constants(temperature_k):
+    spectrum = black_body(temperature_k)
+    metres = spectrum.wavelength_nm * 1e-9
+    law = metres**-5 / np.expm1(PLANCK_J_S * LIGHT_M_S / (metres * BOLTZMANN_J_K * temperature_k))
+    assert spectrum.values == pytest.approx(law / law[spectrum.wavelength_nm == 560.0], rel=1e-8)
+    assert spectrum.values[spectrum.wavelength_nm == 560.0] == pytest.approx(1.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("temperature_k", [3000.0, 4200.0, 6504.0, 9000.0])
+def test_a_black_body_peaks_where_wiens_law_says(temperature_k):
+    spectrum = black_body(temperature_k)
+    peak_nm = spectrum.wavelength_nm[spectrum.values.argmax()]
+    assert abs(peak_nm - WIEN_NM_K / temperature_k) <= 5.0  # the table's step

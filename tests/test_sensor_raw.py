@@ -1,0 +1,94 @@
+"""The raw image: electrons, the dark's spread, and which pixels count as saturated."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from render.errors import InputError
+from sensor.cfa import RGBW
+from sensor.device import draw_device
+from sensor.presets import low_noise, table1_output, table1_pixel
+from sensor.raw import SATURATION_SIGMAS, RawImage
+from sensor.readout import read_out
+
+RAW = RawImage(np.full((4, 4), 120, np.uint16), RGBW, 100.0, 1100.0, 2.0, 3.0, 4.0, 0.01, 0.02)
+STATED = 3.2e-5  # of a normal under -4 sigma
+# Readings are whole numbers: where 4 sigma lies just under one, it is the next number up that decides, and where the
+# dark spreads over about one DN up to 1.5e-4 of the saturated pixels fall under it.
+ROUNDED = 1.6e-4
+
+
+def test_electrons_are_dn_above_black_times_gain():
+    dn = np.array([[0, 100], [350, 1100]], np.uint16)
+    np.testing.assert_array_equal(replace(RAW, dn=dn).electrons, [[-200.0, 0.0], [500.0, 2000.0]])
+
+
+def test_electrons_turned_into_dn_are_the_dn_again():
+    dn = np.random.default_rng(0).integers(0, 2**16, (64, 64), dtype=np.uint16)
+    raw = replace(RAW, dn=dn, black_dn=37.25, white_dn=65_535.0, gain_e_per_dn=0.2357)
+    np.testing.assert_array_equal(np.rint(raw.electrons / raw.gain_e_per_dn + raw.black_dn), dn)
+
+
+def test_dark_spread_is_read_noise_dsnu_and_a_rounding_in_quadrature():
+    assert RAW.dark_noise_e == pytest.approx(np.sqrt(3.0**2 + 4.0**2 + 2.0**2 / 12), rel=1e-15)
+
+
+def test_saturation_begins_four_sigmas_of_the_dark_under_the_well():
+    assert SATURATION_SIGMAS == 4.0
+    assert RAW.saturation_e == pytest.approx(2000.0 - 4 * np.sqrt(25 + 1 / 3), rel=1e-12)
+    dn = np.array([[1089, 1090], [1091, 1100]], np.uint16)  # 1979.87 e- is DN 1089.93
+    np.testing.assert_array_equal(replace(RAW, dn=dn).saturated, [[False, True], [True, True]])
+
+
+@pytest.mark.parametrize("sigma_dn", np.geomspace(0.05, 200, 60))
+def test_a_saturated_pixel_is_missed_with_at_most_the_stated_probability(sigma_dn):
+    raw = replace(RAW, gain_e_per_dn=1.0, read_noise_e=sigma_dn, dsnu_e=0.0)
+    first_flagged = np.ceil(raw.saturation_e - 1000.0)  # DN under the top
+    missed = stats.norm.cdf((first_flagged - 0.5) / sigma_dn)
+    # far above one DN the rounding adds at most half a DN over sigma, which is 4 per cent of a probability near 4 sigma
+    assert missed <= (STATED * 1.04 if sigma_dn > 60 else ROUNDED)
+
+
+@pytest.mark.parametrize(
+    ("camera", "probability"), [(table1_pixel, STATED), (table1_output, STATED), (low_noise, ROUNDED)]
+)
+def test_all_of_a_saturated_frame_is_flagged_and_nothing_of_a_dark_one(camera, probability):
+    sensor = camera()
+    device = draw_device(sensor, (1024, 1024), np.random.default_rng(1))
+    saturated = read_out(np.full((1024, 1024), 1e6), sensor, device, 0.01, np.random.default_rng(2)).saturated
+    allowed = probability * saturated.size
+    # a Poisson count of misses: false-alarm rate under 1e-4 each at the stated probability
+    assert np.count_nonzero(~saturated) <= stats.poisson.isf(1e-4, allowed)
+    dark = read_out(np.zeros((1024, 1024)), sensor, device, 0.01, np.random.default_rng(3))
+    assert not dark.saturated.any()
+
+
+def test_half_a_well_is_not_saturated():
+    sensor = table1_output()
+    device = draw_device(sensor, (256, 256), np.random.default_rng(1))
+    raw = read_out(np.full((256, 256), 7500.0), sensor, device, 0.01, np.random.default_rng(2))
+    assert not raw.saturated.any()  # the threshold lies 40 standard deviations above
+
+
+@pytest.mark.parametrize("shape", [(1, 4), (4, 1), (4,), (4, 4, 1)])
+def test_a_frame_that_does_not_hold_a_tile_is_refused(shape):
+    with pytest.raises(InputError, match=r"mosaic: shape .* doesn't fit the tile .*at least 2x2") as error:
+        replace(RAW, dn=np.zeros(shape, np.uint16))
+    assert str(shape) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"black_dn": 1100.0}, r"black_dn: 1100\.0 is not under white_dn 1100\.0; swap or correct"),
+        ({"black_dn": np.nan}, r"black_dn: nan is not under white_dn"),
+        ({"gain_e_per_dn": 0.0}, r"gain_e_per_dn: 0\.0 is outside .*give electrons per digital number"),
+        ({"cfa": ("RG", "B")}, r"cfa: rows of .* differ in length"),
+    ],
+)
+def test_calibration_that_cannot_be_is_refused(changes, message):
+    with pytest.raises(InputError, match=message):
+        replace(RAW, **changes)
