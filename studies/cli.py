@@ -84,6 +84,8 @@ def demo(
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         line = bar.add_task("start", total=1.0)
         outcome = job.run(task, lambda what, share: bar.update(line, description=what, completed=share))
+    for note in outcome.results["notes"]:
+        print(f"rodcone: {note}", file=sys.stderr)
     print(job.write(outcome, out))
 
 
