@@ -4,9 +4,9 @@ import hashlib
 import json
 import os
 import tempfile
-import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -17,26 +17,30 @@ from render.scene import Scene
 from render.transport import Transport
 
 ENGINE_VERSION = 1  # raise it with any change that moves a rendered value: older entries are then not used
+_DIGEST_BYTES = hashlib.sha256().digest_size
 _ARRAYS = ("radiance", "half_difference", "variance", "irradiance", "emitter_visible")
 _VALUES = ("spp", "passes", "stopped_by", "seconds", "integrator", "variant")
 
 
 def load_transport(folder: Path, scene: Scene, film: Film, settings: Mapping[str, Any]) -> Transport | None:
-    """Stored transport, or None where there is none that is whole (each array carries a CRC-32)."""
-    path = _path(folder, scene, film, settings)
+    """Stored transport, or None where there is none that is whole: a SHA-256 digest ends the file."""
     try:
-        with np.load(path, allow_pickle=False) as entry:
-            arrays: dict[str, Any] = {name: entry.get(name) for name in _ARRAYS}
-            values = json.loads(str(entry["values"]))
-            return Transport(
-                **arrays,
-                **{name: values[name] for name in _VALUES},
-                groups=dict(scene.groups),
-                wavelength_nm=film.wavelength_nm,
-                width_nm=film.width_nm,
-            )
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+        content = _path(folder, scene, film, settings).read_bytes()
+    except OSError:
         return None
+    archive, digest = content[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
+    if hashlib.sha256(archive).digest() != digest:
+        return None
+    with np.load(BytesIO(archive), allow_pickle=False) as entry:
+        arrays: dict[str, Any] = {name: entry.get(name) for name in _ARRAYS}
+        values = json.loads(str(entry["values"]))
+    return Transport(
+        **arrays,
+        **{name: values[name] for name in _VALUES},
+        groups=dict(scene.groups),
+        wavelength_nm=film.wavelength_nm,
+        width_nm=film.width_nm,
+    )
 
 
 def save_transport(folder: Path, scene: Scene, film: Film, settings: Mapping[str, Any], transport: Transport) -> None:
@@ -47,7 +51,10 @@ def save_transport(folder: Path, scene: Scene, film: Film, settings: Mapping[str
     handle, temporary = tempfile.mkstemp(dir=folder, suffix=".part")
     try:
         with os.fdopen(handle, "wb") as file:
-            np.savez(file, values=np.array(values), **arrays)
+            archive = BytesIO()
+            np.savez(archive, values=np.array(values), **arrays)
+            file.write(archive.getbuffer())
+            file.write(hashlib.sha256(archive.getbuffer()).digest())
         Path(temporary).replace(_path(folder, scene, film, settings))
     finally:
         Path(temporary).unlink(missing_ok=True)
@@ -57,6 +64,7 @@ def _path(folder: Path, scene: Scene, film: Film, settings: Mapping[str, Any]) -
     key = {
         "engine": [ENGINE_VERSION, integrator_name(), variant()],
         "scene": [scene.name, scene.description, scene.reference_plane],
+        "groups": [[name, group.emitters] for name, group in scene.groups.items()],
         "film": asdict(film),
         "settings": dict(settings),
     }

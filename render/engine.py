@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from render.cache import load_transport, save_transport
-from render.errors import InputError, require_range
+from render.errors import InputError, require_range, require_whole
 from render.loader import Film, integrator_name, integrators, load_direct, load_unit, mitsuba_module, parts, variant
 from render.scene import Scene
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
@@ -50,12 +50,12 @@ class Limits:
 
     def __post_init__(self) -> None:
         if self.spp is not None:
-            require_range("spp", self.spp, 1, MOST_SPP, "give samples per pixel")
+            require_whole("spp", self.spp, 1, MOST_SPP, "give samples per pixel")
         if self.noise is not None:
             require_range("noise", self.noise, 1e-6, 10.0, "give a relative error such as 0.02")
         if self.max_seconds is not None:
             require_range("max_seconds", self.max_seconds, 1e-3, 1e7, "give seconds")
-        require_range("seed", self.seed, 0, 2**63, "give a whole number")
+        require_whole("seed", self.seed, 0, 2**63, "give a whole number")
 
     @property
     def most_spp(self) -> int:
@@ -173,7 +173,7 @@ def _checked_film(
         raise InputError(f"scene {scene.name}: it has no light; allowed: one light group or more; add one")
     if len(size) != 2 or not all(isinstance(n, int | np.integer) and 1 <= n <= 1 << 15 for n in size):
         raise InputError(f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768")
-    require_range("max_depth", max_depth, 2, 1 << 16, "2 is direct light")
+    require_whole("max_depth", max_depth, 2, 1 << 16, "2 is direct light")
     nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)
     return Film((int(size[0]), int(size[1])), nm, band_widths(nm, width_nm), int(max_depth))
 
@@ -243,7 +243,10 @@ def _bands(mi_scene: Any, sensor: Any, film: Film, most_bands: int, spp: int, se
     """Render one sensor: band averages, shape (band, h, w). Every part of the bands sees the same paths."""
     mi, images = mitsuba_module(), []
     for integrator in integrators(film, most_bands):
-        image = mi.render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
+        try:
+            image = mi.render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
+        except RuntimeError as error:
+            raise InputError(f"scene: Mitsuba can't render it: {_root_cause(error)}; correct the description") from None
         images.append(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
     if variant() == "scalar_spectral":  # specfilm integrates over the band
         return np.ascontiguousarray(images[0] / film.width_nm.astype(np.float32)[:, None, None])
@@ -255,6 +258,13 @@ def _bands(mi_scene: Any, sensor: Any, film: Film, most_bands: int, spp: int, se
     sizes = [part.size for part in parts(film, most_bands)]
     # Channel 0 is the film's own luminance; the last one the mark tested above.
     return np.concatenate([image[1 : 1 + size] for image, size in zip(images, sizes, strict=True)])
+
+
+def _root_cause(error: BaseException) -> str:
+    """Mitsuba's own words, from under the layers that Dr.Jit wraps around them, on one line."""
+    while error.__cause__ or error.__context__:
+        error = error.__cause__ or error.__context__ or error
+    return " ".join(str(error).split())
 
 
 def _emitter_visible(scene: Scene, film: Film, seed: int) -> NDArray[np.bool_]:

@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 from math import isfinite
+from numbers import Real
+from typing import Any
 
 
 class InputError(ValueError):
@@ -17,10 +19,17 @@ def unknown(what: str, value: object, allowed: Iterable[str]) -> InputError:
     return InputError(f"{what}: {value!r} is unknown; allowed: {', '.join(names)}{hint}")
 
 
-def require_range(name: str, value: float, low: float, high: float, fix: str) -> None:
-    """Raise `InputError` unless `value` is finite and ``low <= value <= high``."""
-    if not (isfinite(value) and low <= value <= high):
+def require_range(name: str, value: Any, low: float, high: float, fix: str) -> None:
+    """Raise `InputError` unless `value` is a finite number and ``low <= value <= high``."""
+    if not (isinstance(value, Real) and isfinite(value) and low <= float(value) <= high):
         raise InputError(f"{name}: {value!r} is outside {low:g} to {high:g}; {fix}")
+
+
+def require_whole(name: str, value: Any, low: int, high: int, fix: str) -> None:
+    """Raise `InputError` unless `value` is a whole number and ``low <= value <= high``."""
+    require_range(name, value, low, high, fix)
+    if value != int(value):
+        raise InputError(f"{name}: {value!r} is not a whole number; allowed: {low} to {high}; round it")
 
 
 def require_keys(what: str, given: Iterable[str], allowed: Iterable[str]) -> None:

@@ -105,6 +105,8 @@ def spectrum_node(spectrum: Spectrum) -> Node:
     Evenly spaced points become ``regular``, whose look-up is far cheaper than ``irregular``'s search; and materials
     on one common grid compile to one piece of code, which keeps a scene of fifty materials from taking minutes.
     """
+    if not spectrum.values.any():
+        return uniform_node(0.0)  # Mitsuba refuses a table without any value above 0
     nm, values = spectrum.wavelength_nm, ",".join(map(repr, spectrum.values.tolist()))
     if np.allclose(np.diff(nm), nm[1] - nm[0], rtol=1e-9):
         return {"type": "regular", "wavelength_min": float(nm[0]), "wavelength_max": float(nm[-1]), "values": values}

@@ -1,5 +1,6 @@
 """The 24-patch ColorChecker on grey card, under an even sky."""
 
+from render.errors import require_range
 from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
@@ -24,6 +25,7 @@ def color_checker(light: str = "D65", surround: float = 0.2) -> Scene:
     surround : float
         Reflectance of the grey card around the chart.
     """
+    require_range("surround", surround, 0.0, 1.0, "give a reflectance: 18 % is 0.18")
     camera = {
         "type": "perspective",
         "fov": 20.0,

@@ -1,5 +1,6 @@
 """A grey wall under an even sky: every pixel has the same, known radiance."""
 
+from render.errors import require_range
 from render.geometry import look_at, to_world
 from render.illuminants import illuminant
 from render.scene import LightGroup, Scene
@@ -19,6 +20,7 @@ def flat_field(reflectance: float = 0.5, light: str = "D65") -> Scene:
     light : str
         Illuminant of the sky, whose luminance is 100 cd/m^2.
     """
+    require_range("reflectance", reflectance, 0.0, 1.0, "give a fraction: 18 % is 0.18")
     camera = {"type": "perspective", "fov": 30.0, "to_world": to_world(look_at((0, 0, 3), (0, 0, 0)))}
     geometry = {
         "type": "scene",

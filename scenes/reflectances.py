@@ -18,7 +18,7 @@ def color_checker() -> tuple[tuple[str, Spectrum], ...]:
 
 
 def grey(reflectance: float) -> Spectrum:
-    """Same reflectance at every wavelength."""
+    """Same reflectance, 0 to 1, at every wavelength."""
     return Spectrum(_NM, np.full_like(_NM, reflectance))
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from math import inf
 
-from render.errors import InputError, require_range
+from render.errors import InputError, require_range, require_whole
 from render.spectrum import VISIBLE_NM
 from sensor.cfa import RGBW, Tile, channels, check_tile
 from sensor.curves import Responses, rgbw
@@ -77,6 +77,10 @@ class LensConfig:
         require_range("magnification", self.magnification, 0.0, 1e4, "give its absolute value, 0 for a far scene")
 
 
+def _increasing(window_nm: tuple[float, float]) -> bool:
+    return 0 < window_nm[0] < window_nm[1] < inf
+
+
 @dataclass(frozen=True)
 class SensorConfig:
     """A camera: pixel, lens, mosaic, responses and converter.
@@ -107,15 +111,12 @@ class SensorConfig:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
-        require_range("bits", self.bits, 1, 16, "give the converter's resolution")
-        if self.bits != int(self.bits):
-            raise InputError(f"bits: {self.bits!r} is not a whole number; allowed: 1 to 16; round it")
+        require_whole("bits", self.bits, 1, 16, "give the converter's resolution")
         if self.black_level_dn is not None:
             require_range(
                 "black_level_dn", self.black_level_dn, 0.0, self.white_dn - 0.5, "give DN under the white level"
             )
-        low, high = self.window_nm
-        if not 0 < low < high < inf:
+        if not (isinstance(self.window_nm, tuple | list) and len(self.window_nm) == 2 and _increasing(self.window_nm)):
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give (shortest, longest) in nm")
         self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every letter has a curve
 

@@ -80,15 +80,21 @@ def read_csv(path: str | Path) -> Responses:
         For a missing file, a header without ``wavelength_nm``, a cell that is no number, or a response outside 0..1.
     """
     try:
-        with Path(path).open(newline="", encoding="utf-8") as file:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
             header, *rows = [row for row in csv.reader(file) if row]
         table = np.array([[float(cell) for cell in row] for row in rows], dtype=np.float64)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, csv.Error) as error:
         raise InputError(
             f"responses: {str(path)!r} can't be read ({error}); give a CSV of numbers with a header"
         ) from error
     names = [name.strip() for name in header]
-    if names[0] != "wavelength_nm" or table.ndim != 2 or table.shape[1] != len(names) or len(names) < 2:
+    if (
+        names[0] != "wavelength_nm"
+        or table.ndim != 2
+        or table.shape[1] != len(names)
+        or len(names) < 2
+        or len(set(names)) != len(names)
+    ):
         raise InputError(
             f"responses: {str(path)!r} has header {names}; allowed: wavelength_nm and one letter a column; add it"
         )

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from render.errors import InputError, require_range
 from sensor.cfa import Tile, check_covers, check_tile
 
-SATURATION_SIGMAS = 4.0  # a saturated pixel reads white - 4 sigma_dark or more with probability 1 - 3.2e-5
+# A saturated pixel reads white - 4 sigma_dark or more, give or take half a DN, with probability 1 - 3.2e-5.
+SATURATION_SIGMAS = 4.0
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class RawImage:
     def saturation_e(self) -> float:
         """Level from which a pixel counts as saturated [e-]: noise comes after the well clips (design, section 4)."""
         full_e = (self.white_dn - self.black_dn) * self.gain_e_per_dn
-        return full_e - SATURATION_SIGMAS * self.dark_noise_e
+        return full_e - SATURATION_SIGMAS * self.dark_noise_e - self.gain_e_per_dn / 2
 
     @property
     def saturated(self) -> NDArray[np.bool_]:

@@ -177,6 +177,11 @@ def test_a_spectrum_node_is_the_same_function_in_mitsuba(nm):
         assert seen == pytest.approx(np.interp(four, spectrum.wavelength_nm, spectrum.values), rel=1e-4)
 
 
+def test_a_spectrum_of_zeros_loads_as_black():
+    texture = mitsuba_module().load_dict(spectrum_node(Spectrum(np.array([400.0, 500.0]), np.zeros(2))))
+    assert not np.array(texture.eval(mitsuba_module().SurfaceInteraction3f())).any()
+
+
 def test_a_spectrum_node_keeps_every_digit():
     spectrum = Spectrum(np.array([400.0, 410.0]), np.array([1 / 3, 1e-300]))
     assert spectrum_node(spectrum)["values"] == f"{1 / 3!r},1e-300"

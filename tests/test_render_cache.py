@@ -1,0 +1,194 @@
+"""Finished renders on disk: found again to the bit, made again where anything differs or the file is damaged."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from render import engine
+from render.engine import render
+from render.scene import LightGroup
+from render.spectrum import flat
+from scenes.catalog import load
+
+BANDS_NM = np.arange(405.0, 780.0, 50.0)
+SIZE = (3, 4)
+ARRAYS = ("radiance", "half_difference", "variance", "irradiance", "emitter_visible", "wavelength_nm", "width_nm")
+VALUES = ("spp", "passes", "stopped_by", "seconds", "integrator", "variant")
+
+
+def small(folder, scene=None, **options):
+    settings = {"wavelength_nm": BANDS_NM, "spp": 8, "seed": 0} | options
+    return render(scene or load("flat_field"), settings.pop("size", SIZE), cache=folder, **settings)
+
+
+@pytest.fixture(scope="module")
+def rendered():
+    return small(None)
+
+
+@pytest.fixture
+def renders(rendered, monkeypatch):
+    """Counts the renders made, and hands out one made before in their place."""
+    made = []
+    monkeypatch.setattr(engine, "_render", lambda *args: made.append(args) or rendered)
+    return made
+
+
+def assert_equal(one, other):
+    for name in ARRAYS:
+        a, b = getattr(one, name), getattr(other, name)
+        assert a is b is None or (a.dtype == b.dtype and np.array_equal(a, b)), name
+    assert [getattr(one, name) for name in VALUES] == [getattr(other, name) for name in VALUES]
+    assert list(one.groups) == list(other.groups)
+    assert np.array_equal(one.relight().values, other.relight().values)
+    assert one.relight().relative_mc_error == other.relight().relative_mc_error
+
+
+def test_a_second_call_loads_the_same_bits_and_renders_nothing(tmp_path, renders):
+    one = small(tmp_path)
+    two = small(tmp_path)
+    assert len(renders) == 1
+    assert_equal(one, two)
+
+
+def test_a_real_render_is_found_again(tmp_path, monkeypatch):
+    one = small(tmp_path)
+    monkeypatch.setattr(engine, "_render", None)  # a second render would fail
+    assert_equal(one, small(tmp_path))
+
+
+def test_a_scene_without_a_reference_plane_is_found_again(tmp_path, rendered, monkeypatch):
+    scene = replace(load("flat_field"), reference_plane=None)
+    monkeypatch.setattr(engine, "_render", lambda *args: replace(rendered, irradiance=None))
+    one = small(tmp_path, scene)
+    monkeypatch.setattr(engine, "_render", None)
+    assert_equal(one, small(tmp_path, scene))
+
+
+def test_the_folder_is_made_and_holds_one_whole_file_an_entry(tmp_path, renders):
+    folder = tmp_path / "deep" / "cache"
+    small(folder)
+    small(str(folder), seed=1)  # a path may be text
+    files = sorted(path.name for path in folder.iterdir())
+    assert len(files) == len(renders) == 2
+    assert all(name.startswith("flat_field-") and not name.endswith(".part") for name in files)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"seed": 1},
+        {"spp": 16},
+        {"size": (4, 3)},
+        {"max_depth": 7},
+        {"wavelength_nm": BANDS_NM + 1.0},
+        {"width_nm": 40.0},
+        {"noise": 0.2},
+        {"max_seconds": 100.0},
+        {"scene": load("flat_field", reflectance=0.25)},
+        {"scene": load("flat_field", light="A")},
+        {"scene": replace(load("flat_field"), name="other")},
+        {"scene": replace(load("flat_field"), reference_plane=None)},
+    ],
+    ids="-".join,
+)
+def test_anything_else_asked_for_is_another_entry(change, tmp_path, renders):
+    small(tmp_path)
+    small(tmp_path, **change)
+    assert len(renders) == 2
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_moved_camera_is_another_entry(tmp_path, renders):
+    one = load("flat_field")
+    moved = one.geometry | {"sensor": one.geometry["sensor"] | {"to_world": one.geometry["wall"]["to_world"]}}
+    small(tmp_path)
+    small(tmp_path, replace(one, geometry=moved))
+    assert len(renders) == 2
+
+
+def test_the_same_lights_in_other_groups_or_another_order_are_another_entry(tmp_path, renders):
+    one = load("flat_field")
+    geometry = one.geometry | {"lamp": {"type": "point", "position": [0, 0, 2]}}
+    sky, lamp = LightGroup(("sky",), flat()), LightGroup(("lamp",), flat())
+    together = {"all": LightGroup(("sky", "lamp"), flat())}
+    for groups in ({"sky": sky, "lamp": lamp}, {"lamp": lamp, "sky": sky}, together):
+        small(tmp_path, replace(one, geometry=geometry, groups=groups))
+    assert len(renders) == 3
+
+
+def test_another_engine_version_is_another_entry(tmp_path, renders, monkeypatch):
+    small(tmp_path)
+    monkeypatch.setattr("render.cache.ENGINE_VERSION", 10**6)
+    small(tmp_path)
+    assert len(renders) == 2
+
+
+def after(folder, damage):
+    """Renders, damages the file, renders twice again."""
+    small(folder)
+    (file,) = folder.iterdir()
+    file.write_bytes(damage(file.read_bytes()))
+    results = small(folder), small(folder)
+    assert [path.name for path in folder.iterdir()] == [file.name]
+    return results
+
+
+def flipped(position, bit=3):
+    def damage(stored):
+        stored = bytearray(stored)
+        stored[position] ^= 1 << bit
+        return bytes(stored)
+
+    return damage
+
+
+@pytest.mark.parametrize("kept", [0, 1, 100, 0.5, 0.9, -1])
+def test_a_truncated_file_is_rendered_again(kept, tmp_path, renders, rendered):
+    results = after(tmp_path, lambda stored: stored[: int(kept * len(stored)) if 0 < kept < 1 else kept])
+    assert len(renders) == 2
+    for result in results:
+        assert_equal(result, rendered)
+
+
+def test_a_file_of_something_else_is_rendered_again(tmp_path, renders, rendered):
+    for result in after(tmp_path, lambda stored: b"not a render"):
+        assert_equal(result, rendered)
+    assert len(renders) == 2
+
+
+def test_a_flipped_bit_of_the_radiance_is_noticed(tmp_path, renders, rendered):
+    radiance = rendered.radiance.tobytes()
+    for result in after(tmp_path, lambda stored: flipped(stored.index(radiance) + 5)(stored)):
+        assert_equal(result, rendered)
+    assert len(renders) == 2
+
+
+def test_a_flipped_bit_anywhere_never_changes_a_result(tmp_path, renders, rendered):
+    small(tmp_path)
+    (file,) = tmp_path.iterdir()
+    stored = file.read_bytes()
+    for position in [*range(0, len(stored), 61), *range(len(stored) - 600, len(stored), 3)]:  # the directory is last
+        for bit in (0, 3, 6):
+            file.write_bytes(flipped(position, bit)(stored))
+            assert_equal(small(tmp_path), rendered)
+    assert len(renders) > 100  # most places are read
+
+
+def test_a_file_that_can_not_be_written_leaves_nothing(tmp_path, renders, monkeypatch):
+    def fail(*args, **arrays):
+        raise OSError("disk full")
+
+    monkeypatch.setattr("render.cache.np.savez", fail)
+    with pytest.raises(OSError, match="disk full"):
+        small(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_folder_nothing_is_kept(tmp_path, renders, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    small(None)
+    small(None)
+    assert len(renders) == 2
+    assert list(tmp_path.iterdir()) == []
