@@ -40,7 +40,10 @@ def dense_path(mi: Any) -> Any:
 
         def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
             wavelengths = _band_wavelengths(mi, self.centres, self.widths, sampler.next_1d(active))
-            result, chosen = _trace(mi, scene, sampler, ray, wavelengths, self.max_depth, mi.Bool(active))
+            if self.max_depth == 1:  # light seen directly: no material needs to be compiled
+                result, chosen = _seen(mi, scene, ray, wavelengths), mi.Bool(False)
+            else:
+                result, chosen = _trace(mi, scene, sampler, ray, wavelengths, self.max_depth, mi.Bool(active))
             bands = [value for group in result for value in group]
             return mi.Spectrum(0.0), mi.Bool(True), [*bands, dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
 
@@ -66,6 +69,12 @@ def _emission(emitter: Any, interaction: Any, wavelengths: list[Any]) -> list[An
         interaction.wavelengths = group
         values.append(emitter.eval(interaction))
     return values
+
+
+def _seen(mi: Any, scene: Any, ray: Any, wavelengths: list[Any]) -> list[Any]:
+    """Emission of what the camera's ray meets first."""
+    si = scene.ray_intersect(mi.Ray3f(ray))
+    return list(dr.dispatch(si.emitter(scene), _emission, si, wavelengths))
 
 
 def _emission_towards(emitter: Any, interaction: Any, direction: Any, wavelengths: list[Any]) -> list[Any]:
