@@ -33,7 +33,7 @@ def demo(
     level: Annotated[list[str] | None, Parameter(negative_iterable=())] = None,
     longest_exposure_s: float = 0.066,
     spp: int = 512,
-    max_seconds: float = 55.0,
+    max_seconds: float = 65.0,
     seed: int = 0,
 ) -> None:
     """Photograph one scene from moonlight to daylight with both cameras and write a report.

@@ -50,7 +50,7 @@ class Demo:
     longest_s: float = LONGEST_S
     seed: int = 0
     spp: int = 512
-    max_seconds: float = 55.0
+    max_seconds: float = 65.0
 
 
 @dataclass(frozen=True)
