@@ -1,6 +1,7 @@
 """Rendering a scene's transport: independent passes, their scatter as the error, and the rule that stops them."""
 
 import time
+import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from render.cache import load_transport, save_transport
-from render.errors import InputError, require_range, require_whole
+from render.errors import InputError, require_whole
+from render.limits import Limits
 from render.loader import Film, integrator_name, integrators, load_direct, load_unit, mitsuba_module, parts, variant
 from render.scene import Scene
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
@@ -19,68 +21,11 @@ from render.transport import Stop, Transport, relative_error
 Planes = NDArray[np.float32]  # (band, h, w)
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
 
-DEFAULT_SPP = 64
-PASSES = 8  # scatter of fewer passes says little about the error
-PASS_SPP = 16  # samples a pixel and pass where only an error or a time is asked for
-MOST_SPP = 1 << 16  # ceiling where only an error is asked for
 # Bands traced together by the camera. 40 bands of `still_life`, 256x256, 64 samples on two cores, in parts of 40, 20,
 # 12, 8, 4: first kernels after 31, 21, 11, 10, 9 s, then 55, 33, 30, 32, 40 s a render.
 CAMERA_BANDS = 12
 METER_BANDS = 4  # by the irradiance meter: its film is small, and its kernel another one to compile
 VISIBLE_SPP = 16  # samples a pixel to find where a light is seen directly
-
-
-@dataclass(frozen=True)
-class Limits:
-    """When a render stops: at whichever comes first; with none of the three after `DEFAULT_SPP` samples a pixel.
-
-    Attributes
-    ----------
-    spp : int or None
-    noise : float or None
-        Relative Monte Carlo error to reach.
-    max_seconds : float or None
-    seed : int
-    """
-
-    spp: int | None
-    noise: float | None
-    max_seconds: float | None
-    seed: int
-
-    def __post_init__(self) -> None:
-        if self.spp is not None:
-            require_whole("spp", self.spp, 1, MOST_SPP, "give samples per pixel")
-        if self.noise is not None:
-            require_range("noise", self.noise, 1e-6, 10.0, "give a relative error such as 0.02")
-        if self.max_seconds is not None:
-            require_range("max_seconds", self.max_seconds, 1e-3, 1e7, "give seconds")
-        require_whole("seed", self.seed, 0, 2**63, "give a whole number")
-
-    @property
-    def most_spp(self) -> int:
-        """Samples a pixel after which the render stops in any case."""
-        return self.spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
-
-    @property
-    def pass_spp(self) -> int:
-        """Samples a pixel of each pass."""
-        return PASS_SPP if self.most_spp == MOST_SPP else -(-self.most_spp // PASSES)
-
-    def stop(self, drawn: int, passes: int, error: float, seconds: float, pass_seconds: float) -> Stop | None:
-        """Which limit is reached, None while none is."""
-        if drawn >= self.most_spp:
-            return "samples"
-        if self.noise is not None and passes >= PASSES and error <= self.noise:
-            return "noise"
-        if self.max_seconds is not None and seconds + 2 * pass_seconds > self.max_seconds:
-            return "seconds"  # the next pair of passes would end after it
-        return None
-
-    def share(self, drawn: int, error: float, seconds: float) -> float:
-        """Share of the work done, 0 to 1: by the limit that is nearest."""
-        by_noise = (self.noise / error) ** 2 if self.noise and error else 0.0
-        return min(max(drawn / self.most_spp, seconds / (self.max_seconds or np.inf), by_noise), 1.0)
 
 
 @dataclass
@@ -160,7 +105,11 @@ def render(
     limits = Limits(spp, noise, max_seconds, seed)
     if cache is not None and (found := load_transport(Path(cache), scene, film, asdict(limits))) is not None:
         return found
-    transport = _render(scene, film, limits, progress or (lambda done, error: None))
+    try:
+        transport = _render(scene, film, limits, progress or (lambda done, error: None))
+    except InputError as error:
+        _let_go(error)
+        raise
     if cache is not None:
         save_transport(Path(cache), scene, film, asdict(limits), transport)
     return transport
@@ -171,7 +120,11 @@ def _checked_film(
 ) -> Film:
     if not scene.groups:
         raise InputError(f"scene {scene.name}: it has no light; allowed: one light group or more; add one")
-    if len(size) != 2 or not all(isinstance(n, int | np.integer) and 1 <= n <= 1 << 15 for n in size):
+    if (
+        not isinstance(size, tuple | list)
+        or len(size) != 2
+        or not all(isinstance(n, int | np.integer) and 1 <= n <= 1 << 15 for n in size)
+    ):
         raise InputError(f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768")
     require_whole("max_depth", max_depth, 2, 1 << 16, "2 is direct light")
     nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)
@@ -258,6 +211,15 @@ def _bands(mi_scene: Any, sensor: Any, film: Film, most_bands: int, spp: int, se
     sizes = [part.size for part in parts(film, most_bands)]
     # Channel 0 is the film's own luminance; the last one the mark tested above.
     return np.concatenate([image[1 : 1 + size] for image, size in zip(images, sizes, strict=True)])
+
+
+def _let_go(error: BaseException) -> None:
+    """Free the refused scene, which the traceback holds: Dr.Jit compiles every live material into the next render."""
+    cause: BaseException | None = error
+    while cause:
+        if cause.__traceback__ and cause.__traceback__.tb_next:
+            traceback.clear_frames(cause.__traceback__.tb_next)
+        cause.__traceback__, cause = None, cause.__cause__ or cause.__context__
 
 
 def _root_cause(error: BaseException) -> str:

@@ -12,11 +12,12 @@ import pytest
 from scipy.stats import chi2, norm
 from scipy.stats import t as student
 
-from render.engine import PASSES, render
+from render.engine import render
 from render.errors import InputError
 from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant
 from render.jit import backend
+from render.limits import PASSES
 from render.loader import mitsuba_module
 from render.scene import LightGroup, Scene, spectrum_node
 from render.spectrum import Spectrum, flat
@@ -350,7 +351,7 @@ def complaint(call, *args, **options):
     return text
 
 
-@pytest.mark.parametrize("size", [(0, 5), (5, -1), (5,), (5, 5, 3), (2.0, 3.0), (40_000, 2)])
+@pytest.mark.parametrize("size", [(0, 5), (5, -1), (5,), (5, 5, 3), (2.0, 3.0), (40_000, 2), 5])
 def test_a_bad_size_is_refused_with_its_value(size):
     text = complaint(render, load("flat_field"), size)
     assert text == f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768"
@@ -415,6 +416,14 @@ def test_a_blend_whose_weight_is_a_spectrum_is_refused(freed):
     blend = {"type": "blendbsdf", "weight": RAMP, "matte": {"type": "diffuse"}, "mirror": {"type": "conductor"}}
     text = complaint(render, ball_under_the_sky(blend), (2, 2), wavelength_nm=BANDS_NM, spp=8)
     assert "not implemented" in text  # Mitsuba's reason
+
+
+def test_a_refused_scene_does_not_spoil_the_next_render_while_its_error_is_kept():
+    blend = {"type": "blendbsdf", "weight": RAMP, "matte": {"type": "diffuse"}, "mirror": {"type": "conductor"}}
+    with pytest.raises(InputError) as kept:
+        render(ball_under_the_sky(blend), (2, 2), wavelength_nm=BANDS_NM, spp=8)
+    assert render(ball_under_the_sky({"type": "diffuse"}), (2, 2), wavelength_nm=BANDS_NM, spp=8).radiance.any()
+    assert "not implemented" in str(kept.value)
 
 
 @only_dense

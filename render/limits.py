@@ -1,0 +1,66 @@
+"""When a render stops: samples, error or time, whichever comes first."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from render.errors import require_range, require_whole
+from render.transport import Stop
+
+DEFAULT_SPP = 64
+PASSES = 8  # scatter of fewer passes says little about the error
+PASS_SPP = 16  # samples a pixel and pass where only an error or a time is asked for
+MOST_SPP = 1 << 16  # ceiling where only an error is asked for
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When a render stops: at whichever comes first; with none of the three after `DEFAULT_SPP` samples a pixel.
+
+    Attributes
+    ----------
+    spp : int or None
+    noise : float or None
+        Relative Monte Carlo error to reach.
+    max_seconds : float or None
+    seed : int
+    """
+
+    spp: int | None
+    noise: float | None
+    max_seconds: float | None
+    seed: int
+
+    def __post_init__(self) -> None:
+        if self.spp is not None:
+            require_whole("spp", self.spp, 1, MOST_SPP, "give samples per pixel")
+        if self.noise is not None:
+            require_range("noise", self.noise, 1e-6, 10.0, "give a relative error such as 0.02")
+        if self.max_seconds is not None:
+            require_range("max_seconds", self.max_seconds, 1e-3, 1e7, "give seconds")
+        require_whole("seed", self.seed, 0, 2**63, "give a whole number")
+
+    @property
+    def most_spp(self) -> int:
+        """Samples a pixel after which the render stops in any case."""
+        return self.spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
+
+    @property
+    def pass_spp(self) -> int:
+        """Samples a pixel of each pass."""
+        return PASS_SPP if self.most_spp == MOST_SPP else -(-self.most_spp // PASSES)
+
+    def stop(self, drawn: int, passes: int, error: float, seconds: float, pass_seconds: float) -> Stop | None:
+        """Which limit is reached, None while none is."""
+        if drawn >= self.most_spp:
+            return "samples"
+        if self.noise is not None and passes >= PASSES and error <= self.noise:
+            return "noise"
+        if self.max_seconds is not None and seconds + 2 * pass_seconds > self.max_seconds:
+            return "seconds"  # the next pair of passes would end after it
+        return None
+
+    def share(self, drawn: int, error: float, seconds: float) -> float:
+        """Share of the work done, 0 to 1: by the limit that is nearest."""
+        by_noise = (self.noise / error) ** 2 if self.noise and error else 0.0
+        return min(max(drawn / self.most_spp, seconds / (self.max_seconds or np.inf), by_noise), 1.0)
