@@ -106,12 +106,12 @@ def picture_interleaved(
     substitution_snr: float = SUBSTITUTION_SNR,
 ) -> Picture:
     """As `develop_interleaved`, with the decisions: eqs. (1)-(6), Gray World, matrix, luminance substitution."""
-    letters = _require(raw, ("R", "G", "B", "W"))
+    letters, colours = _require(raw, ("R", "G", "B", "W")), _checked(matrix)
     result = reconstruct_with_noise(raw, neighbourhood=neighbourhood, patch=patch, sigma_d=sigma_d, sigma_s=sigma_s)
     planes = np.asarray(result.estimate, dtype=np.float64)
     balance = _balance(raw, planes, neutral)
     balanced = _clip_highlights(raw, planes * balance.gains)
-    rgb = balanced[..., :3] @ _checked(matrix).T
+    rgb = balanced[..., :3] @ colours.T
     snr = green_snr(raw, planes)
     substituted = snr < substitution_snr
     if substituted:

@@ -91,8 +91,7 @@ class Transport:
             For an unknown group or illuminant, a negative power or level, both levels at once, a level of a scene
             that gives no light, or illuminance without a reference plane.
         """
-        coefficients = self._coefficients(spectra, powers)
-        coefficients = coefficients * self._level(coefficients, luminance_cd_m2, illuminance_lux)
+        coefficients = self._coefficients_at(spectra, powers, luminance_cd_m2, illuminance_lux)
         values = self._combine(coefficients, self.radiance)
         error = relative_error(values, self._combine(coefficients**2, self.variance))
         return self._as_radiance(values, error)
@@ -110,8 +109,7 @@ class Transport:
         Their mean is `relight`'s result; a quarter of the squared difference of any linear function of them is an
         unbiased estimate of that function's Monte Carlo variance.
         """
-        coefficients = self._coefficients(spectra, powers)
-        coefficients = coefficients * self._level(coefficients, luminance_cd_m2, illuminance_lux)
+        coefficients = self._coefficients_at(spectra, powers, luminance_cd_m2, illuminance_lux)
         even, odd = (
             self._as_radiance(np.maximum(self._combine(coefficients, self.radiance + sign * self.half_difference), 0.0))
             for sign in (np.float32(1), np.float32(-1))
@@ -122,8 +120,18 @@ class Transport:
         """Illuminance on the reference plane at a mean luminance under the scene's own lights; None without a plane."""
         if self.irradiance is None:
             return None
-        coefficients = self._coefficients(None, None)
-        return self._plane_lux(coefficients * self._level(coefficients, luminance_cd_m2, None))
+        return self._plane_lux(self._coefficients_at(None, None, luminance_cd_m2, None))
+
+    def _coefficients_at(
+        self,
+        spectra: Mapping[str, Spectrum | str] | None,
+        powers: Mapping[str, float] | None,
+        luminance_cd_m2: float | None,
+        illuminance_lux: float | None,
+    ) -> NDArray[np.float64]:
+        """Spectral emission of each group and band at the level asked for, shape (group, band)."""
+        coefficients = self._coefficients(spectra, powers)
+        return coefficients * self._level(coefficients, luminance_cd_m2, illuminance_lux)
 
     def _coefficients(
         self, spectra: Mapping[str, Spectrum | str] | None, powers: Mapping[str, float] | None
@@ -149,8 +157,6 @@ class Transport:
             asked, present = luminance_cd_m2, self._mean_luminance(coefficients)
         elif illuminance_lux is not None:
             require_range("illuminance_lux", illuminance_lux, 0.0, 1e15, "give an illuminance of 0 or more")
-            if self.irradiance is None:
-                raise InputError("illuminance_lux: the scene states no reference plane; give luminance_cd_m2 instead")
             asked, present = illuminance_lux, self._plane_lux(coefficients)
         else:
             return 1.0
