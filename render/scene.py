@@ -11,7 +11,7 @@ from render.spectrum import Spectrum
 
 Node: TypeAlias = dict[str, Any]
 
-# Emitter plug-ins whose light is one spectrum, and the parameter that holds it: only these can be relit.
+# Emitter plug-ins whose light is one spectrum, and the parameter that holds it.
 EMISSION_PARAMETER = {
     "area": "radiance",
     "constant": "radiance",
@@ -19,7 +19,9 @@ EMISSION_PARAMETER = {
     "spot": "intensity",
     "directional": "irradiance",
 }
-_OTHER_EMITTERS = {"envmap", "sunsky", "sky", "sun", "projector", "directionalarea", "timedsunsky"}
+# Emitter plug-ins with colours of their own, which differ over directions: a spectrum can only filter them.
+OWN_COLOUR_EMITTERS = ("envmap", "sunsky")
+_REFUSED_EMITTERS = ("sky", "sun", "projector", "directionalarea", "timedsunsky", "volumelight")
 
 
 @dataclass(frozen=True)
@@ -31,14 +33,18 @@ class LightGroup:
     emitters : tuple of str
         Where they stand in the scene's dict: ``"sun"``, or ``"panel/emitter"`` for one inside a shape.
     spectrum : Spectrum
-        Emission at power 1: W m^-2 sr^-1 nm^-1 for ``area`` and ``constant``, per m^2 less for the others.
+        Emission at power 1: W m^-2 sr^-1 nm^-1 for ``area`` and ``constant``, per m^2 less for the others. With
+        `own_colour` a factor on what the emitters give by themselves, `flat()` to leave it as it is.
     power : float
         Factor on the spectrum.
+    own_colour : bool
+        The emitters keep the emission that stands in the scene's dict: an ``envmap``, a ``sunsky``, a textured panel.
     """
 
     emitters: tuple[str, ...]
     spectrum: Spectrum
     power: float = 1.0
+    own_colour: bool = False
 
 
 @dataclass(frozen=True)
@@ -58,7 +64,8 @@ class Scene:
     Raises
     ------
     InputError
-        Where a light is missing, of a kind that can't be relit, or in no group; or the plane isn't in the scene.
+        Where a light is missing, of a kind that can't be relit, or in no group; where an ``envmap`` or ``sunsky`` is in
+        a group without `own_colour`; or the plane isn't in the scene.
     """
 
     name: str
@@ -72,22 +79,31 @@ class Scene:
         for path in grouped:
             if path not in present:
                 raise unknown(f"scene {self.name}: emitter", path, present)
+        tinted = {path for group in self.groups.values() if group.own_colour for path in group.emitters}
         for path, kind in present.items():
-            if kind not in EMISSION_PARAMETER:
+            if kind in _REFUSED_EMITTERS:
                 raise InputError(
                     f"scene {self.name}: emitter {path!r} of type {kind!r} can't be relit; "
-                    f"allowed: {', '.join(EMISSION_PARAMETER)}; replace it by one of these"
+                    f"allowed: {', '.join((*EMISSION_PARAMETER, *OWN_COLOUR_EMITTERS))}; replace it by one of these"
                 )
             if grouped.count(path) != 1:
                 raise InputError(
                     f"scene {self.name}: emitter {path!r} is in {grouped.count(path)} light groups; put it in one"
+                )
+            if kind in OWN_COLOUR_EMITTERS and path not in tinted:
+                raise InputError(
+                    f"scene {self.name}: emitter {path!r} of type {kind!r} has colours of its own; "
+                    "allowed: a light group with own_colour=True, whose spectrum is a factor; set it"
                 )
         if self.reference_plane is not None and self.reference_plane not in self.geometry:
             raise unknown(f"scene {self.name}: reference_plane", self.reference_plane, self.geometry)
 
     @property
     def description(self) -> Node:
-        """Plain dict for `mitsuba.load_dict`, every light at its own spectrum and power."""
+        """Plain dict for `mitsuba.load_dict`, every light at its own spectrum and power.
+
+        Lights of their own colour stand in it as they are: Mitsuba has no place for a factor on them.
+        """
         return self.lit({name: spectrum_node(group.spectrum * group.power) for name, group in self.groups.items()})
 
     def lit(self, emission: Mapping[str, Node]) -> Node:
@@ -95,7 +111,7 @@ class Scene:
         result: Node = _copy(self.geometry)
         for name, group in self.groups.items():
             for path in group.emitters:
-                _replace_emitter(result, path.split("/"), emission.get(name))
+                _replace_emitter(result, path.split("/"), emission.get(name), group.own_colour)
         return result
 
 
@@ -125,7 +141,7 @@ def _emitter_paths(node: Node, prefix: str = "") -> dict[str, str]:
         if not isinstance(value, dict):
             continue
         path, kind = f"{prefix}{key}", value.get("type")
-        if kind in EMISSION_PARAMETER or kind in _OTHER_EMITTERS:
+        if kind in (*EMISSION_PARAMETER, *OWN_COLOUR_EMITTERS, *_REFUSED_EMITTERS):
             found[path] = str(kind)
         found |= _emitter_paths(value, f"{path}/")
     return found
@@ -138,12 +154,12 @@ def _copy(value: Any) -> Any:
     return list(value) if isinstance(value, list) else value
 
 
-def _replace_emitter(node: Node, path: list[str], emission: Node | None) -> None:
-    """Give the emitter at `path` its emission, or remove it."""
+def _replace_emitter(node: Node, path: list[str], emission: Node | None, own_colour: bool) -> None:
+    """Give the emitter at `path` its emission, or remove it; one of its own colour keeps what it has."""
     *way, key = path
     for step in way:
         node = node[step]
     if emission is None:
         del node[key]
-    else:
+    elif not own_colour:
         node[key][EMISSION_PARAMETER[node[key]["type"]]] = emission

@@ -11,6 +11,8 @@ from render.errors import InputError
 Floats: TypeAlias = NDArray[np.float64]
 
 VISIBLE_NM = (380.0, 780.0)
+LINE_BASE_NM = 0.1  # far under any band, so that a line's shape doesn't matter
+LINE_REACH_NM = 0.5  # from a line to the edges of its band: wide enough for a lamp's own width and tabulation
 DEFAULT_WAVELENGTH_NM: Floats = np.arange(385.0, 780.0, 10.0)  # centres of 40 bands that fill 380-780 nm
 
 
@@ -70,6 +72,52 @@ class Spectrum:
 def flat(value: float = 1.0) -> Spectrum:
     """Spectrum of one value over 300-1100 nm: wider than any band the project uses."""
     return Spectrum(np.array([300.0, 1100.0]), np.array([value, value]))
+
+
+def line_spectrum(lines_nm: ArrayLike, powers: ArrayLike) -> Spectrum:
+    """Emission lines as triangles 0.1 nm wide at the base; `powers` are their integrals over wavelength.
+
+    Raises
+    ------
+    InputError
+        Where lines aren't increasing, or less than 0.1 nm apart.
+    """
+    lines, heights = np.atleast_1d(lines_nm).astype(np.float64), np.atleast_1d(powers) * (2 / LINE_BASE_NM)
+    if lines.shape != heights.shape or np.any(np.diff(lines) <= LINE_BASE_NM):
+        raise InputError(f"lines_nm: {lines.tolist()!r} is not allowed; give increasing lines over 0.1 nm apart")
+    nm = (lines[:, None] + np.array([-0.5, 0.0, 0.5]) * LINE_BASE_NM).ravel()
+    return Spectrum(nm, (heights[:, None] * np.array([0.0, 1.0, 0.0])).ravel())
+
+
+def line_bands(
+    lines_nm: ArrayLike, range_nm: tuple[float, float] = VISIBLE_NM, width_nm: float = 10.0
+) -> tuple[Floats, Floats]:
+    """Bands that fill a range, each line in a narrow one of its own: centres and widths, shape (band,) each.
+
+    A line's band reaches 0.5 nm to either side; lines less than 1 nm apart share one. The others are `width_nm` wide,
+    cut where a line's band begins; a piece of under 1 nm between the two joins its neighbour.
+
+    Raises
+    ------
+    InputError
+        For a line outside the range.
+    """
+    low, high = range_nm
+    lines = np.sort(np.atleast_1d(np.asarray(lines_nm, dtype=np.float64)))
+    if np.any(lines < low + LINE_REACH_NM) or np.any(lines > high - LINE_REACH_NM):
+        raise InputError(f"lines_nm: {lines.tolist()!r} is not inside {low:g} to {high:g}; widen range_nm")
+    groups = np.split(lines, np.flatnonzero(np.diff(lines) >= 2 * LINE_REACH_NM) + 1) if lines.size else []
+    cuts = np.array([edge for group in groups for edge in (group[0] - LINE_REACH_NM, group[-1] + LINE_REACH_NM)])
+    even = low + width_nm * np.arange(np.floor((high - low) / width_nm + 1e-9) + 1)
+    far = [edge for edge in (*even, high) if not cuts.size or _outside(edge, cuts)]
+    edges = np.unique([low, high, *cuts, *far])
+    return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+
+
+def _outside(edge: float, cuts: Floats) -> bool:
+    """Whether an even edge is at least 1 nm from every line's band, and not in one."""
+    near = np.abs(cuts - edge).min() < 2 * LINE_REACH_NM
+    return not near and np.searchsorted(cuts, edge) % 2 == 0
 
 
 def band_widths(wavelength_nm: ArrayLike, width_nm: ArrayLike | None = None) -> Floats:

@@ -104,11 +104,26 @@ def test_an_emitter_in_two_groups_is_refused(groups):
     assert "emitter 'sky' is in 2 light groups; put it in one" in complaint(groups)
 
 
-@pytest.mark.parametrize("kind", ["envmap", "sunsky", "sky", "sun", "projector", "directionalarea"])
+@pytest.mark.parametrize("kind", ["sky", "sun", "projector", "directionalarea"])
 @pytest.mark.parametrize("grouped", [True, False])
 def test_a_light_that_cannot_be_relit_is_refused_with_what_can(kind, grouped):
     text = complaint({"sky": SKY, "lamp": LAMP} if grouped else {"lamp": LAMP}, sky={"type": kind})
     assert f"emitter 'sky' of type {kind!r} can't be relit; allowed: area, constant, point" in text
+
+
+@pytest.mark.parametrize("kind", ["envmap", "sunsky"])
+def test_a_light_with_colours_of_its_own_needs_a_group_that_says_so(kind):
+    text = complaint({"sky": SKY, "lamp": LAMP}, sky={"type": kind})
+    assert f"emitter 'sky' of type {kind!r} has colours of its own; allowed: a light group with own_colour=True" in text
+
+
+def test_a_light_of_its_own_colour_keeps_it_and_goes_out_with_its_group():
+    sky = {"type": "sunsky", "turbidity": 3.0}
+    own = LightGroup(("sky",), flat(), 2.0, own_colour=True)
+    tinted = Scene("test", GEOMETRY | {"sky": sky}, {"sky": own, "lamp": LAMP})
+    assert tinted.lit({"sky": uniform_node(7.0)})["sky"] == sky
+    assert tinted.description["sky"] == sky
+    assert "sky" not in tinted.lit({"lamp": uniform_node(1.0)})
 
 
 def test_a_light_deep_inside_other_nodes_is_found():

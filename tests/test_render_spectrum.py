@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 
 from render.errors import InputError
 from render.photometry import LIGHT_M_S, PLANCK_J_S
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, black_body, flat
+from render.spectrum import (
+    DEFAULT_WAVELENGTH_NM,
+    Spectrum,
+    band_widths,
+    black_body,
+    flat,
+    line_bands,
+    line_spectrum,
+)
 
 BOLTZMANN_J_K = 1.380649e-23  # exact, SI 2019
 WIEN_NM_K = 2.897771955e6  # CODATA 2018
@@ -141,3 +149,55 @@ def test_a_black_body_peaks_where_wiens_law_says(temperature_k):
     spectrum = black_body(temperature_k)
     peak_nm = spectrum.wavelength_nm[spectrum.values.argmax()]
     assert abs(peak_nm - WIEN_NM_K / temperature_k) <= 5.0  # the table's step
+
+
+def test_a_line_holds_its_power_and_stays_within_a_twentieth_of_a_nanometre():
+    doublet = line_spectrum([589.0, 589.6], [2.0, 1.0])
+    assert doublet.band_average([589.0, 589.6, 589.3], [0.1, 0.1, 1.0]) == pytest.approx([20.0, 10.0, 3.0], rel=1e-9)
+    assert doublet.band_average([588.9, 589.3, 589.7], [0.1, 0.5, 0.1]) == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("lines", [[589.6, 589.0], [589.0, 589.05]])
+def test_lines_that_are_not_apart_are_refused(lines):
+    assert complaint(line_spectrum, lines, [1.0, 1.0]).startswith(f"lines_nm: {lines!r} is not allowed")
+
+
+def edges_of(centres, widths):
+    assert centres[1:] - widths[1:] / 2 == pytest.approx(centres[:-1] + widths[:-1] / 2, abs=1e-9)  # no gap, no overlap
+    return np.append(centres - widths / 2, centres[-1] + widths[-1] / 2)
+
+
+def test_without_lines_the_bands_are_the_default_ones():
+    centres, widths = line_bands([])
+    assert centres == pytest.approx(DEFAULT_WAVELENGTH_NM)
+    assert widths == pytest.approx(np.full(40, 10.0))
+
+
+def test_a_doublet_closer_than_a_nanometre_shares_one_band():
+    centres, widths = line_bands([589.6, 589.0])
+    assert edges_of(centres, widths)[20:25] == pytest.approx([580.0, 588.5, 590.1, 600.0, 610.0])
+
+
+def test_a_piece_of_under_a_nanometre_beside_a_line_joins_its_neighbour():
+    edges = edges_of(*line_bands([579.1], (560.0, 600.0)))
+    assert edges == pytest.approx([560.0, 570.0, 578.6, 579.6, 590.0, 600.0])
+
+
+@given(
+    lines=st.lists(st.floats(381.0, 779.0), min_size=1, max_size=12),
+    width=st.sampled_from([2.0, 5.0, 10.0, 33.0]),
+)
+def test_every_line_has_a_band_whose_edges_are_half_a_nanometre_from_a_line(lines, width):
+    centres, widths = line_bands(lines, width_nm=width)
+    edges = edges_of(centres, widths)
+    assert (edges[0], edges[-1]) == (380.0, 780.0)
+    assert widths.max() <= width + 2.0 + 1e-9
+    for line in lines:
+        band = np.searchsorted(edges, line) - 1
+        for edge in edges[band : band + 2]:
+            assert min(abs(abs(edge - other) - 0.5) for other in lines) < 1e-9
+
+
+@pytest.mark.parametrize("line", [380.2, 790.0])
+def test_a_line_outside_the_range_is_refused(line):
+    assert f"lines_nm: {[line]!r} is not inside 380 to 780" in complaint(line_bands, [line])
