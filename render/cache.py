@@ -1,72 +1,102 @@
-"""Finished renders on disk, under the hash of everything that determines them."""
+"""Renders on disk, under the hash of all that determines them.
+
+How far they were taken isn't in it, nor are the lights' spectra and powers: transport doesn't depend on them.
+"""
 
 import hashlib
 import json
 import os
 import tempfile
-from collections.abc import Mapping
 from dataclasses import asdict
-from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
+from render.error_estimates import relative_error
 from render.loader import Film, integrator_name, variant
-from render.scene import Scene
-from render.transport import Transport
+from render.scene import Node, Scene
+from render.transport import Transport, emission
 
-ENGINE_VERSION = 1  # raise it with any change that moves a rendered value: older entries are then not used
+ENGINE_VERSION = 2  # raise it with any change that moves a rendered value: older entries are then not used
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _ARRAYS = ("radiance", "half_difference", "variance", "irradiance", "emitter_visible")
 _VALUES = ("spp", "passes", "stopped_by", "seconds", "integrator", "variant")
+_CHUNK_BYTES = 1 << 22
 
 
-def load_transport(folder: Path, scene: Scene, film: Film, settings: Mapping[str, Any]) -> Transport | None:
+def load_transport(folder: Path, scene: Scene, film: Film, seed: int) -> Transport | None:
     """Stored transport, or None where there is none that is whole: a SHA-256 digest ends the file."""
     try:
-        content = _path(folder, scene, film, settings).read_bytes()
+        path = _path(folder, scene, film, seed)
+        with path.open("rb") as file:
+            size = path.stat().st_size - _DIGEST_BYTES
+            digest = _digest(file, size)
+            if size < 0 or file.read() != digest:
+                return None
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as entry:
+                arrays: dict[str, Any] = {name: entry.get(name) for name in _ARRAYS}
+                values = json.loads(str(entry["values"]))
     except OSError:
         return None
-    archive, digest = content[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
-    if hashlib.sha256(archive).digest() != digest:
-        return None
-    with np.load(BytesIO(archive), allow_pickle=False) as entry:
-        arrays: dict[str, Any] = {name: entry.get(name) for name in _ARRAYS}
-        values = json.loads(str(entry["values"]))
+    lights = emission(scene.groups, film.wavelength_nm, film.width_nm)
     return Transport(
         **arrays,
         **{name: values[name] for name in _VALUES},
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,
         width_nm=film.width_nm,
+        relative_mc_error=relative_error(lights, arrays["radiance"], arrays["variance"]),
     )
 
 
-def save_transport(folder: Path, scene: Scene, film: Film, settings: Mapping[str, Any], transport: Transport) -> None:
+def save_transport(folder: Path, scene: Scene, film: Film, seed: int, transport: Transport) -> None:
     """Store a transport; readers see the whole file or none."""
     folder.mkdir(parents=True, exist_ok=True)
     arrays = {name: getattr(transport, name) for name in _ARRAYS if getattr(transport, name) is not None}
     values = json.dumps({name: getattr(transport, name) for name in _VALUES})
     handle, temporary = tempfile.mkstemp(dir=folder, suffix=".part")
     try:
-        with os.fdopen(handle, "wb") as file:
-            archive = BytesIO()
-            np.savez(archive, values=np.array(values), **arrays)
-            file.write(archive.getbuffer())
-            file.write(hashlib.sha256(archive.getbuffer()).digest())
-        Path(temporary).replace(_path(folder, scene, film, settings))
+        with os.fdopen(handle, "w+b") as file:
+            np.savez(file, values=np.array(values), **arrays)
+            size = file.seek(0, os.SEEK_END)
+            file.seek(0)
+            digest = _digest(file, size)
+            file.seek(0, os.SEEK_END)
+            file.write(digest)
+        Path(temporary).replace(_path(folder, scene, film, seed))
     finally:
         Path(temporary).unlink(missing_ok=True)
 
 
-def _path(folder: Path, scene: Scene, film: Film, settings: Mapping[str, Any]) -> Path:
+def _digest(file: BinaryIO, size: int) -> bytes:
+    """SHA-256 of the next `size` bytes, read in pieces."""
+    digest = hashlib.sha256()
+    while size > 0 and (piece := file.read(min(size, _CHUNK_BYTES))):
+        digest.update(piece)
+        size -= len(piece)
+    return digest.digest()
+
+
+def _path(folder: Path, scene: Scene, film: Film, seed: int) -> Path:
     key = {
         "engine": [ENGINE_VERSION, integrator_name(), variant()],
-        "scene": [scene.name, scene.description, scene.reference_plane],
-        "groups": [[name, group.emitters] for name, group in scene.groups.items()],
+        "scene": [scene.name, scene.geometry, scene.reference_plane, _file_digests(scene.geometry)],
+        "groups": [[name, group.emitters, group.own_colour] for name, group in scene.groups.items()],
         "film": asdict(film),
-        "settings": dict(settings),
+        "seed": seed,
     }
     text = json.dumps(key, sort_keys=True, default=lambda value: np.asarray(value).tolist())
     return folder / f"{scene.name}-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
+
+
+def _file_digests(node: Node) -> list[str]:
+    """Content of the files (meshes, bitmaps) that a scene's dict names, in its order."""
+    digests = []
+    for key, value in node.items():
+        if isinstance(value, dict):
+            digests += _file_digests(value)
+        elif key == "filename" and Path(str(value)).is_file():
+            digests.append(hashlib.sha256(Path(str(value)).read_bytes()).hexdigest())
+    return digests

@@ -23,7 +23,8 @@ PDF_TOLERANCE = 1e-3
 def dense_path(mi: Any) -> Any:
     """Build the integrator class for the variant that is set; register it as ``densepath``.
 
-    Properties of the plug-in: ``wavelength_nm`` and ``width_nm`` (comma-separated, a multiple of four), ``max_depth``.
+    Properties of the plug-in: ``wavelength_nm`` and ``width_nm`` (comma-separated, a multiple of four), ``max_depth``,
+    and ``own_colour``: whether emission depends on wavelength. At unit emission it doesn't, and is evaluated once.
     Channels after the first (alpha-less luminance film) hold the bands, and one more the share of paths whose BSDF
     chose by wavelength.
     """
@@ -32,6 +33,7 @@ def dense_path(mi: Any) -> Any:
         def __init__(self, props: Any) -> None:
             super().__init__(props)
             self.max_depth = int(props.get("max_depth", 8))
+            self.own_colour = bool(props.get("own_colour", False))
             self.centres = np.array([float(x) for x in str(props["wavelength_nm"]).split(",")])
             self.widths = np.array([float(x) for x in str(props["width_nm"]).split(",")])
 
@@ -43,7 +45,8 @@ def dense_path(mi: Any) -> Any:
             if self.max_depth == 1:  # light seen directly: no material needs to be compiled
                 result, chosen = _seen(mi, scene, ray, wavelengths), mi.Bool(False)
             else:
-                result, chosen = _trace(mi, scene, sampler, ray, wavelengths, self.max_depth, mi.Bool(active))
+                limits = (self.max_depth, self.own_colour)
+                result, chosen = _trace(mi, scene, sampler, ray, wavelengths, *limits, mi.Bool(active))
             bands = [value for group in result for value in group]
             return mi.Spectrum(0.0), mi.Bool(True), [*bands, dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
 
@@ -71,18 +74,33 @@ def _emission(emitter: Any, interaction: Any, wavelengths: list[Any]) -> list[An
     return values
 
 
-def _seen(mi: Any, scene: Any, ray: Any, wavelengths: list[Any]) -> list[Any]:
-    """Emission of what the camera's ray meets first."""
-    si = scene.ray_intersect(mi.Ray3f(ray))
-    return list(dr.dispatch(si.emitter(scene), _emission, si, wavelengths))
-
-
 def _emission_towards(emitter: Any, interaction: Any, direction: Any, wavelengths: list[Any]) -> list[Any]:
     values = []
     for group in wavelengths:
         interaction.wavelengths = group
         values.append(emitter.eval_direction(interaction, direction))
     return values
+
+
+def _emitted(emitter: Any, interaction: Any, wavelengths: list[Any], own_colour: bool) -> list[Any]:
+    """Emission of the light that a path meets."""
+    if own_colour:
+        return list(dr.dispatch(emitter, _emission, interaction, wavelengths))
+    return [emitter.eval(interaction)[0]] * len(wavelengths)  # unit emission: the same at every wavelength
+
+
+def _arriving(direction: Any, sampled: Any, interaction: Any, wavelengths: list[Any], own_colour: bool) -> list[Any]:
+    """Emission towards a point from the sampled position on a light, over the density of the sample."""
+    if own_colour:
+        values = dr.dispatch(direction.emitter, _emission_towards, interaction, direction, wavelengths)
+        return [dr.select(direction.pdf != 0, value / direction.pdf, 0.0) for value in values]
+    return [sampled[0]] * len(wavelengths)
+
+
+def _seen(mi: Any, scene: Any, ray: Any, wavelengths: list[Any]) -> list[Any]:
+    """Emission of what the camera's ray meets first."""
+    si = scene.ray_intersect(mi.Ray3f(ray))
+    return list(dr.dispatch(si.emitter(scene), _emission, si, wavelengths))
 
 
 def _scatter(
@@ -115,7 +133,14 @@ def _roulette(throughput: list[Any], eta: Any, depth: Any, sample: Any) -> tuple
 
 @dr.syntax
 def _trace(
-    mi: Any, scene: Any, sampler: Any, camera_ray: Any, wavelengths: list[Any], max_depth: int, active: Any
+    mi: Any,
+    scene: Any,
+    sampler: Any,
+    camera_ray: Any,
+    wavelengths: list[Any],
+    max_depth: int,
+    own_colour: bool,
+    active: Any,
 ) -> tuple[list[Any], Any]:
     """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``)."""
     context = mi.BSDFContext()
@@ -132,7 +157,7 @@ def _trace(
         seen = mi.DirectionSample3f(scene, si, previous)
         light_pdf = scene.pdf_emitter_direction(previous, seen, ~previous_delta)
         share = dr.select(previous_delta, 1.0, _power_heuristic(previous_pdf, light_pdf))
-        emitted = dr.dispatch(seen.emitter, _emission, si, wavelengths)
+        emitted = _emitted(seen.emitter, si, wavelengths, own_colour)
         for g in range(len(wavelengths)):
             result[g] += throughput[g] * emitted[g] * share
 
@@ -140,18 +165,18 @@ def _trace(
         bsdf = si.bsdf(ray)
         lit = go_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         si.wavelengths = wavelengths[0]
-        ds, arriving = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
-        lit &= (ds.pdf != 0) & dr.any(arriving != 0)
+        ds, sampled = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
+        lit &= (ds.pdf != 0) & dr.any(sampled != 0)
         towards_light = si.to_local(ds.d)
         lobe, angle = sampler.next_1d(), sampler.next_2d()
         values, pdf, sample, weights, by_wavelength = dr.dispatch(
             bsdf, _scatter, context, si, towards_light, lobe, angle, wavelengths
         )
         chosen |= go_on & by_wavelength
-        factor = dr.select(lit, dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, pdf)) / ds.pdf, 0.0)
-        direct = dr.dispatch(ds.emitter, _emission_towards, si, ds, wavelengths)
+        factor = dr.select(lit, dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, pdf)), 0.0)
+        direct = _arriving(ds, sampled, si, wavelengths, own_colour)
         for g in range(len(wavelengths)):
-            result[g] += dr.select(lit, throughput[g] * values[g] * direct[g] * factor, 0.0)
+            result[g] += throughput[g] * values[g] * (direct[g] * factor)
             throughput[g] = throughput[g] * weights[g]
 
         ray = si.spawn_ray(si.to_world(sample.wo))

@@ -1,55 +1,27 @@
 """Rendering a scene's transport: independent passes, their scatter as the error, and the rule that stops them."""
 
+import signal
+import threading
 import time
-import traceback
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from render.cache import load_transport, save_transport
+from render.error_estimates import relative_error
 from render.errors import InputError, require_whole
 from render.limits import Limits
-from render.loader import Film, integrator_name, integrators, load_direct, load_unit, mitsuba_module, parts, variant
+from render.loader import Film, integrator_name, load_unit, variant
+from render.passes import Sums, add_pass, emitter_visible, let_go, no_passes, sums_of
 from render.scene import Scene
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
-from render.transport import Stop, Transport, relative_error
+from render.transport import Stop, Transport, emission
 
-Planes = NDArray[np.float32]  # (band, h, w)
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
-
-# Bands traced together by the camera. 40 bands of `still_life`, 256x256, 64 samples on two cores, in parts of 40, 20,
-# 12, 8, 4: first kernels after 31, 21, 11, 10, 9 s, then 55, 33, 30, 32, 40 s a render.
-CAMERA_BANDS = 12
-METER_BANDS = 4  # by the irradiance meter: its film is small, and its kernel another one to compile
-VISIBLE_SPP = 16  # samples a pixel to find where a light is seen directly
-
-
-@dataclass
-class _Sums:
-    """Running sums of one group's passes (Welford), planes of (band, h, w); the only mutable state of a render."""
-
-    mean: Planes
-    scatter: Planes
-    signed: Planes
-    plane: Floats | None = None
-    passes: int = 0
-    drawn: int = 0
-
-    def add(self, planes: Planes) -> None:
-        self.passes += 1
-        delta = planes - self.mean
-        self.mean += delta / np.float32(self.passes)
-        self.scatter += delta * (planes - self.mean)
-        self.signed += planes if self.passes % 2 else -planes
-
-    @property
-    def variance(self) -> Planes:
-        """Variance of the mean."""
-        return self.scatter / np.float32((self.passes - 1) * self.passes)
 
 
 def render(
@@ -59,16 +31,19 @@ def render(
     wavelength_nm: ArrayLike | None = None,
     width_nm: ArrayLike | None = None,
     spp: int | None = None,
+    max_spp: int | None = None,
     noise: float | None = None,
     max_seconds: float | None = None,
     max_depth: int = 8,
     seed: int = 0,
     cache: str | Path | None = None,
+    resume: Transport | None = None,
     progress: Progress | None = None,
 ) -> Transport:
     """Render each light group of a scene at unit spectral emission.
 
-    Stops at whichever comes first of `spp`, `noise` and `max_seconds`; with none of them after 64 samples a pixel.
+    Stops at whichever comes first of `spp` (or `max_spp`), `noise` and `max_seconds`; with none of them after 64
+    samples a pixel. Ctrl-C ends it after the passes under way and keeps them; a second one gives up.
 
     Parameters
     ----------
@@ -76,21 +51,27 @@ def render(
     size : (int, int)
         Height and width in pixels.
     wavelength_nm, width_nm : (band,) array_like, optional
-        Band centres and widths; 40 bands of 10 nm over 380-780 nm by default.
+        Band centres and widths; 40 bands of 10 nm over 380-780 nm by default. `render.spectrum.line_bands` gives
+        emission lines bands of their own.
     spp : int, optional
-        Samples a pixel, rounded up to what the passes and the stratified sampler can hold.
+        Samples a pixel, in eight passes; rounded up to what the passes and the stratified sampler can hold.
+    max_spp : int, optional
+        The same as a ceiling beside `noise` or `max_seconds`: in passes of 16 or fewer.
     noise : float, optional
-        Relative Monte Carlo error (median over pixels and bands, scene's own lights) to reach.
+        Relative Monte Carlo error (median over pixels and bands, variance pooled over 3x3 pixels, scene's own lights)
+        to reach, judged from eight passes on.
     max_seconds : float, optional
-        Time to keep; at least two passes are made.
+        Time to keep, earlier calls' included; at least two passes are made.
     max_depth : int
         Longest path in segments; 2 is direct light.
     seed : int
         The same seed gives the same bits on one machine, variant and LLVM, whatever the number of threads.
     cache : path, optional
-        Folder of finished renders; an unreadable entry is rendered again.
+        Folder of renders: one that is fine enough is returned, a coarser one is gone on from, a damaged one not used.
+    resume : Transport, optional
+        An earlier result of the same scene, size, bands, depth and seed to go on from; its passes are kept.
     progress : callable, optional
-        Called after each pass with the share done and the error so far.
+        Called after each pair of passes with the share done and the error so far.
 
     Returns
     -------
@@ -99,19 +80,24 @@ def render(
     Raises
     ------
     InputError
-        For a bad size, band or limit, a scene without light, or a material that picks lobes by wavelength.
+        For a bad size, band or limit, a scene without light, a material that picks lobes by wavelength, a light whose
+        data end within the bands, or an earlier result of another size, bands or lights.
     """
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
-    limits = Limits(spp, noise, max_seconds, seed)
-    if cache is not None and (found := load_transport(Path(cache), scene, film, asdict(limits))) is not None:
-        return found
+    limits = Limits(spp, max_spp, noise, max_seconds, seed)
+    earlier = _checked_earlier(resume, scene, film)
+    if cache is not None:
+        found = load_transport(Path(cache), scene, film, seed)
+        earlier = max((x for x in (earlier, found) if x), key=lambda x: x.spp, default=None)
+    if earlier is not None and limits.met_by(earlier):
+        return earlier
     try:
-        transport = _render(scene, film, limits, progress or (lambda done, error: None))
+        transport = _render(scene, film, limits, earlier, progress or (lambda done, error: None))
     except InputError as error:
-        _let_go(error)
+        let_go(error)
         raise
     if cache is not None:
-        save_transport(Path(cache), scene, film, asdict(limits), transport)
+        save_transport(Path(cache), scene, film, seed, transport)
     return transport
 
 
@@ -128,129 +114,100 @@ def _checked_film(
         raise InputError(f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768")
     require_whole("max_depth", max_depth, 2, 1 << 16, "2 is direct light")
     nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)
-    return Film((int(size[0]), int(size[1])), nm, band_widths(nm, width_nm), int(max_depth))
+    widths = band_widths(nm, width_nm)
+    scene.check_range((nm - widths / 2).min(), (nm + widths / 2).max())
+    return Film((int(size[0]), int(size[1])), nm, widths, int(max_depth))
 
 
-def _render(scene: Scene, film: Film, limits: Limits, progress: Progress) -> Transport:
-    start = time.perf_counter()
+def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film) -> Transport | None:
+    """Give the result to go on from; refuse another scene's."""
+    if earlier is None:
+        return None
+    shape = (len(scene.groups), film.wavelength_nm.size, *film.size)
+    same_bands = np.array_equal(earlier.wavelength_nm, film.wavelength_nm) and np.array_equal(
+        earlier.width_nm, film.width_nm
+    )
+    if earlier.radiance.shape != shape or not same_bands or list(earlier.groups) != list(scene.groups):
+        raise InputError(
+            f"resume: (group, band, h, w) {earlier.radiance.shape} of lights {list(earlier.groups)} don't fit the "
+            f"{shape} of {list(scene.groups)} asked for; allowed: a result of the same scene, size and bands; "
+            "leave it out"
+        )
+    return earlier
+
+
+def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None, progress: Progress) -> Transport:
+    start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
+    sums = sums_of(earlier) if earlier else no_passes(len(scene.groups), film)
+    pass_spp = earlier.spp // earlier.passes if earlier else limits.pass_spp
     loaded = [load_unit(scene, group, film) for group in scene.groups]
-    shape = (film.wavelength_nm.size, *film.size)
-    sums = [
-        _Sums(np.zeros(shape, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32)) for _ in loaded
-    ]
-    stopped_by: Stop | None = None
-    for done, pass_seconds in _pairs(loaded, sums, film, limits):
-        seconds, error = time.perf_counter() - start, _own_error(scene, film, sums)
-        progress(limits.share(sums[0].drawn, error, seconds), error)
-        stopped_by = limits.stop(sums[0].drawn, done, error, seconds, pass_seconds)
-        if stopped_by:
-            break
+    lights, stopped_by = _lights(scene, film), None
+    with _told_to_stop() as told:
+        while stopped_by is None:
+            for _ in range(2):  # two by two, so that even and odd halves stay equal
+                pass_start = time.perf_counter()
+                add_pass(loaded, sums, film, pass_spp, limits.seed)
+            now = time.perf_counter()
+            error = relative_error(lights, sums.mean, sums.scatter, float(sums.variance_factor))
+            progress(limits.share(sums.drawn, error, now - start), error)
+            # The second of a pair compiles nothing: it tells how long the next ones take.
+            stopped_by = limits.stop(sums.drawn, sums.passes, error, now - start, now - pass_start)
+            if stopped_by is None and told():
+                stopped_by = "interrupt"
+    return _transport(scene, film, sums, stopped_by, earlier, limits.seed, start)
+
+
+def _transport(
+    scene: Scene,
+    film: Film,
+    sums: Sums,
+    stopped_by: Stop,
+    earlier: Transport | None,
+    seed: int,
+    start: float,
+) -> Transport:
+    """Turn the sums into a result, in place: they are used up."""
+    sums.scatter *= sums.variance_factor
+    sums.signed /= np.float32(sums.passes)
     return Transport(
-        radiance=np.stack([s.mean for s in sums]),
-        half_difference=np.stack([s.signed / np.float32(s.passes) for s in sums]),
-        variance=np.stack([s.variance for s in sums]),
-        irradiance=np.stack([s.plane / s.passes for s in sums if s.plane is not None])
-        if scene.reference_plane
-        else None,
-        emitter_visible=_emitter_visible(scene, film, limits.seed),
+        radiance=sums.mean,
+        half_difference=sums.signed,
+        variance=sums.scatter,
+        irradiance=sums.plane / sums.passes if scene.reference_plane else None,
+        emitter_visible=earlier.emitter_visible if earlier else emitter_visible(scene, film, seed),
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,
         width_nm=film.width_nm,
-        spp=sums[0].drawn,
-        passes=sums[0].passes,
-        stopped_by=stopped_by or "samples",
+        spp=sums.drawn,
+        passes=sums.passes,
+        stopped_by=stopped_by,
         seconds=time.perf_counter() - start,
         integrator=integrator_name(),
         variant=variant(),
+        relative_mc_error=relative_error(_lights(scene, film), sums.mean, sums.scatter),
     )
 
 
-def _pairs(loaded: list[Any], sums: list[_Sums], film: Film, limits: Limits) -> Iterator[tuple[int, float]]:
-    """Add passes two by two, so that even and odd halves stay equal.
-
-    Yields the passes done, and the seconds of the last one: the second of a pair, which compiles nothing.
-    """
-    done = 0
-    while True:
-        for _ in range(2):
-            start = time.perf_counter()
-            for index, (mi_scene, total) in enumerate(zip(loaded, sums, strict=True)):
-                total.drawn += _one_pass(mi_scene, total, film, limits.pass_spp, _pass_seed(limits.seed, index, done))
-            done += 1
-        yield done, time.perf_counter() - start
+def _lights(scene: Scene, film: Film) -> Floats:
+    """Spectral emission of the scene's own lights, shape (group, band)."""
+    return emission(scene.groups, film.wavelength_nm, film.width_nm)
 
 
-def _one_pass(mi_scene: Any, total: _Sums, film: Film, pass_spp: int, seed: int) -> int:
-    """Add one pass to the sums; gives the samples a pixel that the sampler really drew."""
-    sensors = mi_scene.sensors()
-    total.add(_bands(mi_scene, sensors[0], film, CAMERA_BANDS, pass_spp, seed))
-    if len(sensors) > 1:
-        meter = _bands(mi_scene, sensors[1], film, METER_BANDS, pass_spp, seed).mean(axis=(1, 2), dtype=np.float64)
-        if variant() != "scalar_spectral":
-            meter *= np.pi  # the meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels
-        total.plane = meter if total.plane is None else total.plane + meter
-    return int(sensors[0].sampler().sample_count())
+@contextmanager
+def _told_to_stop() -> Iterator[Callable[[], bool]]:
+    """Within it, the first Ctrl-C is noted and the second one raises KeyboardInterrupt. Main thread alone gets them."""
+    noted = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield noted.is_set
+        return
 
+    def note(number: int, frame: Any) -> None:
+        if noted.is_set():
+            raise KeyboardInterrupt
+        noted.set()
 
-def _bands(mi_scene: Any, sensor: Any, film: Film, most_bands: int, spp: int, seed: int) -> Planes:
-    """Render one sensor: band averages, shape (band, h, w). Every part of the bands sees the same paths."""
-    mi, images = mitsuba_module(), []
-    for integrator in integrators(film, most_bands):
-        try:
-            image = mi.render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
-        except RuntimeError as error:
-            raise InputError(f"scene: Mitsuba can't render it: {_root_cause(error)}; correct the description") from None
-        images.append(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
-    if variant() == "scalar_spectral":  # specfilm integrates over the band
-        return np.ascontiguousarray(images[0] / film.width_nm.astype(np.float32)[:, None, None])
-    if any(image[-1].any() for image in images):
-        raise InputError(
-            "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
-            "allowed: materials whose sampling doesn't depend on wavelength; replace it"
-        )
-    sizes = [part.size for part in parts(film, most_bands)]
-    # Channel 0 is the film's own luminance; the last one the mark tested above.
-    return np.concatenate([image[1 : 1 + size] for image, size in zip(images, sizes, strict=True)])
-
-
-def _let_go(error: BaseException) -> None:
-    """Free the refused scene, which the traceback holds: Dr.Jit compiles every live material into the next render."""
-    cause: BaseException | None = error
-    while cause:
-        if cause.__traceback__ and cause.__traceback__.tb_next:
-            traceback.clear_frames(cause.__traceback__.tb_next)
-        cause.__traceback__, cause = None, cause.__cause__ or cause.__context__
-
-
-def _root_cause(error: BaseException) -> str:
-    """Mitsuba's own words, from under the layers that Dr.Jit wraps around them, on one line."""
-    while error.__cause__ or error.__context__:
-        error = error.__cause__ or error.__context__ or error
-    return " ".join(str(error).split())
-
-
-def _emitter_visible(scene: Scene, film: Film, seed: int) -> NDArray[np.bool_]:
-    """Pixels in which a light is seen directly, shape (h, w)."""
-    loaded = load_direct(scene, film)
-    one_band = Film(film.size, film.wavelength_nm[:1], film.width_nm[:1], 1)
-    planes = _bands(
-        loaded, loaded.sensors()[0], one_band, METER_BANDS, VISIBLE_SPP, _pass_seed(seed, len(scene.groups), 0)
-    )
-    return np.asarray(planes[0] > 0)
-
-
-def _pass_seed(seed: int, group: int, index: int) -> int:
-    """Seed of one pass of one group, from its coordinates alone."""
-    return int(np.random.SeedSequence([seed, group, index]).generate_state(1)[0])
-
-
-def _own_error(scene: Scene, film: Film, sums: list[_Sums]) -> float:
-    """Relative error under the scene's own lights."""
-    values = np.zeros_like(sums[0].mean)
-    variance = np.zeros_like(values)
-    for group, total in zip(scene.groups.values(), sums, strict=True):
-        spectrum = (group.spectrum * group.power).band_average(film.wavelength_nm, film.width_nm)
-        emission = spectrum.astype(np.float32)[:, None, None]
-        values += emission * total.mean
-        variance += emission**2 * total.variance
-    return relative_error(values, variance)
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield noted.is_set
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if before is None else before)

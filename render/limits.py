@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from render.errors import require_range, require_whole
-from render.transport import Stop
+from render.errors import InputError, require_range, require_whole
+from render.transport import Stop, Transport
 
 DEFAULT_SPP = 64
 PASSES = 8  # scatter of fewer passes says little about the error
@@ -20,20 +20,34 @@ class Limits:
     Attributes
     ----------
     spp : int or None
+        Samples a pixel, drawn in `PASSES` passes.
+    max_spp : int or None
+        The same, drawn in passes of at most `PASS_SPP`: for a render that is to stop earlier.
     noise : float or None
         Relative Monte Carlo error to reach.
     max_seconds : float or None
     seed : int
+
+    Raises
+    ------
+    InputError
+        For a limit out of range, or both `spp` and `max_spp`.
     """
 
-    spp: int | None
-    noise: float | None
-    max_seconds: float | None
-    seed: int
+    spp: int | None = None
+    max_spp: int | None = None
+    noise: float | None = None
+    max_seconds: float | None = None
+    seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.spp is not None:
-            require_whole("spp", self.spp, 1, MOST_SPP, "give samples per pixel")
+        for name in ("spp", "max_spp"):
+            if getattr(self, name) is not None:
+                require_whole(name, getattr(self, name), 1, MOST_SPP, "give samples per pixel")
+        if self.spp is not None and self.max_spp is not None:
+            raise InputError(
+                f"spp and max_spp: {self.spp!r} and {self.max_spp!r} are both given; allowed: one; leave spp out"
+            )
         if self.noise is not None:
             require_range("noise", self.noise, 1e-6, 10.0, "give a relative error such as 0.02")
         if self.max_seconds is not None:
@@ -43,12 +57,19 @@ class Limits:
     @property
     def most_spp(self) -> int:
         """Samples a pixel after which the render stops in any case."""
-        return self.spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
+        return self.spp or self.max_spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
 
     @property
     def pass_spp(self) -> int:
         """Samples a pixel of each pass."""
-        return PASS_SPP if self.most_spp == MOST_SPP else -(-self.most_spp // PASSES)
+        whole = -(-self.most_spp // PASSES)
+        return min(whole, PASS_SPP) if self.max_spp or self.most_spp == MOST_SPP else whole
+
+    def met_by(self, earlier: Transport) -> bool:
+        """Whether a render that was made earlier leaves nothing to do."""
+        pass_seconds = earlier.seconds / earlier.passes
+        reached = self.stop(earlier.spp, earlier.passes, earlier.relative_mc_error, earlier.seconds, pass_seconds)
+        return reached is not None
 
     def stop(self, drawn: int, passes: int, error: float, seconds: float, pass_seconds: float) -> Stop | None:
         """Which limit is reached, None while none is."""

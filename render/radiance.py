@@ -24,6 +24,9 @@ class SpectralRadiance:
         Median over pixels and bands of the Monte Carlo standard error over the mean; 0 where nothing was rendered.
     width_nm : (band,) float64
         Band widths; left out, the spacing of evenly spaced centres.
+    band_error : (band,) float64, optional
+        What light that varies within a band adds to each band, relative, RMS over pixels: the product of band averages
+        of transport and emission misses their covariance (`render.error_estimates.within_band_error`).
 
     Raises
     ------
@@ -35,6 +38,7 @@ class SpectralRadiance:
     wavelength_nm: Floats
     relative_mc_error: float = 0.0
     width_nm: Floats | None = None
+    band_error: Floats | None = None
 
     def __post_init__(self) -> None:
         values = np.asarray(self.values)

@@ -21,6 +21,7 @@ EMISSION_PARAMETER = {
 }
 # Emitter plug-ins with colours of their own, which differ over directions: a spectrum can only filter them.
 OWN_COLOUR_EMITTERS = ("envmap", "sunsky")
+SUNSKY_NM = (320.0, 720.0)  # Mitsuba's tables (Hosek & Wilkie 2012) end here, and give 0 beyond: found by evaluating it
 _REFUSED_EMITTERS = ("sky", "sun", "projector", "directionalarea", "timedsunsky", "volumelight")
 
 
@@ -97,6 +98,15 @@ class Scene:
                 )
         if self.reference_plane is not None and self.reference_plane not in self.geometry:
             raise unknown(f"scene {self.name}: reference_plane", self.reference_plane, self.geometry)
+
+    def check_range(self, shortest_nm: float, longest_nm: float) -> None:
+        """Raise `InputError` where a light's data end within the wavelengths asked for."""
+        low, high = SUNSKY_NM
+        if "sunsky" in _emitter_paths(self.geometry).values() and (shortest_nm < low or longest_nm > high):
+            raise InputError(
+                f"scene {self.name}: bands reach {shortest_nm:g}-{longest_nm:g} nm, and a sunsky is known over "
+                f"{low:g}-{high:g} nm alone; give wavelength_nm within, or light by area, constant and directional"
+            )
 
     @property
     def description(self) -> Node:

@@ -1,21 +1,23 @@
 """Light transport of a scene, rendered once; any spectrum, power and level of its lights afterwards."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
 
+from render.error_estimates import relative_error, within_band_error
 from render.errors import InputError, require_keys, require_range
 from render.illuminants import illuminant
+from render.jit import arrays, backend, dr
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.spectrum import Floats, Spectrum
 
-Stop = Literal["samples", "noise", "seconds"]
+Stop = Literal["samples", "noise", "seconds", "interrupt"]
 
 
 @dataclass(frozen=True)
@@ -39,9 +41,12 @@ class Transport:
     wavelength_nm, width_nm : (band,) float64
     spp, passes : int
         Samples a pixel, all passes together, and the number of passes.
-    stopped_by : "samples", "noise" or "seconds"
+    stopped_by : "samples", "noise", "seconds" or "interrupt"
     seconds : float
+        Of all the calls that it took.
     integrator, variant : str
+    relative_mc_error : float
+        Error reached under the scene's own lights: median over pixels and bands of standard error over mean.
     """
 
     radiance: NDArray[np.float32]
@@ -58,6 +63,7 @@ class Transport:
     seconds: float
     integrator: str
     variant: str
+    relative_mc_error: float = 0.0
 
     def relight(
         self,
@@ -83,7 +89,7 @@ class Transport:
         Returns
         -------
         SpectralRadiance
-            float32, each value rounded once from float64.
+            float32, each value rounded once from float64. Its `band_error` tells what the product of band averages misses.
 
         Raises
         ------
@@ -91,10 +97,15 @@ class Transport:
             For an unknown group or illuminant, a negative power or level, both levels at once, a level of a scene
             that gives no light, or illuminance without a reference plane.
         """
-        coefficients = self._coefficients_at(spectra, powers, luminance_cd_m2, illuminance_lux)
-        values = self._combine(coefficients, self.radiance)
-        error = relative_error(values, self._combine(coefficients**2, self.variance))
-        return self._as_radiance(values, error)
+        lights = self._lights(spectra, powers)
+        coefficients = self._at_level(self._emission(lights), luminance_cd_m2, illuminance_lux)
+        return SpectralRadiance(
+            _view(_combine(coefficients, self.radiance)),
+            self.wavelength_nm,
+            relative_error(coefficients, self.radiance, self.variance),
+            self.width_nm,
+            within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm),
+        )
 
     def relight_halves(
         self,
@@ -109,93 +120,95 @@ class Transport:
         Their mean is `relight`'s result; a quarter of the squared difference of any linear function of them is an
         unbiased estimate of that function's Monte Carlo variance.
         """
-        coefficients = self._coefficients_at(spectra, powers, luminance_cd_m2, illuminance_lux)
-        even, odd = (
-            self._as_radiance(np.maximum(self._combine(coefficients, self.radiance + sign * self.half_difference), 0.0))
-            for sign in (np.float32(1), np.float32(-1))
-        )
+        emitted = self._emission(self._lights(spectra, powers))
+        coefficients = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
+        values, difference = _combine(coefficients, self.radiance), _combine(coefficients, self.half_difference)
+        halves = (np.maximum(values + difference, 0.0), np.maximum(values - difference, 0.0))
+        even, odd = (SpectralRadiance(_view(half), self.wavelength_nm, 0.0, self.width_nm) for half in halves)
         return even, odd
 
     def illuminance_lux(self, luminance_cd_m2: float) -> float | None:
         """Illuminance on the reference plane at a mean luminance under the scene's own lights; None without a plane."""
         if self.irradiance is None:
             return None
-        return self._plane_lux(self._coefficients_at(None, None, luminance_cd_m2, None))
+        return self._plane_lux(self._at_level(self._emission(self._lights(None, None)), luminance_cd_m2, None))
 
-    def _coefficients_at(
-        self,
-        spectra: Mapping[str, Spectrum | str] | None,
-        powers: Mapping[str, float] | None,
-        luminance_cd_m2: float | None,
-        illuminance_lux: float | None,
-    ) -> NDArray[np.float64]:
-        """Spectral emission of each group and band at the level asked for, shape (group, band)."""
-        coefficients = self._coefficients(spectra, powers)
-        return coefficients * self._level(coefficients, luminance_cd_m2, illuminance_lux)
-
-    def _coefficients(
+    def _lights(
         self, spectra: Mapping[str, Spectrum | str] | None, powers: Mapping[str, float] | None
-    ) -> NDArray[np.float64]:
-        """Spectral emission of each group and band, shape (group, band)."""
+    ) -> dict[str, LightGroup]:
+        """Light groups as asked for."""
         require_keys("spectra: light group", spectra or {}, self.groups)
         require_keys("powers: light group", powers or {}, self.groups)
-        rows = []
+        lights = {}
         for name, group in self.groups.items():
             own = (spectra or {}).get(name, group.spectrum)
-            spectrum = illuminant(own) if isinstance(own, str) else own
             power = float((powers or {}).get(name, group.power))
             require_range(f"powers[{name!r}]", power, 0.0, 1e30, "give a factor of 0 or more")
-            rows.append(spectrum.band_average(self.wavelength_nm, self.width_nm) * power)
-        return np.array(rows)
+            lights[name] = replace(group, spectrum=illuminant(own) if isinstance(own, str) else own, power=power)
+        return lights
 
-    def _level(self, coefficients: Floats, luminance_cd_m2: float | None, illuminance_lux: float | None) -> float:
-        """Factor that brings the lights to the level asked for."""
+    def _emission(self, lights: Mapping[str, LightGroup]) -> Floats:
+        return emission(lights, self.wavelength_nm, self.width_nm)
+
+    def _at_level(self, emitted: Floats, luminance_cd_m2: float | None, illuminance_lux: float | None) -> Floats:
+        """Emission brought to the level asked for, shape (group, band)."""
         if luminance_cd_m2 is not None and illuminance_lux is not None:
             raise InputError("luminance_cd_m2 and illuminance_lux: both given; allowed: one of them; leave one out")
         if luminance_cd_m2 is not None:
             require_range("luminance_cd_m2", luminance_cd_m2, 0.0, 1e15, "give a mean luminance of 0 or more")
-            asked, present = luminance_cd_m2, self._mean_luminance(coefficients)
+            asked, present = luminance_cd_m2, self._mean_luminance(emitted)
         elif illuminance_lux is not None:
             require_range("illuminance_lux", illuminance_lux, 0.0, 1e15, "give an illuminance of 0 or more")
-            asked, present = illuminance_lux, self._plane_lux(coefficients)
+            asked, present = illuminance_lux, self._plane_lux(emitted)
         else:
-            return 1.0
+            return emitted
         if present <= 0:
             raise InputError(f"level: {asked} can't be reached, the scene gives no light; raise a power or spectrum")
-        return asked / present
+        return emitted * (asked / present)
 
-    def _mean_luminance(self, coefficients: Floats) -> float:
+    @cached_property
+    def _mean_radiance(self) -> Floats:
+        """Mean over pixels that see no light directly, shape (group, band)."""
         kept = ~self.emitter_visible
         if not kept.any():
             raise InputError(
                 "luminance_cd_m2: every pixel sees a light directly; give illuminance_lux or powers instead"
             )
-        mean = self.radiance[:, :, kept].mean(axis=2, dtype=np.float64)
-        return float(luminance((coefficients * mean).sum(axis=0), self.wavelength_nm, self.width_nm))
+        planes = self.radiance.reshape(-1, *kept.shape)
+        means = [(plane if kept.all() else plane[kept]).mean(dtype=np.float64) for plane in planes]
+        return np.reshape(means, self.radiance.shape[:2])
 
-    def _plane_lux(self, coefficients: Floats) -> float:
+    def _mean_luminance(self, emitted: Floats) -> float:
+        spectral = (emitted * self._mean_radiance).sum(axis=0)
+        return float(luminance(spectral, self.wavelength_nm, self.width_nm))
+
+    def _plane_lux(self, emitted: Floats) -> float:
         if self.irradiance is None:
             raise InputError("illuminance_lux: the scene states no reference plane; give luminance_cd_m2 instead")
-        return float(luminance((coefficients * self.irradiance).sum(axis=0), self.wavelength_nm, self.width_nm))
-
-    @staticmethod
-    def _combine(coefficients: Floats, planes: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Sum over groups, shape (band, h, w); in float64 band by band, rounded once."""
-        result = np.empty(planes.shape[1:], dtype=np.float32)
-        for band, factors in enumerate(coefficients.T):
-            result[band] = sum(c * plane.astype(np.float64) for c, plane in zip(factors, planes[:, band], strict=True))
-        return result
-
-    def _as_radiance(self, planes: NDArray[np.float32], error: float = 0.0) -> SpectralRadiance:
-        """Band-planar memory behind the (h, w, band) view that the type promises: every later step sums over bands."""
-        return SpectralRadiance(np.moveaxis(planes, 0, -1), self.wavelength_nm, error, self.width_nm)
+        return float(luminance((emitted * self.irradiance).sum(axis=0), self.wavelength_nm, self.width_nm))
 
 
-def relative_error(values: NDArray[np.float32], variance: NDArray[np.float32]) -> float:
-    """Median over pixels and bands of standard error over mean, the variance pooled over 3x3 pixels; dark values out.
+def emission(lights: Mapping[str, LightGroup], wavelength_nm: Floats, width_nm: Floats) -> Floats:
+    """Spectral emission of each group, band averages, shape (group, band)."""
+    return np.array([x.spectrum.band_average(wavelength_nm, width_nm) * x.power for x in lights.values()])
 
-    Shapes (band, h, w). Pooling steadies an estimate that has few passes behind it.
-    """
-    pooled = uniform_filter(variance, size=(1, 3, 3), mode="nearest")
-    lit = values > 0
-    return float(np.median(np.sqrt(np.maximum(pooled[lit], 0)) / values[lit])) if lit.any() else 0.0
+
+def _combine(coefficients: Floats, planes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Sum over groups, shape (band, h, w): in float64, rounded once; every value is read once."""
+    groups, bands, height, width = planes.shape
+    flat = planes.reshape(groups, bands * height * width)
+    if backend() == "numpy":
+        terms = coefficients[:, :, None] * flat.reshape(groups, bands, -1)
+        return np.asarray(terms.sum(axis=0), dtype=np.float32).reshape(bands, height, width)
+    types = arrays()
+    band = dr.arange(types.UInt, bands * height * width) // dr.opaque(types.UInt, height * width)
+    total = types.Float64(0)
+    for group in range(groups):  # arrays of the host are read where they are, not copied
+        factor = dr.gather(types.Float64, types.Float64(coefficients[group]), band)
+        total = dr.fma(types.Float64(types.Float(flat[group])), factor, total)
+    return np.asarray(types.Float(total).numpy()).reshape(bands, height, width)
+
+
+def _view(planes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(h, w, band) view, as the type promises, of band-planar memory: every later step sums over bands."""
+    return np.moveaxis(planes, 0, -1)

@@ -7,6 +7,7 @@ import pytest
 
 from render import engine
 from render.engine import render
+from render.illuminants import illuminant
 from render.scene import LightGroup
 from render.spectrum import flat
 from scenes.catalog import load
@@ -14,7 +15,7 @@ from scenes.catalog import load
 BANDS_NM = np.arange(405.0, 780.0, 50.0)
 SIZE = (3, 4)
 ARRAYS = ("radiance", "half_difference", "variance", "irradiance", "emitter_visible", "wavelength_nm", "width_nm")
-VALUES = ("spp", "passes", "stopped_by", "seconds", "integrator", "variant")
+VALUES = ("spp", "passes", "stopped_by", "seconds", "integrator", "variant", "relative_mc_error")
 
 
 def small(folder, scene=None, **options):
@@ -79,15 +80,11 @@ def test_the_folder_is_made_and_holds_one_whole_file_an_entry(tmp_path, renders)
     "change",
     [
         {"seed": 1},
-        {"spp": 16},
         {"size": (4, 3)},
         {"max_depth": 7},
         {"wavelength_nm": BANDS_NM + 1.0},
         {"width_nm": 40.0},
-        {"noise": 0.2},
-        {"max_seconds": 100.0},
         {"scene": load("flat_field", reflectance=0.25)},
-        {"scene": load("flat_field", light="A")},
         {"scene": replace(load("flat_field"), name="other")},
         {"scene": replace(load("flat_field"), reference_plane=None)},
     ],
@@ -98,6 +95,49 @@ def test_anything_else_asked_for_is_another_entry(change, tmp_path, renders):
     small(tmp_path, **change)
     assert len(renders) == 2
     assert len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize("fine_enough", [{}, {"spp": 4}, {"spp": None, "max_spp": 8}, {"noise": 10.0, "spp": 64}])
+def test_a_render_that_is_fine_enough_is_returned(fine_enough, tmp_path, renders):
+    one = small(tmp_path)
+    assert_equal(small(tmp_path, **fine_enough), one)
+    assert len(renders) == 1
+
+
+def test_a_time_that_is_spent_is_not_spent_again(tmp_path, renders, rendered):
+    small(tmp_path)
+    small(tmp_path, spp=None, max_seconds=rendered.seconds)
+    assert len(renders) == 1
+    small(tmp_path, spp=None, max_seconds=10 * rendered.seconds)
+    assert len(renders) == 2
+
+
+def test_a_coarser_render_is_gone_on_from_and_the_finer_one_kept(tmp_path):
+    coarse = small(tmp_path, spp=16)
+    fine = small(tmp_path, spp=48)
+    assert (fine.spp, fine.passes) == (48, 24)  # in passes of the size it began with
+    assert fine.seconds > coarse.seconds
+    assert_equal(small(tmp_path, spp=48), fine)
+    assert_equal(small(tmp_path, spp=16), fine)
+    assert len(list(tmp_path.iterdir())) == 1
+    assert np.array_equal(fine.radiance, small(None, spp=48, resume=small(None, spp=16)).radiance)
+
+
+def test_other_lights_in_the_same_places_share_an_entry(tmp_path, renders):
+    small(tmp_path)
+    other = small(tmp_path, load("flat_field", light="A"))
+    assert len(renders) == 1
+    assert other.groups["sky"].spectrum is illuminant("A")
+
+
+def test_a_mesh_whose_file_changed_is_another_entry(tmp_path, renders):
+    mesh = tmp_path / "ball.ply"
+    scene = load("flat_field")
+    scene = replace(scene, geometry=scene.geometry | {"ball": {"type": "ply", "filename": str(mesh)}})
+    for content in (b"one", b"two", b"two"):
+        mesh.write_bytes(content)
+        small(tmp_path / "cache", scene)
+    assert len(renders) == 2
 
 
 def test_a_moved_camera_is_another_entry(tmp_path, renders):

@@ -5,6 +5,10 @@ Monte Carlo values are compared in units of their own stated standard error. By 
 """
 
 import gc
+import os
+import signal
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -310,6 +314,73 @@ def test_time_asked_for_ends_a_render_after_two_passes_at_least():
     assert longer.stopped_by == "seconds"
     assert longer.passes > 2
     assert longer.seconds < 5.0  # all the samples allowed would take minutes
+
+
+def test_a_ceiling_of_samples_ends_a_render_in_passes_of_sixteen_or_fewer():
+    assert (small(spp=None, max_spp=24).spp, small(spp=None, max_spp=24).passes) == (24, PASSES)
+    made = small(spp=None, max_spp=200, noise=1e-6)
+    assert (made.stopped_by, made.spp // made.passes) == ("samples", 16)
+    assert 200 <= made.spp < 200 + 2 * 16
+    text = complaint(small, spp=8, max_spp=16)
+    assert text == "spp and max_spp: 8 and 16 are both given; allowed: one; leave spp out"
+
+
+def test_a_render_that_is_gone_on_from_has_the_bits_of_one_that_was_not_interrupted():
+    whole = small(5, spp=None, max_spp=64, noise=1e-6)
+    part = small(5, spp=None, max_seconds=1e-3, max_spp=64)  # two passes
+    assert part.passes == 2
+    on = small(5, spp=None, max_spp=64, resume=part)
+    assert (on.spp, on.passes) == (whole.spp, whole.passes)
+    assert on.seconds > part.seconds
+    assert np.array_equal(on.radiance, whole.radiance)
+    # The sums behind these two are taken back from rounded values.
+    assert on.variance == pytest.approx(whole.variance, rel=1e-5, abs=1e-12)
+    assert on.half_difference == pytest.approx(whole.half_difference, abs=1e-6)
+    assert on.irradiance == pytest.approx(whole.irradiance, rel=1e-12)
+    assert part.passes == 2  # untouched
+
+
+def test_a_result_of_another_render_is_not_gone_on_from():
+    part = small(spp=4)
+    for options in ({"width_nm": 40.0}, {"wavelength_nm": BANDS_NM + 1.0}):
+        assert complaint(small, spp=16, resume=part, **options).startswith("resume: (group, band, h, w) (1, 8, 3, 4)")
+    assert complaint(render, load("flat_field"), (4, 4), wavelength_nm=BANDS_NM, resume=part).startswith("resume: ")
+
+
+def test_control_c_keeps_the_passes_made_so_far(tmp_path):
+    def press(share, error):
+        os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    made = small(spp=None, max_spp=4096, cache=tmp_path, progress=press)
+    assert made.stopped_by == "interrupt"
+    assert 2 <= made.passes <= 4
+    assert signal.getsignal(signal.SIGINT) is before
+    on = small(spp=None, max_spp=128, cache=tmp_path)
+    assert (on.passes, on.stopped_by) == (8, "samples")
+    assert np.array_equal(on.radiance, small(spp=None, max_spp=128).radiance)
+
+
+def test_a_second_control_c_gives_up(tmp_path):
+    def press(share, error):
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01)
+
+    with pytest.raises(KeyboardInterrupt):
+        small(spp=None, max_spp=4096, cache=tmp_path, progress=press)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_render_in_another_thread_leaves_control_c_alone():
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(small).result().stopped_by == "samples"
+
+
+def test_the_error_reached_is_told():
+    made = small(spp=64)
+    assert made.relative_mc_error == pytest.approx(made.relight().relative_mc_error, rel=1e-5)
+    assert 0 < made.relative_mc_error < 0.05
 
 
 def test_progress_rises_to_one_with_the_error_so_far():

@@ -12,7 +12,7 @@ from render.illuminants import illuminant
 from render.photometry import luminance
 from render.scene import LightGroup
 from render.spectrum import Spectrum, flat
-from render.transport import Transport, relative_error
+from render.transport import Transport
 
 NM, WIDTH_NM = np.arange(400.0, 701.0, 50.0), np.full(7, 50.0)
 SIZE = (5, 6)
@@ -207,24 +207,6 @@ def test_halves_are_never_negative():
     made = transport()
     made = replace(made, half_difference=made.radiance * np.float32(-3.0))
     assert min(half.values.min() for half in made.relight_halves()) == 0.0
-
-
-def test_the_relative_error_of_uniform_planes_is_standard_error_over_mean():
-    values, variance = np.full((3, 8, 9), 4.0, np.float32), np.full((3, 8, 9), 0.25, np.float32)
-    assert relative_error(values, variance) == pytest.approx(0.5 / 4.0, rel=1e-6)
-
-
-def test_the_relative_error_pools_the_variance_over_three_by_three_pixels():
-    values, variance = np.ones((1, 3, 3), np.float32), np.zeros((1, 3, 3), np.float32)
-    variance[0, 1, 1] = 9.0 * 0.04
-    assert relative_error(values, variance) == pytest.approx(0.2, rel=1e-6)  # every pixel's window holds the middle
-
-
-def test_the_relative_error_does_not_mix_bands_and_leaves_dark_values_out():
-    values, variance = np.ones((2, 4, 4), np.float32), np.full((2, 4, 4), 0.01, np.float32)
-    values[1], variance[1] = 0.0, 100.0
-    assert relative_error(values, variance) == pytest.approx(0.1, rel=1e-6)
-    assert relative_error(np.zeros((1, 2, 2), np.float32), np.ones((1, 2, 2), np.float32)) == 0.0
 
 
 def test_the_error_of_a_relit_scene_adds_the_groups_variances():

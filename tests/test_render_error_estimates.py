@@ -1,0 +1,106 @@
+"""Error estimates against closed forms: pooled Monte Carlo error, and light that varies within a band."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from render.error_estimates import SAMPLE_PIXELS, relative_error, within_band_error
+from render.scene import LightGroup
+from render.spectrum import Spectrum, band_widths, flat, line_spectrum
+
+ONE = np.ones((1, 3))
+NM = np.arange(505.0, 600.0, 10.0)
+WIDTH_NM = band_widths(NM, None)
+
+
+def test_the_relative_error_of_uniform_planes_is_standard_error_over_mean():
+    values, variance = np.full((1, 3, 8, 9), 4.0, np.float32), np.full((1, 3, 8, 9), 0.25, np.float32)
+    assert relative_error(ONE, values, variance) == pytest.approx(0.5 / 4.0, rel=1e-6)
+    assert relative_error(ONE, values, variance, factor=4.0) == pytest.approx(1.0 / 4.0, rel=1e-6)
+
+
+def test_the_relative_error_pools_the_variance_over_three_by_three_pixels():
+    values, variance = np.ones((1, 1, 3, 3), np.float32), np.zeros((1, 1, 3, 3), np.float32)
+    variance[0, 0, 1, 1] = 9.0 * 0.04
+    # Every pixel's window holds the middle.
+    assert relative_error(ONE[:, :1], values, variance) == pytest.approx(0.2, rel=1e-6)
+
+
+def test_the_relative_error_does_not_mix_bands_and_leaves_dark_values_out():
+    values, variance = np.ones((1, 2, 4, 4), np.float32), np.full((1, 2, 4, 4), 0.01, np.float32)
+    values[:, 1], variance[:, 1] = 0.0, 100.0
+    assert relative_error(ONE[:, :2], values, variance) == pytest.approx(0.1, rel=1e-6)
+    assert relative_error(ONE[:, :1], np.zeros((1, 1, 2, 2), np.float32), variance[:, 1:, :2, :2]) == 0.0
+
+
+def test_of_several_lights_values_add_and_variances_add_with_the_squared_emission():
+    emitted = np.array([[3.0], [1.0]])
+    values, variance = np.ones((2, 1, 5, 4), np.float32), np.full((2, 1, 5, 4), 0.01, np.float32)
+    assert relative_error(emitted, values, variance) == pytest.approx(0.1 * np.sqrt(10.0) / 4.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 3000), (3000, 1), (90, 70), (257, 301)])
+def test_pixels_are_judged_all_over_a_picture_of_any_size(size):
+    rng = np.random.default_rng(1)
+    values = rng.uniform(1.0, 2.0, (1, 1, *size)).astype(np.float32)
+    error = relative_error(ONE[:, :1], values, (0.1 * values) ** 2)
+    assert error == pytest.approx(0.1, rel=0.2)
+    half_dark = values * (np.arange(size[1]) < size[1] / 2)
+    part = relative_error(ONE[:, :1], half_dark, (0.1 * values) ** 2)
+    assert part == pytest.approx(0.1, rel=0.2)  # dark ones out, the other half judged
+    assert SAMPLE_PIXELS == 1024
+
+
+def missed(transport, spectrum, power=1.0):
+    planes = np.asarray(transport, np.float32)[None, :, None, None] * np.ones((1, 1, 2, 3), np.float32)
+    return within_band_error({"lamp": LightGroup(("lamp",), spectrum, power)}, planes, NM, WIDTH_NM)
+
+
+def test_light_that_is_even_within_each_band_misses_nothing():
+    assert missed(np.linspace(0.1, 0.9, NM.size), flat(3.0)) == pytest.approx(np.zeros(NM.size), abs=1e-6)
+
+
+@pytest.mark.parametrize("power", [1.0, 50.0])
+@pytest.mark.parametrize("offset_nm", [-3.0, 0.5, 4.0])
+def test_a_line_beside_the_centre_of_a_band_misses_slope_times_distance(offset_nm, power):
+    transport = 0.1 + 0.01 * (NM - 500.0)
+    line = missed(transport, line_spectrum([545.0 + offset_nm], [2.0]), power)
+    # The transport at the line, less its mean over the band, over that mean. A sub-band is 0.16 nm wide.
+    assert line[4] == pytest.approx(abs(0.01 * offset_nm) / transport[4], abs=0.01 * 0.09 / transport[4])
+    assert np.delete(line, 4) == pytest.approx(np.zeros(NM.size - 1), abs=1e-12)
+
+
+def test_a_line_at_the_centre_of_a_band_misses_the_parabolas_rise_over_its_mean():
+    curve = lambda nm: 0.2 + 1e-4 * (nm - 500.0) ** 2  # noqa: E731
+    means = curve(NM) + 1e-4 * WIDTH_NM**2 / 12
+    line = missed(means, line_spectrum([545.0], [2.0]))
+    assert line[4] == pytest.approx(1e-4 * 100.0 / 12 / means[4], rel=2e-3)
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(deadline=None, derandomize=True, max_examples=60)
+def test_a_parabola_is_never_missed_by_more_than_is_said(seed):
+    rng = np.random.default_rng(seed)
+    a, b, c = rng.uniform(0.2, 1.0), rng.uniform(-2e-3, 2e-3), rng.uniform(0.0, 3e-5)
+    curve = Spectrum(np.arange(495.0, 606.0, 0.1), a + b * (np.arange(495.0, 606.0, 0.1) - 550.0) + 0 * c)
+    edges = np.sort(rng.uniform(500.0, 600.0, 7))
+    light = Spectrum(np.array([500.0, *edges, 600.0]), rng.uniform(0.0, 1.0, 9))
+    fine = np.arange(500.005, 600.0, 0.01)
+    product = curve.band_average(fine, np.full_like(fine, 0.01)) * light.band_average(fine, np.full_like(fine, 0.01))
+    truth = product.reshape(NM.size, -1).mean(axis=1)
+    transport, emission = curve.band_average(NM, WIDTH_NM), light.band_average(NM, WIDTH_NM)
+    assert np.all(np.abs(truth / (transport * emission) - 1) <= missed(transport, light) * 1.01 + 1e-4)
+
+
+@pytest.mark.parametrize("bands", [1, 2, 3])
+def test_a_few_bands_are_enough_for_an_estimate(bands):
+    nm, width = 500.0 + 100.0 * np.arange(bands), np.full(bands, 100.0)
+    planes = (1.0 + np.arange(bands, dtype=np.float32))[None, :, None, None] * np.ones((1, 1, 1, 1), np.float32)
+    lamp = {"lamp": LightGroup(("lamp",), line_spectrum([525.0], [1.0]))}
+    error = within_band_error(lamp, planes, nm, width)
+    assert error[0] == pytest.approx(0.25 if bands > 1 else 0.0, rel=0.05)  # a slope of 1 per 100 nm, over a mean of 1
+
+
+def test_a_dark_band_has_no_error():
+    assert missed(np.zeros(NM.size), line_spectrum([545.0], [2.0])).tolist() == [0.0] * NM.size
