@@ -23,8 +23,10 @@ PDF_TOLERANCE = 1e-3
 def dense_path(mi: Any) -> Any:
     """Build the integrator class for the variant that is set; register it as ``densepath``.
 
-    Properties of the plug-in: ``wavelength_nm`` and ``width_nm`` (comma-separated, a multiple of four), ``max_depth``,
-    and ``own_colour``: whether emission depends on wavelength. At unit emission it doesn't, and is evaluated once.
+    Properties of the plug-in: ``wavelength_nm`` and ``width_nm`` (comma-separated, a multiple of four), ``max_depth``;
+    ``own_colour``: whether emission depends on wavelength (at unit emission it doesn't, and is evaluated once);
+    ``meter``: whether paths begin on the shape of the scene's irradiance meter, instead of with the camera's ray. Its
+    bands are irradiance over pi.
     Channels after the first (alpha-less luminance film) hold the bands, and one more the share of paths whose BSDF
     chose by wavelength.
     """
@@ -34,6 +36,7 @@ def dense_path(mi: Any) -> Any:
             super().__init__(props)
             self.max_depth = int(props.get("max_depth", 8))
             self.own_colour = bool(props.get("own_colour", False))
+            self.meter = bool(props.get("meter", False))
             self.centres = np.array([float(x) for x in str(props["wavelength_nm"]).split(",")])
             self.widths = np.array([float(x) for x in str(props["width_nm"]).split(",")])
 
@@ -45,8 +48,10 @@ def dense_path(mi: Any) -> Any:
             if self.max_depth == 1:  # light seen directly: no material needs to be compiled
                 result, chosen = _seen(mi, scene, ray, wavelengths), mi.Bool(False)
             else:
-                limits = (self.max_depth, self.own_colour)
-                result, chosen = _trace(mi, scene, sampler, ray, wavelengths, *limits, mi.Bool(active))
+                begin = _at_meter if self.meter else _at_camera
+                start = begin(mi, scene, sampler, ray, wavelengths, self.own_colour)
+                limits = (self.max_depth, self.own_colour, mi.Bool(active))
+                result, chosen = _trace(mi, scene, sampler, start, wavelengths, *limits)
             bands = [value for group in result for value in group]
             return mi.Spectrum(0.0), mi.Bool(True), [*bands, dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
 
@@ -62,7 +67,9 @@ def _band_wavelengths(mi: Any, centres: Any, widths: Any, sample: Any) -> list[A
 
 
 def _power_heuristic(a: Any, b: Any) -> Any:
-    return dr.select(a > 0, dr.square(a) / (dr.square(a) + dr.square(b)), 0)
+    """Weight a^2 / (a^2 + b^2), by the ratio: the squares of densities near a light's rim leave float32's range."""
+    weight = dr.rcp(1 + dr.square(b / a))
+    return dr.select((a > 0) & dr.isfinite(weight), weight, 0)
 
 
 def _emission(emitter: Any, interaction: Any, wavelengths: list[Any]) -> list[Any]:
@@ -131,12 +138,40 @@ def _roulette(throughput: list[Any], eta: Any, depth: Any, sample: Any) -> tuple
     return [group * factor for group in throughput], (~plays | (sample < survival)) & (brightest != 0)
 
 
+def _at_camera(
+    mi: Any, scene: Any, sampler: Any, ray: Any, wavelengths: list[Any], own_colour: bool
+) -> tuple[Any, ...]:
+    """Where a path begins: its ray, the point that it left, the density of its direction, light received so far."""
+    del scene, sampler, own_colour
+    dark = [mi.Spectrum(0.0) for _ in wavelengths]
+    return mi.Ray3f(ray), dr.zeros(mi.SurfaceInteraction3f), mi.Float(1.0), mi.Bool(True), dark
+
+
+def _at_meter(mi: Any, scene: Any, sampler: Any, ray: Any, wavelengths: list[Any], own_colour: bool) -> tuple[Any, ...]:
+    """The same on the irradiance meter's shape, a white matte surface whose lights are sampled as any other's.
+
+    Mitsuba's own meter only waits for its rays to meet a light: the sun is met once in 50 000, a point light never.
+    """
+    card = next(shape for shape in scene.shapes() if shape.is_sensor())
+    place = card.sample_position(ray.time, sampler.next_2d())
+    here = dr.zeros(mi.SurfaceInteraction3f, dr.width(ray.o))
+    here.p, here.n, here.sh_frame, here.wavelengths = place.p, place.n, mi.Frame3f(place.n), wavelengths[0]
+    ds, sampled = scene.sample_emitter_direction(here, sampler.next_2d(), True)
+    density = dr.maximum(here.to_local(ds.d).z, 0.0) * dr.inv_pi
+    factor = density * dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, density))
+    arriving = _arriving(ds, sampled, here, wavelengths, own_colour)
+    received = [mi.Spectrum(dr.select(dr.any(sampled != 0), value * factor, 0.0)) for value in arriving]
+    out = mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
+    onward = here.spawn_ray(here.to_world(out))
+    return onward, here, mi.warp.square_to_cosine_hemisphere_pdf(out), mi.Bool(False), received
+
+
 @dr.syntax
 def _trace(
     mi: Any,
     scene: Any,
     sampler: Any,
-    camera_ray: Any,
+    start: tuple[Any, ...],
     wavelengths: list[Any],
     max_depth: int,
     own_colour: bool,
@@ -144,13 +179,10 @@ def _trace(
 ) -> tuple[list[Any], Any]:
     """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``)."""
     context = mi.BSDFContext()
-    ray = mi.Ray3f(camera_ray)
+    ray, previous, previous_pdf, previous_delta, result = start
     ray.wavelengths = wavelengths[0]
     throughput = [mi.Spectrum(1.0) for _ in wavelengths]
-    result = [mi.Spectrum(0.0) for _ in wavelengths]
     eta, depth = mi.Float(1.0), mi.UInt32(0)
-    previous = dr.zeros(mi.SurfaceInteraction3f)
-    previous_pdf, previous_delta = mi.Float(1.0), mi.Bool(True)
     chosen = mi.Bool(False)
     while dr.hint(active, label="dense path"):
         si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
@@ -158,8 +190,7 @@ def _trace(
         light_pdf = scene.pdf_emitter_direction(previous, seen, ~previous_delta)
         share = dr.select(previous_delta, 1.0, _power_heuristic(previous_pdf, light_pdf))
         emitted = _emitted(seen.emitter, si, wavelengths, own_colour)
-        for g in range(len(wavelengths)):
-            result[g] += throughput[g] * emitted[g] * share
+        result = [r + t * (e * share) for r, t, e in zip(result, throughput, emitted, strict=True)]
 
         go_on = (depth + 1 < max_depth) & si.is_valid()
         bsdf = si.bsdf(ray)

@@ -11,6 +11,7 @@ from render.dense import LANES, dense_path
 from render.errors import InputError
 from render.jit import backend
 from render.scene import Node, Scene, uniform_node
+from render.scene_paths import search_path
 from render.spectrum import Floats
 
 METER_PIXELS = 64  # film of the irradiance meter, each side
@@ -35,11 +36,13 @@ def mitsuba_module() -> Any:
     """Mitsuba with its variant set and the dense integrator registered."""
     import mitsuba  # only now: its import loads Dr.Jit, which must find the LLVM that `render.jit` has chosen
 
-    mitsuba.set_variant(variant())
-    mitsuba.set_log_level(mitsuba.LogLevel.Error)
+    mi: Any = mitsuba
+    mi.set_variant(variant())
+    mi.set_log_level(mi.LogLevel.Error)
+    mi.set_file_resolver(search_path(mi))
     if backend() != "numpy":
-        mitsuba.register_integrator("densepath", dense_path(mitsuba))
-    return mitsuba
+        mi.register_integrator("densepath", dense_path(mi))
+    return mi
 
 
 @dataclass(frozen=True)
@@ -134,7 +137,7 @@ def _recorder(film: Film, size: tuple[int, int]) -> Node:
     return node
 
 
-def integrators(film: Film, part_bands: int, own_colour: bool) -> list[Any]:
+def integrators(film: Film, part_bands: int, own_colour: bool, meter: bool = False) -> list[Any]:
     """Integrators that together give all bands in order, each at most `part_bands` (a multiple of four).
 
     Parts of one size share a kernel. A part is filled up to a multiple of four by repeating its last band; `parts`
@@ -150,7 +153,7 @@ def integrators(film: Film, part_bands: int, own_colour: bool) -> list[Any]:
             name: ",".join(map(repr, values[padded].tolist()))
             for name, values in (("wavelength_nm", film.wavelength_nm), ("width_nm", film.width_nm))
         }
-        options = {"max_depth": film.max_depth, "own_colour": own_colour}
+        options = {"max_depth": film.max_depth, "own_colour": own_colour, "meter": meter}
         made.append(mi.load_dict({"type": "densepath", **options, **bands}))
     return made
 

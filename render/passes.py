@@ -81,18 +81,20 @@ def _add(sums: Sums, where: Any, planes: Planes) -> None:
 
 def _meter(unit: Loaded, sensor: Any, film: Film, spp: int, seed: int) -> Floats:
     """Irradiance on the reference plane, shape (band,); summed in float64, so that threads don't change it."""
-    parts_of = band_parts(unit, sensor, film, METER_BANDS, spp, seed)
+    parts_of = band_parts(unit, sensor, film, METER_BANDS, spp, seed, meter=True)
     meter = np.concatenate([planes.mean(axis=(1, 2), dtype=np.float64) for _, planes in parts_of])
     # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
     return meter if variant() == "scalar_spectral" else meter * np.pi
 
 
-def band_parts(unit: Loaded, sensor: Any, film: Film, most: int, spp: int, seed: int) -> Iterator[tuple[int, Planes]]:
+def band_parts(
+    unit: Loaded, sensor: Any, film: Film, most: int, spp: int, seed: int, meter: bool = False
+) -> Iterator[tuple[int, Planes]]:
     """Render one sensor, at most `most` bands at a time: index of the first band, and band averages (band, h, w).
 
     Every part of the bands sees the same paths.
     """
-    first, tracers = 0, integrators(film, most, unit.own_colour)
+    first, tracers = 0, integrators(film, most, unit.own_colour, meter)
     if variant() == "scalar_spectral":  # specfilm integrates over the band
         image = _rendered(unit, sensor, tracers[0], spp, seed)
         yield 0, image / film.width_nm.astype(np.float32)[:, None, None]

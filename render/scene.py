@@ -22,7 +22,8 @@ EMISSION_PARAMETER = {
 # Emitter plug-ins with colours of their own, which differ over directions: a spectrum can only filter them.
 OWN_COLOUR_EMITTERS = ("envmap", "sunsky")
 SUNSKY_NM = (320.0, 720.0)  # Mitsuba's tables (Hosek & Wilkie 2012) end here, and give 0 beyond: found by evaluating it
-_REFUSED_EMITTERS = ("sky", "sun", "projector", "directionalarea", "timedsunsky", "volumelight")
+_REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
+_SIZELESS_EMITTERS = ("point", "spot", "directional")  # rays of the irradiance meter can't meet them: it would read 0
 
 
 @dataclass(frozen=True)

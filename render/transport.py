@@ -89,7 +89,7 @@ class Transport:
         Returns
         -------
         SpectralRadiance
-            float32, each value rounded once from float64. Its `band_error` tells what the product of band averages misses.
+            float32, each value rounded once from float64. Its `band_error` tells what products of band averages miss.
 
         Raises
         ------
