@@ -1,41 +1,124 @@
 """Light spectra by name, each scaled to a luminance of 1 cd/m^2 (1 lux for an irradiance)."""
 
+import re
 from functools import cache
 
 import numpy as np
 
-from render.errors import unknown
-from render.photometry import luminance
-from render.spectrum import Spectrum, black_body, flat
+from render.errors import require_range, unknown
+from render.photometry import LUMINOUS_EFFICACY_LM_W, colour_matching_functions, luminance
+from render.spectrum import Spectrum, black_body, flat, line_spectrum
 from render.tables import colour_science
 
-# CIE 015:2018 tables as colour-science holds them; F11 stands for narrow-band fluorescent lamps.
-_TABULATED = {"A": "A", "D50": "D50", "D55": "D55", "D65": "D65", "D75": "D75", "F2": "FL2", "F11": "FL11"}
-MOONLIGHT_K = 4200.0  # sunlight reddened by the lunar albedo looks like 4100-4200 K (Kieffer & Stone 2005)
+# CIE 015:2018 tables as colour-science holds them, mostly in 5 nm steps. F11 stands for narrow-band fluorescent lamps,
+# HP1 is standard high-pressure sodium, LED-B3 a white LED of 4100 K, LED-RGB1 three LEDs, LED-V1 a violet-pumped one.
+_TABULATED = {
+    **{name: name for name in ("A", "D50", "D55", "D65", "D75")},
+    "F2": "FL2",
+    "F11": "FL11",
+    "sodium_high": "HP1",
+    **{f"LED-{kind}": f"LED-{kind}" for kind in ("B1", "B2", "B3", "B4", "B5", "BH1", "RGB1", "V1", "V2")},
+}
+# Sodium D2 and D1 in air, NIST Atomic Spectra Database; D2 is twice as strong where the vapour is thin. In a
+# low-pressure lamp the two are nearer to equal: 0.6 nm apart, no band and no eye can tell.
+_LINES = {"sodium_low": ((588.995, 589.592), (2.0, 1.0))}
+# Rise of the full moon's reflectance per nm, over its value at 550 nm: straight line through the 16 bands of 405 to
+# 775 nm of the ROLO model at a phase of 7 degrees (Kieffer & Stone 2005, equation 10 and table 4; libration left out).
+MOON_SLOPE_PER_NM = 1.48e-3
+_TEMPERATURE = re.compile(r"(D?)(\d+(?:\.\d+)?)K")
 
 
 def names() -> tuple[str, ...]:
-    """Names that `illuminant` knows."""
-    return (*sorted(_TABULATED), "E", "moonlight")
+    """Names that `illuminant` knows, besides a temperature such as ``3000K`` or ``D7000K``."""
+    return (*sorted((*_TABULATED, "E")), "moonlight", *_LINES, "sunlight")
 
 
-@cache
-def illuminant(name: str) -> Spectrum:
-    """Spectrum of a named light with a luminance of 1 cd/m^2.
+def lines_nm(name: str) -> tuple[float, ...]:
+    """Emission lines of a named light, to give `line_bands`; empty where its spectrum is smooth.
+
+    Fluorescent lamps and high-pressure sodium count as smooth: their tables hold 5 nm steps, no lines.
 
     Raises
     ------
     InputError
         Where `name` is unknown.
     """
+    illuminant(name)
+    return _LINES[name][0] if name in _LINES else ()
+
+
+@cache
+def illuminant(name: str) -> Spectrum:
+    """Spectrum of a named light with a luminance of 1 cd/m^2.
+
+    Parameters
+    ----------
+    name : str
+        One of `names()`; or ``3000K``, a black body; or ``D7000K``, daylight of that temperature.
+
+    Raises
+    ------
+    InputError
+        Where `name` is unknown or its temperature out of range.
+    """
+    if temperature := _TEMPERATURE.fullmatch(name):
+        kelvin = float(temperature[2])
+        if temperature[1]:
+            return daylight(kelvin)
+        require_range("illuminant: black body [K]", kelvin, 800.0, 1e6, "cooler ones hardly glow")
+        return unit_luminance(black_body(kelvin))
     if name not in names():
-        raise unknown("illuminant", name, names())
+        raise unknown("illuminant", name, (*names(), "temperature such as 3000K"))
+    if name in _LINES:
+        return _unit_lines(*_LINES[name])
+    return unit_luminance(_smooth(name))
+
+
+def _unit_lines(at_nm: tuple[float, ...], powers: tuple[float, ...]) -> Spectrum:
+    """Lines with a luminance of 1: V at the lines themselves, since bands of 1 nm would be 1 % off."""
+    v = colour_matching_functions()[1]
+    visible = np.interp(at_nm, v.wavelength_nm, v.values) @ np.array(powers)
+    return line_spectrum(at_nm, np.array(powers) / (LUMINOUS_EFFICACY_LM_W * visible))
+
+
+def _smooth(name: str) -> Spectrum:
     if name == "E":
-        return unit_luminance(flat())
+        return flat()
     if name == "moonlight":
-        return unit_luminance(black_body(MOONLIGHT_K))
+        sun = _direct_sun()
+        return Spectrum(sun.wavelength_nm, sun.values * (1 + MOON_SLOPE_PER_NM * (sun.wavelength_nm - 550.0)))
+    if name == "sunlight":
+        return _direct_sun()
     table = colour_science().SDS_ILLUMINANTS[_TABULATED[name]]
+    return Spectrum(table.wavelengths, table.values)
+
+
+@cache
+def daylight(cct_k: float) -> Spectrum:
+    """CIE daylight of a correlated colour temperature (CIE 015:2018, formula of illuminants D), of 1 cd/m^2.
+
+    Parameters
+    ----------
+    cct_k : float
+        4000 to 25 000 K; D65 is 6504 K, since the second radiation constant has changed from 1.4380 to 1.4388 cm K.
+
+    Raises
+    ------
+    InputError
+        For a temperature outside that range, in which the formula holds.
+    """
+    require_range("illuminant: daylight [K]", cct_k, 4000.0, 25_000.0, "below it give a black body such as 3000K")
+    colour = colour_science()
+    table = colour.sd_CIE_illuminant_D_series(colour.temperature.CCT_to_xy_CIE_D(cct_k), M1_M2_rounding=False)
     return unit_luminance(Spectrum(table.wavelengths, table.values))
+
+
+def _direct_sun() -> Spectrum:
+    """Sun's own beam at the ground, in 1 nm means: ASTM G173-03, direct and circumsolar, sun 42 degrees high."""
+    table = colour_science().plotting.datasets.SD_ASTMG173_DIRECT_CIRCUMSOLAR
+    nm = np.arange(300.0, 1101.0)
+    fine = Spectrum(table.wavelengths, table.values)
+    return Spectrum(nm, fine.band_average(nm, np.ones_like(nm)))
 
 
 def unit_luminance(spectrum: Spectrum) -> Spectrum:

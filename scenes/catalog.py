@@ -7,13 +7,27 @@ from typing import Any
 from render.errors import require_keys, unknown
 from render.scene import Scene
 from scenes.color_checker import color_checker
+from scenes.cornell_box import cornell_box
 from scenes.flat_field import flat_field
+from scenes.furnace import furnace
+from scenes.lit_and_shadowed import lit_and_shadowed
+from scenes.night_street import night_street
+from scenes.siemens_star import siemens_star
+from scenes.slanted_edge import slanted_edge
 from scenes.still_life import still_life
+from scenes.still_life_outdoor import still_life_outdoor
 
 _BUILDERS: dict[str, Callable[..., Scene]] = {
     "color_checker": color_checker,
+    "cornell_box": cornell_box,
     "flat_field": flat_field,
+    "furnace": furnace,
+    "lit_and_shadowed": lit_and_shadowed,
+    "night_street": night_street,
+    "siemens_star": siemens_star,
+    "slanted_edge": slanted_edge,
     "still_life": still_life,
+    "still_life_outdoor": still_life_outdoor,
 }
 
 

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 
-from render.spectrum import Spectrum
+from render.spectrum import Floats, Spectrum
 from render.tables import colour_science
 
 _NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all materials keeps scenes quick to compile
@@ -30,3 +30,8 @@ def edge(centre_nm: float, width_nm: float, low: float, high: float) -> Spectrum
 def band(centre_nm: float, width_nm: float, low: float, high: float) -> Spectrum:
     """Reflectance with one Gaussian bump of standard deviation `width_nm`: greens, blues."""
     return Spectrum(_NM, low + (high - low) * np.exp(-0.5 * ((_NM - centre_nm) / width_nm) ** 2))
+
+
+def resampled(wavelength_nm: Floats, values: Floats) -> Spectrum:
+    """Measured curve on the common grid; its ends are held outside its range."""
+    return Spectrum(_NM, np.interp(_NM, wavelength_nm, values))

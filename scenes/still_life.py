@@ -1,4 +1,4 @@
-"""A table with fruit, metal, cloth and charts under one softbox: colours, texture, light and shade."""
+"""A table with fruit, metal, glass, cloth and charts under one softbox: colours, texture, light and shade."""
 
 from math import cos, pi, sin
 
@@ -7,7 +7,7 @@ from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Spectrum
 from scenes.color_checker import chart
-from scenes.materials import checks, floor, glossy, matte, metal, panel
+from scenes.materials import ball, checks, floor, glass, glossy, matte, metal, panel, rod
 from scenes.reflectances import band, edge, grey
 
 LIGHT_LUMINANCE_CD_M2 = 1000.0
@@ -46,11 +46,12 @@ def _room() -> dict[str, Node]:
 def _things() -> dict[str, Node]:
     card = translate(0.14, 0.150, -0.30) @ rotate((1, 0, 0), -8)
     return {
-        "orange": _ball(-0.36, 0.062, 0.26, 0.060, glossy(edge(575, 14, 0.05, 0.72), 0.18)),
-        "lime": _ball(-0.23, 0.050, 0.36, 0.048, glossy(band(545, 32, 0.05, 0.52), 0.15)),
-        "plum": _ball(-0.20, 0.050, 0.20, 0.048, glossy(band(450, 36, 0.05, 0.34), 0.10)),
-        "bowl_ball": _ball(0.06, 0.075, 0.16, 0.075, metal("Au", 0.25)),
-        "steel_rod": _rod((0.335, 0.0, 0.02), (0.335, 0.36, 0.02), 0.018, metal("Al", 0.15)),
+        "orange": ball(-0.36, 0.062, 0.26, 0.060, glossy(edge(575, 14, 0.05, 0.72), 0.18)),
+        "lime": ball(-0.23, 0.050, 0.36, 0.048, glossy(band(545, 32, 0.05, 0.52), 0.15)),
+        "plum": ball(-0.20, 0.050, 0.20, 0.048, glossy(band(450, 36, 0.05, 0.34), 0.10)),
+        "bowl_ball": ball(0.06, 0.075, 0.16, 0.075, metal("Au", 0.25)),
+        "glass_ball": ball(-0.075, 0.048, 0.27, 0.048, glass()),
+        "steel_rod": rod((0.335, 0.0, 0.02), (0.335, 0.36, 0.02), 0.018, metal("Al", 0.15)),
         "box": _box(0.30, 0.08, 0.26, 0.16, 0.16, 24, matte(band(465, 38, 0.06, 0.55))),
         "book": _box(0.29, 0.175, 0.26, 0.20, 0.03, 10, matte(edge(605, 16, 0.05, 0.55))),
         **chart(card),
@@ -63,14 +64,6 @@ def _things() -> dict[str, Node]:
 def _lights() -> dict[str, Node]:
     place = look_at((-1.5, 1.75, 1.35), (0.05, 0.15, -0.05))
     return {"softbox": panel(place, 1.7, 1.7, matte(BLACK), emitter={"type": "area"})}
-
-
-def _ball(x: float, y: float, z: float, radius: float, bsdf: Node) -> Node:
-    return {"type": "sphere", "center": [x, y, z], "radius": radius, "bsdf": bsdf}
-
-
-def _rod(start: tuple[float, ...], end: tuple[float, ...], radius: float, bsdf: Node) -> Node:
-    return {"type": "cylinder", "p0": list(start), "p1": list(end), "radius": radius, "bsdf": bsdf}
 
 
 def _box(x: float, y: float, z: float, width: float, height: float, turn: float, bsdf: Node) -> Node:

@@ -8,6 +8,7 @@ from render.errors import InputError
 from render.scene import Scene
 from scenes.catalog import load, names
 from scenes.levels import DEMO_LEVELS
+from scenes.materials import metal
 from scenes.reflectances import band, color_checker, edge, grey
 
 BANDS_NM = np.arange(405.0, 780.0, 50.0)
@@ -21,8 +22,33 @@ def complaint(*args, **options):
     return text
 
 
-def test_names_are_the_three_scenes_in_order():
-    assert names() == ("color_checker", "flat_field", "still_life")
+LIT_BY_NAME = ("color_checker", "cornell_box", "flat_field", "siemens_star", "slanted_edge", "still_life")
+
+
+def test_names_are_the_scenes_in_order():
+    others = ("furnace", "lit_and_shadowed", "night_street", "still_life_outdoor")
+    assert names() == tuple(sorted((*LIT_BY_NAME, *others)))
+
+
+def nodes(node):
+    """All nodes of a scene's dict, the scene itself first."""
+    yield node
+    for value in node.values():
+        if isinstance(value, dict):
+            yield from nodes(value)
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_scene_keeps_compiling_quick_by_one_grid_and_few_kinds_of_material(name):
+    spectra = [node for node in nodes(load(name).geometry) if node.get("type") in ("regular", "irregular", "uniform")]
+    grids = {
+        (node["type"], node["wavelength_min"], node["wavelength_max"], node["values"].count(",")) for node in spectra
+    }
+    assert grids == {("regular", 380.0, 780.0, 80)}
+    kinds = {node["type"] for node in nodes(load(name).geometry)}
+    plugins = {"twosided", "diffuse", "roughplastic", "roughconductor", "dielectric", "checkerboard"}
+    shapes = {"rectangle", "cube", "sphere", "cylinder", "disk"}
+    assert kinds <= plugins | shapes | {"scene", "perspective", "regular", "area", "constant"}
 
 
 @pytest.mark.parametrize("name", names())
@@ -31,13 +57,14 @@ def test_every_scene_loads_under_its_own_name_with_a_light_and_a_reference_plane
     assert isinstance(scene, Scene)
     assert scene.name == name
     assert scene.groups
+    assert all(group.power > 0 for group in scene.groups.values())
     assert scene.reference_plane in scene.geometry
     assert scene.geometry["sensor"]["type"] == "perspective"
 
 
-@pytest.mark.parametrize("name", names())
-def test_every_scene_takes_a_light_by_name(name):
-    (warm,), (cold,) = load(name, light="A").groups.values(), load(name).groups.values()
+@pytest.mark.parametrize("name", LIT_BY_NAME)
+def test_every_scene_of_one_light_takes_it_by_name(name):
+    (warm,), (cold,) = load(name, light="A").groups.values(), load(name, light="D65").groups.values()
     red, blue = (warm.spectrum.band_average(nm, 20.0) / cold.spectrum.band_average(nm, 20.0) for nm in (650.0, 450.0))
     assert red > 1.3 * blue
     assert warm.power == cold.power
@@ -46,6 +73,8 @@ def test_every_scene_takes_a_light_by_name(name):
 def test_options_reach_the_builder():
     values = load("flat_field", reflectance=0.25).geometry["wall"]["bsdf"]["bsdf"]["reflectance"]["values"]
     assert set(values.split(",")) == {"0.25"}
+    values = load("slanted_edge", contrast=3.0).geometry["dark"]["bsdf"]["bsdf"]["reflectance"]["values"]
+    assert [float(value) for value in set(values.split(","))] == pytest.approx([0.2])
     values = load("color_checker", surround=0.5).geometry["card"]["bsdf"]["bsdf"]["reflectance"]["values"]
     assert set(values.split(",")) == {"0.5"}
 
@@ -53,7 +82,7 @@ def test_options_reach_the_builder():
 @pytest.mark.parametrize(("name", "nearest"), [("still_live", "still_life"), ("flatfield", "flat_field")])
 def test_an_unknown_scene_is_refused_and_the_nearest_named(name, nearest):
     text = complaint(name)
-    assert text.startswith(f"scene: {name!r} is unknown; allowed: color_checker, flat_field, still_life")
+    assert text.startswith(f"scene: {name!r} is unknown; allowed: {', '.join(names())}")
     assert text.endswith(f"did you mean {nearest!r}?")
 
 
@@ -71,6 +100,21 @@ def test_an_unknown_light_is_refused():
 @pytest.mark.parametrize(("name", "option"), [("flat_field", "reflectance"), ("color_checker", "surround")])
 def test_a_reflectance_outside_zero_to_one_is_refused_with_its_value(name, option, value):
     assert complaint(name, **{option: value}).startswith(f"{option}: {value!r} is outside 0 to 1")
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "start"),
+    [
+        ("slanted_edge", {"contrast": 0.5}, "contrast: 0.5 is outside 1 to 1e+06"),
+        ("slanted_edge", {"angle_deg": 60.0}, "angle_deg: 60.0 is outside -45 to 45"),
+        ("siemens_star", {"spokes": 1}, "spokes: 1 is outside 2 to 720"),
+        ("siemens_star", {"spokes": 7.5}, "spokes: 7.5 is not a whole number"),
+        ("lit_and_shadowed", {"dark_cd_m2": -1.0}, "dark_cd_m2: -1.0 is outside 0 to 1e+09"),
+        ("lit_and_shadowed", {"lit_cd_m2": np.nan}, "lit_cd_m2: nan is outside 0 to 1e+09"),
+    ],
+)
+def test_an_option_out_of_range_is_refused_with_its_value(name, options, start):
+    assert complaint(name, **options).startswith(start)
 
 
 def test_the_chart_has_24_reflectances_that_rise_along_its_grey_row():
@@ -113,3 +157,25 @@ def test_still_life_fills_a_picture_from_shadow_to_highlight():
     assert 0.7 < np.median(kept) / kept.mean() < 1.3
     assert kept.max() / kept.min() > 50
     assert made.illuminance_lux(25.0) > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", names())
+def test_every_scene_renders_in_every_band_with_light_from_each_of_its_groups(name):
+    made = render(load(name), (24, 24), wavelength_nm=BANDS_NM[::2], width_nm=50.0, spp=16)
+    assert np.isfinite(made.radiance).all()
+    assert made.radiance.min() >= 0
+    assert (made.radiance.max(axis=(2, 3)) > 0).all()
+    assert (made.irradiance > 0).any()
+    assert made.relight().luminance().max() > 0
+
+
+@pytest.mark.parametrize(
+    ("material", "nm", "reflectance"),
+    [("Cu", 450.0, 0.55), ("Cu", 650.0, 0.93), ("Au", 450.0, 0.39), ("Au", 650.0, 0.96), ("Al", 550.0, 0.92)],
+)  # at normal incidence: CRC Handbook of Chemistry and Physics, optical properties of selected elements
+def test_a_metal_reflects_as_its_handbook_says(material, nm, reflectance):
+    bsdf = metal(material, 0.2)["bsdf"]
+    at = [float(bsdf[part]["values"].split(",")[round((nm - 380) / 5)]) for part in ("eta", "k")]
+    index = complex(*at)
+    assert abs((index - 1) / (index + 1)) ** 2 == pytest.approx(reflectance, abs=0.05)  # Fresnel; samples differ

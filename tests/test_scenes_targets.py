@@ -1,0 +1,93 @@
+"""Targets that have closed forms: a furnace that is 1, an edge of known lean and contrast, a star of counted spokes.
+
+By chance each statistical test may fail at most `FALSE_ALARM` of the time, over all its comparisons; seeds are fixed.
+"""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from render.engine import render
+from scenes.catalog import load
+from scenes.cornell_box import paint
+from scenes.siemens_star import RADIUS_M
+
+FALSE_ALARM = 1e-5
+BANDS_NM = np.arange(430.0, 780.0, 100.0)  # four bands fill 380-780 nm
+PASSES = 8
+
+
+def test_every_pixel_and_band_of_the_furnace_is_one_within_its_error():
+    made = render(load("furnace"), (16, 16), wavelength_nm=BANDS_NM, spp=256, seed=1)
+    radiance, error = made.radiance[0].astype(np.float64), np.sqrt(made.variance[0].astype(np.float64))
+    sky = error.max(axis=0) < 1e-6
+    assert 0.2 < sky.mean() < 0.8  # the ball, the block and the sky are in view
+    assert radiance[:, sky] == pytest.approx(np.ones((4, sky.sum())), abs=1e-6)
+    z = ((radiance - 1) / np.where(sky, 1, error))[:, ~sky]
+    assert np.abs(z).max() < student.isf(FALSE_ALARM / 2 / z.size, PASSES - 1)
+    mean_error = np.sqrt((error[0][~sky] ** 2).sum()) / (~sky).sum()
+    assert mean_error < 1e-3
+    assert abs(radiance[0][~sky].mean() - 1) < norm.isf(FALSE_ALARM / 2) * mean_error
+    # Rays from the block that meet the ball or itself find 1 too, within the noise of paths.
+    assert made.irradiance / np.pi == pytest.approx(np.ones((1, 4)), abs=5e-3)
+
+
+@pytest.mark.parametrize(("contrast", "angle_deg"), [(4.0, 5.0), (20.0, -8.0)])
+def test_the_edge_has_its_contrast_and_leans_by_its_angle(contrast, angle_deg):
+    scene = load("slanted_edge", contrast=contrast, angle_deg=angle_deg)
+    made = render(scene, (40, 40), wavelength_nm=BANDS_NM, spp=256, seed=2)
+    picture = made.radiance[0].mean(axis=0, dtype=np.float64)
+    error = np.sqrt(made.variance[0, 0].mean(dtype=np.float64))  # bands share their paths
+    dark, bright = picture[:, :8].mean(), picture[:, -8:].mean()
+    assert bright == pytest.approx(0.6, abs=norm.isf(FALSE_ALARM / 2) * error / np.sqrt(320))
+    assert dark == pytest.approx(0.6 / contrast, abs=norm.isf(FALSE_ALARM / 2) * error / np.sqrt(320))
+    dark_pixels = ((bright - picture) / (bright - dark)).sum(axis=1)
+    rows = np.arange(40) - 19.5
+    slope, middle = np.polyfit(rows, dark_pixels, 1)
+    row_error = np.sqrt(40) * error / (bright - dark)
+    bound = norm.isf(FALSE_ALARM / 4)
+    assert slope == pytest.approx(np.tan(np.radians(angle_deg)), abs=bound * row_error / np.sqrt((rows**2).sum()))
+    assert middle == pytest.approx(20.0, abs=bound * row_error / np.sqrt(40))
+    assert bound * row_error / np.sqrt((rows**2).sum()) < np.tan(np.radians(0.5))  # sees half a degree
+
+
+@pytest.mark.parametrize("spokes", [9, 24])
+def test_the_star_has_its_spokes_black_on_white(spokes):
+    pixels = 96
+    made = render(load("siemens_star", spokes=spokes), (pixels, pixels), wavelength_nm=BANDS_NM, spp=16, seed=3)
+    picture = made.radiance[0].mean(axis=0, dtype=np.float64)
+    pixel_m = 2 * 1.25 * np.tan(np.radians(10.0)) / pixels
+    angle = (np.arange(4 * 360) + 0.5) * np.pi / 720
+    rings = []
+    for share in (0.7, 0.95):
+        radius = share * RADIUS_M / pixel_m  # a sector of 24 spokes is 3.6 pixels wide at 0.7
+        column, row = pixels / 2 + radius * np.cos(angle), pixels / 2 - radius * np.sin(angle)
+        rings.append(picture[row.astype(int), column.astype(int)] > 0.445)  # half way from 0.04 to 0.85
+        assert np.count_nonzero(rings[-1] != np.roll(rings[-1], 1)) == 2 * spokes
+        assert rings[-1].mean() == pytest.approx(0.5, abs=0.05)
+    assert (rings[0] == rings[1]).mean() > 0.75  # spokes run straight out; half a pixel's error at each side
+    assert np.percentile(picture, 2) == pytest.approx(0.04, rel=0.15)
+    assert np.percentile(picture, 85) == pytest.approx(0.85, rel=0.05)
+
+
+def test_the_cornell_boxs_paints_are_its_published_ones():
+    at_nm = np.array([400.0, 500.0, 600.0, 700.0])
+    published = {"white": [0.343, 0.747, 0.740, 0.737], "green": [0.092, 0.285, 0.160, 0.159]}
+    for colour, values in (published | {"red": [0.040, 0.058, 0.287, 0.642]}).items():
+        curve = paint(colour)
+        assert np.interp(at_nm, curve.wavelength_nm, curve.values) == pytest.approx(values)
+        assert curve.values[0] == values[0]
+        assert curve.values[-1] == values[-1]
+
+
+def test_the_cornell_box_is_red_on_the_left_green_on_the_right_and_white_between():
+    made = render(load("cornell_box", light="E"), (32, 32), wavelength_nm=BANDS_NM, spp=64, seed=4)
+    blue, green, _, red = made.radiance[0, :, 10:22, :].mean(axis=1, dtype=np.float64)
+    left, right, back = red[2:5].mean() / green[2:5].mean(), red[27:30].mean() / green[27:30].mean(), red / green
+    # Paints at 730 and 530 nm: red 0.64 / 0.06, green 0.16 / 0.47, white 0.74 / 0.73; light from wall to wall blurs it.
+    assert left > 5
+    assert right < 0.7
+    assert 0.7 < back[16:24].mean() < 1.5
+    assert (blue > 0).all()
+    assert made.emitter_visible.any()
