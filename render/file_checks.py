@@ -1,0 +1,68 @@
+"""What a picture file may declare before memory is taken for it, and what its wavelengths say about bands."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from render.errors import InputError
+from render.spectrum import Floats, band_widths
+
+MOST_SIDE = 1 << 15  # pixels; the engine's own limit
+MOST_BYTES = 1 << 33  # of float32 pixels: 8 GiB, such as 4 Mpx with 500 bands; a render that size needs three times it
+
+
+def require_file(path: Path) -> int:
+    """Size of a file in bytes.
+
+    Raises
+    ------
+    InputError
+        Where there is no file at `path`.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; allowed: the path of a file; correct it")
+    return path.stat().st_size
+
+
+def require_extent(height: int, width: int, channels: int) -> int:
+    """Bytes that float32 pixels take.
+
+    Raises
+    ------
+    InputError
+        Where a side is not 1 to 32768 pixels, or the pixels of all channels are over 8 GiB.
+    """
+    if not (0 < height <= MOST_SIDE and 0 < width <= MOST_SIDE):
+        raise InputError(f"{height} x {width} pixels are not allowed; each side is 1 to {MOST_SIDE}; crop or scale it")
+    needed = 4 * height * width * channels
+    if needed > MOST_BYTES:
+        raise InputError(
+            f"{height} x {width} pixels with {channels} channels are {needed} bytes; allowed: {MOST_BYTES}; "
+            "crop it, or keep fewer bands"
+        )
+    return needed
+
+
+def widths_between(wavelength_nm: Floats) -> Floats:
+    """Band widths [nm] of a file that states none: the spacing of its wavelengths.
+
+    Where that is uneven, edges half-way between neighbours (the trapezoidal rule), which a `UserWarning` tells.
+
+    Raises
+    ------
+    InputError
+        For fewer than two wavelengths, or where they don't increase.
+    """
+    nm = np.asarray(wavelength_nm, dtype=np.float64)
+    steps = np.diff(nm)
+    if nm.size < 2 or not np.all((steps > 0) & np.isfinite(steps)) or nm[0] <= 0:
+        return band_widths(nm)  # which refuses it
+    if np.allclose(steps, steps[0], rtol=1e-6):
+        return band_widths(nm)
+    warnings.warn(
+        "its wavelengths are not evenly spaced and no widths are stated: edges half-way between them are taken",
+        UserWarning,
+        stacklevel=2,
+    )
+    return np.asarray((np.append(steps[0], steps) + np.append(steps, steps[-1])) / 2)
