@@ -1,23 +1,56 @@
 """Colour filter arrays: a tile of letters, repeated over the sensor."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError
+from render.errors import InputError, unknown
 
 Tile: TypeAlias = tuple[str, ...]
 
 RGBW: Tile = ("RG", "BW")  # Parmar & Wandell 2009, Figure 2
 BAYER: Tile = ("RG", "GB")
 
+# Mosaics by name; any other tile of letters is as good, with a response for each letter.
+MOSAICS: Mapping[str, Tile] = MappingProxyType(
+    {
+        "rgbw": RGBW,
+        "bayer": BAYER,
+        "bayer_rggb": BAYER,
+        "bayer_bggr": ("BG", "GR"),
+        "bayer_grbg": ("GR", "BG"),
+        "bayer_gbrg": ("GB", "RG"),
+        # Half of the pixels panchromatic, each colour on a diagonal: after Compton & Hamilton (Eastman Kodak), "Image
+        # sensor with improved light sensitivity", US patent 8 139 130.
+        "rgbw_4x4": ("WGWR", "GWRW", "WBWG", "BWGW"),
+        "rccc": ("RC", "CC"),  # cameras in cars: one red pixel in four, the others clear (C)
+        "mono": ("W",),
+    }
+)
+
+
+def tile_of(mosaic: str | Sequence[str]) -> Tile:
+    """Tile of a mosaic given by a name of `MOSAICS`, or by its rows of letters.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, or rows that are no rectangle of letters.
+    """
+    if not isinstance(mosaic, str):
+        return check_tile(mosaic)
+    if mosaic not in MOSAICS:
+        raise unknown("cfa", mosaic, MOSAICS)
+    return MOSAICS[mosaic]
+
 
 def check_tile(tile: Sequence[str]) -> Tile:
     """Return `tile` as a tuple of rows, or raise `InputError` where it is not a rectangle of letters."""
-    rows = tuple(tile)
-    if isinstance(tile, str) or not rows or not all(isinstance(row, str) and row.isalpha() for row in rows):
+    rows = tuple(tile) if isinstance(tile, Sequence) and not isinstance(tile, str) else ()
+    if not rows or not all(isinstance(row, str) and row.isalpha() for row in rows):
         raise InputError(f"cfa: {tile!r} is not a tile; allowed: rows of letters such as {RGBW}; give a tuple of rows")
     if len({len(row) for row in rows}) != 1:
         raise InputError(f"cfa: rows of {rows!r} differ in length; allowed: a rectangle; pad or cut the rows")

@@ -1,10 +1,13 @@
 """What a camera is: pixel, lens, mosaic, responses, converter. Zero switches a term off; there are no mode flags."""
 
 from dataclasses import dataclass, field
-from math import inf
+from math import hypot, inf
+from numbers import Real
+
+import numpy as np
 
 from render.errors import InputError, require_range, require_whole
-from render.spectrum import VISIBLE_NM
+from render.spectrum import VISIBLE_NM, Floats
 from sensor.cfa import RGBW, Tile, channels, check_tile
 from sensor.curves import Responses, rgbw
 
@@ -26,8 +29,18 @@ class PixelConfig:
     prnu : float
         Standard deviation over pixels of the relative photo-response.
     dark_current_e_per_s : float
+        Of every pixel, collected with the light and Poisson like it.
     conversion_gain_uv_per_e, voltage_swing_v, analog_gain : float
         Reported and used to convert noise given in volts; the well alone decides where pixels clip.
+    column_gain_spread : float
+        Standard deviation over columns of their amplifiers' relative gain; it acts on what the well gave, so behind the
+        Poisson draw and the clip.
+    column_offset_e : float
+        Standard deviation over columns of their fixed dark offset [e-], added where DSNU is.
+    hot_pixel_share, hot_pixel_dark_current_e_per_s : float
+        Share of pixels that leak, and the dark current that they have on top of the others'.
+    crosstalk : float
+        Share of a pixel's photo-electrons that each of its four neighbours collects instead.
     """
 
     pitch_um: float
@@ -40,6 +53,11 @@ class PixelConfig:
     conversion_gain_uv_per_e: float = 30.0
     voltage_swing_v: float = 1.08
     analog_gain: float = 1.0
+    column_gain_spread: float = 0.0
+    column_offset_e: float = 0.0
+    hot_pixel_share: float = 0.0
+    hot_pixel_dark_current_e_per_s: float = 0.0
+    crosstalk: float = 0.0
 
     def __post_init__(self) -> None:
         limits = {
@@ -53,9 +71,25 @@ class PixelConfig:
             "conversion_gain_uv_per_e": (1e-6, 1e9, "give microvolts per electron"),
             "voltage_swing_v": (1e-6, 1e6, "give volts"),
             "analog_gain": (1e-6, 1e6, "give a factor"),
+            "column_gain_spread": (0.0, 1.0, "give a fraction, 0 for none"),
+            "column_offset_e": (0.0, 1e9, "give electrons, 0 for none"),
+            "hot_pixel_share": (0.0, 1.0, "give a fraction, 0 for none"),
+            "hot_pixel_dark_current_e_per_s": (0.0, 1e12, "give electrons per second, 0 for none"),
+            "crosstalk": (0.0, 0.25, "give the share that goes to each of four neighbours, 0 for none"),
         }
         for name, (low, high, fix) in limits.items():
             require_range(name, getattr(self, name), low, high, fix)
+        require_range("prnu with column_gain_spread", self.fixed_gain, 0.0, 1.0, "make the root of their squares less")
+
+    @property
+    def fixed_dark_e(self) -> float:
+        """Standard deviation over pixels of all fixed dark offsets [e-]: DSNU and column offsets."""
+        return hypot(self.dsnu_e, self.column_offset_e)
+
+    @property
+    def fixed_gain(self) -> float:
+        """Standard deviation over pixels of all relative gains: PRNU and column gains."""
+        return hypot(self.prnu, self.column_gain_spread)
 
     @property
     def swing_e(self) -> float:
@@ -65,20 +99,63 @@ class PixelConfig:
 
 @dataclass(frozen=True)
 class LensConfig:
-    """A lens: f-number, transmittance, and |magnification| (0 for a far scene)."""
+    """A lens.
+
+    Attributes
+    ----------
+    f_number, transmittance, magnification : float
+        The last as its absolute value; 0 for a far scene.
+    horizontal_view_deg : float
+        Angle of view across the whole picture: light falls off with the fourth power of the cosine off the axis.
+    diffraction : float
+        Width of the point image over that of an ideal circular aperture: 1 for a lens without faults.
+    defocus_um : float
+        Diameter of the disc on the sensor that a point out of focus becomes.
+    veiling_glare : float
+        Share of the light that scatters evenly over the picture, about the index of ISO 9358.
+    """
 
     f_number: float
     transmittance: float = 1.0
     magnification: float = 0.0
+    horizontal_view_deg: float = 0.0
+    diffraction: float = 0.0
+    defocus_um: float = 0.0
+    veiling_glare: float = 0.0
 
     def __post_init__(self) -> None:
-        require_range("f_number", self.f_number, 0.1, 1e4, "give focal length over aperture")
-        require_range("transmittance", self.transmittance, 0.0, 1.0, "give a fraction")
-        require_range("magnification", self.magnification, 0.0, 1e4, "give its absolute value, 0 for a far scene")
+        limits = {
+            "f_number": (0.1, 1e4, "give focal length over aperture"),
+            "transmittance": (0.0, 1.0, "give a fraction"),
+            "magnification": (0.0, 1e4, "give its absolute value, 0 for a far scene"),
+            "horizontal_view_deg": (0.0, 175.0, "give degrees, 0 for no falloff"),
+            "diffraction": (0.0, 100.0, "give 1 for an ideal lens, 0 for none"),
+            "defocus_um": (0.0, 1e6, "give micrometres, 0 for none"),
+            "veiling_glare": (0.0, 1.0, "give a fraction, 0 for none"),
+        }
+        for name, (low, high, fix) in limits.items():
+            require_range(name, getattr(self, name), low, high, fix)
+
+
+def check_window(window_nm: tuple[float, float], wavelength_nm: Floats, width_nm: Floats) -> None:
+    """Raise `InputError` where a camera's window opens beyond 380-780 nm and the bands don't reach there.
+
+    Bands that are absent count as dark. Within 380-780 nm that is a choice of the scene; beyond, it would hide that a
+    W pixel may collect 16-35 % of its electrons there. Less than one more band may be missing.
+    """
+    first, last = wavelength_nm - width_nm / 2, wavelength_nm + width_nm / 2
+    beyond = ((window_nm[0], min(VISIBLE_NM[0], window_nm[1]), 0), (max(VISIBLE_NM[1], window_nm[0]), window_nm[1], -1))
+    for low, high, outermost in beyond:
+        seen = np.clip(np.minimum(last, high) - np.maximum(first, low), 0.0, None).sum()
+        if high - low - seen >= width_nm[outermost]:
+            raise InputError(
+                f"window_nm: {window_nm!r} asks for light at {low:g} to {high:g} nm and the scene's bands, "
+                f"{first[0]:g} to {last[-1]:g} nm, hold {seen:g} nm of it; narrow the window or render those bands"
+            )
 
 
 def _increasing(window_nm: tuple[float, float]) -> bool:
-    return 0 < window_nm[0] < window_nm[1] < inf
+    return all(isinstance(nm, Real) for nm in window_nm) and 0 < window_nm[0] < window_nm[1] < inf
 
 
 @dataclass(frozen=True)
@@ -130,7 +207,7 @@ class SensorConfig:
         """Black level in electrons."""
         if self.black_level_dn is not None:
             return self.black_level_dn * self.gain_e_per_dn
-        return float(BLACK_SIGMAS * (self.pixel.read_noise_e**2 + self.pixel.dsnu_e**2) ** 0.5)
+        return float(BLACK_SIGMAS * (self.pixel.read_noise_e**2 + self.pixel.fixed_dark_e**2) ** 0.5)
 
     @property
     def gain_e_per_dn(self) -> float:

@@ -1,6 +1,7 @@
 """Spectral responses of colour channels: electrons per photon at the pixel, quantum efficiency included."""
 
 import csv
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -10,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from render.errors import InputError, unknown
+from render.errors import InputError, require_range, unknown
 from render.spectrum import Floats, Spectrum
 
 # Smooth curves of the project's own: peak * exp(-|(nm - centre) / width|^power), another width and power on each side.
@@ -71,14 +72,87 @@ def rgbw() -> Responses:
     return Responses(curves)
 
 
-def read_csv(path: str | Path) -> Responses:
-    """Read measured responses: a header ``wavelength_nm,R,G,...`` and one row a wavelength, electrons per photon.
+@cache
+def built_in() -> Responses:
+    """`rgbw`'s curves, and W's once more as C: the clear pixel of RCCC mosaics."""
+    return Responses({**rgbw().curves, "C": rgbw().curves["W"]})
+
+
+class QuantumEfficiencyWarning(UserWarning):
+    """The curves to be multiplied by a quantum efficiency seem to hold one already."""
+
+
+def read_csv(
+    path: str | Path,
+    *,
+    range_nm: tuple[float, float] | None = None,
+    ir_cut: float | Spectrum | None = None,
+    quantum_efficiency: float | Spectrum | None = None,
+) -> Responses:
+    """Read measured responses: a header ``wavelength_nm,R,G,...`` and one row a wavelength.
+
+    Parameters
+    ----------
+    path : str or Path
+        Electrons per photon; transmittances of the filters where `quantum_efficiency` is given.
+    range_nm : (float, float), optional
+        Wavelengths to use, which the file must reach; None for all of the file's. Outside, the response is 0.
+    ir_cut : float or Spectrum, optional
+        Filter in front: the wavelength from which it lets nothing through, or its transmittance.
+    quantum_efficiency : float or Spectrum, optional
+        Of the photodiode, which multiplies every curve. None where the file holds it.
 
     Raises
     ------
     InputError
-        For a missing file, a header without ``wavelength_nm``, a cell that is no number, or a response outside 0..1.
+        For a missing file, a header without ``wavelength_nm``, a cell that is no number, a response outside 0..1, or a
+        range that the file doesn't reach.
+
+    Warns
+    -----
+    QuantumEfficiencyWarning
+        Where a quantum efficiency is given for curves that seem to hold one.
     """
+    letters, nm, columns = _table(path)
+    curves = {letter: Spectrum(nm, column) for letter, column in zip(letters, columns, strict=True)}
+    if range_nm is not None:
+        curves = {letter: _within(curve, range_nm, str(path)) for letter, curve in curves.items()}
+    if quantum_efficiency is not None:
+        Responses(curves)  # a transmittance over 1 is told before the product hides it
+        reason = _holds_quantum_efficiency(curves)
+        if reason:
+            warnings.warn(
+                f"responses: {str(path)!r} seems to hold the quantum efficiency already ({reason}), and is multiplied "
+                "by one again; leave quantum_efficiency out if the file gives electrons per photon",
+                QuantumEfficiencyWarning,
+                stacklevel=2,
+            )
+    for factor in (ir_cut if isinstance(ir_cut, Spectrum) else None, quantum_efficiency):
+        if factor is not None:
+            curves = {letter: _times(curve, factor) for letter, curve in curves.items()}
+    if isinstance(ir_cut, int | float):
+        require_range("ir_cut", ir_cut, nm[0] + 1e-9, 1e5, "give nm within the file's wavelengths, or a curve")
+        last = min(float(ir_cut), float(nm[-1]) if range_nm is None else range_nm[1])
+        curves = {letter: _within(curve, (float(curve.wavelength_nm[0]), last), "") for letter, curve in curves.items()}
+    return Responses(curves)
+
+
+def read_curve(path: str | Path) -> Spectrum:
+    """Read one curve, such as a filter's transmittance or a quantum efficiency: ``wavelength_nm`` and one more column.
+
+    Raises
+    ------
+    InputError
+        As `read_csv` does, and for more columns than two.
+    """
+    names, nm, columns = _table(path)
+    if len(names) != 1:
+        raise InputError(f"curve: {str(path)!r} has {len(names)} columns beside wavelength_nm; allowed: 1; keep one")
+    return Responses({names[0]: Spectrum(nm, columns[0])}).curves[names[0]]
+
+
+def _table(path: str | Path) -> tuple[list[str], Floats, list[Floats]]:
+    """Names, wavelengths and columns of a CSV."""
     try:
         with Path(path).open(newline="", encoding="utf-8-sig") as file:
             header, *rows = [row for row in csv.reader(file) if row]
@@ -98,4 +172,55 @@ def read_csv(path: str | Path) -> Responses:
         raise InputError(
             f"responses: {str(path)!r} has header {names}; allowed: wavelength_nm and one letter a column; add it"
         )
-    return Responses({letter: Spectrum(table[:, 0], table[:, i + 1]) for i, letter in enumerate(names[1:])})
+    return names[1:], table[:, 0], [table[:, i] for i in range(1, len(names))]
+
+
+def _within(curve: Spectrum, range_nm: tuple[float, float], path: str) -> Spectrum:
+    """Cut a curve to a range, with a point at each end."""
+    first, last = range_nm
+    nm = curve.wavelength_nm
+    if not nm[0] <= first < last <= nm[-1]:
+        raise InputError(
+            f"range_nm: {range_nm!r} is not inside the wavelengths of {path!r}, {nm[0]:g} to {nm[-1]:g} nm; "
+            "give a range that the file reaches"
+        )
+    points = np.unique(np.concatenate([[first], nm[(nm > first) & (nm < last)], [last]]))
+    return Spectrum(points, np.interp(points, nm, curve.values))
+
+
+def _times(curve: Spectrum, factor: float | Spectrum) -> Spectrum:
+    """Product, on the points of both: exact there, linear between; zero where either ends."""
+    if not isinstance(factor, Spectrum):
+        require_range("quantum_efficiency", factor, 0.0, 1.0, "give electrons per photon")
+        return curve * float(factor)
+    first = max(curve.wavelength_nm[0], factor.wavelength_nm[0])
+    last = min(curve.wavelength_nm[-1], factor.wavelength_nm[-1])
+    nm = np.union1d(curve.wavelength_nm, factor.wavelength_nm)
+    nm = nm[(nm >= first) & (nm <= last)]
+    if nm.size < 2:
+        raise InputError(
+            f"responses: curves over {curve.wavelength_nm[0]:g}-{curve.wavelength_nm[-1]:g} nm and a filter over "
+            f"{factor.wavelength_nm[0]:g}-{factor.wavelength_nm[-1]:g} nm share no range; give curves that overlap"
+        )
+    values = [np.interp(nm, one.wavelength_nm, one.values) for one in (curve, factor)]
+    return Spectrum(nm, values[0] * values[1])
+
+
+def _holds_quantum_efficiency(curves: Mapping[str, Spectrum]) -> str:
+    """Say why curves look as if a quantum efficiency were in them, or nothing.
+
+    Colour filters pass 0.8 or more at their peaks and clear ones the same everywhere, while front-lit silicon with its
+    filters stays under 0.7, and a clear pixel (W, C) follows silicon's rise from blue to red (so do ISETCam's sensors).
+    """
+    most = max(float(curve.values.max()) for curve in curves.values())
+    if most < 0.7:
+        return f"no curve exceeds {most:.2f}, where filters alone pass 0.8 or more at their peak"
+    nm = np.arange(450.0, 651.0, 5.0)
+    for letter, curve in curves.items():
+        if letter not in ("W", "C"):
+            continue
+        values = np.interp(nm, curve.wavelength_nm, curve.values, left=0.0, right=0.0)
+        low = float(values.min() / values.max()) if values.max() else 0.0
+        if 0.3 < low < 0.8:  # passes all of 450-650 nm, and not evenly
+            return f"{letter} passes all of 450-650 nm but falls to {low:.2f} of its peak there, as silicon does"
+    return ""

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from sensor.cfa import check_covers
 from sensor.config import SensorConfig
@@ -19,11 +20,17 @@ class Device:
     photo_response : (h, w) float64
         Relative gain of each pixel's photo-electrons, mean 1 and standard deviation PRNU; not negative.
     dark_offset_e : (h, w) float64
-        Fixed offset of each pixel [e-], mean 0 and standard deviation DSNU.
+        Fixed offset of each pixel [e-], mean 0: DSNU and its column's offset.
+    column_gain : (w,) float64, optional
+        Relative gain of each column's amplifier, mean 1; not negative. None where all are 1.
+    hot : (h, w) bool, optional
+        Where a pixel is hot: a defect map as a camera's calibration holds it. None where no pixel is.
     """
 
     photo_response: NDArray[np.float64]
     dark_offset_e: NDArray[np.float64]
+    column_gain: NDArray[np.float64] | None = None
+    hot: NDArray[np.bool_] | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -40,6 +47,14 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
         Where the shape doesn't hold a tile of the mosaic, or `rng` isn't a Generator.
     """
     check_covers(sensor.cfa, tuple(shape))
-    key = draw_key(rng)
-    response = 1.0 + sensor.pixel.prnu * normals(key, Term.PRNU, shape)
-    return Device(np.maximum(response, 0.0), sensor.pixel.dsnu_e * normals(key, Term.DSNU, shape))
+    key, pixel, one_row = draw_key(rng), sensor.pixel, (1, shape[1])
+    response = np.maximum(1.0 + pixel.prnu * normals(key, Term.PRNU, shape), 0.0)
+    offset_e = pixel.dsnu_e * normals(key, Term.DSNU, shape)
+    column_gain = hot = None
+    if pixel.column_offset_e:
+        offset_e += pixel.column_offset_e * normals(key, Term.COLUMN_OFFSET, one_row)
+    if pixel.column_gain_spread:
+        column_gain = np.maximum(1.0 + pixel.column_gain_spread * normals(key, Term.COLUMN_GAIN, one_row)[0], 0.0)
+    if pixel.hot_pixel_share:
+        hot = normals(key, Term.HOT, shape) < ndtri(pixel.hot_pixel_share)
+    return Device(response, offset_e, column_gain, hot)

@@ -1,74 +1,70 @@
-"""Cameras by name: two readings of the paper's Table 1, and a present-day pixel of the same geometry."""
+"""Cameras by name: TOML files in `sensor/data`, which `rodcone new preset` copies for users to change."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from pathlib import Path
 
 from render.errors import unknown
-from sensor.cfa import BAYER, RGBW, Tile
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.config import SensorConfig
+from sensor.config_file import read_sensor
 
-# Table 1 of Parmar & Wandell 2009. It contradicts itself (1.08 V at 30 uV an electron are 36 000 electrons, the well
-# holds 15 000), and doesn't say where its noise voltages are measured: hence two presets.
-_CONVERSION_GAIN_UV_PER_E = 30.0
-_ANALOG_GAIN = 7.98
-_READ_NOISE_UV = 4580.0
-_DSNU_UV = 6000.0
-
-_TILES: dict[str, Tile] = {"rgbw": RGBW, "bayer": BAYER}
-
-
-def _camera(cfa: str, read_noise_e: float, dsnu_e: float, prnu: float) -> SensorConfig:
-    if cfa not in _TILES:
-        raise unknown("cfa", cfa, _TILES)
-    pixel = PixelConfig(
-        pitch_um=2.2,
-        fill_factor=0.9,
-        full_well_e=15_000.0,
-        read_noise_e=read_noise_e,
-        dsnu_e=dsnu_e,
-        prnu=prnu,
-        conversion_gain_uv_per_e=_CONVERSION_GAIN_UV_PER_E,
-        voltage_swing_v=1.08,
-        analog_gain=_ANALOG_GAIN,
-    )
-    return SensorConfig(pixel, LensConfig(f_number=2.8), cfa=_TILES[cfa])
-
-
-def table1_pixel(cfa: str = "rgbw") -> SensorConfig:
-    """Table 1, its noise voltages taken at the photodiode, as ISET computes: read 152.7 e-, DSNU 200 e-."""
-    return _camera(cfa, _READ_NOISE_UV / _CONVERSION_GAIN_UV_PER_E, _DSNU_UV / _CONVERSION_GAIN_UV_PER_E, 0.017)
-
-
-def table1_output(cfa: str = "rgbw") -> SensorConfig:
-    """Table 1, its noise voltages taken behind the analog gain of 7.98: read 19.1 e-, DSNU 25.1 e-."""
-    behind_gain = _CONVERSION_GAIN_UV_PER_E * _ANALOG_GAIN
-    return _camera(cfa, _READ_NOISE_UV / behind_gain, _DSNU_UV / behind_gain, 0.017)
-
-
-def low_noise(cfa: str = "rgbw") -> SensorConfig:
-    """Present-day pixel, Table 1's geometry: read 1.5 e-, DSNU 1 e-, PRNU 1 % (typical of backside-lit CMOS)."""
-    return _camera(cfa, 1.5, 1.0, 0.01)
-
-
-_PRESETS: dict[str, Callable[[str], SensorConfig]] = {
-    "table1_pixel": table1_pixel,
-    "table1_output": table1_output,
-    "low_noise": low_noise,
-}
+_FOLDER = Path(__file__).parent / "data"
+_NAMES = (
+    "table1_pixel",
+    "table1_output",
+    "low_noise",
+    "table1_output_6um",
+    "table1_output_3um",
+    "table1_output_2um",
+)
 
 
 def names() -> tuple[str, ...]:
     """Names that `preset` knows."""
-    return tuple(_PRESETS)
+    return _NAMES
 
 
-def preset(name: str, cfa: str = "rgbw") -> SensorConfig:
-    """Camera by name, with an ``rgbw`` or ``bayer`` mosaic.
+def preset_file(name: str) -> Path:
+    """File of a preset.
 
     Raises
     ------
     InputError
-        For an unknown name or mosaic.
+        For an unknown name.
     """
-    if name not in _PRESETS:
-        raise unknown("sensor preset", name, _PRESETS)
-    return _PRESETS[name](cfa)
+    if name not in _NAMES:
+        raise unknown("sensor preset", name, _NAMES)
+    return _FOLDER / f"{name}.toml"
+
+
+def preset(name: str | Path, cfa: str | Sequence[str] | None = None) -> SensorConfig:
+    """Camera by name, or from a TOML file of the user's own.
+
+    Parameters
+    ----------
+    name : str or Path
+        One of `names`, or a path that ends in ``.toml``.
+    cfa : str or sequence of str, optional
+        Mosaic: a name of `sensor.cfa.MOSAICS`, or rows of letters. None takes the file's own, RGBW in every preset.
+
+    Raises
+    ------
+    InputError
+        For an unknown name or mosaic, or a file that doesn't describe a camera.
+    """
+    own = isinstance(name, Path) or name.endswith(".toml")
+    return read_sensor(name if own else preset_file(str(name)), cfa)
+
+
+def table1_pixel(cfa: str = "rgbw") -> SensorConfig:
+    """Table 1, its noise voltages taken at the photodiode, as ISET computes: read 152.7 e-, DSNU 200 e-."""
+    return preset("table1_pixel", cfa)
+
+
+def table1_output(cfa: str = "rgbw") -> SensorConfig:
+    """Table 1, its noise voltages taken behind the analog gain of 7.98: read 19.1 e-, DSNU 25.1 e-."""
+    return preset("table1_output", cfa)
+
+
+def low_noise(cfa: str = "rgbw") -> SensorConfig:
+    """Present-day pixel, Table 1's geometry: read 1.5 e-, DSNU 1 e-, PRNU 1 % (typical of backside-lit CMOS)."""
+    return preset("low_noise", cfa)

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from render.errors import InputError
 
 _U32 = np.uint64(0xFFFFFFFF)
-_MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
-_WEYL = (0x9E3779B9, 0xBB67AE85)
-_ROUNDS = 10
+MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
+WEYL = (0x9E3779B9, 0xBB67AE85)
+ROUNDS = 10
+_PIXELS_AT_ONCE = 1 << 18  # the words of a draw take ten times its memory
 
 
 class Term(IntEnum):
@@ -23,6 +24,10 @@ class Term(IntEnum):
     DSNU = 2
     SHOT = 3
     READ = 4
+    COLUMN_GAIN = 5
+    COLUMN_OFFSET = 6
+    HOT = 7
+    EXPOSURE = 8  # shot and read noise of one pixel together, in `sensor.kernel`
 
 
 def draw_key(rng: np.random.Generator) -> int:
@@ -36,22 +41,31 @@ def philox(counter: tuple[NDArray[np.uint64], ...], key: int) -> tuple[NDArray[n
     """Four 32-bit words (in uint64) for each counter of four 32-bit words, under a 64-bit key."""
     c0, c1, c2, c3 = counter
     k0, k1 = key & 0xFFFFFFFF, key >> 32
-    for _ in range(_ROUNDS):
-        first, second = c0 * _MULTIPLIERS[0], c2 * _MULTIPLIERS[1]
+    for _ in range(ROUNDS):
+        first, second = c0 * MULTIPLIERS[0], c2 * MULTIPLIERS[1]
         c0, c1, c2, c3 = (
             (second >> np.uint64(32)) ^ c1 ^ np.uint64(k0),
             second & _U32,
             (first >> np.uint64(32)) ^ c3 ^ np.uint64(k1),
             first & _U32,
         )
-        k0, k1 = (k0 + _WEYL[0]) & 0xFFFFFFFF, (k1 + _WEYL[1]) & 0xFFFFFFFF
+        k0, k1 = (k0 + WEYL[0]) & 0xFFFFFFFF, (k1 + WEYL[1]) & 0xFFFFFFFF
     return c0, c1, c2, c3
 
 
 def normals(key: int, term: Term, shape: tuple[int, int]) -> NDArray[np.float64]:
     """Standard normal draw for each pixel, shape `shape` (Box-Muller on two 53-bit uniforms)."""
-    rows, columns = (index.astype(np.uint64) for index in np.indices(shape, dtype=np.uint32))
-    words = philox((columns, rows, np.full(shape, term, dtype=np.uint64), np.zeros(shape, dtype=np.uint64)), key)
+    draws = np.empty(shape)
+    columns = np.arange(shape[1], dtype=np.uint64)[None, :]
+    terms, zeros = (np.full((1, 1), number, dtype=np.uint64) for number in (int(term), 0))
+    rows_at_once = max(1, _PIXELS_AT_ONCE // max(1, shape[1]))
+    for first in range(0, shape[0], rows_at_once):
+        rows = np.arange(first, min(first + rows_at_once, shape[0]), dtype=np.uint64)[:, None]
+        draws[first : first + rows_at_once] = _box_muller(philox((columns, rows, terms, zeros), key))
+    return draws
+
+
+def _box_muller(words: tuple[NDArray[np.uint64], ...]) -> NDArray[np.float64]:
     first, second = (
         (((a << np.uint64(32)) | b) >> np.uint64(11)).astype(np.float64) * 2.0**-53 for a, b in (words[:2], words[2:])
     )

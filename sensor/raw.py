@@ -1,12 +1,14 @@
 """The raw image: what a camera's software is given, and nothing of the truth."""
 
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError, require_range
-from sensor.cfa import Tile, check_covers, check_tile
+from sensor.calibration import ColourCalibration
+from sensor.cfa import Tile, channels, check_covers, check_tile
 
 # A saturated pixel reads white - 4 sigma_dark or more, give or take half a DN, with probability 1 - 3.2e-5.
 SATURATION_SIGMAS = 4.0
@@ -32,6 +34,22 @@ class RawImage:
         Standard deviation of the pixels' relative response.
     exposure_s : float
         Exposure time [s].
+    camera : str
+        Name of the camera: printable ASCII, as TIFF's tags hold it.
+    f_number, iso : float or None
+        Of the lens, and the saturation-based speed (ISO 12232); None where not noted.
+    colour : ColourCalibration or None
+        Of the channels of `cfa`; None for a camera without colours, or one not calibrated.
+    engine : str
+        What drew a simulated frame's noise: ``numpy`` (exact), or ``llvm`` or ``cuda`` (`sensor.poisson` states the
+        error); empty where unknown, as for a file of another program.
+    column_gain_spread : float
+        Standard deviation of the columns' relative gain, in `prnu` too: full pixels of weak columns read less.
+
+    Raises
+    ------
+    InputError
+        For a frame without a whole tile, or a number out of its range.
     """
 
     dn: NDArray[np.uint16]
@@ -43,15 +61,45 @@ class RawImage:
     dsnu_e: float
     prnu: float
     exposure_s: float
+    camera: str = "rodcone"
+    f_number: float | None = None
+    iso: float | None = None
+    colour: ColourCalibration | None = None
+    engine: str = ""
+    column_gain_spread: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
         check_covers(self.cfa, np.shape(self.dn))
-        require_range("gain_e_per_dn", self.gain_e_per_dn, 1e-12, 1e12, "give electrons per digital number")
+        limits = {
+            "gain_e_per_dn": (1e-12, 1e12, "give electrons per digital number"),
+            "read_noise_e": (0.0, 1e9, "give electrons, 0 for none"),
+            "dsnu_e": (0.0, 1e9, "give electrons, 0 for none"),
+            "prnu": (0.0, 1.0, "give a fraction: 1.7 % is 0.017"),
+            "exposure_s": (0.0, 1e7, "give seconds, 0 or more"),
+            "f_number": (0.1, 1e4, "give focal length over aperture"),
+            "iso": (1e-6, 1e9, "give a speed above 0"),
+            "column_gain_spread": (0.0, 1.0, "give a fraction, 0 for none"),
+        }
+        for name, (low, high, fix) in limits.items():
+            if getattr(self, name) is not None:
+                require_range(name, getattr(self, name), low, high, fix)
+        self._check_levels()
+        if not (isinstance(self.camera, str) and self.camera.isascii() and self.camera.isprintable() and self.camera):
+            raise InputError(f"camera: {self.camera!r} is not allowed; give a name in printable ASCII")
+        if self.colour is not None and self.colour.neutral.size != len(channels(self.cfa)):
+            raise InputError(
+                f"colour: {self.colour.neutral.size} channels don't fit the mosaic's {channels(self.cfa)}; "
+                "calibrate this camera"
+            )
+
+    def _check_levels(self) -> None:
         if not self.black_dn < self.white_dn:
             raise InputError(
                 f"black_dn: {self.black_dn!r} is not under white_dn {self.white_dn!r}; swap or correct them"
             )
+        for name in ("black_dn", "white_dn"):
+            require_range(name, getattr(self, name), -65_535.0, 65_535.0, "give digital numbers of 16 bits")
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -72,7 +120,8 @@ class RawImage:
     def saturation_e(self) -> float:
         """Level from which a pixel counts as saturated [e-]: noise comes after the well clips (design, section 4)."""
         full_e = (self.white_dn - self.black_dn) * self.gain_e_per_dn
-        return full_e - SATURATION_SIGMAS * self.dark_noise_e - self.gain_e_per_dn / 2
+        spread_e = hypot(self.dark_noise_e, self.column_gain_spread * full_e)
+        return full_e - SATURATION_SIGMAS * spread_e - self.gain_e_per_dn / 2
 
     @property
     def saturated(self) -> NDArray[np.bool_]:

@@ -7,7 +7,7 @@ from render.errors import require_range
 from render.photometry import photons_per_joule
 from render.spectrum import Floats
 from sensor.cfa import channels, check_covers, mask
-from sensor.config import SensorConfig
+from sensor.config import SensorConfig, check_window
 from sensor.optics import SpectralIrradiance
 
 
@@ -17,8 +17,14 @@ def electrons_per_irradiance(
     """Electrons of each channel per unit irradiance in each band, shape (channel, band).
 
     Response x photons per joule x band width (its part inside the camera's window) x collecting area x time.
+
+    Raises
+    ------
+    InputError
+        For a negative exposure, or a window beyond 380-780 nm that the bands don't reach.
     """
     require_range("exposure_s", exposure_s, 0.0, 1e7, "give seconds, 0 or more")
+    check_window(sensor.window_nm, wavelength_nm, width_nm)
     low, high = sensor.window_nm
     first, last = wavelength_nm - width_nm / 2, wavelength_nm + width_nm / 2
     inside_nm = np.clip(np.minimum(last, high) - np.maximum(first, low), 0.0, None)

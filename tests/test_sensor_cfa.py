@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from render.errors import InputError
-from sensor.cfa import BAYER, RGBW, channels, check_covers, check_tile, letter_map, mask
+from sensor.cfa import BAYER, MOSAICS, RGBW, channels, check_covers, check_tile, letter_map, mask, tile_of
 
 RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
 
@@ -66,3 +66,42 @@ def test_a_frame_that_does_not_hold_a_tile_is_refused_with_its_shape(shape):
     assert str(shape) in message
     assert "at least 2x2" in message
     assert "\n" not in message
+
+
+# Mosaics by name
+
+
+def test_bayer_s_four_phases_are_one_mosaic_moved_by_a_row_and_a_column():
+    start = letter_map(BAYER, (4, 4))
+    for name, row, column in (("rggb", 0, 0), ("grbg", 0, 1), ("gbrg", 1, 0), ("bggr", 1, 1)):
+        moved = np.roll(start, (-row, -column), axis=(0, 1))[:2, :2]
+        assert tuple("".join(line) for line in moved) == MOSAICS[f"bayer_{name}"]
+        assert "".join(MOSAICS[f"bayer_{name}"]) == name.upper()
+    assert MOSAICS["bayer"] == MOSAICS["bayer_rggb"]
+
+
+def test_the_4x4_mosaic_has_half_of_its_pixels_white_on_a_checkerboard_and_colours_on_diagonals():
+    letters = letter_map(MOSAICS["rgbw_4x4"], (4, 4))
+    rows, columns = np.indices((4, 4))
+    np.testing.assert_array_equal(letters == "W", (rows + columns) % 2 == 0)
+    assert {letter: int((letters == letter).sum()) for letter in "RGB"} == {"R": 2, "G": 4, "B": 2}
+    for row, column in zip(*np.nonzero(letters != "W"), strict=True):  # each colour again one step down and left
+        assert letters[(row + 1) % 4, (column - 1) % 4] == letters[row, column] or letters[row, column] != "G"
+
+
+def test_rccc_has_one_red_pixel_in_four_and_three_clear_ones():
+    assert sorted("".join(MOSAICS["rccc"])) == ["C", "C", "C", "R"]
+
+
+def test_a_mosaic_is_taken_by_name_or_by_its_rows():
+    assert tile_of("bayer") == BAYER
+    assert tile_of(["CY", "YM"]) == ("CY", "YM")
+    with pytest.raises(InputError, match=r"cfa: 'rgwb' is unknown; allowed: bayer.*did you mean 'rgbw'"):
+        tile_of("rgwb")
+    with pytest.raises(InputError, match=r"cfa: 3 is not a tile"):
+        tile_of(3)
+
+
+def test_the_table_of_mosaics_cannot_be_written_to():
+    with pytest.raises(TypeError):
+        MOSAICS["mine"] = ("RG", "GB")

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from render.errors import InputError
+from render.radiance import SpectralRadiance
 from render.spectrum import flat
 from sensor.cfa import BAYER, RGBW
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.config import LensConfig, PixelConfig, SensorConfig, check_window
 from sensor.curves import Responses
+from sensor.optics import form_image
 from sensor.presets import low_noise, names, preset, table1_output, table1_pixel
+from sensor.response import expected_electrons
 
 PIXEL = PixelConfig(pitch_um=2.2, fill_factor=0.9, full_well_e=15_000.0, read_noise_e=3.0, dsnu_e=4.0, prnu=0.01)
 LENS = LensConfig(f_number=2.8)
@@ -106,6 +109,11 @@ def test_zero_is_allowed_wherever_it_switches_a_term_off(field):
         ("conversion_gain_uv_per_e", 0.0),
         ("voltage_swing_v", -1.0),
         ("analog_gain", 0.0),
+        ("column_gain_spread", -0.01),
+        ("column_offset_e", np.nan),
+        ("hot_pixel_share", 1.5),
+        ("hot_pixel_dark_current_e_per_s", -1.0),
+        ("crosstalk", 0.26),
     ],
 )
 def test_a_pixel_out_of_range_is_refused_by_name_and_value(field, value):
@@ -157,4 +165,55 @@ def test_an_unknown_preset_or_mosaic_names_the_nearest():
     one_line(error, "'low_nois'", *names(), "did you mean 'low_noise'?")
     with pytest.raises(InputError) as error:
         table1_pixel("bayr")
-    one_line(error, "cfa: 'bayr'", "bayer, rgbw", "did you mean 'bayer'?")
+    one_line(error, "cfa: 'bayr'", "bayer, bayer_bggr", "rgbw_4x4", "did you mean 'bayer'?")
+
+
+# The window
+
+
+def bands(first_nm, last_nm, width_nm=10.0):
+    """Centres and widths of bands that fill a range."""
+    centres = np.arange(first_nm + width_nm / 2, last_nm, width_nm)
+    return centres, np.full(centres.size, width_nm)
+
+
+@pytest.mark.parametrize("window_nm", [(380.0, 780.0), (400.0, 700.0), (300.0, 780.0), (380.0, 1068.0), (800.0, 900.0)])
+def test_bands_that_reach_the_window_s_ends_are_accepted(window_nm):
+    check_window(window_nm, *bands(300.0, 1070.0))
+    check_window(window_nm, *bands(300.0, 1060.0))  # 8 nm less: no further band of 10 nm would fit
+
+
+@pytest.mark.parametrize("window_nm", [(380.0, 780.0), (400.0, 700.0), (500.0, 600.0)])
+def test_inside_380_to_780_nm_absent_bands_are_the_scene_s_choice(window_nm):
+    check_window(window_nm, *bands(450.0, 650.0))
+    check_window(window_nm, np.array([589.0]), np.array([1.0]))
+
+
+@pytest.mark.parametrize(
+    ("window_nm", "parts"),
+    [
+        ((380.0, 1068.0), ("(380.0, 1068.0)", "780 to 1068 nm", "380 to 780 nm, hold 0 nm", "narrow the window")),
+        ((380.0, 790.0), ("780 to 790 nm", "render those bands")),
+        ((360.0, 780.0), ("360 to 380 nm",)),
+        ((800.0, 1000.0), ("800 to 1000 nm",)),
+    ],
+)
+def test_a_window_beyond_the_scene_s_bands_is_refused_in_one_line(window_nm, parts):
+    with pytest.raises(InputError) as error:
+        check_window(window_nm, *bands(380.0, 780.0))
+    one_line(error, *parts)
+
+
+def test_a_gap_in_the_infrared_bands_is_seen_too():
+    nm, width = bands(380.0, 1070.0)
+    inside = (nm < 800) | (nm > 840)
+    with pytest.raises(InputError, match=r"780 to 1068 nm.*hold 248 nm"):
+        check_window((380.0, 1068.0), nm[inside], width[inside])
+
+
+def test_a_photograph_through_a_window_beyond_the_radiance_is_refused():
+    nm = np.arange(385.0, 780.0, 10.0)
+    sensor = SensorConfig(PIXEL, LENS, window_nm=(380.0, 1000.0))
+    radiance = SpectralRadiance(np.ones((4, 4, nm.size)), nm)
+    with pytest.raises(InputError, match="window_nm"):
+        expected_electrons(form_image(radiance, sensor), sensor, 0.01)

@@ -1,12 +1,14 @@
 """Responses of R, G, B, W: peaks and electron ratios of the published sensor, and curves from a file."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 from render.errors import InputError
 from render.illuminants import illuminant
 from render.spectrum import Spectrum
-from sensor.curves import Responses, read_csv, rgbw
+from sensor.curves import QuantumEfficiencyWarning, Responses, read_csv, read_curve, rgbw
 
 PEAKS = {"R": (0.560, 592.0), "G": (0.678, 540.0), "B": (0.415, 476.0), "W": (1.0, 620.0)}
 
@@ -113,3 +115,113 @@ def test_a_missing_csv_is_refused_with_its_name(tmp_path):
     with pytest.raises(InputError, match=r"absent\.csv.*can't be read.*give a CSV") as error:
         read_csv(tmp_path / "absent.csv")
     assert "\n" not in str(error.value)
+
+
+# Range, infrared cut and quantum efficiency
+
+FILTERS = "wavelength_nm,G,W\n400,0,0.9\n500,0.8,0.9\n600,0.4,0.9\n800,0.2,0.9\n"
+
+
+def curve(responses, letter="G"):
+    one = responses.curves[letter]
+    return one.wavelength_nm.tolist(), one.values.tolist()
+
+
+def test_a_range_cuts_the_curves_with_a_point_at_each_end(tmp_path):
+    responses = read_csv(write(tmp_path, FILTERS), range_nm=(450.0, 700.0))
+    nm, values = curve(responses)
+    assert nm == [450.0, 500.0, 600.0, 700.0]
+    np.testing.assert_allclose(values, [0.4, 0.8, 0.4, 0.3], rtol=1e-15)
+    # nothing outside: W's 0.9 over 690-700 nm of a band of 690-710 nm
+    assert responses.band_average(("W",), [700.0], [20.0])[0, 0] == pytest.approx(0.45, rel=1e-12)
+
+
+@pytest.mark.parametrize("range_nm", [(399.0, 700.0), (400.0, 801.0), (700.0, 500.0), (500.0, np.nan)])
+def test_a_range_that_the_file_does_not_reach_is_refused(tmp_path, range_nm):
+    with pytest.raises(InputError, match=r"range_nm: .*400 to 800 nm; give a range that the file reaches"):
+        read_csv(write(tmp_path, FILTERS), range_nm=range_nm)
+
+
+def test_an_infrared_cut_is_a_wavelength_or_a_curve(tmp_path):
+    path = write(tmp_path, FILTERS)
+    nm, values = curve(read_csv(path, ir_cut=650.0))
+    assert nm == [400.0, 500.0, 600.0, 650.0]
+    np.testing.assert_allclose(values, [0.0, 0.8, 0.4, 0.35], rtol=1e-15)
+    assert curve(read_csv(path, ir_cut=900.0)) == curve(read_csv(path))
+    nm, values = curve(read_csv(path, ir_cut=Spectrum([300.0, 600.0, 700.0], [0.5, 0.5, 0.0])))
+    assert nm == [400.0, 500.0, 600.0, 700.0]
+    np.testing.assert_allclose(values, [0.0, 0.4, 0.2, 0.0], rtol=1e-15)
+    nm, _ = curve(read_csv(path, range_nm=(450.0, 640.0), ir_cut=650.0))
+    assert (nm[0], nm[-1]) == (450.0, 640.0)
+    nm, _ = curve(read_csv(path, range_nm=(450.0, 700.0), ir_cut=650.0))
+    assert (nm[0], nm[-1]) == (450.0, 650.0)
+
+
+def test_a_cut_before_the_first_wavelength_or_a_filter_elsewhere_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"ir_cut: 400\.0"):
+        read_csv(write(tmp_path, FILTERS), ir_cut=400.0)
+    with pytest.raises(InputError, match=r"range_nm: \(450\.0, 430\.0\)"):
+        read_csv(write(tmp_path, FILTERS), range_nm=(450.0, 700.0), ir_cut=430.0)
+    with pytest.raises(InputError, match=r"400-800 nm and a filter over 900-1000 nm share no range"):
+        read_csv(write(tmp_path, FILTERS), ir_cut=Spectrum([900.0, 1000.0], [1.0, 1.0]))
+
+
+def test_a_quantum_efficiency_multiplies_filters_without_a_word(tmp_path):
+    path = write(tmp_path, FILTERS)
+    nm, values = curve(read_csv(path, quantum_efficiency=0.5))
+    assert nm == [400.0, 500.0, 600.0, 800.0]
+    np.testing.assert_allclose(values, [0.0, 0.4, 0.2, 0.1], rtol=1e-15)
+    nm, values = curve(read_csv(path, quantum_efficiency=Spectrum([400.0, 700.0, 1000.0], [0.6, 0.6, 0.0])))
+    assert nm == [400.0, 500.0, 600.0, 700.0, 800.0]
+    np.testing.assert_allclose(values, [0.0, 0.48, 0.24, 0.18, 0.08], rtol=1e-14)
+
+
+@pytest.mark.parametrize("efficiency", [-0.1, 1.1, np.nan])
+def test_a_quantum_efficiency_out_of_range_is_refused(tmp_path, efficiency):
+    with pytest.raises(InputError, match="quantum_efficiency"):
+        read_csv(write(tmp_path, FILTERS), quantum_efficiency=efficiency)
+
+
+def test_filters_in_per_cent_are_told_so_although_the_product_would_fit(tmp_path):
+    with pytest.raises(InputError, match="divide per cent by 100"):
+        read_csv(write(tmp_path, "wavelength_nm,G\n400,20\n500,80\n"), quantum_efficiency=0.005)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("wavelength_nm,R,G\n400,0,0.1\n550,0.1,0.6\n650,0.55,0\n", "no curve exceeds 0.60"),
+        ("wavelength_nm,G,W\n400,0,0.4\n550,0.8,0.8\n650,0,1.0\n", "W passes all of 450-650 nm but falls to 0.53"),
+    ],
+)
+def test_a_quantum_efficiency_that_would_be_applied_twice_is_warned_of_in_one_line(tmp_path, text, reason):
+    path = write(tmp_path, text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_csv(path)  # nothing is multiplied: no warning
+    with pytest.warns(QuantumEfficiencyWarning) as caught:
+        read_csv(path, quantum_efficiency=0.5)
+    (one,) = caught
+    assert one.filename == __file__
+    message = str(one.message)
+    assert "\n" not in message
+    for part in (reason, "curves.csv", "electrons per photon"):
+        assert part in message
+
+
+def test_the_project_s_own_curves_would_be_recognised_as_holding_it(tmp_path):
+    nm = np.arange(380.0, 781.0, 5.0)
+    columns = [np.interp(nm, one.wavelength_nm, one.values) for one in rgbw().curves.values()]
+    rows = [",".join(map(repr, map(float, row))) for row in zip(nm, *columns, strict=True)]
+    path = write(tmp_path, "\n".join(["wavelength_nm,R,G,B,W", *rows]))
+    with pytest.warns(QuantumEfficiencyWarning, match="W passes all"):
+        read_csv(path, quantum_efficiency=0.5)
+
+
+def test_a_single_curve_is_read_and_a_second_column_or_per_cent_refused(tmp_path):
+    one = read_curve(write(tmp_path, "wavelength_nm,t\n400,0.5\n500,1\n"))
+    assert (one.wavelength_nm.tolist(), one.values.tolist()) == ([400.0, 500.0], [0.5, 1.0])
+    with pytest.raises(InputError, match="2 columns beside wavelength_nm"):
+        read_curve(write(tmp_path, FILTERS))
+    with pytest.raises(InputError, match="divide per cent by 100"):
+        read_curve(write(tmp_path, "wavelength_nm,t\n400,50\n500,90\n"))

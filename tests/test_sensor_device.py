@@ -1,5 +1,7 @@
 """One chip: its fixed patterns."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,3 +82,73 @@ def test_a_chip_that_does_not_hold_a_tile_is_refused(shape):
 def test_a_seed_instead_of_a_generator_is_refused():
     with pytest.raises(InputError, match=r"rng: 7 is not a NumPy Generator"):
         draw_device(camera(), (8, 8), 7)
+
+
+# Columns and hot pixels
+
+REAL = {"column_gain_spread": 0.01, "column_offset_e": 3.0, "hot_pixel_share": 0.02}
+
+
+def chip(shape=(512, 512), seed=1, dsnu_e=0.0, **terms):
+    sensor = camera(prnu=0.0, dsnu_e=dsnu_e)
+    sensor = replace(sensor, pixel=replace(sensor.pixel, **terms))
+    return draw_device(sensor, shape, np.random.default_rng(seed))
+
+
+def test_zero_leaves_columns_and_hot_pixels_out_and_the_other_patterns_alone():
+    plain, real = (draw_device(one, (64, 64), np.random.default_rng(1)) for one in (camera(), replaced(**REAL)))
+    assert plain.column_gain is None
+    assert plain.hot is None
+    np.testing.assert_array_equal(real.photo_response, plain.photo_response)
+
+
+def replaced(**terms):
+    return replace(camera(), pixel=replace(camera().pixel, **terms))
+
+
+def test_column_patterns_are_one_number_a_column_with_the_stated_spread():
+    device = chip((3, 40_000), column_gain_spread=0.01, column_offset_e=3.0)
+    assert device.column_gain.shape == (40_000,)
+    np.testing.assert_array_equal(device.dark_offset_e, np.broadcast_to(device.dark_offset_e[0], (3, 40_000)))
+    # means and standard deviations within 4 standard errors: false-alarm rate 2.5e-4
+    for pattern, mean, sigma in ((device.column_gain, 1.0, 0.01), (device.dark_offset_e[0], 0.0, 3.0)):
+        assert abs(pattern.mean() - mean) < 4 * sigma / np.sqrt(40_000)
+        assert abs(pattern.std() - sigma) < 4 * sigma / np.sqrt(80_000)
+    assert abs(np.corrcoef(device.column_gain, device.dark_offset_e[0])[0, 1]) < 4 / 200
+
+
+def test_column_offsets_add_to_dsnu():
+    both, columns, pixels = (chip(dsnu_e=d, column_offset_e=c) for d, c in ((5.0, 3.0), (0.0, 3.0), (5.0, 0.0)))
+    np.testing.assert_allclose(both.dark_offset_e, columns.dark_offset_e + pixels.dark_offset_e, rtol=1e-12)
+
+
+def test_a_wild_column_gain_is_no_negative_amplifier():
+    assert chip((2, 4096), column_gain_spread=1.0).column_gain.min() == 0.0
+
+
+@pytest.mark.parametrize("share", [0.001, 0.02, 0.7])
+def test_the_stated_share_of_pixels_is_hot(share):
+    hot = chip(hot_pixel_share=share).hot
+    assert hot.dtype == np.bool_
+    # binomial, within 4 standard errors: false-alarm rate 6.3e-5 each
+    assert abs(hot.mean() - share) < 4 * np.sqrt(share * (1 - share) / hot.size)
+
+
+def test_all_pixels_can_be_hot_and_more_hot_pixels_hold_the_fewer():
+    assert chip(hot_pixel_share=1.0).hot.all()
+    few, many = (chip(hot_pixel_share=share).hot for share in (0.01, 0.05))
+    assert np.all(many[few])
+
+
+def test_hot_pixels_lie_apart_from_the_other_patterns():
+    sensor = replaced(hot_pixel_share=0.3, column_offset_e=3.0)
+    device = draw_device(sensor, (512, 512), np.random.default_rng(1))
+    for pattern in (device.photo_response, device.dark_offset_e):
+        assert abs(np.corrcoef(device.hot.ravel(), pattern.ravel())[0, 1]) < 4.5 / 512  # twice 7e-6
+
+
+def test_a_smaller_chip_s_columns_and_hot_pixels_are_the_larger_one_s_corner():
+    large, small = (chip(shape, **REAL) for shape in ((20, 30), (6, 11)))
+    np.testing.assert_array_equal(small.column_gain, large.column_gain[:11])
+    np.testing.assert_array_equal(small.hot, large.hot[:6, :11])
+    np.testing.assert_array_equal(small.dark_offset_e, large.dark_offset_e[:6, :11])

@@ -256,6 +256,96 @@ def test_inputs_are_left_as_they_were():
         np.testing.assert_array_equal(array, copy)
 
 
+# Terms of real chips
+
+
+def test_a_column_s_amplifier_multiplies_counts_and_not_their_mean():
+    gains = np.repeat([0.5, 1.0, 2.0], 200)
+    device = Device(np.ones((600, 600)), np.zeros((600, 600)), column_gain=gains)
+    electrons = expose(camera(bits=16), 30.0, (600, 600), device).electrons
+    for gain in (0.5, 1.0, 2.0):
+        here, mean, variance = electrons[:, gains == gain], 30.0 * gain, 30.0 * gain**2  # a mean scaled by it: 30 gain
+        # six comparisons within 4 standard errors: 3.8e-4
+        assert abs(here.mean() - mean) < 4 * np.sqrt(variance / here.size)
+        assert abs(here.var() - variance) < 4 * gain**2 * np.sqrt((2 * 30.0**2 + 30.0) / here.size)
+
+
+def test_the_well_clips_before_the_column_s_amplifier_and_offsets_come_behind_it():
+    gains = np.tile([0.5, 0.8], 32)
+    device = Device(np.ones((64, 64)), np.full((64, 64), 20.0), column_gain=gains)
+    sensor = camera(bits=16)
+    raw = expose(sensor, 1e5, device=device)
+    expected = np.rint((1000.0 * gains + 20.0) / sensor.gain_e_per_dn + sensor.black_dn)
+    np.testing.assert_array_equal(raw.dn, np.broadcast_to(expected, (64, 64)))
+
+
+def test_a_hot_pixel_collects_its_own_dark_current_on_top_of_the_others_and_no_light_scales_it():
+    hot = np.zeros((300, 300), dtype=bool)
+    hot[:, ::3] = True
+    device = Device(np.full((300, 300), 2.0), np.zeros((300, 300)), hot=hot)
+    sensor = camera(bits=16, dark_current_e_per_s=50.0, hot_pixel_dark_current_e_per_s=400.0)
+    electrons = expose(sensor, 25.0, (300, 300), device, exposure_s=0.2).electrons
+    for where, mean in ((~hot, 60.0), (hot, 140.0)):
+        here = electrons[where]
+        # Poisson: mean and variance within 4 standard errors, four comparisons: 2.5e-4
+        assert abs(here.mean() - mean) < 4 * np.sqrt(mean / here.size)
+        assert abs(here.var() - mean) < 4 * np.sqrt((2 * mean**2 + mean) / here.size)
+
+
+def test_hot_pixels_are_cold_in_an_exposure_of_0_s():
+    device = Device(np.ones((8, 8)), np.zeros((8, 8)), hot=np.ones((8, 8), dtype=bool))
+    np.testing.assert_array_equal(expose(camera(hot_pixel_dark_current_e_per_s=1e12), 0.0, (8, 8), device, 0.0).dn, 0)
+
+
+def test_crosstalk_moves_means_before_photo_response_and_leaves_counts_poisson_and_independent():
+    light_e, response = np.zeros((512, 512)), np.ones((512, 512))
+    light_e[::4, ::4] = 800.0
+    response[1::4, ::4] = 0.5  # the pixels under the bright ones
+    device = Device(response, np.zeros((512, 512)))
+    electrons = expose(camera(bits=16, crosstalk=0.1), light_e, (512, 512), device).electrons
+    for rows, columns, mean in ((0, 0, 480.0), (0, 1, 80.0), (3, 0, 80.0), (1, 0, 40.0)):
+        here = electrons[rows::4, columns::4][1:-1, 1:-1]
+        # eight comparisons within 4 standard errors: 5e-4
+        assert abs(here.mean() - mean) < 4 * np.sqrt(mean / here.size)
+        assert abs(here.var() - mean) < 4 * np.sqrt((2 * mean**2 + mean) / here.size)
+    np.testing.assert_array_equal(electrons[2::4, 2::4], 0.0)
+    giver, taker = electrons[::4, ::4].ravel(), electrons[::4, 1::4].ravel()
+    assert abs(np.corrcoef(giver, taker)[0, 1]) < 4.5 / np.sqrt(giver.size)  # 7e-6
+
+
+def test_new_patterns_stay_with_the_chip_over_exposures_and_zero_switches_each_off():
+    terms = {"column_gain_spread": 0.05, "column_offset_e": 4.0, "hot_pixel_share": 0.1}
+    sensor = camera(bits=16, hot_pixel_dark_current_e_per_s=1e6, **terms)
+    device = draw_device(sensor, (64, 64), rng(1))
+    # hot pixels full, all others dark: no noise is left
+    first, second = (expose(sensor, 0.0, device=device, seed=seed, exposure_s=1.0).dn for seed in (2, 3))
+    np.testing.assert_array_equal(first, second)
+    black = np.rint(device.dark_offset_e / sensor.gain_e_per_dn + sensor.black_dn)
+    np.testing.assert_array_equal(first[~device.hot], np.clip(black, 0, None)[~device.hot])
+    off = camera(bits=16)
+    np.testing.assert_array_equal(expose(off, 50.0, device=draw_device(off, (64, 64), rng(1))).dn, expose(off, 50.0).dn)
+
+
+def test_the_raw_image_s_calibration_holds_column_noise_too():
+    raw = expose(camera(dsnu_e=3.0, column_offset_e=4.0, prnu=0.03, column_gain_spread=0.04), 10.0)
+    assert (raw.dsnu_e, raw.prnu) == (pytest.approx(5.0), pytest.approx(0.05))
+
+
+def test_full_pixels_of_weak_columns_count_as_saturated_too():
+    sensor = camera(bits=16, read_noise_e=2.0, column_gain_spread=0.02)
+    device = draw_device(sensor, (32, 512), rng(8))
+    full = expose(sensor, 1e5, (32, 512), device)
+    assert full.column_gain_spread == 0.02
+    assert full.electrons.min() < 1000.0 - 40.0
+    # a column under 4 standard deviations: 3.2e-5 of 512
+    assert full.saturated.all()
+    assert not expose(sensor, 700.0, (32, 512), device).saturated.any()
+
+
+def test_black_stands_five_sigmas_above_0_with_column_offsets_too():
+    assert camera(read_noise_e=2.0, dsnu_e=3.0, column_offset_e=6.0).black_e == pytest.approx(35.0)
+
+
 # Refusals
 
 

@@ -1,0 +1,155 @@
+"""Several exposures of one scene, and their merge into one picture of the light."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.errors import InputError, require_range
+from render.radiance import SpectralRadiance
+from sensor.capture import capture
+from sensor.config import SensorConfig
+from sensor.device import Device
+from sensor.raw import RawImage
+
+# A frame counts where the merged rate fills the well to no more than 6 standard deviations under its end: its own
+# noise then clips once in 1e9 pixels.
+CLEAR_SIGMAS = 6.0
+_ROUNDS = 6  # of the weights: what a further one would change is under a thousandth of the merged noise
+
+# What frames must share to be one camera's: all that turns DN into electrons, and the noise that weighs them.
+_CALIBRATION = (
+    *("cfa", "shape", "black_dn", "white_dn", "gain_e_per_dn"),
+    *("read_noise_e", "dsnu_e", "prnu", "column_gain_spread"),
+)
+
+
+@dataclass(frozen=True)
+class Merged:
+    """Light of a scene from several exposures.
+
+    Attributes
+    ----------
+    rate_e_per_s : (h, w) float64
+        Photo-electrons a second behind each pixel's filter; negative where noise took it under 0. Where `saturated`,
+        what the shortest exposure holds: the least that it can be.
+    temporal_variance, fixed_variance : (h, w) float64
+        Its variance over exposures, and over chips by DSNU and PRNU [(e-/s)^2].
+    saturated : (h, w) bool
+        Where even the shortest exposure is full.
+    """
+
+    rate_e_per_s: NDArray[np.float64]
+    temporal_variance: NDArray[np.float64]
+    fixed_variance: NDArray[np.float64]
+    saturated: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class _Group:
+    """All frames of one exposure time: their number, and their mean rate."""
+
+    exposure_s: float
+    count: int
+    rate: NDArray[np.float64]
+
+
+def burst(
+    radiance: SpectralRadiance,
+    sensor: SensorConfig,
+    exposures_s: Sequence[float],
+    device: Device,
+    rng: np.random.Generator,
+) -> tuple[RawImage, ...]:
+    """Take one frame for each exposure time (`sensor.exposure.bracket_s`), one after the other with one chip."""
+    return tuple(capture(radiance, sensor, exposure_s, device, rng) for exposure_s in exposures_s)
+
+
+def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merged:
+    """Weigh each pixel's exposures by the inverse of their temporal noise, and leave the saturated ones out.
+
+    Weights and saturation both follow the merged rate itself, never one frame's own noisy value: among linear
+    estimates, the best one is uncorrelated with the differences between the frames, so that what is decided from it
+    biases no frame against another. What remains is under 1 % of a pixel's merged noise, at any light.
+
+    In the dark the stated temporal variance is too large by the factor 1 + 0.4 / (temporal dark noise [e-]), since a
+    noisy pixel's light can't be told better. Fixed offsets are common to all frames, so that no weight averages them
+    away; where they exceed the temporal noise several times they disturb the weights, and are better taken off first.
+
+    Parameters
+    ----------
+    frames : sequence of RawImage
+        Of one camera and one scene; exposure times above 0, in any order.
+    dark_current_e_per_s : float
+        Calibrated dark current, to be subtracted.
+
+    Raises
+    ------
+    InputError
+        For no frames, frames of different cameras, or an exposure of 0 s.
+    """
+    require_range("dark_current_e_per_s", dark_current_e_per_s, 0.0, 1e12, "give electrons per second, 0 for none")
+    groups = _grouped(frames)
+    first = frames[0]
+    temporal_e2 = first.read_noise_e**2 + first.gain_e_per_dn**2 / 12
+    full_e = (first.white_dn - first.black_dn) * first.gain_e_per_dn
+    spread_e = (full_e + first.dark_noise_e**2 + (first.column_gain_spread * full_e) ** 2) ** 0.5
+    clear_e = max(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)  # half, lest a well of a few electrons never count
+
+    rate, variance, per_s = _weighted(groups, temporal_e2)
+    full = rate * groups[0].exposure_s >= clear_e
+    for start in range(1, len(groups)):
+        if not full.any():
+            break
+        shorter = _weighted(groups[start:], temporal_e2)
+        rate, variance, per_s = (
+            np.where(full, new, old) for new, old in zip(shorter, (rate, variance, per_s), strict=True)
+        )
+        full &= rate * groups[start].exposure_s >= clear_e
+    photo_rate = rate - dark_current_e_per_s
+    fixed = (first.dsnu_e * per_s) ** 2 + (first.prnu * photo_rate) ** 2
+    return Merged(photo_rate, variance, fixed, full)
+
+
+def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
+    """Frames by exposure time, longest first, once they are known to be one camera's."""
+    if len(frames) == 0:
+        raise InputError("frames: none were given; allowed: one or more raw images; take some")
+    for index, frame in enumerate(frames):
+        for name in _CALIBRATION:
+            if getattr(frame, name) != getattr(frames[0], name):
+                raise InputError(
+                    f"frames: {name} of frame {index} is {getattr(frame, name)!r}, of the first "
+                    f"{getattr(frames[0], name)!r}; allowed: frames of one camera; merge them apart"
+                )
+        require_range(f"exposure_s of frame {index}", frame.exposure_s, 1e-12, 1e7, "leave frames of 0 s out")
+    groups = []
+    for exposure_s in sorted({frame.exposure_s for frame in frames}, reverse=True):
+        same = [frame.electrons for frame in frames if frame.exposure_s == exposure_s]
+        groups.append(_Group(exposure_s, len(same), np.asarray(sum(same)) / (len(same) * exposure_s)))
+    return groups
+
+
+def _weighted(
+    groups: Sequence[_Group], temporal_e2: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Best rate, its variance, and the mean of 1/exposure under its weights, each (h, w).
+
+    A group's rate has the variance (rate x time + temporal noise) / (frames x time^2). The rate in it is the merged
+    one: a start from shot noise alone, where the weights are the times, and a few rounds.
+    """
+    whole_s = sum(group.count * group.exposure_s for group in groups)
+    rate = np.asarray(sum(group.rate * (group.count * group.exposure_s / whole_s) for group in groups))
+    for _ in range(_ROUNDS):
+        weights = [_weight(group, rate, temporal_e2) for group in groups]
+        total = np.asarray(sum(weights))
+        rate = sum(w * group.rate for w, group in zip(weights, groups, strict=True)) / total
+    per_s = np.asarray(sum(w / group.exposure_s for w, group in zip(weights, groups, strict=True))) / total
+    return rate, 1 / total, per_s
+
+
+def _weight(group: _Group, rate: NDArray[np.float64], temporal_e2: float) -> NDArray[np.float64]:
+    """Inverse variance of a group's rate."""
+    noise_e2 = np.maximum(rate, 0.0) * group.exposure_s + temporal_e2
+    return np.asarray(group.count * group.exposure_s**2 / noise_e2)

@@ -1,0 +1,124 @@
+"""A camera from a TOML file: what a preset is, and what users copy and change."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any
+
+from render.errors import InputError, require_keys
+from render.spectrum import Spectrum
+from sensor.cfa import channels, tile_of
+from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.curves import Responses, built_in, read_csv, read_curve, rgbw
+
+_SETTINGS = ("bits", "black_level_dn", "window_nm")
+_KEYS = ("cfa", *_SETTINGS, "pixel", "lens", "responses")
+_RESPONSE_KEYS = ("csv", "range_nm", "quantum_efficiency", "ir_cut")
+
+
+def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> SensorConfig:
+    """Read a camera.
+
+    Parameters
+    ----------
+    path : str or Path
+        TOML with the tables ``[pixel]`` and ``[lens]`` (fields of `PixelConfig` and `LensConfig`), optionally ``cfa``
+        (a name of `sensor.cfa.MOSAICS`, or rows of letters), ``bits``, ``black_level_dn``, ``window_nm``, and
+        ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency`` ("included", a number, or a CSV) and
+        ``ir_cut`` (nm, or a CSV). Names of CSV files are relative to the TOML's folder.
+    cfa : str or sequence of str, optional
+        Mosaic to use in place of the file's.
+
+    Raises
+    ------
+    InputError
+        For a file that can't be read, an unknown or missing key, or a value out of range; the file is named.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            content = tomllib.load(file)
+    except (OSError, ValueError) as error:  # TOMLDecodeError and UnicodeDecodeError are ValueErrors
+        reason = " ".join(str(error).split())
+        raise InputError(
+            f"sensor file: {str(path)!r} can't be read ({reason}); copy a preset: rodcone new preset NAME -o FILE"
+        ) from error
+    try:
+        return _sensor(content, Path(path).parent, cfa)
+    except InputError as error:
+        raise InputError(f"sensor file {str(path)!r}: {error}") from error
+
+
+def _sensor(content: Mapping[str, Any], folder: Path, cfa: str | Sequence[str] | None) -> SensorConfig:
+    require_keys("key", content, _KEYS)
+    tile = tile_of(content.get("cfa", "rgbw") if cfa is None else cfa)
+    if "responses" in content:
+        responses = _responses(_table("responses", content), folder)
+    else:
+        responses = rgbw() if set(channels(tile)) <= set("RGBW") else built_in()
+    settings = {name: content[name] for name in _SETTINGS if name in content}
+    if "window_nm" in settings:
+        settings["window_nm"] = _pair("window_nm", settings["window_nm"])
+    return SensorConfig(
+        PixelConfig(**_numbers("pixel", content, PixelConfig)),
+        LensConfig(**_numbers("lens", content, LensConfig)),
+        cfa=tile,
+        responses=responses,
+        **settings,
+    )
+
+
+def _table(name: str, content: Mapping[str, Any]) -> dict[str, Any]:
+    table = content.get(name)
+    if not isinstance(table, dict):
+        raise InputError(f"{name}: {table!r} is not a table; allowed: [{name}] and its keys; add it")
+    return table
+
+
+def _numbers(name: str, content: Mapping[str, Any], kind: type) -> dict[str, Any]:
+    """Keys of a table, checked against the fields of the dataclass that they go into."""
+    table = _table(name, content)
+    require_keys(f"{name} key", table, [field.name for field in fields(kind)])
+    for field in fields(kind):
+        if field.default is MISSING and field.name not in table:
+            raise InputError(f"{name}: {field.name} is missing; allowed: a number; add it to [{name}]")
+    for key, value in table.items():
+        if isinstance(value, bool):  # a Real for Python
+            raise InputError(f"{key}: {value!r} is not a number; allowed: a number, 0 to switch a term off; write one")
+    return table
+
+
+def _pair(name: str, value: Any) -> tuple[float, float]:
+    if not (isinstance(value, list | tuple) and len(value) == 2 and all(isinstance(x, int | float) for x in value)):
+        raise InputError(f"{name}: {value!r} is not a pair of numbers; allowed: [shortest, longest] in nm; write so")
+    return float(value[0]), float(value[1])
+
+
+def _responses(table: Mapping[str, Any], folder: Path) -> Responses:
+    """Curves of a CSV, with everything about them said in the file: what isn't said would be guessed."""
+    require_keys("responses key", table, _RESPONSE_KEYS)
+    for key in ("csv", "range_nm", "quantum_efficiency"):
+        if key not in table:
+            raise InputError(
+                f"responses: {key} is missing; allowed: csv, range_nm = [shortest, longest], "
+                'quantum_efficiency = "included", a number or a CSV; add it to [responses]'
+            )
+    if not isinstance(table["csv"], str):
+        raise InputError(f"csv: {table['csv']!r} is not a file's name; allowed: a name in quotes; write so")
+    efficiency = table["quantum_efficiency"]
+    return read_csv(
+        folder / table["csv"],
+        range_nm=_pair("range_nm", table["range_nm"]),
+        ir_cut=_number_or_curve("ir_cut", table.get("ir_cut"), folder),
+        quantum_efficiency=None
+        if efficiency == "included"
+        else _number_or_curve("quantum_efficiency", efficiency, folder),
+    )
+
+
+def _number_or_curve(name: str, value: Any, folder: Path) -> float | Spectrum | None:
+    if isinstance(value, str):
+        return read_curve(folder / value)
+    if isinstance(value, bool) or not isinstance(value, int | float | None):
+        raise InputError(f"{name}: {value!r} is not allowed; give a number, or the name of a CSV in quotes")
+    return None if value is None else float(value)

@@ -1,0 +1,121 @@
+"""Light that a lens spreads: diffraction, defocus and veiling glare, band by band.
+
+The picture is transformed by cosines (DCT-II), which see it continued as its own mirror image: no border darkens, and
+light stays light to rounding. A band is worked on in double precision, several on threads.
+"""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dctn, idctn
+from scipy.special import j1
+
+from render.radiance import SpectralRadiance
+from render.spectrum import Floats
+from sensor.config import LensConfig
+
+_BANDS_A_THREAD = 16  # a band at work takes as much memory as a dozen bands of float32
+
+
+def limit_per_um(wavelength_nm: float, lens: LensConfig) -> float:
+    """Frequency from which on diffraction lets nothing through: 1 / (wavelength x working f-number), inf without."""
+    spot_um = wavelength_nm * 1e-3 * lens.f_number * (1 + lens.magnification) * lens.diffraction
+    return 1 / spot_um if spot_um else inf
+
+
+def diffraction_otf(frequency_per_um: Floats, wavelength_nm: float, lens: LensConfig) -> Floats:
+    """Transfer of an incoherent image by a circular aperture: 2/pi (arccos s - s sqrt(1 - s^2)), 0 from s = 1 on.
+
+    s is the frequency over its limit; Goodman, "Introduction to Fourier Optics", section 6.3.
+    """
+    s = np.minimum(frequency_per_um / limit_per_um(wavelength_nm, lens), 1.0)
+    return np.asarray(2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2)))
+
+
+def defocus_otf(frequency_per_um: Floats, diameter_um: float) -> Floats:
+    """Transfer of an even disc, 2 J1(x) / x with x = pi x diameter x frequency; it goes under 0.
+
+    The geometric limit of Hopkins, "The frequency response of a defocused optical system" (Proc. R. Soc. A 231, 1955):
+    good where the disc is wider than the diffraction's, two wavelengths of path or more at the aperture's rim.
+    """
+    x = np.pi * diameter_um * frequency_per_um
+    return np.asarray(np.divide(2 * j1(x), x, out=np.ones_like(x), where=x > 1e-9))
+
+
+def lens_otf(frequency_per_um: Floats, wavelength_nm: float, lens: LensConfig) -> Floats:
+    """Both together."""
+    return diffraction_otf(frequency_per_um, wavelength_nm, lens) * defocus_otf(frequency_per_um, lens.defocus_um)
+
+
+def sampled_otf(
+    shape: tuple[int, int], step_um: float, wavelength_nm: float, lens: LensConfig, folded: bool
+) -> NDArray[np.float64]:
+    """Transfer at the cosines' frequencies of a picture with samples `step_um` apart, shape `shape`, 1 at the first.
+
+    Parameters
+    ----------
+    folded : bool
+        False: the function itself, cut at the samples' Nyquist frequency. True: with its copies one sampling frequency
+        away added, which is the transform of the point image taken at the samples (Poisson's sum). That is nowhere
+        negative, and below the pixels' Nyquist frequency the same wherever the lens's limit lies under the sampling
+        frequency less that.
+    """
+    rows, columns = (np.arange(size) / (2 * size * step_um) for size in shape)
+    limit = limit_per_um(wavelength_nm, lens)
+    total = lens_otf(np.hypot(rows[:, None], columns), wavelength_nm, lens)
+    for down, across in ((-1, 0), (0, -1), (-1, -1)) if folded else ():
+        nearest = np.hypot(rows[-1] * bool(down), columns[-1] * bool(across))  # where a copy comes closest to 0
+        if nearest < limit < inf:
+            shifted = np.hypot(rows[:, None] + down / step_um, columns + across / step_um)
+            total += lens_otf(shifted, wavelength_nm, lens)
+    return total
+
+
+def spread_light(
+    radiance: SpectralRadiance, scale: NDArray[np.float64], lens: LensConfig, pitch_um: float, samples: int
+) -> NDArray[np.floating]:
+    """Irradiance behind the lens, shape (h / samples, w / samples, band), band-planar.
+
+    Parameters
+    ----------
+    radiance : SpectralRadiance
+        `samples` x `samples` values a pixel.
+    scale : (h, w) float64
+        Irradiance over radiance of each sample before light spreads.
+    lens : LensConfig
+    pitch_um : float
+        Of the pixels.
+    samples : int
+    """
+    height, width = (size // samples for size in radiance.shape)
+    planes = np.empty((radiance.wavelength_nm.size, height, width), dtype=radiance.values.dtype)
+
+    def one_band(band: int) -> None:
+        light = radiance.values[..., band] * scale
+        if lens.diffraction or lens.defocus_um:
+            light = _blur(light, pitch_um / samples, float(radiance.wavelength_nm[band]), lens, folded=samples > 1)
+        light = light.reshape(height, samples, width, samples).mean(axis=(1, 3))
+        planes[band] = (1 - lens.veiling_glare) * light + lens.veiling_glare * light.mean()
+
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, 1 + len(planes) // _BANDS_A_THREAD)) as threads:
+        list(threads.map(one_band, range(len(planes))))
+    return np.moveaxis(planes, 0, -1)
+
+
+def _blur(
+    light: NDArray[np.float64], step_um: float, wavelength_nm: float, lens: LensConfig, folded: bool
+) -> NDArray[np.float64]:
+    """One band behind the lens; where the result would fall under 0 it is 0, and the rest gives that light back."""
+    shape = (light.shape[0], light.shape[1])
+    spectrum = dctn(light, type=2)
+    spectrum *= sampled_otf(shape, step_um, wavelength_nm, lens, folded)
+    blurred = np.asarray(idctn(spectrum, type=2, overwrite_x=True))
+    if blurred.min() < 0:
+        total = blurred.sum()
+        np.maximum(blurred, 0.0, out=blurred)
+        kept = blurred.sum()
+        blurred *= total / kept if total > 0 else 0.0
+    return blurred

@@ -1,0 +1,51 @@
+"""Raw files by the ending of their name: digital negatives and 16-bit TIFF with a sidecar."""
+
+from pathlib import Path
+
+from render.errors import InputError
+from sensor.cfa import Tile
+from sensor.dng import is_bayer, is_rgbw, read_dng, write_dng
+from sensor.raw import RawImage
+from sensor.raw_tiff import read_tiff, write_tiff
+
+ENDINGS = (".dng", ".tif", ".tiff")
+
+
+def check_ending(path: Path, tile: Tile) -> None:
+    """Raise `InputError` where a mosaic can't be written under this name."""
+    if path.suffix.lower() not in ENDINGS:
+        raise InputError(f"raw file: {str(path)!r} has another ending; allowed: {', '.join(ENDINGS)}; rename it")
+    if path.suffix.lower() == ".dng" and not (is_bayer(tile) or is_rgbw(tile)):
+        raise InputError(
+            f"raw file: {str(path)!r} can't hold the mosaic {tile}; allowed as DNG: Bayer, 2x2 RGBW; "
+            f"write {path.with_suffix('.tif').name}"
+        )
+
+
+def write_raw(raw: RawImage, path: str | Path) -> tuple[Path, ...]:
+    """Write a raw file; gives the paths of what was written, the picture first.
+
+    Raises
+    ------
+    InputError
+        For another ending than ``.dng``, ``.tif`` or ``.tiff``, or a raw image that the format can't hold.
+    OSError
+        Where the folder is missing or can't be written.
+    """
+    place = Path(path)
+    check_ending(place, raw.cfa)
+    return (write_dng(raw, place),) if place.suffix.lower() == ".dng" else write_tiff(raw, place)
+
+
+def read_raw(path: str | Path) -> RawImage:
+    """Read a raw file that `write_raw` wrote: the same raw image, bit for bit.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing, damaged, changed or of another program.
+    """
+    place = Path(path)
+    if place.suffix.lower() not in ENDINGS:
+        raise InputError(f"raw file: {str(place)!r} has another ending; allowed: {', '.join(ENDINGS)}; give a raw file")
+    return read_dng(place) if place.suffix.lower() == ".dng" else read_tiff(place)

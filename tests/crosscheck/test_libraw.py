@@ -1,0 +1,156 @@
+"""LibRaw develops a noise-free ColorChecker from our negatives as their own tags predict, and as our pipeline does.
+
+LibRaw balances with AsShotNeutral, goes to sRGB through ColorMatrix2 (D65) alone whatever the light, each row of
+camera-from-sRGB scaled to sum 1, and calls the least amplified channel's white level 1. The prediction here does the
+same arithmetic on the patches' expected signals, from tags read by tifffile. What separates the two: LibRaw cuts the
+fraction of BlackLevel off (at most 1 DN of 16 383, times gains of 2 and matrix entries of 1.6: 2e-4), the raw data's
+and the output's rounding. Under D65 our own white balance by AsShotNeutral and our fitted matrix are the same line.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+from numpy.typing import NDArray
+
+from isp.bayer import bilinear
+from isp.colour import adapt_to_d65, xyz_to_srgb
+from isp.remosaic import remosaic
+from render.illuminants import illuminant
+from render.photometry import tristimulus
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from scenes.reflectances import color_checker
+from sensor.cfa import channels, mask
+from sensor.presets import low_noise
+from sensor.raw import RawImage
+from sensor.raw_files import write_raw
+from sensor.response import electrons_per_irradiance
+from studies.calibrate import calibrate
+
+rawpy = pytest.importorskip("rawpy", reason="rawpy (LibRaw) is not installed")
+
+NM = DEFAULT_WAVELENGTH_NM
+WIDTH = band_widths(NM)
+# Patches and their side [pixels]; left out of each is what the reconstruction, its patches and LibRaw together reach.
+ROWS, COLUMNS, SIDE, EDGE = 4, 6, 36, 14
+SRGB_TO_XYZ = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]  # IEC 61966-2-1
+
+Image = NDArray[np.float64]
+
+
+def surfaces() -> Image:
+    return np.array([curve.band_average(NM, WIDTH) for _, curve in color_checker()])
+
+
+def chart(cfa: str, light: str) -> tuple[RawImage, Image]:
+    """Noise-free exposure of the chart, white at 95 % of the well of the fullest channel; its signals (24, channel)."""
+    sensor = low_noise(cfa)
+    spectrum = illuminant(light).band_average(NM, WIDTH)
+    weights = electrons_per_irradiance(sensor, NM, WIDTH, 1.0)
+    scale = 0.95 * sensor.pixel.full_well_e / (weights @ spectrum).max()
+    electrons = (surfaces() * spectrum) @ weights.T * scale
+    shape = (ROWS * SIDE, COLUMNS * SIDE)
+    mosaic = np.zeros(shape)
+    for index, letter in enumerate(channels(sensor.cfa)):
+        plane = np.kron(electrons[:, index].reshape(ROWS, COLUMNS), np.ones((SIDE, SIDE)))
+        mosaic[mask(sensor.cfa, letter, shape)] = plane[mask(sensor.cfa, letter, shape)]
+    raw = RawImage(
+        np.rint(mosaic / sensor.gain_e_per_dn + sensor.black_dn).astype(np.uint16),
+        sensor.cfa,
+        sensor.black_dn,
+        sensor.white_dn,
+        sensor.gain_e_per_dn,
+        sensor.pixel.read_noise_e,
+        sensor.pixel.dsnu_e,
+        sensor.pixel.prnu,
+        0.01,
+        colour=calibrate(sensor, illuminant(light)),
+    )
+    return raw, electrons
+
+
+def full_e(raw: RawImage) -> float:
+    return (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
+
+
+def patches(picture: Image) -> Image:
+    """Every pixel of the patches' inner parts, shape (24, pixel, 3)."""
+    tiles = picture.reshape(ROWS, SIDE, COLUMNS, SIDE, 3).swapaxes(1, 2)[:, :, EDGE:-EDGE, EDGE:-EDGE]
+    return tiles.reshape(ROWS * COLUMNS, -1, 3)
+
+
+def by_libraw(path: Path) -> Image:
+    with rawpy.imread(str(path)) as raw:
+        picture = raw.postprocess(
+            adjust_maximum_thr=0, no_auto_bright=True, gamma=(1, 1), use_camera_wb=True, output_bps=16
+        )
+    return np.asarray(picture / 65_535)
+
+
+def predicted(path: Path, share_of_full: Image) -> Image:
+    """Linear sRGB of signals given as shares of full scale (patch, channel), by the file's tags."""
+    with tifffile.TiffFile(path) as file:
+        tags = {tag.name: tag.value for tag in file.pages[0].tags}
+    matrix, neutral = (
+        np.array(tags[name][::2]) / np.array(tags[name][1::2]) for name in ("ColorMatrix2", "AsShotNeutral")
+    )
+    camera = matrix.reshape(-1, 3) @ SRGB_TO_XYZ
+    camera /= camera.sum(axis=1, keepdims=True)
+    return np.clip(share_of_full / neutral * neutral.max() @ np.linalg.pinv(camera).T, 0.0, 1.0)
+
+
+# The issue asks for 0.005. A Bayer file leaves 2.3e-4 (D65) and 4.7e-4 (A); in RGBW LibRaw's four-colour interpolation
+# and W's signal, which amplifies the others' black by 5 and 11, leave more.
+@pytest.mark.parametrize(
+    ("cfa", "light", "bound"),
+    [
+        *[(f"bayer_{phase}", "D65", 1e-3) for phase in ("rggb", "bggr", "grbg", "gbrg")],
+        ("bayer", "A", 1e-3),
+        ("rgbw", "D65", 5e-3),
+        ("rgbw", "A", 5e-3),
+    ],
+)
+def test_libraw_develops_the_chart_as_the_tags_predict(cfa: str, light: str, bound: float, tmp_path: Path) -> None:
+    raw, electrons = chart(cfa, light)
+    (path,) = write_raw(raw, tmp_path / "chart.dng")
+    difference = patches(by_libraw(path)) - predicted(path, electrons / full_e(raw))[:, None]
+    assert np.abs(difference).max() < bound
+
+
+def test_libraw_and_our_own_development_agree_under_d65(tmp_path: Path) -> None:
+    raw, _ = chart("bayer", "D65")
+    assert raw.colour is not None
+    balanced = bilinear(raw) / full_e(raw) / raw.colour.neutral * raw.colour.neutral.max()
+    ours = np.clip(balanced @ raw.colour.to_srgb.T, 0.0, 1.0)
+    (path,) = write_raw(raw, tmp_path / "chart.dng")
+    assert np.abs(patches(by_libraw(path)) - patches(ours)).max() < 1e-3
+
+
+def test_libraw_is_as_near_to_the_true_colours_as_the_matrix_fit(tmp_path: Path) -> None:
+    """The camera is no observer: its best matrix leaves 0.006 of white on average, 0.05 at a saturated colour."""
+    raw, _ = chart("bayer", "D65")
+    (path,) = write_raw(raw, tmp_path / "chart.dng")
+    light = illuminant("D65").band_average(NM, WIDTH)
+    white = tristimulus(light, NM, WIDTH)
+    true = xyz_to_srgb(adapt_to_d65(tristimulus(surfaces() * light, NM, WIDTH) / white[1], white))
+    true *= 0.95 * 15_000 / full_e(raw)
+    error = np.abs(patches(by_libraw(path)).mean(axis=1) - np.clip(true, 0.0, 1.0))
+    assert 0.003 < error.mean() < 0.007
+    assert error.max() < 0.05
+
+
+def test_libraw_develops_the_bayer_file_beside_an_rgbw_one(tmp_path: Path) -> None:
+    raw, electrons = chart("rgbw", "D65")
+    (path,) = write_raw(remosaic(raw), tmp_path / "chart_bayer.dng")
+    difference = patches(by_libraw(path)) - predicted(path, electrons[:, :3] / full_e(raw))[:, None]
+    assert np.abs(difference).max() < 1e-3
+
+
+def test_a_wrong_matrix_or_balance_would_be_seen(tmp_path: Path) -> None:
+    """One per cent on one entry moves some patch by more than the bounds above."""
+    raw, electrons = chart("bayer", "D65")
+    (path,) = write_raw(raw, tmp_path / "chart.dng")
+    whole = predicted(path, electrons / full_e(raw))
+    moved = predicted(path, electrons * [1.01, 1.0, 1.0] / full_e(raw))
+    assert np.abs(whole - moved).max() > 5e-3

@@ -1,0 +1,218 @@
+"""Light that a lens spreads: closed forms of the transfer functions, energy, borders, and a slanted edge's MTF."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import j0, j1
+
+from render.radiance import SpectralRadiance
+from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf
+from sensor.optics import camera_equation, falloff, form_image
+
+PIXEL = PixelConfig(pitch_um=2.2, fill_factor=0.9, full_well_e=15_000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
+GREEN = np.array([550.0])
+IDEAL = LensConfig(2.8, diffraction=1.0)
+
+
+def camera(pitch_um=2.2, **lens):
+    return SensorConfig(replace(PIXEL, pitch_um=pitch_um), LensConfig(**{"f_number": 2.8, **lens}))
+
+
+def scene(values, nm=GREEN):
+    values = np.asarray(values, dtype=np.float64)
+    return SpectralRadiance(values[..., None] if values.ndim == 2 else values, nm, width_nm=np.full(nm.size, 10.0))
+
+
+def image(values, samples=1, pitch_um=2.2, nm=GREEN, **lens):
+    """Irradiance over what the camera equation gives."""
+    sensor = camera(pitch_um, **lens)
+    made = form_image(scene(values, nm), sensor, samples).values / camera_equation(sensor.lens)
+    return made[..., 0] if nm.size == 1 else made
+
+
+# The transfer functions
+
+
+def test_diffraction_s_transfer_is_the_overlap_of_two_discs():
+    for s in (0.0, 0.1, 0.3, 0.5, 0.9, 1.0, 1.5):
+        overlap = quad(lambda x: 4 * np.sqrt(1 - x**2), min(s, 1.0), 1)[0] / pi  # lens-shaped area over the disc's
+        made = diffraction_otf(np.array(s / (0.55 * 2.8)), 550.0, IDEAL)
+        assert made == pytest.approx(overlap, abs=1e-9)
+
+
+def test_the_limit_is_one_over_wavelength_times_the_working_f_number():
+    assert limit_per_um(550.0, IDEAL) == pytest.approx(1 / (0.55 * 2.8), rel=1e-14)
+    close = replace(IDEAL, magnification=1.0)
+    assert limit_per_um(500.0, close) == pytest.approx(1 / (0.5 * 5.6), rel=1e-14)
+    assert limit_per_um(500.0, replace(close, diffraction=2.0)) == pytest.approx(1 / (0.5 * 11.2), rel=1e-14)
+    assert limit_per_um(500.0, replace(close, diffraction=0.0)) == np.inf
+
+
+def test_without_diffraction_every_frequency_passes():
+    np.testing.assert_array_equal(diffraction_otf(np.array([0.0, 1.0, 100.0]), 550.0, LensConfig(2.8)), 1.0)
+
+
+def test_defocus_is_the_transform_of_an_even_disc():
+    for frequency in (0.0, 0.05, 0.2, 0.37, 1.0):
+        integral = quad(lambda r, f=frequency: r * j0(2 * pi * f * r), 0, 1.5)[0] * 2 / 1.5**2
+        assert defocus_otf(np.array([frequency]), 3.0)[0] == pytest.approx(integral, abs=1e-9)
+    np.testing.assert_array_equal(defocus_otf(np.array([0.0, 0.3]), 0.0), 1.0)
+
+
+@pytest.mark.parametrize("f_number", [1.05, 1.4])
+def test_folded_copies_are_the_transform_of_the_airy_pattern_at_the_samples(f_number):
+    lens, step_um, size = replace(IDEAL, f_number=f_number), 0.55, 96
+    assert limit_per_um(550.0, lens) > 0.5 / step_um
+    x = np.arange(-size + 1, size) * step_um
+    v = pi * np.hypot(x[:, None], x) / (0.55 * f_number)
+    airy = np.divide(2 * j1(v), v, out=np.ones_like(v), where=v > 0) ** 2
+    frequency = np.arange(12) / (2 * 12 * step_um)
+    cosines = np.cos(2 * pi * frequency[:, None] * x)
+    direct = cosines @ airy @ cosines.T
+    made = sampled_otf((12, 12), step_um, 550.0, lens, folded=True)
+    # beyond 96 samples lie 2 N lambda / (pi^2 96 step) of the light, 0.3 %
+    np.testing.assert_allclose(made / made[0, 0], direct / direct[0, 0], atol=6e-3)
+    assert np.abs(sampled_otf((12, 12), step_um, 550.0, lens, folded=False) - direct / direct[0, 0]).max() > 0.1
+
+
+# Light
+
+
+@pytest.mark.parametrize("samples", [1, 4])
+@pytest.mark.parametrize(
+    "lens", [{"diffraction": 1.0}, {"defocus_um": 9.0}, {"veiling_glare": 0.2}, {"diffraction": 2.0, "defocus_um": 4.0}]
+)
+def test_light_is_kept_and_a_uniform_picture_stays_uniform_up_to_its_border(lens, samples):
+    even = image(np.full((8 * samples, 12 * samples), 3.0), samples, **lens)
+    np.testing.assert_allclose(even, 3.0, rtol=1e-12)
+    rng = np.random.default_rng(1)
+    lamps = rng.random((8 * samples, 12 * samples)) ** 40 * 1e5  # five decades, lamps at the border too
+    lamps[0, 0] = lamps[-1, 5] = 1e5
+    spread = image(lamps, samples, **lens)
+    assert spread.mean() == pytest.approx(lamps.mean(), rel=1e-12)
+    assert spread.min() >= 0
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_light_is_kept_to_1e_6_in_every_band_in_single_precision_too(dtype):
+    nm = np.arange(385.0, 780.0, 10.0)
+    values = np.random.default_rng(2).random((24, 40, nm.size)).astype(dtype)
+    sensor = camera(diffraction=1.0, defocus_um=3.0, veiling_glare=0.03)
+    made = form_image(SpectralRadiance(values, nm), sensor)
+    assert made.values.dtype == dtype
+    factor = camera_equation(sensor.lens)
+    means = made.values.mean(axis=(0, 1), dtype=np.float64), values.mean(axis=(0, 1), dtype=np.float64)
+    np.testing.assert_allclose(means[0], means[1] * factor, rtol=1e-6)
+
+
+def test_a_picture_and_its_mirror_image_side_by_side_are_spread_alike():
+    picture = np.random.default_rng(3).random((16, 20))
+    doubled = np.hstack([picture, picture[:, ::-1]])
+    options = {"diffraction": 1.0, "defocus_um": 8.0, "f_number": 8.0}
+    np.testing.assert_allclose(image(doubled, **options)[:, :20], image(picture, **options), rtol=1e-12)
+
+
+def test_a_long_wavelength_spreads_further_and_bands_do_not_mix():
+    values = np.zeros((33, 33, 3))
+    values[16, 16] = 1.0
+    nm = np.array([400.0, 550.0, 700.0])
+    made = image(values, nm=nm, diffraction=1.0, f_number=8.0)
+    centre = made[16, 16]
+    assert centre[0] > centre[1] > centre[2]
+    alone = image(values[..., 1], diffraction=1.0, f_number=8.0)
+    np.testing.assert_allclose(made[..., 1], alone, rtol=1e-12)
+
+
+def test_veiling_glare_is_a_share_of_the_mean_added_to_every_pixel():
+    picture = np.zeros((10, 10))
+    picture[:, :5] = 4.0
+    made = image(picture, veiling_glare=0.05)
+    np.testing.assert_allclose(made[:, :5], 0.95 * 4 + 0.05 * 2, rtol=1e-13)
+    np.testing.assert_allclose(made[:, 5:], 0.05 * 2, rtol=1e-13)
+
+
+def test_samples_of_a_pixel_are_averaged():
+    picture = np.random.default_rng(4).random((12, 20))
+    np.testing.assert_allclose(image(picture, 4), picture.reshape(3, 4, 5, 4).mean(axis=(1, 3)), rtol=1e-13)
+
+
+def test_falloff_is_the_fourth_power_of_the_cosine_off_the_axis():
+    lens = LensConfig(2.8, horizontal_view_deg=90.0)  # the sides' middles lie 45 degrees off
+    shape = (301, 401)
+    made = falloff(lens, shape)
+    x, y = 200 / 200.5, 150 / 200.5  # pixel centres of the corner, in units of the distance to the lens
+    assert made[0, 0] == pytest.approx(np.cos(np.arctan(np.hypot(x, y))) ** 4, rel=1e-12)
+    assert made[150, 200] == pytest.approx(1.0, rel=1e-12)
+    assert made[150, 0] == pytest.approx(0.25, rel=5e-3)
+    np.testing.assert_allclose(made, made[::-1, ::-1], rtol=1e-12)
+    np.testing.assert_allclose(image(np.full(shape, 2.0), horizontal_view_deg=90.0), 2 * made, rtol=1e-12)
+    spread = image(np.full(shape, 2.0), horizontal_view_deg=90.0, veiling_glare=1e-12)  # the other way through
+    np.testing.assert_allclose(spread, 2 * made, rtol=1e-9)
+
+
+# A slanted edge
+
+
+def slanted_edge(height, width, degrees, sub=8):
+    """Share of each sample that is bright, the edge tilted off the vertical; box-filtered as a render is."""
+    offsets = (np.arange(sub) + 0.5) / sub - 0.5
+    y, x = np.arange(height) - (height - 1) / 2, np.arange(width) - (width - 1) / 2
+    slope = np.tan(np.radians(degrees))
+    bright = np.zeros((height, width))
+    for dy in offsets:  # along x the share is exact
+        edge = (y[:, None] + dy) * slope
+        bright += np.clip(x - edge + 0.5, 0.0, 1.0)
+    return bright / sub
+
+
+def edge_mtf(picture, degrees, bins=4):
+    """Frequencies [cycles a pixel] and MTF as ISO 12233 estimates it: edge spread in quarter pixels, then its slope.
+
+    The standard windows the slope; here the edge's height is known to be 1 and the picture wide, so that nothing of the
+    point image's wings need be cut but what lies beyond 100 pixels: 4 N lambda / (2 pi^2 100 pitch), 0.4 % at f/8.
+    """
+    height, width = picture.shape
+    y, x = np.arange(height) - (height - 1) / 2, np.arange(width) - (width - 1) / 2
+    distance = (x - y[:, None] * np.tan(np.radians(degrees))) * np.cos(np.radians(degrees))
+    reach = bins * 100
+    index = np.floor(distance * bins + 0.5).astype(int) + reach
+    inside = (index >= 0) & (index <= 2 * reach)
+    spread = np.bincount(index[inside], picture[inside]) / np.bincount(index[inside])
+    frequency = np.fft.rfftfreq(2 * reach, 1 / bins)
+    # a bin averages over its width, and a difference of neighbours is a slope over theirs
+    return frequency, np.abs(np.fft.rfft(np.diff(spread))) / np.maximum(np.sinc(frequency / bins) ** 2, 0.1)
+
+
+def theory(frequency, f_number, pitch_um, degrees, defocus_um=0.0):
+    """Transfer of lens and square pixel across the edge."""
+    lens = LensConfig(f_number, diffraction=1.0)
+    along, across = frequency * np.cos(np.radians(degrees)), frequency * np.sin(np.radians(degrees))
+    optics = diffraction_otf(frequency / pitch_um, 550.0, lens) * defocus_otf(frequency / pitch_um, defocus_um)
+    return np.abs(optics * np.sinc(along) * np.sinc(across))
+
+
+@pytest.mark.parametrize(
+    ("f_number", "pitch_um", "defocus_um", "samples"),
+    [(2.8, 2.2, 0.0, 4), (1.4, 2.2, 0.0, 4), (8.0, 2.2, 0.0, 4), (2.8, 6.0, 0.0, 8), (2.8, 2.2, 3.0, 4)],
+)
+@pytest.mark.parametrize("degrees", [5.0, 9.0])
+def test_the_mtf_of_a_slanted_edge_is_lens_times_pixel_up_to_nyquist(degrees, f_number, pitch_um, defocus_um, samples):
+    edge = slanted_edge(samples * 96, samples * 240, degrees)
+    picture = image(edge, samples, pitch_um, f_number=f_number, diffraction=1.0, defocus_um=defocus_um)
+    frequency, mtf = edge_mtf(picture, degrees)
+    shown = frequency <= 0.5
+    error = mtf[shown] - theory(frequency[shown], f_number, pitch_um, degrees, defocus_um)
+    assert np.abs(error).max() < 0.01
+
+
+def test_one_sample_a_pixel_has_the_pixel_s_aperture_once():
+    # f/2.8, 550 nm, 2.2 um: 0.36 at Nyquist is right; a kernel that holds the aperture again gives 0.46 or less
+    edge = slanted_edge(96, 240, 5.0)
+    frequency, mtf = edge_mtf(image(edge, diffraction=1.0), 5.0)
+    at_nyquist = np.interp(0.5, frequency, mtf)
+    assert at_nyquist == pytest.approx(0.36, abs=0.01)
+    assert theory(np.array([0.5]), 2.8, 2.2, 5.0)[0] == pytest.approx(0.36, abs=0.005)

@@ -1,0 +1,93 @@
+"""What a camera's optics leave out, and that the costs stated are those that `form_image` shows when it is put in."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from render.radiance import SpectralRadiance
+from sensor.left_out import left_out, under_zero
+from sensor.optics import camera_equation, falloff, form_image
+from sensor.presets import names, preset
+
+
+def camera(pitch_um=2.2, **lens):
+    sensor = preset("low_noise")
+    return replace(sensor, pixel=replace(sensor.pixel, pitch_um=pitch_um), lens=replace(sensor.lens, **lens))
+
+
+def line(sensor, start, samples=1):
+    return next(text for text in left_out(sensor, samples) if text.startswith(start))
+
+
+def numbers(text):
+    return [float(x) for x in re.findall(r"\d+\.\d+", text)]
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_preset_says_in_one_line_each_what_it_leaves_out(name):
+    lines = left_out(preset(name))
+    starts = [text.split(":")[0] for text in lines]
+    assert starts == [
+        "diffraction",
+        "cos^4 falloff",
+        "veiling glare",
+        "defocus",
+        "aberrations, distortion, flare, polarisation",
+    ]
+    assert not any("\n" in text for text in lines)
+
+
+def test_a_complete_lens_leaves_out_what_is_not_modelled_alone():
+    whole = camera(diffraction=1.0, horizontal_view_deg=40.0, veiling_glare=0.02, defocus_um=5.0)
+    assert [text.split(":")[0] for text in left_out(whole, 4)] == ["aberrations, distortion, flare, polarisation"]
+
+
+def test_diffraction_at_f_2_8_and_2_2_um_costs_what_the_design_says():
+    assert numbers(line(camera(), "diffraction"))[-2:] == [0.64, 0.36]
+    assert numbers(line(camera(f_number=16.0), "diffraction"))[-1] == 0.0  # beyond the lens's limit
+
+
+def test_a_pixel_wide_blur_costs_2_j1_x_over_x_at_half_pi():
+    assert numbers(line(camera(), "defocus"))[-1] == pytest.approx(0.6366 * 0.7217, abs=0.006)
+
+
+def test_the_falloff_stated_is_that_of_a_picture_s_corners():
+    lost = float(re.search(r"lose (\d+) %|lose (\d+)%", line(camera(), "cos^4"))[0].split()[1].strip("%"))
+    corner = falloff(replace(camera().lens, horizontal_view_deg=40.0), (1500, 2000))[0, 0]
+    assert lost == pytest.approx(100 * (1 - corner), abs=0.6)
+
+
+@pytest.mark.parametrize("f_number", [1.4, 2.8])
+def test_the_light_taken_from_around_a_point_is_what_form_image_takes(f_number):
+    sensor = camera(diffraction=1.0, f_number=f_number)
+    stated = float(re.search(r"([\d.]+)%", line(sensor, "detail finer than a pixel"))[1]) / 100
+    assert stated == pytest.approx(under_zero(sensor), abs=6e-4)
+    point, even = np.zeros((64, 64, 1)), np.ones((64, 64, 1))
+    point[32, 32] = 1.0
+    nm, width = np.array([550.0]), np.array([10.0])
+    made = form_image(SpectralRadiance(even + point, nm, width_nm=width), sensor).values[..., 0]
+    below = 1.0 - made / camera_equation(sensor.lens)  # on an even ground nothing is cut
+    assert below[below > 0].sum() == pytest.approx(stated, abs=6e-4)
+
+
+def test_a_disc_of_a_few_pixels_alone_tells_of_its_lobes_too():
+    assert "detail finer than a pixel" in line(camera(defocus_um=4.0), "detail")
+    assert not any("finer" in text for text in left_out(camera(defocus_um=4.0), 4))
+
+
+def test_a_lens_that_no_pixel_can_follow_needs_no_more_samples():
+    assert not any("finer" in text for text in left_out(camera(diffraction=1.0, f_number=16.0)))
+    assert not any("finer" in text for text in left_out(camera(diffraction=1.0), 4))
+
+
+def test_samples_too_far_apart_for_the_lens_are_told_with_their_cost():
+    sensor = camera(pitch_um=6.0, diffraction=1.0)
+    assert 0.001 < numbers(line(sensor, "detail finer than a sample", 4))[0] < 0.03
+    assert not any("finer" in text for text in left_out(sensor, 8))
+
+
+def test_a_disc_within_the_airy_disc_is_called_a_guess():
+    assert "rough guess" in line(camera(diffraction=1.0, defocus_um=1.0), "defocus")
+    assert not any(text.startswith("defocus") for text in left_out(camera(diffraction=1.0, defocus_um=5.0)))
