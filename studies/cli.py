@@ -8,7 +8,6 @@ from typing import Annotated, Any
 from cyclopts import App, CycloptsError, Parameter
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 # Packages named render, sensor, ... exist in other distributions: `doctor` tells which ones Python finds, and must
@@ -35,6 +34,7 @@ def demo(
     spp: int = 512,
     max_seconds: float = 65.0,
     seed: int = 0,
+    light: str | None = None,
 ) -> None:
     """Photograph one scene from moonlight to daylight with both cameras and write a report.
 
@@ -43,9 +43,10 @@ def demo(
     out
         Folder for report.html, results.json and overview.png.
     scene
-        Scene by name: color_checker, flat_field or still_life.
+        Scene by name: color_checker, flat_field or still_life. Or a file of spectral radiance: OpenEXR (.exr) or an
+        ISETCam scene (.mat).
     size
-        Side of the picture in pixels.
+        Side of the picture in pixels; a file has its own.
     sensor
         Sensor preset; may be given several times (low_noise and table1_output by default).
     level
@@ -59,8 +60,11 @@ def demo(
         Time for the render, at most.
     seed
         Seed of the render, the chips and the exposures.
+    light
+        Light of the scene by name, such as A; for a file the light that its colours are judged under (D65 by default).
     """
     from studies import demo as job
+    from studies.progress import progress
 
     defaults = job.Demo()
     task = job.Demo(
@@ -72,18 +76,12 @@ def demo(
         seed=seed,
         spp=spp,
         max_seconds=max_seconds,
+        light=light,
     )
     job.check(task)
     out.mkdir(parents=True, exist_ok=True)  # a place that can't be written is told before the render, not after
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        line = bar.add_task("start", total=1.0)
-        outcome = job.run(task, lambda what, share: bar.update(line, description=what, completed=share))
+    with progress(sys.stderr) as step:
+        outcome = job.run(task, step)
     for note in outcome.results["notes"]:
         print(f"rodcone: {note}", file=sys.stderr)
     print(job.write(outcome, out))
@@ -102,6 +100,13 @@ def doctor() -> int:
         table.add_row(row.name, escape(row.value) if row.ok else f"[red]{escape(row.value)}[/red]")
     Console().print(table)
     return 0 if found.ok else 1
+
+
+app.command("studies.capture_command:capture", name="capture", help="Photograph a scene into raw files.")
+app.command("studies.characterise_command:characterise", name="characterise", help="Measure a chip after EMVA 1288.")
+app.command("studies.develop_command:develop", name="develop", help="Develop a raw file into a PNG.")
+app.command("studies.new_command:app", name="new", help="Write files to start from: a preset to change.")
+app.command("studies.render_command:render", name="render", help="Render a scene into a spectral OpenEXR file.")
 
 
 def main(arguments: list[str] | None = None) -> Any:

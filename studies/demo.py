@@ -16,18 +16,23 @@ from numpy.typing import NDArray
 from isp.colour import encode_srgb
 from render.engine import render
 from render.errors import InputError, require_range
+from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
+from render.radiance_source import is_radiance_file
+from render.spectrum import Spectrum
 from render.transport import Transport
 from scenes.catalog import load
 from scenes.levels import DEMO_LEVELS, LightLevel
-from sensor.optics import LEFT_OUT, form_image
+from sensor.exposure import LONGEST_S, RULE, auto_exposure_s
+from sensor.left_out import left_out
+from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import expected_electrons
 from studies.budget import monte_carlo_share
 from studies.camera import CAMERAS, Camera, Shot, build_camera, mean_electrons, photograph
-from studies.exposure import LONGEST_S, RULE, auto_exposure_s
 from studies.levels import parse_level, resolve_level
 from studies.pictures import contact_sheet, to_bytes
+from studies.radiance_file import check_radiance_file, open_radiance_file
 from studies.report import render_report
 from studies.results import environment, level_facts, notes, render_facts, sensor_facts
 from studies.truth import Light, light_in_bands, true_srgb
@@ -41,7 +46,11 @@ Step = Callable[[str, float], None]  # what is being done, and the share of the 
 
 @dataclass(frozen=True)
 class Demo:
-    """What to run: scene, picture size, sensors, light levels (None: moonlight to daylight) and the render's limits."""
+    """What to run: scene, picture size, sensors, light levels (None: moonlight to daylight) and the render's limits.
+
+    `scene` is a name, or a spectral picture file (``.exr``, ``.mat``), which brings its own size. `light` names the
+    scene's light, or the light under which a file's colours are judged; None: the scene's own, D65 for a file.
+    """
 
     scene: str = "still_life"
     size: int = 256
@@ -51,6 +60,7 @@ class Demo:
     seed: int = 0
     spp: int = 512
     max_seconds: float = 65.0
+    light: str | None = None
 
 
 @dataclass(frozen=True)
@@ -74,7 +84,12 @@ class _Clock:
 
 def check(demo: Demo) -> None:
     """Raise `InputError` for anything in `demo` that can be told before the render."""
-    load(demo.scene)
+    if demo.light is not None:
+        illuminant(demo.light)
+    if is_radiance_file(demo.scene):
+        check_radiance_file(demo.scene, demo.levels or ())
+    else:
+        load(demo.scene, **_options(demo))
     require_range("size", demo.size, 16, 4096, "give the picture's side in pixels")
     require_range("seed", demo.seed, 0, 2**31, "give a whole number")
     require_range("longest exposure", demo.longest_s, 1e-9, 1e4, "give seconds above 0")
@@ -98,22 +113,16 @@ def run(demo: Demo, step: Step = lambda what, share: None) -> Outcome:
         For an unknown scene, sensor or unit, or a value out of range; before anything is rendered.
     """
     check(demo)
-    scene, clock = load(demo.scene), _Clock()
+    clock = _Clock()
     step("render", 0.0)
-    transport = render(
-        scene,
-        (demo.size, demo.size),
-        wavelength_nm=WAVELENGTH_NM,
-        spp=demo.spp,
-        max_seconds=demo.max_seconds,
-        seed=demo.seed,
-        progress=lambda share, error: step(f"render, relative error {error:.3f}", 0.6 * share),
-    )
+    if is_radiance_file(demo.scene):
+        transport, spectrum, assumed = open_radiance_file(demo.scene, demo.light)
+    else:
+        (transport, spectrum), assumed = _rendered(demo, step), []
     clock.add("render", transport.seconds)
     levels = DEMO_LEVELS if demo.levels is None else [resolve_level(level, transport) for level in demo.levels]
-    first = next(iter(scene.groups.values()))
-    light = light_in_bands(first.spectrum, transport.wavelength_nm, transport.width_nm)
-    cameras = _cameras(demo, light)
+    light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
+    cameras = _cameras(demo, light, transport.emitter_visible.shape)
     cells: list[dict[str, Any]] = []
     encoded: dict[str, NDArray[np.float64]] = {}
     for index, level in enumerate(levels):
@@ -124,7 +133,7 @@ def run(demo: Demo, step: Step = lambda what, share: None) -> Outcome:
     step("report", 0.95)
     truth = _truth(transport.relight(luminance_cd_m2=levels[0].luminance_cd_m2), transport, light)
     pictures = {name: to_bytes(picture) for name, picture in {**encoded, "truth": truth}.items()}
-    results = _results(demo, transport, levels, cells, clock)
+    results = _results(demo, transport, levels, cells, clock, assumed)
     sheet = [
         [encoded[_name(i, sensor, camera)] for i in range(len(levels))] for sensor in demo.sensors for camera in CAMERAS
     ]
@@ -151,10 +160,30 @@ def _name(level: int, sensor: str, camera: str) -> str:
     return f"{level}/{sensor}/{camera}"
 
 
-def _cameras(demo: Demo, light: Light) -> list[Camera]:
+def _options(demo: Demo) -> dict[str, str]:
+    """Options of the scene's builder."""
+    return {} if demo.light is None else {"light": demo.light}
+
+
+def _rendered(demo: Demo, step: Step) -> tuple[Transport, Spectrum]:
+    """Transport of a scene by name, and its light."""
+    scene = load(demo.scene, **_options(demo))
+    transport = render(
+        scene,
+        (demo.size, demo.size),
+        wavelength_nm=WAVELENGTH_NM,
+        spp=demo.spp,
+        max_seconds=demo.max_seconds,
+        seed=demo.seed,
+        progress=lambda share, error: step(f"render, relative error {error:.3f}", 0.6 * share),
+    )
+    return transport, next(iter(scene.groups.values())).spectrum
+
+
+def _cameras(demo: Demo, light: Light, shape: tuple[int, int]) -> list[Camera]:
     """Every camera with its chip; the chip's patterns come from the seed and its place alone."""
     return [
-        build_camera(name, sensor, light, (demo.size, demo.size), np.random.default_rng([demo.seed, s, c, 0]))
+        build_camera(name, sensor, light, shape, np.random.default_rng([demo.seed, s, c, 0]))
         for s, sensor in enumerate(demo.sensors)
         for c, name in enumerate(CAMERAS)
     ]
@@ -225,13 +254,18 @@ def _cell(camera: Camera, shot: Shot, expected_e: NDArray[np.float64], level: in
 
 
 def _results(
-    demo: Demo, transport: Transport, levels: Sequence[LightLevel], cells: list[dict[str, Any]], clock: _Clock
+    demo: Demo,
+    transport: Transport,
+    levels: Sequence[LightLevel],
+    cells: list[dict[str, Any]],
+    clock: _Clock,
+    assumed: Sequence[str],
 ) -> dict[str, Any]:
     return {
         "rodcone": metadata.version("rodcone"),
         "seed": demo.seed,
-        "scene": demo.scene,
-        "size": [demo.size, demo.size],
+        "scene": Path(demo.scene).name,
+        "size": list(transport.emitter_visible.shape),
         "environment": environment(),
         "render": render_facts(transport),
         "exposure_rule": RULE.format(longest=demo.longest_s * 1e3),
@@ -241,6 +275,6 @@ def _results(
         "cameras": list(CAMERAS),
         "cells": cells,
         "stages": [{"name": name, "seconds": seconds} for name, seconds in clock.stages.items()],
-        "left_out": list(LEFT_OUT),
-        "notes": notes(),
+        "left_out": list(dict.fromkeys(line for name in demo.sensors for line in left_out(preset(name)))),
+        "notes": [*notes(), *assumed],
     }

@@ -8,11 +8,11 @@ from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from render.tables import colour_science
+from sensor.exposure import LONGEST_S, auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import low_noise, table1_output
 from sensor.response import channel_electrons, expected_electrons
 from studies.budget import monte_carlo_share
-from studies.exposure import LONGEST_S, auto_exposure_s
 from studies.metrics import measure, psnr_db
 from studies.truth import green_scale, light_in_bands, neutral_electrons, true_srgb
 

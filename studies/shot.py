@@ -1,0 +1,163 @@
+"""One photograph as raw files: a scene or a stored radiance in, digital negatives out."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from isp.remosaic import remosaic
+from render.engine import render
+from render.errors import InputError, require_range, require_whole
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from render.radiance_source import is_radiance_file
+from render.scene import Scene
+from render.spectrum import Spectrum
+from render.transport import Transport
+from scenes.catalog import load
+from sensor.calibration import ColourCalibration
+from sensor.capture import capture
+from sensor.cfa import channels, check_covers
+from sensor.config import SensorConfig
+from sensor.device import draw_device
+from sensor.dng import is_rgbw
+from sensor.exposure import auto_exposure_s
+from sensor.optics import form_image
+from sensor.presets import preset
+from sensor.raw import RawImage
+from sensor.raw_files import check_ending, write_raw
+from studies.calibrate import calibrate, iso_speed
+from studies.levels import parse_level, resolve_level
+from studies.radiance_file import check_radiance_file, open_radiance_file
+
+Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
+_DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to photograph and how; None stands for the preset's mosaic, auto exposure, the scene's level and light."""
+
+    source: str
+    out: Path
+    sensor: str = "low_noise"
+    cfa: str | None = None
+    exposure_s: float | None = None
+    level: str | None = None
+    white_balance: str | None = None
+    size: int = 256
+    spp: int = 64
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Taken:
+    """Paths of the files written, facts of the exposure as JSON holds them, and what had to be assumed."""
+
+    paths: tuple[Path, ...]
+    facts: dict[str, Any]
+    notes: tuple[str, ...]
+
+
+def take(order: Order, step: Step = lambda what, share: None) -> Taken:
+    """Photograph and write; a 2x2 RGBW negative gets a re-mosaiced Bayer one beside it, ``NAME_bayer.dng``.
+
+    Raises
+    ------
+    InputError
+        For an unknown name or a value out of range, before anything is rendered.
+    OSError
+        Where the folder can't be written.
+    """
+    sensor, scene = _check(order)
+    if scene is None:
+        transport, light, notes = open_radiance_file(order.source, order.white_balance)
+    else:
+        light = _light(order, scene)
+        notes = []
+    colour = calibrate(sensor, light) if set("RGB") <= set(channels(sensor.cfa)) else None
+    order.out.parent.mkdir(parents=True, exist_ok=True)  # told before the render, not after
+    if scene is not None:
+        transport = _render(order, scene, step)
+    step("exposure", 0.9)
+    radiance = _lit(order, transport)
+    raw = _expose(order, sensor, radiance, colour)
+    bayer = remosaic(raw) if order.out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) else None
+    paths = write_raw(raw, order.out)
+    if bayer is not None:
+        paths += write_raw(bayer, order.out.with_stem(order.out.stem + "_bayer"))
+    return Taken(paths, _facts(order, raw, radiance, paths), tuple(notes))
+
+
+def _check(order: Order) -> tuple[SensorConfig, Scene | None]:
+    """Sensor and scene (None: a stored radiance), or `InputError`."""
+    sensor = preset(order.sensor, order.cfa)
+    check_ending(order.out, sensor.cfa)
+    require_whole("size", order.size, 1, 8192, "give the picture's side in pixels")
+    check_covers(sensor.cfa, (order.size, order.size))
+    require_whole("spp", order.spp, 1, 1 << 16, "give samples per pixel")
+    require_whole("seed", order.seed, 0, 2**31, "give a whole number")
+    if order.exposure_s is not None:
+        require_range("exposure_s", order.exposure_s, 0.0, 1e7, "give seconds, 0 or more")
+    elif "G" not in channels(sensor.cfa):
+        raise InputError(f"cfa: {sensor.cfa} has no G for the auto exposure; allowed: a mosaic with G; give exposure_s")
+    levels = () if order.level is None else (order.level,)
+    for level in levels:
+        parse_level(level)
+    if is_radiance_file(order.source):
+        check_radiance_file(order.source, levels)
+        return sensor, None
+    return sensor, load(order.source)
+
+
+def _light(order: Order, scene: Scene) -> Spectrum:
+    if order.white_balance is not None:
+        return illuminant(order.white_balance)
+    return next(iter(scene.groups.values())).spectrum
+
+
+def _render(order: Order, scene: Scene, step: Step) -> Transport:
+    return render(
+        scene,
+        (order.size, order.size),
+        spp=order.spp,
+        seed=order.seed,
+        progress=lambda share, error: step(f"render, relative error {error:.3f}", 0.9 * share),
+    )
+
+
+def _lit(order: Order, transport: Transport) -> SpectralRadiance:
+    if order.level is None:
+        return transport.relight()
+    return transport.relight(luminance_cd_m2=resolve_level(order.level, transport).luminance_cd_m2)
+
+
+def _expose(
+    order: Order, sensor: SensorConfig, radiance: SpectralRadiance, colour: ColourCalibration | None
+) -> RawImage:
+    exposure_s = order.exposure_s
+    if exposure_s is None:
+        exposure_s = auto_exposure_s(form_image(radiance, sensor), sensor)
+    device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
+    raw = capture(radiance, sensor, exposure_s, device, np.random.default_rng([order.seed, _FRAME]))
+    name = Path(order.sensor).stem.encode("ascii", "replace").decode()
+    return replace(raw, camera=name, f_number=sensor.lens.f_number, iso=iso_speed(sensor), colour=colour)
+
+
+def _facts(order: Order, raw: RawImage, radiance: SpectralRadiance, paths: tuple[Path, ...]) -> dict[str, Any]:
+    return {
+        "paths": [str(path) for path in paths],
+        "source": order.source,
+        "sensor": order.sensor,
+        "cfa": list(raw.cfa),
+        "size": list(raw.shape),
+        "seed": order.seed,
+        "exposure_s": raw.exposure_s,
+        "iso": raw.iso,
+        "engine": raw.engine,
+        "luminance_cd_m2": float(radiance.luminance().mean()),
+        "relative_mc_error": radiance.relative_mc_error,
+        "saturated": float(raw.saturated.mean()),
+    }
