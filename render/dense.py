@@ -127,6 +127,15 @@ def _scatter(
     return [value for value, *_ in drawn], pdf, sample, [weight for *_, weight in drawn], chosen
 
 
+def _times(first: list[Any], second: list[Any]) -> list[Any]:
+    return [a * b for a, b in zip(first, second, strict=True)]
+
+
+def _plus(result: list[Any], throughput: list[Any], light: list[Any], factor: Any) -> list[Any]:
+    """Add light, times a factor that all wavelengths share, seen through the path's throughput."""
+    return [r + t * (x * factor) for r, t, x in zip(result, throughput, light, strict=True)]
+
+
 def _roulette(throughput: list[Any], eta: Any, depth: Any, sample: Any) -> tuple[list[Any], Any]:
     """Russian roulette by the brightest wavelength, so that one decision serves all; gives the survivors."""
     brightest = dr.max(throughput[0])
@@ -190,7 +199,7 @@ def _trace(
         light_pdf = scene.pdf_emitter_direction(previous, seen, ~previous_delta)
         share = dr.select(previous_delta, 1.0, _power_heuristic(previous_pdf, light_pdf))
         emitted = _emitted(seen.emitter, si, wavelengths, own_colour)
-        result = [r + t * (e * share) for r, t, e in zip(result, throughput, emitted, strict=True)]
+        result = _plus(result, throughput, emitted, share)
 
         go_on = (depth + 1 < max_depth) & si.is_valid()
         bsdf = si.bsdf(ray)
@@ -206,9 +215,8 @@ def _trace(
         chosen |= go_on & by_wavelength
         factor = dr.select(lit, dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, pdf)), 0.0)
         direct = _arriving(ds, sampled, si, wavelengths, own_colour)
-        for g in range(len(wavelengths)):
-            result[g] += throughput[g] * values[g] * (direct[g] * factor)
-            throughput[g] = throughput[g] * weights[g]
+        result = _plus(result, _times(throughput, values), direct, factor)
+        throughput = _times(throughput, weights)
 
         ray = si.spawn_ray(si.to_world(sample.wo))
         ray.wavelengths = wavelengths[0]
