@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.loader import Film, Loaded, load_unit, mitsuba_module, variant
+from render.loader import PART_BANDS, Film, Loaded, load_unit, mitsuba_module, variant
 from render.passes import band_parts
 from render.photometry import photons_per_joule
 from render.scene import Scene
@@ -63,7 +63,7 @@ def ours(scene: Scene, film: Film, spp: int) -> Render:
         total = np.zeros((film.wavelength_nm.size, *film.size))
         for index, unit in enumerate(loaded):
             camera = unit.mi_scene.sensors()[0]
-            for first, planes in band_parts(unit, camera, film, unit.part_bands, spp, 1000 * index + seed):
+            for first, planes in band_parts(unit, camera, film, PART_BANDS, spp, 1000 * index + seed):
                 here = np.s_[first : first + len(planes)]
                 total[here] += lights[index, here, None, None] * planes
         return total
@@ -121,9 +121,9 @@ def measure(renders: dict[str, Render], repeats: int) -> dict[str, Measured]:
     squares: dict[str, Any] = dict.fromkeys(renders, 0.0)
     for seed in range(1, repeats + 1):
         for name, draw in renders.items():
-            start = time.perf_counter()
+            start = time.process_time()
             image = draw(seed)
-            seconds[name].append(time.perf_counter() - start)
+            seconds[name].append(time.process_time() - start)
             sums[name], squares[name] = sums[name] + image, squares[name] + image**2
 
     found = {}

@@ -25,6 +25,7 @@ def dense_path(mi: Any) -> Any:
 
     Properties of the plug-in: ``wavelength_nm`` and ``width_nm`` (comma-separated, a multiple of four), ``max_depth``;
     ``own_colour``: whether emission depends on wavelength (at unit emission it doesn't, and is evaluated once);
+    ``sample_lights``: whether paths go to look for lights. Where the one light is an even sky, any direction finds it;
     ``meter``: whether paths begin on the shape of the scene's irradiance meter, instead of with the camera's ray. Its
     bands are irradiance over pi.
     Channels after the first (alpha-less luminance film) hold the bands, and one more the share of paths whose BSDF
@@ -36,6 +37,7 @@ def dense_path(mi: Any) -> Any:
             super().__init__(props)
             self.max_depth = int(props.get("max_depth", 8))
             self.own_colour = bool(props.get("own_colour", False))
+            self.sample_lights = bool(props.get("sample_lights", True))
             self.meter = bool(props.get("meter", False))
             self.centres = np.array([float(x) for x in str(props["wavelength_nm"]).split(",")])
             self.widths = np.array([float(x) for x in str(props["width_nm"]).split(",")])
@@ -49,9 +51,9 @@ def dense_path(mi: Any) -> Any:
                 result, chosen = _seen(mi, scene, ray, wavelengths), mi.Bool(False)
             else:
                 begin = _at_meter if self.meter else _at_camera
-                start = begin(mi, scene, sampler, ray, wavelengths, self.own_colour)
-                limits = (self.max_depth, self.own_colour, mi.Bool(active))
-                result, chosen = _trace(mi, scene, sampler, start, wavelengths, *limits)
+                how = (self.own_colour, self.sample_lights)
+                start = begin(mi, scene, sampler, ray, wavelengths, *how)
+                result, chosen = _trace(mi, scene, sampler, start, wavelengths, self.max_depth, *how, mi.Bool(active))
             bands = [value for group in result for value in group]
             return mi.Spectrum(0.0), mi.Bool(True), [*bands, dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
 
@@ -114,17 +116,81 @@ def _scatter(
     bsdf: Any, context: Any, interaction: Any, towards_light: Any, lobe: Any, angle: Any, wavelengths: list[Any]
 ) -> tuple[list[Any], Any, Any, list[Any], Any]:
     """Evaluate and sample a BSDF at all wavelengths within one virtual call: shared terms are then computed once."""
+    if hasattr(bsdf, "scatter_bands"):  # `render.matte`, whose sampling knows no wavelength
+        values, pdf, sample, weights = bsdf.scatter_bands(interaction, towards_light, angle, wavelengths)
+        return values, pdf, sample, weights, dr.zeros(dr.mask_t(pdf))
     drawn = []
     for group in wavelengths:
         interaction.wavelengths = group
         drawn.append(bsdf.eval_pdf_sample(context, interaction, towards_light, lobe, angle))
     _, pdf, sample, _ = drawn[0]
-    chosen = dr.zeros(dr.mask_t(pdf))
-    for _, group_pdf, group_sample, _ in drawn[1:]:
-        chosen |= abs(group_pdf - pdf) > PDF_TOLERANCE * pdf
-        chosen |= abs(group_sample.pdf - sample.pdf) > PDF_TOLERANCE * sample.pdf
-        chosen |= group_sample.sampled_component != sample.sampled_component
+    chosen = _differs(sample, [other for _, _, other, _ in drawn[1:]])
+    for _, other_pdf, _, _ in drawn[1:]:
+        chosen |= abs(other_pdf - pdf) > PDF_TOLERANCE * pdf
     return [value for value, *_ in drawn], pdf, sample, [weight for *_, weight in drawn], chosen
+
+
+def _sample(
+    bsdf: Any, context: Any, interaction: Any, lobe: Any, angle: Any, wavelengths: list[Any]
+) -> tuple[Any, list[Any], Any]:
+    """Sample a BSDF at all wavelengths within one virtual call."""
+    if hasattr(bsdf, "sample_bands"):
+        sample, weights = bsdf.sample_bands(interaction, angle, wavelengths)
+        return sample, weights, dr.zeros(dr.mask_t(sample.pdf))
+    drawn = []
+    for group in wavelengths:
+        interaction.wavelengths = group
+        drawn.append(bsdf.sample(context, interaction, lobe, angle))
+    sample = drawn[0][0]
+    return sample, [weight for _, weight in drawn], _differs(sample, [other for other, _ in drawn[1:]])
+
+
+def _differs(sample: Any, others: list[Any]) -> Any:
+    """Whether the BSDF sampled another way at other wavelengths."""
+    chosen = dr.zeros(dr.mask_t(sample.pdf))
+    for other in others:
+        chosen |= abs(other.pdf - sample.pdf) > PDF_TOLERANCE * sample.pdf
+        chosen |= other.sampled_component != sample.sampled_component
+    return chosen
+
+
+def _share(
+    mi: Any, scene: Any, si: Any, previous: Any, previous_pdf: Any, previous_delta: Any, sample_lights: bool
+) -> Any:
+    """Weight of the light that a path meets, beside the chance that it had been sampled from the point before."""
+    if not sample_lights:
+        return mi.Float(1.0)
+    seen = mi.DirectionSample3f(scene, si, previous)
+    light_pdf = scene.pdf_emitter_direction(previous, seen, ~previous_delta)
+    return dr.select(previous_delta, 1.0, _power_heuristic(previous_pdf, light_pdf))
+
+
+def _bounce_by_light(
+    mi: Any, scene: Any, sampler: Any, bsdf: Any, si: Any, go_on: Any, wavelengths: list[Any], own_colour: bool
+) -> tuple[list[Any], Any, list[Any], Any]:
+    """Light received from a sampled position on a lamp; then a sampled direction, its weights, and the mark."""
+    lit = go_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+    si.wavelengths = wavelengths[0]
+    ds, sampled = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
+    lit &= (ds.pdf != 0) & dr.any(sampled != 0)
+    context, lobe, angle = mi.BSDFContext(), sampler.next_1d(), sampler.next_2d()
+    values, pdf, sample, weights, by_wavelength = dr.dispatch(
+        bsdf, _scatter, context, si, si.to_local(ds.d), lobe, angle, wavelengths
+    )
+    factor = dr.select(lit, dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, pdf)), 0.0)
+    arriving = _arriving(ds, sampled, si, wavelengths, own_colour)
+    received = [value * (light * factor) for value, light in zip(values, arriving, strict=True)]
+    return received, sample, weights, by_wavelength
+
+
+def _bounce(
+    mi: Any, scene: Any, sampler: Any, bsdf: Any, si: Any, go_on: Any, wavelengths: list[Any], own_colour: bool
+) -> tuple[list[Any], Any, list[Any], Any]:
+    """The same where no lamp is looked for."""
+    del scene, go_on, own_colour
+    context, lobe, angle = mi.BSDFContext(), sampler.next_1d(), sampler.next_2d()
+    sample, weights, by_wavelength = dr.dispatch(bsdf, _sample, context, si, lobe, angle, wavelengths)
+    return [mi.Spectrum(0.0) for _ in wavelengths], sample, weights, by_wavelength
 
 
 def _times(first: list[Any], second: list[Any]) -> list[Any]:
@@ -147,16 +213,16 @@ def _roulette(throughput: list[Any], eta: Any, depth: Any, sample: Any) -> tuple
     return [group * factor for group in throughput], (~plays | (sample < survival)) & (brightest != 0)
 
 
-def _at_camera(
-    mi: Any, scene: Any, sampler: Any, ray: Any, wavelengths: list[Any], own_colour: bool
-) -> tuple[Any, ...]:
+def _at_camera(mi: Any, scene: Any, sampler: Any, ray: Any, wavelengths: list[Any], *how: bool) -> tuple[Any, ...]:
     """Where a path begins: its ray, the point that it left, the density of its direction, light received so far."""
-    del scene, sampler, own_colour
+    del scene, sampler, how
     dark = [mi.Spectrum(0.0) for _ in wavelengths]
     return mi.Ray3f(ray), dr.zeros(mi.SurfaceInteraction3f), mi.Float(1.0), mi.Bool(True), dark
 
 
-def _at_meter(mi: Any, scene: Any, sampler: Any, ray: Any, wavelengths: list[Any], own_colour: bool) -> tuple[Any, ...]:
+def _at_meter(
+    mi: Any, scene: Any, sampler: Any, ray: Any, wavelengths: list[Any], own_colour: bool, sample_lights: bool
+) -> tuple[Any, ...]:
     """The same on the irradiance meter's shape, a white matte surface whose lights are sampled as any other's.
 
     Mitsuba's own meter only waits for its rays to meet a light: the sun is met once in 50 000, a point light never.
@@ -165,14 +231,16 @@ def _at_meter(mi: Any, scene: Any, sampler: Any, ray: Any, wavelengths: list[Any
     place = card.sample_position(ray.time, sampler.next_2d())
     here = dr.zeros(mi.SurfaceInteraction3f, dr.width(ray.o))
     here.p, here.n, here.sh_frame, here.wavelengths = place.p, place.n, mi.Frame3f(place.n), wavelengths[0]
-    ds, sampled = scene.sample_emitter_direction(here, sampler.next_2d(), True)
-    density = dr.maximum(here.to_local(ds.d).z, 0.0) * dr.inv_pi
-    factor = density * dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, density))
-    arriving = _arriving(ds, sampled, here, wavelengths, own_colour)
-    received = [mi.Spectrum(dr.select(dr.any(sampled != 0), value * factor, 0.0)) for value in arriving]
+    received = [mi.Spectrum(0.0) for _ in wavelengths]
+    if sample_lights:
+        ds, sampled = scene.sample_emitter_direction(here, sampler.next_2d(), True)
+        density = dr.maximum(here.to_local(ds.d).z, 0.0) * dr.inv_pi
+        factor = density * dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, density))
+        arriving = _arriving(ds, sampled, here, wavelengths, own_colour)
+        received = [mi.Spectrum(dr.select(dr.any(sampled != 0), value * factor, 0.0)) for value in arriving]
     out = mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
     onward = here.spawn_ray(here.to_world(out))
-    return onward, here, mi.warp.square_to_cosine_hemisphere_pdf(out), mi.Bool(False), received
+    return onward, here, mi.warp.square_to_cosine_hemisphere_pdf(out), mi.Bool(not sample_lights), received
 
 
 @dr.syntax
@@ -184,10 +252,11 @@ def _trace(
     wavelengths: list[Any],
     max_depth: int,
     own_colour: bool,
+    sample_lights: bool,
     active: Any,
 ) -> tuple[list[Any], Any]:
     """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``)."""
-    context = mi.BSDFContext()
+    bounce = _bounce_by_light if sample_lights else _bounce
     ray, previous, previous_pdf, previous_delta, result = start
     ray.wavelengths = wavelengths[0]
     throughput = [mi.Spectrum(1.0) for _ in wavelengths]
@@ -195,27 +264,15 @@ def _trace(
     chosen = mi.Bool(False)
     while dr.hint(active, label="dense path"):
         si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
-        seen = mi.DirectionSample3f(scene, si, previous)
-        light_pdf = scene.pdf_emitter_direction(previous, seen, ~previous_delta)
-        share = dr.select(previous_delta, 1.0, _power_heuristic(previous_pdf, light_pdf))
-        emitted = _emitted(seen.emitter, si, wavelengths, own_colour)
-        result = _plus(result, throughput, emitted, share)
+        share = _share(mi, scene, si, previous, previous_pdf, previous_delta, sample_lights)
+        result = _plus(result, throughput, _emitted(si.emitter(scene), si, wavelengths, own_colour), share)
 
         go_on = (depth + 1 < max_depth) & si.is_valid()
-        bsdf = si.bsdf(ray)
-        lit = go_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        si.wavelengths = wavelengths[0]
-        ds, sampled = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
-        lit &= (ds.pdf != 0) & dr.any(sampled != 0)
-        towards_light = si.to_local(ds.d)
-        lobe, angle = sampler.next_1d(), sampler.next_2d()
-        values, pdf, sample, weights, by_wavelength = dr.dispatch(
-            bsdf, _scatter, context, si, towards_light, lobe, angle, wavelengths
+        received, sample, weights, by_wavelength = bounce(
+            mi, scene, sampler, si.bsdf(ray), si, go_on, wavelengths, own_colour
         )
+        result = _plus(result, throughput, received, 1.0)
         chosen |= go_on & by_wavelength
-        factor = dr.select(lit, dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, pdf)), 0.0)
-        direct = _arriving(ds, sampled, si, wavelengths, own_colour)
-        result = _plus(result, _times(throughput, values), direct, factor)
         throughput = _times(throughput, weights)
 
         ray = si.spawn_ray(si.to_world(sample.wo))

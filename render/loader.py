@@ -10,18 +10,17 @@ from numpy.typing import NDArray
 from render.dense import LANES, dense_path
 from render.errors import InputError
 from render.jit import backend
+from render.matte import matte_surface, with_matte_surfaces
 from render.scene import Node, Scene, uniform_node
 from render.scene_paths import search_path
 from render.spectrum import Floats
 
 METER_PIXELS = 64  # film of the irradiance meter, each side
 
-# Bands traced together. More share the work of tracing, but the kernel's first compilation grows faster than their
-# number, and with several kinds of material little is saved: 40 bands of `still_life`, 128x128, 16 samples on two cores
-# take 2.3, 1.6, 1.6 s of processor time in parts of 12, 20, 40, and compile in 5, 9, 27 s. With matte surfaces alone
-# 32 bands compile in 2 s, and take 0.84 s where two parts of 16 take 1.4.
-PART_BANDS, MATTE_PART_BANDS = 20, 40
-
+# Bands traced together. More share the work of tracing, but a kernel's first compilation grows faster than their
+# number: 40 bands of `still_life_outdoor`, 96x96, 16 samples, take 0.89 s of processor time in two parts and 0.69 s in
+# one, and compile in 5 and 12 s.
+PART_BANDS = 40
 _SAMPLER = {"type": "multijitter"}  # 8.7 times less error than "independent" under sun and sky at 64 samples, as fast
 _VARIANTS = {"cuda": "cuda_ad_spectral", "llvm": "llvm_ad_spectral", "numpy": "scalar_spectral"}
 
@@ -42,6 +41,7 @@ def mitsuba_module() -> Any:
     mi.set_file_resolver(search_path(mi))
     if backend() != "numpy":
         mi.register_integrator("densepath", dense_path(mi))
+        mi.register_bsdf("matte", matte_surface(mi))
     return mi
 
 
@@ -73,13 +73,13 @@ class Loaded:
     mi_scene : mitsuba.Scene
     own_colour : bool
         Whether emission depends on wavelength; at unit emission it is evaluated once.
-    part_bands : int
-        Bands that the camera traces together.
+    sample_lights : bool
+        Whether paths go to look for lights.
     """
 
     mi_scene: Any
     own_colour: bool
-    part_bands: int
+    sample_lights: bool
 
 
 def integrator_name() -> str:
@@ -98,16 +98,15 @@ def load_unit(scene: Scene, group: str, film: Film) -> Loaded:
             "sampler": _SAMPLER,
         }
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
-    mi_scene = _load(scene, description)
-    part_bands = MATTE_PART_BANDS if _is_matte(mi_scene) else PART_BANDS
-    return Loaded(mi_scene, scene.groups[group].own_colour, part_bands)
+    mi_scene = _load(scene, description if backend() == "numpy" else with_matte_surfaces(description))
+    return Loaded(mi_scene, scene.groups[group].own_colour, not _is_even_sky(mi_scene))
 
 
 def load_direct(scene: Scene, film: Film) -> Loaded:
     """Load a scene for one question: which pixels see a light directly. All groups at unit emission, depth 1."""
     description = scene.lit({name: uniform_node(1.0) for name in scene.groups})
     description["sensor"] = {**description["sensor"], "film": _recorder(film, film.size), "sampler": _SAMPLER}
-    return Loaded(_load(scene, description), own_colour=True, part_bands=LANES)
+    return Loaded(_load(scene, description), own_colour=True, sample_lights=True)
 
 
 def _load(scene: Scene, description: Node) -> Any:
@@ -118,11 +117,14 @@ def _load(scene: Scene, description: Node) -> Any:
         raise InputError(f"scene {scene.name}: Mitsuba can't load it: {reason}; correct the description") from error
 
 
-def _is_matte(mi_scene: Any) -> bool:
-    """Whether all surfaces are Lambertian."""
-    flags = mitsuba_module().BSDFFlags
-    diffuse = flags.DiffuseReflection | flags.FrontSide | flags.BackSide | flags.SpatiallyVarying
-    return all(int(shape.bsdf().flags()) & ~int(diffuse) == 0 for shape in mi_scene.shapes() if shape.bsdf())
+def _is_even_sky(mi_scene: Any) -> bool:
+    """Whether the one light is a sky of the same radiance all around.
+
+    Every direction finds it, so that directions sampled for the surface alone leave less noise than a mixture with ones
+    sampled for the sky; and half of the rays are saved.
+    """
+    emitters = mi_scene.emitters()
+    return len(emitters) == 1 and emitters[0].class_name() == "ConstantBackgroundEmitter"
 
 
 def _recorder(film: Film, size: tuple[int, int]) -> Node:
@@ -137,7 +139,7 @@ def _recorder(film: Film, size: tuple[int, int]) -> Node:
     return node
 
 
-def integrators(film: Film, part_bands: int, own_colour: bool, meter: bool = False) -> list[Any]:
+def integrators(film: Film, part_bands: int, unit: Loaded, meter: bool = False) -> list[Any]:
     """Integrators that together give all bands in order, each at most `part_bands` (a multiple of four).
 
     Parts of one size share a kernel. A part is filled up to a multiple of four by repeating its last band; `parts`
@@ -153,8 +155,8 @@ def integrators(film: Film, part_bands: int, own_colour: bool, meter: bool = Fal
             name: ",".join(map(repr, values[padded].tolist()))
             for name, values in (("wavelength_nm", film.wavelength_nm), ("width_nm", film.width_nm))
         }
-        options = {"max_depth": film.max_depth, "own_colour": own_colour, "meter": meter}
-        made.append(mi.load_dict({"type": "densepath", **options, **bands}))
+        options = {"own_colour": unit.own_colour, "sample_lights": unit.sample_lights, "meter": meter}
+        made.append(mi.load_dict({"type": "densepath", "max_depth": film.max_depth, **options, **bands}))
     return made
 
 

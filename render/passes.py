@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError
-from render.loader import Film, Loaded, integrators, load_direct, mitsuba_module, parts, variant
+from render.loader import PART_BANDS, Film, Loaded, integrators, load_direct, mitsuba_module, parts, variant
 from render.scene import Scene
 from render.spectrum import Floats
 from render.transport import Transport
@@ -64,7 +64,7 @@ def add_pass(loaded: list[Loaded], sums: Sums, film: Film, pass_spp: int, seed: 
     for group, unit in enumerate(loaded):
         camera, *meter = unit.mi_scene.sensors()
         of_pass = pass_seed(seed, group, sums.passes - 1)
-        for first, planes in band_parts(unit, camera, film, unit.part_bands, pass_spp, of_pass):
+        for first, planes in band_parts(unit, camera, film, PART_BANDS, pass_spp, of_pass):
             _add(sums, np.s_[group, first : first + len(planes)], planes)
         if meter:
             sums.plane[group] += _meter(unit, meter[0], film, min(pass_spp, METER_SPP), of_pass)
@@ -94,7 +94,7 @@ def band_parts(
 
     Every part of the bands sees the same paths.
     """
-    first, tracers = 0, integrators(film, most, unit.own_colour, meter)
+    first, tracers = 0, integrators(film, most, unit, meter)
     if variant() == "scalar_spectral":  # specfilm integrates over the band
         image = _rendered(unit, sensor, tracers[0], spp, seed)
         yield 0, image / film.width_nm.astype(np.float32)[:, None, None]
@@ -124,7 +124,7 @@ def emitter_visible(scene: Scene, film: Film, seed: int) -> NDArray[np.bool_]:
     one_band = Film(film.size, film.wavelength_nm[:1], film.width_nm[:1], 1)
     of_pass = pass_seed(seed, len(scene.groups), 0)
     camera = loaded.mi_scene.sensors()[0]
-    _, planes = next(band_parts(loaded, camera, one_band, loaded.part_bands, VISIBLE_SPP, of_pass))
+    _, planes = next(band_parts(loaded, camera, one_band, PART_BANDS, VISIBLE_SPP, of_pass))
     return np.asarray(planes[0] > 0)
 
 

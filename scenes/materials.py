@@ -1,12 +1,10 @@
 """Mitsuba nodes for surfaces and flat shapes, so that each scene reads as a list of things."""
 
 from functools import cache
-from importlib.util import find_spec
-from pathlib import Path
+from importlib import metadata
 
 import numpy as np
 
-from render.errors import InputError
 from render.geometry import rotate, scale, to_world, translate
 from render.scene import Node, spectrum_node
 from render.spectrum import Floats, Spectrum
@@ -41,10 +39,7 @@ def metal(material: str, roughness: float) -> Node:
 @cache
 def _optical_constant(file: str) -> Spectrum:
     """Table of two columns, nm and value, from Mitsuba's own data; found without importing it."""
-    package = find_spec("mitsuba")
-    if package is None or not package.submodule_search_locations:
-        raise InputError("mitsuba: it is not installed; install rodcone's dependencies")
-    table = np.loadtxt(Path(package.submodule_search_locations[0]) / "data" / "ior" / file)
+    table = np.loadtxt(str(metadata.distribution("mitsuba").locate_file(f"mitsuba/data/ior/{file}")))
     return resampled(table[:, 0], table[:, 1])
 
 

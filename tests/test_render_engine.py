@@ -68,9 +68,28 @@ def lit_variance(transport, groups):
     return np.einsum("gb,gbhw->bhw", emissions(groups) ** 2, transport.variance.astype(np.float64))
 
 
+def noisy_wall():
+    """The flat field with a point light behind the wall: no light more, but paths go to look for lights now.
+
+    Under the sky alone they don't, and every path brings the same: the flat field is exact.
+    """
+    scene = load("flat_field")
+    geometry = scene.geometry | {"behind": {"type": "point", "position": [0, 0, -1]}}
+    groups = {"sky": replace(scene.groups["sky"], emitters=("sky", "behind"))}
+    return replace(scene, geometry=geometry, groups=groups)
+
+
 @pytest.fixture(scope="module")
 def wall():
-    return render(load("flat_field"), SIZE, wavelength_nm=BANDS_NM, spp=128, seed=1)
+    return render(noisy_wall(), SIZE, wavelength_nm=BANDS_NM, spp=128, seed=1)
+
+
+def test_a_wall_under_an_even_sky_is_exact():
+    made = render(load("flat_field"), SIZE, wavelength_nm=BANDS_NM, spp=8, seed=1)
+    assert made.radiance == pytest.approx(np.full((1, 8, *SIZE), 0.5), rel=1e-6)
+    assert made.irradiance == pytest.approx(np.full((1, 8), np.pi), rel=1e-5)
+    assert made.relative_mc_error < 1e-6
+    assert not made.emitter_visible.any()
 
 
 def two_lights():
@@ -162,7 +181,9 @@ def test_a_rendered_wall_gives_the_analytic_electrons_within_the_stated_error(wa
 
 
 def test_the_reference_plane_under_an_even_sky_gets_pi_times_its_radiance(wall):
-    assert wall.irradiance == pytest.approx(np.full((1, 8), np.pi), rel=1e-5)
+    # A mixture of directions sampled for the surface and for the sky: a sample scatters by less than its mean, and
+    # 64x64 pixels have 8 passes of 16.
+    assert wall.irradiance == pytest.approx(np.full((1, 8), np.pi), rel=bound(8) / np.sqrt(64 * 64 * 8 * 16))
     assert wall.relight(illuminance_lux=50.0 * np.pi).luminance().mean() == pytest.approx(25.0, rel=5e-3)
     assert wall.illuminance_lux(25.0) == pytest.approx(50.0 * np.pi, rel=5e-3)
 
@@ -185,8 +206,10 @@ def test_color_checker_patches_are_reflectance_times_sky_in_every_band():
         left, top = round(w / 2 + x / pixel_m) - 1, round(h / 2 - y / pixel_m) - 1
         here = np.s_[:, top : top + pixels_of_patch, left : left + pixels_of_patch]
         seen, variance = made.radiance[0][here].astype(np.float64), made.variance[0][here].astype(np.float64)
-        error = np.sqrt(variance.sum(axis=(1, 2))) / pixels_of_patch**2
-        z.append((seen.mean(axis=(1, 2)) - reflectance.band_average(BANDS_NM, WIDTH_NM)) / error)
+        truth = reflectance.band_average(BANDS_NM, WIDTH_NM)
+        # Under an even sky the jitter within a band is all that scatters; where a patch is grey, float32's rounding.
+        error = np.hypot(np.sqrt(variance.sum(axis=(1, 2))) / pixels_of_patch**2, 2e-6 * truth)
+        z.append((seen.mean(axis=(1, 2)) - truth) / error)
     freedom = pixels_of_patch**2 * (PASSES - 1)
     assert np.abs(z).max() < student.isf(FALSE_ALARM / 2 / (24 * 8), freedom)
     # Mean 28/26 for Student's law; bands share their paths, so 24 patches count: 0.33 is its standard error.
@@ -266,7 +289,7 @@ def test_a_wall_in_front_of_the_sky_hides_it(wall):
 
 
 def small(seed=0, **options):
-    return render(load("flat_field"), (3, 4), **({"wavelength_nm": BANDS_NM, "spp": 8, "seed": seed} | options))
+    return render(noisy_wall(), (3, 4), **({"wavelength_nm": BANDS_NM, "spp": 8, "seed": seed} | options))
 
 
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
@@ -393,7 +416,7 @@ def test_progress_rises_to_one_with_the_error_so_far():
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (7, 1)])
 def test_images_of_one_pixel_or_one_row_are_rendered(size):
-    made = render(load("flat_field"), size, wavelength_nm=BANDS_NM, spp=64, seed=9)
+    made = render(noisy_wall(), size, wavelength_nm=BANDS_NM, spp=64, seed=9)
     assert made.radiance.shape == (1, 8, *size)
     assert made.relight().shape == size
     error = np.sqrt(made.variance[0, 0].sum(dtype=np.float64)) / made.radiance[0, 0].size
