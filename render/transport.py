@@ -127,6 +127,11 @@ class Transport:
         even, odd = (SpectralRadiance(_view(half), self.wavelength_nm, 0.0, self.width_nm) for half in halves)
         return even, odd
 
+    def relight_variance(self, *, luminance_cd_m2: float) -> NDArray[np.float32]:
+        """Monte Carlo variance of `relight` at a level of the scene's own lights, shape (band, h, w)."""
+        coefficients = self._at_level(self._emission(self._lights(None, None)), luminance_cd_m2, None)
+        return _combine(coefficients**2, self.variance)
+
     def illuminance_lux(self, luminance_cd_m2: float) -> float | None:
         """Illuminance on the reference plane at a mean luminance under the scene's own lights; None without a plane."""
         if self.irradiance is None:

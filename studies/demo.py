@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour import encode_srgb
-from render.engine import render
 from render.errors import InputError, require_range
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
@@ -28,10 +27,11 @@ from sensor.left_out import left_out
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import expected_electrons
-from studies.budget import monte_carlo_share
+from studies.budget import monte_carlo_share, pixel_share
 from studies.camera import CAMERAS, Camera, Shot, build_camera, mean_electrons, photograph
 from studies.levels import parse_level, resolve_level
 from studies.pictures import contact_sheet, to_bytes
+from studies.quiet_render import render_quietly
 from studies.radiance_file import check_radiance_file, open_radiance_file
 from studies.report import render_report
 from studies.results import environment, level_facts, notes, render_facts, sensor_facts
@@ -120,7 +120,7 @@ def run(demo: Demo, step: Step = lambda what, share: None) -> Outcome:
     else:
         (transport, spectrum), assumed = _rendered(demo, step), []
     clock.add("render", transport.seconds)
-    levels = DEMO_LEVELS if demo.levels is None else [resolve_level(level, transport) for level in demo.levels]
+    levels = _levels(demo, transport)
     light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
     cameras = _cameras(demo, light, transport.emitter_visible.shape)
     cells: list[dict[str, Any]] = []
@@ -168,16 +168,28 @@ def _options(demo: Demo) -> dict[str, str]:
 def _rendered(demo: Demo, step: Step) -> tuple[Transport, Spectrum]:
     """Transport of a scene by name, and its light."""
     scene = load(demo.scene, **_options(demo))
-    transport = render(
+    transport = render_quietly(
         scene,
         (demo.size, demo.size),
+        lambda made: brightest_share(demo, made),
         wavelength_nm=WAVELENGTH_NM,
-        spp=demo.spp,
+        max_spp=demo.spp,
         max_seconds=demo.max_seconds,
         seed=demo.seed,
         progress=lambda share, error: step(f"render, relative error {error:.3f}", 0.6 * share),
     )
     return transport, next(iter(scene.groups.values())).spectrum
+
+
+def brightest_share(demo: Demo, transport: Transport) -> float:
+    """Largest `pixel_share` of the sensors at the brightest level: where a render's noise shows most."""
+    brightest = max(level.luminance_cd_m2 for level in _levels(demo, transport))
+    sensors = [preset(name, mosaic) for name in demo.sensors for mosaic, _ in CAMERAS.values()]
+    return max(pixel_share(transport, sensor, brightest, demo.longest_s) for sensor in sensors)
+
+
+def _levels(demo: Demo, transport: Transport) -> Sequence[LightLevel]:
+    return DEMO_LEVELS if demo.levels is None else [resolve_level(level, transport) for level in demo.levels]
 
 
 def _cameras(demo: Demo, light: Light, shape: tuple[int, int]) -> list[Camera]:
@@ -267,7 +279,7 @@ def _results(
         "scene": Path(demo.scene).name,
         "size": list(transport.emitter_visible.shape),
         "environment": environment(),
-        "render": render_facts(transport),
+        "render": render_facts(transport) | {"brightest_share": brightest_share(demo, transport)},
         "exposure_rule": RULE.format(longest=demo.longest_s * 1e3),
         "display_white": "the scene's 99th percentile of luminance, visible lamps excluded, is shown at 90 % of white",
         "levels": level_facts(levels, transport),

@@ -16,6 +16,7 @@ from markupsafe import Markup
 
 from render.errors import InputError, require_keys, require_range
 from studies import report_text as text
+from studies.budget import MOST_SHARE
 from studies.charts import Chart, Line, line_chart
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -101,7 +102,7 @@ def cell_view(cell: Mapping[str, Any], level: Mapping[str, Any], rivals: Sequenc
         "substitution": substitution,
         "balance": balance_text(cell["balance"]),
         "mc_share": text.percent(cell["mc_share"]),
-        "over": cell["mc_share"] is not None and cell["mc_share"] > text.MC_AIM,
+        "over": cell["mc_share"] is not None and cell["mc_share"] > MOST_SHARE,
         "electrons": " ".join(f"{name}\N{NBSP}{text.significant(mean)}" for name, mean in electrons.items()),
         "capture": text.duration(seconds.get("capture")),
         "develop": text.duration(seconds.get("develop")),
@@ -193,7 +194,7 @@ def page_view(results: Mapping[str, Any], pictures: Mapping[str, bytes]) -> dict
         start = index - index % count
         views.append(cell_view(cell, levels[cell["level"]], cells[start : start + count]))
     share = text.Metric("mc_share", "Monte Carlo share", 1, "", higher=False)
-    aim = (text.MC_AIM, f"aim {text.percent(text.MC_AIM)}")
+    aim = (MOST_SHARE, f"aim {text.percent(MOST_SHARE)}")
     data = {
         "levels": [level_view(level) for level in levels],
         "sensors": [sensor["name"] for sensor in results["sensors"]],

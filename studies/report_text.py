@@ -6,17 +6,18 @@ from itertools import groupby
 from math import floor, isfinite, isinf, isnan, log10
 from typing import Any
 
+from studies.budget import MOST_SHARE, OF_PIXELS
+
 MISSING = "—"
 NBSP = "\N{NO-BREAK SPACE}"
-# What Monte Carlo noise may add to the sensor's own noise variance before it counts as part of the result.
-MC_AIM = 0.03
 CAMERA_NAMES = {"interleaved": "Interleaved", "bayer": "Bayer"}
 # As the title writes them; elsewhere the short names stand beside their pictures.
 CAMERA_TITLES = {"interleaved": "Interleaved RGBW"}
 STOPPED_BY = {
     "seconds": "the time it was given was used up",
     "noise": "the error asked for was reached",
-    "spp": "the samples asked for were done",
+    "samples": "the samples asked for were done",
+    "interrupt": "it was interrupted",
 }
 
 
@@ -169,7 +170,9 @@ def render_sentence(render: Mapping[str, Any]) -> str:
     return (
         f"The render made {render['passes']} passes, {render['spp']} samples a pixel, in {duration(render['seconds'])} "
         f"and stopped because {why}. The relative Monte Carlo error it reached is "
-        f"{percent(render['relative_mc_error'])}."
+        f"{percent(render['relative_mc_error'])}. In the brightest light its noise variance is at most "
+        f"{percent(render['brightest_share'])} of the sensor's own in {percent(OF_PIXELS)} of the pixels "
+        f"({percent(MOST_SHARE)} is the aim)."
     )
 
 
@@ -180,11 +183,11 @@ def share_sentence(levels: Sequence[str], cells: Sequence[Mapping[str, Any]]) ->
         return "The Monte Carlo share is not known for any picture."
     worst = max(known, key=lambda cell: float(cell["mc_share"]))
     where = f"{levels[worst['level']]}, {worst['sensor']}, {camera_name(worst['camera'])}"
-    over = sum(cell["mc_share"] > MC_AIM for cell in known)
+    over = sum(cell["mc_share"] > MOST_SHARE for cell in known)
     most = f"The largest Monte Carlo share is {percent(worst['mc_share'])} ({where})"
     if not over:
-        return f"{most}: all {len(known)} pictures keep the {percent(MC_AIM)} aim."
+        return f"{most}: all {len(known)} pictures keep the {percent(MOST_SHARE)} aim."
     return (
-        f"{most}: {over} of {len(known)} pictures miss the {percent(MC_AIM)} aim. "
+        f"{most}: {over} of {len(known)} pictures miss the {percent(MOST_SHARE)} aim. "
         "In those, noise of the render counts as texture of the scene, and the metrics see it."
     )

@@ -69,7 +69,7 @@ def sample_results() -> dict[str, Any]:
         "render": {
             "integrator": "path + specfilm", "variant": "llvm_ad_spectral", "seconds": 41.2, "spp": 256, "passes": 16,
             "stopped_by": "seconds", "relative_mc_error": 0.031, "bands": 40, "first_nm": 385.0, "last_nm": 775.0,
-            "width_nm": 10.0,
+            "width_nm": 10.0, "brightest_share": 0.42,
         },
         "exposure_rule": "99th percentile of expected G at 80 % of the well, at most 66 ms",
         "display_white": "White is the luminance of a perfect diffuser in the scene's brightest light.",

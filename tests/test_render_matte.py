@@ -43,7 +43,9 @@ def test_value_density_and_sample_are_those_of_mitsuba(stock, situation):
     assert np.asarray(sample.pdf)[kept] == pytest.approx(np.asarray(expected.pdf)[kept], rel=1e-5)
     assert np.array_equal(np.asarray(sample.pdf) > 0, kept)
     assert np.asarray(sample.wo)[:, kept] == pytest.approx(np.asarray(expected.wo)[:, kept], abs=1e-6)
-    assert np.array_equal(np.asarray(sample.sampled_type)[kept], np.asarray(expected.sampled_type)[kept])
+    for part in ("sampled_type", "sampled_component", "eta"):
+        own_part, other_part = (np.broadcast_to(np.asarray(getattr(x, part)), COUNT)[kept] for x in (sample, expected))
+        assert np.array_equal(own_part, other_part), part
 
 
 @pytest.mark.parametrize("stock", [DIFFUSE, TWOSIDED], ids=["one side", "two sides"])

@@ -111,6 +111,6 @@ def test_bad_levels_are_refused_in_one_line(text: str) -> None:
     ],
 )
 def test_bad_input_is_refused_before_the_render(demo: Demo, message: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studies.demo.render", lambda *args, **more: pytest.fail("rendered"))
+    monkeypatch.setattr("studies.demo.render_quietly", lambda *args, **more: pytest.fail("rendered"))
     with pytest.raises(InputError, match=message):
         run(demo)
