@@ -114,7 +114,11 @@ def _rendered(unit: Loaded, sensor: Any, integrator: Any, spp: int, seed: int) -
     try:
         image = mitsuba_module().render(unit.mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
     except RuntimeError as error:
-        raise InputError(f"scene: Mitsuba can't render it: {_root_cause(error)}; correct the description") from None
+        cause = _root_cause(error)
+        if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
+            raise
+        words = " ".join(str(cause).split())
+        raise InputError(f"scene: Mitsuba can't render it: {words}; correct the description") from None
     return np.ascontiguousarray(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
 
 
@@ -142,8 +146,8 @@ def let_go(error: BaseException) -> None:
         cause.__traceback__, cause = None, cause.__cause__ or cause.__context__
 
 
-def _root_cause(error: BaseException) -> str:
-    """Mitsuba's own words, from under the layers that Dr.Jit wraps around them, on one line."""
+def _root_cause(error: BaseException) -> BaseException:
+    """Error from under the layers that Dr.Jit wraps around it."""
     while error.__cause__ or error.__context__:
         error = error.__cause__ or error.__context__ or error
-    return " ".join(str(error).split())
+    return error

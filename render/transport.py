@@ -201,17 +201,23 @@ def emission(lights: Mapping[str, LightGroup], wavelength_nm: Floats, width_nm: 
 def _combine(coefficients: Floats, planes: NDArray[np.float32]) -> NDArray[np.float32]:
     """Sum over groups, shape (band, h, w): in float64, rounded once; every value is read once."""
     groups, bands, height, width = planes.shape
-    flat = planes.reshape(groups, bands * height * width)
+    pixels = height * width
+    flat = planes.reshape(groups, bands, pixels)
     if backend() == "numpy":
-        terms = coefficients[:, :, None] * flat.reshape(groups, bands, -1)
-        return np.asarray(terms.sum(axis=0), dtype=np.float32).reshape(bands, height, width)
+        result = np.empty((bands, pixels), dtype=np.float32)
+        for band in range(bands):
+            result[band] = coefficients[:, band] @ flat[:, band].astype(np.float64)
+        return result.reshape(bands, height, width)
     types = arrays()
-    band = dr.arange(types.UInt, bands * height * width) // dr.opaque(types.UInt, height * width)
-    total = types.Float64(0)
-    for group in range(groups):  # arrays of the host are read where they are, not copied
-        factor = dr.gather(types.Float64, types.Float64(coefficients[group]), band)
-        total = dr.fma(types.Float64(types.Float(flat[group])), factor, total)
-    return np.asarray(types.Float(total).numpy()).reshape(bands, height, width)
+    sums, index = dr.empty(types.Float, bands * pixels), dr.arange(types.UInt, pixels)
+    for band in range(bands):  # a kernel each, all of one code; arrays of the host are read where they are
+        total = types.Float64(0)
+        for group in range(groups):
+            factor = dr.opaque(types.Float64, float(coefficients[group, band]))
+            total = dr.fma(types.Float64(types.Float(flat[group, band])), factor, total)
+        dr.scatter(sums, types.Float(total), index + dr.opaque(types.UInt, band * pixels), mode=dr.ReduceMode.Permute)
+        dr.eval(sums)
+    return np.asarray(sums.numpy()).reshape(bands, height, width)
 
 
 def _view(planes: NDArray[np.float32]) -> NDArray[np.float32]:

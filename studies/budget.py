@@ -59,5 +59,5 @@ def pixel_share(transport: Transport, sensor: SensorConfig, luminance_cd_m2: flo
     inside = expected_e < sensor.pixel.full_well_e
     if not inside.any():
         return 0.0
-    shares = error_e[inside] ** 2 / noise_variance(expected_e[inside], sensor, exposure_s)
-    return float(np.quantile(shares, OF_PIXELS))
+    own = np.stack([noise_variance(plane, sensor, exposure_s) for plane in expected_e])
+    return float(np.quantile(error_e[inside] ** 2 / own[inside], OF_PIXELS))
