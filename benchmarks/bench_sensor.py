@@ -4,18 +4,21 @@ Run ``python benchmarks/bench_sensor.py``. It prints the environment, the first 
 kernel cache (compilation included), then for each size and light the shortest of interleaved rounds: the whole capture;
 its parts, the sum over bands and the readout; reading the bands' memory once, which nothing can undercut; and NumPy's
 `Generator.poisson` alone on the same means, which the whole is measured against. At the end, the exact form and a lens
-that diffracts. Rounds are interleaved and the shortest counts because other work may share the CPU: compare ratios of
-one run. Processor time of all threads together stands beside the time on the clock: NumPy's sampler runs on one thread,
-and the kernel's two or more get less of a CPU that others use too.
+that diffracts, and the largest memory of two fresh processes (``--memory`` runs these alone): 24 megapixels taken from
+strips, and the picture behind the lens that diffracts, beside the size of its bands. Rounds are interleaved and the
+shortest counts because other work may share the CPU: compare ratios of one run. Processor time of all threads together
+stands beside the time on the clock: NumPy's sampler runs on one thread, and the kernel's two or more get less of a CPU
+that others use too.
 """
 
 import os
 import platform
+import resource
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +27,7 @@ import numpy as np
 
 from render.jit import LIBLLVM, backend, dr
 from render.radiance import SpectralRadiance
-from sensor.capture import capture
+from sensor.capture import capture, capture_strips
 from sensor.device import draw_device
 from sensor.lanes import expected_electrons_single, read_frame
 from sensor.optics import camera_equation, form_image
@@ -104,6 +107,45 @@ def first_call() -> None:
     print(f"first capture, 64x64, compilation included: {time.perf_counter() - start:.2f} s", flush=True)
 
 
+def peak_gb() -> float:
+    """Largest memory of this process so far [GB]."""
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes there, kibibytes elsewhere
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9
+
+
+def strips_memory() -> None:
+    """Time and memory of 24 megapixels whose radiance is made strip by strip."""
+    shape, rows = (4000, 6000), 100
+    sensor, part = preset("low_noise"), scene(rows, LIGHTS["a lit room"])
+    device = draw_device(sensor, shape, np.random.default_rng(1))
+
+    def strips() -> Iterator[SpectralRadiance]:
+        for _ in range(shape[0] // rows):
+            values = np.tile(np.moveaxis(part.values, -1, 0), (1, 1, shape[1] // rows))
+            yield SpectralRadiance(np.moveaxis(values, 0, -1), NM)
+
+    start = time.perf_counter()
+    capture_strips(strips(), sensor, EXPOSURE_S, device, np.random.default_rng(2))
+    print(f"24 megapixels from strips of {rows} rows: {time.perf_counter() - start:.1f} s, at most {peak_gb():.2f} GB")
+
+
+def lens_memory() -> None:
+    """Memory of an image behind a lens that diffracts, over that of the bands it is made from."""
+    sensor, radiance = preset("low_noise"), scene(1024, LIGHTS["a lit room"])
+    lens = replace(sensor.lens, diffraction=1.0, veiling_glare=0.02)
+    before, cube = peak_gb(), radiance.values.nbytes / 1e9
+    form_image(radiance, replace(sensor, lens=lens))
+    print(
+        f"1024x1024 behind a lens that diffracts: bands {cube:.2f} GB, image and all that its making takes "
+        f"{(peak_gb() - before) / cube:.2f} x that on top"
+    )
+
+
+def memory() -> None:
+    for part in ("--strips", "--lens"):
+        subprocess.run([sys.executable, __file__, part], check=True)
+
+
 def main() -> None:
     environment()
     with tempfile.TemporaryDirectory() as home:
@@ -126,8 +168,11 @@ def main() -> None:
         "image behind a lens that diffracts": lambda: form_image(radiance, replace(sensor, lens=lens)),
     }
     for name, took in shortest(slow, rounds=2).items():
-        print(f"1024x1024, {name}: {took[0]:.0f} ms, processor {took[1]:.0f} ms")
+        print(f"1024x1024, {name}: {took[0]:.0f} ms, processor {took[1]:.0f} ms", flush=True)
+    memory()
 
+
+PARTS = {"--first-call": first_call, "--strips": strips_memory, "--lens": lens_memory, "--memory": memory}
 
 if __name__ == "__main__":
-    first_call() if "--first-call" in sys.argv[1:] else main()
+    PARTS.get(" ".join(sys.argv[1:]), main)()

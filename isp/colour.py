@@ -14,7 +14,7 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from sensor.curves import rgbw
 
 Image = NDArray[np.float64]
-BalanceSource = Literal["gray world", "calibrated"]
+BalanceSource = Literal["gray world", "calibrated", "given"]
 
 LEAST_STANDARD_ERRORS = 5.0  # a channel whose mean is less certain than this can't set its own gain
 
@@ -34,7 +34,7 @@ class Balance:
     gains : (channel,) float64
         Factor on each channel; green's is 1.
     sources : tuple of str
-        Where each gain comes from: ``gray world``, or ``calibrated`` where the picture was too dark to tell.
+        Where each gain comes from: ``gray world``, ``calibrated`` where the picture was too dark to tell, or ``given``.
     """
 
     gains: Floats

@@ -29,7 +29,7 @@ class Picture:
     rgb : (h, w, 3) float64
         Linear sRGB, not clipped to the display; a neutral reads the electrons of a green pixel.
     balance : mapping of str to str
-        Where each channel's gain comes from: ``gray world`` or ``calibrated``.
+        Where each channel's gain comes from: ``gray world``, ``calibrated`` or ``given``.
     snr : float or None
         Frame SNR of green, on which substitution is decided; None for the Bayer camera.
     substituted : bool or None
@@ -50,6 +50,7 @@ def develop_interleaved(
     matrix: ArrayLike,
     *,
     neutral: ArrayLike | None = None,
+    balance: ArrayLike | None = None,
     neighbourhood: int = NEIGHBOURHOOD,
     patch: int = PATCH,
     sigma_d: float = SIGMA_D,
@@ -67,6 +68,8 @@ def develop_interleaved(
     neutral : (channel,) array_like, optional
         Calibrated response to a neutral, in the order of `sensor.cfa.channels`: the white balance of pictures that are
         too dark for Gray World. The project's own curves under D65 by default.
+    balance : (channel,) array_like, optional
+        Response to what shall come out neutral, such as a file's as-shot neutral, in place of Gray World's means.
     neighbourhood, patch, sigma_d, sigma_s
         Of `isp.interleaved.reconstruct`.
     substitution_snr : float
@@ -86,6 +89,7 @@ def develop_interleaved(
         raw,
         matrix,
         neutral=neutral,
+        balance=balance,
         neighbourhood=neighbourhood,
         patch=patch,
         sigma_d=sigma_d,
@@ -99,6 +103,7 @@ def picture_interleaved(
     matrix: ArrayLike,
     *,
     neutral: ArrayLike | None = None,
+    balance: ArrayLike | None = None,
     neighbourhood: int = NEIGHBOURHOOD,
     patch: int = PATCH,
     sigma_d: float = SIGMA_D,
@@ -109,28 +114,32 @@ def picture_interleaved(
     letters, colours = _require(raw, ("R", "G", "B", "W")), _checked(matrix)
     result = reconstruct_with_noise(raw, neighbourhood=neighbourhood, patch=patch, sigma_d=sigma_d, sigma_s=sigma_s)
     planes = np.asarray(result.estimate, dtype=np.float64)
-    balance = _balance(raw, planes, neutral)
-    balanced = _clip_highlights(raw, planes * balance.gains)
+    white = _balance(raw, planes, neutral, balance)
+    balanced = _clip_highlights(raw, planes * white.gains)
     rgb = balanced[..., :3] @ colours.T
     snr = green_snr(raw, planes)
     substituted = snr < substitution_snr
     if substituted:
         rgb = substitute_luminance(rgb, balanced[..., 3], ~_saturated_nearby(raw, "W"))
-    return Picture(rgb, dict(zip(letters, balance.sources, strict=True)), snr, substituted, result.engine)
+    return Picture(rgb, dict(zip(letters, white.sources, strict=True)), snr, substituted, result.engine)
 
 
-def develop_bayer(raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None) -> Image:
+def develop_bayer(
+    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
+) -> Image:
     """Develop a Bayer raw image: bilinear demosaicking, Gray World, matrix; parameters as `develop_interleaved`."""
-    return picture_bayer(raw, matrix, neutral=neutral).rgb
+    return picture_bayer(raw, matrix, neutral=neutral, balance=balance).rgb
 
 
-def picture_bayer(raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None) -> Picture:
+def picture_bayer(
+    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
+) -> Picture:
     """As `develop_bayer`, with the decisions."""
     letters = _require(raw, ("R", "G", "B"))
     planes = bilinear(raw)
-    balance = _balance(raw, planes, neutral)
-    rgb = _clip_highlights(raw, planes * balance.gains) @ _checked(matrix).T
-    return Picture(rgb, dict(zip(letters, balance.sources, strict=True)), None, None, "numpy")
+    white = _balance(raw, planes, neutral, balance)
+    rgb = _clip_highlights(raw, planes * white.gains) @ _checked(matrix).T
+    return Picture(rgb, dict(zip(letters, white.sources, strict=True)), None, None, "numpy")
 
 
 def _require(raw: RawImage, letters: tuple[str, ...]) -> tuple[str, ...]:
@@ -150,23 +159,32 @@ def _checked(matrix: ArrayLike) -> Image:
     return array
 
 
-def _balance(raw: RawImage, planes: Image, neutral: ArrayLike | None) -> Balance:
-    """Gray World: colours over the pixels without a saturated colour sample nearby, W over those it leaves as well.
+def _balance(raw: RawImage, planes: Image, neutral: ArrayLike | None, given: ArrayLike | None) -> Balance:
+    """White balance as given, or else by Gray World.
 
+    Gray World takes colours over the pixels without a saturated colour sample nearby, W over those it leaves as well.
     W saturates first; taking its pixels out of the colours' means too would leave them the dark part of the scene.
     """
     letters = channels(raw.cfa)
-    calibrated = neutral_response(letters) if neutral is None else np.asarray(neutral, dtype=np.float64)
-    if calibrated.shape != (len(letters),) or not np.all(calibrated > 0):
-        raise InputError(
-            f"neutral: {calibrated.tolist()!r} is not allowed; give a positive response for each of {letters}"
-        )
+    if given is not None:
+        response = _response("balance", given, letters)
+        return Balance(response[letters.index("G")] / response, tuple("given" for _ in letters))
+    calibrated = neutral_response(letters) if neutral is None else _response("neutral", neutral, letters)
     colours = ~_saturated_nearby(raw, "RGB")
     balance = _gray_world(raw, planes, calibrated, "RGB", colours)
     if "W" not in letters:
         return balance
     white = _gray_world(raw, planes, calibrated, "GW", colours & ~_saturated_nearby(raw, "W"))
     return Balance(np.append(balance.gains, white.gains[1]), (*balance.sources, white.sources[1]))
+
+
+def _response(name: str, values: ArrayLike, letters: tuple[str, ...]) -> Image:
+    response = np.asarray(values, dtype=np.float64)
+    if response.shape != (len(letters),) or not np.all((response > 0) & np.isfinite(response)):
+        raise InputError(
+            f"{name}: {response.tolist()!r} is not allowed; give a positive response for each of {letters}"
+        )
+    return response
 
 
 def _gray_world(raw: RawImage, planes: Image, calibrated: Image, letters: str, usable: NDArray[np.bool_]) -> Balance:

@@ -23,8 +23,9 @@ MOSAICS: Mapping[str, Tile] = MappingProxyType(
         "bayer_bggr": ("BG", "GR"),
         "bayer_grbg": ("GR", "BG"),
         "bayer_gbrg": ("GB", "RG"),
-        # Half of the pixels panchromatic, each colour on a diagonal: after Compton & Hamilton (Eastman Kodak), "Image
-        # sensor with improved light sensitivity", US patent 8 139 130.
+        # White on a checkerboard, and 2x2 cells of one colour on a diagonal, G R over B G. Demosaicking studies call it
+        # Kodak's, after Compton & Hamilton, "Image sensor with improved light sensitivity", US patent 8 139 130; some
+        # begin it two rows later, with W B W G.
         "rgbw_4x4": ("WGWR", "GWRW", "WBWG", "BWGW"),
         "rccc": ("RC", "CC"),  # cameras in cars: one red pixel in four, the others clear (C)
         "mono": ("W",),

@@ -8,7 +8,7 @@ from typing import Any
 
 from render.errors import InputError, require_keys
 from render.spectrum import Spectrum
-from sensor.cfa import channels, tile_of
+from sensor.cfa import Tile, channels, tile_of
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.curves import Responses, built_in, read_csv, read_curve, rgbw
 
@@ -35,6 +35,7 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     InputError
         For a file that can't be read, an unknown or missing key, or a value out of range; the file is named.
     """
+    tile = None if cfa is None else tile_of(cfa)  # a wrong one isn't the file's fault
     try:
         with Path(path).open("rb") as file:
             content = tomllib.load(file)
@@ -44,14 +45,14 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
             f"sensor file: {str(path)!r} can't be read ({reason}); copy a preset: rodcone new preset NAME -o FILE"
         ) from error
     try:
-        return _sensor(content, Path(path).parent, cfa)
+        return _sensor(content, Path(path).parent, tile)
     except InputError as error:
         raise InputError(f"sensor file {str(path)!r}: {error}") from error
 
 
-def _sensor(content: Mapping[str, Any], folder: Path, cfa: str | Sequence[str] | None) -> SensorConfig:
+def _sensor(content: Mapping[str, Any], folder: Path, cfa: Tile | None) -> SensorConfig:
     require_keys("key", content, _KEYS)
-    tile = tile_of(content.get("cfa", "rgbw") if cfa is None else cfa)
+    tile = tile_of(content.get("cfa", "rgbw")) if cfa is None else cfa
     if "responses" in content:
         responses = _responses(_table("responses", content), folder)
     else:

@@ -1,5 +1,6 @@
 """Files that appear whole or not at all."""
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
@@ -14,10 +15,26 @@ def replacing(*paths: Path) -> Iterator[tuple[Path, ...]]:
     Raises
     ------
     OSError
-        Where the folder of the first, which has to be that of all, is missing or can't be written.
+        Where the folder of the first, which has to be that of all, is missing or can't be written; it names the path.
     """
-    with tempfile.TemporaryDirectory(dir=paths[0].parent, prefix=".part-") as parts:
+    with _folder_beside(paths[0]) as parts:
         places = tuple(Path(parts) / path.name for path in paths)
         yield places
         for place, path in zip(places, paths, strict=True):
             os.replace(place, path)
+
+
+def check_place(path: Path) -> None:
+    """Make the folder of a file to be written later, and raise `OSError` where it can't be written there."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.is_dir():
+        raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    with _folder_beside(path):
+        pass
+
+
+def _folder_beside(path: Path) -> "tempfile.TemporaryDirectory[str]":
+    try:
+        return tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-")
+    except OSError as error:  # named after a folder that nobody asked for
+        raise OSError(error.errno, error.strerror, str(path)) from error

@@ -52,7 +52,7 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
 
 
 def under_zero(sensor: SensorConfig) -> float:
-    """Share of a point's light in the negative lobes of its image where one sample is a pixel."""
+    """Share of a point's light in the negative lobes of its image, 32 pixels around, where one sample is a pixel."""
     side = 32
     shape = (2 * side, 2 * side)
     point = np.zeros(shape)

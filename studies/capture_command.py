@@ -18,9 +18,10 @@ def capture(
     exposure_s: float | None = None,
     level: str | None = None,
     white_balance: str | None = None,
-    size: int = 256,
+    size: int | None = None,
     spp: int = 64,
     seed: int = 0,
+    trust_scene: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Photograph a scene and write raw files that raw converters open; prints their paths.
@@ -28,7 +29,8 @@ def capture(
     Parameters
     ----------
     source
-        Scene by name such as color_checker, or a file of spectral radiance: .exr, or .mat of ISETCam.
+        Scene by name such as color_checker, a Mitsuba scene (.xml), or a file of spectral radiance: .exr, or .mat of
+        ISETCam.
     out
         Raw file to write: .dng for Bayer and 2x2 RGBW (with a re-mosaiced Bayer one beside it, NAME_bayer.dng), .tif
         with a .json beside it for any mosaic.
@@ -43,21 +45,25 @@ def capture(
         by default.
     white_balance
         Illuminant, such as D65, that the camera's as-shot white balance and colour matrix are set to; the scene's
-        first light by default, D65 for a file.
+        first light by default, D65 for a file of radiance.
     size
-        Side of the rendered picture in pixels; a file keeps its own.
+        Longer side of the rendered picture in pixels; 256 by default, a .xml scene's film has its own, a file of
+        radiance keeps its own.
     spp
         Samples a pixel of the render.
     seed
         Seed of the render, the chip and the exposure.
+    trust_scene
+        Let a .xml scene load plug-ins of its own, which are native code, and files from anywhere.
     json
         Print one JSON object with the paths and facts of the exposure instead of the paths.
     """
     from studies.progress import progress
     from studies.shot import Order, take
 
+    order = Order(source, out, sensor, cfa, exposure_s, level, white_balance, size, spp, seed, trust_scene)
     with progress(sys.stderr) as step:
-        taken = take(Order(source, out, sensor, cfa, exposure_s, level, white_balance, size, spp, seed), step)
+        taken = take(order, step)
     for note in taken.notes:
         print(f"rodcone: {note}", file=sys.stderr)
     print(notation.dumps(taken.facts) if json else "\n".join(str(path) for path in taken.paths))

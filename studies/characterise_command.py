@@ -31,8 +31,10 @@ def characterise(
         Plot to write besides: photon transfer (linear and logarithmic), SNR and linearity, as .svg.
     json
         Print one JSON object in place of the table, with the photon-transfer series in it.
-    height, width
-        Of the chip in pixels; more of them make the standard errors smaller, column noise needs width.
+    height
+        Of the chip in pixels; more of them make the standard errors smaller.
+    width
+        Of the chip in pixels; column noise needs width.
     exposure_s
         Exposure time of the photon-transfer series in seconds.
     seed
@@ -40,15 +42,17 @@ def characterise(
     """
     from render.errors import InputError
     from sensor.characterise import characterise as run
-    from sensor.files import replacing
+    from sensor.files import check_place, replacing
     from sensor.presets import preset as camera
     from studies.transfer_chart import transfer_svg
 
     if out is not None and out.suffix.lower() != ".svg":
         raise InputError(f"out: {str(out)!r} has another ending; allowed: .svg; rename it")
-    result = run(camera(preset), (height, width), seed, exposure_s)
+    sensor = camera(preset)
     if out is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
+        check_place(out)
+    result = run(sensor, (height, width), seed, exposure_s)
+    if out is not None:
         with replacing(out) as (place,):
             place.write_text(transfer_svg(result, f"{preset}, characterised after EMVA 1288"), "utf-8")
     print(notation.dumps(as_data(result), allow_nan=False) if json else as_table(result))

@@ -1,6 +1,9 @@
 """The command `rodcone`. Results on stdout, progress and errors on stderr; bad input exits with code 2."""
 
 import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
@@ -112,7 +115,8 @@ app.command("studies.render_command:render", name="render", help="Render a scene
 def main(arguments: list[str] | None = None) -> Any:
     """Run the command; one line on stderr and exit code 2 for bad input, 1 for a file that can't be written."""
     try:
-        code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+        with _warnings_in_one_line():
+            code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         fail(" ".join(str(error).split()), BAD_INPUT)
     except OSError as error:
@@ -126,6 +130,14 @@ def main(arguments: list[str] | None = None) -> Any:
     except KeyboardInterrupt:
         fail("stopped; nothing was written", 130)
     sys.exit(code or 0)
+
+
+@contextmanager
+def _warnings_in_one_line() -> Iterator[None]:
+    """Print warnings as errors are, without the place in the code."""
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_: print(f"rodcone: {message}", file=sys.stderr)
+        yield
 
 
 def fail(message: str, code: int) -> None:

@@ -13,6 +13,7 @@ from sensor.dng import is_bayer
 from sensor.raw_files import read_raw
 from studies.camera import CAMERAS
 
+WHITE_BALANCES = ("gray-world", "as-shot")
 WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # the demo's rule, here on the picture's own luminance
 
 
@@ -24,11 +25,12 @@ class Developed:
     facts: dict[str, Any]
 
 
-def develop_file(path: Path, isp: str | None = None, ev: float | None = None) -> Developed:
+def develop_file(
+    path: Path, isp: str | None = None, ev: float | None = None, white_balance: str = WHITE_BALANCES[0]
+) -> Developed:
     """Read a raw file and develop it with its own colour calibration.
 
-    White balance is Gray World, the file's as-shot neutral where the picture is too dark for that; the colour matrix is
-    the file's, fitted under the light that the as-shot neutral stands for.
+    The colour matrix is the file's, fitted under the light that its as-shot neutral stands for.
 
     Parameters
     ----------
@@ -37,6 +39,9 @@ def develop_file(path: Path, isp: str | None = None, ev: float | None = None) ->
     ev : float, optional
         Brightness in stops: at 0 green's full well is white. Left out, the 99th percentile of the picture's luminance
         comes to 90 % of white, which noise raises in the deepest dark; for looking, not for measuring.
+    white_balance : str
+        ``gray-world`` as in the paper, with the file's as-shot neutral where the picture is too dark for that; or
+        ``as-shot``, that neutral in any case.
 
     Raises
     ------
@@ -45,13 +50,17 @@ def develop_file(path: Path, isp: str | None = None, ev: float | None = None) ->
     """
     if isp is not None and isp not in CAMERAS:
         raise unknown("isp", isp, CAMERAS)
+    if white_balance not in WHITE_BALANCES:
+        raise unknown("white_balance", white_balance, WHITE_BALANCES)
     if ev is not None:
         require_range("ev", ev, -40.0, 40.0, "give stops")
     raw = read_raw(path)
     if raw.colour is None:
         raise InputError(f"{path}: it holds no colour calibration; allowed: a camera with R, G and B; capture with one")
     name = isp or ("bayer" if is_bayer(raw.cfa) else "interleaved")
-    picture = CAMERAS[name][1](raw, raw.colour.to_srgb, neutral=raw.colour.neutral)
+    neutral = raw.colour.neutral
+    fixed = neutral if white_balance == "as-shot" else None
+    picture = CAMERAS[name][1](raw, raw.colour.to_srgb, neutral=neutral, balance=fixed)
     full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
     linear = picture.rgb / full_e
     stops = _stops(linear) if ev is None else ev

@@ -19,7 +19,8 @@ def preset(name: str, /, *, out: Annotated[Path, Parameter(name=["--out", "-o"])
     Parameters
     ----------
     name
-        Preset by name: low_noise, table1_output, table1_pixel, ...
+        Preset by name: low_noise, table1_pixel, table1_output, or table1_output_6um, _3um and _2um for the paper's
+        Figures 1 and 5.
     out
         File to write, ending in .toml; one that exists is left alone. Wherever a preset's name goes, so does this path.
     """

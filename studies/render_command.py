@@ -1,8 +1,6 @@
 """The command `rodcone render`."""
 
-import errno
 import json as notation
-import os
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,16 +16,14 @@ from render.illuminants import illuminant
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup, Scene
-from render.scene_file import load_scene_file
 from render.scene_parts import SceneFile
 from render.spectrum import VISIBLE_NM, Floats, Spectrum
 from render.transport import Transport
-from scenes.catalog import load
-from studies.levels import parse_level
+from sensor.files import check_place
 from studies.progress import progress
 from studies.results import render_facts
+from studies.scene_source import asked_level, open_scene
 
-CATALOGUE_SIDE = 256  # pixels, where neither the scene nor the user states a size
 MOST_BANDS = 1000
 INTERRUPTED = 130  # exit code after Ctrl-C: 128 + SIGINT
 
@@ -131,11 +127,11 @@ def run(order: Order) -> dict[str, Any]:
     if order.out.suffix.lower() != ".exr":
         raise InputError(f"out: {str(order.out)!r} is not allowed; give a file ending in .exr")
     nm, widths = _bands(order.bands)
-    opened = _open(order)
+    opened = open_scene(order.source, order.trust)
     scene, size = opened.scene, _size(opened.size, order.height, order.width)
     spectra = _spectra(scene, order.light)
-    luminance_cd_m2, illuminance_lux = _level(scene, order.level)
-    _require_place(order.out)
+    luminance_cd_m2, illuminance_lux = asked_level(scene, order.level)
+    check_place(order.out)
     with progress(sys.stderr) as step:
         step("render", 0.0)
         transport = render_transport(
@@ -149,14 +145,6 @@ def run(order: Order) -> dict[str, Any]:
     radiance = transport.relight(spectra, luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
     write_exr(order.out, radiance, scene=scene.name)
     return _facts(order, opened, transport, radiance)
-
-
-def _open(order: Order) -> SceneFile:
-    if Path(order.source).suffix.lower() == ".xml":
-        return load_scene_file(order.source, trust=order.trust)
-    if order.trust:
-        raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")
-    return SceneFile(load(order.source), (CATALOGUE_SIDE, CATALOGUE_SIDE), ())
 
 
 def _bands(text: str | None) -> tuple[Floats | None, Floats | None]:
@@ -208,28 +196,6 @@ def _luminance(scene: Scene, name: str, group: LightGroup) -> float:
     if own <= 0:
         raise InputError(f"light: group {name!r} of scene {scene.name} is dark; give it a spectrum in the scene")
     return own
-
-
-def _level(scene: Scene, text: str | None) -> tuple[float | None, float | None]:
-    """Level as mean luminance [cd m^-2] or as illuminance [lux]; neither for the scene's own lights."""
-    if text is None:
-        return None, None
-    value, unit = parse_level(text)
-    if unit == "lux" and scene.reference_plane is None:
-        raise InputError(
-            f"level: {text!r} needs a reference plane, which scene {scene.name} doesn't state; give it in cd/m2, "
-            "or put an irradiancemeter on a shape"
-        )
-    return (None, value) if unit == "lux" else (value, None)
-
-
-def _require_place(out: Path) -> None:
-    """Raise `OSError` before the render where the file can't be written after it."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    if out.is_dir():
-        raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(out))
-    if not os.access(out.parent, os.W_OK):
-        raise OSError(errno.EACCES, os.strerror(errno.EACCES), str(out.parent))
 
 
 def _facts(order: Order, opened: SceneFile, transport: Transport, radiance: SpectralRadiance) -> dict[str, Any]:

@@ -52,7 +52,7 @@ def sensor_facts(name: str) -> dict[str, Any]:
 
 
 def environment() -> dict[str, Any]:
-    """Versions and engine that made the numbers."""
+    """Versions and engines that made the numbers."""
     packages = {name: metadata.version(name) for name in ("mitsuba", "drjit", "numpy", "scipy", "scikit-image")}
     return {
         "python": platform.python_version(),
@@ -60,6 +60,7 @@ def environment() -> dict[str, Any]:
         "llvm": LIBLLVM.name if LIBLLVM else "none",
         "variant": variant(),
         "engine": backend(),
+        "engine of captures": "numpy",  # `studies.camera.photograph` reads out in the exact form
         "threads": dr.thread_count() if backend() == "llvm" else 1,
         "platform": platform.platform(),
     }
@@ -69,7 +70,7 @@ def notes() -> list[str]:
     """What fell back, in words."""
     if backend() == "numpy":
         return [
-            "Neither LLVM nor CUDA answered: stock path + specfilm rendered in scalar_spectral, and the reconstruction "
-            "ran its NumPy form."
+            "Neither LLVM nor CUDA answered: stock path + specfilm rendered in scalar_spectral, captures and the "
+            "reconstruction ran their NumPy forms."
         ]
     return []

@@ -14,9 +14,9 @@ from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_source import is_radiance_file
 from render.scene import Scene
+from render.scene_parts import SceneFile
 from render.spectrum import Spectrum
 from render.transport import Transport
-from scenes.catalog import load
 from sensor.calibration import ColourCalibration
 from sensor.capture import capture
 from sensor.cfa import channels, check_covers
@@ -24,13 +24,16 @@ from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.dng import is_rgbw
 from sensor.exposure import auto_exposure_s
+from sensor.files import check_place
+from sensor.left_out import left_out
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files import check_ending, write_raw
 from studies.calibrate import calibrate, iso_speed
-from studies.levels import parse_level, resolve_level
-from studies.radiance_file import check_radiance_file, open_radiance_file
+from studies.levels import parse_level
+from studies.radiance_file import LIGHT, check_radiance_file, open_radiance_file
+from studies.scene_source import asked_level, open_scene
 
 Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
@@ -38,7 +41,7 @@ _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this
 
 @dataclass(frozen=True)
 class Order:
-    """What to photograph and how; None stands for the preset's mosaic, auto exposure, the scene's level and light."""
+    """What to photograph and how; None: the preset's mosaic, auto exposure, the scene's level, light and size."""
 
     source: str
     out: Path
@@ -47,9 +50,10 @@ class Order:
     exposure_s: float | None = None
     level: str | None = None
     white_balance: str | None = None
-    size: int = 256
+    size: int | None = None
     spp: int = 64
     seed: int = 0
+    trust: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,67 +75,82 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
     OSError
         Where the folder can't be written.
     """
-    sensor, scene = _check(order)
-    if scene is None:
+    sensor, opened = _check(order)
+    if opened is None:
         transport, light, notes = open_radiance_file(order.source, order.white_balance)
     else:
-        light = _light(order, scene)
-        notes = []
+        light, notes = _light(order, opened.scene)
+        notes += opened.notes
     colour = calibrate(sensor, light) if set("RGB") <= set(channels(sensor.cfa)) else None
-    order.out.parent.mkdir(parents=True, exist_ok=True)  # told before the render, not after
-    if scene is not None:
-        transport = _render(order, scene, step)
+    check_place(order.out)  # told before the render, not after
+    if opened is not None:
+        transport = _render(order, opened, step)
     step("exposure", 0.9)
-    radiance = _lit(order, transport)
+    radiance = _lit(order, opened, transport)
     raw = _expose(order, sensor, radiance, colour)
     bayer = remosaic(raw) if order.out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) else None
     paths = write_raw(raw, order.out)
     if bayer is not None:
         paths += write_raw(bayer, order.out.with_stem(order.out.stem + "_bayer"))
-    return Taken(paths, _facts(order, raw, radiance, paths), tuple(notes))
+    return Taken(paths, _facts(order, sensor, raw, radiance, paths), tuple(notes))
 
 
-def _check(order: Order) -> tuple[SensorConfig, Scene | None]:
+def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
     """Sensor and scene (None: a stored radiance), or `InputError`."""
     sensor = preset(order.sensor, order.cfa)
     check_ending(order.out, sensor.cfa)
-    require_whole("size", order.size, 1, 8192, "give the picture's side in pixels")
-    check_covers(sensor.cfa, (order.size, order.size))
     require_whole("spp", order.spp, 1, 1 << 16, "give samples per pixel")
     require_whole("seed", order.seed, 0, 2**31, "give a whole number")
+    if order.size is not None:
+        require_whole("size", order.size, 1, 8192, "give the picture's longer side in pixels")
     if order.exposure_s is not None:
         require_range("exposure_s", order.exposure_s, 0.0, 1e7, "give seconds, 0 or more")
     elif "G" not in channels(sensor.cfa):
         raise InputError(f"cfa: {sensor.cfa} has no G for the auto exposure; allowed: a mosaic with G; give exposure_s")
-    levels = () if order.level is None else (order.level,)
-    for level in levels:
-        parse_level(level)
     if is_radiance_file(order.source):
-        check_radiance_file(order.source, levels)
+        if order.trust:
+            raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")
+        check_radiance_file(order.source, () if order.level is None else (order.level,))
         return sensor, None
-    return sensor, load(order.source)
+    opened = open_scene(order.source, order.trust)
+    asked_level(opened.scene, order.level)
+    check_covers(sensor.cfa, _size(order, opened))
+    return sensor, opened
 
 
-def _light(order: Order, scene: Scene) -> Spectrum:
+def _size(order: Order, opened: SceneFile) -> tuple[int, int]:
+    """Height and width: the film's own, or its proportions with the longer side that was asked for."""
+    height, width = opened.size
+    scale = 1.0 if order.size is None else order.size / max(height, width)
+    return max(1, round(height * scale)), max(1, round(width * scale))
+
+
+def _light(order: Order, scene: Scene) -> tuple[Spectrum, list[str]]:
+    """Light that the camera's colours are set to, and what had to be assumed."""
     if order.white_balance is not None:
-        return illuminant(order.white_balance)
-    return next(iter(scene.groups.values())).spectrum
+        return illuminant(order.white_balance), []
+    name, first = next(iter(scene.groups.items()))
+    if not first.own_colour:
+        return first.spectrum, []
+    assumed = f"scene {scene.name}: light group {name!r} has colours of its own; white balance is set to {LIGHT}"
+    return illuminant(LIGHT), [f"{assumed}, --white-balance sets it otherwise"]
 
 
-def _render(order: Order, scene: Scene, step: Step) -> Transport:
+def _render(order: Order, opened: SceneFile, step: Step) -> Transport:
     return render(
-        scene,
-        (order.size, order.size),
+        opened.scene,
+        _size(order, opened),
         spp=order.spp,
         seed=order.seed,
         progress=lambda share, error: step(f"render, relative error {error:.3f}", 0.9 * share),
     )
 
 
-def _lit(order: Order, transport: Transport) -> SpectralRadiance:
-    if order.level is None:
-        return transport.relight()
-    return transport.relight(luminance_cd_m2=resolve_level(order.level, transport).luminance_cd_m2)
+def _lit(order: Order, opened: SceneFile | None, transport: Transport) -> SpectralRadiance:
+    if opened is None:
+        return transport.relight(luminance_cd_m2=None if order.level is None else parse_level(order.level)[0])
+    luminance_cd_m2, illuminance_lux = asked_level(opened.scene, order.level)
+    return transport.relight(luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
 
 
 def _expose(
@@ -146,7 +165,9 @@ def _expose(
     return replace(raw, camera=name, f_number=sensor.lens.f_number, iso=iso_speed(sensor), colour=colour)
 
 
-def _facts(order: Order, raw: RawImage, radiance: SpectralRadiance, paths: tuple[Path, ...]) -> dict[str, Any]:
+def _facts(
+    order: Order, sensor: SensorConfig, raw: RawImage, radiance: SpectralRadiance, paths: tuple[Path, ...]
+) -> dict[str, Any]:
     return {
         "paths": [str(path) for path in paths],
         "source": order.source,
@@ -160,4 +181,5 @@ def _facts(order: Order, raw: RawImage, radiance: SpectralRadiance, paths: tuple
         "luminance_cd_m2": float(radiance.luminance().mean()),
         "relative_mc_error": radiance.relative_mc_error,
         "saturated": float(raw.saturated.mean()),
+        "left_out": list(left_out(sensor)),
     }

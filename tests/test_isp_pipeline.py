@@ -99,9 +99,27 @@ def test_wrong_mosaic_is_refused(develop: object) -> None:
         picture_bayer(raw(("RG", "BW"), dict.fromkeys("RGBW", 1.0)), IDENTITY)
 
 
+def test_a_given_balance_takes_the_place_of_gray_world() -> None:
+    matrix = np.array([[1.5, -0.5, 0.0], [0.0, 1.0, 0.0], [0.25, -0.25, 1.0]])
+    four = raw(("RG", "BW"), {"R": 500, "G": 1000, "B": 400, "W": 5000})
+    three = raw(("RG", "GB"), {"R": 500, "G": 1000, "B": 400})
+    # response 1 : 2 : 1 (: 4): R and B doubled, so that balanced signals are 1000, 1000 and 800
+    expected = [1000.0, 1000.0, 800.0]
+    for picture, letters in (
+        (picture_interleaved(four, matrix, balance=[1, 2, 1, 4]), "RGBW"),
+        (picture_bayer(three, matrix, neutral=[7, 1, 7], balance=[1, 2, 1]), "RGB"),
+    ):
+        assert picture.rgb == pytest.approx(np.full((32, 32, 3), expected), rel=1e-5)
+        assert picture.balance == dict.fromkeys(letters, "given")
+    assert develop_bayer(three, matrix, balance=[1, 2, 1]) == pytest.approx(np.full((32, 32, 3), expected))
+    assert develop_interleaved(four, matrix, balance=[1, 2, 1, 4])[0, 0] == pytest.approx(expected, rel=1e-5)
+
+
 def test_wrong_matrix_or_neutral_is_refused() -> None:
     image = raw(("RG", "GB"), {"R": 1, "G": 1, "B": 1})
     with pytest.raises(InputError, match=r"^matrix: shape \(2, 3\)"):
         develop_bayer(image, np.ones((2, 3)))
     with pytest.raises(InputError, match=r"^neutral: \[1.0, 0.0, 1.0\]"):
         develop_bayer(image, IDENTITY, neutral=[1, 0, 1])
+    with pytest.raises(InputError, match=r"^balance: \[1.0, inf, 1.0\]"):
+        develop_bayer(image, IDENTITY, balance=[1, np.inf, 1])

@@ -192,6 +192,7 @@ def test_filters_in_per_cent_are_told_so_although_the_product_would_fit(tmp_path
     [
         ("wavelength_nm,R,G\n400,0,0.1\n550,0.1,0.6\n650,0.55,0\n", "no curve exceeds 0.60"),
         ("wavelength_nm,G,W\n400,0,0.4\n550,0.8,0.8\n650,0,1.0\n", "W passes all of 450-650 nm but falls to 0.53"),
+        ("wavelength_nm,C\n400,0.2\n450,0.31\n650,0.93\n", "C passes all of 450-650 nm but falls to 0.33"),
     ],
 )
 def test_a_quantum_efficiency_that_would_be_applied_twice_is_warned_of_in_one_line(tmp_path, text, reason):

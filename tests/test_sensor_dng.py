@@ -372,6 +372,19 @@ def test_a_small_file_of_many_tags_takes_little_memory(tmp_path: Path) -> None:
     assert peak < 20 * 9 * length
 
 
+def test_strips_that_all_claim_the_same_bytes_are_refused(tmp_path: Path) -> None:
+    strips, length, first = 512, 1024, 8 + 1024
+    arrays = struct.pack(f"<{strips}I", *[8] * strips) + struct.pack(f"<{strips}I", *[length] * strips)
+    one = {256: 512, 257: 512, 258: 16, 259: 1, 262: 32803, 277: 1}
+    tags = [(code, 1, value) for code, value in one.items()]
+    tags += [(273, strips, first), (279, strips, first + 4 * strips)]
+    entries = b"".join(struct.pack("<HHII", code, 4, count, value) for code, count, value in sorted(tags))
+    content = b"II*\0" + struct.pack("<I", first + len(arrays)) + bytes(length) + arrays
+    (tmp_path / "shot.dng").write_bytes(content + struct.pack("<H", len(tags)) + entries + bytes(4))
+    with pytest.raises(InputError, match=r"512 x 512 pixels of 2 bytes don't fit its \d{4} bytes"):
+        read_dng(tmp_path / "shot.dng")
+
+
 @pytest.mark.parametrize("content", [b"", b"II*\0", b"MM\0*" + bytes(40), b"II*\0\xff\xff\xff\xff", bytes(100)])
 def test_what_is_no_dng_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "shot.dng").write_bytes(content)

@@ -15,6 +15,7 @@ from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from sensor.cfa import BAYER, RGBW, mask
+from sensor.left_out import left_out
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -95,6 +96,7 @@ def test_the_signal_is_that_of_the_level_and_exposure_asked_for(
         code, printed, _ = call(arguments, capsys)
         facts = json.loads(printed)
         assert (code, facts["paths"], facts["exposure_s"]) == (0, [out], exposure_s)
+        assert facts["left_out"] == list(left_out(sensor))
         assert facts["luminance_cd_m2"] == pytest.approx(25.0 if level is None else 50.0, rel=1e-6)
         expected = expected_electrons(form_image(wall(), sensor), sensor, 0.02) * factor
         # mean over 3072 pixels: shot noise, PRNU and the dark; five standard errors
@@ -139,7 +141,10 @@ def test_the_file_carries_the_calibration_for_the_white_balance_asked_for(
     [
         (["color_cheker"], ["scene", "color_cheker", "did you mean 'color_checker'"]),
         (["flat_field", "--sensor", "lownoise"], ["sensor preset", "did you mean 'low_noise'"]),
-        (["flat_field", "--cfa", "bayr"], ["cfa", "'bayr'", "bayer"]),
+        (["flat_field", "--cfa", "bayr"], ["rodcone: cfa: 'bayr' is unknown", "did you mean 'bayer'"]),
+        (["flat_field", "--trust-scene"], ["'flat_field' is no .xml scene"]),
+        (["scene.exr", "--trust-scene"], ["'scene.exr' is no .xml scene"]),
+        (["none.xml"], ["'none.xml' is missing"]),
         (["flat_field", "--cfa", "rccc"], ["can't hold the mosaic", "shot.tif"]),
         (["flat_field", "--cfa", "rccc", "-o", "o/shot.tif"], ["has no G", "give exposure_s"]),
         (["flat_field", "-o", "o/shot.cr2"], ["another ending", ".dng, .tif, .tiff"]),
@@ -168,6 +173,44 @@ def test_bad_input_is_one_line_exit_code_2_and_no_file(
     for word in words:
         assert word in err
     assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+SCENE = """<scene version="3.0.0">
+<sensor type="perspective"><float name="fov" value="20"/>
+  <transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="24"/></film></sensor>
+<shape type="rectangle" id="wall"><bsdf type="diffuse"><spectrum name="reflectance" value="0.5"/></bsdf></shape>
+<emitter type="directional" id="sun"><vector name="direction" x="0" y="0" z="-1"/>{}</emitter>
+</scene>"""
+
+
+def test_a_users_scene_is_photographed_as_large_as_its_film_says(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    scene, out = tmp_path / "room.xml", tmp_path / "shot.dng"
+    scene.write_text(SCENE.format('<spectrum name="irradiance" value="2"/>'))
+    arguments = ["capture", str(scene), "-o", str(out), "--cfa", "bayer", "--spp", "1"]
+    for more, shape in (([], (24, 32)), (["--size", "16"], (12, 16))):
+        code, printed, err = call([*arguments, "--level", "25cd/m2", *more], capsys)
+        assert (code, printed, err, read_raw(out).shape) == (0, f"{out}\n", "", shape)
+    code, _, err = call([*arguments, "--level", "25lux"], capsys)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "needs a reference plane, which scene room doesn't state" in err
+
+
+def test_light_with_colours_of_its_own_leaves_the_balance_at_daylight_and_says_so(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    scene, out = tmp_path / "room.xml", tmp_path / "shot.dng"
+    two = '<spectrum name="irradiance" value="2"/></emitter><emitter type="directional" id="sun:b">'
+    scene.write_text(SCENE.format(two + '<spectrum name="irradiance" value="400:1, 700:2"/>'))
+    arguments = ["capture", str(scene), "-o", str(out), "--cfa", "bayer", "--spp", "1", "--level", "25cd/m2"]
+    code, _, err = call(arguments, capsys)
+    assert (code, err.count("\n")) == (0, 1)
+    assert "light group 'sun' has colours of its own; white balance is set to D65, --white-balance sets it" in err
+    colour = read_raw(out).colour
+    assert colour is not None
+    np.testing.assert_array_equal(colour.neutral, calibrate(preset("low_noise", "bayer"), illuminant("D65")).neutral)
 
 
 def test_lux_of_a_file_without_a_plane_is_refused(
@@ -249,6 +292,28 @@ def test_a_picture_too_dark_for_gray_world_takes_the_files_neutral(
     assert np.abs(grey - 255 * encode_srgb(np.array(0.64))).max() <= 3.0
 
 
+@pytest.mark.parametrize("cfa", ["bayer", "rgbw"])
+def test_as_shot_balance_keeps_the_light_s_colour_that_gray_world_takes_away(
+    cfa: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    raw = negative(tmp_path / "shot.dng", cfa, 0.1, light="A")
+    colour = calibrate(preset("low_noise", cfa), illuminant("D65"))
+    write_raw(replace(raw, colour=colour), tmp_path / "shot.dng")  # balanced for daylight, taken under a lamp
+    signal = np.array([raw.electrons[mask(raw.cfa, letter, SHAPE)].mean() for letter in "RGB"])
+    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
+    orange = colour.to_srgb @ (signal / colour.neutral[:3] / full_e)
+    for balance, source, expected in (("as-shot", "given", orange), ("gray-world", "gray world", np.full(3, 0.1))):
+        out = tmp_path / f"{balance}.png"
+        arguments = ["develop", str(tmp_path / "shot.dng"), "--ev", "1", "--white-balance", balance, "-o", str(out)]
+        code, printed, _ = call([*arguments, "--json"], capsys)
+        assert (code, set(json.loads(printed)["balance"].values())) == (0, {source})
+        with Image.open(out) as picture:
+            pixels = np.asarray(picture)
+        # half a level of 8 bits, and the raw data's rounding: half a DN of 340 in B, 0.15 % of linear light
+        assert np.abs(pixels - 255 * encode_srgb(2 * expected)).max() <= 0.7
+    assert orange[0] > 2 * orange[2]  # R over B of illuminant A seen by daylight
+
+
 def test_sixteen_bits_hold_what_eight_round_away(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     negative(tmp_path / "shot.dng")
     for bits in ("8", "16"):
@@ -273,6 +338,8 @@ def test_black_frames_are_black_and_no_division_by_zero(capsys: pytest.CaptureFi
         (["shot.dng", "--isp", "interleaved"], ["holds ('R', 'G', 'B')", "use the other camera's pipeline"]),
         (["shot.dng", "--isp", "bayr"], ["isp", "'bayr'", "did you mean 'bayer'"]),
         (["shot.dng", "--bits", "12"], ["bits: 12", "give 8 or 16"]),
+        (["shot.dng", "--white-balance", "as_shot"], ["white_balance", "did you mean 'as-shot'"]),
+        (["."], ["'.' is a folder"]),
         (["shot.dng", "--ev", "inf"], ["ev: inf", "give stops"]),
         (["shot.dng", "-o", "shot.jpg"], ["another ending", ".png"]),
         (["shot.cr2"], ["another ending", ".dng"]),

@@ -2,6 +2,7 @@
 
 import json
 import re
+import warnings
 from xml.etree import ElementTree
 
 import numpy as np
@@ -100,6 +101,21 @@ def test_a_file_of_the_user_s_own_is_measured_too(capsys, tmp_path):
     assert code == 0
     assert figures["DSNU"]["configured"] == 9.0
     assert figures["DSNU"]["measured"] == pytest.approx(9.0, rel=0.1)
+
+
+def test_a_warning_is_one_line_without_its_place_in_the_code(capsys, tmp_path):
+    (tmp_path / "qe.csv").write_text(
+        "wavelength_nm,R,G,B,W\n400,0,0,0.4,0.4\n550,0,0.6,0,0.8\n700,0.5,0,0,0.9\n", "utf-8"
+    )
+    responses = '[responses]\ncsv = "qe.csv"\nrange_nm = [400.0, 700.0]\nquantum_efficiency = 0.5\n'
+    path = tmp_path / "mine.toml"
+    path.write_text(preset_file("low_noise").read_text("utf-8") + responses, "utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        code, out, err = call(["characterise", str(path), *SMALL], capsys)
+    assert (code, out.count("DSNU"), err.count("\n")) == (0, 1, 1)
+    assert err.startswith("rodcone: responses: ")
+    assert "seems to hold the quantum efficiency already" in err
 
 
 @pytest.mark.parametrize(
