@@ -92,6 +92,8 @@ def load_unit(scene: Scene, group: str, film: Film) -> Loaded:
     description = scene.lit({group: uniform_node(1.0)})
     description["sensor"] = {**description["sensor"], "film": _recorder(film, film.size), "sampler": _SAMPLER}
     if scene.reference_plane:
+        if backend() == "numpy":
+            scene.check_meter()
         meter = {
             "type": "irradiancemeter",
             "film": _recorder(film, (METER_PIXELS, METER_PIXELS)),

@@ -23,7 +23,7 @@ EMISSION_PARAMETER = {
 OWN_COLOUR_EMITTERS = ("envmap", "sunsky")
 SUNSKY_NM = (320.0, 720.0)  # Mitsuba's tables (Hosek & Wilkie 2012) end here, and give 0 beyond: found by evaluating it
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
-_SIZELESS_EMITTERS = ("point", "spot", "directional")  # rays of the irradiance meter can't meet them: it would read 0
+_SIZELESS_EMITTERS = ("point", "spot", "directional")  # rays can't meet them
 
 
 @dataclass(frozen=True)
@@ -108,6 +108,15 @@ class Scene:
                 f"scene {self.name}: bands reach {shortest_nm:g}-{longest_nm:g} nm, and a sunsky is known over "
                 f"{low:g}-{high:g} nm alone; give wavelength_nm within, or light by area, constant and directional"
             )
+
+    def check_meter(self) -> None:
+        """Raise `InputError` where Mitsuba's own irradiance meter, whose rays have to meet a light, would read 0."""
+        for path, kind in _emitter_paths(self.geometry).items():
+            if self.reference_plane and kind in _SIZELESS_EMITTERS:
+                raise InputError(
+                    f"scene {self.name}: without LLVM or CUDA light of {path!r} of type {kind!r} can't be measured; "
+                    "allowed: lights with a size; leave reference_plane out, or see `rodcone doctor`"
+                )
 
     @property
     def description(self) -> Node:

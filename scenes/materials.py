@@ -92,7 +92,13 @@ def block(place: Floats, width_m: float, height_m: float, depth_m: float, bsdf: 
 
 def rod(start: tuple[float, float, float], end: tuple[float, float, float], radius_m: float, bsdf: Node) -> Node:
     """Open cylinder between two points."""
-    return {"type": "cylinder", "p0": list(start), "p1": list(end), "radius": radius_m, "bsdf": bsdf}
+    return {
+        "type": "cylinder",
+        "p0": [float(x) for x in start],
+        "p1": [float(x) for x in end],
+        "radius": radius_m,
+        "bsdf": bsdf,
+    }
 
 
 def glass() -> Node:

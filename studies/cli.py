@@ -46,8 +46,8 @@ def demo(
     out
         Folder for report.html, results.json and overview.png.
     scene
-        Scene by name: color_checker, flat_field or still_life. Or a file of spectral radiance: OpenEXR (.exr) or an
-        ISETCam scene (.mat).
+        Scene by name, such as still_life, still_life_outdoor, night_street or cornell_box. Or a file of spectral
+        radiance: OpenEXR (.exr) or an ISETCam scene (.mat).
     size
         Side of the picture in pixels; a file has its own.
     sensor

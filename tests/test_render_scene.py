@@ -2,6 +2,7 @@
 
 import copy
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -104,7 +105,7 @@ def test_an_emitter_in_two_groups_is_refused(groups):
     assert "emitter 'sky' is in 2 light groups; put it in one" in complaint(groups)
 
 
-@pytest.mark.parametrize("kind", ["sky", "sun", "projector", "directionalarea"])
+@pytest.mark.parametrize("kind", ["timed_sunsky", "projector", "directionalarea"])
 @pytest.mark.parametrize("grouped", [True, False])
 def test_a_light_that_cannot_be_relit_is_refused_with_what_can(kind, grouped):
     text = complaint({"sky": SKY, "lamp": LAMP} if grouped else {"lamp": LAMP}, sky={"type": kind})
@@ -124,6 +125,16 @@ def test_a_light_of_its_own_colour_keeps_it_and_goes_out_with_its_group():
     assert tinted.lit({"sky": uniform_node(7.0)})["sky"] == sky
     assert tinted.description["sky"] == sky
     assert "sky" not in tinted.lit({"lamp": uniform_node(1.0)})
+
+
+@pytest.mark.parametrize("kind", ["point", "spot", "directional"])
+def test_a_light_without_size_beside_a_plane_is_refused_where_the_meter_would_miss_it(kind):
+    lamp = {"lamp": {"type": kind}}
+    small = Scene("test", GEOMETRY | {"sky": lamp["lamp"]}, BOTH, reference_plane="ball")
+    with pytest.raises(InputError, match=f"'sky' of type '{kind}' can't be measured"):
+        small.check_meter()
+    replace(small, reference_plane=None).check_meter()
+    Scene("test", GEOMETRY, BOTH, reference_plane="ball").check_meter()
 
 
 def test_a_light_deep_inside_other_nodes_is_found():
