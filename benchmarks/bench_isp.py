@@ -8,19 +8,17 @@ on one 8-bit plane of the same size with the same windows, where `cv2` is instal
 """
 
 import os
-import platform
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
+from environment import print_environment
 
 from isp.interleaved import reconstruct
-from render.jit import LIBLLVM, backend, dr
 from sensor.cfa import RGBW, letter_map
 from sensor.raw import RawImage
 
@@ -64,16 +62,7 @@ def first_call() -> None:
 
 
 def main() -> None:
-    processor = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        names = [line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if "model name" in line]
-        processor = names[0] if names else processor
-    library = LIBLLVM.name if LIBLLVM else "none"
-    print(f"{processor}, {os.cpu_count()} cores, {dr.thread_count()} threads; Python {platform.python_version()}")
-    print(f"NumPy {np.__version__}, Dr.Jit {dr.__version__} on {backend()}, LLVM library {library}")
-    if hasattr(os, "getloadavg"):
-        print(f"load before the run: {os.getloadavg()[0]:.1f}")
+    print_environment()
     with tempfile.TemporaryDirectory() as home:
         subprocess.run([sys.executable, __file__, "--first-call"], check=True, env={**os.environ, "HOME": home})
     opencv = None

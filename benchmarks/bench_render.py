@@ -14,14 +14,13 @@ both its renders count.
 """
 
 import argparse
-import os
-import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from environment import print_environment
 from numpy.typing import NDArray
 
 from render.loader import PART_BANDS, Film, Loaded, load_unit, mitsuba_module, variant
@@ -153,7 +152,8 @@ def main() -> None:
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--repeats", type=int, default=8)
     given = parser.parse_args()
-    print(f"{platform.platform()}, {os.cpu_count()} cores, Mitsuba {mitsuba_module().__version__}, {variant()}")
+    print_environment()
+    print(f"Mitsuba {mitsuba_module().__version__}, {variant()}")
     print(f"{given.size}x{given.size}, {given.spp} samples a pixel, depth {DEPTH}, {given.repeats} repeats")
     for name in given.scene or SCENES:
         scene = load(name)

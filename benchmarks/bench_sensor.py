@@ -12,7 +12,6 @@ that others use too.
 """
 
 import os
-import platform
 import resource
 import subprocess
 import sys
@@ -21,11 +20,11 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
+from environment import print_environment
 
-from render.jit import LIBLLVM, backend, dr
+from render.jit import backend
 from render.radiance import SpectralRadiance
 from sensor.capture import capture, capture_strips
 from sensor.device import draw_device
@@ -85,19 +84,6 @@ def parts(radiance: SpectralRadiance) -> dict[str, Callable[[], object]]:
     }
 
 
-def environment() -> None:
-    processor = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        names = [line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if "model name" in line]
-        processor = names[0] if names else processor
-    library = LIBLLVM.name if LIBLLVM else "none"
-    print(f"{processor}, {os.cpu_count()} cores, {dr.thread_count()} threads; Python {platform.python_version()}")
-    print(f"NumPy {np.__version__}, Dr.Jit {dr.__version__} on {backend()}, LLVM library {library}")
-    if hasattr(os, "getloadavg"):
-        print(f"load before the run: {os.getloadavg()[0]:.1f}")
-
-
 def first_call() -> None:
     """Time of the first capture in this process."""
     sensor, radiance = preset("low_noise"), scene(64, 1e-4)
@@ -147,7 +133,7 @@ def memory() -> None:
 
 
 def main() -> None:
-    environment()
+    print_environment()
     with tempfile.TemporaryDirectory() as home:
         subprocess.run([sys.executable, __file__, "--first-call"], check=True, env={**os.environ, "HOME": home})
     if backend() == "numpy":

@@ -11,6 +11,11 @@ class InputError(ValueError):
     """Bad input from the caller. The message is one line; the command line prints it and exits with code 2."""
 
 
+def one_line(error: BaseException) -> str:
+    """Give the words of an error on one line."""
+    return " ".join(str(error).split())
+
+
 def unknown(what: str, value: object, allowed: Iterable[str]) -> InputError:
     """Build the error for a name that is not in a list, naming the nearest one that is."""
     names = sorted(allowed)

@@ -3,8 +3,6 @@
 import contextlib
 import errno
 import io
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +10,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from render.errors import InputError
+from render.errors import InputError, one_line
 from render.exr_layout import (
     BANDS,
     LAYOUT_UNITS,
@@ -27,6 +25,7 @@ from render.exr_layout import (
     write_bands,
 )
 from render.file_checks import require_extent, require_file
+from render.files import replacing
 from render.photometry import tristimulus
 from render.radiance import SpectralRadiance
 
@@ -95,13 +94,11 @@ def write_exr(path: str | Path, radiance: SpectralRadiance, *, scene: str = "") 
 def _write_whole(path: Path, header: dict[str, Any], channels: dict[str, NDArray[np.float32]]) -> None:
     """Write beside the place and move there."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-") as folder:
-        part = os.path.join(folder, "part.exr")
+    with replacing(path) as (place,):
         try:
-            OpenEXR.File(header, channels).write(part)
+            OpenEXR.File(header, channels).write(str(place))
         except RuntimeError as error:
-            raise OSError(errno.EIO, " ".join(str(error).split()), str(path)) from error
-        os.replace(part, path)
+            raise OSError(errno.EIO, one_line(error), str(path)) from error
 
 
 def _preview(radiance: SpectralRadiance) -> tuple[NDArray[np.float32], float]:
@@ -191,7 +188,7 @@ def _part(path: Path, *, header_only: bool) -> Any:
         with contextlib.redirect_stdout(said):
             parts = OpenEXR.File(str(path), separate_channels=True, header_only=header_only).parts
     except Exception as error:
-        raise InputError(f"OpenEXR can't read it: {' '.join(str(error).split())}; save it again") from error
+        raise InputError(f"OpenEXR can't read it: {one_line(error)}; save it again") from error
     if not parts:  # printed as "Warning: ... for part 0 - reason"
         reason = " ".join(said.getvalue().rpartition(" - ")[2].split())
         raise InputError(f"OpenEXR can't read it: {reason}; save it again")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.dense import LANES, dense_path
-from render.errors import InputError
+from render.errors import InputError, one_line
 from render.jit import backend
 from render.matte import matte_surface, with_matte_surfaces
 from render.scene import Node, Scene, uniform_node
@@ -115,8 +115,8 @@ def _load(scene: Scene, description: Node) -> Any:
     try:
         return mitsuba_module().load_dict(description)
     except RuntimeError as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"scene {scene.name}: Mitsuba can't load it: {reason}; correct the description") from error
+        words = one_line(error)
+        raise InputError(f"scene {scene.name}: Mitsuba can't load it: {words}; correct the description") from error
 
 
 def _is_even_sky(mi_scene: Any) -> bool:

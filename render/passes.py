@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError
+from render.errors import InputError, one_line
 from render.loader import PART_BANDS, Film, Loaded, integrators, load_direct, mitsuba_module, parts, variant
 from render.scene import Scene
 from render.spectrum import Floats
@@ -117,8 +117,7 @@ def _rendered(unit: Loaded, sensor: Any, integrator: Any, spp: int, seed: int) -
         cause = _root_cause(error)
         if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
             raise
-        words = " ".join(str(cause).split())
-        raise InputError(f"scene: Mitsuba can't render it: {words}; correct the description") from None
+        raise InputError(f"scene: Mitsuba can't render it: {one_line(cause)}; correct the description") from None
     return np.ascontiguousarray(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from render.allowed_plugins import ALLOWED, SPECTRA
-from render.errors import InputError
+from render.errors import InputError, one_line
 from render.jit import backend, dr
 from render.scene import EMISSION_PARAMETER, LightGroup, Node
 from render.spectrum import Floats, Spectrum, flat
@@ -20,7 +20,7 @@ Path = tuple[str, ...]  # keys from the scene to one of its parts
 
 def reason(error: RuntimeError) -> str:
     """Mitsuba's own words on one line, less the lines of its source."""
-    return " ".join(re.sub(r"\[\w+\.cpp:\d+\] ", "", str(error)).split())
+    return re.sub(r"\[\w+\.cpp:\d+\] ", "", one_line(error))
 
 
 def type_of(part: Any) -> str:

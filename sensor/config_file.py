@@ -6,7 +6,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
-from render.errors import InputError, require_keys
+from render.errors import InputError, one_line, require_keys
 from render.spectrum import Spectrum
 from sensor.cfa import Tile, channels, tile_of
 from sensor.config import LensConfig, PixelConfig, SensorConfig
@@ -40,7 +40,7 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
         with Path(path).open("rb") as file:
             content = tomllib.load(file)
     except (OSError, ValueError) as error:  # TOMLDecodeError and UnicodeDecodeError are ValueErrors
-        reason = " ".join(str(error).split())
+        reason = one_line(error)
         raise InputError(
             f"sensor file: {str(path)!r} can't be read ({reason}); copy a preset: rodcone new preset NAME -o FILE"
         ) from error

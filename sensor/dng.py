@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from render.errors import InputError
+from render.files import replacing
 from sensor.calibration import ColourCalibration
 from sensor.cfa import Tile, channels
-from sensor.files import replacing
 from sensor.raw import RawImage
 from sensor.raw_json import parse_json, raw_image, to_json
 from sensor.tiff import CFA, EXIF, Tags, Values, read_mosaic, text, write_mosaic

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError
-from sensor.files import replacing
+from render.files import replacing
 from sensor.raw import RawImage
 from sensor.raw_json import MOST_BYTES, parse_json, raw_image, to_json
 from sensor.tiff import MIN_IS_BLACK, read_mosaic, write_mosaic

@@ -41,8 +41,8 @@ def characterise(
         Seed of the chip and of its frames.
     """
     from render.errors import InputError
+    from render.files import check_place, replacing
     from sensor.characterise import characterise as run
-    from sensor.files import check_place, replacing
     from sensor.presets import preset as camera
     from studies.transfer_chart import transfer_svg
 

@@ -1,8 +1,6 @@
 """The main job: one scene, one render, light levels in; two cameras' pictures and a report out."""
 
 import json
-import os
-import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 
 from isp.colour import encode_srgb
 from render.errors import InputError, require_range
+from render.files import replacing
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_source import is_radiance_file
@@ -148,11 +147,9 @@ def write(outcome: Outcome, folder: Path) -> Path:
         "overview.png": outcome.overview,
         "report.html": render_report(outcome.results, outcome.pictures).encode(),
     }
-    with tempfile.TemporaryDirectory(dir=folder, prefix=".part-") as parts:
-        for name, content in files.items():
-            (Path(parts) / name).write_bytes(content)
-        for name in files:
-            os.replace(Path(parts) / name, folder / name)
+    with replacing(*(folder / name for name in files)) as places:
+        for place, content in zip(places, files.values(), strict=True):
+            place.write_bytes(content)
     return folder / "report.html"
 
 

@@ -39,7 +39,7 @@ def develop(
         Print one JSON object with the path and what was decided instead of the path.
     """
     from render.errors import InputError
-    from sensor.files import check_place, replacing
+    from render.files import check_place, replacing
     from studies.development import develop_file
     from studies.png import to_png
 

@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from render.errors import InputError
-from sensor.files import replacing
+from render.files import replacing
 from sensor.presets import preset_file
 
 app = App(name="new", help="Write files to start from.")

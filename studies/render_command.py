@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from render.engine import render as render_transport
 from render.errors import InputError, require_keys, require_whole
 from render.exr import write_exr
+from render.files import check_place
 from render.illuminants import illuminant
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
@@ -19,7 +20,6 @@ from render.scene import LightGroup, Scene
 from render.scene_parts import SceneFile
 from render.spectrum import VISIBLE_NM, Floats, Spectrum
 from render.transport import Transport
-from sensor.files import check_place
 from studies.progress import progress
 from studies.results import render_facts
 from studies.scene_source import asked_level, open_scene

@@ -10,6 +10,7 @@ import numpy as np
 from isp.remosaic import remosaic
 from render.engine import render
 from render.errors import InputError, require_range, require_whole
+from render.files import check_place
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_source import is_radiance_file
@@ -24,7 +25,6 @@ from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.dng import is_rgbw
 from sensor.exposure import auto_exposure_s
-from sensor.files import check_place
 from sensor.left_out import left_out
 from sensor.optics import form_image
 from sensor.presets import preset

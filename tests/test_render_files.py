@@ -2,7 +2,7 @@
 
 import pytest
 
-from sensor.files import check_place, replacing
+from render.files import check_place, replacing
 
 
 def test_all_files_take_their_names_at_the_end(tmp_path):

@@ -11,9 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from render.errors import InputError
+from render.files import replacing
 from sensor.calibration import ColourCalibration
 from sensor.cfa import MOSAICS, Tile, channels
-from sensor.files import replacing
 from sensor.raw import RawImage
 from sensor.raw_files import read_raw, write_raw
 from sensor.raw_json import KEYS, MOST_BYTES, VERSION
