@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour import encode_srgb, fit_matrix
-from isp.pipeline import Picture, picture_bayer, picture_interleaved
+from isp.picture import Picture
+from isp.pipeline import picture_bayer, picture_interleaved
 from scenes.reflectances import color_checker
 from sensor.cfa import channels, mask
 from sensor.config import SensorConfig

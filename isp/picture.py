@@ -1,0 +1,87 @@
+"""A developed picture, and how linear planes of three colours become one."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from isp.balance import clip_highlights, white_balance
+from isp.colour import BalanceSource
+from render.errors import InputError
+from render.jit import Backend
+from sensor.cfa import channels
+from sensor.raw import RawImage
+
+Image = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A developed picture, and what was decided on the way.
+
+    Attributes
+    ----------
+    rgb : (h, w, 3) float64
+        Linear sRGB, not clipped to the display; a neutral reads the electrons of a green pixel.
+    balance : mapping of str to str
+        Where each channel's gain comes from: ``gray world``, ``calibrated`` or ``given``.
+    snr : float or None
+        Frame SNR of green, on which substitution is decided; None for the Bayer camera.
+    substituted : bool or None
+        Whether W replaced the luminance; None for the Bayer camera.
+    engine : "cuda", "llvm" or "numpy"
+        What ran the reconstruction.
+    """
+
+    rgb: Image
+    balance: Mapping[str, BalanceSource]
+    snr: float | None
+    substituted: bool | None
+    engine: Backend
+
+
+def finish(
+    raw: RawImage,
+    planes: Image,
+    matrix: ArrayLike,
+    *,
+    neutral: ArrayLike | None = None,
+    balance: ArrayLike | None = None,
+    engine: Backend = "numpy",
+) -> Picture:
+    """Develop planes of R, G and B: white balance, highlights, matrix.
+
+    Parameters
+    ----------
+    raw : RawImage
+        The exposure that the planes come from; its mosaic holds R, G and B.
+    planes : (h, w, 3) float64
+        Demosaicked channels [e-].
+    matrix, neutral, balance
+        As `isp.pipeline.develop_interleaved`.
+    engine : "cuda", "llvm" or "numpy"
+        What made the planes.
+    """
+    white = white_balance(raw, planes, neutral, balance)
+    rgb = clip_highlights(raw, planes * white.gains) @ checked_matrix(matrix).T
+    return Picture(rgb, dict(zip(channels(raw.cfa), white.sources, strict=True)), None, None, engine)
+
+
+def require_letters(raw: RawImage, letters: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the mosaic's letters, or raise `InputError` where they are others."""
+    if channels(raw.cfa) != letters:
+        raise InputError(
+            f"raw: mosaic {raw.cfa} holds {channels(raw.cfa)}; allowed here: {letters}; use the other camera's pipeline"
+        )
+    return letters
+
+
+def checked_matrix(matrix: ArrayLike) -> Image:
+    """Return the matrix as an array, or raise `InputError` unless it is 3x3 and finite."""
+    array = np.asarray(matrix, dtype=np.float64)
+    if array.shape != (3, 3) or not np.all(np.isfinite(array)):
+        raise InputError(
+            f"matrix: shape {array.shape} is not allowed; give 3x3 finite numbers, as fit_matrix makes them"
+        )
+    return array
