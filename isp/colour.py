@@ -11,7 +11,7 @@ from render.errors import InputError
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule, tristimulus
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
-from sensor.curves import rgbw
+from sensor.curves import Responses, rgbw
 
 Image = NDArray[np.float64]
 BalanceSource = Literal["gray world", "calibrated", "given"]
@@ -19,7 +19,7 @@ BalanceSource = Literal["gray world", "calibrated", "given"]
 LEAST_STANDARD_ERRORS = 5.0  # a channel whose mean is less certain than this can't set its own gain
 
 # IEC 61966-2-1 (sRGB): chromaticities of its primaries and of D65.
-_PRIMARIES_XY = np.array([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]])
+SRGB_PRIMARIES_XY = np.array([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]])
 _D65_XY = np.array([0.3127, 0.3290])
 # Bradford cone responses (Lam 1985), as ICC.1:2010 Annex E gives them.
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
@@ -70,16 +70,20 @@ def gray_world(
     return Balance(gains, tuple(sources))
 
 
-def neutral_response(letters: Sequence[str]) -> Floats:
-    """Relative electrons of the project's own curves from a neutral under D65, shape (letter,)."""
+def neutral_response(letters: Sequence[str], responses: Responses | None = None) -> Floats:
+    """Relative electrons of curves, the project's own by default, from a neutral under D65, shape (letter,)."""
     nm = DEFAULT_WAVELENGTH_NM
     width = band_widths(nm)
     light = illuminant("D65").band_average(nm, width) * photons_per_joule(nm)
-    return np.asarray(rgbw().band_average(tuple(letters), nm, width) @ light)
+    return np.asarray((responses or rgbw()).band_average(tuple(letters), nm, width) @ light)
 
 
 def fit_matrix(
-    responses: ArrayLike, wavelength_nm: ArrayLike, illuminant_spd: ArrayLike, reflectances: ArrayLike
+    responses: ArrayLike,
+    wavelength_nm: ArrayLike,
+    illuminant_spd: ArrayLike,
+    reflectances: ArrayLike,
+    width_nm: ArrayLike | None = None,
 ) -> NDArray[np.float64]:
     """Matrix from white-balanced camera channels to linear sRGB, least squares over reflectances.
 
@@ -91,11 +95,13 @@ def fit_matrix(
     responses : (channel, band) array_like
         Electrons per photon; three channels, or four with W.
     wavelength_nm : (band,) array_like
-        Evenly spaced centres.
+        Centres; evenly spaced where `width_nm` is left out.
     illuminant_spd : (band,) array_like
         Spectral power of the light, any scale.
     reflectances : (patch, band) array_like
         Training surfaces, such as the ColorChecker's. This and `responses` may also come transposed.
+    width_nm : (band,) array_like, optional
+        Widths of bands that aren't evenly spaced.
 
     Returns
     -------
@@ -107,8 +113,22 @@ def fit_matrix(
     InputError
         Where a shape doesn't fit the wavelengths, or there are too few surfaces.
     """
+    signals, target = training(responses, wavelength_nm, illuminant_spd, reflectances, width_nm)
+    # Rows sum to 1: the last coefficient is 1 minus the others, so fit differences from the last channel.
+    free, *_ = np.linalg.lstsq(signals[:, :-1] - signals[:, -1:], target - signals[:, -1:], rcond=None)
+    return np.concatenate([free, 1.0 - free.sum(axis=0, keepdims=True)]).T
+
+
+def training(
+    responses: ArrayLike,
+    wavelength_nm: ArrayLike,
+    illuminant_spd: ArrayLike,
+    reflectances: ArrayLike,
+    width_nm: ArrayLike | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Balanced signals (patch, channel) and linear sRGB (patch, 3) of training surfaces; as `fit_matrix` takes them."""
     nm = np.asarray(wavelength_nm, dtype=np.float64)
-    width = band_widths(nm)
+    width = band_widths(nm, width_nm)
     camera, surfaces = _band_last("responses", responses, nm.size), _band_last("reflectances", reflectances, nm.size)
     light = _band_last("illuminant_spd", illuminant_spd, nm.size)[0]
     if surfaces.shape[0] < camera.shape[0]:
@@ -116,10 +136,7 @@ def fit_matrix(
     photons = light * photons_per_joule(nm) * width
     signals = (surfaces * photons) @ camera.T / (photons @ camera.T)
     white = tristimulus(light, nm, width)
-    target = xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light, nm, width) / white[1], white))
-    # Rows sum to 1: the last coefficient is 1 minus the others, so fit differences from the last channel.
-    free, *_ = np.linalg.lstsq(signals[:, :-1] - signals[:, -1:], target - signals[:, -1:], rcond=None)
-    return np.concatenate([free, 1.0 - free.sum(axis=0, keepdims=True)]).T
+    return signals, xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light, nm, width) / white[1], white))
 
 
 def _band_last(name: str, values: ArrayLike, bands: int) -> NDArray[np.float64]:
@@ -139,19 +156,20 @@ def xyz_from_xy(xy: Floats) -> Floats:
     return np.array([xy[0] / xy[1], 1.0, (1 - xy[0] - xy[1]) / xy[1]])
 
 
-def _srgb_to_xyz() -> NDArray[np.float64]:
-    columns = np.stack([xyz_from_xy(xy) for xy in _PRIMARIES_XY], axis=1)
+def rgb_to_xyz(primaries_xy: Floats) -> NDArray[np.float64]:
+    """Matrix from linear R, G, B with these primaries, (3, 2) x and y, to XYZ; (1, 1, 1) gives D65 at Y = 1."""
+    columns = np.stack([xyz_from_xy(xy) for xy in primaries_xy], axis=1)
     return np.asarray(columns * np.linalg.solve(columns, xyz_from_xy(_D65_XY)))
 
 
 def xyz_to_srgb(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
     """Linear sRGB of XYZ over the last axis; D65 at Y = 1 gives (1, 1, 1)."""
-    return np.asarray(xyz @ np.linalg.inv(_srgb_to_xyz()).T)
+    return np.asarray(xyz @ np.linalg.inv(rgb_to_xyz(SRGB_PRIMARIES_XY)).T)
 
 
 def luminance_of_srgb(rgb: NDArray[np.floating]) -> NDArray[np.float64]:
     """Y of linear sRGB over the last axis."""
-    return np.asarray(rgb @ _srgb_to_xyz()[1])
+    return np.asarray(rgb @ rgb_to_xyz(SRGB_PRIMARIES_XY)[1])
 
 
 def adapt_to_d65(xyz: NDArray[np.float64], white_xyz: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -29,9 +29,11 @@ class Picture:
     snr : float or None
         Frame SNR of green, on which substitution is decided; None for the Bayer camera.
     substituted : bool or None
-        Whether W replaced the luminance; None for the Bayer camera.
+        Whether W gave most of the luminance; None for the Bayer camera.
     engine : "cuda", "llvm" or "numpy"
         What ran the reconstruction.
+    substitution : float or None
+        W's share of the luminance, 0 to 1; None for the Bayer camera.
     """
 
     rgb: Image
@@ -39,6 +41,7 @@ class Picture:
     snr: float | None
     substituted: bool | None
     engine: Backend
+    substitution: float | None = None
 
 
 def finish(

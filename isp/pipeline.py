@@ -3,20 +3,30 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.balance import clip_highlights, saturated_nearby, white_balance
+from isp.balance import clip_highlights, white_balance
 from isp.bayer import bilinear
+from isp.colour_fit import ColourFit, relative_noise
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, checked_matrix, finish, require_letters
 from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S
-from isp.substitution import SUBSTITUTION_SNR, green_snr, substitute_luminance
+from isp.similarity import saturated_fraction
+from isp.substitution import (
+    OCTAVES,
+    SUBSTITUTION_SNR,
+    green_snr,
+    matrix_with_white,
+    matrix_without_white,
+    substitution_weight,
+)
 from sensor.raw import RawImage
 
 Image = NDArray[np.float64]
+SATURATION_WINDOW = 5  # pixels over which eq. (6) counts
 
 
 def develop_interleaved(
     raw: RawImage,
-    matrix: ArrayLike,
+    matrix: ArrayLike | ColourFit,
     *,
     neutral: ArrayLike | None = None,
     balance: ArrayLike | None = None,
@@ -25,6 +35,7 @@ def develop_interleaved(
     sigma_d: float = SIGMA_D,
     sigma_s: float = SIGMA_S,
     substitution_snr: float = SUBSTITUTION_SNR,
+    octaves: float = OCTAVES,
 ) -> Image:
     """Develop an interleaved RGBW raw image; `picture_interleaved` gives the decisions beside the picture.
 
@@ -32,8 +43,9 @@ def develop_interleaved(
     ----------
     raw : RawImage
         Mosaic with R, G, B and W.
-    matrix : (3, 3) array_like
-        From balanced R, G, B to linear sRGB (`isp.colour.fit_matrix`).
+    matrix : (3, 3) array_like or ColourFit
+        From balanced R, G, B to linear sRGB (`isp.colour.fit_matrix`). A fit of all channels
+        (`isp.colour_fit.fit_colours`) lets W into the colours where it isn't saturated, as far as the noise asks.
     neutral : (channel,) array_like, optional
         Calibrated response to a neutral, in the order of `sensor.cfa.channels`: the white balance of pictures that are
         too dark for Gray World. The project's own curves under D65 by default.
@@ -42,7 +54,9 @@ def develop_interleaved(
     neighbourhood, patch, sigma_d, sigma_s
         Of `isp.interleaved.reconstruct`.
     substitution_snr : float
-        W replaces the luminance where the frame's green SNR is under it; 0 never, inf always.
+        W gives half of the luminance where the frame's green SNR is this, more under it; 0 never, inf always.
+    sharpness : float
+        Of `isp.substitution.substitution_weight`; inf is the paper's switch.
 
     Returns
     -------
@@ -64,12 +78,13 @@ def develop_interleaved(
         sigma_d=sigma_d,
         sigma_s=sigma_s,
         substitution_snr=substitution_snr,
+        octaves=octaves,
     ).rgb
 
 
 def picture_interleaved(
     raw: RawImage,
-    matrix: ArrayLike,
+    matrix: ArrayLike | ColourFit,
     *,
     neutral: ArrayLike | None = None,
     balance: ArrayLike | None = None,
@@ -78,19 +93,26 @@ def picture_interleaved(
     sigma_d: float = SIGMA_D,
     sigma_s: float = SIGMA_S,
     substitution_snr: float = SUBSTITUTION_SNR,
+    octaves: float = OCTAVES,
 ) -> Picture:
     """As `develop_interleaved`, with the decisions: eqs. (1)-(6), Gray World, matrix, luminance substitution."""
-    letters, colours = require_letters(raw, ("R", "G", "B", "W")), checked_matrix(matrix)
+    letters = require_letters(raw, ("R", "G", "B", "W"))
+    if not isinstance(matrix, ColourFit):
+        matrix = checked_matrix(matrix)
     result = reconstruct_with_noise(raw, neighbourhood=neighbourhood, patch=patch, sigma_d=sigma_d, sigma_s=sigma_s)
     planes = np.asarray(result.estimate, dtype=np.float64)
     white = white_balance(raw, planes, neutral, balance)
-    balanced = clip_highlights(raw, planes * white.gains)
-    rgb = balanced[..., :3] @ colours.T
     snr = green_snr(raw, planes)
-    substituted = snr < substitution_snr
-    if substituted:
-        rgb = substitute_luminance(rgb, balanced[..., 3], ~saturated_nearby(raw, "W"))
-    return Picture(rgb, dict(zip(letters, white.sources, strict=True)), snr, substituted, result.engine)
+    weight = substitution_weight(snr, substitution_snr, octaves)
+    noise = (
+        relative_noise(raw, planes, result.noise_gain, white.gains, matrix) if isinstance(matrix, ColourFit) else 0.0
+    )
+    balanced = clip_highlights(raw, planes * white.gains)
+    # W leaves the colours as eq. (6) leaves it out of the similarity: by the share of saturated pixels around.
+    alpha = saturated_fraction(raw, SATURATION_WINDOW)[..., None]
+    rgb = (1.0 - alpha) * (balanced @ matrix_with_white(matrix, noise, weight).T)
+    rgb += alpha * (balanced[..., :3] @ matrix_without_white(matrix, noise).T)
+    return Picture(rgb, dict(zip(letters, white.sources, strict=True)), snr, weight > 0.5, result.engine, weight)
 
 
 def develop_bayer(

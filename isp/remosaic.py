@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from isp.defects import mend
 from isp.interleaved import reconstruct
 from render.errors import InputError
 from sensor.cfa import Tile, channels, mask
@@ -31,14 +32,14 @@ def remosaic(raw: RawImage) -> RawImage:
 
     Where the two mosaics agree the sample stays as it is; elsewhere (W's sites, and B's where B has to move) stands the
     interleaved reconstruction of that channel, a weighted mean of its samples that W's detail guides. Those pixels hold
-    less noise than the noise profile says, and are correlated with their neighbours.
+    less noise than the noise profile says, and are correlated with their neighbours. Defective pixels are mended first.
 
     Raises
     ------
     InputError
         Where the mosaic is not 2x2 RGBW.
     """
-    tile = bayer_tile(raw.cfa)
+    tile, raw = bayer_tile(raw.cfa), mend(raw)
     estimate_dn = np.asarray(reconstruct(raw), dtype=np.float64) / raw.gain_e_per_dn + raw.black_dn
     dn = raw.dn.copy()
     for index, letter in enumerate(channels(raw.cfa)):

@@ -1,9 +1,16 @@
-"""Luminance substitution: in the deepest dark W gives the picture its luminance (Parmar & Wandell 2009, 3.1.3)."""
+"""Luminance substitution: in the deepest dark W gives the picture its luminance (Parmar & Wandell 2009, 3.1.3).
+
+The paper switches. Here the weight falls smoothly with the frame's SNR, so that a sweep over light shows no step; over
+a half counts as on, which is the switch's decision. W is not luminance: what it sees besides is taken out by the matrix
+fitted on surfaces (`isp.colour_fit`), as far as the noise of the colours allows.
+"""
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from isp.colour import luminance_of_srgb
+from isp.colour_fit import ColourFit
+from render.errors import InputError
 from sensor.cfa import channels
 from sensor.raw import RawImage
 
@@ -11,6 +18,13 @@ from sensor.raw import RawImage
 # expected SNR at 5 and 10 ms on `still_life`, under each reading of the table (docs/decisions/0005).
 SUBSTITUTION_SNR = 4.95  # `table1_output`: 3.59 and 6.82
 SUBSTITUTION_SNR_TABLE1_PIXEL = 0.672  # `table1_pixel`: 0.476 and 0.951
+OCTAVES = 1.0  # on either side: narrower shows as a step over light, wider leaves W in bright pictures
+
+# How much more error the reconstructed colours hold than noise: each is sampled at one pixel in four, and what W's
+# likeness brings together need not have one colour. Factors on their noise variance, in the matrix and in the
+# luminance that is substituted (docs/decisions/0015 has the sweep).
+COLOUR_ERROR = 10.0
+LUMINANCE_ERROR = 100.0
 
 
 def green_snr(raw: RawImage, estimate: NDArray[np.floating]) -> float:
@@ -30,18 +44,67 @@ def green_snr(raw: RawImage, estimate: NDArray[np.floating]) -> float:
     return float(np.median(kept)) if kept.size else float("nan")
 
 
-def substitute_luminance(
-    rgb: NDArray[np.float64], white: NDArray[np.float64], usable: NDArray[np.bool_]
-) -> NDArray[np.float64]:
-    """Replace the luminance of linear sRGB by W's, keeping each pixel's colour differences.
+def substitution_weight(snr: float, threshold: float, octaves: float = OCTAVES) -> float:
+    """How far W takes the luminance over, 0 to 1: smoothstep in log2(snr / threshold); over 0.5 counts as on.
 
     Parameters
     ----------
-    rgb : (h, w, 3) float64
-    white : (h, w) float64
-        Balanced W plane: equal to luminance on a neutral.
-    usable : (h, w) bool
-        Where W is not saturated; elsewhere the picture keeps its own luminance.
+    snr : float
+        Of `green_snr`; NaN (all saturated) gives 0, none or less than none gives 1.
+    threshold : float
+        SNR at a weight of one half; 0 never substitutes, inf always does.
+    octaves : float
+        Of SNR on either side of the threshold over which the weight goes to 1 and to 0; 0 is the paper's switch.
+
+    Raises
+    ------
+    InputError
+        For a threshold or a number of octaves that is negative or NaN.
     """
-    change = np.where(usable, white - luminance_of_srgb(rgb), 0.0)
-    return rgb + change[..., None]
+    for name, value in (("substitution_snr", threshold), ("octaves", octaves)):
+        if not value >= 0.0:  # written so that NaN fails
+            raise InputError(f"{name}: {value!r} is not allowed; give 0 or more")
+    if np.isnan(snr) or threshold == 0.0:
+        return 0.0
+    if np.isinf(threshold) or snr <= 0.0:
+        return 1.0
+    above = float(np.log2(snr / threshold))
+    if abs(above) >= octaves:
+        return float(above < 0.0)
+    t = 0.5 * (1.0 - above / octaves)
+    return t * t * (3.0 - 2.0 * t)
+
+
+def matrix_with_white(matrix: ArrayLike | ColourFit, noise: ArrayLike, weight: float) -> NDArray[np.float64]:
+    """Matrix from balanced R, G, B and W to linear sRGB, with its luminance substituted by `weight`.
+
+    Parameters
+    ----------
+    matrix : (3, 3) array_like or ColourFit
+        With a fit W joins the colours, by weights that minimise the expected error at the noise; a plain matrix leaves
+        it out of them, and W as it is gives the luminance.
+    noise : (4,) array_like
+        Variance of the balanced channels, as `isp.colour_fit.relative_noise`.
+    weight : float
+        Of `substitution_weight`.
+
+    Returns
+    -------
+    (3, 4) float64
+        Rows sum to 1, where those of `matrix` do.
+    """
+    if isinstance(matrix, ColourFit):
+        errors = np.asarray(noise, dtype=np.float64)
+        colours = matrix.matrix("RGBW", errors * COLOUR_ERROR)
+        white = luminance_of_srgb(matrix.matrix("RGBW", errors * [*[LUMINANCE_ERROR] * 3, 1.0]).T)
+    else:
+        colours = np.hstack([np.asarray(matrix, dtype=np.float64), np.zeros((3, 1))])
+        white = np.array([0.0, 0.0, 0.0, 1.0])
+    return np.asarray(colours + weight * (white - luminance_of_srgb(colours.T)))
+
+
+def matrix_without_white(matrix: ArrayLike | ColourFit, noise: ArrayLike) -> NDArray[np.float64]:
+    """As `matrix_with_white`, (3, 3), from balanced R, G and B: for pixels near which W is saturated."""
+    if isinstance(matrix, ColourFit):
+        return matrix.matrix("RGB", np.asarray(noise, dtype=np.float64)[:3] * COLOUR_ERROR)
+    return np.asarray(matrix, dtype=np.float64)

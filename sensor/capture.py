@@ -153,4 +153,4 @@ def _read_single(
     expected_e: NDArray[np.float32], sensor: SensorConfig, device: Device, exposure_s: float, rng: np.random.Generator
 ) -> RawImage:
     dn = read_frame(expected_e, sensor, device, exposure_s, draw_key(rng))
-    return as_raw(dn, sensor, exposure_s, engine=backend())
+    return as_raw(dn, sensor, exposure_s, engine=backend(), hot=device.hot)

@@ -46,6 +46,10 @@ class Responses:
                 )
         object.__setattr__(self, "curves", MappingProxyType(dict(self.curves)))
 
+    def __reduce__(self) -> tuple[type["Responses"], tuple[dict[str, Spectrum]]]:
+        """Travel to other processes, which a mapping proxy doesn't by itself."""
+        return Responses, (dict(self.curves),)
+
     def band_average(self, letters: tuple[str, ...], wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
         """Mean response in each band, shape (letter, band).
 

@@ -5,11 +5,12 @@ exactly (most have rationals of 32 bits) stands once more in DNGPrivateData, as 
 reading takes the calibration from there, and refuses a file whose public levels and mosaic say something else.
 """
 
+import struct
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from render.errors import InputError
 from render.files import replacing
@@ -17,17 +18,20 @@ from sensor.calibration import ColourCalibration
 from sensor.cfa import Tile, channels
 from sensor.raw import RawImage
 from sensor.raw_json import parse_json, raw_image, to_json
-from sensor.tiff import CFA, EXIF, Tags, Values, read_mosaic, text, write_mosaic
+from sensor.tiff import CFA, EXIF, MAKER, Tags, Values, read_make, read_mosaic, text, write_mosaic
 
 PRIVATE = b"rodcone\0"
 PRIVATE_DATA = 50740
+MAKE = "rodcone"
 CFA_REPEAT, CFA_PATTERN, BLACK_LEVEL, WHITE_LEVEL = 33421, 33422, 50714, 50717
+OPCODES = 51008  # OpcodeList1: what is done to the samples as read
 EXPOSURE_TIME, F_NUMBER, ISO = 33434, 33437, 34855
 _COMPARED = {
     CFA_REPEAT: "CFARepeatPatternDim",
     CFA_PATTERN: "CFAPattern",
     BLACK_LEVEL: "BlackLevel",
     WHITE_LEVEL: "WhiteLevel",
+    OPCODES: "OpcodeList1",
     EXPOSURE_TIME: "ExposureTime",
     F_NUMBER: "FNumber",
     ISO: "PhotographicSensitivity",
@@ -91,6 +95,11 @@ def read_dng(path: Path) -> RawImage:
     return raw
 
 
+def is_own(path: Path) -> bool:
+    """Whether a file says that `write_dng` wrote it; what doesn't is some camera's or program's."""
+    return read_make(path) == MAKE
+
+
 def dng_tags(raw: RawImage) -> Tags:
     """Tags of the first directory, without those that describe the TIFF itself.
 
@@ -104,7 +113,7 @@ def dng_tags(raw: RawImage) -> Tags:
     height, width = raw.shape
     tags: dict[int, tuple[str, Values]] = {
         254: ("I", (0,)),  # NewSubfileType: the full picture
-        271: text("rodcone"),
+        MAKER: text(MAKE),
         272: text(raw.camera),
         274: ("H", (1,)),  # Orientation: upright
         CFA_REPEAT: ("H", (2, 2)),
@@ -122,8 +131,17 @@ def dng_tags(raw: RawImage) -> Tags:
         51041: ("d", (1 / full_e, (raw.dark_noise_e / full_e) ** 2)),  # NoiseProfile
     }
     tags |= _colour_tags(colour)
+    if raw.defects is not None and is_bayer(raw.cfa):
+        tags[OPCODES] = ("U", tuple(_bad_pixels(raw.cfa, raw.defects)))
     tags[PRIVATE_DATA] = ("B", tuple(PRIVATE + to_json(raw).encode("ascii")))
     return dict(sorted(tags.items()))
+
+
+def _bad_pixels(tile: Tile, defects: NDArray[np.intp]) -> bytes:
+    """Opcode FixBadPixelsList of DNG 1.3, chapter 6: big-endian, to be skipped by who doesn't know it; Bayer alone."""
+    phase = ("RG", "GR", "GB", "BG").index(tile[0])
+    parameters = struct.pack(">3I", phase, len(defects), 0) + defects.astype(">u4").tobytes()
+    return struct.pack(">IIIII", 1, 5, 0x01030000, 1, len(parameters)) + parameters
 
 
 def exif_tags(raw: RawImage) -> Tags:

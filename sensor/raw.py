@@ -45,11 +45,13 @@ class RawImage:
         error); empty where unknown, as for a file of another program.
     column_gain_spread : float
         Standard deviation of the columns' relative gain, in `prnu` too: full pixels of weak columns read less.
+    defects : (n, 2) intp, optional
+        Row and column of each defective pixel, as a camera's maker lists them; None where there is none.
 
     Raises
     ------
     InputError
-        For a frame without a whole tile, or a number out of its range.
+        For a frame without a whole tile, a number out of its range, or a defect that isn't in the frame.
     """
 
     dn: NDArray[np.uint16]
@@ -67,10 +69,13 @@ class RawImage:
     colour: ColourCalibration | None = None
     engine: str = ""
     column_gain_spread: float = 0.0
+    defects: NDArray[np.intp] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
         check_covers(self.cfa, np.shape(self.dn))
+        if self.defects is not None:
+            object.__setattr__(self, "defects", _checked_defects(self.defects, self.shape))
         limits = {
             "gain_e_per_dn": (1e-12, 1e12, "give electrons per digital number"),
             "read_noise_e": (0.0, 1e9, "give electrons, 0 for none"),
@@ -127,3 +132,20 @@ class RawImage:
     def saturated(self) -> NDArray[np.bool_]:
         """Where the pixel counts as saturated, shape (h, w)."""
         return self.electrons >= self.saturation_e
+
+
+def _checked_defects(defects: NDArray[np.intp], shape: tuple[int, int]) -> NDArray[np.intp] | None:
+    """Rows and columns in the frame's order, each once; None where there is none."""
+    try:
+        places = np.asarray(defects)
+    except (ValueError, OverflowError):  # lists of unequal length
+        places = np.empty(0, dtype=np.object_)
+    if places.size == 0 and places.dtype != np.object_:
+        return None
+    fits = places.ndim == 2 and places.shape[1] == 2 and places.dtype.kind in "iu"
+    if not fits or np.any((places < 0) | (places >= np.array(shape))):
+        raise InputError(
+            f"defects: an array of shape {places.shape} is not allowed; give rows and columns inside {shape} as (n, 2) "
+            "whole numbers"
+        )
+    return np.unique(places.astype(np.intp), axis=0)

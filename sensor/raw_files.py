@@ -1,10 +1,12 @@
-"""Raw files by the ending of their name: digital negatives and 16-bit TIFF with a sidecar."""
+"""Raw files: our digital negatives and 16-bit TIFF with a sidecar, by the ending of their name, and real cameras'."""
 
 from pathlib import Path
+from typing import Any
 
 from render.errors import InputError
 from sensor.cfa import Tile
-from sensor.dng import is_bayer, is_rgbw, read_dng, write_dng
+from sensor.dng import is_bayer, is_own, is_rgbw, read_dng, write_dng
+from sensor.photograph import read_photograph
 from sensor.raw import RawImage
 from sensor.raw_tiff import read_tiff, write_tiff
 
@@ -38,14 +40,29 @@ def write_raw(raw: RawImage, path: str | Path) -> tuple[Path, ...]:
 
 
 def read_raw(path: str | Path) -> RawImage:
-    """Read a raw file that `write_raw` wrote: the same raw image, bit for bit.
+    """Read a raw file: one that `write_raw` wrote bit for bit, a camera's as `sensor.photograph.read_photograph` does.
 
     Raises
     ------
     InputError
-        For a file that is missing, damaged, changed or of another program.
+        As `open_raw`.
+    """
+    return open_raw(path)[0]
+
+
+def open_raw(path: str | Path) -> tuple[RawImage, dict[str, Any]]:
+    """Read a raw file, and for a camera's, what had to be estimated or assumed; nothing for our own.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing, damaged, changed, or that LibRaw doesn't read as a Bayer mosaic.
     """
     place = Path(path)
-    if place.suffix.lower() not in ENDINGS:
-        raise InputError(f"raw file: {str(place)!r} has another ending; allowed: {', '.join(ENDINGS)}; give a raw file")
-    return read_dng(place) if place.suffix.lower() == ".dng" else read_tiff(place)
+    if not place.is_file():
+        raise InputError(f"{place}: there is no such file; give the path of a raw file")
+    if place.suffix.lower() in ENDINGS[1:]:
+        return read_tiff(place), {}
+    if place.suffix.lower() == ENDINGS[0] and is_own(place):
+        return read_dng(place), {}
+    return read_photograph(place)

@@ -15,6 +15,7 @@ FORMAT = "rodcone raw image"
 VERSION = 1
 KEYS = tuple(field.name for field in fields(RawImage) if field.name != "dn")
 _OPTIONAL = ("f_number", "iso")
+_MAY_LACK = ("defects",)  # keys that a file without them leaves out
 _NUMBERS = (
     *("black_dn", "white_dn", "gain_e_per_dn", "read_noise_e", "dsnu_e", "prnu", "exposure_s", "column_gain_spread"),
     *_OPTIONAL,
@@ -27,11 +28,26 @@ def to_json(raw: RawImage, **more: Any) -> str:
     """Everything of a raw image but its pixels; `more` are keys of the file format's own.
 
     Python writes the shortest decimals that read back as the same float64.
+
+    Raises
+    ------
+    InputError
+        Where the list of defective pixels is too long to be read back.
     """
     calibration: dict[str, Any] = {key: getattr(raw, key) for key in KEYS}
     if raw.colour is not None:
         calibration["colour"] = {key: value.tolist() for key, value in asdict(raw.colour).items()}
-    return json.dumps({"format": FORMAT, "version": VERSION, **more, **calibration}, allow_nan=False, default=float)
+    defects = calibration.pop("defects")
+    if defects is not None:
+        calibration["defects"] = defects.tolist()
+    content = {"format": FORMAT, "version": VERSION, **more, **calibration}
+    text = json.dumps(content, allow_nan=False, default=float)
+    if len(text) > MOST_BYTES:
+        raise InputError(
+            f"defects: {0 if defects is None else len(defects)} pixels don't fit a raw file; allowed: a calibration of "
+            f"{MOST_BYTES} bytes; list fewer"
+        )
+    return text
 
 
 def parse_json(text: bytes, name: str, more: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -51,7 +67,7 @@ def parse_json(text: bytes, name: str, more: tuple[str, ...] = ()) -> dict[str, 
             f"{name}: its calibration is not that of a raw image; allowed: {FORMAT!r}, version {VERSION}; write it anew"
         )
     require_keys(f"{name}: calibration", (key[:_MOST_TOLD] for key in held), ("format", "version", *KEYS, *more))
-    missing = [key for key in (*KEYS, *more) if key not in held]
+    missing = [key for key in (*KEYS, *more) if key not in held and key not in _MAY_LACK]
     if missing:
         raise InputError(f"{name}: its calibration lacks {', '.join(missing)}; write the file anew")
     return held
@@ -79,7 +95,7 @@ def raw_image(held: dict[str, Any], dn: NDArray[np.uint16], name: str) -> RawIma
             if not isinstance(colour, dict) or set(colour) != names:
                 raise InputError(f"colour: allowed is null, or an object of {', '.join(sorted(names))}; correct it")
             colour = ColourCalibration(**colour)
-        return RawImage(dn, **{key: held[key] for key in KEYS if key != "colour"}, colour=colour)
+        return RawImage(dn, **{key: held[key] for key in KEYS if key != "colour" and key in held}, colour=colour)
     except InputError as error:
         told = str(error)
         told = told if len(told) <= _MOST_TOLD else f"{told[:_MOST_TOLD]} ..."

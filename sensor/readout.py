@@ -61,11 +61,18 @@ def read_out(
     if pixel.read_noise_e:
         collected_e += pixel.read_noise_e * normals(key, Term.READ, expected.shape)
     dn = np.rint(collected_e / sensor.gain_e_per_dn + sensor.black_dn)
-    return as_raw(np.clip(dn, 0, sensor.white_dn).astype(np.uint16), sensor, exposure_s, engine="numpy")
+    dn = np.clip(dn, 0, sensor.white_dn).astype(np.uint16)
+    return as_raw(dn, sensor, exposure_s, engine="numpy", hot=device.hot)
 
 
-def as_raw(dn: NDArray[np.uint16], sensor: SensorConfig, exposure_s: float, engine: str) -> RawImage:
-    """Raw image of a frame that `engine` drew, with the camera's calibration."""
+def as_raw(
+    dn: NDArray[np.uint16],
+    sensor: SensorConfig,
+    exposure_s: float,
+    engine: str,
+    hot: NDArray[np.bool_] | None = None,
+) -> RawImage:
+    """Raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels."""
     pixel = sensor.pixel
     return RawImage(
         dn=dn,
@@ -79,6 +86,7 @@ def as_raw(dn: NDArray[np.uint16], sensor: SensorConfig, exposure_s: float, engi
         column_gain_spread=pixel.column_gain_spread,
         exposure_s=float(exposure_s),
         engine=engine,
+        defects=None if hot is None else np.argwhere(hot),
     )
 
 

@@ -19,6 +19,7 @@ Tags = Mapping[int, tuple[str, Values]]  # code: (struct format of one value, va
 
 IMAGE_WIDTH, IMAGE_LENGTH, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC = 256, 257, 258, 259, 262
 STRIP_OFFSETS, SAMPLES_PER_PIXEL, STRIP_BYTE_COUNTS = 273, 277, 279
+MAKER = 271  # Make: of the camera
 EXIF = 34665
 _EXIF_LATER = 34664  # no tag's code: tifffile refuses to write EXIF itself, and this keeps the codes in order
 MIN_IS_BLACK, CFA = 1, 32803
@@ -26,6 +27,7 @@ _LAYOUT = (IMAGE_WIDTH, IMAGE_LENGTH, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC)
 _STRIPS = (STRIP_OFFSETS, SAMPLES_PER_PIXEL, STRIP_BYTE_COUNTS)
 
 _FORMATS = {1: "B", 2: "s", 3: "H", 4: "I", 5: "2I", 6: "b", 7: "B", 8: "h", 9: "i", 10: "2i", 11: "f", 12: "d"}
+_UNDEFINED = 7  # bytes whose meaning is the tag's own; written from the form "U", read as "B"
 _MOST_VALUE_BYTES = 1 << 20  # of one tag: a million pixel rows in strips of four, or any calibration
 _LONGEST_SIDE = 1 << 17  # pixels; larger chips exist as mosaics of chips alone
 
@@ -43,7 +45,10 @@ def write_mosaic(path: Path, dn: NDArray[np.uint16], photometric: int, tags: Tag
     if dn.ndim != 2 or dn.dtype != np.uint16:
         raise InputError(f"dn: {dn.dtype} of shape {dn.shape} is not allowed; give (h, w) of uint16")
     tags = {**tags, **({_EXIF_LATER: ("I", (0,))} if exif else {})}
-    extra = [(code, kind, _count(kind, values), _value(kind, values), True) for code, (kind, values) in tags.items()]
+    extra = [
+        (code, _UNDEFINED if kind == "U" else kind, _count(kind, values), _value(kind, values), True)
+        for code, (kind, values) in tags.items()
+    ]
     with tifffile.TiffWriter(path, byteorder="<", bigtiff=False) as file:
         file.write(
             np.ascontiguousarray(dn), photometric=photometric, metadata=None, software="rodcone", extratags=extra
@@ -87,7 +92,7 @@ def _count(kind: str, values: Values) -> int:
 
 def _value(kind: str, values: Values) -> Any:
     """Value as tifffile takes it: texts and bytes as bytes, one number alone, more as a tuple."""
-    if kind in ("s", "B"):
+    if kind in ("s", "B", "U"):
         return bytes(int(value) for value in values)
     return values[0] if len(values) == 1 else values
 
@@ -95,6 +100,16 @@ def _value(kind: str, values: Values) -> Any:
 def text(value: str) -> tuple[str, Values]:
     """ASCII tag with its closing zero."""
     return "s", (*value.encode("ascii"), 0)
+
+
+def read_make(path: Path) -> str | None:
+    """Make of the camera as the first directory gives it; None where it gives none, or there is none to read."""
+    try:
+        with path.open("rb") as file:
+            kind, values = _read_tags(file, path.stat().st_size, (MAKER,), str(path)).get(MAKER, ("", ()))
+    except (InputError, OSError):
+        return None
+    return bytes(int(value) for value in values).rstrip(b"\0").decode("ascii", "replace") if kind == "s" else None
 
 
 def read_mosaic(path: Path, photometric: int, codes: Collection[int] = ()) -> tuple[NDArray[np.uint16], Tags]:

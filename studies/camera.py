@@ -1,15 +1,15 @@
 """A camera under study: its sensor, its chip, its colour matrix, and one photograph developed and measured."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour import encode_srgb, fit_matrix
+from isp.colour import encode_srgb
+from isp.colour_fit import ColourFit, fit_colours
 from isp.picture import Picture
-from isp.pipeline import picture_bayer, picture_interleaved
+from isp.processors import PROCESSORS, Processor
 from scenes.reflectances import color_checker
 from sensor.cfa import channels, mask
 from sensor.config import SensorConfig
@@ -17,14 +17,12 @@ from sensor.device import Device, draw_device
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.readout import read_out
+from sensor.variations import vary
 from studies.metrics import Quality, measure
-from studies.truth import Light, green_scale, neutral_electrons
+from studies.truth import Light, neutral_electrons
 
-Develop = Callable[..., Picture]
-CAMERAS: dict[str, tuple[str, Develop]] = {
-    "interleaved": ("rgbw", picture_interleaved),
-    "bayer": ("bayer", picture_bayer),
-}
+# The paper's two, which the demo compares: mosaic and software. A study may ask for any of `PROCESSORS`.
+CAMERAS = {name: (PROCESSORS[name].mosaic, PROCESSORS[name].develop) for name in ("interleaved", "bayer")}
 
 
 @dataclass(frozen=True)
@@ -34,11 +32,11 @@ class Camera:
     Attributes
     ----------
     name : str
-        ``interleaved`` or ``bayer``.
+        Of `isp.processors.PROCESSORS`.
     sensor_name : str
     sensor : SensorConfig
     device : Device
-    matrix : (3, 3) float64
+    colours : ColourFit
         Fitted under the study's light on the ColorChecker.
     """
 
@@ -46,7 +44,7 @@ class Camera:
     sensor_name: str
     sensor: SensorConfig
     device: Device
-    matrix: NDArray[np.float64]
+    colours: ColourFit
 
 
 @dataclass(frozen=True)
@@ -63,13 +61,19 @@ class Shot:
 
 
 def build_camera(name: str, sensor_name: str, light: Light, shape: tuple[int, int], rng: np.random.Generator) -> Camera:
-    """Make a camera: preset and mosaic, one chip drawn from `rng`, matrix for the light."""
-    sensor = preset(sensor_name, CAMERAS[name][0])
+    """Make a camera: preset and mosaic, one chip drawn from `rng`, colours for the light."""
+    sensor = vary(preset(sensor_name), PROCESSORS[name].mosaic)
+    colours = colour_fit(sensor, PROCESSORS[name], light)
+    return Camera(name, sensor_name, sensor, draw_device(sensor, shape, rng), colours)
+
+
+def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> ColourFit:
+    """Fit of the processor's balanced colours, and the mosaic's other letters, under a light on the ColorChecker."""
     nm, width = light.wavelength_nm, light.width_nm
     surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
-    responses = sensor.responses.band_average(("R", "G", "B"), nm, width)
-    matrix = fit_matrix(responses, nm, light.spectrum, surfaces)
-    return Camera(name, sensor_name, sensor, draw_device(sensor, shape, rng), matrix)
+    letters = (*processor.colours, *(x for x in channels(sensor.cfa) if x not in processor.colours))
+    responses = sensor.responses.band_average(letters, nm, width)
+    return fit_colours(letters, responses, nm, light.spectrum, surfaces, width)
 
 
 def photograph(
@@ -94,9 +98,11 @@ def photograph(
     raw = read_out(expected_e, camera.sensor, camera.device, exposure_s, rng)
     exposed = time.perf_counter()
     neutral = neutral_electrons(camera.sensor, light, exposure_s)
-    picture = CAMERAS[camera.name][1](raw, camera.matrix, neutral=neutral)
+    processor = PROCESSORS[camera.name]
+    picture = processor.develop(raw, camera.colours, neutral=neutral)
     developed = time.perf_counter()
-    encoded = encode_srgb(picture.rgb / (green_scale(camera.sensor, light, exposure_s) * white_cd_m2))
+    unit_e = neutral[channels(camera.sensor.cfa).index(processor.unit)]  # of 1 cd/m^2
+    encoded = encode_srgb(picture.rgb / (unit_e * white_cd_m2))
     quality = measure(encoded, truth)
     done = time.perf_counter()
     return Shot(raw, encoded, quality, picture, exposed - start, developed - exposed, done - developed)

@@ -95,9 +95,39 @@ def test_a_name_that_does_not_fit_is_refused(name: str, cfa: str, message: str, 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_reading_another_ending_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"has another ending; allowed: \.dng, \.tif, \.tiff; give a raw file"):
-        read_raw(tmp_path / "shot.cr2")
+@pytest.mark.parametrize("name", ["shot.cr2", "shot.dng", "shot.tif"])
+def test_a_missing_file_is_named(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=rf"{name}: there is no such file; give the path of a raw file"):
+        read_raw(tmp_path / name)
+
+
+def test_a_list_of_defects_comes_back_from_the_sidecar(tmp_path: Path) -> None:
+    raw = replace(exposure(("RC", "CC")), defects=np.array([(3, 1), (8, 10)]))
+    back = read_raw(write_raw(raw, tmp_path / "shot.tif")[0])
+    np.testing.assert_array_equal(back.defects, [(3, 1), (8, 10)])
+
+
+def test_a_file_from_before_there_were_lists_is_read(tmp_path: Path) -> None:
+    write_raw(exposure(("RC", "CC")), tmp_path / "shot.tif")
+    assert "defects" not in json.loads((tmp_path / "shot.json").read_text())
+    assert read_raw(tmp_path / "shot.tif").defects is None
+
+
+def test_a_list_too_long_for_a_file_is_refused(tmp_path: Path) -> None:
+    shape = (300, 400)
+    raw = replace(exposure(("RC", "CC"), shape), defects=np.argwhere(np.ones(shape, dtype=bool)))
+    with pytest.raises(InputError, match=r"defects: 120000 pixels don't fit a raw file; .*list fewer"):
+        write_raw(raw, tmp_path / "shot.tif")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("places", [[[9, 0]], [[0]], "all", [[0, 1.5]]])
+def test_a_list_of_defects_that_cannot_be_is_refused(places: object, tmp_path: Path) -> None:
+    write_raw(exposure(("RC", "CC")), tmp_path / "shot.tif")
+    held = json.loads((tmp_path / "shot.json").read_text()) | {"defects": places}
+    (tmp_path / "shot.json").write_text(json.dumps(held))
+    with pytest.raises(InputError, match=r"shot\.json: defects: .* is not allowed; give rows and columns"):
+        read_raw(tmp_path / "shot.tif")
 
 
 def test_a_sidecar_of_another_exposure_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,233 @@
+"""How good the interleaved camera's pictures are, beside its opponents', and whether anything jumps over the light.
+
+Run ``python benchmarks/bench_quality.py transitions``, ``... ranking``, ``... substitution`` or ``... settings``;
+renders are kept in ``out/bench_quality``. Quality is against the noise-free truth at the known exposure scale, as in
+the demo.
+
+- transitions: quality over light in half octaves, at a fixed exposure and with auto exposure, and the deepest drop over
+  one octave until the colours themselves saturate.
+- ranking: every processor on the same scene, exposure, pixel and well; means over seeds, and the interleaved camera's
+  lead over the paper's reference with its 95 % interval (20 seeds for these two, 5 for the others).
+- substitution: Figure 6's decision, 20 seeds a scene and exposure.
+- settings: sweep of patch, sigma_d and sigma_s that the defaults come from.
+"""
+
+import argparse
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from environment import print_environment
+from numpy.typing import NDArray
+
+from isp.colour import encode_srgb
+from isp.pipeline import picture_interleaved
+from isp.processors import PROCESSORS
+from render.engine import render
+from render.errors import InputError
+from scenes.catalog import load
+from sensor.cfa import channels, mask
+from sensor.exposure import auto_exposure_s
+from sensor.optics import form_image
+from sensor.readout import read_out
+from sensor.response import expected_electrons
+from studies.camera import Camera, build_camera, photograph
+from studies.demo import WAVELENGTH_NM, WHITE_AT, WHITE_PERCENTILE
+from studies.metrics import measure
+from studies.truth import Light, light_in_bands, neutral_electrons, true_srgb
+
+SIZE = 160
+FIXED_S, LONGEST_S = 0.020, 0.066
+OUT = Path("out/bench_quality")
+T_95 = 2.093  # Student's t at 19 degrees of freedom, two-sided 95 %
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A rendered scene at a mean of 1 cd/m^2: its radiance, light, white and truth."""
+
+    radiance: Any
+    light: Light
+    white_cd_m2: float
+    truth: NDArray[np.float64]
+
+
+def open_stage(name: str, max_spp: int, max_seconds: float) -> Stage:
+    scene = load(name)
+    transport = render(
+        scene,
+        (SIZE, SIZE),
+        wavelength_nm=WAVELENGTH_NM,
+        max_spp=max_spp,
+        max_seconds=max_seconds,
+        cache=OUT / "renders",
+    )
+    spectrum = next(iter(scene.groups.values())).spectrum
+    light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
+    radiance = transport.relight(luminance_cd_m2=1.0)
+    luminance = radiance.luminance()[~transport.emitter_visible]
+    white = float(np.percentile(luminance, WHITE_PERCENTILE)) / WHITE_AT
+    return Stage(radiance, light, white, encode_srgb(true_srgb(radiance, light, white)))
+
+
+class Bench:
+    """One scene and sensor: photographs at any level, exposure and seed; images formed once a camera."""
+
+    def __init__(self, stage: Stage, sensor: str) -> None:
+        self.stage, self.sensor, self._images = stage, sensor, {}
+
+    def camera(self, name: str, seed: int) -> Camera:
+        """Camera with the chip of a seed."""
+        return build_camera(
+            name, self.sensor, self.stage.light, self.stage.truth.shape[:2], np.random.default_rng([seed, 0])
+        )
+
+    def exposed(self, camera: Camera, level: float, exposure_s: float | None) -> tuple[NDArray[np.float64], float]:
+        """Expected electrons, and the exposure [s]; None: auto exposure of its own."""
+        if camera.name not in self._images:
+            self._images[camera.name] = form_image(self.stage.radiance, camera.sensor)
+        image = self._images[camera.name]
+        lit = replace(image, values=image.values * level)
+        seconds = auto_exposure_s(lit, camera.sensor, LONGEST_S) if exposure_s is None else exposure_s
+        return expected_electrons(lit, camera.sensor, seconds), seconds
+
+    def shot(self, camera: Camera, level: float, exposure_s: float | None, seed: int) -> Any:
+        """One photograph, developed and measured."""
+        electrons, seconds = self.exposed(camera, level, exposure_s)
+        rng = np.random.default_rng([seed, 1])
+        white = self.stage.white_cd_m2 * level
+        return photograph(camera, electrons, self.stage.truth, self.stage.light, white, seconds, rng)
+
+    def green_snr_db(self, level: float, exposure_s: float | None) -> float:
+        """Median SNR of a green pixel of the Bayer camera, in expectation."""
+        camera = self.camera("bayer", 0)
+        electrons, seconds = self.exposed(camera, level, exposure_s)
+        green = electrons[mask(camera.sensor.cfa, "G", electrons.shape)]
+        dark = self.shot(camera, level, seconds, 0).raw.dark_noise_e
+        return float(20 * np.log10(np.median(green / np.sqrt(green + dark**2))))
+
+
+def transitions(bench: Bench, seeds: int) -> dict[str, list[dict[str, float]]]:
+    """Quality in half octaves of light, until 1 % of the colours' samples are saturated."""
+    curves: dict[str, list[dict[str, float]]] = {}
+    for name, exposure_s in ((f"{FIXED_S * 1e3:g} ms", FIXED_S), ("auto exposure", None)):
+        curves[name] = []
+        for level in 2.0 ** np.arange(-10, 17, 0.5):
+            shots = [bench.shot(bench.camera("interleaved", s), level, exposure_s, s) for s in range(seeds)]
+            sites = [mask(shot.raw.cfa, "W", shot.raw.shape) for shot in shots]
+            full = [
+                (shot.raw.saturated[at].mean(), shot.raw.saturated[~at].mean())
+                for shot, at in zip(shots, sites, strict=True)
+            ]
+            row = {
+                "level": float(level),
+                "psnr": float(np.mean([shot.quality.psnr_db for shot in shots])),
+                "delta_e": float(np.mean([shot.quality.delta_e_median for shot in shots])),
+                "substitution": float(np.mean([shot.picture.substitution for shot in shots])),
+                "white_full": float(np.mean([w for w, _ in full])),
+                "colours_full": float(np.mean([c for _, c in full])),
+            }
+            if row["colours_full"] > 0.01:
+                break
+            curves[name].append(row)
+    return curves
+
+
+def print_transitions(curves: dict[str, list[dict[str, float]]]) -> None:
+    for name, rows in curves.items():
+        print(f"\n{name}\n   cd/m2   PSNR  dE2000  W's share  W full")
+        for row in rows:
+            print("{level:8.4g} {psnr:6.2f} {delta_e:7.2f} {substitution:10.2f} {white_full:7.2f}".format(**row))
+        drops = [(a["psnr"] - b["psnr"], b["level"]) for a, b in zip(rows, rows[2:], strict=False)]
+        print("deepest drop over one octave: {:.2f} dB, up to {:.4g} cd/m2".format(*max(drops)))
+
+
+def ranking(bench: Bench, levels: Iterable[float]) -> None:
+    """Means over seeds of every processor, level by level."""
+    for level in levels:
+        print(
+            f"\n{level:g} cd/m2, {FIXED_S * 1e3:g} ms, Bayer's median G SNR {bench.green_snr_db(level, FIXED_S):.1f} dB"
+        )
+        found = {}
+        for name in PROCESSORS:
+            seeds = 20 if name in ("interleaved", "bayer") else 5
+            try:
+                found[name] = [bench.shot(bench.camera(name, s), level, FIXED_S, s).quality for s in range(seeds)]
+            except InputError as error:
+                print(f"  {name}: {error}")
+        for name, qualities in found.items():
+            psnr, delta_e = ([getattr(q, x) for q in qualities] for x in ("psnr_db", "delta_e_median"))
+            print(f"  {name:16s} {np.mean(psnr):6.2f} dB  dE {np.mean(delta_e):6.2f}", end="")
+            print(f"  SSIM {np.mean([q.ssim for q in qualities]):.3f}", flush=True)
+        for label, key, sign in (("PSNR", "psnr_db", 1), ("dE2000", "delta_e_median", -1)):
+            pairs = zip(found["interleaved"], found["bayer"], strict=True)
+            lead = np.array([sign * (getattr(a, key) - getattr(b, key)) for a, b in pairs])
+            half = T_95 * lead.std(ddof=1) / math.sqrt(lead.size)
+            print(f"  interleaved leads bayer in {label} by {lead.mean():.2f} +- {half:.2f}")
+
+
+def substitution(bench: Bench) -> None:
+    """Figure 6: 25 cd/m^2 at 5, 10 and 20 ms."""
+    for exposure_s in (0.005, 0.010, 0.020):
+        pictures = [bench.shot(bench.camera("interleaved", s), 25.0, exposure_s, s).picture for s in range(20)]
+        on = sum(bool(picture.substituted) for picture in pictures)
+        snr = [picture.snr for picture in pictures]
+        print(
+            f"  {exposure_s * 1e3:g} ms: on for {on} of 20 seeds; SNR {np.mean(snr):.3f} +- {np.std(snr):.3f}",
+            flush=True,
+        )
+
+
+def settings(bench: Bench, levels: Sequence[float]) -> None:
+    """Mean loss of PSNR against the best of the sweep at each level, and mean ratio of dE2000 to its best."""
+    choices = [(p, d, s) for p in (1, 3, 5) for d in (3.0, 6.0, 10.0) for s in (2.0, 3.0, 4.0, 8.0, 16.0)]
+    camera, stage = bench.camera("interleaved", 0), bench.stage
+    found = np.zeros((len(levels), len(choices), 2))
+    for level, row in zip(levels, found, strict=True):
+        electrons, seconds = bench.exposed(camera, level, FIXED_S)
+        raw = read_out(electrons, camera.sensor, camera.device, seconds, np.random.default_rng([0, 1]))
+        neutral = neutral_electrons(camera.sensor, stage.light, seconds)
+        white_e = neutral[channels(camera.sensor.cfa).index("G")] * stage.white_cd_m2 * level
+        for j, (patch, sigma_d, sigma_s) in enumerate(choices):
+            picture = picture_interleaved(
+                raw, camera.colours, neutral=neutral, patch=patch, sigma_d=sigma_d, sigma_s=sigma_s
+            )
+            quality = measure(encode_srgb(picture.rgb / white_e), stage.truth)
+            row[j] = quality.psnr_db, quality.delta_e_median
+    loss = (found[..., 0].max(axis=1, keepdims=True) - found[..., 0]).mean(axis=0)
+    ratio = (found[..., 1] / found[..., 1].min(axis=1, keepdims=True)).mean(axis=0)
+    print("patch sigma_d sigma_s  mean loss  dE2000 over its best")
+    for j in np.argsort(loss)[:15]:
+        patch, sigma_d, sigma_s = choices[j]
+        print(f"{patch:5d} {sigma_d:7g} {sigma_s:7g} {loss[j]:7.2f} dB {ratio[j]:10.2f}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", choices=("transitions", "ranking", "substitution", "settings"))
+    parser.add_argument("--scene", nargs="+", default=["still_life", "color_checker"])
+    parser.add_argument("--sensor", nargs="+", default=["low_noise", "table1_output"])
+    parser.add_argument("--level", nargs="+", type=float, default=[0.0625, 0.25, 1.0, 4.0, 16.0, 64.0, 256.0])
+    parser.add_argument("--seeds", type=int, default=3)
+    options = parser.parse_args()
+    print_environment()
+    for scene in options.scene:
+        stage = open_stage(scene, max_spp=768, max_seconds=150.0)
+        for sensor in options.sensor if options.what != "substitution" else ["table1_output"]:
+            print(f"\n== {scene}, {sensor}", flush=True)
+            bench = Bench(stage, sensor)
+            if options.what == "transitions":
+                print_transitions(transitions(bench, options.seeds))
+            elif options.what == "ranking":
+                ranking(bench, options.level)
+            elif options.what == "substitution":
+                substitution(bench)
+            else:
+                settings(bench, options.level)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,44 @@
+"""A camera with another mosaic, and where that needs it, other filters in front of its pixels."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+from render.errors import unknown
+from sensor.cfa import MOSAICS, RGBW, Tile
+from sensor.config import SensorConfig
+from sensor.curves import Responses, built_in
+from sensor.filters import complementary, neutral_density
+
+CMYW: Tile = ("CM", "YW")  # RGBW's places, each primary in its complement's
+
+# Mosaics that need curves of their own, made from the camera's.
+VARIATIONS: Mapping[str, tuple[Tile, Callable[[Responses], Responses]]] = MappingProxyType(
+    {"rgbw_nd": (RGBW, neutral_density), "cmyw": (CMYW, complementary)}
+)
+
+
+def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
+    """Give a camera another mosaic: the same pixel, well, lens and converter.
+
+    Parameters
+    ----------
+    sensor : SensorConfig
+        With curves of R, G, B and W.
+    mosaic : str
+        A name of `sensor.cfa.MOSAICS`, or ``rgbw_nd`` (W behind a neutral density that gives it G's sensitivity) or
+        ``cmyw`` (cyan, magenta, yellow and W), of `sensor.filters`.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, or curves that are missing.
+    """
+    if mosaic in VARIATIONS:
+        tile, change = VARIATIONS[mosaic]
+        return replace(sensor, cfa=tile, responses=change(sensor.responses))
+    if mosaic not in MOSAICS:
+        raise unknown("cfa", mosaic, (*MOSAICS, *VARIATIONS))
+    tile = MOSAICS[mosaic]
+    clear = "C" in "".join(tile) and "C" not in sensor.responses.curves
+    return replace(sensor, cfa=tile, responses=built_in() if clear else sensor.responses)

@@ -1,0 +1,212 @@
+"""Raw files of other cameras through LibRaw: levels, orientation, colours and noise, and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from render.errors import InputError
+from sensor.dng import rational
+from sensor.noise_profile import read_noise_profile
+from sensor.photograph import ASSUMED_DARK_NOISE_E, ASSUMED_FULL_WELL_E, read_photograph
+from sensor.raw_files import open_raw, read_raw
+from sensor.tiff import CFA, Values, text, write_mosaic
+
+rawpy = pytest.importorskip("rawpy", reason="rodcone[photographs] (LibRaw) is not installed")
+
+SHAPE = (40, 60)
+BLACK = (512.0, 514.0, 510.0, 520.0)  # of the tile's sites, row by row
+WHITE = 16_000
+MATRIX = np.array([[0.9, -0.3, -0.1], [-0.4, 1.2, 0.2], [-0.05, 0.15, 0.6]])  # XYZ under D65 to the camera
+
+
+def other_camera(
+    path: Path,
+    dn: np.ndarray,
+    *,
+    pattern: tuple[int, ...] = (0, 1, 1, 2),
+    repeat: tuple[int, int] = (2, 2),
+    orientation: int = 1,
+    noise: tuple[float, ...] | None = None,
+    colours: bool = True,
+) -> Path:
+    """Digital negative of some camera: a black level a site, no word from rodcone."""
+    tags: dict[int, tuple[str, Values]] = {
+        254: ("I", (0,)),
+        271: text("Other"),
+        272: text("Model X"),
+        274: ("H", (orientation,)),
+        33421: ("H", repeat),
+        33422: ("B", pattern),
+        50706: ("B", (1, 4, 0, 0)),
+        50707: ("B", (1, 1, 0, 0)),
+        50708: text("Other Model X"),
+        50710: ("B", (0, 1, 2)),
+        50711: ("H", (1,)),
+        50713: ("H", (2, 2)),
+        50714: ("2I", rational(BLACK)),
+        50717: ("I", (WHITE,)),
+    }
+    if colours:
+        tags[50721] = ("2i", rational(MATRIX))
+        tags[50728] = ("2I", rational((0.5, 1.0, 0.7)))
+        tags[50778] = ("H", (21,))
+    if noise is not None:
+        tags[51041] = ("d", noise)
+    write_mosaic(path, dn, CFA, dict(sorted(tags.items())), {33434: ("2I", rational(0.01)), 33437: ("2I", rational(4))})
+    return path
+
+
+def levels(electrons: np.ndarray) -> np.ndarray:
+    """DN of a mosaic at one electron a DN, each site over its own black level."""
+    black = np.tile(np.array(BLACK).reshape(2, 2), (electrons.shape[0] // 2, electrons.shape[1] // 2))
+    return np.rint(np.minimum(electrons + black, WHITE)).astype(np.uint16)
+
+
+def test_each_channels_black_is_taken_off(tmp_path: Path) -> None:
+    above = np.random.default_rng(0).integers(0, 15_000, SHAPE).astype(np.float64)
+    raw = read_raw(other_camera(tmp_path / "shot.dng", levels(above)))
+    assert (raw.cfa, raw.shape, raw.black_dn, raw.white_dn) == (("RG", "GB"), SHAPE, 520.0, 16_000.0)
+    np.testing.assert_array_equal(raw.dn - raw.black_dn, above)
+    assert (raw.exposure_s, raw.f_number, raw.iso) == (pytest.approx(0.01), pytest.approx(4.0), None)
+
+
+def test_a_full_sample_is_full_whatever_its_black_was(tmp_path: Path) -> None:
+    raw = read_raw(other_camera(tmp_path / "shot.dng", np.full(SHAPE, WHITE, np.uint16)))
+    assert raw.saturated.all()
+    np.testing.assert_array_equal(raw.dn, np.full(SHAPE, WHITE))
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_frames_are_turned_upright_as_libraw_turns_its_own_pictures(orientation: int, tmp_path: Path) -> None:
+    above = np.full(SHAPE, 2000.0)
+    above[:20, :20] = 12_000.0  # a bright corner: its place and the frame's proportions tell all eight apart
+    path = other_camera(tmp_path / "shot.dng", levels(above), orientation=orientation)
+    raw = read_raw(path)
+    with rawpy.imread(str(path)) as theirs:
+        picture = theirs.postprocess(output_bps=16, no_auto_bright=True, gamma=(1, 1), half_size=False)
+    assert picture.shape[:2] == raw.shape
+    assert brightest_corner(picture[..., 1]) == brightest_corner(raw.dn)
+    # the letters are turned with the samples: each is found by its own level
+    shares = np.select([np.indices(SHAPE).sum(0) % 2 == 1, np.indices(SHAPE)[0] % 2 == 0], [1.0, 0.5], 0.25)
+    mosaic = read_raw(other_camera(tmp_path / "sites.dng", levels(8000.0 * shares), orientation=orientation))
+    by_value = np.where(mosaic.electrons == 8000 * mosaic.gain_e_per_dn, "G", "R")
+    by_value[np.isclose(mosaic.electrons, 2000 * mosaic.gain_e_per_dn)] = "B"
+    assert mosaic.cfa == tuple("".join(row) for row in by_value[:2, :2])
+
+
+def brightest_corner(frame: np.ndarray) -> int:
+    ends = (slice(2, 12), slice(-12, -2))
+    return int(np.argmax([frame[row, column].mean() for row in ends for column in ends]))
+
+
+def test_white_balance_and_matrix_are_the_files(tmp_path: Path) -> None:
+    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0))))
+    assert raw.colour is not None
+    assert raw.colour.neutral == pytest.approx([0.5, 1.0, 0.7], rel=1e-5)
+    assert raw.colour.to_srgb.sum(axis=1) == pytest.approx(np.ones(3))
+    # ColorMatrix1 is for D65 here: a camera colour of an XYZ goes back to that XYZ in sRGB, as DNG's chapter 6 has it
+    srgb_to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    to_camera = MATRIX @ srgb_to_xyz
+    balanced = to_camera / to_camera.sum(axis=1, keepdims=True)
+    assert raw.colour.to_srgb == pytest.approx(np.linalg.inv(balanced), abs=2e-3)
+    white = np.array([0.9505, 1.0, 1.089])
+    response = raw.colour.xyz_to_camera_d65 @ white
+    assert response / response[1] == pytest.approx(MATRIX @ white / (MATRIX @ white)[1], abs=2e-3)
+    assert raw.colour.camera_to_xyz_d65 @ np.ones(3) == pytest.approx([0.9642, 1.0, 0.8249], abs=2e-3)  # D50
+    assert (facts["as_shot"], facts["colour_matrix"]) == ("file", "LibRaw")
+
+
+def test_a_file_without_colours_says_so(tmp_path: Path) -> None:
+    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)), colours=False))
+    assert raw.colour is not None
+    assert facts["colour_matrix"] == "none"
+    np.testing.assert_array_equal(raw.colour.to_srgb, np.eye(3))
+
+
+def test_noise_comes_from_the_files_profile(tmp_path: Path) -> None:
+    # S = 1 / full scale in electrons, O = (dark / full scale)^2; three channels whose mean counts
+    full, dark = 31_000.0, 6.0
+    pair = (1 / full, (dark / full) ** 2)
+    path = other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)), noise=pair * 3)
+    raw, facts = open_raw(path)
+    assert facts["noise"] == "profile of the file"
+    assert raw.gain_e_per_dn == pytest.approx(full / (WHITE - 520))
+    assert raw.read_noise_e == pytest.approx(dark)
+
+
+@pytest.mark.parametrize("pair", [(0.0, 0.0), (float("nan"), 1.0), (-1e-4, 1e-9), (2.0, 1e-9), (1e-4, 2.0), (1e-4,)])
+def test_a_profile_that_says_nothing_is_not_believed(pair: tuple[float, ...], tmp_path: Path) -> None:
+    path = other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)), noise=pair)
+    assert read_noise_profile(path, 15_000.0) is None
+
+
+def test_noise_is_estimated_from_a_frame_large_enough_and_assumed_otherwise(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    ramp = np.tile(np.geomspace(20.0, 4000.0, 512), (400, 1))
+    electrons = rng.poisson(ramp) + 3.0 * rng.standard_normal(ramp.shape)  # at 0.5 e- a DN
+    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", levels(electrons / 0.5)))
+    assert facts["noise"] == "estimated from the frame"
+    assert facts["gain_e_per_dn"] == raw.gain_e_per_dn == pytest.approx(0.5, rel=0.2)
+    raw, facts = open_raw(other_camera(tmp_path / "small.dng", levels(np.full(SHAPE, 3000.0))))
+    assert facts["noise"] == "assumed"
+    assert (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn == pytest.approx(ASSUMED_FULL_WELL_E)
+    assert raw.read_noise_e == ASSUMED_DARK_NOISE_E
+
+
+def test_mosaics_that_are_not_bayers_are_refused(tmp_path: Path) -> None:
+    dn = levels(np.full((36, 60), 3000.0))
+    x_trans = (
+        1,
+        2,
+        1,
+        1,
+        0,
+        1,
+        0,
+        1,
+        0,
+        2,
+        1,
+        2,
+        1,
+        2,
+        1,
+        1,
+        0,
+        1,
+        1,
+        0,
+        1,
+        1,
+        2,
+        1,
+        2,
+        1,
+        2,
+        0,
+        1,
+        0,
+        1,
+        0,
+        1,
+        1,
+        2,
+        1,
+    )
+    other_camera(tmp_path / "x.dng", dn, pattern=x_trans, repeat=(6, 6))
+    other_camera(tmp_path / "row.dng", dn, pattern=(0, 1, 0, 2))
+    for name in ("x.dng", "row.dng"):
+        with pytest.raises(InputError, match=rf"{name}: .*; allowed: Bayer") as error:
+            read_photograph(tmp_path / name)
+        assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("content", [b"", b"no raw file", b"II*\0" + bytes(40), b"MM\0*" + bytes(40)])
+@pytest.mark.parametrize("name", ["shot.nef", "shot.dng", "shot"])
+def test_what_libraw_cannot_read_is_one_line(name: str, content: bytes, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=r"shot.*: LibRaw can't read it \(.+\); allowed: raw files") as error:
+        read_raw(tmp_path / name)
+    assert "\n" not in str(error.value)
+    assert "b'" not in str(error.value)
