@@ -14,11 +14,10 @@ from numpy.typing import ArrayLike
 
 from isp.anscombe import anscombe, unstabilise
 from isp.demosaic import MALVAR_REACH, menon, require_bayer
-from isp.interleaved import reconstruct
+from isp.interleaved import reconstruct_with_noise
 from isp.mosaic import as_picture, balance_mosaic, to_rgb
 from isp.picture import Picture, finish
 from isp.planes import Plane
-from render.jit import backend
 from render.optional import optional_library
 from sensor.raw import RawImage
 
@@ -31,10 +30,22 @@ _SMALLEST = 32  # pixels of a picture of half the size: the library fails on one
 def picture_bayer_nlm(
     raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
 ) -> Picture:
-    """Develop a Bayer raw image with `isp.interleaved.reconstruct`, each colour judged by itself."""
+    """Develop a Bayer raw image with `isp.interleaved.reconstruct`, each colour judged by itself.
+
+    With a `ColourFit` the colours know their noise, as the interleaved camera's do.
+    """
     require_bayer(raw.cfa)
-    planes = np.asarray(reconstruct(raw), dtype=np.float64)
-    return finish(raw, planes, matrix, neutral=neutral, balance=balance, engine=backend())
+    result = reconstruct_with_noise(raw)
+    planes = np.asarray(result.estimate, dtype=np.float64)
+    return finish(
+        raw,
+        planes,
+        matrix,
+        neutral=neutral,
+        balance=balance,
+        engine=result.engine,
+        noise_gain=result.noise_gain,
+    )
 
 
 def picture_bayer_bm3d(

@@ -13,7 +13,7 @@ Kijima: T. Kijima et al., "Image sensor with improved light sensitivity", US pat
 being combined until they gather about as much light as W does, then one from both.
 
 Ours in all of them: white balance before, interpolation by normalised convolution, the way back to linear sRGB, and
-what happens to highlights. None of the three has an answer to a saturated W: the luminance ends where W's well does.
+what happens to highlights. None of the three has an answer to a saturated W: luminance ends where W's well does.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import convolve1d
 
 from isp.colour import luminance_of_srgb, neutral_response
-from isp.mosaic import Image, as_picture, balance_mosaic, to_rgb
+from isp.mosaic import Image, as_picture, balance_mosaic, near_saturated, to_rgb
 from isp.picture import Picture, require_letters
 from isp.planes import Plane, fill, tent
 from sensor.cfa import Tile, mask
@@ -41,7 +41,7 @@ def picture_sato(
     require_letters(raw, LETTERS)
     mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
     colours = np.stack([fill(mosaic.values, raw.cfa, letter) for letter in "RGB"], axis=-1)
-    rgb = with_luminance(to_rgb(raw, colours, matrix, 1), fill(mosaic.values, raw.cfa, "W"))
+    rgb = _fused(raw, to_rgb(raw, colours, matrix, 1), fill(mosaic.values, raw.cfa, "W"))
     return as_picture(raw, rgb, mosaic.balance)
 
 
@@ -57,7 +57,7 @@ def picture_yamagami(
         neutral = neutral_response(LETTERS) * np.array([1.0, 1.0, 1.0, matched_transmittance(rgbw())])
     mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
     colours = np.stack([combine(mosaic.values, raw.cfa, letter) for letter in "RGB"], axis=-1)
-    rgb = with_luminance(to_rgb(raw, colours, matrix, MATCHED_RADIUS), fill(mosaic.values, raw.cfa, "W"))
+    rgb = _fused(raw, to_rgb(raw, colours, matrix, MATCHED_RADIUS), fill(mosaic.values, raw.cfa, "W"))
     return as_picture(raw, rgb, mosaic.balance)
 
 
@@ -90,6 +90,17 @@ def combine(values: Plane, cfa: Tile, letter: str, radius: int = MATCHED_RADIUS)
         total = convolve1d(total, tent(radius), axis, mode="constant")
         weight = convolve1d(weight, tent(radius), axis, mode="constant")
     return np.asarray(total / weight)
+
+
+def _fused(raw: RawImage, rgb: Image, luminance: Plane) -> Image:
+    """W's luminance with the colours' differences; where W is full, with their ratios.
+
+    Differences that belong to a much larger luminance than a full W can tell would turn noise into colour.
+    """
+    own = luminance_of_srgb(rgb)
+    scale = np.where(own > luminance, luminance / np.maximum(own, 1e-12), 1.0)
+    full = near_saturated(raw, "W", 1)[..., None]
+    return np.where(full, rgb * scale[..., None], with_luminance(rgb, luminance))
 
 
 def with_luminance(rgb: Image, luminance: Plane) -> Image:

@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from isp.balance import clip_highlights, white_balance
 from isp.colour import BalanceSource
+from isp.colour_fit import ColourFit, relative_noise
+from isp.substitution import matrix_without_white
 from render.errors import InputError
 from render.jit import Backend
 from sensor.cfa import channels
@@ -47,11 +49,12 @@ class Picture:
 def finish(
     raw: RawImage,
     planes: Image,
-    matrix: ArrayLike,
+    matrix: ArrayLike | ColourFit,
     *,
     neutral: ArrayLike | None = None,
     balance: ArrayLike | None = None,
     engine: Backend = "numpy",
+    noise_gain: NDArray[np.floating] | None = None,
 ) -> Picture:
     """Develop planes of R, G and B: white balance, highlights, matrix.
 
@@ -65,8 +68,12 @@ def finish(
         As `isp.pipeline.develop_interleaved`.
     engine : "cuda", "llvm" or "numpy"
         What made the planes.
+    noise_gain : (h, w, 3) array, optional
+        Of `isp.interleaved.reconstruct_with_noise`: with a `ColourFit` as `matrix`, colours that know this noise.
     """
     white = white_balance(raw, planes, neutral, balance)
+    if noise_gain is not None and isinstance(matrix, ColourFit):
+        matrix = matrix_without_white(matrix, relative_noise(raw, planes, noise_gain, white.gains, matrix))
     rgb = clip_highlights(raw, planes * white.gains) @ checked_matrix(matrix).T
     return Picture(rgb, dict(zip(channels(raw.cfa), white.sources, strict=True)), None, None, engine)
 

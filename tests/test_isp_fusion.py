@@ -121,3 +121,14 @@ def test_complementary_colours_in_the_dark_take_their_own_neutral() -> None:
     picture = picture_complementary(exposure(level, ("CM", "YW"), dark_e=1000.0), np.eye(3))
     assert picture.balance == dict.fromkeys("CMYW", "calibrated")
     assert picture.rgb == pytest.approx(np.full((16, 16, 3), 80.0), abs=0.3)
+
+
+def test_where_w_is_full_the_colours_keep_their_ratios_at_its_luminance() -> None:
+    # W reads 15 000 e- at most: 3000 balanced. An orange of that and more luminance keeps its chromaticity.
+    level = {"R": 5000.0, "G": 6000.0, "B": 800.0, "W": 40_000.0}
+    raw = exposure({letter: np.full((16, 16), one) for letter, one in level.items()})
+    orange = np.array([10_000.0, 6000.0, 2000.0])
+    for develop in (picture_sato, picture_yamagami):
+        rgb = develop(raw, np.eye(3), balance=BALANCE).rgb
+        expected = orange * 3000.0 / luminance_of_srgb(orange)
+        assert rgb == pytest.approx(np.broadcast_to(expected, (16, 16, 3)), rel=1e-4)
