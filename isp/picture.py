@@ -12,6 +12,7 @@ from isp.colour_fit import ColourFit, relative_noise
 from isp.substitution import matrix_without_white
 from render.errors import InputError
 from render.jit import Backend
+from render.notebook import html_of, preview_png
 from sensor.cfa import channels
 from sensor.raw import RawImage
 
@@ -44,6 +45,15 @@ class Picture:
     substituted: bool | None
     engine: Backend
     substitution: float | None = None
+
+    def _repr_png_(self) -> bytes:
+        return preview_png(self.rgb)
+
+    def _repr_html_(self) -> str:
+        facts = {"white balance": ", ".join(f"{letter}: {source}" for letter, source in self.balance.items())}
+        if self.snr is not None:
+            facts["frame SNR of green"] = f"{self.snr:.3g}, W's share of the luminance {self.substitution or 0:.2g}"
+        return html_of("Picture", facts | {"engine": self.engine}, self._repr_png_())
 
 
 def finish(

@@ -61,7 +61,7 @@ def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
 
 def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str, Any]]:
     letters = _letters(opened, path)
-    black, white = _black(opened, letters), _white_level(opened)
+    black, white = _black(opened), int(opened.white_level)
     if not black.max() < white:
         raise InputError(f"{path}: black {black.max():g} is not under white {white:g}; it is damaged or no photograph")
     dn = np.minimum(opened.raw_image_visible + (black.max() - black), white)
@@ -111,16 +111,10 @@ def _tile(letters: NDArray[np.str_], path: Path) -> Tile:
     return tile
 
 
-def _black(opened: Any, letters: NDArray[np.str_]) -> NDArray[np.intp]:
+def _black(opened: Any) -> NDArray[np.intp]:
     """Black level of each pixel [DN]."""
     levels = np.array(opened.black_level_per_channel, dtype=np.intp)
     return np.asarray(levels[np.asarray(opened.raw_colors_visible)])
-
-
-def _white_level(opened: Any) -> int:
-    """Reading from which samples are full: the least that LibRaw or the file gives."""
-    linear = [int(level) for level in opened.camera_white_level_per_channel or () if level > 0]
-    return min(int(opened.white_level), *linear) if linear else int(opened.white_level)
 
 
 def _turned(frame: NDArray[Any], flip: int) -> NDArray[Any]:

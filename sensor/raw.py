@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError, require_range
+from render.notebook import html_of, preview_png
 from sensor.calibration import ColourCalibration
 from sensor.cfa import Tile, channels, check_covers, check_tile
 
@@ -105,6 +106,19 @@ class RawImage:
             )
         for name in ("black_dn", "white_dn"):
             require_range(name, getattr(self, name), -65_535.0, 65_535.0, "give digital numbers of 16 bits")
+
+    def _repr_png_(self) -> bytes:
+        return preview_png(np.maximum(self.electrons, 0.0))
+
+    def _repr_html_(self) -> str:
+        facts = {
+            "size": f"{self.shape[0]} x {self.shape[1]} pixels, mosaic {' / '.join(self.cfa)}",
+            "exposure": f"{self.exposure_s * 1e3:.4g} ms",
+            "range": f"black {self.black_dn:.4g} to white {self.white_dn:.6g} DN, {self.gain_e_per_dn:.3g} e-/DN",
+            "mean": f"{self.electrons.mean():.4g} e-, dark noise {self.dark_noise_e:.3g} e-",
+            "saturated": f"{self.saturated.mean():.2%}",
+        }
+        return html_of("RawImage", facts, self._repr_png_())
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -16,43 +16,43 @@ def develop(
     bits: int = 8,
     ev: float | None = None,
     white_balance: str = "gray-world",
+    encoding: str = "srgb",
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
-    """Develop a raw file of `rodcone capture` into a PNG in sRGB; prints its path.
+    """Develop a raw file of `rodcone capture`, or any camera's with a Bayer mosaic, into a picture; prints its path.
 
     Parameters
     ----------
     raw
-        Raw file: .dng, or .tif with its .json beside it.
+        Raw file: .dng, or .tif with its .json beside it; or a camera's, such as .nef, .cr2 or .dng, which takes
+        pip install 'rodcone[photographs]'.
     out
-        Picture to write; the raw file's name with .png by default.
+        Picture to write, .png or .tif; the raw file's name with .png by default.
     isp
-        Pipeline: interleaved (RGBW) or bayer; by the mosaic in the file where left out.
+        Pipeline: interleaved (RGBW) or bayer, by the mosaic in the file where left out. For Bayer also bayer_malvar,
+        bayer_menon, bayer_nlm and bayer_bm3d; for RGBW rgbw_sato, rgbw_kijima, rgbw_yamagami and rgbw_gindele.
     bits
         Of each channel: 8 or 16.
     ev
         Brightness in stops, at 0 a full well is white; by default the 99th percentile of the picture's luminance is
         shown at 90 % of white.
     white_balance
-        gray-world, as in the paper, or as-shot: what capture's --white-balance set, as raw converters do.
+        gray-world, as in the paper, or as-shot: what capture's --white-balance or the camera set, as raw converters do.
+    encoding
+        Colours of the picture: srgb, or display-p3 for screens with a wider gamut.
     json
         Print one JSON object with the path and what was decided instead of the path.
     """
     from render.errors import InputError
-    from render.files import check_place, replacing
+    from render.files import check_place
     from studies.development import develop_file
-    from studies.png import to_png
+    from studies.picture_file import check_picture_file, write_picture
 
     if not raw.name:
         raise InputError(f"raw: {str(raw)!r} is a folder; give the path of a raw file")
     picture = raw.with_suffix(".png") if out is None else out
-    if picture.suffix.lower() != ".png":
-        raise InputError(f"out: {str(picture)!r} has another ending; allowed: .png; rename it")
-    if bits not in (8, 16):
-        raise InputError(f"bits: {bits!r} is not allowed; give 8 or 16")
+    check_picture_file(picture, bits, encoding)
     check_place(picture)
-    developed = develop_file(raw, isp, ev, white_balance)
-    content = to_png(developed.encoded, bits)
-    with replacing(picture) as (place,):
-        place.write_bytes(content)
+    developed = develop_file(raw, isp, ev, white_balance, encoding)
+    write_picture(developed.encoded, picture, bits, encoding)
     print(notation.dumps({"path": str(picture), **developed.facts}) if json else picture)

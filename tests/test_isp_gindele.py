@@ -36,6 +36,22 @@ def test_where_w_is_full_the_colours_stand_alone(cfa: Tile) -> None:
     np.testing.assert_allclose(rgb[:, 21 + REACH :], adams_planes(values, cfa)[:, 21 + REACH :], rtol=1e-12)
 
 
+def test_a_sites_own_detail_is_added_as_a_quarter_of_its_laplacian() -> None:
+    # one red sample of 4: 2 * 4 / 4 in W there, on both diagonals alike; two sites away the other diagonal is smoother
+    mosaic = np.zeros((20, 20))
+    mosaic[8, 8] = 4.0
+    white = luminance_plane(mosaic, ("RG", "BW"))
+    assert white[8, 8] == 2.0
+    assert white[[6, 6, 10, 10], [6, 10, 6, 10]] == pytest.approx(np.zeros(4))
+
+
+@pytest.mark.parametrize("cfa", PHASES)
+def test_more_reflection_changes_nothing(cfa: Tile) -> None:
+    mosaic = np.random.default_rng(2).uniform(100, 1000, (19, 22))
+    more = luminance_plane(np.pad(mosaic, 8, mode="reflect"), cfa)[8:-8, 8:-8]
+    np.testing.assert_allclose(luminance_plane(mosaic, cfa), more, rtol=1e-12)
+
+
 @pytest.mark.parametrize("cfa", PHASES)
 def test_a_grey_ramp_is_reproduced_in_any_direction(cfa: Tile) -> None:
     rows, columns = np.indices((22, 25))

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import pytest
 
+from isp.colour import luminance_of_srgb
 from isp.processors import PROCESSORS
 from render.errors import InputError
 from render.optional import optional_library
@@ -85,6 +86,21 @@ def test_bright_ends_at_greens_full_well_or_where_w_alone_is_the_luminance_at_w_
     rgb = PROCESSORS[name].develop(grey(name, tile, np.full((24, 24), 1e5)), IDENTITY, balance=balance).rgb
     ends_with_w = name in ("rgbw_sato", "cmyw_yamagami")
     assert rgb == pytest.approx(np.full((24, 24, 3), FULL_E / 5 if ends_with_w else FULL_E), rel=1e-5)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_nothing_beside_a_highlight_is_brighter_than_it(name: str) -> None:
+    # filters with negative weights overshoot at the edge of a square of saturated grey
+    require_library(name)
+    rows, columns = np.indices((32, 34))
+    square = np.where((abs(rows - 16) < 7) & (abs(columns - 16) < 7), 1e5, 2000.0)
+    tile = tile_of(name)
+    balance = [neutral_of(name)[letter] for letter in channels(tile)]
+    rgb = PROCESSORS[name].develop(grey(name, tile, square), IDENTITY, balance=balance).rgb
+    if name in ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami"):  # differences of colours from a luminance of their own
+        assert luminance_of_srgb(rgb).max() <= FULL_E * (1 + 1e-6)
+    else:
+        assert rgb.max() <= FULL_E * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("name", QUICK)

@@ -31,6 +31,17 @@ def test_texture_in_half_the_frame_changes_little() -> None:
     assert found.gain_e_per_dn == pytest.approx(0.5, rel=0.2)
 
 
+def test_clipped_highlights_do_not_pass_for_quiet_ones() -> None:
+    # most of the frame lies at the white level, where clipping takes half of the noise away
+    rng = np.random.default_rng(5)
+    below = np.tile(np.linspace(400.0, 3600.0, 384), (512, 1))
+    levels = np.hstack([below, np.full((512, 768), 3990.0)])
+    dn = np.minimum(np.rint(rng.poisson(levels) / 0.5), 8000.0)
+    found = estimate_noise(dn, 8000.0)
+    assert found is not None
+    assert found.gain_e_per_dn == pytest.approx(0.5, rel=0.1)
+
+
 @pytest.mark.parametrize(
     "above_black_dn",
     [

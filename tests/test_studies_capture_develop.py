@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 from PIL import Image
 
 from isp.colour import encode_srgb
+from isp.encoding import encode
 from render.exr import write_exr
 from render.illuminants import illuminant
 from render.photometry import luminance
@@ -322,6 +324,60 @@ def test_sixteen_bits_hold_what_eight_round_away(capsys: pytest.CaptureFixture[s
     assert [(tmp_path / f"{bits}.png").read_bytes()[24] for bits in (8, 16)] == [8, 16]  # IHDR's depth
 
 
+def test_a_picture_in_display_p3_as_tiff_carries_its_profile(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    raw = negative(tmp_path / "shot.dng", share=0.1, light="A")
+    colour = calibrate(preset("low_noise", "bayer"), illuminant("D65"))
+    write_raw(replace(raw, colour=colour), tmp_path / "shot.dng")  # an orange wall, as above
+    signal = np.array([raw.electrons[mask(raw.cfa, letter, SHAPE)].mean() for letter in "RGB"])
+    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
+    orange = colour.to_srgb @ (signal / colour.neutral[:3] / full_e)
+    out = tmp_path / "wide.tif"
+    arguments = ["develop", str(tmp_path / "shot.dng"), "--encoding", "display-p3", "--bits", "16", "-o", str(out)]
+    code, printed, _ = call([*arguments, "--ev", "0", "--white-balance", "as-shot", "--json"], capsys)
+    assert (code, json.loads(printed)["encoding"]) == (0, "display-p3")
+    with Image.open(out) as picture:
+        assert b"D\0i\0s\0p\0l\0a\0y\0 \0P\x003" in picture.info["icc_profile"]
+    pixels = tifffile.imread(out)
+    assert pixels.dtype == np.uint16
+    assert np.abs(pixels / 65_535 - encode(orange, "display-p3")).max() <= 0.7 / 255
+    assert np.abs(encode(orange, "display-p3") - encode(orange, "srgb")).max() > 5 / 255
+
+
+@pytest.mark.parametrize("isp", ["bayer_malvar", "bayer_menon", "bayer_nlm"])
+def test_any_processor_of_the_mosaic_can_be_asked_for(
+    isp: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    negative(tmp_path / "shot.dng")
+    code, out, _ = call(["develop", str(tmp_path / "shot.dng"), "--isp", isp, "--ev", "0", "--json"], capsys)
+    assert (code, json.loads(out)["isp"]) == (0, isp)
+    with Image.open(tmp_path / "shot.png") as picture:
+        assert np.abs(np.asarray(picture) - 255 * encode_srgb(np.array(0.25))).max() <= 0.6
+
+
+def test_a_photograph_of_another_camera_is_developed_and_says_what_was_assumed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    raw = negative(tmp_path / "shot.dng")
+    with tifffile.TiffFile(tmp_path / "shot.dng") as file:
+        page = file.pages[0]
+        kept = (33421, 33422, 50706, 50707, 50710, 50711, 50714, 50717, 50722, 50728, 50779)  # the rest is ours
+        tags = [(tag.code, tag.dtype, tag.count, tag.value, True) for tag in page.tags.values() if tag.code in kept]
+        dn = page.asarray()
+    tifffile.imwrite(
+        tmp_path / "other.dng", dn, photometric=32803, metadata=None, extratags=[*tags, (271, "s", 0, "Other", True)]
+    )
+    code, out, _ = call(["develop", str(tmp_path / "other.dng"), "--ev", "0", "--json"], capsys)
+    facts = json.loads(out)
+    assert (code, facts["isp"], facts["noise"], facts["as_shot"]) == (0, "bayer", "assumed", "file")
+    assert facts["reader"].startswith("LibRaw 0.")
+    with Image.open(tmp_path / "other.png") as picture:
+        # LibRaw cuts black's fraction off: up to one DN of the well's 16 000, and the levels' rounding as above
+        assert np.abs(np.asarray(picture) - 255 * encode_srgb(np.array(0.25))).max() <= 0.7
+        assert picture.size == raw.shape[::-1]
+
+
 def test_black_frames_are_black_and_no_division_by_zero(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     raw = negative(tmp_path / "shot.dng")
     write_raw(replace(raw, dn=np.zeros_like(raw.dn)), tmp_path / "shot.dng")
@@ -342,7 +398,11 @@ def test_black_frames_are_black_and_no_division_by_zero(capsys: pytest.CaptureFi
         (["."], ["'.' is a folder"]),
         (["shot.dng", "--ev", "inf"], ["ev: inf", "give stops"]),
         (["shot.dng", "-o", "shot.jpg"], ["another ending", ".png"]),
-        (["shot.cr2"], ["another ending", ".dng"]),
+        (["none.cr2"], ["none.cr2", "no such file"]),
+        (["junk.nef"], ["junk.nef", "LibRaw can't read it"]),
+        (["shot.dng", "--encoding", "p3"], ["encoding: 'p3'", "display-p3, srgb"]),
+        (["shot.dng", "--isp", "rgbw_sato"], ["holds ('R', 'G', 'B')"]),
+        (["shot.dng", "--isp", "cmyw_yamagami"], ["is not C, M, Y and W"]),
         (["cut.dng"], ["cut.dng", "cut off"]),
         (["mono.tif"], ["no colour calibration"]),
         (["four.tif"], ["use the other camera's pipeline"]),
@@ -358,6 +418,7 @@ def test_what_cannot_be_developed_is_one_line_exit_code_2_and_no_picture(
     monkeypatch.chdir(tmp_path)
     raw = negative(Path("shot.dng"))
     Path("cut.dng").write_bytes(Path("shot.dng").read_bytes()[:-1])
+    Path("junk.nef").write_bytes(b"no raw file")
     write_raw(replace(raw, cfa=("W",), colour=None), Path("mono.tif"))
     write_raw(replace(raw, cfa=("RC", "GB"), colour=calibrate_four()), Path("four.tif"))
     code, out, err = call(["develop", *arguments], capsys)
