@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError, require_range
-from render.photometry import luminance
+from render.notebook import XYZ_TO_SRGB, html_of, preview_png
+from render.photometry import luminance, tristimulus
 from render.spectrum import Floats, band_widths
 
 
@@ -67,6 +68,19 @@ class SpectralRadiance:
     def luminance(self) -> NDArray[np.float64]:
         """Luminance of each pixel [cd m^-2], shape (h, w)."""
         return luminance(self.values, self.wavelength_nm, self.widths_nm)
+
+    def _repr_png_(self) -> bytes:
+        return preview_png(tristimulus(self.values, self.wavelength_nm, self.widths_nm) @ XYZ_TO_SRGB.T)
+
+    def _repr_html_(self) -> str:
+        first, last = (float(self.wavelength_nm[i] + way * self.widths_nm[i] / 2) for i, way in ((0, -1), (-1, 1)))
+        facts = {
+            "size": f"{self.shape[0]} x {self.shape[1]} pixels",
+            "bands": f"{self.wavelength_nm.size} over {first:g} to {last:g} nm",
+            "mean luminance": f"{self.luminance().mean():.3g} cd/m²",
+            "Monte Carlo error": f"{self.relative_mc_error:.2g} of the value",
+        }
+        return html_of("SpectralRadiance", facts, self._repr_png_())
 
 
 def check_values(name: str, values: NDArray[np.floating]) -> None:

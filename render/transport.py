@@ -12,6 +12,7 @@ from render.error_estimates import relative_error, within_band_error
 from render.errors import InputError, require_keys, require_range
 from render.illuminants import illuminant
 from render.jit import arrays, backend, dr
+from render.notebook import html_of
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
@@ -137,6 +138,19 @@ class Transport:
         if self.irradiance is None:
             return None
         return self._plane_lux(self._at_level(self._emission(self._lights(None, None)), luminance_cd_m2, None))
+
+    def _repr_png_(self) -> bytes:
+        return self.relight()._repr_png_()
+
+    def _repr_html_(self) -> str:
+        facts = {
+            "size": f"{self.radiance.shape[2]} x {self.radiance.shape[3]} pixels, {self.wavelength_nm.size} bands",
+            "lights": ", ".join(self.groups),
+            "samples": f"{self.spp} a pixel in {self.passes} passes, {self.seconds:.1f} s",
+            "Monte Carlo error": f"{self.relative_mc_error:.2g} of the value",
+            "integrator": f"{self.integrator}, {self.variant}",
+        }
+        return html_of("Transport, under the scene's own lights", facts, self._repr_png_())
 
     def _lights(
         self, spectra: Mapping[str, Spectrum | str] | None, powers: Mapping[str, float] | None

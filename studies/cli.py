@@ -105,11 +105,16 @@ def doctor() -> int:
     return 0 if found.ok else 1
 
 
+app.command("studies.bench_command:bench", name="bench", help="Measure speed against error, stage by stage.")
 app.command("studies.capture_command:capture", name="capture", help="Photograph a scene into raw files.")
 app.command("studies.characterise_command:characterise", name="characterise", help="Measure a chip after EMVA 1288.")
 app.command("studies.develop_command:develop", name="develop", help="Develop a raw file into a PNG.")
-app.command("studies.new_command:app", name="new", help="Write files to start from: a preset to change.")
+app.command("studies.new_command:app", name="new", help="Write files to start from: preset, study, cluster.")
+app.command("studies.plan_command:plan", name="plan", help="Compute a study's error budget and the cheapest model.")
 app.command("studies.render_command:render", name="render", help="Render a scene into a spectral OpenEXR file.")
+app.command("studies.sweep_command:sweep", name="sweep", help="Make every picture of a study, and go on after any end.")
+app.command("studies.sweep_command:export", name="export", help="Write a sweep's ledger as CSV or Parquet.")
+app.register_install_completion_command(help="Complete rodcone's commands and options in this shell from now on.")
 
 
 def main(arguments: list[str] | None = None) -> Any:

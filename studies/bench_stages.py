@@ -1,0 +1,24 @@
+"""Every stage of the chain, measured one after the other."""
+
+from collections.abc import Iterator
+
+from scenes.catalog import load
+from sensor.presets import preset
+from studies.bench_camera import by_lens, by_readout, by_reconstruction, camera_of
+from studies.bench_points import Stage
+from studies.bench_renders import by_bands, by_samples
+from studies.bench_setup import Bench
+
+STAGES = 7
+
+
+def stages(bench: Bench) -> Iterator[Stage]:
+    """Measure one stage after the other."""
+    scene, sensor = load(bench.scene), preset(bench.sensor)
+    finest, made = by_bands(bench, scene, sensor)
+    yield made
+    yield by_samples(bench, scene, sensor)
+    camera = camera_of(bench, scene, sensor, finest)
+    yield by_lens(bench, camera)
+    yield from by_readout(bench, camera)
+    yield from by_reconstruction(bench, camera)

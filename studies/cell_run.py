@@ -1,0 +1,243 @@
+"""One cell: exposed, developed, measured; its picture on disk before its row is given back."""
+
+import json
+import platform
+import time
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.colour import encode_srgb
+from isp.processors import PROCESSORS
+from render.errors import InputError
+from render.files import replacing
+from render.jit import backend, dr
+from sensor.cfa import channels, mask
+from sensor.config import SensorConfig
+from sensor.device import Device, draw_device
+from sensor.lanes import read_frame
+from sensor.noise import noise_variance
+from sensor.optics import falloff
+from sensor.random import draw_key
+from sensor.raw import RawImage
+from sensor.readout import as_raw, read_out
+from studies.cells import Cell, device_stream, exposure_stream
+from studies.digests import code_version, digest_bytes
+from studies.metrics import measure
+from studies.png import to_png
+from studies.truth import neutral_electrons
+
+Image = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Row:
+    """What the ledger holds of a cell. Times and host alone differ from run to run.
+
+    Attributes
+    ----------
+    key, code : str
+        Of `Cell`.
+    scene ... seed
+        Of `studies.cells.Coordinates`.
+    luminance_cd_m2, illuminance_lux, exposure_s : float
+        The level in both units (lux where the scene states a plane), and the time.
+    spp, bands : int
+        Of the render.
+    lens : str
+        Terms of the modelled lens, as JSON.
+    budget_share : float or None
+        Share of the noise variance that a plan predicts for its approximations.
+    psnr_db, ssim, delta_e_median, delta_e_p95 : float
+        Of `studies.metrics.Quality`.
+    mc_share : float
+        Monte Carlo variance over the sensor's own, means over the pixels below saturation.
+    snr_db : float or None
+        Green's, where the processor measures it.
+    substitution : int or None
+        Whether W stood for luminance.
+    saturated : float
+        Share of the pixels.
+    balance, mean_electrons : str
+        By channel, as JSON.
+    engine : str
+        What developed it.
+    picture : str
+        File below the folder of pictures.
+    capture_s, develop_s, measure_s : float
+    finished : str
+        UTC.
+    host : str
+    """
+
+    key: str
+    code: str
+    scene: str
+    spectrum: str
+    level: str
+    exposure: str
+    sensor: str
+    processor: str
+    seed: int
+    luminance_cd_m2: float
+    illuminance_lux: float | None
+    exposure_s: float
+    spp: int
+    bands: int
+    lens: str
+    budget_share: float | None
+    psnr_db: float
+    ssim: float
+    delta_e_median: float
+    delta_e_p95: float
+    mc_share: float
+    snr_db: float | None
+    substitution: int | None
+    saturated: float
+    balance: str
+    mean_electrons: str
+    engine: str
+    picture: str
+    capture_s: float
+    develop_s: float
+    measure_s: float
+    finished: str
+    host: str
+
+
+TIME_AND_HOST = ("capture_s", "develop_s", "measure_s", "finished", "host")
+
+
+def run_cell(cell: Cell, threads: int | None = None) -> Row:
+    """Make the picture of a cell and measure it against the truth.
+
+    Parameters
+    ----------
+    cell : Cell
+    threads : int, optional
+        For Dr.Jit in this process; left out, as many as it has.
+
+    Raises
+    ------
+    InputError
+        Where this process has other code than the one that asks, or can't read the arrays by their paths.
+    OSError
+        Where the picture can't be written.
+    """
+    _check_code(cell)
+    if threads is not None:
+        limit_threads(threads)
+    truth = _array(cell.truth)
+    expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * (cell.luminance_cd_m2 * cell.exposure_s)
+    processor, mosaic = PROCESSORS[cell.at.processor], PROCESSORS[cell.at.processor].mosaic
+    shape = (truth.shape[0], truth.shape[1])
+    device = draw_device(cell.sensor, shape, device_stream(cell.at, mosaic))
+    start = time.perf_counter()
+    raw = _expose(cell, expected_e, device, exposure_stream(cell.at, mosaic))
+    exposed = time.perf_counter()
+    neutral = neutral_electrons(cell.sensor, cell.light, cell.exposure_s)
+    picture = processor.develop(raw, cell.colours, neutral=neutral)
+    developed = time.perf_counter()
+    encoded = _encoded(cell, picture.rgb, float(neutral[channels(cell.sensor.cfa).index(processor.unit)]))
+    quality = measure(encoded, truth)
+    measured = time.perf_counter()
+    return Row(
+        key=cell.key,
+        code=cell.code,
+        **vars(cell.at),
+        luminance_cd_m2=cell.luminance_cd_m2,
+        illuminance_lux=cell.illuminance_lux,
+        exposure_s=cell.exposure_s,
+        spp=cell.spp,
+        bands=cell.bands,
+        lens=json.dumps(vars(cell.sensor.lens)),
+        budget_share=cell.budget_share,
+        **vars(quality),
+        mc_share=_monte_carlo_share(cell, expected_e),
+        snr_db=_decibels(picture.snr),
+        substitution=None if picture.substituted is None else int(picture.substituted),
+        saturated=float(raw.saturated.mean()),
+        balance=json.dumps(dict(picture.balance)),
+        mean_electrons=json.dumps(_mean_electrons(cell.sensor, expected_e)),
+        engine=picture.engine,
+        picture=_keep(cell.pictures, to_png(encoded)),
+        capture_s=exposed - start,
+        develop_s=developed - exposed,
+        measure_s=measured - developed,
+        finished=datetime.now(UTC).isoformat(timespec="milliseconds"),
+        host=platform.node(),
+    )
+
+
+@cache
+def limit_threads(threads: int) -> None:
+    """Give Dr.Jit in this process so many threads; on the LLVM backend alone does it matter."""
+    if backend() == "llvm":
+        dr.set_thread_count(threads)
+
+
+def _check_code(cell: Cell) -> None:
+    if cell.code != code_version():
+        raise InputError(
+            f"worker on {platform.node()}: its code is {code_version()}, the sweep's is {cell.code}; "
+            "allowed: the same; install the same rodcone and start the worker again"
+        )
+
+
+def _encoded(cell: Cell, rgb: Image, unit_e: float) -> Image:
+    """Encode a developed picture, in which a neutral of 1 cd/m^2 reads `unit_e`, shape (h, w, 3)."""
+    linear = rgb / (unit_e * cell.white_cd_m2)
+    if cell.sensor.lens.horizontal_view_deg:  # a camera corrects the falloff that it knows of its lens
+        linear = linear / falloff(cell.sensor.lens, linear.shape[:2])[..., None]
+    return encode_srgb(linear)
+
+
+def _array(path: Path) -> Image:
+    try:
+        return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{path}: can't be read on {platform.node()} ({error}); allowed: a folder that all workers see under the "
+            "same path; give one with --out, or run the sweep again where the file is damaged"
+        ) from error
+
+
+def _expose(cell: Cell, expected_e: Image, device: Device, rng: np.random.Generator) -> RawImage:
+    if cell.exact or backend() == "numpy":
+        return read_out(expected_e, cell.sensor, device, cell.exposure_s, rng)
+    single = expected_e.astype(np.float32)
+    dn = read_frame(single, cell.sensor, device, cell.exposure_s, draw_key(rng))
+    return as_raw(dn, cell.sensor, cell.exposure_s, engine=backend())
+
+
+def _monte_carlo_share(cell: Cell, expected_e: Image) -> float:
+    """As `studies.budget.monte_carlo_share`, from the half difference that the frame keeps."""
+    inside = expected_e < cell.sensor.pixel.full_well_e
+    if not inside.any():
+        return 0.0
+    error_e = _array(cell.half_difference) * (cell.luminance_cd_m2 * cell.exposure_s)
+    own = noise_variance(expected_e, cell.sensor, cell.exposure_s)[inside].mean()
+    return float((error_e[inside] ** 2).mean() / own)
+
+
+def _decibels(snr: float | None) -> float | None:
+    return 20 * float(np.log10(snr)) if snr is not None and snr > 0 else None
+
+
+def _mean_electrons(sensor: SensorConfig, expected_e: Image) -> dict[str, float]:
+    shape = (expected_e.shape[0], expected_e.shape[1])
+    return {letter: float(expected_e[mask(sensor.cfa, letter, shape)].mean()) for letter in channels(sensor.cfa)}
+
+
+def _keep(folder: Path, content: bytes) -> str:
+    """Write a picture under the hash of its content; gives its name below the folder."""
+    name = digest_bytes(content)
+    place = folder / name[:2] / f"{name}.png"
+    place.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(place) as (part,):
+        part.write_bytes(content)
+    return f"{name[:2]}/{name}.png"

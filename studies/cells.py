@@ -1,0 +1,119 @@
+"""Cells of a study: one picture each, with all that decides it, a key of that, and random streams by coordinates."""
+
+from dataclasses import astuple, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from isp.colour_fit import ColourFit
+from sensor.config import SensorConfig
+from studies.digests import digest
+from studies.levels import parse_level
+from studies.study import Condition, label, parse_exposure
+from studies.truth import Light
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """Place of a cell in its study, as the user wrote it; files by their own names."""
+
+    scene: str
+    spectrum: str
+    level: str
+    exposure: str
+    sensor: str
+    processor: str
+    seed: int
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One picture to make. It travels to its worker as it is; arrays travel as paths.
+
+    Attributes
+    ----------
+    key : str
+        Hash of all below and of the code that made it.
+    at : Coordinates
+    luminance_cd_m2 : float
+        Mean scene luminance.
+    illuminance_lux : float or None
+        On the reference plane; None without one.
+    exposure_s : float
+    sensor : SensorConfig
+        With the processor's mosaic and the lens that is modelled.
+    exact : bool
+        As `studies.model.ImageModel`.
+    colours : ColourFit
+        Of the processor's balanced planes, under the scene's light.
+    light : Light
+    white_cd_m2 : float
+        Luminance shown as white.
+    electrons, half_difference, truth : Path
+        As `studies.frames.Frame` and `LitScene` hold them.
+    pictures : Path
+        Folder that the picture goes to, under the hash of its content.
+    code : str
+        `studies.digests.code_version` of the process that asks.
+    spp, bands : int
+        Of the render, for the ledger.
+    budget_share : float or None
+        Share of the noise variance that a plan predicts for its approximations.
+    """
+
+    key: str
+    at: Coordinates
+    luminance_cd_m2: float
+    illuminance_lux: float | None
+    exposure_s: float
+    sensor: SensorConfig
+    exact: bool
+    colours: ColourFit
+    light: Light
+    white_cd_m2: float
+    electrons: Path
+    half_difference: Path
+    truth: Path
+    pictures: Path
+    code: str
+    spp: int
+    bands: int
+    budget_share: float | None = None
+
+
+def coordinates(condition: Condition, processor: str, seed: int) -> Coordinates:
+    """Coordinates of a condition's cell, files under their names."""
+    scene, spectrum, level, exposure, sensor = (
+        condition.scene.source,
+        condition.spectrum,
+        condition.level,
+        condition.exposure,
+        condition.sensor,
+    )
+    return Coordinates(label(scene), spectrum, level, exposure, label(sensor), processor, seed)
+
+
+def cell_key(
+    at: Coordinates, frame: str, luminance_cd_m2: float, exposure_s: float, exact: bool, colours: ColourFit, code: str
+) -> str:
+    """Key of a cell: its coordinates, which seed its noise, and all that its picture is made from."""
+    return digest([astuple(at), frame, luminance_cd_m2, exposure_s, exact, colours, code])
+
+
+def device_stream(at: Coordinates, mosaic: str) -> np.random.Generator:
+    """Stream of a chip's fixed patterns: they belong to the sensor, its mosaic and the seed, not to the exposure."""
+    return _stream("device", at.sensor, mosaic, at.seed)
+
+
+def exposure_stream(at: Coordinates, mosaic: str) -> np.random.Generator:
+    """Stream of one exposure's noise; processors of the same mosaic develop the same exposure.
+
+    It depends on names and values alone, not on their places in the study: another level more leaves the others' noise.
+    """
+    value, unit = parse_level(at.level)
+    exposure = parse_exposure(at.exposure)
+    return _stream("exposure", at.scene, at.spectrum, value, unit, exposure, at.sensor, mosaic, at.seed)
+
+
+def _stream(*parts: object) -> np.random.Generator:
+    return np.random.default_rng(int(digest(list(parts)), 16))

@@ -1,0 +1,177 @@
+"""What all cells of one scene share, made once and kept as files: the truth, and electrons per cd/m^2 and second.
+
+Light is linear: a mosaic's expected electrons at any level and exposure are those at 1 cd/m^2 and 1 s times both. So a
+cell reads one (h, w) array from its path, whatever the number of bands, and no array goes through a scheduler.
+"""
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from isp.colour import encode_srgb
+from isp.colour_fit import ColourFit
+from isp.processors import Processor
+from render.files import replacing
+from render.radiance import SpectralRadiance
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
+from render.transport import Transport
+from sensor.config import SensorConfig
+from sensor.exposure import auto_exposure_s
+from sensor.optics import form_image
+from sensor.response import expected_electrons
+from studies.camera import colour_fit
+from studies.digests import code_version, digest
+from studies.lit_scene import OpenedScene, white_spectrum
+from studies.model import ImageModel, modelled
+from studies.truth import Light, light_in_bands, true_srgb
+
+WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # the scene's 99th percentile of luminance is shown at 90 % of white
+_PLAIN = ImageModel(diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0)
+_DARK_S = 1e7  # what `auto_exposure_s` answers where there is no light: longer than any exposure
+
+
+@dataclass(frozen=True)
+class LitScene:
+    """A render under one spectrum, at a mean luminance of 1 cd/m^2.
+
+    Attributes
+    ----------
+    key : str
+    light : Light
+        That the cameras' colours are set to.
+    white_cd_m2 : float
+        Luminance shown as white.
+    lux_per_cd_m2 : float or None
+        Illuminance of the reference plane; None without one.
+    truth : Path
+        Encoded sRGB of the noise-free scene, (h, w, 3) float64; the same at every level.
+    """
+
+    key: str
+    light: Light
+    white_cd_m2: float
+    lux_per_cd_m2: float | None
+    truth: Path
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A lit scene on a sensor, at 1 cd/m^2 and 1 s.
+
+    Attributes
+    ----------
+    key : str
+    sensor : SensorConfig
+        With the modelled lens.
+    auto_s : float
+        Auto exposure there, without a longest time [s].
+    electrons : Path
+        Expected electrons, (h, w) float64.
+    half_difference : Path
+        Of even and odd passes, one draw of the Monte Carlo error, (h, w) float32.
+    """
+
+    key: str
+    sensor: SensorConfig
+    auto_s: float
+    electrons: Path
+    half_difference: Path
+
+
+def lit_key(render: str, opened: OpenedScene, spectrum: str) -> str:
+    """Key of a lit scene: the render's content, the scene's own lights, the spectrum, the code."""
+    return digest([render, opened.identity, spectrum, code_version()])
+
+
+def frame_key(lit: str, preset: SensorConfig, sensor: SensorConfig) -> str:
+    """Key of a frame: the lit scene, the preset that sets the exposure, and the sensor as it is modelled."""
+    return digest([lit, preset, sensor])
+
+
+def read_lit(folder: Path, key: str) -> LitScene | None:
+    """Lit scene made earlier, None where there is none that is whole."""
+    facts = _read(folder / f"{key}.json")
+    truth = folder / f"{key}.truth.npy"
+    if facts is None or not truth.is_file():
+        return None
+    light = Light(*(np.array(facts["light"][name]) for name in ("wavelength_nm", "width_nm", "spectrum")))
+    return LitScene(key, light, facts["white_cd_m2"], facts["lux_per_cd_m2"], truth)
+
+
+def make_lit(folder: Path, key: str, opened: OpenedScene, transport: Transport, spectrum: str) -> LitScene:
+    """Make and keep a lit scene; `transport` is lit by `under` already."""
+    radiance = transport.relight(luminance_cd_m2=1.0)
+    light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
+    luminance = radiance.luminance()[~transport.emitter_visible]
+    white = float(np.percentile(luminance, WHITE_PERCENTILE)) / WHITE_AT
+    lux = transport.illuminance_lux(1.0)
+    facts = {
+        "light": {name: value.tolist() for name, value in vars(light).items()},
+        "white_cd_m2": white,
+        "lux_per_cd_m2": lux,
+    }
+    truth = encode_srgb(true_srgb(radiance, light, white))
+    with replacing(folder / f"{key}.truth.npy", folder / f"{key}.json") as (picture, text):
+        np.save(picture, truth)
+        text.write_text(json.dumps(facts), "utf-8")
+    return LitScene(key, light, white, lux, folder / f"{key}.truth.npy")
+
+
+def read_frame(folder: Path, key: str, sensor: SensorConfig) -> Frame | None:
+    """Frame made earlier, None where there is none that is whole."""
+    electrons, difference = (folder / f"{key}.{name}.npy" for name in ("electrons", "difference"))
+    facts = _read(folder / f"{key}.json")
+    if facts is None or not (electrons.is_file() and difference.is_file()):
+        return None
+    return Frame(key, sensor, facts["auto_s"], electrons, difference)
+
+
+def make_frame(
+    folder: Path,
+    key: str,
+    views: tuple[SpectralRadiance, SpectralRadiance, SpectralRadiance],
+    preset: SensorConfig,
+    sensor: SensorConfig,
+) -> None:
+    """Make and keep a frame.
+
+    Parameters
+    ----------
+    views : three SpectralRadiance
+        The lit scene at 1 cd/m^2: all passes of its render, the even, and the odd ones.
+    preset : SensorConfig
+        Whose auto exposure it is, whatever mosaic and lens `sensor` has.
+    """
+    whole, even, odd = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in views)
+    names = [folder / f"{key}.{name}" for name in ("electrons.npy", "difference.npy", "json")]
+    with replacing(*names) as (electrons, difference, text):
+        np.save(electrons, whole)
+        np.save(difference, ((even - odd) / 2).astype(np.float32))
+        text.write_text(json.dumps({"auto_s": _auto_s(views[0], preset)}), "utf-8")
+
+
+def _auto_s(radiance: SpectralRadiance, preset: SensorConfig) -> float:
+    """Auto exposure at 1 cd/m^2 [s], without a longest time.
+
+    It is the same for every processor and every model of the lens, so that their pictures can be compared: the preset's
+    own mosaic behind a lens that spreads no light.
+    """
+    plain = modelled(replace(preset, lens=replace(preset.lens, defocus_um=0.0)), _PLAIN)
+    return auto_exposure_s(form_image(radiance, plain), plain, _DARK_S)
+
+
+def colours_under(sensor: SensorConfig, processor: Processor, spectrum: Spectrum) -> ColourFit:
+    """Fit a processor's colours under a light, in bands of its own: calibration doesn't depend on the render."""
+    nm: Floats = DEFAULT_WAVELENGTH_NM
+    return colour_fit(sensor, processor, light_in_bands(spectrum, nm, band_widths(nm)))
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        facts: dict[str, Any] = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError):
+        return None
+    return facts

@@ -1,0 +1,90 @@
+"""Fewer, wider bands out of a render's fine ones: what a render of those would give, without rendering again."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.radiance import SpectralRadiance
+from render.spectrum import LINE_BASE_NM, VISIBLE_NM, Floats, Spectrum, line_bands
+from render.transport import Transport
+
+FINE_NM = 10.0  # of the reference's bands (design: 380-780 nm in 10 nm bands)
+# Bands that a plan may choose, where no line asks for one of its own: the renderer works on four at a time, so that
+# numbers between cost as much as the next multiple.
+COUNTS = (4, 8, 12, 16, 20, 28, 40)
+
+
+def emission_lines_nm(spectrum: Spectrum) -> Floats:
+    """Wavelengths of a spectrum's emission lines (`render.spectrum.line_spectrum`): peaks under 0.2 nm wide."""
+    nm, values = spectrum.wavelength_nm, spectrum.values
+    narrow = np.diff(nm) <= LINE_BASE_NM
+    peak = narrow[:-1] & narrow[1:] & (values[1:-1] > values[:-2]) & (values[1:-1] > values[2:])
+    return nm[1:-1][peak]
+
+
+def fine_bands(spectra: Iterable[Spectrum], range_nm: tuple[float, float] = VISIBLE_NM) -> tuple[Floats, Floats]:
+    """Band centres and widths of the reference: 10 nm, and a narrow one for each emission line of any spectrum."""
+    lines = np.unique(np.concatenate([np.zeros(0), *(emission_lines_nm(spectrum) for spectrum in spectra)]))
+    return line_bands(lines[(lines > range_nm[0] + 1) & (lines < range_nm[1] - 1)], range_nm, FINE_NM)
+
+
+def groups_of(width_nm: Floats, count: int) -> list[NDArray[np.intp]]:
+    """Indices of the fine bands of each of about `count` wide ones, neighbours and as even as can be.
+
+    A line's narrow band stays alone, so that with lines there are some more.
+    """
+    size = width_nm.size / min(count, width_nm.size)
+    narrow = width_nm < FINE_NM / 4
+    made: list[NDArray[np.intp]] = []
+    for run in np.split(np.arange(width_nm.size), np.flatnonzero(np.diff(narrow.astype(int))) + 1):
+        pieces = run.size if narrow[run[0]] else max(1, round(run.size / size))
+        made += np.array_split(run, pieces)
+    return made
+
+
+def wide_bands(transport: Transport | SpectralRadiance, groups: Sequence[NDArray[np.intp]]) -> tuple[Floats, Floats]:
+    """Centres and widths of merged bands."""
+    width_nm = transport.width_nm if transport.width_nm is not None else np.zeros(0)
+    first = np.array([transport.wavelength_nm[g[0]] - width_nm[g[0]] / 2 for g in groups])
+    last = np.array([transport.wavelength_nm[g[-1]] + width_nm[g[-1]] / 2 for g in groups])
+    return (first + last) / 2, last - first
+
+
+def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) -> Transport:
+    """Transport in wide bands, of the same paths.
+
+    The variance is that of bands which rise and fall together: the most that it can be.
+    """
+    nm, width_nm = wide_bands(transport, groups)
+    matrix = _means(transport.width_nm, groups)
+    return replace(
+        transport,
+        radiance=_merge(matrix, transport.radiance),
+        half_difference=_merge(matrix, transport.half_difference),
+        variance=_merge(matrix, np.sqrt(np.maximum(transport.variance, 0.0))) ** 2,
+        irradiance=None if transport.irradiance is None else transport.irradiance @ matrix.T,
+        wavelength_nm=nm,
+        width_nm=width_nm,
+    )
+
+
+def merge_radiance(radiance: SpectralRadiance, groups: Sequence[NDArray[np.intp]]) -> SpectralRadiance:
+    """Radiance averaged over wide bands: what bands that follow light and scene within themselves would hold."""
+    nm, width_nm = wide_bands(radiance, groups)
+    values = radiance.values @ _means(radiance.widths_nm, groups).T.astype(radiance.values.dtype)
+    return SpectralRadiance(values, nm, radiance.relative_mc_error, width_nm)
+
+
+def _means(width_nm: Floats, groups: Sequence[NDArray[np.intp]]) -> Floats:
+    """Weights of fine bands in the mean over each wide one, shape (wide, fine)."""
+    matrix = np.zeros((len(groups), width_nm.size))
+    for row, group in enumerate(groups):
+        matrix[row, group] = width_nm[group] / width_nm[group].sum()
+    return matrix
+
+
+def _merge(matrix: Floats, planes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Means over bands of (group, band, h, w)."""
+    return np.asarray(np.einsum("wf,gfyx->gwyx", matrix, planes, optimize=True), dtype=np.float32)

@@ -1,0 +1,27 @@
+"""The notebooks of the documentation run, and show something."""
+
+from pathlib import Path
+
+import pytest
+
+NOTEBOOKS = sorted((Path(__file__).resolve().parent.parent / "docs" / "notebooks").glob("*.ipynb"))
+
+
+def test_there_is_a_notebook() -> None:
+    assert [path.name for path in NOTEBOOKS] == ["first_picture.ipynb"]
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")  # Jupyter's own warn of its transport
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.name)
+def test_a_notebook_runs_from_top_to_bottom_and_every_cell_shows_something(path: Path) -> None:
+    nbformat = pytest.importorskip("nbformat", reason="needs nbclient and ipykernel (extra dev)")
+    nbclient = pytest.importorskip("nbclient", reason="needs nbclient and ipykernel (extra dev)")
+    pytest.importorskip("ipykernel", reason="needs nbclient and ipykernel (extra dev)")
+    notebook = nbformat.read(path, as_version=4)
+    nbformat.validate(notebook)
+    nbclient.NotebookClient(notebook, timeout=280, kernel_name="python3").execute()
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            shown = [output.get("data", {}) for output in cell.outputs]
+            assert any("text/html" in data for data in shown), cell.source

@@ -1,0 +1,151 @@
+"""One cell against the same steps written out, and what the files that cells share have to hold."""
+
+import hashlib
+import json
+import pickle
+from dataclasses import replace
+from importlib.util import module_from_spec, spec_from_file_location
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from isp.colour import encode_srgb
+from isp.colour_fit import fit_colours
+from isp.pipeline import picture_bayer
+from render.errors import InputError
+from render.illuminants import illuminant
+from render.radiance_source import as_transport, load_radiance
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from scenes.reflectances import color_checker
+from sensor.device import draw_device
+from sensor.exposure import auto_exposure_s
+from sensor.optics import falloff, form_image
+from sensor.presets import preset
+from sensor.readout import read_out
+from sensor.response import expected_electrons
+from studies.cell_run import run_cell
+from studies.cells import Cell, device_stream, exposure_stream
+from studies.ledger import open_ledger
+from studies.lit_scene import open_all
+from studies.metrics import measure
+from studies.model import ImageModel, Plan
+from studies.prepare import Job, scene_cells
+from studies.study import conditions
+from studies.truth import light_in_bands, neutral_electrons, true_srgb
+
+
+def beside(name: str) -> Any:
+    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+SAMPLE = beside("sweep_sample")
+
+
+def made(folder: Path, plan: Plan | None = None, **changes: Any) -> list[Cell]:
+    """Cells of the small study, their shared files made."""
+    study = SAMPLE.small_study(folder, **changes)
+    with open_ledger(folder) as base:
+        job = Job(study, plan or SAMPLE.stated(study), folder, base)
+        return [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
+
+
+def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
+    cell = next(cell for cell in made(tmp_path) if cell.at.level == "25cd/m2")
+    row = run_cell(cell)
+
+    transport = as_transport(load_radiance(tmp_path / "scene.exr"))
+    radiance = transport.relight(luminance_cd_m2=25.0)
+    sensor = preset("low_noise", "bayer")
+    irradiance = form_image(radiance, sensor)
+    exposure_s = auto_exposure_s(irradiance, preset("low_noise"), 0.066)
+    expected_e = expected_electrons(irradiance, sensor, exposure_s)
+    light = light_in_bands(illuminant("E"), transport.wavelength_nm, transport.width_nm)
+    nm, width = DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM)
+    surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
+    fine = light_in_bands(illuminant("E"), nm, width)
+    responses = sensor.responses.band_average(("R", "G", "B"), nm, width)
+    colours = fit_colours(("R", "G", "B"), responses, nm, fine.spectrum, surfaces, width)
+    device = draw_device(sensor, radiance.shape, device_stream(cell.at, "bayer"))
+    raw = read_out(expected_e, sensor, device, exposure_s, exposure_stream(cell.at, "bayer"))
+    neutral = neutral_electrons(sensor, light, exposure_s)
+    white = float(np.percentile(radiance.luminance(), 99.0)) / 0.9
+    encoded = encode_srgb(picture_bayer(raw, colours, neutral=neutral).rgb / (neutral[1] * white))
+    quality = measure(encoded, encode_srgb(true_srgb(radiance, light, white)))
+
+    assert row.exposure_s == pytest.approx(exposure_s, rel=1e-6)  # the level is put on before or after float32
+    assert row.psnr_db == pytest.approx(quality.psnr_db, abs=1e-3)
+    assert row.ssim == pytest.approx(quality.ssim, abs=1e-5)
+    assert row.delta_e_median == pytest.approx(quality.delta_e_median, abs=1e-3)
+    content = (tmp_path / "pictures" / row.picture).read_bytes()
+    shown = np.asarray(Image.open(BytesIO(content)), dtype=int)
+    assert (np.abs(shown - np.rint(encoded * 255)) <= 1).all()
+    assert hashlib.sha256(content).hexdigest().startswith(Path(row.picture).stem)
+    assert json.loads(row.mean_electrons)["G"] == pytest.approx(expected_e[::2, 1::2].mean(), rel=0.2)
+    assert (row.luminance_cd_m2, row.illuminance_lux, row.mc_share) == (25.0, None, 0.0)
+
+
+def test_a_cell_gives_the_same_row_and_picture_each_time(tmp_path: Path) -> None:
+    cell = made(tmp_path)[0]
+    first, second = run_cell(cell), run_cell(cell)
+    times = dict.fromkeys(("capture_s", "develop_s", "measure_s"), 0.0) | {"finished": ""}
+    assert replace(first, **times) == replace(second, **times)  # type: ignore[arg-type]
+
+
+def test_seeds_share_no_noise_and_processors_of_a_mosaic_share_all(tmp_path: Path) -> None:
+    first, second = (run_cell(cell) for cell in made(tmp_path, levels=("1cd/m2",)))
+    assert first.picture != second.picture
+    assert first.psnr_db == pytest.approx(second.psnr_db, abs=2.0)  # 320 pixels: 3 standard errors of the mean square
+
+
+def test_single_precision_readout_draws_a_frame_of_the_same_statistics(tmp_path: Path) -> None:
+    study = SAMPLE.small_study(tmp_path)
+    plan = SAMPLE.stated(study)
+    images = {key: replace(model, exact=False) for key, model in plan.images.items()}
+    exact, single = made(tmp_path)[0], made(tmp_path, replace(plan, images=images))[0]
+    assert exact.key != single.key
+    assert run_cell(exact).picture != run_cell(single).picture
+    assert run_cell(exact).psnr_db == pytest.approx(run_cell(single).psnr_db, abs=2.0)
+
+
+def test_the_falloff_that_a_lens_is_known_to_have_is_taken_out_of_the_picture(tmp_path: Path) -> None:
+    """Bright and nearly without noise: PSNR with 60 degrees of view is that without, 3 dB more would be lost else."""
+    study = SAMPLE.small_study(tmp_path, levels=("25cd/m2",), seeds=(0,), exposures=("20ms",))
+    plain = made(tmp_path, levels=("25cd/m2",), seeds=(0,), exposures=("20ms",))[0]
+    wide = Plan({}, dict.fromkeys(conditions(study), ImageModel(0.0, 0.0, 60.0)))
+    shaded = made(tmp_path, wide, levels=("25cd/m2",), seeds=(0,), exposures=("20ms",))[0]
+    assert falloff(shaded.sensor.lens, SAMPLE.SIZE)[0, 0] < 0.6
+    with_, without = run_cell(shaded), run_cell(plain)
+    assert json.loads(with_.mean_electrons)["G"] < 0.95 * json.loads(without.mean_electrons)["G"]
+    assert with_.psnr_db == pytest.approx(without.psnr_db, abs=2.0)
+
+
+def test_a_cell_weighs_the_same_whatever_the_pictures_size_and_travels_as_it_is(tmp_path: Path) -> None:
+    small, large = tmp_path / "small", tmp_path / "large"
+    large.mkdir()
+    SAMPLE.picture(large / "scene.exr", (64, 64))
+    small.mkdir()
+    weights = [pickle.dumps(made(folder)[0]) for folder in (small, large)]
+    assert abs(len(weights[0]) - len(weights[1])) < 500  # 3776 pixels more would be 30 kB
+    assert pickle.loads(weights[0]).key == made(small)[0].key
+    assert np.load(pickle.loads(weights[1]).electrons).shape == (64, 64)
+
+
+def test_other_code_and_arrays_out_of_reach_are_told_in_one_line(tmp_path: Path) -> None:
+    cell = made(tmp_path)[0]
+    with pytest.raises(InputError, match="install the same rodcone"):
+        run_cell(replace(cell, code="0.0.0+other"))
+    with pytest.raises(InputError, match="a folder that all workers see") as told:
+        run_cell(replace(cell, electrons=tmp_path / "absent.npy"))
+    assert "\n" not in str(told.value)
+    cell.truth.write_bytes(b"no array")
+    with pytest.raises(InputError, match="can't be read"):
+        run_cell(cell)

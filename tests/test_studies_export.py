@@ -1,0 +1,105 @@
+"""A ledger as a table: CSV that no spreadsheet runs, Parquet and pandas with the same values."""
+
+import csv
+from dataclasses import asdict, replace
+from io import StringIO
+from pathlib import Path
+
+import pandas as pd
+import pyarrow.parquet
+import pytest
+
+from render.errors import InputError
+from studies.cell_run import Row
+from studies.export import read_rows, to_csv, to_pandas, write_table
+from studies.ledger import COLUMNS, add, open_ledger, want
+
+ROW = Row(
+    key="00ff",
+    code="0.1.0+abc",
+    scene="desk, lit.exr",
+    spectrum="own",
+    level="25cd/m2",
+    exposure="auto",
+    sensor="low_noise",
+    processor="bayer",
+    seed=2**40,
+    luminance_cd_m2=25.0,
+    illuminance_lux=None,
+    exposure_s=0.1 + 0.2,
+    spp=0,
+    bands=10,
+    lens='{"f_number": 2.8}',
+    budget_share=None,
+    psnr_db=float("inf"),
+    ssim=-0.25,
+    delta_e_median=0.0,
+    delta_e_p95=1.5,
+    mc_share=0.0,
+    snr_db=-3.5,
+    substitution=1,
+    saturated=0.0,
+    balance="{}",
+    mean_electrons="{}",
+    engine="llvm",
+    picture="ab/abcd.png",
+    capture_s=0.1,
+    develop_s=0.2,
+    measure_s=0.3,
+    finished="2026-01-01T00:00:00+00:00",
+    host="here",
+)
+
+
+@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
+def test_a_text_that_a_spreadsheet_would_run_is_quoted(start: str) -> None:
+    table = list(csv.reader(StringIO(to_csv([replace(ROW, scene=f"{start}cmd|' /C calc'!A0")]), newline="")))
+    assert table[1][COLUMNS.index("scene")] == f"'{start}cmd|' /C calc'!A0"
+
+
+def test_csv_holds_every_value_and_numbers_as_they_are() -> None:
+    header, values = csv.reader(StringIO(to_csv([ROW]), newline=""))
+    assert tuple(header) == COLUMNS
+    found = dict(zip(header, values, strict=True))
+    assert (found["scene"], found["ssim"], found["snr_db"]) == ("desk, lit.exr", "-0.25", "-3.5")
+    assert float(found["exposure_s"]) == ROW.exposure_s  # every digit
+    assert (found["illuminance_lux"], found["psnr_db"]) == ("", "inf")
+
+
+def test_parquet_and_pandas_hold_the_same_values(tmp_path: Path) -> None:
+    table = [ROW, replace(ROW, key="01", illuminance_lux=500.0)]
+    write_table(table, tmp_path / "t.parquet")
+    read = pyarrow.parquet.read_table(tmp_path / "t.parquet").to_pylist()
+    assert read == [asdict(row) for row in table]
+    frame = to_pandas(table)
+    assert list(frame.columns) == list(COLUMNS)
+    assert frame.loc[1, "illuminance_lux"] == 500.0
+    assert pd.isna(frame.loc[0, "illuminance_lux"])
+    assert frame["exposure_s"].tolist() == [ROW.exposure_s] * 2
+
+
+def test_rows_come_from_the_ledger_in_the_studys_order_or_all(tmp_path: Path) -> None:
+    with open_ledger(tmp_path) as base:
+        for key in ("a", "b", "c"):
+            add(base, replace(ROW, key=key))
+        want(base, ["c", "a"])
+    assert [row.key for row in read_rows(tmp_path)] == ["c", "a"]
+    assert read_rows(tmp_path, everything=True) == [replace(ROW, key=key) for key in "abc"]
+
+
+def test_wrong_places_are_told_and_nothing_is_left(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"holds no ledger.sqlite"):
+        read_rows(tmp_path)
+    with pytest.raises(InputError, match=r"'.txt' is unknown; allowed: .csv, .parquet"):
+        write_table([ROW], tmp_path / "t.txt")
+    with pytest.raises(OSError, match="absent"):
+        write_table([ROW], tmp_path / "absent" / "t.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_library_that_is_absent_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("studies.export.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"rodcone\[parquet\]"):
+        write_table([ROW], tmp_path / "t.parquet")
+    with pytest.raises(InputError, match=r"rodcone\[pandas\]"):
+        to_pandas([ROW])

@@ -1,0 +1,131 @@
+"""The ledger: whole rows, a version that is checked, and one line for a full disk or a foreign file."""
+
+import errno
+import sqlite3
+from dataclasses import replace
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from render.errors import InputError
+from studies.ledger import (
+    FILE,
+    VERSION,
+    RenderRecord,
+    add,
+    done,
+    note_render,
+    note_run,
+    open_ledger,
+    render_record,
+    rows,
+    want,
+)
+
+
+def beside(name: str) -> Any:
+    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+ROW = beside("test_studies_export").ROW
+
+
+def test_rows_outlive_the_connection_and_a_key_stands_once(tmp_path: Path) -> None:
+    with open_ledger(tmp_path) as base:
+        add(base, ROW)
+        add(base, replace(ROW, ssim=0.5))
+        add(base, replace(ROW, key="1"))
+    with open_ledger(tmp_path) as base:
+        assert rows(base, everything=True) == [replace(ROW, ssim=0.5), replace(ROW, key="1")]
+        assert rows(base) == []  # none were asked for
+
+
+def test_a_second_process_reads_while_the_first_is_open(tmp_path: Path) -> None:
+    with open_ledger(tmp_path) as writer:
+        add(writer, ROW)
+        assert writer.execute("PRAGMA journal_mode").fetchone()[0] == "wal"
+        with open_ledger(tmp_path) as reader:
+            assert rows(reader, everything=True) == [ROW]
+
+
+def test_a_row_counts_as_done_only_with_a_picture_that_is_not_empty(tmp_path: Path) -> None:
+    with open_ledger(tmp_path) as base:
+        for name in ("whole", "empty", "gone"):
+            add(base, replace(ROW, key=name, picture=f"{name}.png"))
+        (tmp_path / "whole.png").write_bytes(b"x")
+        (tmp_path / "empty.png").write_bytes(b"")
+        assert done(base, tmp_path) == {"whole"}
+
+
+def test_what_the_last_run_wants_takes_the_place_of_the_ones_before(tmp_path: Path) -> None:
+    with open_ledger(tmp_path) as base:
+        for key in ("a", "b", "c"):
+            add(base, replace(ROW, key=key))
+        want(base, ["a", "missing", "b"])
+        want(base, ["c", "b"])
+        assert [row.key for row in rows(base)] == ["c", "b"]
+
+
+def test_renders_and_runs_are_noted(tmp_path: Path) -> None:
+    record = RenderRecord("content", 64, 20, 1.5)
+    with open_ledger(tmp_path) as base:
+        assert render_record(base, "request") is None
+        note_render(base, "request", RenderRecord("coarser", 16, 20, 0.5))
+        note_render(base, "request", record)
+        assert render_record(base, "request") == record
+        note_run(base, "2026-01-01T00:00:00+00:00", "here", "{}", {"numpy": "2"})
+        assert base.execute("SELECT environment FROM runs").fetchall() == [('{"numpy": "2"}',)]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (f"PRAGMA user_version = {VERSION + 1}", f"it has version {VERSION + 1}, this rodcone reads {VERSION}"),
+        ("PRAGMA user_version = 0", "it has version 0"),
+        ("PRAGMA application_id = 0", "it is no ledger of rodcone"),
+    ],
+)
+def test_another_version_is_refused_and_left_as_it_is(change: str, words: str, tmp_path: Path) -> None:
+    with open_ledger(tmp_path) as base:
+        add(base, ROW)
+        base.execute(change)
+    with pytest.raises(InputError, match=words), open_ledger(tmp_path):
+        pass
+    with sqlite3.connect(tmp_path / FILE) as base:
+        assert base.execute("SELECT key FROM cells").fetchall() == [(ROW.key,)]
+    base.close()
+
+
+def test_a_file_that_is_no_database_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
+    (tmp_path / FILE).write_bytes(b"notes of mine " * 100)
+    with pytest.raises(InputError, match="it is no ledger"), open_ledger(tmp_path):
+        pass
+    assert (tmp_path / FILE).read_bytes() == b"notes of mine " * 100
+
+
+def test_a_full_disk_is_told_as_such_and_the_rows_before_it_stand(tmp_path: Path) -> None:
+    kept = 0
+
+    def fill() -> None:
+        nonlocal kept
+        with open_ledger(tmp_path) as base:
+            pages = base.execute("PRAGMA page_count").fetchone()[0]
+            base.execute(f"PRAGMA max_page_count = {pages + 8}")  # SQLite's own "database or disk is full"
+            while kept < 1000:
+                add(base, replace(ROW, key=f"{kept:04}"))
+                kept += 1
+
+    with pytest.raises(OSError, match="full") as told:
+        fill()
+    assert told.value.errno == errno.ENOSPC
+    assert told.value.filename == str(tmp_path / FILE)
+    assert 0 < kept < 1000
+    with open_ledger(tmp_path) as base:
+        assert [row.key for row in rows(base, everything=True)] == [f"{place:04}" for place in range(kept)]
