@@ -31,16 +31,17 @@ class Point:
 
 @dataclass(frozen=True)
 class Line:
-    """What is to be drawn: a name and one value (or None) for each position."""
+    """What is to be drawn: a name, one value (or None) for each position, and where known the interval around it."""
 
     name: str
     values: Sequence[float | None]
     texts: Sequence[str]
+    intervals: Sequence[tuple[float, float] | None] = ()
 
 
 @dataclass(frozen=True)
 class Series:
-    """A line ready to draw; `slot` picks colour, dash and mark."""
+    """A line ready to draw; `slot` picks colour, dash and mark; `band` outlines its intervals."""
 
     name: str
     label: str
@@ -48,6 +49,7 @@ class Series:
     path: str
     points: tuple[Point, ...]
     label_y: float
+    band: str = ""
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,21 @@ def line_path(points: Sequence[Point | None]) -> str:
     return " ".join(parts)
 
 
+def band_path(xs: Sequence[float], intervals: Sequence[tuple[float, float] | None], scale: Scale) -> str:
+    """Outline the intervals from left to right; an unknown one ends a piece, and one alone is a vertical stroke."""
+    pieces: list[list[tuple[float, float, float]]] = [[]]
+    for x, interval in zip(xs, intervals, strict=True):
+        if interval is None or not all(isfinite(end) for end in interval):
+            pieces.append([])
+        else:
+            pieces[-1].append((x, scale.at(interval[0]), scale.at(interval[1])))
+    outlines = []
+    for piece in filter(None, pieces):
+        around = [(x, high) for x, _, high in piece] + [(x, low) for x, low, _ in piece[::-1]]
+        outlines.append("M" + "L".join(f"{x:g} {y:g}" for x, y in around) + "Z")
+    return " ".join(outlines)
+
+
 def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list[float]:
     """Move label positions apart until neighbours are `gap` from each other, within `low`..`high` where that fits."""
     order = sorted(range(len(wanted)), key=lambda index: wanted[index])
@@ -157,7 +174,8 @@ def _series(slot: int, line: Line, order: Sequence[int], xs: Sequence[float], sc
         placed.append(Point(xs[index], scale.at(value or 0.0), line.texts[index]) if known else None)
     points = tuple(point for point in placed if point is not None)
     label = line.name if len(line.name) <= LABEL_LENGTH else line.name[: LABEL_LENGTH - 1] + "…"
-    return Series(line.name, label, slot, line_path(placed), points, points[-1].y if points else TOP)
+    band = band_path([xs[i] for i in order], [line.intervals[i] for i in order], scale) if line.intervals else ""
+    return Series(line.name, label, slot, line_path(placed), points, points[-1].y if points else TOP, band)
 
 
 def line_chart(
@@ -193,7 +211,8 @@ def line_chart(
     Chart
         Coordinates in SVG units.
     """
-    given = [*(value for line in lines for value in line.values), *shared, rule[0] if rule else None]
+    ends = [end for line in lines for interval in line.intervals if interval for end in interval]
+    given = [*(value for line in lines for value in line.values), *ends, *shared, rule[0] if rule else None]
     scale, ticks = _value_axis([value for value in given if value is not None and isfinite(value)], log_y)
     # A margin of 40 % of the value keeps the outermost marks off the frame.
     across = Scale(min(x) / 1.4, max(x) * 1.4, LEFT, WIDTH - RIGHT, log=True)

@@ -7,17 +7,17 @@ page only through Jinja's escaping (text) and ``tojson`` (the script's data bloc
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from render.errors import InputError, require_keys, require_range
+from render.errors import InputError, require_range
 from studies import report_text as text
 from studies.budget import MOST_SHARE
 from studies.charts import Chart, Line, line_chart
+from studies.report_cells import exposure_name, exposures, groups, ordered_cells, seeds
 
 TEMPLATES = Path(__file__).parent / "templates"
 TRUTH = "truth"
@@ -59,26 +59,6 @@ def _picture(pictures: Mapping[str, bytes], name: str) -> str:
     return data_uri(name, pictures[name])
 
 
-def ordered_cells(results: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the cells by sensor, level, camera; each combination has to be there exactly once."""
-    sensors = [sensor["name"] for sensor in results["sensors"]]
-    cameras = list(results["cameras"])
-    found: dict[tuple[str, int, str], Mapping[str, Any]] = {}
-    for cell in results["cells"]:
-        require_keys("cell's sensor", [cell["sensor"]], sensors)
-        require_keys("cell's camera", [cell["camera"]], cameras)
-        require_range("cell's level", cell["level"], 0, len(results["levels"]) - 1, "give the level's place in levels")
-        place = (cell["sensor"], cell["level"], cell["camera"])
-        if place in found:
-            raise InputError(f"cells: {place!r} comes twice; give each sensor, level and camera once")
-        found[place] = cell
-    wanted = list(product(sensors, range(len(results["levels"])), cameras))
-    for place in wanted:
-        if place not in found:
-            raise InputError(f"cells: {place!r} is missing; give one cell for each sensor, level and camera")
-    return [found[place] for place in wanted]
-
-
 def balance_text(balance: Mapping[str, str] | None) -> str:
     """Say which channels Gray World balanced, and which fell back."""
     if not balance:
@@ -91,15 +71,14 @@ def balance_text(balance: Mapping[str, str] | None) -> str:
 
 def cell_view(cell: Mapping[str, Any], level: Mapping[str, Any], rivals: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return everything the page says about one cell, as text; `best` names the metrics in which it leads `rivals`."""
-    substitution = {True: "on", False: "off", None: "not applicable"}[cell["substitution"]]
     electrons = cell["mean_electrons"] or {}
     seconds = cell["seconds"] or {}
     return {
         **{metric.key: text.metric_text(metric, cell) for metric in METRICS},
-        "snr_db": text.fixed(cell["snr_db"], 1, "dB"),
+        "snr_db": text.interval_text(cell, "snr_db", 1, "dB"),
         "exposure": text.duration(cell["exposure_s"]),
         "saturated": text.percent(cell["saturated"]),
-        "substitution": substitution,
+        "substitution": text.substitution_text(cell["substitution"]),
         "balance": balance_text(cell["balance"]),
         "mc_share": text.percent(cell["mc_share"]),
         "over": cell["mc_share"] is not None and cell["mc_share"] > MOST_SHARE,
@@ -107,7 +86,7 @@ def cell_view(cell: Mapping[str, Any], level: Mapping[str, Any], rivals: Sequenc
         "capture": text.duration(seconds.get("capture")),
         "develop": text.duration(seconds.get("develop")),
         "best": [metric.key for metric in METRICS if text.leader(metric, rivals)[0] is cell],
-        "alt": f"{text.camera_name(cell['camera'])} picture, {level['name']}, {cell['sensor']}",
+        "alt": f"{text.camera_name(cell['camera'])} picture, {level['name']}, {cell['group']}",
     }
 
 
@@ -124,53 +103,59 @@ def level_view(level: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def sensor_charts(
+def group_charts(
     results: Mapping[str, Any], cells: Sequence[Mapping[str, Any]], metric: text.Metric, **options: Any
 ) -> list[Chart]:
-    """Return `metric` over luminance, one chart a sensor, all on one scale."""
+    """Return `metric` over luminance, one chart a sensor and exposure, all on one scale."""
     luminance = [level["luminance_cd_m2"] for level in results["levels"]]
     for value in luminance:
         require_range("luminance_cd_m2", value, 1e-12, 1e12, "the axis is logarithmic: give a positive luminance")
+    ends = [end for cell in cells for end in cell["intervals"].get(metric.key, ())]
     charts = []
-    for sensor in results["sensors"]:
-        lines = []
-        for camera in results["cameras"]:
-            own = [cell for cell in cells if (cell["sensor"], cell["camera"]) == (sensor["name"], camera)]
-            name = text.camera_name(camera)
-            write = text.percent if options.get("percent") else None
-            values = [write(cell[metric.key]) if write else text.metric_text(metric, cell) for cell in own]
-            words = [
-                f"{name}, {level['name']}: {value}" for level, value in zip(results["levels"], values, strict=True)
-            ]
-            lines.append(Line(name, [cell[metric.key] for cell in own], words))
+    for group in groups(results):
+        own = [cell for cell in cells if cell["group"] == group]
+        lines = [_line(results, own, camera, metric, options.get("percent", False)) for camera in results["cameras"]]
         charts.append(
             line_chart(
-                f"{metric.name}, {sensor['name']}",
+                f"{metric.name}, {group}",
                 f"{metric.name} over scene luminance for {text.join([line.name for line in lines])}. "
                 "The table of all pictures holds the numbers.",
                 luminance,
                 lines,
-                shared=[cell[metric.key] for cell in cells],
+                shared=[*(cell[metric.key] for cell in cells), *ends],
                 **options,
             )
         )
     return charts
 
 
+def _line(
+    results: Mapping[str, Any], cells: Sequence[Mapping[str, Any]], camera: str, metric: text.Metric, percent: bool
+) -> Line:
+    """Return one camera's values over the levels, in words too."""
+    own = [cell for cell in cells if cell["camera"] == camera]
+    name = text.camera_name(camera)
+    written = [text.percent(cell[metric.key]) if percent else text.metric_text(metric, cell) for cell in own]
+    words = [f"{name}, {level['name']}: {value}" for level, value in zip(results["levels"], written, strict=True)]
+    known = [cell["intervals"].get(metric.key) for cell in own]
+    return Line(name, [cell[metric.key] for cell in own], words, known if any(known) else ())
+
+
 def summary(results: Mapping[str, Any], cells: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the report's sentences: one headline, and a list for each sensor."""
+    """Return the report's sentences: one headline, and a list for each sensor and exposure."""
     names = [str(level["name"]) for level in results["levels"]]
     count = len(results["cameras"])
     rows = [cells[start : start + count] for start in range(0, len(cells), count)]
     per = len(names)
     return {
         "headline": text.headline(names, rows),
-        "sensors": [
-            {"name": sensor["name"], "sentences": text.sensor_sentences(names, rows[place * per : (place + 1) * per])}
-            for place, sensor in enumerate(results["sensors"])
+        "groups": [
+            {"name": group, "sentences": text.sensor_sentences(names, rows[place * per : (place + 1) * per])}
+            for place, group in enumerate(groups(results))
         ],
         "render": text.render_sentence(results["render"]),
         "share": text.share_sentence(names, cells),
+        "seeds": text.seeds_sentence(seeds(results)),
     }
 
 
@@ -197,7 +182,8 @@ def page_view(results: Mapping[str, Any], pictures: Mapping[str, bytes]) -> dict
     aim = (MOST_SHARE, f"aim {text.percent(MOST_SHARE)}")
     data = {
         "levels": [level_view(level) for level in levels],
-        "sensors": [sensor["name"] for sensor in results["sensors"]],
+        "groups": groups(results),
+        "exposures": [exposure_name(time) for time in exposures(results)],
         "cameras": [text.camera_name(camera) for camera in results["cameras"]],
         "cells": views,
     }
@@ -213,9 +199,13 @@ def page_view(results: Mapping[str, Any], pictures: Mapping[str, bytes]) -> dict
         "rows": VIEWER_ROWS,
         "summary": summary(results, cells),
         "charted": CHARTED,
-        # One row of charts for each sensor.
-        "charts": list(zip(*(sensor_charts(results, cells, metric) for metric in CHARTED), strict=True)),
-        "share_charts": sensor_charts(results, cells, share, log_y=True, percent=True, rule=aim),
+        "groups": data["groups"],
+        # One row of charts for each group.
+        "charts": list(zip(*(group_charts(results, cells, metric) for metric in CHARTED), strict=True)),
+        "share_charts": group_charts(results, cells, share, log_y=True, percent=True, rule=aim),
+        # Effect and cost, as `sensor.left_out.left_out` parts them.
+        "left_out": [line.partition(": ")[::2] for line in results["left_out"]],
+        "seeds": seeds(results),
         "stages": stage_rows(results["stages"]),
         "total": text.duration(sum(stage["seconds"] or 0.0 for stage in results["stages"])),
         "text": text,
@@ -229,6 +219,9 @@ def render_report(results: Mapping[str, Any], pictures: Mapping[str, bytes]) -> 
     ----------
     results : mapping
         What ``results.json`` holds: configuration, levels, sensors, cameras, one cell for each of their combinations.
+        Where there are several exposures, ``exposures`` names them and each cell its own in ``exposure`` (``auto``, or
+        a time such as ``10ms``). Cells may name a ``seed``; with several, numbers are means with 95 % intervals and
+        pictures are the first seed's.
     pictures : mapping of str to bytes
         PNG or WebP files by each cell's ``picture``, and ``"truth"``.
 

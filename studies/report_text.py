@@ -70,8 +70,23 @@ def duration(seconds: float | None) -> str:
 
 
 def metric_text(metric: Metric, cell: Mapping[str, Any]) -> str:
-    """Write a cell's value of `metric`."""
-    return fixed(cell[metric.key], metric.digits, metric.unit)
+    """Write a cell's value of `metric`, with the half of its confidence interval where there is one."""
+    return interval_text(cell, metric.key, metric.digits, metric.unit)
+
+
+def interval_text(cell: Mapping[str, Any], key: str, digits: int, unit: str = "") -> str:
+    """Write a cell's figure as "20.1 ± 0.3 dB" where seeds give an interval, else as "20.1 dB"."""
+    interval = cell.get("intervals", {}).get(key)
+    if interval is None:
+        return fixed(cell[key], digits, unit)
+    return f"{fixed(cell[key], digits)}{NBSP}±{NBSP}{fixed((interval[1] - interval[0]) / 2, digits, unit)}"
+
+
+def substitution_text(share: float | None) -> str:
+    """Say for which part of the seeds (or whether, with one) luminance was substituted."""
+    if share is None:
+        return "not applicable"
+    return "on" if share == 1 else f"on for {percent(share)} of the seeds" if share else "off"
 
 
 def camera_name(camera: str) -> str:
@@ -85,7 +100,11 @@ def join(parts: Sequence[str]) -> str:
 
 
 def leader(metric: Metric, cells: Sequence[Mapping[str, Any]]) -> tuple[Mapping[str, Any] | None, float]:
-    """Return the cell that is best in `metric` and its lead over the next; None where the written numbers tie."""
+    """Return the cell that is best in `metric` and its lead over the next; None where nothing is to be told apart.
+
+    That is where the written numbers tie, or where the confidence intervals over seeds overlap. (A test of the
+    difference would find a lead in some cases in which 95 % intervals overlap: overlap is the stricter rule.)
+    """
     known = [cell for cell in cells if cell[metric.key] is not None and not isnan(cell[metric.key])]
     ranked = sorted(known, key=lambda cell: float(cell[metric.key]), reverse=metric.higher)
     if len(ranked) < 2:
@@ -93,6 +112,9 @@ def leader(metric: Metric, cells: Sequence[Mapping[str, Any]]) -> tuple[Mapping[
     first, second = (float(cell[metric.key]) for cell in ranked[:2])
     # Judged on the numbers as printed: nobody should read "leads" beside two equal figures.
     if fixed(first, metric.digits) == fixed(second, metric.digits):
+        return None, 0.0
+    spans_of_two = [cell.get("intervals", {}).get(metric.key) for cell in ranked[:2]]
+    if None not in spans_of_two and max(low for low, _ in spans_of_two) <= min(high for _, high in spans_of_two):
         return None, 0.0
     return ranked[0], abs(first - second)
 
@@ -133,10 +155,7 @@ def sensor_sentences(levels: Sequence[str], rows: Sequence[Sequence[Mapping[str,
     for slot, camera in enumerate(cell["camera"] for cell in rows[0]):
         states = [cells[slot]["substitution"] for cells in rows]
         if any(state is not None for state in states):
-            on = [index for index, state in enumerate(states) if state]
-            where = f"on {spans(levels, on)}" if on else "off at every level"
-            rest = ", off elsewhere" if 0 < len(on) < len(levels) else ""
-            sentences.append(f"Luminance substitution ({camera_name(camera)}): {where}{rest}.")
+            sentences.append(f"Luminance substitution ({camera_name(camera)}): {_substituted(levels, states)}.")
         fallen = [index for index, cells in enumerate(rows) if "calibrated" in (cells[slot]["balance"] or {}).values()]
         if fallen:
             where = spans(levels, fallen)
@@ -144,8 +163,19 @@ def sensor_sentences(levels: Sequence[str], rows: Sequence[Sequence[Mapping[str,
     return sentences
 
 
+def _substituted(levels: Sequence[str], states: Sequence[float | None]) -> str:
+    """Say at which levels luminance was substituted; a state is the share of the seeds with it."""
+    on = [index for index, state in enumerate(states) if state == 1]
+    some = [index for index, state in enumerate(states) if state and state < 1]
+    if not on and not some:
+        return "off at every level"
+    said = [f"on {spans(levels, on)}"] if on else []
+    said += [f"on for some seeds {spans(levels, some)}"] if some else []
+    return ", ".join(said) + (", off elsewhere" if len(on) + len(some) < len(levels) else "")
+
+
 def headline(levels: Sequence[str], cells: Sequence[Sequence[Mapping[str, Any]]]) -> str:
-    """Count the conditions (level and sensor) in which each camera leads in PSNR, with each one's largest lead."""
+    """Count the conditions in which each camera leads in PSNR (sensor, exposure, level), with its largest lead."""
     won: dict[str, list[tuple[float, Mapping[str, Any]]]] = {cell["camera"]: [] for cell in cells[0]}
     for condition in cells:
         best, margin = leader(PSNR, condition)
@@ -157,7 +187,7 @@ def headline(levels: Sequence[str], cells: Sequence[Sequence[Mapping[str, Any]]]
         tail = ""
         if most:
             cell = most[1]
-            tail = f" (by {fixed(most[0], 1, 'dB')} at most: {levels[cell['level']]}, {cell['sensor']})"
+            tail = f" (by {fixed(most[0], 1, 'dB')} at most: {levels[cell['level']]}, {cell['group']})"
         counts.append(f"{camera_name(camera)} in {len(leads)}{tail}")
     tied = len(cells) - sum(len(leads) for leads in won.values())
     ending = f"; in {tied} no camera leads" if tied else ""
@@ -176,13 +206,23 @@ def render_sentence(render: Mapping[str, Any]) -> str:
     )
 
 
+def seeds_sentence(seeds: Sequence[int]) -> str:
+    """Say how many seeds the numbers come from, and what that means for them."""
+    if len(seeds) == 1:
+        return f"One seed ({seeds[0]}): how far another draw of the noise would move the numbers is not known here."
+    return (
+        f"Means over {len(seeds)} seeds; ± and bands are the 95{NBSP}% confidence interval of the mean (Student's t), "
+        f"and where the intervals of two cameras overlap none leads. Pictures are those of seed {seeds[0]}."
+    )
+
+
 def share_sentence(levels: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> str:
     """Judge the Monte Carlo share of all cells against the aim."""
     known = [cell for cell in cells if cell["mc_share"] is not None and isfinite(cell["mc_share"])]
     if not known:
         return "The Monte Carlo share is not known for any picture."
     worst = max(known, key=lambda cell: float(cell["mc_share"]))
-    where = f"{levels[worst['level']]}, {worst['sensor']}, {camera_name(worst['camera'])}"
+    where = f"{levels[worst['level']]}, {worst['group']}, {camera_name(worst['camera'])}"
     over = sum(cell["mc_share"] > MOST_SHARE for cell in known)
     most = f"The largest Monte Carlo share is {percent(worst['mc_share'])} ({where})"
     if not over:

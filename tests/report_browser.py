@@ -106,10 +106,7 @@ class Page:
         self._session = browser.send("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.send(f"{domain}.enable")
-        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
-        self.send("Emulation.setDeviceMetricsOverride", **size)
-        scheme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
-        self.send("Emulation.setEmulatedMedia", features=scheme)
+        self.show(width=width, height=height, dark=dark)
         self.send("Emulation.setScriptExecutionDisabled", value=not script)
         self.address = file.resolve().as_uri()
         self.send("Page.navigate", url=self.address)
@@ -118,6 +115,13 @@ class Page:
     def send(self, method: str, **params: Any) -> dict[str, Any]:
         """Send one command to this tab."""
         return self._browser.send(method, self._session, **params)
+
+    def show(self, *, width: int, height: int = 900, dark: bool = False, medium: str = "") -> None:
+        """Set the window's size, the colour scheme and the medium (``print``, or the window's own)."""
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.send("Emulation.setDeviceMetricsOverride", **size)
+        scheme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+        self.send("Emulation.setEmulatedMedia", media=medium, features=scheme)
 
     def value(self, script: str) -> Any:
         """Return what `script` evaluates to in the page."""
@@ -129,6 +133,11 @@ class Page:
         """Press one key."""
         for kind in ("rawKeyDown", "keyUp"):
             self.send("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code)
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Press the mouse at one place of the window and let go at another."""
+        for kind, (x, y) in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
+            self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def complaints(self) -> list[Any]:
         """Return console messages, exceptions and logged violations so far."""

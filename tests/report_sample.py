@@ -93,10 +93,32 @@ def sample_results() -> dict[str, Any]:
     }  # fmt: skip
 
 
+def sample_axes() -> dict[str, Any]:
+    """Return small results of one sensor, three levels, two exposures and three seeds.
+
+    Seeds move PSNR by -0.1, 0 and 0.1 dB, so that its mean is the first sample's and its deviation is 0.1 dB.
+    """
+    results = sample_results()
+    results["size"] = [64, 64]
+    results["sensors"] = results["sensors"][:1]
+    results["levels"] = results["levels"][:3]
+    results["exposures"] = ["auto", "10ms"]
+    cells = [cell for cell in results["cells"] if cell["level"] < 3 and cell["sensor"] == SENSORS[0]["name"]]
+    results["cells"] = [
+        {
+            **cell, "exposure": exposure, "seed": 5 + place, "psnr_db": cell["psnr_db"] + shift - loss,
+            "exposure_s": 0.01 if loss else cell["exposure_s"], "picture": f"{cell['picture']}/{exposure}",
+        }
+        for exposure, loss in (("auto", 0.0), ("10ms", 3.0))
+        for place, shift in enumerate((-0.1, 0.0, 0.1)) for cell in cells
+    ]  # fmt: skip
+    return results
+
+
 def _encode(linear: np.ndarray) -> bytes:
     file = BytesIO()
     Image.fromarray((255 * np.clip(linear, 0, 1) ** (1 / 2.2)).round().astype(np.uint8)).save(
-        file, "WEBP", lossless=True
+        file, "WEBP", lossless=True, quality=0, method=0
     )
     return file.getvalue()
 
@@ -115,7 +137,7 @@ def sample_pictures(results: dict[str, Any]) -> dict[str, bytes]:
     scene = np.where(((x * 32).astype(int) + (y * 32).astype(int) & 1)[..., None] * (y < 0.2)[..., None], 0.8, scene)
     rng = np.random.default_rng(7)
     pictures = {"truth": _encode(scene)}
-    for cell in results["cells"]:
+    for cell in {cell["picture"]: cell for cell in results["cells"]}.values():
         noise = rng.standard_normal(scene.shape) * 10 ** (-float(cell["psnr_db"] or 0) / 20)
         pictures[cell["picture"]] = _encode(scene + noise)
     return pictures

@@ -115,9 +115,7 @@ def test_policy_holds_the_scripts_hash() -> None:
     assert policy is not None
     data, script = outline.scripts
     digest = b64encode(sha256(script.encode()).digest()).decode()
-    assert policy.startswith(
-        f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
-    )
+    assert policy == f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
     assert len(json.loads(data)["cells"]) == 28
     first = [tag for tag, _ in outline.tags].index("meta")
     assert "http-equiv" in outline.tags[first + 1][1], "the policy has to come before all it is to hold for"
@@ -224,7 +222,7 @@ def _camera(of: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
-        (_drop_cell, "('low_noise', 6, 'bayer') is missing"),
+        (_drop_cell, "sensor 'low_noise', exposure 'auto', level 6, camera 'bayer', seed 0 is missing"),
         (_twice, "comes twice"),
         (_dark, "luminance_cd_m2: 0.0"),
         (_no_seed, "'seed' is missing"),
@@ -257,6 +255,56 @@ def test_unknown_numbers_become_dashes() -> None:
     assert "Infinity" not in outline.scripts[0]
     for fault in ("nan", "None"):
         assert re.search(rf"\b{fault}\b", unescape(re.sub(r"base64,[^\"]*", "", page_of(of)))) is None
+
+
+def test_error_budget_holds_each_picture_s_share_and_what_is_left_out() -> None:
+    of = results()
+    of["left_out"] = ["veiling glare: each per cent adds 1 %", "aberrations"]
+    page = unescape(page_of(of))
+    budget = page[page.index('<table class="cells budget">') : page.index('<section id="time"')]
+    rows = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", budget, re.DOTALL)]
+    assert rows[0] == ["", "table1_output", "low_noise"]
+    assert rows[1] == ["Level", *["Interleaved", "Bayer"] * 2]
+    for row, level in zip(rows[2:], range(7), strict=True):
+        places = [(level, sensor["name"], camera) for sensor in of["sensors"] for camera in of["cameras"]]
+        shares = [text.percent(cell_at(of, *place)["mc_share"]) for place in places]
+        assert row == [of["levels"][level]["name"], *shares]
+    over = sum(cell["mc_share"] > 0.03 for cell in of["cells"])
+    assert budget.count('class="n over') == over > 0
+    assert "<dt>veiling glare</dt><dd>each per cent adds 1 %</dd>" in budget
+    assert "<dt>aberrations</dt><dd>—</dd>" in budget
+
+
+def test_seeds_and_exposures_stand_in_the_page() -> None:
+    of = SAMPLE.sample_axes()
+    outline, page = Outline(page_of(of)), unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ")
+    data = json.loads(outline.scripts[0])
+    assert data["exposures"] == ["automatic", "10\N{NO-BREAK SPACE}ms"]
+    assert len(data["cells"]) == 2 * 3 * 2, "one a picture, not one a seed"
+    cell = next(cell for cell in of["cells"] if cell["seed"] == 6 and cell["exposure"] == "10ms")
+    # Deviation 0.1 dB over 3 seeds: Student's 95 % interval is 4.3027 x 0.1 / sqrt(3) = 0.248 dB wide to each side.
+    assert data["cells"][6]["psnr_db"].replace("\N{NO-BREAK SPACE}", " ") == f"{cell['psnr_db']:.1f} ± 0.2 dB"
+    assert page.count('class="band"') == 2 * (3 + 1) * 2, "for each exposure, metric (and Monte Carlo share), camera"
+    assert "Means over 3 seeds" in page
+    assert "seeds 5, 6, 7" in page
+    assert "Sensor table1_output, exposure 10 ms" in page
+
+
+def test_one_seed_draws_no_band_and_says_so() -> None:
+    page = page_of(results())
+    assert 'class="band"' not in page
+    assert "±" not in page
+    assert "One seed (0)" in page
+    assert 'id="exposure"' not in page
+
+
+@pytest.mark.slow
+def test_demo_s_report_stays_under_5_mb(tmp_path: Path) -> None:
+    from studies.demo import Demo, run, write
+
+    # The demo's size, sensors and levels; fewer samples a pixel leave more noise, which packs worse.
+    size = write(run(Demo(spp=16, max_seconds=20.0)), tmp_path).stat().st_size
+    assert 1e6 < size < 5e6
 
 
 def test_one_camera_and_one_level_make_a_page() -> None:

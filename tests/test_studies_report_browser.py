@@ -54,6 +54,15 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.fixture(scope="module")
+def axes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report of several exposures and seeds."""
+    results = SAMPLE.sample_axes()
+    file: Path = tmp_path_factory.mktemp("axes") / "report.html"
+    file.write_text(render_report(results, SAMPLE.sample_pictures(results)), encoding="utf-8")
+    return file
+
+
 def shown(page: Any) -> dict[str, Any]:
     """Return what the viewer shows of its first camera and its level."""
     value: dict[str, Any] = page.value(
@@ -116,6 +125,7 @@ def test_detail_holds_the_pixels_it_names(browser: Any, report: Path) -> None:
     )
     truth = np.asarray(Image.open(BytesIO(SAMPLE.sample_pictures(SAMPLE.sample_results())["truth"])).convert("RGB"))
     assert color == truth[180 - 8, 100 - 16].tolist()
+    assert page.value("getComputedStyle(document.querySelector('[data-truth] canvas')).imageRendering") == "pixelated"
 
 
 def test_wipe_shows_two_pictures(browser: Any, report: Path) -> None:
@@ -129,14 +139,91 @@ def test_wipe_shows_two_pictures(browser: Any, report: Path) -> None:
         "const wiper = document.getElementById('wiper'); wiper.value = 20; wiper.dispatchEvent(new Event('input'))"
     )
     assert "80%" in page.value("getComputedStyle(document.getElementById('over')).clipPath")
+    page.value(
+        "document.documentElement.style.scrollBehavior = 'auto'; document.querySelector('.stage').scrollIntoView()"
+    )
+    box = page.value(
+        "(({left, top, width}) => [left, top, width])(document.querySelector('.stage').getBoundingClientRect())"
+    )
+    page.drag((box[0] + 0.5 * box[2], box[1] + 50), (box[0] + 0.25 * box[2], box[1] + 60))
+    assert page.value("document.getElementById('wiper').value") == "25"
+    assert "75%" in page.value("getComputedStyle(document.getElementById('over')).clipPath")
+    page.value("document.getElementById('wiper').focus()")
+    page.press("ArrowRight", 39)
+    spoken = page.value("document.getElementById('wiper').getAttribute('aria-valuetext')")
+    assert spoken == "26 % Interleaved, 74 % Bayer"
 
 
-@pytest.mark.parametrize(("width", "factor"), [(360, 1), (1000, 1), (1280, 1), (1920, 2), (2560, 2)])
-def test_fits_the_window_with_whole_pixels(browser: Any, report: Path, width: int, factor: int) -> None:
-    page = Page(browser, report, width=width)
-    assert page.value("document.documentElement.scrollWidth") <= width
-    assert page.value("document.querySelector('#side img').getBoundingClientRect().width") == 256 * factor
+def test_fits_the_window_with_whole_pixels(browser: Any, report: Path) -> None:
+    page = Page(browser, report)
+    for dark in (False, True):
+        for width, factor in ((360, 1), (1000, 1), (1280, 1), (1920, 2), (2560, 2)):
+            page.show(width=width, dark=dark)
+            assert page.value("document.documentElement.scrollWidth") <= width
+            assert page.value("document.querySelector('#side img').getBoundingClientRect().width") == 256 * factor
     assert page.value("document.getElementById('scale').textContent").startswith("Each picture is 256 × 256 pixels")
+
+
+def test_exposure_slider_changes_picture_and_numbers_and_nothing_scrolls(browser: Any, axes: Path) -> None:
+    page = Page(browser, axes)
+    of = SAMPLE.sample_axes()
+    page.press("Tab", 9)  # the skip link; from it on by keyboard alone
+    page.value("document.getElementById('level').focus()")
+    page.press("ArrowRight", 39)
+    before = shown(page)
+    page.press("Tab", 9)
+    assert page.value("document.activeElement.id") == "exposure"
+    assert page.value("getComputedStyle(document.activeElement).outlineStyle") == "solid", "the focus can't be seen"
+    page.press("ArrowRight", 39)
+    after = shown(page)
+    mean = next(c for c in of["cells"] if (c["level"], c["seed"], c["exposure"]) == (1, 6, "10ms"))["psnr_db"]
+    assert after["psnr"].replace("\N{NO-BREAK SPACE}", " ") == f"{mean:.1f} ± 0.2 dB"
+    assert page.value("document.getElementById('exposure').getAttribute('aria-valuetext')").startswith("10")
+    assert after["level"] == before["level"] == "street light"
+    assert "exposure 10" in after["status"]
+    # Six cells an exposure, two a level.
+    assert after["picture"] == page.value("document.querySelector('[data-cell=\"8\"] img').src") != before["picture"]
+    page.value("document.querySelector('[data-cell=\"5\"]').click()")
+    assert page.value("[document.getElementById('exposure').value, document.getElementById('level').value]") == [
+        "0",
+        "2",
+    ]
+    for width in (360, 1280, 2560):
+        page.show(width=width)
+        assert page.value("document.documentElement.scrollWidth") <= width
+    assert page.complaints() == []
+    assert page.requests() == []
+
+
+def test_every_control_has_a_name_for_a_screen_reader(browser: Any, axes: Path) -> None:
+    page = Page(browser, axes)
+    page.value("document.querySelector('[name=view][value=wipe]').click()")
+    nodes = page.send("Accessibility.getFullAXTree")["nodes"]
+    wanted = {"slider": 3, "radio": 3, "combobox": 2}  # level, exposure, wipe; one sensor, two views; left, right
+    for role, count in wanted.items():
+        names = [node["name"]["value"] for node in nodes if node.get("role", {}).get("value") == role]
+        assert len(names) == count, (role, names)
+        assert all(names), (role, names)
+    pictures = [node for node in nodes if node.get("role", {}).get("value") == "image" and not node["ignored"]]
+    assert len(pictures) > 12
+    assert all(node["name"]["value"] for node in pictures)
+
+
+def test_print_holds_every_level_and_no_control(browser: Any, axes: Path) -> None:
+    page = Page(browser, axes, width=720)
+    page.value("document.querySelector('[name=view][value=wipe]').click()")
+    page.show(width=720, medium="print")
+    visible = "[...document.querySelectorAll('%s')].filter((one) => one.getClientRects().length).length"
+    assert page.value(visible % "input, select, button, canvas, nav, .stage") == 0
+    assert page.value(visible % ".sheet img") == 12
+    assert page.value(visible % "#side img") == 3
+    tops = page.value("[...document.querySelectorAll('.sheet')].map((sheet) => new Set([...sheet.children].map("
+                      "(item) => item.getBoundingClientRect().top)).size)")  # fmt: skip
+    assert tops == [1, 1], "the levels of a contact sheet stand in one row"
+    wide = "Math.max(...[...document.querySelectorAll('main > section:not(#table)')].map((one) => one.scrollWidth))"
+    assert page.value(wide) <= 720
+    # A4 across, less 10 mm to each side, at CSS's 96 pixels an inch.
+    assert page.value("document.querySelector('#table table').scrollWidth") <= (297 - 2 * 10) / 25.4 * 96
 
 
 @pytest.mark.parametrize("dark", [False, True])
@@ -149,7 +236,8 @@ def test_screen_is_not_blank(browser: Any, report: Path, dark: bool) -> None:
     page.value(
         "document.documentElement.style.scrollBehavior = 'auto'; document.getElementById('pictures').scrollIntoView()"
     )
-    assert np.unique(page.screenshot().reshape(-1, 3), axis=0).shape[0] > 5000, "noise pictures hold many colours"
+    colours = page.screenshot().astype(np.int64) @ (1 << 16, 1 << 8, 1)
+    assert np.unique(colours).size > 5000, "noise pictures hold many colours"
 
 
 def test_without_script_the_first_level_stands(browser: Any, report: Path) -> None:
@@ -162,6 +250,12 @@ def test_without_script_the_first_level_stands(browser: Any, report: Path) -> No
     assert page.value(visible) == 0, "controls that can do nothing are shown"
     assert page.value("document.querySelector('noscript').innerText").startswith("Without JavaScript")
     assert page.value("document.querySelector('#side img').getBoundingClientRect().width") == 256
+    reachable = (
+        "[...document.querySelectorAll('.sheet img')].filter((one) => one.getClientRects().length && one.naturalWidth)"
+    )
+    assert page.value(f"new Set({reachable}.map((one) => one.src)).size") == 28, "every picture can be seen"
+    page.value("document.querySelector('noscript a').click()")
+    assert page.value("location.hash") == "#overview"
 
 
 def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:

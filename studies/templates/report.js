@@ -1,5 +1,5 @@
 "use strict";
-// The viewer: level, sensor, view and detail. Numbers come ready as text, pictures from the overview's images.
+// The viewer: level, exposure, sensor, view and detail. Numbers come ready as text, pictures from the overview's images.
 (() => {
   const byId = (id) => document.getElementById(id);
   const all = (selector, root = document) => [...root.querySelectorAll(selector)];
@@ -11,9 +11,11 @@
   // The attributes: the properties of the same name give the size on the screen.
   const [width, height] = ["width", "height"].map((name) => Number(truth.getAttribute(name)));
   const LOUPE = [32, 16]; // image pixels
-  const state = { level: 0, sensor: 0 };
+  const state = { level: 0, exposure: 0, sensor: 0 };
 
-  const cellIndex = (camera) => (state.sensor * data.levels.length + state.level) * data.cameras.length + camera;
+  // Cells lie in the order of sensor, exposure, level, camera.
+  const group = () => state.sensor * data.exposures.length + state.exposure;
+  const cellIndex = (camera) => (group() * data.levels.length + state.level) * data.cameras.length + camera;
   const source = (camera) => (camera === "truth" ? truth : thumbs[cellIndex(Number(camera))].querySelector("img")).src;
   const clamp = (value, low, high) => Math.min(Math.max(Math.round(value) || 0, low), high);
 
@@ -33,10 +35,14 @@
     byId("level-name").textContent = level.name;
     byId("level-luminance").textContent = level.luminance;
     byId("level-lux").textContent = level.lux;
-    byId("sensor-name").textContent = data.sensors[state.sensor];
+    byId("sensor-name").textContent = data.groups[group()];
     byId("level-source").textContent = level.source;
     byId("level").value = state.level;
     byId("level").setAttribute("aria-valuetext", level.spoken);
+    if (byId("exposure")) {
+      byId("exposure").value = state.exposure;
+      byId("exposure").setAttribute("aria-valuetext", data.exposures[state.exposure]);
+    }
     for (const guide of all("[data-guide]")) {
       guide.classList.toggle("current", Number(guide.dataset.guide) === state.level);
     }
@@ -54,7 +60,7 @@
       else thumb.removeAttribute("aria-current");
     }
     const said = data.cameras.map((name, camera) => `${name} PSNR ${data.cells[cellIndex(camera)].psnr_db}`);
-    byId("status").textContent = `${data.levels[state.level].spoken}, ${data.sensors[state.sensor]}: ${said.join(", ")}`;
+    byId("status").textContent = `${data.levels[state.level].spoken}, ${data.groups[group()]}: ${said.join(", ")}`;
     showWipe();
     showDetail();
   }
@@ -62,8 +68,11 @@
   function showWipe() {
     byId("over").src = source(byId("left").value);
     byId("under").src = source(byId("right").value);
-    byId("over").alt = `${byId("left").selectedOptions[0].text}, left of the wipe`;
-    byId("under").alt = `${byId("right").selectedOptions[0].text}, right of the wipe`;
+    const [left, right] = ["left", "right"].map((id) => byId(id).selectedOptions[0].text);
+    byId("over").alt = `${left}, left of the wipe`;
+    byId("under").alt = `${right}, right of the wipe`;
+    const share = Number(byId("wiper").value);
+    byId("wiper").setAttribute("aria-valuetext", `${share} % ${left}, ${100 - share} % ${right}`);
     byId("wipe").style.setProperty("--wipe", `${byId("wiper").value}%`);
   }
 
@@ -110,6 +119,10 @@
     state.level = Number(event.target.value);
     show();
   });
+  byId("exposure")?.addEventListener("input", (event) => {
+    state.exposure = Number(event.target.value);
+    show();
+  });
   for (const input of all("[name=sensor]")) {
     input.addEventListener("change", () => {
       state.sensor = Number(input.value);
@@ -126,6 +139,17 @@
   }
   for (const id of ["left", "right", "wiper"]) byId(id).addEventListener("input", showWipe);
   for (const id of ["column", "row"]) byId(id).addEventListener("input", showDetail);
+  const stage = document.querySelector(".stage");
+  const drag = (event) => {
+    const box = stage.getBoundingClientRect();
+    byId("wiper").value = clamp((100 * (event.clientX - box.left)) / box.width, 0, 100);
+    showWipe();
+  };
+  stage.addEventListener("pointerdown", (event) => {
+    stage.setPointerCapture(event.pointerId);
+    drag(event);
+  });
+  stage.addEventListener("pointermove", (event) => stage.hasPointerCapture(event.pointerId) && drag(event));
   for (const figure of figures) {
     const picture = figure.querySelector(".picture");
     const point = (event) => {
@@ -140,7 +164,9 @@
   for (const thumb of thumbs) {
     thumb.addEventListener("click", () => {
       const condition = Math.floor(Number(thumb.dataset.cell) / data.cameras.length);
-      state.sensor = Math.floor(condition / data.levels.length);
+      const chosen = Math.floor(condition / data.levels.length);
+      state.sensor = Math.floor(chosen / data.exposures.length);
+      state.exposure = chosen % data.exposures.length;
       state.level = condition % data.levels.length;
       show();
     });
