@@ -11,22 +11,17 @@ What the paper leaves open is settled so:
 - The largest weight counts as 1, so W_y is never 0: where all others underflow, the most similar sample is the result.
 """
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.kernel import PACKET, Frame, Grid, Lanes, reconstruct_lanes, samples_size
-from isp.planes import Plane, planes
 from isp.reference import reference_with_noise
-from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Reconstruction, Settings
-from isp.similarity import saturated_fraction
-from isp.tiles import Offsets, Work, list_offsets, make_grid, sort_work
-from render.jit import arrays, backend, dr
+from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Distance, Reconstruction, Settings
+from isp.strip_sums import reconstruct_rows
+from isp.strips import strip_rows
+from isp.tiles import number_tile
+from render.jit import backend
 from sensor.cfa import channels
 from sensor.raw import RawImage
-
-ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel for memory that isn't aligned, and refuses it packet loads
 
 
 def reconstruct(
@@ -36,6 +31,7 @@ def reconstruct(
     patch: int = PATCH,
     sigma_d: float = SIGMA_D,
     sigma_s: float = SIGMA_S,
+    distance: Distance = "noise",
 ) -> NDArray[np.float32]:
     """Reconstruct every channel at every pixel.
 
@@ -48,7 +44,10 @@ def reconstruct(
     sigma_d : float
         Standard deviation of the spatial weight, eq. (4) [pixels]; 0.001 to inf.
     sigma_s : float
-        Standard deviation of the similarity weight, eq. (5) [standard deviations of one pixel's noise]; 0.001 to inf.
+        Standard deviation of the similarity weight, eq. (5) [standard deviations of one pixel's noise, or electrons];
+        0.001 to inf.
+    distance : {"noise", "raw"}
+        Patches in units of noise, debiased and trusted as far as their SNR allows, or in electrons as the paper has it.
 
     Returns
     -------
@@ -62,12 +61,14 @@ def reconstruct(
 
     Notes
     -----
-    Takes some 250 bytes a pixel of RGBW while it runs, most of it the planes in packets (`isp.kernel`). Other sizes,
-    sigmas and neighbourhoods run the kernels compiled already; another patch or size of tile compiles its own.
+    Other sizes, sigmas and neighbourhoods run the kernels compiled already; another patch or size of tile compiles its
+    own. Besides the result a call takes some 400 MB at most.
     """
-    return reconstruct_with_noise(
-        raw, neighbourhood=neighbourhood, patch=patch, sigma_d=sigma_d, sigma_s=sigma_s
-    ).estimate.astype(np.float32, copy=False)
+    settings = Settings(neighbourhood, patch, sigma_d, sigma_s, distance)
+    settings.check_reaches(raw.cfa)
+    if backend() == "numpy":
+        return reference_with_noise(raw, settings).estimate.astype(np.float32)
+    return _reconstruct(raw, settings, noise=False)[0]
 
 
 def reconstruct_with_noise(
@@ -77,86 +78,25 @@ def reconstruct_with_noise(
     patch: int = PATCH,
     sigma_d: float = SIGMA_D,
     sigma_s: float = SIGMA_S,
+    distance: Distance = "noise",
 ) -> Reconstruction:
     """As `reconstruct`, with the factor by which the weights reduce white noise, and the engine that ran."""
-    settings = Settings(neighbourhood, patch, sigma_d, sigma_s)
+    settings = Settings(neighbourhood, patch, sigma_d, sigma_s, distance)
     settings.check_reaches(raw.cfa)
     engine = backend()
     if engine == "numpy":
         return reference_with_noise(raw, settings)
-    alpha, grid = saturated_fraction(raw, patch), make_grid(raw.cfa, patch)
-    offsets = list_offsets(raw.cfa, settings)
-    frame = _load(raw, alpha, offsets, settings, grid)
-    shape = (*raw.shape, len(channels(raw.cfa)))
-    results = [dr.zeros(arrays().Float, int(np.prod(shape))) for _ in range(2)]
-    for work in sort_work(alpha, raw.cfa, grid, settings.reach):
-        if len(work.row):
-            _run(frame, offsets, work, grid, results)
-    estimate, noise_gain = (np.array(result).reshape(shape) for result in results)
+    estimate, noise_gain = _reconstruct(raw, settings, noise=True)
     return Reconstruction(estimate, noise_gain, engine)
 
 
-def _load(raw: RawImage, alpha: Plane, offsets: Offsets, settings: Settings, grid: Grid) -> Frame:
-    """Pad and pack what the lanes read."""
-    jit, before = arrays(), settings.reach + settings.patch // 2
-    # A lane at the lower right corner reaches beyond the frame, by its own size and to the end of its last packet.
-    margins = [(before, before + grid.height), (before, before + grid.width + PACKET)]
-    h = np.pad(planes(raw).astype(np.float32), [(0, 0), *margins], mode="reflect")
-    rows, pitch = h.shape[1:]
-    columns = [np.pad(raw.electrons, margins), np.pad(alpha, margins)]
-    samples = np.zeros((rows, pitch, samples_size(grid)), dtype=np.float32)
-    for c in range(grid.columns):
-        for i, values in enumerate(columns):
-            shift = c * grid.step[1]
-            samples[:, : pitch - shift, i * grid.columns + c] = values[:, shift:]
-    return Frame(
-        h=_packets(h),
-        samples=_upload(samples, jit.Float),
-        entries=_upload(offsets.entries, jit.Float),
-        height=dr.opaque(jit.UInt, raw.shape[0]),
-        width=dr.opaque(jit.UInt, raw.shape[1]),
-        rows=dr.opaque(jit.UInt, rows),
-        pitch=dr.opaque(jit.UInt, pitch),
-        reach=dr.opaque(jit.UInt, settings.reach),
-        channels=dr.opaque(jit.UInt, len(h)),
-        length=dr.opaque(jit.UInt, offsets.entries.shape[1]),
-        decay=dr.opaque(jit.Float, float(np.log2(np.e)) / (2.0 * settings.sigma_s**2)),
-    )
-
-
-def _packets(h: NDArray[np.float32]) -> Any:
-    """Each value together with those that follow it, `PACKET` in all."""
-    jit = arrays()
-    source = _upload(np.append(h.ravel(), np.zeros(PACKET, np.float32)), jit.Float)
-    index = dr.arange(jit.UInt, h.size * PACKET)
-    packets = dr.gather(jit.Float, source, index // PACKET + index % PACKET)
-    dr.eval(packets)
-    return packets
-
-
-def _upload(values: NDArray[Any], kind: Any) -> Any:
-    """Copy to an evaluated, aligned Dr.Jit array."""
-    memory = np.empty(values.nbytes + ALIGNMENT, dtype=np.uint8)
-    start = -memory.ctypes.data % ALIGNMENT
-    aligned = memory[start : start + values.nbytes].view(values.dtype)
-    aligned[:] = values.ravel()
-    return kind(aligned)
-
-
-def _run(frame: Frame, offsets: Offsets, work: Work, grid: Grid, results: list[Any]) -> None:
-    """Reconstruct one group of lanes and put its pixels in their place."""
-    jit = arrays()
-    row, column, channel, number, count = (
-        _upload(values, jit.UInt)
-        for values in (work.row, work.column, work.channel, work.list, offsets.counts[work.list])
-    )
-    corner = (row + frame.reach) * frame.pitch + column + frame.reach
-    lanes = Lanes(row, column, corner, number, count, tuple(_upload(plane, jit.UInt) for plane in work.planes))
-    pixels = reconstruct_lanes(frame, lanes, grid)
-    dr.eval(pixels)  # a scatter straight from the loop would repeat the loop for each array
-    for i, values in enumerate(pixels):
-        y, x = row + (i // grid.columns) * grid.step[0], column + (i % grid.columns) * grid.step[1]
-        place = (y * frame.width + x) * frame.channels + channel
-        for result, value in zip(results, values, strict=True):
-            dr.scatter(result, value, place, (y < frame.height) & (x < frame.width))
-    dr.eval(results)
+def _reconstruct(raw: RawImage, settings: Settings, *, noise: bool) -> list[NDArray[np.float32]]:
+    """Estimate and, where asked for, noise gain, strip by strip."""
+    pattern, count = number_tile(raw.cfa), len(channels(raw.cfa))
+    results = [np.empty((*raw.shape, count), np.float32) for _ in range(1 + noise)]
+    step = strip_rows(raw.shape[1], pattern, settings.patch)
+    for first in range(0, raw.shape[0], step):
+        rows = first, min(first + step, raw.shape[0])
+        for result, values in zip(results, reconstruct_rows(raw, rows, pattern, settings, noise=noise), strict=True):
+            result[rows[0] : rows[1]] = values
+    return results

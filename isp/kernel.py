@@ -1,77 +1,53 @@
-"""Eqs. (1)-(5) for one group of tiles in Dr.Jit: one source for LLVM and CUDA.
+"""Eqs. (1)-(5) for a group of tiles of pixels in Dr.Jit: one source for LLVM and CUDA.
 
-A lane reconstructs one channel at a small grid of pixels that share a phase of the tile. All of them then use the same
-offsets d = y - x (those that lead to a sample of that channel), the same planes and the same noise distances, so one
-compiled kernel serves every phase, channel and colour filter array: what differs is read from a list, one entry an
-offset. Neighbouring pixels' patches overlap, and the lane forms their common row sums once.
+A lane owns a dense tile of adjacent pixels x and goes through the offsets d = y - x of one class: those that lead from
+its tile to one place in the tile of letters. The letter at y then depends on the pixel's place in the lane alone, so
+each pair (x, y) is met once, and one compiled kernel serves all classes. Patches of neighbours overlap: the lane forms
+the rows' sums of squared differences once (`isp.window_sums`).
 
-A plain gather costs as much as twenty multiply-adds on a CPU. Rows are therefore stored as packets: each pixel holds
-the `PACKET` values that start there, which a lane loads with one instruction from any column.
+Loading is what costs. Rows are therefore stored in groups, one at every column where patches around y may begin: each
+holds all the values that a lane reads from there on, of one row or two, to be loaded with one instruction a lane.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
+from isp.lane_shape import HEAD, PACKET, Pixel, Shape, entry_size, packet_width, whole_packets
+from isp.weighted_sums import FARTHEST, HEADROOM, NEVER, add_exactly, add_quickly, at_least, start_sums
+from isp.window_sums import window_sums
 from render.jit import arrays, dr
-
-PACKET = 8  # floats a lane loads at once: one AVX register, and the most Dr.Jit takes on a CPU
-ENTRY = 8  # floats of one list entry: row and column of d, log2 of the spatial weight, then B of each plane
-NEVER = -1e30  # log weight of a pixel outside the frame; far under any real one (sigma >= 1e-3), and finite
-
-
-@dataclass(frozen=True)
-class Grid:
-    """The pixels of one lane: `rows` x `columns` of them, one tile of `step` pixels apart, with patches of `patch`."""
-
-    rows: int
-    columns: int
-    step: tuple[int, int]
-    patch: int
-
-    @property
-    def height(self) -> int:
-        """Rows that the patches of the lane's pixels cover together."""
-        return self.step[0] * (self.rows - 1) + self.patch
-
-    @property
-    def width(self) -> int:
-        """Columns that they cover."""
-        return self.step[1] * (self.columns - 1) + self.patch
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Evaluated Dr.Jit arrays that all lanes read.
+    """Evaluated Dr.Jit arrays that all lanes read; rows and columns begin at the first patch (`isp.strips`).
 
     Attributes
     ----------
     h : Float
-        Planes in packets, [plane, row, column, PACKET], padded.
-    samples : Float
-        Per padded pixel, e of the `columns` pixels of a lane that starts there, then their alpha.
+        Planes, [plane, row // packet_rows, group, row % packet_rows, `packet_width`].
+    samples, alpha, decay : Float
+        At patches' centres, [row // packet_rows, group, row % packet_rows, `whole_packets(columns)`]: samples; alpha,
+        or None; log2(e) r(x) / (2 sigma_s^2).
     entries : Float
-        Lists of offsets, [list, entry, ENTRY].
-    height, width, channels : UInt
-        Shape of the result.
-    rows, pitch : UInt
-        Rows and columns of a padded plane.
-    reach, length : UInt
-        Largest offset along an axis, entries of a list.
-    decay : Float
-        log2(e) / (2 sigma_s^2).
+        Lists of offsets, [class, entry, `entry_size`].
+    counts : UInt
+        Entries of each list.
+    length, height, width, plane_groups, groups : UInt
+        Entries a list has room for; size of the whole frame; groups of a plane, and of a row.
     """
 
     h: Any
     samples: Any
+    alpha: Any
+    decay: Any
     entries: Any
+    counts: Any
+    length: Any
     height: Any
     width: Any
-    channels: Any
-    rows: Any
-    pitch: Any
-    reach: Any
-    length: Any
-    decay: Any
+    plane_groups: Any
+    groups: Any
 
 
 @dataclass(frozen=True)
@@ -80,136 +56,180 @@ class Lanes:
 
     Attributes
     ----------
-    row, column : UInt
-        First pixel in the frame.
-    corner : UInt
-        First pixel of its patch in the padded planes.
-    list, count : UInt
-        List of offsets, and how many entries of it hold.
-    planes : tuple of UInt
-        The plane that judges similarity, or two of them (the band's own and W's) where alpha mixes them.
+    row, column : Int
+        Its first pixel in the frame; may lie outside.
+    window_row, window_column : UInt
+        First pixel of its patches in the arrays.
+    group : UInt
+        Number of the group where its list's steps begin.
+    list : UInt
+        Class of offsets.
+    line : UInt
+        Where its first row of sums goes.
     """
 
     row: Any
     column: Any
-    corner: Any
+    window_row: Any
+    window_column: Any
+    group: Any
     list: Any
-    count: Any
-    planes: tuple[Any, ...]
+    line: Any
 
 
-def reconstruct_lanes(frame: Frame, lanes: Lanes, grid: Grid) -> list[tuple[Any, Any]]:
-    """Estimate and noise gain at each pixel of the lanes' grids, row by row."""
-    jit = arrays()
-    lane_count = dr.width(lanes.row)
-    margin = grid.patch // 2  # from the first pixel of a patch to its centre
-    here = [_window(frame, plane, lanes.corner, grid) for plane in lanes.planes]
+def reconstruct_lanes(frame: Frame, lanes: Lanes, shape: Shape) -> list[tuple[Any, ...]]:
+    """Sums of eqs. (1) and (3) at each pixel of the lanes, row by row.
+
+    Returns
+    -------
+    list of (weight, value[, square][, largest])
+        As `isp.weighted_sums.start_sums`: sums of w, of w times the sample, of w^2 where asked for.
+    """
+    jit, count, width = arrays(), dr.width(lanes.row), packet_width(shape.columns, shape.patch)
+    here = {}
+    for plane in shape.slots:
+        rows, columns = _window(shape, plane)
+        here[plane] = _load_here(frame, lanes, frame.h, shape.slots.index(plane), width, rows, columns, shape)
+    around = range(shape.rows), range(shape.columns)
+    decay = _load_here(frame, lanes, frame.decay, 0, whole_packets(shape.columns), *around, shape)
+    first_entry, entries = lanes.list * frame.length, dr.gather(jit.UInt, frame.counts, lanes.list)
 
     def add_offset(k: Any, sums: list[tuple[Any, ...]]) -> tuple[Any, list[tuple[Any, ...]]]:
-        entry = dr.gather(jit.ArrayXf, frame.entries, lanes.list * frame.length + k, shape=(ENTRY, lane_count))
-        row, column = jit.Int(entry[0]), jit.Int(entry[1])
-        moved = jit.UInt(jit.Int(lanes.corner) + row * jit.Int(frame.pitch) + column)
-        distances = [
-            _distances(window, _window(frame, plane, moved, grid), entry[3 + i], grid)
-            for i, (plane, window) in enumerate(zip(lanes.planes, here, strict=True))
-        ]
-        inside = _inside(frame, jit.Int(lanes.row) + row, jit.Int(lanes.column) + column, grid)
-        samples = _samples(frame, moved + margin * frame.pitch + margin, grid)
+        entry = _entry(frame, first_entry + k, shape)
+        group = lanes.group + dr.reinterpret_array(jit.UInt, entry[0])
+        distances = _distances(frame, group, here, entry, shape)
+        samples = _samples(frame.samples, group, frame, shape)
+        alpha = _samples(frame.alpha, group, frame, shape) if shape.judge == "both" else {}
+        spatial = _spatial(frame, lanes, entry, shape)
         updated = []
-        for old, judged, (electrons, alpha), valid in zip(
-            sums, zip(*distances, strict=True), samples, inside, strict=True
-        ):
-            log_weight = dr.fma(-frame.decay, _beta_squared(judged, alpha), entry[2])
-            updated.append(_accumulate(old, dr.select(valid, log_weight, NEVER), electrons))
+        for pixel, old in zip(shape.pixels, sums, strict=True):
+            squared = _beta_squared(distances[pixel], alpha.get(pixel))
+            log_weight = dr.fma(-decay[pixel], squared, spatial[pixel])
+            if shape.exact:
+                updated.append(add_exactly(old, log_weight, spatial[pixel] > FARTHEST, samples[pixel]))
+            else:
+                updated.append(add_quickly(old, log_weight, samples[pixel]))
         return k + 1, updated
 
-    start = [tuple(dr.full(jit.Float, v, lane_count) for v in (NEVER, 0.0, 0.0, 0.0))] * (grid.rows * grid.columns)
-    _, sums = dr.while_loop((jit.UInt(0), start), lambda k, _: k < lanes.count, add_offset)
-    return [(value / weight, square / dr.square(weight)) for _, weight, square, value in sums]
+    start = start_sums(exact=shape.exact, noise=shape.noise)
+    sums = [tuple(dr.full(jit.Float, value, count) for value in start) for _ in shape.pixels]
+    _, sums = dr.while_loop((jit.UInt(0), sums), lambda k, _: k < entries, add_offset)
+    return sums
 
 
-def _window(frame: Frame, plane: Any, corner: Any, grid: Grid) -> list[list[Any]]:
-    """Rows of the part of a plane that the patches of the lane's pixels cover."""
-    return [_row(frame, plane, corner + i * frame.pitch, grid) for i in range(grid.height)]
+def _window(shape: Shape, plane: int) -> tuple[range, range]:
+    """Rows and columns under the patches that a plane judges."""
+    rows, columns = shape.judged(plane)
+    return range(rows[0], rows[-1] + shape.patch), range(columns[0], columns[-1] + shape.patch)
 
 
-def _row(frame: Frame, plane: Any, start: Any, grid: Grid) -> list[Any]:
-    """`grid.width` values of a plane from padded pixel `start` on."""
-    index, values = plane * (frame.rows * frame.pitch) + start, []
-    for offset in range(0, grid.width, PACKET):
-        values += _packet(frame.h, index + offset, PACKET)
-    return values[: grid.width]
+def _load_here(
+    frame: Frame, lanes: Lanes, source: Any, slot: int, width: int, rows: range, columns: range, shape: Shape
+) -> dict[Pixel, Any]:
+    """Values around x: lanes may begin between groups, so the values that follow are loaded too, and shifted."""
+    pair, across = shape.packet_rows, shape.across
+    group = slot * frame.plane_groups + lanes.window_row // pair * frame.groups + lanes.window_column // across
+    more = range(rows.start, rows.stop + pair - 1)
+    first, second = (_load_rows(source, group + i, more, width, width, frame, shape) for i in (0, 1))
+    lines = {i: first[i] + second[i][width - across :] for i in more}
+    values = {}
+    for i in rows:
+        line = lines[i]
+        for shift in range(1, pair):
+            chosen = lanes.window_row % pair == shift
+            line = [dr.select(chosen, new, old) for new, old in zip(lines[i + shift], line, strict=True)]
+        for j in columns:
+            values[i, j] = line[j]
+            for shift in range(1, across):
+                values[i, j] = dr.select(lanes.window_column % across == shift, line[j + shift], values[i, j])
+    return values
 
 
-def _packet(source: Any, index: Any, size: int) -> list[Any]:
-    packet = dr.gather(arrays().ArrayXf, source, index, shape=(size, dr.width(index)))
-    return [packet[i] for i in range(size)]
+def _load_rows(
+    source: Any, group: Any, rows: range, needed: int, width: int, frame: Frame, shape: Shape
+) -> dict[int, list[Any]]:
+    """First `needed` values of some rows from a group on: one packet for all rows of a group, or one each."""
+    pair, values = shape.packet_rows, {}
+    for i in range(rows.start // pair, (rows.stop - 1) // pair + 1):
+        lines = [r for r in range(i * pair, i * pair + pair) if r in rows]
+        first = group + i * frame.groups
+        if len(lines) == pair and pair * width <= 2 * PACKET:
+            together = _load(source, first, pair * width, 0, pair * width)
+            values.update({r: together[k * width :][:needed] for k, r in enumerate(lines)})
+        else:
+            values.update({r: _load(source, first, pair * width, r % pair * width, needed) for r in lines})
+    return values
 
 
-def _distances(here: list[list[Any]], there: list[list[Any]], noise: Any, grid: Grid) -> list[Any]:
-    """Squared distance of each pixel's patch in two windows, less what noise alone makes, 0 or more."""
-    down, across = grid.step
-    row_sums = []
-    for row, moved in zip(here, there, strict=True):
-        differences = [x - y for x, y in zip(row, moved, strict=True)]
-        row_sums.append([_sum_of_squares(differences[c * across :][: grid.patch]) for c in range(grid.columns)])
-    totals = [
-        sum((row_sums[r * down + i][c] for i in range(1, grid.patch)), row_sums[r * down][c])
-        for r in range(grid.rows)
-        for c in range(grid.columns)
-    ]
-    return [dr.maximum(total - noise, 0.0) for total in totals]
+def _load(source: Any, group: Any, size: int, offset: int, needed: int) -> list[Any]:
+    """`needed` values of a group of `size`, from `offset` on, in as few packets as there are."""
+    values: list[Any] = []
+    while len(values) < needed:
+        packet = size if size <= 2 * PACKET and needed == size else min(PACKET, whole_packets(needed - len(values)))
+        place = group * (size // packet) + (offset + len(values)) // packet
+        loaded = dr.gather(arrays().ArrayXf, source, place, shape=(packet, dr.width(place)))
+        values += [loaded[i] for i in range(packet)]
+    return values[:needed]
 
 
-def _sum_of_squares(values: list[Any]) -> Any:
-    total = dr.square(values[0])
-    for value in values[1:]:
-        total = dr.fma(value, value, total)
-    return total
+def _entry(frame: Frame, number: Any, shape: Shape) -> list[Any]:
+    """Head of a list's entry and the noise distances that the judges need."""
+    needed = HEAD + shape.cell_count * (1 if shape.judge == "white" else 2)
+    return _load(frame.entries, number, entry_size(shape.cell_count), 0, needed)
 
 
-def _inside(frame: Frame, row: Any, column: Any, grid: Grid) -> list[Any]:
-    """Whether each y lies in the frame: Omega ends at its border."""
-    jit = arrays()  # unsigned, a negative coordinate is a large one
-    rows = [jit.UInt(row + r * grid.step[0]) < frame.height for r in range(grid.rows)]
-    columns = [jit.UInt(column + c * grid.step[1]) < frame.width for c in range(grid.columns)]
-    return [r & c for r in rows for c in columns]
+def _distances(
+    frame: Frame, group: Any, here: dict[int, dict[Pixel, Any]], entry: list[Any], shape: Shape
+) -> dict[Pixel, list[Any]]:
+    """Squared distances of each pixel's patch by its judges, less what noise alone makes, 0 or more."""
+    results: dict[Pixel, list[Any]] = {pixel: [] for pixel in shape.pixels}
+    width = packet_width(shape.columns, shape.patch)
+    for slot, (plane, values) in enumerate(here.items()):
+        rows, columns = shape.judged(plane)
+        lines, places = _window(shape, plane)
+        there = _load_rows(frame.h, group + slot * frame.plane_groups, lines, places.stop, width, frame, shape)
+        row_sums = {}
+        for i in lines:
+            # y - x, not x - y: the x stay in memory, and a processor subtracts memory from a register.
+            change = {j: there[i][j] - values[i, j] for j in places}
+            row_sums[i] = window_sums(change, columns, shape.patch, dr.square, lambda total, v: dr.fma(v, v, total))
+        for k, column in enumerate(columns):
+            line = {i: sums[k] for i, sums in row_sums.items()}
+            totals = window_sums(line, rows, shape.patch, lambda v: v, lambda total, v: total + v)
+            for row, total in zip(rows, totals, strict=True):
+                if plane in shape.judges((row, column)):
+                    own = 0 if shape.judge != "band" and plane == shape.white else shape.cell_count
+                    noise = entry[HEAD + own + shape.cell((row, column))]
+                    results[row, column].append(at_least(total - noise, 0.0))
+    return results
 
 
-def _samples(frame: Frame, start: Any, grid: Grid) -> list[tuple[Any, Any]]:
-    """Electrons and alpha at each y."""
-    pixels = []
-    for r in range(grid.rows):
-        packet = _packet(frame.samples, start + (r * grid.step[0]) * frame.pitch, samples_size(grid))
-        pixels += [(packet[c], packet[grid.columns + c]) for c in range(grid.columns)]
-    return pixels
+def _samples(source: Any, group: Any, frame: Frame, shape: Shape) -> dict[Pixel, Any]:
+    """Samples (or alpha) at each y."""
+    rows = range(shape.rows)
+    lines = _load_rows(source, group, rows, shape.columns, whole_packets(shape.columns), frame, shape)
+    return {(r, c): lines[r][c] for r, c in shape.pixels}
 
 
-def samples_size(grid: Grid) -> int:
-    """Floats that `Frame.samples` holds for one pixel: a power of two, as packets are."""
-    return int(2 ** (2 * grid.columns - 1).bit_length())
+def _spatial(frame: Frame, lanes: Lanes, entry: list[Any], shape: Shape) -> dict[Pixel, Any]:
+    """Log2 of the spatial weight at each y: Omega ends at the frame's border."""
+    jit = arrays()
+    inside: Any = entry[3] if shape.exact else entry[3] + HEADROOM
+    if not shape.bordered:
+        return dict.fromkeys(shape.pixels, inside)
+    # Unsigned, a negative coordinate is a large one.
+    row = jit.UInt(lanes.row) + dr.reinterpret_array(jit.UInt, entry[1])
+    column = jit.UInt(lanes.column) + dr.reinterpret_array(jit.UInt, entry[2])
+    rows = [row + r < frame.height for r in range(shape.rows)]
+    columns = [dr.select(column + c < frame.width, inside, NEVER) for c in range(shape.columns)]
+    return {(r, c): dr.select(rows[r], columns[c], NEVER) for r, c in shape.pixels}
 
 
-def _beta_squared(judged: tuple[Any, ...], alpha: Any) -> Any:
-    """Square of eq. (5): expanded, it needs one square root."""
-    if len(judged) == 1:
-        return judged[0]
-    band, white = judged
+def _beta_squared(distances: list[Any], alpha: Any) -> Any:
+    """Square of eq. (5), expanded: exactly one distance where alpha is 0 or 1."""
+    if len(distances) == 1:
+        return distances[0]
+    white, band = distances
     rest = 1.0 - alpha
-    cross = 2.0 * alpha * rest * dr.sqrt(band * white)
+    cross = 2.0 * alpha * rest * dr.sqrt(band) * dr.sqrt(white)
     return dr.fma(dr.square(alpha), band, dr.fma(dr.square(rest), white, cross))
-
-
-def _accumulate(sums: tuple[Any, ...], log_weight: Any, electrons: Any) -> tuple[Any, ...]:
-    """Add one sample to the sums of eqs. (1) and (3); the largest weight stays 1, so W_y is never 0."""
-    largest, weight, square, value = sums
-    ahead = log_weight - largest
-    smaller = dr.exp2(-dr.abs(ahead))  # one exponential: of the two weights the larger is 1
-    is_larger = ahead > 0.0
-    old, new = dr.select(is_larger, smaller, 1.0), dr.select(is_larger, 1.0, smaller)
-    return (
-        dr.maximum(largest, log_weight),
-        dr.fma(weight, old, new),
-        dr.fma(square, dr.square(old), dr.square(new)),
-        dr.fma(value, old, new * electrons),
-    )

@@ -4,28 +4,37 @@ Planes are filled by normalised convolution (Knutsson & Westin 1993) of the samp
 flat up to the border. They serve only to judge similarity: what is averaged are the samples themselves.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d
 
-from sensor.cfa import Tile, channels, mask
+from isp.settings import Distance
+from sensor.cfa import Tile, channels
 from sensor.raw import RawImage
 
 Plane = NDArray[np.float64]
 
 
-def stabilise(raw: RawImage) -> Plane:
+def stabilise(electrons: NDArray[Any], dark_noise_e: float) -> NDArray[Any]:
     """Mosaic in units of its own noise: generalised Anscombe transform at unit gain.
 
-    t = 2 sqrt(max(e + 3/8 + s^2, 0)) for Poisson e with Gaussian noise of standard deviation s = `raw.dark_noise_e`
+    t = 2 sqrt(max(e + 3/8 + s^2, 0)) for Poisson e with Gaussian noise of standard deviation s
     (Murtagh, Starck & Bijaoui 1995, eq. 7). Its standard deviation is 1 from a few electrons on.
+
+    Parameters
+    ----------
+    electrons : (h, w) float32 or float64
+        Mosaic [e-].
+    dark_noise_e : float
+        s, as `RawImage.dark_noise_e` [e-].
 
     Returns
     -------
-    (h, w) float64
+    (h, w) of the same type
         Stabilised mosaic [standard deviations of a pixel's noise].
     """
-    return np.asarray(2.0 * np.sqrt(np.maximum(raw.electrons + 0.375 + raw.dark_noise_e**2, 0.0)))
+    return np.asarray(2.0 * np.sqrt(np.maximum(electrons + (0.375 + dark_noise_e**2), 0.0)))
 
 
 def tent(radius: int) -> Plane:
@@ -55,42 +64,92 @@ def tent_weights(tile: Tile, letter: str) -> Plane:
         Weight, for the pixel at phase (i, j) of the tile, of the site at each offset up to the radius r. Sums to 1.
     """
     radius = tent_radius(tile, letter)
-    height, width = len(tile), len(tile[0])
-    sampled = np.pad(mask(tile, letter, (height, width)), radius, mode="wrap")
-    windows = np.lib.stride_tricks.sliding_window_view(sampled, (2 * radius + 1, 2 * radius + 1))
-    weights = windows * np.outer(tent(radius), tent(radius))
-    weights[mask(tile, letter, (height, width))] = 0.0
-    weights[mask(tile, letter, (height, width)), radius, radius] = 1.0
+    weights = np.zeros((len(tile), len(tile[0]), 2 * radius + 1, 2 * radius + 1))
+    for phase in np.ndindex(*weights.shape[:2]):
+        if tile[phase[0]][phase[1]] == letter:
+            weights[(*phase, radius, radius)] = 1.0
+        else:
+            weights[phase] = _phase_tent(tile, letter, phase, radius)
     return np.asarray(weights / weights.sum((2, 3), keepdims=True))
 
 
-def fill(values: Plane, tile: Tile, letter: str) -> Plane:
+def fill(values: NDArray[Any], tile: Tile, letter: str) -> NDArray[Any]:
     """One full plane from the samples of `letter`; a sampled site keeps its sample.
 
     Parameters
     ----------
-    values : (h, w) float64
+    values : (h, w) float32 or float64
         Mosaic.
 
     Returns
     -------
-    (h, w) float64
+    (h, w) of the same type
         Where the frame's edge cuts off every sample within the tent's radius, the next radius that reaches one serves.
+        The sums run in one order at every pixel: a part of the frame gives the same bits.
     """
-    sampled = mask(tile, letter, (values.shape[0], values.shape[1]))
-    plane, known = np.where(sampled, values, 0.0), sampled
-    samples, radius = plane, tent_radius(tile, letter)
-    while not known.all():
-        total, weight = samples, sampled.astype(np.float64)
-        for axis in (0, 1):
-            total = convolve1d(total, tent(radius), axis, mode="constant")
-            weight = convolve1d(weight, tent(radius), axis, mode="constant")
-        plane = np.where(known, plane, total / np.maximum(weight, 1.0))  # a weight is 0 or at least 1
-        known, radius = known | (weight > 0.0), radius + 1
-    return plane
+    radius = tent_radius(tile, letter)
+    total, weight = _tent_sums(values, tile, letter, radius)
+    while not np.all(weight):
+        radius += 1
+        more, more_weight = _tent_sums(values, tile, letter, radius)
+        total, weight = np.where(weight > 0.0, total, more), np.where(weight > 0.0, weight, more_weight)
+    total /= weight
+    return total
 
 
-def planes(raw: RawImage) -> Plane:
-    """Planes h_i in units of noise, shape (channel, h, w), in the order of `sensor.cfa.channels`."""
-    stable = stabilise(raw)
-    return np.stack([fill(stable, raw.cfa, letter) for letter in channels(raw.cfa)])
+def _tent_sums(values: NDArray[Any], tile: Tile, letter: str, radius: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Sums of tent times sample, and of the tent, over the samples in the frame; a sampled site is its own sum."""
+    padded, size = np.pad(values, radius), (len(tile), len(tile[0]))
+    inside = [np.pad(np.ones(length, values.dtype), radius) for length in values.shape]
+    total, weight = np.empty_like(values), np.empty_like(values)
+    for phase in np.ndindex(*size):
+        at = slice(phase[0], None, size[0]), slice(phase[1], None, size[1])
+        if tile[phase[0]][phase[1]] == letter:
+            total[at], weight[at] = values[at], 1.0
+            continue
+        # Row and column of the first pixel of this phase, moved by each step of the tent.
+        lines = [
+            [slice(first + step, length + step, pace) for step in range(2 * radius + 1)]
+            for first, length, pace in zip(phase, values.shape, size, strict=True)
+        ]
+        tents = _phase_tent(tile, letter, phase, radius).astype(values.dtype)
+        total[at] = sum(tents[i, j] * padded[lines[0][i], lines[1][j]] for i, j in np.argwhere(tents))
+        rows, columns = (
+            np.stack([line[place] for place in places]) for line, places in zip(inside, lines, strict=True)
+        )
+        # Small whole numbers: exact. Outer products, for a product of matrices would keep its threads spinning.
+        weight[at] = sum(np.outer(row, line @ columns) for row, line in zip(rows, tents, strict=True) if line.any())
+    return total, weight
+
+
+def _phase_tent(tile: Tile, letter: str, phase: tuple[int, ...], radius: int) -> Plane:
+    """Tent around a pixel of some phase of the tile, 0 where there is no sample of the letter."""
+    size = 2 * radius + 1
+    rows, columns = (
+        (np.arange(size) - radius + first) % n for first, n in zip(phase, (len(tile), len(tile[0])), strict=True)
+    )
+    sampled = np.array([list(row) for row in tile])[np.ix_(rows, columns)] == letter
+    return np.asarray(sampled * np.outer(tent(radius), tent(radius)))
+
+
+def box_sums(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+    """Sum of each box of `size` that lies in the array, added up in one order everywhere."""
+    height, width = values.shape[0] - size[0] + 1, values.shape[1] - size[1] + 1
+    lines = values[:height].copy()
+    for i in range(1, size[0]):
+        lines += values[i : i + height]
+    sums = lines[:, :width].copy()
+    for j in range(1, size[1]):
+        sums += lines[:, j : j + width]
+    return sums
+
+
+def judged_mosaic(electrons: NDArray[Any], dark_noise_e: float, distance: Distance) -> NDArray[Any]:
+    """The mosaic that patches are read from: in units of noise, or in electrons."""
+    return stabilise(electrons, dark_noise_e) if distance == "noise" else electrons
+
+
+def planes(raw: RawImage, distance: Distance = "noise") -> Plane:
+    """Planes h_i, shape (channel, h, w), in the order of `sensor.cfa.channels`."""
+    mosaic = judged_mosaic(raw.electrons, raw.dark_noise_e, distance)
+    return np.stack([fill(mosaic, raw.cfa, letter) for letter in channels(raw.cfa)])

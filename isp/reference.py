@@ -10,27 +10,31 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
-from isp.planes import Plane, planes
-from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Reconstruction, Settings
-from isp.similarity import noise_distance, saturated_fraction
+from isp.planes import Plane, fill, planes
+from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Distance, Reconstruction, Settings
+from isp.similarity import noise_distance, reliability, saturated_fraction
 from sensor.cfa import channels, mask
 from sensor.raw import RawImage
 
 
 @dataclass(frozen=True)
 class _Inputs:
-    """What eqs. (1)-(6) read: electrons, the channel sampled at each pixel, padded planes, alpha, noise distance, W."""
+    """What eqs. (1)-(6) read.
+
+    Electrons, the channel sampled at each pixel, padded planes, alpha, reliability of similarity, noise distances, W.
+    """
 
     electrons: Plane
     channel: NDArray[np.intp]
     h: Plane
     alpha: Plane
+    reliability: Plane
     noise: list[Plane]
     white: int | None
 
 
 @dataclass(frozen=True)
-class _Sums:
+class Sums:
     """Sums over y for each (x, channel), in units of exp(largest log weight so far)."""
 
     largest: Plane
@@ -46,6 +50,7 @@ def reconstruct_reference(
     patch: int = PATCH,
     sigma_d: float = SIGMA_D,
     sigma_s: float = SIGMA_S,
+    distance: Distance = "noise",
 ) -> NDArray[np.float64]:
     """Reconstruct every channel at every pixel: `isp.interleaved.reconstruct` in float64.
 
@@ -59,48 +64,63 @@ def reconstruct_reference(
     InputError
         As `isp.settings.Settings`.
     """
-    settings = Settings(neighbourhood, patch, sigma_d, sigma_s)
+    settings = Settings(neighbourhood, patch, sigma_d, sigma_s, distance)
     return np.asarray(reference_with_noise(raw, settings).estimate, dtype=np.float64)
 
 
 def reference_with_noise(raw: RawImage, settings: Settings) -> Reconstruction:
-    """Estimate and noise gain in float64, one offset of the neighbourhood after the other."""
+    """Estimate and noise gain in float64."""
+    sums = sum_weights(raw, settings)
+    return Reconstruction(sums.value / sums.weight, sums.square / sums.weight**2, "numpy")
+
+
+def sum_weights(raw: RawImage, settings: Settings) -> Sums:
+    """Sums of eqs. (1) and (3) in float64, one offset of the neighbourhood after the other."""
     settings.check_reaches(raw.cfa)
     inputs = _inputs(raw, settings)
     shape = (*raw.shape, len(inputs.h))
-    sums = _Sums(np.full(shape, -np.inf), np.zeros(shape), np.zeros(shape), np.zeros(shape))
+    sums = Sums(np.full(shape, -np.inf), np.zeros(shape), np.zeros(shape), np.zeros(shape))
     reach = range(-settings.reach, settings.reach + 1)
     for row in (d for d in reach if abs(d) < raw.shape[0]):
         for column in (d for d in reach if abs(d) < raw.shape[1]):
             _add_offset(sums, inputs, settings, (row, column))
-    return Reconstruction(sums.value / sums.weight, sums.square / sums.weight**2, "numpy")
+    return sums
 
 
 def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
     letters, half = channels(raw.cfa), settings.patch // 2
+    in_noise = settings.distance == "noise"
+    noise = [noise_distance(raw.cfa, letter, settings.patch, settings.reach) for letter in letters]
     return _Inputs(
         electrons=raw.electrons,
         channel=np.argmax([mask(raw.cfa, letter, raw.shape) for letter in letters], axis=0),
-        h=np.pad(planes(raw), ((0, 0), (half, half), (half, half)), mode="reflect"),
+        h=np.pad(planes(raw, settings.distance), ((0, 0), (half, half), (half, half)), mode="reflect"),
         alpha=saturated_fraction(raw, settings.patch),
-        noise=[noise_distance(raw.cfa, letter, settings.patch, settings.reach) for letter in letters],
+        reliability=_reliability(raw, settings.patch) if in_noise else np.ones(raw.shape),
+        noise=noise if in_noise else [np.zeros_like(table) for table in noise],
         white=letters.index("W") if "W" in letters else None,
     )
 
 
-def _add_offset(sums: _Sums, inputs: _Inputs, settings: Settings, offset: tuple[int, int]) -> None:
+def _reliability(raw: RawImage, patch: int) -> Plane:
+    judging_e = fill(raw.electrons, raw.cfa, "W") if "W" in channels(raw.cfa) else raw.electrons
+    return reliability(judging_e, raw.dark_noise_e, patch)
+
+
+def _add_offset(sums: Sums, inputs: _Inputs, settings: Settings, offset: tuple[int, int]) -> None:
     """Add y = x + offset to the sums of each x whose y lies in the frame."""
     shape = inputs.electrons.shape
     x = tuple(np.arange(max(-d, 0), size - max(d, 0)) for d, size in zip(offset, shape, strict=True))
     y = tuple(line + d for line, d in zip(x, offset, strict=True))
     distance = [_distance(inputs, i, settings, x, offset) for i in range(len(inputs.h))]
     log_spatial = -(offset[0] ** 2 + offset[1] ** 2) / (2.0 * settings.sigma_d**2)  # eqs. (2), (4)
+    trust = inputs.reliability[np.ix_(*x)]
     channel, alpha, electrons = (a[np.ix_(*y)] for a in (inputs.channel, inputs.alpha, inputs.electrons))
     for i in range(len(inputs.h)):
         at = np.nonzero(channel == i)  # S_i(y) of eq. (1)
         white = i if inputs.white is None else inputs.white
         beta_s = alpha[at] * np.sqrt(distance[i][at]) + (1.0 - alpha[at]) * np.sqrt(distance[white][at])  # eq. (5)
-        log_weight = log_spatial - beta_s**2 / (2.0 * settings.sigma_s**2)
+        log_weight = log_spatial - trust[at] * beta_s**2 / (2.0 * settings.sigma_s**2)
         _accumulate(sums, (x[0][at[0]], x[1][at[1]], np.full(at[0].shape, i)), log_weight, electrons[at])
 
 
@@ -120,7 +140,7 @@ def _distance(
     return np.asarray(np.maximum(total - noise[np.ix_(x[0] % noise.shape[0], x[1] % noise.shape[1])], 0.0))
 
 
-def _accumulate(sums: _Sums, at: tuple[NDArray[np.intp], ...], log_weight: Plane, value: Plane) -> None:
+def _accumulate(sums: Sums, at: tuple[NDArray[np.intp], ...], log_weight: Plane, value: Plane) -> None:
     """Add one weighted sample to the sums of eqs. (1) and (3); the largest weight stays 1, so W_y is never 0."""
     largest = np.maximum(sums.largest[at], log_weight)
     old, new = np.exp(sums.largest[at] - largest), np.exp(log_weight - largest)

@@ -1,13 +1,16 @@
 """What both forms of the reconstruction take, checked once, and what they return."""
 
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError
+from render.errors import InputError, unknown
 from render.jit import Backend
 from sensor.cfa import Tile
+
+Distance = Literal["noise", "raw"]
 
 NEIGHBOURHOOD = 21  # Parmar & Wandell 2009, section 3.1: the only one of the four that the paper gives
 PATCH = 5
@@ -30,18 +33,22 @@ class Settings:
     sigma_d : float
         Standard deviation of the spatial weight, eq. (4) [pixels].
     sigma_s : float
-        Standard deviation of the similarity weight, eq. (5) [standard deviations of one pixel's noise].
+        Standard deviation of the similarity weight, eq. (5) [standard deviations of one pixel's noise, or electrons].
+    distance : {"noise", "raw"}
+        Whether patches are compared in units of noise, debiased and trusted as far as their SNR allows, or as the paper
+        has it, in electrons.
 
     Raises
     ------
     InputError
-        Where a width is even or not positive, a sigma under 0.001 or NaN, or Omega may miss a letter of the tile.
+        Where a width is even or not positive, a sigma under 0.001 or NaN, or the distance is neither of the two.
     """
 
     neighbourhood: int
     patch: int
     sigma_d: float
     sigma_s: float
+    distance: Distance = "noise"
 
     @property
     def reach(self) -> int:
@@ -57,6 +64,8 @@ class Settings:
             value = getattr(self, name)
             if not value >= SMALLEST_SIGMA:  # written so that NaN fails
                 raise InputError(f"{name}: {value!r} isn't allowed; give {SMALLEST_SIGMA:g} to inf")
+        if self.distance not in get_args(Distance):
+            raise unknown("distance", self.distance, get_args(Distance))
 
     def check_reaches(self, tile: Tile) -> None:
         """Raise `InputError` where Omega, cut at a corner of the frame, may hold no sample of some letter."""

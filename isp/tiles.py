@@ -1,136 +1,245 @@
-"""Work for the kernel: lists of offsets, and lanes sorted by which planes judge similarity."""
+"""What the kernel's lanes go through: the tile of letters in numbers, classes of offsets, and which lanes there are.
 
+Lanes lie so that the pixels y of a lane begin at the same cell of the tile whatever the class, so those of class k
+begin `k // tw` rows and `k % tw` columns before a whole number of lanes.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.kernel import ENTRY, PACKET, Grid
+from isp.lane_shape import HEAD, Cells, Judge, entry_size, packet_rows
 from isp.planes import Plane
 from isp.settings import Settings
 from isp.similarity import noise_distance
-from sensor.cfa import Tile, channels
+from sensor.cfa import Tile
 
-LARGEST_GRID = 4  # pixels a side; more would not fit a CPU's first cache and takes long to compile
-LARGEST_WINDOW = 11  # rows under the patches of one lane, likewise
+# Pixels of a lane on a CPU: 8 x 4 at most, or one tile. Measured: more sharing than 4 x 4 (a tenth less time), and
+# 12 x 4 or 8 x 8 gain nothing more. Where two planes judge, half as many: such lanes are few, and compile for long.
+LANE_ROWS, LANE_COLUMNS, MIXED_LANE_ROWS = 8, 4, 4
 
-Index = NDArray[np.uint32]
+Index = NDArray[np.int32]
+Places = NDArray[np.intp]
+Number = TypeVar("Number", int, Index)
 
 
 @dataclass(frozen=True)
-class Offsets:
-    """Lists of offsets that lead from a phase to the samples of a channel.
+class Pattern:
+    """A tile of letters by number, turned so that as many tiles as possible are alike.
 
     Attributes
     ----------
-    entries : (2 * channel * th * tw, length, ENTRY) float32
-        One list a channel and phase, twice: with the noise distance of the band's own plane first, and of W's first.
-    counts : (2 * channel * th * tw,) uint32
-        Entries that hold; the rest is padding.
+    cells : tuple of tuple of int
+        Number of the letter at each cell; numbers rise in the order in which they appear.
+    white : int or None
+        W's number; the largest that a turn can give it.
+    letters : tuple of str
+        By number.
+    start : pair of int
+        Row and column of the tile where `cells` begin.
     """
 
-    entries: NDArray[np.float32]
-    counts: Index
+    cells: Cells
+    white: int | None
+    letters: tuple[str, ...]
+    start: tuple[int, int]
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Rows and columns of the tile."""
+        return len(self.cells), len(self.cells[0])
 
 
-def make_grid(tile: Tile, patch: int) -> Grid:
-    """Shape of a lane's work: as many columns as one packet covers, and rows until the window is large."""
-    step = (len(tile), len(tile[0]))
-    columns = min(max((PACKET - patch) // step[1] + 1, 1), LARGEST_GRID)
-    rows = min(max((LARGEST_WINDOW - patch) // step[0] + 1, 1), LARGEST_GRID)
-    return Grid(rows, columns, step, patch)
+def number_tile(tile: Tile) -> Pattern:
+    """Pattern of a tile: all its turns (other phases of the same mosaic) give the same `cells` and `white`."""
+    grid = np.array([list(row) for row in tile])
+    patterns = []
+    for start in np.ndindex(*grid.shape):
+        turned = np.roll(grid, (-start[0], -start[1]), (0, 1))
+        letters = tuple(dict.fromkeys(turned.ravel().tolist()))
+        cells = tuple(tuple(letters.index(letter) for letter in row) for row in turned.tolist())
+        white = letters.index("W") if "W" in letters else None
+        patterns.append(Pattern(cells, white, letters, (start[0], start[1])))
+    return min(patterns, key=lambda pattern: (pattern.cells, -(pattern.white or 0), pattern.start))
 
 
-def list_offsets(tile: Tile, settings: Settings) -> Offsets:
-    """Every offset of Omega by channel and phase, with its spatial weight and its noise distances."""
-    letters, reach = channels(tile), settings.reach
-    cells = np.array([list(row) for row in tile])
-    d = np.stack(np.meshgrid(*[np.arange(-reach, reach + 1)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
-    noise = {letter: noise_distance(tile, letter, settings.patch, reach) for letter in letters}
-    spatial = -np.log2(np.e) * (d**2).sum(1) / (2.0 * settings.sigma_d**2)  # log2 G(beta_d, sigma_d), eqs. (2), (4)
+def lane_size(pattern: Pattern, judge: Judge) -> tuple[int, int]:
+    """Rows and columns of a lane: whole tiles."""
+    (down, across), rows = pattern.size, MIXED_LANE_ROWS if judge == "both" else LANE_ROWS
+    return down * max(rows // down, 1), across * max(LANE_COLUMNS // across, 1)
+
+
+def list_offsets(
+    tile: Tile, pattern: Pattern, settings: Settings, groups: int
+) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """Every offset of Omega by class.
+
+    Parameters
+    ----------
+    groups : int
+        Groups of packets in a row (`isp.strips`).
+
+    Returns
+    -------
+    entries : (class, length, entry_size) float32
+        Whole numbers (step in groups, rows, columns) by their bits, log2 G(beta_d, sigma_d) of eqs. (2) and (4), then
+        the noise distance of W's plane and of the band's own by cell of the tile.
+    counts : (class,) uint32
+        Entries that hold; the rest is padding.
+    """
+    (down, across), reach = pattern.size, settings.reach
+    noise = noise_by_class(tile, pattern, settings.patch, reach)
     lists = []
-    for first_judge in ("band", "W"):
-        for letter in letters:
-            judges = (letter, "W" if "W" in letters else letter)
-            for phase in np.ndindex(*cells.shape):
-                tables = [noise[judge][phase].ravel() for judge in judges]
-                table = np.column_stack((d, spatial, *(tables if first_judge == "band" else reversed(tables))))
-                at = (d + phase) % cells.shape
-                lists.append(table[cells[at[:, 0], at[:, 1]] == letter])
+    for shift in np.ndindex(down, across):
+        first = first_offset(pattern, *shift)
+        rows, columns = (
+            np.array([d for d in range(-reach, reach + 1) if d % size == first[axis]])
+            for axis, size in enumerate(pattern.size)
+        )
+        d = np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1).reshape(-1, 2)
+        table = np.zeros((len(d), entry_size(down * across)), dtype=np.float32)
+        lines = (d[:, 0] - first[0]) // packet_rows(pattern.cells)
+        steps = np.column_stack((lines * groups + (d[:, 1] - first[1]) // across, d))
+        table[:, : HEAD - 1] = steps.astype(np.int32).view(np.float32)
+        table[:, HEAD - 1] = -np.log2(np.e) * (d**2).sum(1) / (2.0 * settings.sigma_d**2)
+        if settings.distance == "noise":
+            table[:, HEAD : HEAD + noise.shape[2]] = noise[shift][:, d[:, 0] + reach, d[:, 1] + reach].T
+        lists.append(table)
     counts = np.array([len(table) for table in lists], dtype=np.uint32)
-    entries = np.zeros((len(lists), int(counts.max()), ENTRY), dtype=np.float32)
+    entries = np.zeros((len(lists), int(counts.max()), entry_size(down * across)), dtype=np.float32)
     for target, table in zip(entries, lists, strict=True):
-        target[: len(table), : table.shape[1]] = table
-    return Offsets(entries, counts)
+        target[: len(table)] = table
+    return entries, counts
+
+
+def first_offset(pattern: Pattern, shift_row: Number, shift_column: Number) -> tuple[Number, Number]:
+    """Smallest offset of a class that is not negative, along rows and columns."""
+    (down, across), (row, column) = pattern.size, pattern.start
+    return (row + shift_row) % down, (column + shift_column) % across
+
+
+@lru_cache(maxsize=16)
+def noise_by_class(tile: Tile, pattern: Pattern, patch: int, reach: int) -> Plane:
+    """Noise distances for the cells at y of every class.
+
+    Returns
+    -------
+    (th, tw, 2 * th * tw, 2 reach + 1, 2 reach + 1) float64
+        By class, cell (first W's plane, then the band's own) and offset.
+    """
+    (down, across), white = pattern.size, pattern.white
+    tables = [noise_distance(tile, letter, patch, reach) for letter in pattern.letters]
+    result = np.zeros((down, across, 2 * down * across, 2 * reach + 1, 2 * reach + 1))
+    for shift in np.ndindex(down, across):
+        for number, cell in enumerate(np.ndindex(down, across)):
+            phase = (cell[0] - shift[0]) % down, (cell[1] - shift[1]) % across
+            if white is not None:
+                result[shift][number] = tables[white][phase]
+            result[shift][down * across + number] = tables[pattern.cells[cell[0]][cell[1]]][phase]
+    return result
 
 
 @dataclass(frozen=True)
 class Work:
-    """Lanes that the kernel runs together, one number a lane.
+    """Lanes that one kernel runs, a number a lane.
 
     Attributes
     ----------
-    row, column : (n,) uint32
-        First pixel in the frame.
-    channel : (n,) uint32
-        Channel to reconstruct.
-    list : (n,) uint32
-        Which of `Offsets.entries`.
-    planes : tuple of (n,) uint32
-        The one plane that judges similarity, or two (the band's own, W's).
+    row, column : (n,) int32
+        First pixel in the frame; -1 or less where the class begins before it.
+    shift_row, shift_column : (n,) int32
+        Class.
+    line : (n,) int32
+        Number of its first row among the rows of all tiles, class by class (`tile_grid`).
     """
 
     row: Index
     column: Index
-    channel: Index
-    list: Index
-    planes: tuple[Index, ...]
+    shift_row: Index
+    shift_column: Index
+    line: Index
 
 
-def sort_work(alpha: Plane, tile: Tile, grid: Grid, reach: int) -> tuple[Work, Work]:
-    """All lanes of a frame: those in which one plane judges, then those in which the band and W both do.
+def tile_grid(width: int, rows: tuple[int, int], pattern: Pattern) -> tuple[int, int]:
+    """Tiles of lanes down and across that cover some rows of a frame in every class."""
+    size = lane_size(pattern, "white")
+    return (rows[1] - rows[0] + size[0]) // size[0] + 1, width // size[1] + 2
 
-    Where no alpha > 0 is in reach of a lane, eq. (5) holds W's distance alone; where all alpha are 1, the band's own
-    alone; and the channel W has no other. Exact, at half the work.
+
+def sort_tiles(
+    shape: tuple[int, int], rows: tuple[int, int], alpha: Plane | None, first_row: int, pattern: Pattern, reach: int
+) -> dict[tuple[Judge, bool], Work]:
+    """Lanes for some rows of a frame by what judges in them, and whether y may lie outside the frame.
+
+    Where no alpha > 0 is in reach of a tile, eq. (5) holds W's distance alone; where all alpha are 1, the band's own
+    alone. Exact, at a part of the work.
+
+    Parameters
+    ----------
+    shape : (int, int)
+        Height and width of the frame [pixels].
+    rows : (int, int)
+        First and past the last row to reconstruct; the first is a whole number of lanes.
+    alpha : (n, w) array or None
+        Eq. (6) from row `first_row` of the frame on, as far as it is in reach; None where all are 0.
     """
-    letters = channels(tile)
-    white = letters.index("W") if "W" in letters else -1
-    row, column, phase = _place((alpha.shape[0], alpha.shape[1]), grid)
-    some, bright, whole = (
-        _count_in_reach(condition, row, column, grid, reach)
-        for condition in (alpha > 0.0, alpha >= 1.0, np.ones_like(alpha, dtype=bool))
-    )
-    own = np.arange(len(letters))[:, None]
-    by_white = (some == 0) | (own == white)
-    by_band = ~by_white & (bright == whole)
-
-    def collect(chosen: NDArray[np.bool_], judges: int) -> Work:
-        channel, lane = np.nonzero(chosen)
-        first_is_white = by_white[channel, lane]
-        number = (first_is_white * len(letters) + channel) * (grid.step[0] * grid.step[1]) + phase[lane]
-        planes = (np.where(first_is_white, white, channel), np.full_like(channel, white))[:judges]
-        parts = [part.astype(np.uint32) for part in (row[lane], column[lane], channel, number, *planes)]
-        return Work(parts[0], parts[1], parts[2], parts[3], tuple(parts[4:]))
-
-    return collect(by_white | by_band, 1), collect(~(by_white | by_band), 2)
-
-
-def _place(shape: tuple[int, int], grid: Grid) -> tuple[NDArray[np.intp], ...]:
-    """Row, column and phase of the first pixel of each lane, phase by phase."""
-    (down, across), size = grid.step, (grid.step[0] * grid.rows, grid.step[1] * grid.columns)
-    lanes = (-(-shape[0] // size[0]), -(-shape[1] // size[1]))
-    phase_row, phase_column, i, j = np.indices((down, across, *lanes)).reshape(4, -1)
-    row, column = phase_row + i * size[0], phase_column + j * size[1]
-    inside = (row < shape[0]) & (column < shape[1])
-    return row[inside], column[inside], (phase_row * across + phase_column)[inside]
+    height, width = lane_size(pattern, "white")
+    down, across = tile_grid(shape[1], rows, pattern)
+    tiles = np.meshgrid(rows[0] + np.arange(down) * height, np.arange(across) * width, indexing="ij")
+    before = np.array([size - 1 for size in pattern.size])
+    top, left = (place - back - reach for place, back in zip(tiles, before, strict=True))
+    bottom, right = (place + size + reach for place, size in zip(tiles, (height, width), strict=True))
+    inside = (top >= 0) & (left >= 0) & (bottom <= shape[0]) & (right <= shape[1])
+    if pattern.white is None:
+        some = whole = np.ones_like(inside)
+    elif alpha is None:
+        some = whole = np.zeros_like(inside)
+    else:
+        box = [np.clip(top, 0, None), np.clip(bottom, None, shape[0])]
+        box += [np.clip(left, 0, None), np.clip(right, None, shape[1])]
+        area = (box[1] - box[0]) * (box[3] - box[2])
+        counts = [_count(condition, first_row, *box) for condition in (alpha > 0.0, alpha >= 1.0)]
+        some, whole = counts[0] > 0, counts[1] == area
+    kinds: dict[tuple[Judge, bool], NDArray[np.bool_]] = {
+        ("white", False): ~some & inside,
+        ("white", True): ~some & ~inside,
+        ("band", True): some & whole,
+        ("both", True): some & ~whole,
+    }
+    return {
+        (judge, bordered): _lanes(tiles, chosen, pattern, judge, (rows[1], shape[1]))
+        for (judge, bordered), chosen in kinds.items()
+    }
 
 
-def _count_in_reach(
-    condition: NDArray[np.bool_], row: NDArray[np.intp], column: NDArray[np.intp], grid: Grid, reach: int
-) -> NDArray[np.intp]:
-    """Pixels of the frame within reach of each lane's pixels where the condition holds, from a summed-area table."""
-    table = np.pad(condition, ((1, 0), (1, 0))).cumsum(0, dtype=np.intp).cumsum(1)
-    top, left = np.maximum(row - reach, 0), np.maximum(column - reach, 0)
-    bottom = np.minimum(row + grid.height - grid.patch + reach + 1, condition.shape[0])
-    right = np.minimum(column + grid.width - grid.patch + reach + 1, condition.shape[1])
-    return np.asarray(table[bottom, right] - table[top, right] - table[bottom, left] + table[top, left])
+def _count(
+    condition: NDArray[np.bool_], first_row: int, top: Places, bottom: Places, left: Places, right: Places
+) -> Places:
+    """Pixels where the condition holds in each box of a grid: rows by the first index, columns by the second."""
+    rows = np.flatnonzero(condition.any(axis=1))
+    if not rows.size:
+        return np.zeros_like(top)
+    kept = condition[rows[0] : rows[-1] + 1]
+    lines = np.pad(kept, ((1, 0), (0, 0))).cumsum(0, dtype=np.int32)
+    upper, lower = (np.clip(edge[:, 0] - first_row - rows[0], 0, len(kept)) for edge in (top, bottom))
+    bands = np.pad(lines[lower] - lines[upper], ((0, 0), (1, 0))).cumsum(1, dtype=np.int32)
+    return np.asarray(bands[:, right[0]] - bands[:, left[0]], dtype=np.intp)
+
+
+def _lanes(
+    tiles: Sequence[Places], chosen: NDArray[np.bool_], pattern: Pattern, judge: Judge, end: tuple[int, int]
+) -> Work:
+    """All classes' lanes in the chosen tiles, class by class, without those that hold no pixel to reconstruct."""
+    height, own_height = lane_size(pattern, "white")[0], lane_size(pattern, judge)[0]
+    place, parts = np.flatnonzero(chosen), []
+    for number, shift in enumerate(np.ndindex(*pattern.size)):
+        for down in range(0, height, own_height):
+            row, column = tiles[0][chosen] + down - shift[0], tiles[1][chosen] - shift[1]
+            line = (number * chosen.size + place) * height + down
+            kept = (row < end[0]) & (column < end[1])
+            parts.append(np.stack([row, column, *(np.full_like(row, s) for s in shift), line])[:, kept])
+    return Work(*np.concatenate(parts, axis=1).astype(np.int32))

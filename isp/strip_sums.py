@@ -1,0 +1,243 @@
+"""One strip through the kernel: upload, run each group of lanes, and make the result of the sums."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.kernel import Frame, Lanes, reconstruct_lanes
+from isp.lane_shape import PACKET, Judge, Shape, packet_rows, slots, whole_packets
+from isp.settings import Settings
+from isp.strips import ALIGNMENT, Strip, aligned, centre_groups, decay, make_strip, plane_groups
+from isp.tiles import Pattern, Work, first_offset, lane_size, list_offsets, sort_tiles, tile_grid
+from isp.weighted_sums import HEADROOM, LEAST_WEIGHT, NOTHING
+from render.jit import arrays, dr
+from sensor.cfa import channels
+from sensor.raw import RawImage
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Sums of all lanes of a strip in Dr.Jit arrays, [class, tile down, tile across, row, column].
+
+    Attributes
+    ----------
+    weight, value, square : Float
+        In units of 2^largest; `square` is None where nobody asks for the noise.
+    largest : Float
+        Log2 of the unit.
+    first_row, last_row, width : UInt
+        Pixels to reconstruct: first and past the last row of the frame, columns.
+    """
+
+    weight: Any
+    value: Any
+    square: Any
+    largest: Any
+    first_row: Any
+    last_row: Any
+    width: Any
+
+
+def reconstruct_rows(
+    raw: RawImage, rows: tuple[int, int], pattern: Pattern, settings: Settings, *, noise: bool
+) -> list[NDArray[np.float32]]:
+    """Estimate [e-] and, where asked for, noise gain for some rows of the frame, (rows, w, channel) each.
+
+    The first row is a whole number of lanes; apart from this the result doesn't depend on the rows chosen.
+    """
+    strip, sums = make_strip(raw, rows, pattern, settings), _empty_sums(raw, rows, pattern, noise)
+    work = sort_tiles(raw.shape, rows, strip.alpha, strip.first_row, pattern, settings.reach)
+    _run_all(raw, strip, {kind: lanes for kind, lanes in work.items() if kind[0] == "white"}, sums)
+    others = {kind: lanes for kind, lanes in work.items() if kind[0] != "white" and len(lanes.row)}
+    if others:
+        # The bands' planes are laid out for those rows alone: mostly few.
+        lane, first_rows = lane_size(pattern, "white")[0], np.concatenate([lanes.row for lanes in others.values()])
+        near = max(int(first_rows.min()), rows[0]) // lane * lane, min(int(first_rows.max()) + lane, rows[1])
+        _run_all(raw, make_strip(raw, near, pattern, settings), others, sums)
+    results = finish(sums, raw, rows, pattern)
+    return [np.array(values).reshape(rows[1] - rows[0], raw.shape[1], -1) for values in results]
+
+
+def _run_all(raw: RawImage, strip: Strip, work: Mapping[tuple[Judge, bool], Work], sums: Sums) -> None:
+    """Load a strip and run the kernels of its lanes."""
+    work = {kind: lanes for kind, lanes in work.items() if len(lanes.row)}
+    if not work:
+        return
+    frame, pattern, noise = load(raw, strip, {judge for judge, _ in work}), strip.pattern, sums.square is not None
+    for (judge, bordered), lanes in work.items():
+        size, exact = lane_size(pattern, judge), judge == "both"
+        shape = Shape(pattern.cells, pattern.white, *size, strip.settings.patch, judge, exact, bordered, noise)
+        _run(frame, _upload_lanes(lanes, strip), shape, sums)
+
+
+def load(raw: RawImage, strip: Strip, judges: set[Judge]) -> Frame:
+    """Lay out and upload what the lanes read."""
+    jit, pattern = arrays(), strip.pattern
+    entries, counts = list_offsets(raw.cfa, pattern, strip.settings, strip.groups)
+    planes = slots(pattern.cells, pattern.white)[: 1 if judges == {"white"} else None]
+    mixed = strip.alpha if "both" in judges else None
+    opaque = (
+        dr.opaque(jit.UInt, number)
+        for number in (
+            entries.shape[1],
+            *raw.shape,
+            strip.height // packet_rows(pattern.cells) * strip.groups,
+            strip.groups,
+        )
+    )
+    return Frame(
+        _upload(plane_groups(strip, planes)),
+        _upload(centre_groups(strip.dn - np.float32(raw.black_dn), strip)),
+        None if mixed is None else _upload(centre_groups(mixed, strip)),
+        _upload(centre_groups(decay(strip), strip)),
+        _upload(entries),
+        _upload(counts),
+        *opaque,
+    )
+
+
+def _upload(values: NDArray[Any]) -> Any:
+    """Evaluated Dr.Jit array of the same type, in aligned memory."""
+    jit = arrays()
+    kinds = {"f": jit.Float, "u": jit.UInt, "i": jit.Int}
+    if values.ctypes.data % ALIGNMENT:
+        memory = aligned(values.shape, values.dtype)
+        memory[:] = values
+        values = memory
+    return kinds[values.dtype.kind](values.ravel())
+
+
+def _upload_lanes(work: Work, strip: Strip) -> Lanes:
+    half, across, pair = strip.settings.patch // 2, strip.pattern.size[1], packet_rows(strip.pattern.cells)
+    row, column = work.row - half - strip.top, work.column - half - strip.left
+    first = first_offset(strip.pattern, work.shift_row, work.shift_column)
+    group = (row + first[0]) // pair * strip.groups + (column + first[1]) // across
+    unsigned = (row, column, group, work.shift_row * across + work.shift_column)
+    parts = (work.row, work.column, *(part.astype(np.uint32) for part in (*unsigned, work.line)))
+    return Lanes(*(_upload(part) for part in parts))
+
+
+def _empty_sums(raw: RawImage, rows: tuple[int, int], pattern: Pattern, noise: bool) -> Sums:
+    jit, size = arrays(), lane_size(pattern, "white")
+    tiles = int(np.prod(tile_grid(raw.shape[1], rows, pattern))) * int(np.prod(pattern.size))
+    size_of_all = tiles * size[0] * whole_packets(size[1]) + PACKET  # the last ones stay empty
+    full = [dr.full(jit.Float, value, size_of_all) for value in (0.0, 0.0, 0.0, -HEADROOM)]
+    weight, value, square, largest = full
+    opaque = (dr.opaque(jit.UInt, number) for number in (*rows, raw.shape[1]))
+    return Sums(weight, value, square if noise else None, largest, *opaque)
+
+
+def _run(frame: Frame, lanes: Lanes, shape: Shape, sums: Sums) -> None:
+    """Reconstruct a group of lanes and put their sums in place; those that need it once more, exactly."""
+    pixels = reconstruct_lanes(frame, lanes, shape)
+    failed = dr.full(arrays().Bool, False, dr.width(lanes.row))
+    if not shape.exact:
+        for (weight, *_), inside in zip(pixels, _inside(lanes, shape, sums), strict=True):
+            failed |= inside & (weight < LEAST_WEIGHT)
+    dr.eval(pixels, failed)  # a scatter straight from the loop would repeat the loop for each array
+    _put(pixels, lanes, shape, sums)
+    chosen: Any = dr.compress(failed)
+    if dr.width(chosen):
+        again = Lanes(**{name: dr.gather(type(part), part, chosen) for name, part in vars(lanes).items()})
+        dr.eval(vars(again))
+        _run(frame, again, replace(shape, exact=True, bordered=True), sums)
+
+
+def _inside(lanes: Lanes, shape: Shape, sums: Sums) -> list[Any]:
+    """Whether each pixel of a lane is one to reconstruct."""
+    unsigned = arrays().UInt
+    rows = [unsigned(lanes.row + r) - sums.first_row < sums.last_row - sums.first_row for r in range(shape.rows)]
+    columns = [unsigned(lanes.column + c) < sums.width for c in range(shape.columns)]
+    return [rows[r] & columns[c] for r, c in shape.pixels]
+
+
+def _put(pixels: list[tuple[Any, ...]], lanes: Lanes, shape: Shape, sums: Sums) -> None:
+    """Store sums, a row of a lane at once."""
+    jit, width = arrays(), whole_packets(shape.columns)
+    targets = [sums.weight, sums.value] + [sums.square] * shape.noise + [sums.largest] * shape.exact
+    packet = min(PACKET, width)
+    for number, target in enumerate(targets):
+        for r in range(shape.rows):
+            row = [pixels[r * shape.columns + c][number] for c in range(shape.columns)]
+            row += [row[-1]] * (width - shape.columns)
+            for first in range(0, width, packet):
+                place = (lanes.line + r) * (width // packet) + first // packet
+                dr.scatter(target, jit.ArrayXf(row[first : first + packet]), place, mode=dr.ReduceMode.NoConflicts)
+    dr.eval(targets)
+
+
+def finish(sums: Sums, raw: RawImage, rows: tuple[int, int], pattern: Pattern) -> list[Any]:
+    """f_i(x) of eq. (1) [e-], and sum w^2 / (sum w)^2 where squares were summed, [row, column, channel] each."""
+    jit, by_row, by_column = arrays(), *_places(raw, rows, pattern)
+    letters, layers, width = by_row.shape[0], by_row.shape[1], raw.shape[1]
+    index = dr.arange(jit.UInt, (rows[1] - rows[0]) * width * letters)
+    pixel, letter = _divide(index, letters)
+    row, column = _divide(pixel, width)
+    tables = [(_upload(table), dr.opaque(jit.UInt, table.shape[2])) for table in (by_row, by_column)]
+    parts = []
+    for layer in range(layers):
+        line = letter * layers + layer
+        (rows_at, row_count), (columns_at, column_count) = tables
+        place = dr.gather(jit.UInt, rows_at, line * row_count + row)
+        place += dr.gather(jit.UInt, columns_at, line * column_count + column)
+        arrays_at = [sums.weight, sums.value, sums.largest] + [sums.square] * (sums.square is not None)
+        parts.append([dr.gather(jit.Float, array, place) for array in arrays_at])
+    weight, value, *square = _merge(parts)
+    results = [value / weight * dr.opaque(jit.Float, raw.gain_e_per_dn), *(s / dr.square(weight) for s in square)]
+    dr.eval(results)
+    return results
+
+
+def _merge(parts: list[list[Any]]) -> list[Any]:
+    """Add up weight, value[, square] of several layers in units of their own."""
+    units = [dr.select(weight > 0.0, largest, NOTHING) for weight, _, largest, *_ in parts]
+    common = units[0]
+    for unit in units[1:]:
+        common = dr.maximum(common, unit)
+    scales = [dr.exp2(unit - common) for unit in units]
+    totals = [
+        [weight * s, value * s, *(x * s * s for x in square)]
+        for (weight, value, _, *square), s in zip(parts, scales, strict=True)
+    ]
+    result = totals[0]
+    for more in totals[1:]:
+        result = [total + part for total, part in zip(result, more, strict=True)]
+    return result
+
+
+def _divide(number: Any, divisor: int) -> tuple[Any, Any]:
+    """Quotient and rest; exact, for half a step to the next whole number is far above the rounding of 2^32/divisor."""
+    jit = arrays()
+    inverse, whole = dr.opaque(jit.Float64, 1.0 / divisor), dr.opaque(jit.UInt, divisor)
+    quotient = jit.UInt((jit.Float64(number) + 0.5) * inverse)
+    return quotient, number - quotient * whole
+
+
+def _places(raw: RawImage, rows: tuple[int, int], pattern: Pattern) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+    """Where `Sums` hold each letter's sums: a part by row and one by column, [channel, layer, place], to be added.
+
+    A letter has a layer for each of its cells; where it has fewer than another, they lead to sums that stay empty.
+    """
+    (down, across), size = pattern.size, lane_size(pattern, "white")
+    grid, line = tile_grid(raw.shape[1], rows, pattern), whole_packets(size[1])
+    cells, order = np.array(pattern.cells), channels(raw.cfa)
+    own = [np.argwhere(cells == pattern.letters.index(letter)) for letter in order]
+    layers = max(len(places) for places in own)
+    tile, by_class = size[0] * line, grid[0] * grid[1] * size[0] * line
+    tables = [np.empty((len(order), layers, n), np.uint32) for n in (rows[1] - rows[0], raw.shape[1])]
+    row, column = np.arange(*rows), np.arange(raw.shape[1])
+    for channel, places in enumerate(own):
+        for layer in range(layers):
+            if layer >= len(places):
+                tables[0][channel, layer], tables[1][channel, layer] = down * across * by_class, 0
+                continue
+            cell = places[layer]
+            back = (cell[0] - row) % down, (cell[1] - column) % across
+            tile_row, r = np.divmod(row - rows[0] + back[0], size[0])
+            tile_column, c = np.divmod(column + back[1], size[1])
+            tables[0][channel, layer] = back[0] * across * by_class + tile_row * grid[1] * tile + r * line
+            tables[1][channel, layer] = back[1] * by_class + tile_column * tile + c
+    return tables[0], tables[1]

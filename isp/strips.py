@@ -1,0 +1,158 @@
+"""Strips of a frame: what the kernel reads, laid out for it, a few rows at a time so that memory stays bounded.
+
+A strip's arrays begin at frame row `top` and column `left`. What belongs to a patch's centre (samples, alpha, decay) is
+stored where the patch begins. Nothing in a strip depends on where the strip begins or ends.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.lane_shape import packet_rows, packet_width, whole_packets
+from isp.planes import fill, judged_mosaic
+from isp.settings import Settings
+from isp.similarity import reliability, saturation_dn, share_of_saturated
+from isp.tiles import Pattern, lane_size
+from sensor.raw import RawImage
+
+STRIP_BYTES = 400_000_000  # of all that a strip takes: two megapixels of RGBW
+ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel for memory that isn't aligned, and refuses it packet loads
+
+Array = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Strip:
+    """Some rows of a frame, and where their arrays lie.
+
+    Attributes
+    ----------
+    pattern : Pattern
+    settings : Settings
+    rows : (int, int)
+        First and past the last row to reconstruct.
+    top, left : int
+        Row and column of the frame where the arrays begin; may be negative.
+    height, groups : int
+        Rows of the arrays, and groups of packets in a row.
+    part : RawImage
+        The rows of the mosaic that the arrays depend on.
+    first_row : int
+        Frame row where `part` begins.
+    dn : (n, w) float32
+        Its digital numbers.
+    white_dn : (n, w) float32 or None
+        W's plane of them; None without W.
+    alpha : (n, w) float64 or None
+        Eq. (6); None where it is 0 everywhere, or without W.
+    """
+
+    pattern: Pattern
+    settings: Settings
+    rows: tuple[int, int]
+    top: int
+    left: int
+    height: int
+    groups: int
+    part: RawImage
+    first_row: int
+    dn: Array
+    white_dn: Array | None
+    alpha: Array | None
+
+
+def strip_rows(width: int, pattern: Pattern, patch: int) -> int:
+    """Rows of a strip that takes STRIP_BYTES or less, a whole number of lanes."""
+    lane, cells = lane_size(pattern, "white"), pattern.size[0] * pattern.size[1]
+    packed = len(pattern.letters) * packet_width(lane[1], patch) + 3 * whole_packets(lane[1])
+    floats = 4 * cells + packed / pattern.size[1] + 4 * len(pattern.letters) + 8
+    return max(int(STRIP_BYTES / (4 * floats * width)) // lane[0], 1) * lane[0]
+
+
+def make_strip(raw: RawImage, rows: tuple[int, int], pattern: Pattern, settings: Settings) -> Strip:
+    """Lay out room for all patches: Omega and half a patch around lanes that begin up to a tile early."""
+    half, (down, across), lane = settings.patch // 2, pattern.size, lane_size(pattern, "white")
+    around, pair = settings.reach + half, packet_rows(pattern.cells)
+    # Groups begin where lanes' patches around y do, whose first pixels are at the pattern's start.
+    top, left = rows[0] - (down - 1) - around, -(across - 1) - around
+    top, left = top - (top + half - pattern.start[0]) % pair, left - (left + half - pattern.start[1]) % across
+    height = -(-(rows[1] + lane[0] + around - top) // pair) * pair
+    groups = -(-(raw.shape[1] + lane[1] + around - left) // across) + packet_width(lane[1], settings.patch)
+    # Half a patch for sums over patches, and twice a tile for tents, from a row with the phase of the frame's first.
+    margin = half + 2 * max(pattern.size)
+    last = min(top + height + margin, raw.shape[0])
+    first = max(min(top - margin, last - 2 * margin), 0) // down * down
+    part = replace(raw, dn=raw.dn[first:last])
+    dn = part.dn.astype(np.float32)
+    white_dn = fill(dn, raw.cfa, "W") if pattern.white is not None else None
+    alpha = None
+    if white_dn is not None and float(white_dn.max()) >= saturation_dn(raw):
+        alpha = share_of_saturated(white_dn, saturation_dn(raw), settings.patch)
+    return Strip(pattern, settings, rows, top, left, height, groups, part, first, dn, white_dn, alpha)
+
+
+def plane_groups(strip: Strip, numbers: list[int]) -> Array:
+    """Planes h_i of some letters for `isp.kernel.Frame.h`."""
+    lane, letters = lane_size(strip.pattern, "white"), strip.pattern.letters
+    width = packet_width(lane[1], strip.settings.patch)
+    mosaic = judged_mosaic(_electrons(strip, strip.dn), strip.part.dark_noise_e, strip.settings.distance)
+    result = _empty_groups(strip, (len(numbers),), width)
+    for target, number in zip(result, numbers, strict=True):
+        _group(fill(mosaic, strip.part.cfa, letters[number]), strip, 0, target)
+    return result
+
+
+def centre_groups(values: Array, strip: Strip) -> Array:
+    """Values at patches' centres for `isp.kernel.Frame`."""
+    target = _empty_groups(strip, (), whole_packets(lane_size(strip.pattern, "white")[1]))
+    _group(values, strip, strip.settings.patch // 2, target)
+    return target
+
+
+def decay(strip: Strip) -> Array:
+    """log2(e) r(x) / (2 sigma_s^2) of each pixel of the strip's part of the mosaic."""
+    factor = np.float32(np.log2(np.e) / (2.0 * strip.settings.sigma_s**2))
+    if strip.settings.distance == "raw":
+        return np.full(strip.dn.shape, factor)
+    judging_dn = strip.dn if strip.white_dn is None else strip.white_dn
+    return reliability(_electrons(strip, judging_dn), strip.part.dark_noise_e, strip.settings.patch) * factor
+
+
+def _electrons(strip: Strip, dn: Array) -> Array:
+    return np.asarray((dn - np.float32(strip.part.black_dn)) * np.float32(strip.part.gain_e_per_dn))
+
+
+def _empty_groups(strip: Strip, before: tuple[int, ...], width: int) -> Array:
+    pair = packet_rows(strip.pattern.cells)
+    return aligned((*before, strip.height // pair, strip.groups, pair, width), np.float32)
+
+
+def _group(values: Array, strip: Strip, shift: int, target: Array) -> None:
+    """Fill groups with a part of the frame, reflected at the frame's border as far as patches reach."""
+    half, across, (_, groups, pair, width) = strip.settings.patch // 2, strip.pattern.size[1], target.shape
+    rows = _reflected(strip.top + shift - strip.first_row, strip.height, values.shape[0], half)
+    columns = _reflected(strip.left + shift, groups * across + width, values.shape[1], half)
+    before = max(-(strip.left + shift), 0)
+    spread = np.empty((len(rows), len(columns)), np.float32)
+    lines = values[rows]
+    spread[:, :before] = lines[:, columns[:before]]
+    spread[:, before : before + values.shape[1]] = lines[:, : len(columns) - before]
+    spread[:, before + values.shape[1] :] = lines[:, columns[before + values.shape[1] :]]
+    windows = np.lib.stride_tricks.sliding_window_view(spread, width, axis=1)[:, ::across][:, :groups]
+    target[:] = windows.reshape(-1, pair, groups, width).swapaxes(1, 2)
+
+
+def _reflected(first: int, count: int, size: int, most: int) -> NDArray[np.intp]:
+    """Places 0 to size - 1 for `count` places from `first` on; reflected up to `most` beyond, then the last."""
+    places = np.pad(np.arange(size), most, mode="reflect" if size > 1 else "edge")
+    return np.asarray(places[np.clip(np.arange(first, first + count) + most, 0, len(places) - 1)])
+
+
+def aligned(shape: tuple[int, ...], kind: Any) -> Array:
+    """Empty array that Dr.Jit takes as it is."""
+    size = int(np.prod(shape)) * np.dtype(kind).itemsize
+    memory = np.empty(size + ALIGNMENT, dtype=np.uint8)
+    start = -memory.ctypes.data % ALIGNMENT
+    return np.asarray(memory[start : start + size].view(kind).reshape(shape))
