@@ -110,6 +110,7 @@ app.command("studies.capture_command:capture", name="capture", help="Photograph 
 app.command("studies.characterise_command:characterise", name="characterise", help="Measure a chip after EMVA 1288.")
 app.command("studies.develop_command:develop", name="develop", help="Develop a raw file into a PNG.")
 app.command("studies.new_command:app", name="new", help="Write files to start from: preset, study, cluster.")
+app.command("studies.paper_command:paper", name="paper", help="Compute the paper's figures and judge its claims.")
 app.command("studies.plan_command:plan", name="plan", help="Compute a study's error budget and the cheapest model.")
 app.command("studies.render_command:render", name="render", help="Render a scene into a spectral OpenEXR file.")
 app.command("studies.sweep_command:sweep", name="sweep", help="Make every picture of a study, and go on after any end.")
