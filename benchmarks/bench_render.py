@@ -9,8 +9,8 @@ The error is the standard deviation over independent renders over their mean, th
 are the least of the repeats, which take turns, after one that compiles. The ratio is stock's time for rodcone's error
 over rodcone's time: (t_stock e_stock^2) / (t_rodcone e_rodcone^2), since error falls with one over the root of time.
 Below it the same for the four wide channels of the RGBW sensor, which stock records as such (four channels) and
-rodcone sums from its bands. A scene of two light groups is rendered twice by rodcone, which can then be relit;
-both its renders count.
+rodcone sums from its bands. A scene of two light groups is rendered twice by rodcone, which can then be relit; both
+its renders count. An even sky needs no render of its own.
 """
 
 import argparse
@@ -23,7 +23,7 @@ import numpy as np
 from environment import print_environment
 from numpy.typing import NDArray
 
-from render.loader import PART_BANDS, Film, Loaded, load_unit, mitsuba_module, variant
+from render.loader import PART_BANDS, Film, load_units, mitsuba_module, variant
 from render.passes import band_parts
 from render.photometry import photons_per_joule
 from render.scene import Scene
@@ -55,16 +55,16 @@ def film_of(bands: int, size: int) -> Film:
 
 
 def ours(scene: Scene, film: Film, spp: int) -> Render:
-    loaded: list[Loaded] = [load_unit(scene, group, film) for group in scene.groups]
+    loaded = load_units(scene, film)
     lights = emission(scene.groups, film.wavelength_nm, film.width_nm)
 
     def draw(seed: int) -> NDArray[np.float64]:
         total = np.zeros((film.wavelength_nm.size, *film.size))
         for index, unit in enumerate(loaded):
-            camera = unit.mi_scene.sensors()[0]
+            camera, groups = unit.mi_scene.sensors()[0], list(unit.groups)
             for first, planes in band_parts(unit, camera, film, PART_BANDS, spp, 1000 * index + seed):
-                here = np.s_[first : first + len(planes)]
-                total[here] += lights[index, here, None, None] * planes
+                here = slice(first, first + planes.shape[1])
+                total[here] += (lights[groups, here, None, None] * planes).sum(axis=0)
         return total
 
     return draw

@@ -13,12 +13,12 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from render.error_estimates import relative_error
+from render.error_estimates import SharedPaths, relative_error
 from render.loader import Film, integrator_name, variant
 from render.scene import Node, Scene
 from render.transport import Transport, emission
 
-ENGINE_VERSION = 2  # raise it with any change that moves a rendered value: older entries are then not used
+ENGINE_VERSION = 3  # raise it with any change that moves a rendered value: older entries are then not used
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _ARRAYS = ("radiance", "half_difference", "variance", "irradiance", "emitter_visible")
 _VALUES = ("spp", "passes", "stopped_by", "seconds", "integrator", "variant")
@@ -38,6 +38,7 @@ def load_transport(folder: Path, scene: Scene, film: Film, seed: int) -> Transpo
             with np.load(file, allow_pickle=False) as entry:
                 arrays: dict[str, Any] = {name: entry.get(name) for name in _ARRAYS}
                 values = json.loads(str(entry["values"]))
+                shared = SharedPaths(tuple(values["shared"]), entry["correlation"]) if values["shared"] else None
     except OSError:
         return None
     lights = emission(scene.groups, film.wavelength_nm, film.width_nm)
@@ -47,7 +48,8 @@ def load_transport(folder: Path, scene: Scene, film: Film, seed: int) -> Transpo
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,
         width_nm=film.width_nm,
-        relative_mc_error=relative_error(lights, arrays["radiance"], arrays["variance"]),
+        relative_mc_error=relative_error(lights, arrays["radiance"], arrays["variance"], shared=shared),
+        shared=shared,
     )
 
 
@@ -55,11 +57,14 @@ def save_transport(folder: Path, scene: Scene, film: Film, seed: int, transport:
     """Store a transport; readers see the whole file or none."""
     folder.mkdir(parents=True, exist_ok=True)
     arrays = {name: getattr(transport, name) for name in _ARRAYS if getattr(transport, name) is not None}
-    values = json.dumps({name: getattr(transport, name) for name in _VALUES})
+    values = {name: getattr(transport, name) for name in _VALUES}
+    values["shared"] = transport.shared.groups if transport.shared else None
+    if transport.shared:
+        arrays["correlation"] = transport.shared.correlation
     handle, temporary = tempfile.mkstemp(dir=folder, suffix=".part")
     try:
         with os.fdopen(handle, "w+b") as file:
-            np.savez(file, values=np.array(values), **arrays)
+            np.savez(file, values=np.array(json.dumps(values)), **arrays)
             size = file.seek(0, os.SEEK_END)
             file.seek(0)
             digest = _digest(file, size)

@@ -7,17 +7,17 @@ Band wavelengths are jittered by one common offset a path, which makes each band
 Mitsuba is handed in by `render.loader`, which alone (with `render.engine`) imports it.
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from render.jit import dr
+from render.reflectance_table import TableReader
+from render.scattering import draw, scatter
 
 LANES = 4  # wavelengths of a spectral variant's `Spectrum`
 RR_DEPTH = 5  # Russian roulette from this depth on, as Mitsuba's `path`
-# Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
-# lobes by wavelength and one path can't serve all bands.
-PDF_TOLERANCE = 1e-3
 
 
 def dense_path(mi: Any) -> Any:
@@ -28,8 +28,9 @@ def dense_path(mi: Any) -> Any:
     ``sample_lights``: whether paths go to look for lights. Where the one light is an even sky, any direction finds it;
     ``meter``: whether paths begin on the shape of the scene's irradiance meter, instead of with the camera's ray. Its
     bands are irradiance over pi.
-    Channels after the first (alpha-less luminance film) hold the bands, and one more the share of paths whose BSDF
-    chose by wavelength.
+    ``even_sky``: whether the light of an even sky, which isn't in the scene, is told as well, by the paths that escape.
+    Channels after the first (alpha-less luminance film) hold the bands, then the sky's, and one more the share of paths
+    whose BSDF chose by wavelength.
     """
 
     class DensePath(mi.SamplingIntegrator):  # type: ignore[misc]
@@ -39,30 +40,47 @@ def dense_path(mi: Any) -> Any:
             self.own_colour = bool(props.get("own_colour", False))
             self.sample_lights = bool(props.get("sample_lights", True))
             self.meter = bool(props.get("meter", False))
+            self.even_sky = bool(props.get("even_sky", False))
+            self.offsets: Any = None
+            self.table: TableReader | None = None
             self.centres = np.array([float(x) for x in str(props["wavelength_nm"]).split(",")])
             self.widths = np.array([float(x) for x in str(props["width_nm"]).split(",")])
 
+        def prepare(self, offsets: Any, reflectances: Any) -> None:
+            """Take a pass's offsets (step,) and table (row, step, band) of `render.reflectance_table`."""
+            self.offsets, self.table = mi.Float(offsets), TableReader(mi, reflectances)
+
         def aov_names(self) -> list[str]:
-            return [*(f"band{i:04d}" for i in range(self.centres.size)), "wavelength_dependent_choice"]
+            count = self.centres.size * (1 + self.even_sky)
+            return [*(f"band{i:04d}" for i in range(count)), "wavelength_dependent_choice"]
 
         def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
-            wavelengths = _band_wavelengths(mi, self.centres, self.widths, sampler.next_1d(active))
+            offset, step = _jitter(mi, self.offsets, sampler.next_1d(active))
+            wavelengths = _band_wavelengths(mi, self.centres, self.widths, offset)
             if self.max_depth == 1:  # light seen directly: no material needs to be compiled
                 result, chosen = _seen(mi, scene, ray, wavelengths), mi.Bool(False)
             else:
                 begin = _at_meter if self.meter else _at_camera
                 how = (self.own_colour, self.sample_lights)
                 start = begin(mi, scene, sampler, ray, wavelengths, *how)
-                result, chosen = _trace(mi, scene, sampler, start, wavelengths, self.max_depth, *how, mi.Bool(active))
+                path = (wavelengths, step, self.table, self.max_depth, *how, self.even_sky)
+                result, chosen = _trace(mi, scene, sampler, start, *path, mi.Bool(active))
             bands = [value for group in result for value in group]
             return mi.Spectrum(0.0), mi.Bool(True), [*bands, dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
 
     return DensePath
 
 
-def _band_wavelengths(mi: Any, centres: Any, widths: Any, sample: Any) -> list[Any]:
+def _jitter(mi: Any, offsets: Any, sample: Any) -> tuple[Any, Any]:
+    """Offset of a path from the bands' centres, in widths; of those that the pass has a table for, and which."""
+    if offsets is None:
+        return sample - 0.5, mi.UInt32(0)
+    step = dr.minimum(mi.UInt32(sample * len(offsets)), len(offsets) - 1)
+    return dr.gather(mi.Float, offsets, step), step
+
+
+def _band_wavelengths(mi: Any, centres: Any, widths: Any, offset: Any) -> list[Any]:
     """Wavelengths of a path, four bands an entry. They reach the kernel as data: other bands don't compile it anew."""
-    offset = sample - 0.5
     pairs = zip(centres.tolist(), widths.tolist(), strict=True)
     lanes = [dr.fma(offset, dr.opaque(mi.Float, width), dr.opaque(mi.Float, centre)) for centre, width in pairs]
     return [mi.Spectrum(*lanes[i : i + LANES]) for i in range(0, len(lanes), LANES)]
@@ -112,48 +130,6 @@ def _seen(mi: Any, scene: Any, ray: Any, wavelengths: list[Any]) -> list[Any]:
     return list(dr.dispatch(si.emitter(scene), _emission, si, wavelengths))
 
 
-def _scatter(
-    bsdf: Any, context: Any, interaction: Any, towards_light: Any, lobe: Any, angle: Any, wavelengths: list[Any]
-) -> tuple[list[Any], Any, Any, list[Any], Any]:
-    """Evaluate and sample a BSDF at all wavelengths within one virtual call: shared terms are then computed once."""
-    if hasattr(bsdf, "scatter_bands"):  # `render.matte`, whose sampling knows no wavelength
-        values, pdf, sample, weights = bsdf.scatter_bands(interaction, towards_light, angle, wavelengths)
-        return values, pdf, sample, weights, dr.zeros(dr.mask_t(pdf))
-    drawn = []
-    for group in wavelengths:
-        interaction.wavelengths = group
-        drawn.append(bsdf.eval_pdf_sample(context, interaction, towards_light, lobe, angle))
-    _, pdf, sample, _ = drawn[0]
-    chosen = _differs(sample, [other for _, _, other, _ in drawn[1:]])
-    for _, other_pdf, _, _ in drawn[1:]:
-        chosen |= abs(other_pdf - pdf) > PDF_TOLERANCE * pdf
-    return [value for value, *_ in drawn], pdf, sample, [weight for *_, weight in drawn], chosen
-
-
-def _sample(
-    bsdf: Any, context: Any, interaction: Any, lobe: Any, angle: Any, wavelengths: list[Any]
-) -> tuple[Any, list[Any], Any]:
-    """Sample a BSDF at all wavelengths within one virtual call."""
-    if hasattr(bsdf, "sample_bands"):
-        sample, weights = bsdf.sample_bands(interaction, angle, wavelengths)
-        return sample, weights, dr.zeros(dr.mask_t(sample.pdf))
-    drawn = []
-    for group in wavelengths:
-        interaction.wavelengths = group
-        drawn.append(bsdf.sample(context, interaction, lobe, angle))
-    sample = drawn[0][0]
-    return sample, [weight for _, weight in drawn], _differs(sample, [other for other, _ in drawn[1:]])
-
-
-def _differs(sample: Any, others: list[Any]) -> Any:
-    """Whether the BSDF sampled another way at other wavelengths."""
-    chosen = dr.zeros(dr.mask_t(sample.pdf))
-    for other in others:
-        chosen |= abs(other.pdf - sample.pdf) > PDF_TOLERANCE * sample.pdf
-        chosen |= other.sampled_component != sample.sampled_component
-    return chosen
-
-
 def _share(
     mi: Any, scene: Any, si: Any, previous: Any, previous_pdf: Any, previous_delta: Any, sample_lights: bool
 ) -> Any:
@@ -166,7 +142,16 @@ def _share(
 
 
 def _bounce_by_light(
-    mi: Any, scene: Any, sampler: Any, bsdf: Any, si: Any, go_on: Any, wavelengths: list[Any], own_colour: bool
+    mi: Any,
+    scene: Any,
+    sampler: Any,
+    bsdf: Any,
+    si: Any,
+    go_on: Any,
+    wavelengths: list[Any],
+    step: Any,
+    table: TableReader | None,
+    own_colour: bool,
 ) -> tuple[list[Any], Any, list[Any], Any]:
     """Light received from a sampled position on a lamp; then a sampled direction, its weights, and the mark."""
     lit = go_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
@@ -175,7 +160,7 @@ def _bounce_by_light(
     lit &= (ds.pdf != 0) & dr.any(sampled != 0)
     context, lobe, angle = mi.BSDFContext(), sampler.next_1d(), sampler.next_2d()
     values, pdf, sample, weights, by_wavelength = dr.dispatch(
-        bsdf, _scatter, context, si, si.to_local(ds.d), lobe, angle, wavelengths
+        bsdf, partial(scatter, table), context, si, si.to_local(ds.d), lobe, angle, wavelengths, step
     )
     factor = dr.select(lit, dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, pdf)), 0.0)
     arriving = _arriving(ds, sampled, si, wavelengths, own_colour)
@@ -184,17 +169,32 @@ def _bounce_by_light(
 
 
 def _bounce(
-    mi: Any, scene: Any, sampler: Any, bsdf: Any, si: Any, go_on: Any, wavelengths: list[Any], own_colour: bool
+    mi: Any,
+    scene: Any,
+    sampler: Any,
+    bsdf: Any,
+    si: Any,
+    go_on: Any,
+    wavelengths: list[Any],
+    step: Any,
+    table: TableReader | None,
+    own_colour: bool,
 ) -> tuple[list[Any], Any, list[Any], Any]:
     """The same where no lamp is looked for."""
     del scene, go_on, own_colour
     context, lobe, angle = mi.BSDFContext(), sampler.next_1d(), sampler.next_2d()
-    sample, weights, by_wavelength = dr.dispatch(bsdf, _sample, context, si, lobe, angle, wavelengths)
+    sample, weights, by_wavelength = dr.dispatch(
+        bsdf, partial(draw, table), context, si, lobe, angle, wavelengths, step
+    )
     return [mi.Spectrum(0.0) for _ in wavelengths], sample, weights, by_wavelength
 
 
 def _times(first: list[Any], second: list[Any]) -> list[Any]:
     return [a * b for a, b in zip(first, second, strict=True)]
+
+
+def _either(first: Any, where: list[Any], elsewhere: list[Any]) -> list[Any]:
+    return [dr.select(first, a, b) for a, b in zip(where, elsewhere, strict=True)]
 
 
 def _plus(result: list[Any], throughput: list[Any], light: list[Any], factor: Any) -> list[Any]:
@@ -250,30 +250,36 @@ def _trace(
     sampler: Any,
     start: tuple[Any, ...],
     wavelengths: list[Any],
+    step: Any,
+    table: TableReader | None,
     max_depth: int,
     own_colour: bool,
     sample_lights: bool,
+    even_sky: bool,
     active: Any,
 ) -> tuple[list[Any], Any]:
-    """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``)."""
+    """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``).
+
+    A path that escapes meets the even sky, and then carries what the sky would give it: its throughput.
+    """
     bounce = _bounce_by_light if sample_lights else _bounce
     ray, previous, previous_pdf, previous_delta, result = start
     ray.wavelengths = wavelengths[0]
     throughput = [mi.Spectrum(1.0) for _ in wavelengths]
     eta, depth = mi.Float(1.0), mi.UInt32(0)
-    chosen = mi.Bool(False)
+    chosen, escaped = mi.Bool(False), mi.Bool(False)
     while dr.hint(active, label="dense path"):
         si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
         share = _share(mi, scene, si, previous, previous_pdf, previous_delta, sample_lights)
         result = _plus(result, throughput, _emitted(si.emitter(scene), si, wavelengths, own_colour), share)
 
-        go_on = (depth + 1 < max_depth) & si.is_valid()
+        go_on, escaped = (depth + 1 < max_depth) & si.is_valid(), ~si.is_valid()
         received, sample, weights, by_wavelength = bounce(
-            mi, scene, sampler, si.bsdf(ray), si, go_on, wavelengths, own_colour
+            mi, scene, sampler, si.bsdf(ray), si, go_on, wavelengths, step, table, own_colour
         )
         result = _plus(result, throughput, received, 1.0)
         chosen |= go_on & by_wavelength
-        throughput = _times(throughput, weights)
+        scattered = _times(throughput, weights)
 
         ray = si.spawn_ray(si.to_world(sample.wo))
         ray.wavelengths = wavelengths[0]
@@ -281,6 +287,8 @@ def _trace(
         previous, previous_pdf = dr.detach(si), sample.pdf
         previous_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
         depth[si.is_valid()] += 1
-        throughput, survives = _roulette(throughput, eta, depth, sampler.next_1d())
+        scattered, survives = _roulette(scattered, eta, depth, sampler.next_1d())
+        throughput = _either(escaped & even_sky, throughput, scattered)
         active = go_on & survives
-    return result, chosen
+    sky = _either(escaped, throughput, [mi.Spectrum(0.0) for _ in wavelengths])
+    return [*result, *(sky if even_sky else [])], chosen

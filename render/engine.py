@@ -15,7 +15,7 @@ from render.cache import load_transport, save_transport
 from render.error_estimates import relative_error
 from render.errors import InputError, require_whole
 from render.limits import Limits
-from render.loader import Film, integrator_name, load_unit, variant
+from render.loader import Film, integrator_name, load_units, variant
 from render.passes import Sums, add_pass, emitter_visible, let_go, no_passes, sums_of
 from render.scene import Scene
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
@@ -140,7 +140,7 @@ def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None,
     start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
     sums = sums_of(earlier) if earlier else no_passes(len(scene.groups), film)
     pass_spp = earlier.spp // earlier.passes if earlier else limits.pass_spp
-    loaded = [load_unit(scene, group, film) for group in scene.groups]
+    loaded = load_units(scene, film)
     lights, stopped_by = _lights(scene, film), None
     with _told_to_stop() as told:
         while stopped_by is None:
@@ -148,7 +148,7 @@ def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None,
                 pass_start = time.perf_counter()
                 add_pass(loaded, sums, film, pass_spp, limits.seed)
             now = time.perf_counter()
-            error = relative_error(lights, sums.mean, sums.scatter, float(sums.variance_factor))
+            error = relative_error(lights, sums.mean, sums.scatter, float(sums.variance_factor), sums.shared)
             progress(limits.share(sums.drawn, error, now - start), error)
             # The second of a pair compiles nothing: it tells how long the next ones take.
             stopped_by = limits.stop(sums.drawn, sums.passes, error, now - start, now - pass_start)
@@ -167,6 +167,7 @@ def _transport(
     start: float,
 ) -> Transport:
     """Turn the sums into a result, in place: they are used up."""
+    shared = sums.shared
     sums.scatter *= sums.variance_factor
     sums.signed /= np.float32(sums.passes)
     return Transport(
@@ -184,7 +185,8 @@ def _transport(
         seconds=time.perf_counter() - start,
         integrator=integrator_name(),
         variant=variant(),
-        relative_mc_error=relative_error(_lights(scene, film), sums.mean, sums.scatter),
+        relative_mc_error=relative_error(_lights(scene, film), sums.mean, sums.scatter, shared=shared),
+        shared=shared,
     )
 
 

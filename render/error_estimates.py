@@ -4,6 +4,7 @@ Both are judged on pixels spread evenly over the picture, so that asking costs l
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,40 @@ SAMPLE_PIXELS = 1024  # judged: with 40 bands the median of the error is then su
 SUB_BANDS = 64  # of a band, over which a light's moments are summed: 0.16 nm in a band of 10 nm
 
 
+@dataclass(frozen=True)
+class SharedPaths:
+    """Two light groups that were rendered along the same paths, so that their errors aren't independent.
+
+    Attributes
+    ----------
+    groups : (int, int)
+        Which, by their order.
+    correlation : (band, h, w) float32
+        Of their errors, -1 to 1.
+    """
+
+    groups: tuple[int, int]
+    correlation: NDArray[np.float32]
+
+    def term(self, emitted: Floats, variance: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Twice the covariance of the two groups' light: what it adds to the variance of the sum, (band, h, w).
+
+        Parameters
+        ----------
+        emitted : (group, band) float64
+        variance : (group, band, h, w) float32
+        """
+        one, other = self.groups
+        factor = (2 * emitted[one] * emitted[other]).astype(np.float32)[:, None, None]
+        return np.asarray(factor * self.correlation * np.sqrt(variance[one]) * np.sqrt(variance[other]))
+
+
 def relative_error(
-    emitted: Floats, radiance: NDArray[np.float32], variance: NDArray[np.float32], factor: float = 1.0
+    emitted: Floats,
+    radiance: NDArray[np.float32],
+    variance: NDArray[np.float32],
+    factor: float = 1.0,
+    shared: SharedPaths | None = None,
 ) -> float:
     """Median over pixels and bands of standard error over mean, the variance pooled over 3x3 pixels; dark values out.
 
@@ -28,6 +61,8 @@ def relative_error(
     radiance, variance : (group, band, h, w) float32
     factor : float
         On the variance.
+    shared : SharedPaths, optional
+        Groups whose errors are correlated.
     """
     rows, columns = _spread(radiance.shape[2:])
     last_row, last_column = radiance.shape[2] - 1, radiance.shape[3] - 1
@@ -36,10 +71,14 @@ def relative_error(
     for down in (-1, 0, 1):
         for right in (-1, 0, 1):
             around = np.clip(rows + down, 0, last_row)[:, None], np.clip(columns + right, 0, last_column)
-            pooled += (squares * variance[:, :, around[0], around[1]]).sum(axis=0)
+            here = variance[:, :, around[0], around[1]]
+            pooled += (squares * here).sum(axis=0)
+            if shared:
+                part = replace(shared, correlation=shared.correlation[:, around[0], around[1]])
+                pooled += part.term(emitted, here)
     values = (emitted[:, :, None, None] * radiance[:, :, rows[:, None], columns]).sum(axis=0)
     lit = values > 0
-    return float(np.median(np.sqrt(pooled[lit] * factor / 9) / values[lit])) if lit.any() else 0.0
+    return float(np.median(np.sqrt(np.maximum(pooled[lit], 0.0) * factor / 9) / values[lit])) if lit.any() else 0.0
 
 
 def within_band_error(

@@ -1,6 +1,6 @@
 """From a `Scene` to Mitsuba objects: variant, film, and the scene at unit emission."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -11,9 +11,10 @@ from render.dense import LANES, dense_path
 from render.errors import InputError, one_line
 from render.jit import backend
 from render.matte import matte_surface, with_matte_surfaces
+from render.reflectance_table import band_offsets, reflectance_table, with_rows
 from render.scene import Node, Scene, uniform_node
 from render.scene_paths import search_path
-from render.spectrum import Floats
+from render.spectrum import Floats, Spectrum
 
 METER_PIXELS = 64  # film of the irradiance meter, each side
 
@@ -66,20 +67,28 @@ class Film:
 
 @dataclass(frozen=True)
 class Loaded:
-    """One light group's Mitsuba scene: sensor 0 is the camera, sensor 1 the irradiance meter if any.
+    """Mitsuba's scene of one light group, or of one and an even sky: sensor 0 is the camera, 1 the meter if any.
 
     Attributes
     ----------
     mi_scene : mitsuba.Scene
+    groups : tuple of int
+        Which of the scene's groups it tells, by their order. A second one is the even sky, which isn't in `mi_scene`:
+        paths that escape bring its light.
     own_colour : bool
         Whether emission depends on wavelength; at unit emission it is evaluated once.
     sample_lights : bool
         Whether paths go to look for lights.
+    curves : tuple of Spectrum
+        Reflectances that are read from a table, row by row. None where lights have colours of their own: a line in them
+        would be met at few of the table's wavelengths.
     """
 
     mi_scene: Any
+    groups: tuple[int, ...]
     own_colour: bool
     sample_lights: bool
+    curves: tuple[Spectrum, ...] = ()
 
 
 def integrator_name() -> str:
@@ -87,7 +96,17 @@ def integrator_name() -> str:
     return "path + specfilm" if backend() == "numpy" else "dense path (all bands along each path)"
 
 
-def load_unit(scene: Scene, group: str, film: Film) -> Loaded:
+def load_units(scene: Scene, film: Film) -> list[Loaded]:
+    """Load what is rendered one after the other: each light group by itself, and an even sky along with the first."""
+    names = list(scene.groups)
+    skies = [] if backend() == "numpy" or len(names) == 1 else [name for name in names if scene.is_even_sky(name)][:1]
+    units = [_load_unit(scene, name, film) for name in names if name not in skies]
+    if skies:
+        units[0] = replace(units[0], groups=(*units[0].groups, names.index(skies[0])))
+    return units
+
+
+def _load_unit(scene: Scene, group: str, film: Film) -> Loaded:
     """Load a scene with one light group at unit spectral emission (or its own colour)."""
     description = scene.lit({group: uniform_node(1.0)})
     description["sensor"] = {**description["sensor"], "film": _recorder(film, film.size), "sampler": _SAMPLER}
@@ -100,15 +119,20 @@ def load_unit(scene: Scene, group: str, film: Film) -> Loaded:
             "sampler": _SAMPLER,
         }
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
-    mi_scene = _load(scene, description if backend() == "numpy" else with_matte_surfaces(description))
-    return Loaded(mi_scene, scene.groups[group].own_colour, not _is_even_sky(mi_scene))
+    place, own_colour = (list(scene.groups).index(group),), scene.groups[group].own_colour
+    if backend() == "numpy":
+        return Loaded(_load(scene, description), place, own_colour, sample_lights=True)
+    matte = with_matte_surfaces(description)
+    tabulated, curves = (matte, ()) if own_colour else with_rows(matte)
+    mi_scene = _load(scene, tabulated)
+    return Loaded(mi_scene, place, own_colour, not _is_even_sky(mi_scene), curves)
 
 
 def load_direct(scene: Scene, film: Film) -> Loaded:
     """Load a scene for one question: which pixels see a light directly. All groups at unit emission, depth 1."""
     description = scene.lit({name: uniform_node(1.0) for name in scene.groups})
     description["sensor"] = {**description["sensor"], "film": _recorder(film, film.size), "sampler": _SAMPLER}
-    return Loaded(_load(scene, description), own_colour=True, sample_lights=True)
+    return Loaded(_load(scene, description), (0,), own_colour=True, sample_lights=True)
 
 
 def _load(scene: Scene, description: Node) -> Any:
@@ -141,24 +165,27 @@ def _recorder(film: Film, size: tuple[int, int]) -> Node:
     return node
 
 
-def integrators(film: Film, part_bands: int, unit: Loaded, meter: bool = False) -> list[Any]:
+def integrators(film: Film, part_bands: int, unit: Loaded, seed: int, meter: bool = False) -> list[Any]:
     """Integrators that together give all bands in order, each at most `part_bands` (a multiple of four).
 
     Parts of one size share a kernel. A part is filled up to a multiple of four by repeating its last band; `parts`
-    tells how many count.
+    tells how many count. The seed decides where in the bands the paths' wavelengths lie.
     """
     mi = mitsuba_module()
     if backend() == "numpy":
         return [mi.load_dict({"type": "path", "max_depth": film.max_depth})]
-    made = []
+    how = {"own_colour": unit.own_colour, "sample_lights": unit.sample_lights, "even_sky": len(unit.groups) > 1}
+    offsets, made = band_offsets(seed), []
     for part in parts(film, part_bands):
         padded = np.concatenate([part, np.full(-part.size % LANES, part[-1])])
+        centre, width = film.wavelength_nm[padded], film.width_nm[padded]
         bands = {
-            name: ",".join(map(repr, values[padded].tolist()))
-            for name, values in (("wavelength_nm", film.wavelength_nm), ("width_nm", film.width_nm))
+            name: ",".join(map(repr, values.tolist()))
+            for name, values in (("wavelength_nm", centre), ("width_nm", width))
         }
-        options = {"own_colour": unit.own_colour, "sample_lights": unit.sample_lights, "meter": meter}
-        made.append(mi.load_dict({"type": "densepath", "max_depth": film.max_depth, **options, **bands}))
+        made.append(mi.load_dict({"type": "densepath", "max_depth": film.max_depth, "meter": meter, **how, **bands}))
+        if unit.curves:
+            made[-1].prepare(offsets, reflectance_table(unit.curves, centre + width * offsets[:, None]))
     return made
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from render.error_estimates import SharedPaths
 from render.errors import InputError, one_line
 from render.loader import PART_BANDS, Film, Loaded, integrators, load_direct, mitsuba_module, parts, variant
 from render.scene import Scene
@@ -23,12 +24,17 @@ VISIBLE_SPP = 16  # samples a pixel to find where a light is seen directly
 
 @dataclass
 class Sums:
-    """Running sums over passes (Welford), (group, band, h, w); the only mutable state of a render."""
+    """Running sums over passes (Welford), (group, band, h, w); the only mutable state of a render.
+
+    `product` (band, h, w) is the scatter's counterpart of two groups that `share` their paths: their covariance's.
+    """
 
     mean: NDArray[np.float32]
     scatter: NDArray[np.float32]
     signed: NDArray[np.float32]
     plane: Floats
+    share: tuple[int, int] | None = None
+    product: Planes | None = None
     passes: int = 0
     drawn: int = 0
 
@@ -36,6 +42,16 @@ class Sums:
     def variance_factor(self) -> np.float32:
         """What turns the scatter into the variance of the mean."""
         return np.float32(1 / ((self.passes - 1) * self.passes))
+
+    @property
+    def shared(self) -> SharedPaths | None:
+        """How the errors of two groups go together."""
+        if self.share is None or self.product is None:
+            return None
+        one, other = (np.sqrt(self.scatter[group]) for group in self.share)
+        both = one * other
+        found = np.divide(self.product, both, out=np.zeros_like(both), where=both > 0)
+        return SharedPaths(self.share, np.clip(found, -1, 1, out=found))
 
 
 def no_passes(groups: int, film: Film) -> Sums:
@@ -47,8 +63,8 @@ def no_passes(groups: int, film: Film) -> Sums:
 
 def sums_of(transport: Transport) -> Sums:
     """Sums that an earlier render stopped at, to go on from: its radiance to the bit."""
-    passes, drawn = transport.passes, transport.spp
-    return Sums(
+    passes, drawn, shared = transport.passes, transport.spp, transport.shared
+    sums = Sums(
         mean=transport.radiance.copy(),
         scatter=transport.variance * np.float32((passes - 1) * passes),
         signed=transport.half_difference * np.float32(passes),
@@ -56,33 +72,45 @@ def sums_of(transport: Transport) -> Sums:
         passes=passes,
         drawn=drawn,
     )
+    if shared:
+        one, other = (np.sqrt(sums.scatter[group]) for group in shared.groups)
+        sums.share, sums.product = shared.groups, shared.correlation * one * other
+    return sums
 
 
 def add_pass(loaded: list[Loaded], sums: Sums, film: Film, pass_spp: int, seed: int) -> None:
     """Render every group once more, with a seed of its own, and add it to the sums."""
     sums.passes += 1
-    for group, unit in enumerate(loaded):
+    for unit in loaded:
         camera, *meter = unit.mi_scene.sensors()
-        of_pass = pass_seed(seed, group, sums.passes - 1)
+        of_pass = pass_seed(seed, unit.groups[0], sums.passes - 1)
         for first, planes in band_parts(unit, camera, film, PART_BANDS, pass_spp, of_pass):
-            _add(sums, np.s_[group, first : first + len(planes)], planes)
+            _add(sums, unit.groups, slice(first, first + planes.shape[1]), planes)
         if meter:
-            sums.plane[group] += _meter(unit, meter[0], film, min(pass_spp, METER_SPP), of_pass)
+            sums.plane[list(unit.groups)] += _meter(unit, meter[0], film, min(pass_spp, METER_SPP), of_pass)
     sums.drawn += int(camera.sampler().sample_count())  # what the stratified sampler really drew
 
 
-def _add(sums: Sums, where: Any, planes: Planes) -> None:
-    mean, count = sums.mean[where], np.float32(sums.passes)
-    delta = planes - mean
-    mean += delta / count
-    sums.scatter[where] += delta * (planes - mean)
-    sums.signed[where] += planes if sums.passes % 2 else -planes
+def _add(sums: Sums, groups: tuple[int, ...], bands: slice, planes: Planes) -> None:
+    """Add some bands of one pass; `planes` holds the groups in the order given."""
+    count, off_mean = np.float32(sums.passes), []
+    for group, of_group in zip(groups, planes, strict=True):
+        mean = sums.mean[group, bands]
+        delta = of_group - mean
+        mean += delta / count
+        sums.scatter[group, bands] += delta * (of_group - mean)
+        sums.signed[group, bands] += of_group if sums.passes % 2 else -of_group
+        off_mean.append(delta)
+    if len(groups) == 2:
+        if sums.product is None:
+            sums.share, sums.product = (groups[0], groups[1]), np.zeros_like(sums.mean[0])
+        sums.product[bands] += off_mean[0] * (planes[1] - sums.mean[groups[1], bands])
 
 
 def _meter(unit: Loaded, sensor: Any, film: Film, spp: int, seed: int) -> Floats:
-    """Irradiance on the reference plane, shape (band,); summed in float64, so that threads don't change it."""
+    """Irradiance on the reference plane, shape (group, band); summed in float64, so that threads don't change it."""
     parts_of = band_parts(unit, sensor, film, METER_BANDS, spp, seed, meter=True)
-    meter = np.concatenate([planes.mean(axis=(1, 2), dtype=np.float64) for _, planes in parts_of])
+    meter = np.concatenate([planes.mean(axis=(2, 3), dtype=np.float64) for _, planes in parts_of], axis=1)
     # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
     return meter if variant() == "scalar_spectral" else meter * np.pi
 
@@ -90,14 +118,15 @@ def _meter(unit: Loaded, sensor: Any, film: Film, spp: int, seed: int) -> Floats
 def band_parts(
     unit: Loaded, sensor: Any, film: Film, most: int, spp: int, seed: int, meter: bool = False
 ) -> Iterator[tuple[int, Planes]]:
-    """Render one sensor, at most `most` bands at a time: index of the first band, and band averages (band, h, w).
+    """Render one sensor, at most `most` bands at a time: index of the first band, and band averages.
 
-    Every part of the bands sees the same paths.
+    These have shape (group, band, h, w), the groups being those of the unit. Every part of the bands sees the same
+    paths.
     """
-    first, tracers = 0, integrators(film, most, unit, meter)
+    first, tracers = 0, integrators(film, most, unit, seed, meter)
     if variant() == "scalar_spectral":  # specfilm integrates over the band
         image = _rendered(unit, sensor, tracers[0], spp, seed)
-        yield 0, image / film.width_nm.astype(np.float32)[:, None, None]
+        yield 0, (image / film.width_nm.astype(np.float32)[:, None, None])[None]
         return
     for part, integrator in zip(parts(film, most), tracers, strict=True):
         image = _rendered(unit, sensor, integrator, spp, seed)
@@ -106,7 +135,9 @@ def band_parts(
                 "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
                 "allowed: materials whose sampling doesn't depend on wavelength; replace it"
             )
-        yield first, image[1 : 1 + part.size]  # channel 0 is the film's own luminance; the last one the mark above
+        # Channel 0 is the film's own luminance, the last one the mark above; between them each group's bands.
+        groups = image[1:-1].reshape(len(unit.groups), -1, *image.shape[1:])
+        yield first, groups[:, : part.size]
         first += part.size
 
 
@@ -128,7 +159,7 @@ def emitter_visible(scene: Scene, film: Film, seed: int) -> NDArray[np.bool_]:
     of_pass = pass_seed(seed, len(scene.groups), 0)
     camera = loaded.mi_scene.sensors()[0]
     _, planes = next(band_parts(loaded, camera, one_band, PART_BANDS, VISIBLE_SPP, of_pass))
-    return np.asarray(planes[0] > 0)
+    return np.asarray(planes[0, 0] > 0)
 
 
 def pass_seed(seed: int, group: int, index: int) -> int:

@@ -100,6 +100,12 @@ class Scene:
         if self.reference_plane is not None and self.reference_plane not in self.geometry:
             raise unknown(f"scene {self.name}: reference_plane", self.reference_plane, self.geometry)
 
+    def is_even_sky(self, group: str) -> bool:
+        """Whether a group is one light of one spectrum and of the same radiance from all around."""
+        lights = self.groups[group]
+        kinds = [_emitter_paths(self.geometry)[path] for path in lights.emitters]
+        return kinds == ["constant"] and not lights.own_colour
+
     def check_range(self, shortest_nm: float, longest_nm: float) -> None:
         """Raise `InputError` where a light's data end within the wavelengths asked for."""
         low, high = SUNSKY_NM

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from render.error_estimates import relative_error, within_band_error
+from render.error_estimates import SharedPaths, relative_error, within_band_error
 from render.errors import InputError, require_keys, require_range
 from render.illuminants import illuminant
 from render.jit import arrays, backend, dr
@@ -48,6 +48,8 @@ class Transport:
     integrator, variant : str
     relative_mc_error : float
         Error reached under the scene's own lights: median over pixels and bands of standard error over mean.
+    shared : SharedPaths or None
+        Two groups whose errors are correlated, since an even sky is rendered along with another group.
     """
 
     radiance: NDArray[np.float32]
@@ -65,6 +67,7 @@ class Transport:
     integrator: str
     variant: str
     relative_mc_error: float = 0.0
+    shared: SharedPaths | None = None
 
     def relight(
         self,
@@ -103,7 +106,7 @@ class Transport:
         return SpectralRadiance(
             _view(_combine(coefficients, self.radiance)),
             self.wavelength_nm,
-            relative_error(coefficients, self.radiance, self.variance),
+            relative_error(coefficients, self.radiance, self.variance, shared=self.shared),
             self.width_nm,
             within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm),
         )
@@ -131,7 +134,10 @@ class Transport:
     def relight_variance(self, *, luminance_cd_m2: float) -> NDArray[np.float32]:
         """Monte Carlo variance of `relight` at a level of the scene's own lights, shape (band, h, w)."""
         coefficients = self._at_level(self._emission(self._lights(None, None)), luminance_cd_m2, None)
-        return _combine(coefficients**2, self.variance)
+        independent = _combine(coefficients**2, self.variance)
+        if self.shared is None:
+            return independent
+        return np.asarray(np.maximum(independent + self.shared.term(coefficients, self.variance), np.float32(0)))
 
     def illuminance_lux(self, luminance_cd_m2: float) -> float | None:
         """Illuminance on the reference plane at a mean luminance under the scene's own lights; None without a plane."""

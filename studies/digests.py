@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -15,8 +16,9 @@ from render.scene import Scene
 
 _LENGTH = 32  # hexadecimal digits, 128 bits: two of a million cells meet with a chance of 1e-27
 _FOLDERS = ("render", "scenes", "sensor", "isp")  # beside `studies`, all of them decide a picture
-# Of this package those that do; the others only ask, store and show.
-_MODULES = ("camera", "cell_run", "cells", "frames", "levels", "lit_scene", "metrics", "model", "png", "truth")
+# Of this package what making a frame and running a cell import; the other modules only ask, store and show.
+_DECIDING = ("cell_run", "frames")
+_IMPORT = re.compile(r"^\s*from studies\.(\w+) import", re.MULTILINE)
 _CODE = (".py", ".toml", ".csv")
 
 
@@ -49,9 +51,20 @@ def code_version() -> str:
     """Version of rodcone, and the hash of the sources that decide a picture."""
     here = Path(__file__).parent
     files = [path for name in _FOLDERS for path in (here.parent / name).rglob("*") if path.suffix in _CODE]
-    files += [here / f"{name}.py" for name in _MODULES]
+    files += [here / f"{name}.py" for name in deciding_modules()]
     contents = {path.relative_to(here.parent).as_posix(): digest_file(path) for path in files}
     return f"{metadata.version('rodcone')}+{digest(contents)[:12]}"
+
+
+def deciding_modules() -> list[str]:
+    """Modules of `studies` that decide a picture: `_DECIDING` and all that these import, in alphabetical order."""
+    here, found, waiting = Path(__file__).parent, set[str](), list(_DECIDING)
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += _IMPORT.findall((here / f"{name}.py").read_text("utf-8"))
+    return sorted(found)
 
 
 def _plain(value: Any) -> Any:

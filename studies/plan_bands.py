@@ -67,6 +67,8 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
         irradiance=None if transport.irradiance is None else transport.irradiance @ matrix.T,
         wavelength_nm=nm,
         width_nm=width_nm,
+        shared=transport.shared
+        and replace(transport.shared, correlation=_merge(matrix, transport.shared.correlation[None])[0]),
     )
 
 

@@ -65,7 +65,13 @@ def emissions(groups):
 
 def lit_variance(transport, groups):
     """Variance of the radiance that the groups give together, (band, h, w)."""
-    return np.einsum("gb,gbhw->bhw", emissions(groups) ** 2, transport.variance.astype(np.float64))
+    given, variance = emissions(groups), transport.variance.astype(np.float64)
+    independent = np.einsum("gb,gbhw->bhw", given**2, variance)
+    if transport.shared is None:
+        return independent
+    one, other = transport.shared.groups
+    covariance = transport.shared.correlation * np.sqrt(variance[one] * variance[other])
+    return independent + 2 * (given[one] * given[other])[:, None, None] * covariance
 
 
 def noisy_wall():
@@ -299,9 +305,19 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
     assert not (one.radiance == other.radiance).any()
 
 
-def test_groups_and_passes_draw_from_seeds_of_their_own(two):
-    sky, lamp = (two.half_difference[g, 0] / np.sqrt(np.maximum(two.variance[g, 0], 1e-20)) for g in (0, 1))
-    noisy = (two.variance[:, 0] > 1e-8).all(axis=0)
+def apart(scene):
+    """The scene with a light of no power in the sky's group, which then is rendered by itself."""
+    geometry = scene.geometry | {"off": {"type": "point", "position": [0, -9, 0]}}
+    return replace(
+        scene, geometry=geometry, groups=scene.groups | {"sky": replace(scene.groups["sky"], emitters=("sky", "off"))}
+    )
+
+
+def test_groups_and_passes_draw_from_seeds_of_their_own():
+    made = render(apart(two_lights()), SIZE, wavelength_nm=BANDS_NM[:4], width_nm=50.0, spp=64, seed=2)
+    assert made.shared is None
+    sky, lamp = (made.half_difference[g, 0] / np.sqrt(np.maximum(made.variance[g, 0], 1e-20)) for g in (0, 1))
+    noisy = (made.variance[:, 0] > 1e-8).all(axis=0)
     assert noisy.sum() > 60
     assert abs(np.corrcoef(sky[noisy], lamp[noisy])[0, 1]) < bound(1) / np.sqrt(noisy.sum())
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from render.error_estimates import SAMPLE_PIXELS, relative_error, within_band_error
+from render.error_estimates import SAMPLE_PIXELS, SharedPaths, relative_error, within_band_error
 from render.scene import LightGroup
 from render.spectrum import Spectrum, band_widths, flat, line_spectrum
 
@@ -38,6 +38,18 @@ def test_of_several_lights_values_add_and_variances_add_with_the_squared_emissio
     emitted = np.array([[3.0], [1.0]])
     values, variance = np.ones((2, 1, 5, 4), np.float32), np.full((2, 1, 5, 4), 0.01, np.float32)
     assert relative_error(emitted, values, variance) == pytest.approx(0.1 * np.sqrt(10.0) / 4.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("correlation", [-1.0, -0.3, 0.0, 1.0])
+def test_errors_of_groups_that_share_paths_add_with_their_correlation(correlation):
+    emitted = np.array([[3.0], [0.5], [1.0]])
+    values, variance = np.ones((3, 1, 5, 4), np.float32), np.full((3, 1, 5, 4), 0.01, np.float32)
+    variance[1] = 0.0
+    shared = SharedPaths((2, 0), np.full((1, 5, 4), correlation, np.float32))
+    expected = 0.1 * np.sqrt(9.0 + 1.0 + 2 * correlation * 3.0)
+    assert relative_error(emitted, values, variance, shared=shared) == pytest.approx(expected / 4.5, rel=1e-6)
+    shared = SharedPaths((1, 0), np.full((1, 5, 4), correlation, np.float32))  # the second has no error
+    assert relative_error(emitted, values, variance, shared=shared) == pytest.approx(0.1 * 10**0.5 / 4.5, rel=1e-6)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 3000), (3000, 1), (90, 70), (257, 301)])

@@ -6,6 +6,7 @@ import pytest
 from render.jit import backend, dr
 from render.loader import mitsuba_module
 from render.matte import with_matte_surfaces
+from render.reflectance_table import TableReader, reflectance_table, with_rows
 
 pytestmark = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba renders")
 
@@ -53,7 +54,7 @@ def test_all_bands_at_once_are_the_bands_one_by_one(stock, situation):
     mi, (si, wo, numbers) = mitsuba_module(), situation
     own, context = mi.load_dict(with_matte_surfaces({"bsdf": stock})["bsdf"]), mi.BSDFContext()
     groups = [mi.Spectrum(400.0, 420.0, 440.0, 460.0), mi.Spectrum(500.0, 600.0, 700.0, 770.0)]
-    values, density, sample, weights = own.scatter_bands(si, wo, numbers, groups)
+    values, density, sample, weights = own.scatter_bands(si, wo, numbers, groups, None, None)
     for group, value, weight in zip(groups, values, weights, strict=True):
         si.wavelengths = group
         assert np.asarray(value) == pytest.approx(np.asarray(own.eval(context, si, wo)), rel=1e-5, abs=1e-9)
@@ -61,6 +62,35 @@ def test_all_bands_at_once_are_the_bands_one_by_one(stock, situation):
         assert np.asarray(weight) == pytest.approx(np.asarray(one_weight), rel=1e-5)
         assert np.array_equal(np.asarray(sample.wo), np.asarray(one.wo))
     assert np.asarray(density) == pytest.approx(np.asarray(own.pdf(context, si, wo)), rel=1e-6)
+
+
+CHECKS = {
+    "type": "checkerboard",
+    "color0": RAMP,
+    "color1": {"type": "regular", "wavelength_min": 380.0, "wavelength_max": 780.0, "values": "0.9,0.3,0.2"},
+}
+
+
+@pytest.mark.parametrize("twosided", [False, True], ids=["one side", "two sides"])
+@pytest.mark.parametrize("reflectance", [RAMP, CHECKS], ids=["plain", "checks"])
+def test_reflectance_read_from_the_table_is_that_of_the_texture(reflectance, twosided, situation):
+    mi, (si, wo, numbers) = mitsuba_module(), situation
+    bsdf = {"type": "diffuse", "reflectance": reflectance}
+    node, curves = with_rows(with_matte_surfaces({"bsdf": {"type": "twosided", "bsdf": bsdf} if twosided else bsdf}))
+    rng = np.random.default_rng(3)
+    nm, step = rng.uniform(370.0, 790.0, (16, 8)), rng.integers(0, 16, COUNT)  # 380-780 nm is known
+    reader = TableReader(mi, reflectance_table(curves, nm))
+    si.uv = mi.Point2f(*rng.random((2, COUNT)).astype(np.float32))
+    groups = [mi.Spectrum(*nm[step, first : first + 4].T.astype(np.float32)) for first in (0, 4)]
+    surface, stock = mi.load_dict(node["bsdf"]), mi.load_dict(with_matte_surfaces({"bsdf": bsdf})["bsdf"])
+    surface_of_stock = stock.reflectance
+    values, density, sample, weights = surface.scatter_bands(si, wo, numbers, groups, reader, mi.UInt32(step))
+    for group, value, weight in zip(groups, values, weights, strict=True):
+        si.wavelengths = group
+        expected = np.asarray(surface_of_stock.eval(si)) * (np.asarray(sample.pdf) > 0)
+        assert len(np.unique(np.round(expected, 3))) > 20
+        assert np.asarray(weight) == pytest.approx(expected, rel=1e-5, abs=2e-6)
+        assert np.asarray(value) == pytest.approx(expected * np.asarray(density), rel=1e-5, abs=2e-6)
 
 
 def test_lambertian_surfaces_become_it_wherever_they_stand():

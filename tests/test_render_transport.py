@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from render.error_estimates import SharedPaths
 from render.errors import InputError
 from render.illuminants import illuminant
 from render.photometry import luminance
@@ -214,6 +215,22 @@ def test_the_error_of_a_relit_scene_adds_the_groups_variances():
     made = transport(radiance=np.ones(shape, np.float32), variance=np.full(shape, 0.01, np.float32))
     lit = made.relight({"sky": flat(), "lamp": flat()}, powers={"sky": 3.0, "lamp": 1.0})
     assert lit.relative_mc_error == pytest.approx(0.1 * np.sqrt(3.0**2 + 1.0) / 4.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("correlation", [-1.0, -0.4, 0.7])
+def test_the_variance_of_groups_that_share_paths_holds_their_covariance(correlation):
+    made = transport()
+    made = replace(made, shared=SharedPaths((0, 1), np.full(made.variance.shape[1:], correlation, np.float32)))
+    given = np.stack([100.0 * illuminant("D65").band_average(NM, WIDTH_NM), 0.3 * RAMP.band_average(NM, WIDTH_NM)])
+    level = 12.0 / made.relight().luminance().mean()
+    sky, lamp = (level * given)[:, :, None, None] * np.sqrt(made.variance.astype(np.float64))
+    expected = sky**2 + lamp**2 + 2 * correlation * sky * lamp
+    found = made.relight_variance(luminance_cd_m2=12.0)
+    assert found.dtype == np.float32
+    assert np.abs(found - expected).max() <= 1e-6 * (sky + lamp).max() ** 2
+    assert found.min() >= 0
+    pooled = made.relight().relative_mc_error / replace(made, shared=None).relight().relative_mc_error
+    assert (pooled > 1) == (correlation > 0)
 
 
 def test_the_error_does_not_depend_on_the_level():

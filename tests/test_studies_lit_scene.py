@@ -1,5 +1,7 @@
 """A study's scene: opened with its faults told, and lit by another spectrum at the luminance of its own."""
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +15,7 @@ from render.radiance_source import as_transport
 from render.scene import LightGroup
 from render.transport import Transport
 from scenes.catalog import load
-from studies.digests import digest, digest_scene
+from studies.digests import deciding_modules, digest, digest_scene
 from studies.lit_scene import level_luminance, open_choice, spectral_luminance, under, white_spectrum
 from studies.study import OWN, SceneChoice, Study
 
@@ -108,6 +110,17 @@ def test_files_that_a_scene_names_count_by_their_content(tmp_path: Path) -> None
     assert before == digest_scene(with_mesh)
     mesh.write_bytes(b"two")
     assert digest_scene(with_mesh) != before
+
+
+def test_the_code_that_decides_a_picture_is_what_its_making_imports() -> None:
+    """Measured in a process of its own: whatever of `studies` making a frame and running a cell load."""
+    script = (
+        "import studies.cell_run, studies.frames, sys; print(*(x for x in sys.modules if x.startswith('studies.')))"
+    )
+    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    assert {name.removeprefix("studies.") for name in loaded} <= set(deciding_modules())
+    assert {"metrics", "truth", "camera", "png", "lit_scene"} <= set(deciding_modules())
+    assert not {"report", "cli", "sweep", "ledger", "workers"} & set(deciding_modules())
 
 
 def test_digests_tell_values_apart_to_the_last_bit_and_not_their_containers() -> None:

@@ -101,6 +101,8 @@ def compared(scene, block, made, lit, direct):
     away = ~maximum_filter(made.emitter_visible, 3)
     emitted = [g.spectrum.band_average(made.wavelength_nm, made.width_nm) * g.power for g in scene.groups.values()]
     variance = np.einsum("gb,gbhw->bhw", np.square(emitted), made.variance.astype(np.float64))
+    if made.shared:
+        variance += made.shared.term(np.array(emitted), made.variance)
     ours = Estimate.of_pixels(lit * away, variance * away, made.passes, block)
     mean, variance = direct.mean(axis=0), direct.var(axis=0, ddof=1) / len(direct)
     return difference(ours, Estimate.of_pixels(mean * away, variance * away, len(direct), block))
