@@ -1,13 +1,14 @@
 """How good the interleaved camera's pictures are, beside its opponents', and whether anything jumps over the light.
 
-Run ``python benchmarks/bench_quality.py transitions``, ``... ranking``, ``... substitution`` or ``... settings``;
-renders are kept in ``out/bench_quality``. Quality is against the noise-free truth at the known exposure scale, as in
-the demo.
+Run ``python benchmarks/bench_quality.py transitions``, ``... ranking``, ``... daylight``, ``... substitution`` or
+``... settings``; renders are kept in ``out/bench_quality``. Quality is against the noise-free truth at the known
+exposure scale, as in the demo.
 
 - transitions: quality over light in half octaves, at a fixed exposure and with auto exposure, and the deepest drop over
   one octave until the colours themselves saturate.
 - ranking: every processor on the same scene, exposure, pixel and well; means over seeds, and the interleaved camera's
   lead over the paper's reference with its 95 % interval (20 seeds for these two, 5 for the others).
+- daylight: bright light, where Bayer samples green twice as densely, with and without W below saturation.
 - substitution: Figure 6's decision, 20 seeds a scene and exposure.
 - settings: sweep of patch, sigma_d and sigma_s that the defaults come from.
 """
@@ -41,6 +42,7 @@ from studies.truth import Light, light_in_bands, neutral_electrons, true_srgb
 
 SIZE = 160
 FIXED_S, LONGEST_S = 0.020, 0.066
+DAYLIGHT_CD_M2 = 1000.0
 OUT = Path("out/bench_quality")
 T_95 = 2.093  # Student's t at 19 degrees of freedom, two-sided 95 %
 
@@ -85,26 +87,27 @@ class Bench:
             name, self.sensor, self.stage.light, self.stage.truth.shape[:2], np.random.default_rng([seed, 0])
         )
 
-    def exposed(self, camera: Camera, level: float, exposure_s: float | None) -> tuple[NDArray[np.float64], float]:
-        """Expected electrons, and the exposure [s]; None: auto exposure of its own."""
+    def exposed(self, camera: Camera, level: float, exposure: float | str) -> tuple[NDArray[np.float64], float]:
+        """Expected electrons, and the exposure [s]; a letter: auto exposure by this channel."""
         if camera.name not in self._images:
             self._images[camera.name] = form_image(self.stage.radiance, camera.sensor)
         image = self._images[camera.name]
         lit = replace(image, values=image.values * level)
-        seconds = auto_exposure_s(lit, camera.sensor, LONGEST_S) if exposure_s is None else exposure_s
-        return expected_electrons(lit, camera.sensor, seconds), seconds
+        if isinstance(exposure, str):
+            exposure = auto_exposure_s(lit, camera.sensor, LONGEST_S, channel=exposure)
+        return expected_electrons(lit, camera.sensor, exposure), exposure
 
-    def shot(self, camera: Camera, level: float, exposure_s: float | None, seed: int) -> Any:
+    def shot(self, camera: Camera, level: float, exposure: float | str, seed: int) -> Any:
         """One photograph, developed and measured."""
-        electrons, seconds = self.exposed(camera, level, exposure_s)
+        electrons, seconds = self.exposed(camera, level, exposure)
         rng = np.random.default_rng([seed, 1])
         white = self.stage.white_cd_m2 * level
         return photograph(camera, electrons, self.stage.truth, self.stage.light, white, seconds, rng)
 
-    def green_snr_db(self, level: float, exposure_s: float | None) -> float:
+    def green_snr_db(self, level: float, exposure: float | str) -> float:
         """Median SNR of a green pixel of the Bayer camera, in expectation."""
         camera = self.camera("bayer", 0)
-        electrons, seconds = self.exposed(camera, level, exposure_s)
+        electrons, seconds = self.exposed(camera, level, exposure)
         green = electrons[mask(camera.sensor.cfa, "G", electrons.shape)]
         dark = self.shot(camera, level, seconds, 0).raw.dark_noise_e
         return float(20 * np.log10(np.median(green / np.sqrt(green + dark**2))))
@@ -113,10 +116,10 @@ class Bench:
 def transitions(bench: Bench, seeds: int) -> dict[str, list[dict[str, float]]]:
     """Quality in half octaves of light, until 1 % of the colours' samples are saturated."""
     curves: dict[str, list[dict[str, float]]] = {}
-    for name, exposure_s in ((f"{FIXED_S * 1e3:g} ms", FIXED_S), ("auto exposure", None)):
+    for name, exposure in ((f"{FIXED_S * 1e3:g} ms", FIXED_S), ("auto exposure", "G")):
         curves[name] = []
         for level in 2.0 ** np.arange(-10, 17, 0.5):
-            shots = [bench.shot(bench.camera("interleaved", s), level, exposure_s, s) for s in range(seeds)]
+            shots = [bench.shot(bench.camera("interleaved", s), level, exposure, s) for s in range(seeds)]
             sites = [mask(shot.raw.cfa, "W", shot.raw.shape) for shot in shots]
             full = [
                 (shot.raw.saturated[at].mean(), shot.raw.saturated[~at].mean())
@@ -169,6 +172,20 @@ def ranking(bench: Bench, levels: Iterable[float]) -> None:
             print(f"  interleaved leads bayer in {label} by {lead.mean():.2f} +- {half:.2f}")
 
 
+def daylight(bench: Bench) -> None:
+    """In bright light, with an exposure by green as all cameras choose it, and one that keeps W below saturation."""
+    for name, channel in (("bayer", "G"), ("bayer_menon", "G"), ("interleaved", "G"), ("interleaved", "W")):
+        shots = [bench.shot(bench.camera(name, s), DAYLIGHT_CD_M2, channel, s) for s in range(5)]
+        white = [float(shot.raw.saturated[mask(shot.raw.cfa, "W", shot.raw.shape)].mean()) for shot in shots]
+        print(
+            f"  {name:12s} exposed for {channel}, {shots[0].raw.exposure_s * 1e3:.3g} ms:"
+            f" {np.mean([shot.quality.psnr_db for shot in shots]):.2f} dB"
+            f"  dE {np.mean([shot.quality.delta_e_median for shot in shots]):.2f}"
+            + (f"  W full {np.mean(white):.2f}" if name == "interleaved" else ""),
+            flush=True,
+        )
+
+
 def substitution(bench: Bench) -> None:
     """Figure 6: 25 cd/m^2 at 5, 10 and 20 ms."""
     for exposure_s in (0.005, 0.010, 0.020):
@@ -207,7 +224,7 @@ def settings(bench: Bench, levels: Sequence[float]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("transitions", "ranking", "substitution", "settings"))
+    parser.add_argument("what", choices=("transitions", "ranking", "daylight", "substitution", "settings"))
     parser.add_argument("--scene", nargs="+", default=["still_life", "color_checker"])
     parser.add_argument("--sensor", nargs="+", default=["low_noise", "table1_output"])
     parser.add_argument("--level", nargs="+", type=float, default=[0.0625, 0.25, 1.0, 4.0, 16.0, 64.0, 256.0])
@@ -223,6 +240,8 @@ def main() -> None:
                 print_transitions(transitions(bench, options.seeds))
             elif options.what == "ranking":
                 ranking(bench, options.level)
+            elif options.what == "daylight":
+                daylight(bench)
             elif options.what == "substitution":
                 substitution(bench)
             else:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from isp.lane_shape import HEAD, PACKET, Pixel, Shape, entry_size, packet_width, whole_packets
-from isp.weighted_sums import FARTHEST, HEADROOM, NEVER, add_exactly, add_quickly, at_least, start_sums
+from isp.weighted_sums import HEADROOM, add_exactly, add_quickly, at_least, start_sums
 from isp.window_sums import window_sums
 from render.jit import arrays, dr
 
@@ -94,21 +94,21 @@ def reconstruct_lanes(frame: Frame, lanes: Lanes, shape: Shape) -> list[tuple[An
     decay = _load_here(frame, lanes, frame.decay, 0, whole_packets(shape.columns), *around, shape)
     first_entry, entries = lanes.list * frame.length, dr.gather(jit.UInt, frame.counts, lanes.list)
 
+    add = add_exactly if shape.exact else add_quickly
+
     def add_offset(k: Any, sums: list[tuple[Any, ...]]) -> tuple[Any, list[tuple[Any, ...]]]:
         entry = _entry(frame, first_entry + k, shape)
         group = lanes.group + dr.reinterpret_array(jit.UInt, entry[0])
         distances = _distances(frame, group, here, entry, shape)
         samples = _samples(frame.samples, group, frame, shape)
         alpha = _samples(frame.alpha, group, frame, shape) if shape.judge == "both" else {}
-        spatial = _spatial(frame, lanes, entry, shape)
+        spatial = entry[3] if shape.exact else entry[3] + HEADROOM
+        inside = _inside(frame, lanes, entry, shape) if shape.bordered else {}
         updated = []
         for pixel, old in zip(shape.pixels, sums, strict=True):
             squared = _beta_squared(distances[pixel], alpha.get(pixel))
-            log_weight = dr.fma(-decay[pixel], squared, spatial[pixel])
-            if shape.exact:
-                updated.append(add_exactly(old, log_weight, spatial[pixel] > FARTHEST, samples[pixel]))
-            else:
-                updated.append(add_quickly(old, log_weight, samples[pixel]))
+            log_weight = dr.fma(-decay[pixel], squared, spatial)
+            updated.append(add(old, log_weight, inside.get(pixel), samples[pixel]))
         return k + 1, updated
 
     start = start_sums(exact=shape.exact, noise=shape.noise)
@@ -211,18 +211,15 @@ def _samples(source: Any, group: Any, frame: Frame, shape: Shape) -> dict[Pixel,
     return {(r, c): lines[r][c] for r, c in shape.pixels}
 
 
-def _spatial(frame: Frame, lanes: Lanes, entry: list[Any], shape: Shape) -> dict[Pixel, Any]:
-    """Log2 of the spatial weight at each y: Omega ends at the frame's border."""
+def _inside(frame: Frame, lanes: Lanes, entry: list[Any], shape: Shape) -> dict[Pixel, Any]:
+    """Whether each y lies in the frame: Omega ends at its border."""
     jit = arrays()
-    inside: Any = entry[3] if shape.exact else entry[3] + HEADROOM
-    if not shape.bordered:
-        return dict.fromkeys(shape.pixels, inside)
     # Unsigned, a negative coordinate is a large one.
     row = jit.UInt(lanes.row) + dr.reinterpret_array(jit.UInt, entry[1])
     column = jit.UInt(lanes.column) + dr.reinterpret_array(jit.UInt, entry[2])
     rows = [row + r < frame.height for r in range(shape.rows)]
-    columns = [dr.select(column + c < frame.width, inside, NEVER) for c in range(shape.columns)]
-    return {(r, c): dr.select(rows[r], columns[c], NEVER) for r, c in shape.pixels}
+    columns = [column + c < frame.width for c in range(shape.columns)]
+    return {(r, c): rows[r] & columns[c] for r, c in shape.pixels}
 
 
 def _beta_squared(distances: list[Any], alpha: Any) -> Any:

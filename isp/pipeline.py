@@ -21,7 +21,6 @@ from isp.substitution import (
 from sensor.raw import RawImage
 
 Image = NDArray[np.float64]
-SATURATION_WINDOW = 5  # pixels over which eq. (6) counts
 
 
 def develop_interleaved(
@@ -109,7 +108,7 @@ def picture_interleaved(
     )
     balanced = clip_highlights(raw, planes * white.gains)
     # W leaves the colours as eq. (6) leaves it out of the similarity: by the share of saturated pixels around.
-    alpha = saturated_fraction(raw, SATURATION_WINDOW)[..., None]
+    alpha = saturated_fraction(raw)[..., None]
     rgb = (1.0 - alpha) * (balanced @ matrix_with_white(matrix, noise, weight).T)
     rgb += alpha * (balanced[..., :3] @ matrix_without_white(matrix, noise).T)
     return Picture(rgb, dict(zip(letters, white.sources, strict=True)), snr, weight > 0.5, result.engine, weight)

@@ -15,12 +15,19 @@ from sensor.raw import RawImage
 
 Plane = NDArray[np.float64]
 
+# Under it PRNU adds less than 1 % to shot noise up to a million electrons, and ln(1 + p) runs out of digits.
+LEAST_PRNU = 1e-4
 
-def stabilise(electrons: NDArray[Any], dark_noise_e: float) -> NDArray[Any]:
-    """Mosaic in units of its own noise: generalised Anscombe transform at unit gain.
 
-    t = 2 sqrt(max(e + 3/8 + s^2, 0)) for Poisson e with Gaussian noise of standard deviation s
-    (Murtagh, Starck & Bijaoui 1995, eq. 7). Its standard deviation is 1 from a few electrons on.
+def stabilise(electrons: NDArray[Any], dark_noise_e: float, prnu: float) -> NDArray[Any]:
+    """Mosaic in units of its own noise: generalised Anscombe transform at unit gain, with PRNU.
+
+    The integral of 1 / sqrt(s^2 + e + 3/8 + (p e)^2), shot noise, dark noise s and PRNU p:
+
+        t = ln(1 + 2 p sqrt(v) + 2 p^2 e') / p,    e' = e + 3/8,    v = s^2 + e' + (p e')^2
+
+    which for p -> 0 is 2 sqrt(e + 3/8 + s^2) (Murtagh, Starck & Bijaoui 1995, eq. 7) less a constant. Its standard
+    deviation is 1 from a few electrons on. Where e' is under 0 PRNU is left out; under -s^2 t stays 0.
 
     Parameters
     ----------
@@ -28,13 +35,19 @@ def stabilise(electrons: NDArray[Any], dark_noise_e: float) -> NDArray[Any]:
         Mosaic [e-].
     dark_noise_e : float
         s, as `RawImage.dark_noise_e` [e-].
+    prnu : float
+        p, as `RawImage.prnu`.
 
     Returns
     -------
     (h, w) of the same type
         Stabilised mosaic [standard deviations of a pixel's noise].
     """
-    return np.asarray(2.0 * np.sqrt(np.maximum(electrons + (0.375 + dark_noise_e**2), 0.0)))
+    if prnu < LEAST_PRNU:
+        return np.asarray(2.0 * np.sqrt(np.maximum(electrons + (0.375 + dark_noise_e**2), 0.0)))
+    seen = np.maximum(electrons + 0.375, 0.0)
+    variance = np.maximum(electrons + (0.375 + dark_noise_e**2), 0.0) + (prnu * seen) ** 2
+    return np.asarray(np.log(1.0 + 2.0 * prnu * np.sqrt(variance) + 2.0 * prnu**2 * seen) / prnu)
 
 
 def tent(radius: int) -> Plane:
@@ -144,12 +157,12 @@ def box_sums(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
     return sums
 
 
-def judged_mosaic(electrons: NDArray[Any], dark_noise_e: float, distance: Distance) -> NDArray[Any]:
-    """The mosaic that patches are read from: in units of noise, or in electrons."""
-    return stabilise(electrons, dark_noise_e) if distance == "noise" else electrons
+def judged_mosaic(electrons: NDArray[Any], raw: RawImage, distance: Distance) -> NDArray[Any]:
+    """The mosaic of `raw` [e-] as patches are read from it: in units of noise, or as it is."""
+    return stabilise(electrons, raw.dark_noise_e, raw.prnu) if distance == "noise" else electrons
 
 
 def planes(raw: RawImage, distance: Distance = "noise") -> Plane:
     """Planes h_i, shape (channel, h, w), in the order of `sensor.cfa.channels`."""
-    mosaic = judged_mosaic(raw.electrons, raw.dark_noise_e, distance)
+    mosaic = judged_mosaic(raw.electrons, raw, distance)
     return np.stack([fill(mosaic, raw.cfa, letter) for letter in channels(raw.cfa)])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
 from isp.planes import Plane, fill, planes
-from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Distance, Reconstruction, Settings
+from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, WINDOW, Distance, Reconstruction, Settings
 from isp.similarity import noise_distance, reliability, saturated_fraction
 from sensor.cfa import channels, mask
 from sensor.raw import RawImage
@@ -95,16 +95,16 @@ def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
         electrons=raw.electrons,
         channel=np.argmax([mask(raw.cfa, letter, raw.shape) for letter in letters], axis=0),
         h=np.pad(planes(raw, settings.distance), ((0, 0), (half, half), (half, half)), mode="reflect"),
-        alpha=saturated_fraction(raw, settings.patch),
-        reliability=_reliability(raw, settings.patch) if in_noise else np.ones(raw.shape),
+        alpha=saturated_fraction(raw),
+        reliability=_reliability(raw) if in_noise else np.ones(raw.shape),
         noise=noise if in_noise else [np.zeros_like(table) for table in noise],
         white=letters.index("W") if "W" in letters else None,
     )
 
 
-def _reliability(raw: RawImage, patch: int) -> Plane:
+def _reliability(raw: RawImage) -> Plane:
     judging_e = fill(raw.electrons, raw.cfa, "W") if "W" in channels(raw.cfa) else raw.electrons
-    return reliability(judging_e, raw.dark_noise_e, patch)
+    return reliability(judging_e, raw.dark_noise_e, WINDOW)
 
 
 def _add_offset(sums: Sums, inputs: _Inputs, settings: Settings, offset: tuple[int, int]) -> None:

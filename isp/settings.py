@@ -13,12 +13,12 @@ from sensor.cfa import Tile
 Distance = Literal["noise", "raw"]
 
 NEIGHBOURHOOD = 21  # Parmar & Wandell 2009, section 3.1: the only one of the four that the paper gives
-PATCH = 5
-# Swept on a textured RGBW scene, W's mean 1 to 5000 e-, dark noise 2 and 30 e-; PSNR averaged over channels and these
-# ten conditions. Best of sigma_d 2..15 and sigma_s 1..24: 18.06 dB at (10, 8); here 17.91, for less blur in bright
-# frames. At 10 e- with 2 e- of noise (10, 4) gains 0.5 dB; at 1000 e- and more (2, 16) to (2, 24) gain 1.5 to 2.
+# Best of 45 over light levels, sensors and scenes (`benchmarks/bench_quality.py settings`, docs/decisions/0015):
+# fine texture rarely repeats, and a patch of one pixel, the bilateral filter, finds what is alike in any light.
+PATCH = 1
 SIGMA_D = 6.0
-SIGMA_S = 8.0
+SIGMA_S = 3.0
+WINDOW = 9  # pixels a side over which eq. (6) counts, and W's SNR is averaged
 SMALLEST_SIGMA = 1e-3  # below it the spatial weight of the next pixel is exp(-5e5) or less: nothing new to ask for
 
 

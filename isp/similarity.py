@@ -6,15 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.planes import Plane, box_sums, fill, tent_weights
+from isp.settings import WINDOW
 from sensor.cfa import Tile
 from sensor.raw import RawImage
 
+SMALLEST_VARIANCE = 1e-30  # [e-^2]: no light on a sensor without noise has no SNR
+MOST_SNR_SQUARED = 1e15  # far beyond where r is 1; its square fits single precision
 
-def saturated_fraction(raw: RawImage, patch: int) -> Plane:
-    """Alpha of eq. (6): the share of saturated pixels in the patch of h_W around each pixel.
 
-    A pixel of h_W counts as saturated where the W plane, filled from digital numbers, is at `raw.saturation_e` or
-    above. Only pixels inside the frame count. A mosaic without W has 1 everywhere: each band judges itself.
+def saturated_fraction(raw: RawImage, window: int = WINDOW) -> Plane:
+    """Alpha of eq. (6): the share of saturated pixels in h_W around each pixel, over `window` pixels a side.
+
+    A pixel of h_W counts as saturated where any sample that fills it is: between a full sample and another the filled
+    value is too low. Only pixels inside the frame count. A mosaic without W has 1 everywhere: each band judges itself.
 
     Returns
     -------
@@ -23,18 +27,19 @@ def saturated_fraction(raw: RawImage, patch: int) -> Plane:
     """
     if "W" not in "".join(raw.cfa):
         return np.ones(raw.shape)
-    return share_of_saturated(fill(raw.dn.astype(np.float32), raw.cfa, "W"), saturation_dn(raw), patch)
+    full = (raw.dn >= saturation_dn(raw)).astype(np.float32)
+    return share_of_saturated(fill(full, raw.cfa, "W") > 0.0, window)
 
 
-def share_of_saturated(white_dn: NDArray[Any], limit_dn: float, patch: int) -> Plane:
-    """`saturated_fraction` of a W plane filled from digital numbers."""
-    saturated = np.pad(white_dn >= limit_dn, patch // 2).astype(np.uint16)
+def share_of_saturated(saturated: NDArray[np.bool_], window: int) -> Plane:
+    """`saturated_fraction` from the saturated pixels of h_W."""
+    padded = np.pad(saturated, window // 2).astype(np.uint16)
     inside = [
-        box_sums(np.pad(np.ones((1, size), np.uint16), ((0, 0), (patch // 2,) * 2)), (1, patch))
-        for size in white_dn.shape
+        box_sums(np.pad(np.ones((1, size), np.uint16), ((0, 0), (window // 2,) * 2)), (1, window))
+        for size in saturated.shape
     ]
     # Small whole numbers: 0 and 1 are exact.
-    return np.asarray(box_sums(saturated, (patch, patch)) / np.asarray(inside[0].T * inside[1], dtype=np.float64))
+    return np.asarray(box_sums(padded, (window, window)) / np.asarray(inside[0].T * inside[1], dtype=np.float64))
 
 
 def saturation_dn(raw: RawImage) -> float:
@@ -42,8 +47,8 @@ def saturation_dn(raw: RawImage) -> float:
     return raw.saturation_e / raw.gain_e_per_dn + raw.black_dn
 
 
-def reliability(judging_e: NDArray[Any], dark_noise_e: float, patch: int) -> NDArray[Any]:
-    """How far similarity can be trusted at each pixel: r of `reliability_of_mean` for the patch around it.
+def reliability(judging_e: NDArray[Any], dark_noise_e: float, window: int) -> NDArray[Any]:
+    """How far similarity can be trusted at each pixel: r of `reliability_of_mean` for the window around it.
 
     Parameters
     ----------
@@ -55,20 +60,23 @@ def reliability(judging_e: NDArray[Any], dark_noise_e: float, patch: int) -> NDA
     Returns
     -------
     (h, w) of the same type
-        0 to 1. Beyond the border the patch goes on by reflection, as the patches h_i do.
+        0 to 1. Beyond the border the window goes on by reflection, as the patches h_i do.
     """
-    mean_e = box_sums(np.pad(judging_e, patch // 2, mode="reflect"), (patch, patch)) / patch**2
+    mean_e = box_sums(np.pad(judging_e, window // 2, mode="reflect"), (window, window)) / window**2
     return reliability_of_mean(mean_e, dark_noise_e)
 
 
 def reliability_of_mean(mean_e: NDArray[Any], dark_noise_e: float) -> NDArray[Any]:
-    """The factor r = snr^2 / (1 + snr^2) on the exponent of the similarity weight, of a patch's mean.
+    """The factor r = snr^4 / (1 + snr^4) on the exponent of the similarity weight.
 
     snr is the mean, 0 or more, over the noise of one sample there, sqrt(mean + dark_noise_e^2). Where it is far under
-    1, patches differ by noise alone, and what is left is the distance weight.
+    1, patches differ by noise alone, and what is left is the distance weight. The fourth power, as the second takes up
+    to 0.25 dB at an SNR of 1 to 3 (docs/decisions/0015).
     """
     signal_e = np.maximum(mean_e, 0.0)
-    return np.asarray(signal_e**2 / (signal_e**2 + signal_e + dark_noise_e**2))
+    noise_squared = np.maximum(signal_e + dark_noise_e**2, SMALLEST_VARIANCE)
+    squared = np.minimum(signal_e * (signal_e / noise_squared), MOST_SNR_SQUARED) ** 2
+    return np.asarray(squared / (1.0 + squared))
 
 
 def noise_distance(tile: Tile, letter: str, patch: int, reach: int) -> NDArray[np.float64]:

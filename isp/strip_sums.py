@@ -28,17 +28,12 @@ class Sums:
         In units of 2^largest; `square` is None where nobody asks for the noise.
     largest : Float
         Log2 of the unit.
-    first_row, last_row, width : UInt
-        Pixels to reconstruct: first and past the last row of the frame, columns.
     """
 
     weight: Any
     value: Any
     square: Any
     largest: Any
-    first_row: Any
-    last_row: Any
-    width: Any
 
 
 def reconstruct_rows(
@@ -126,8 +121,7 @@ def _empty_sums(raw: RawImage, rows: tuple[int, int], pattern: Pattern, noise: b
     size_of_all = tiles * size[0] * whole_packets(size[1]) + PACKET  # the last ones stay empty
     full = [dr.full(jit.Float, value, size_of_all) for value in (0.0, 0.0, 0.0, -HEADROOM)]
     weight, value, square, largest = full
-    opaque = (dr.opaque(jit.UInt, number) for number in (*rows, raw.shape[1]))
-    return Sums(weight, value, square if noise else None, largest, *opaque)
+    return Sums(weight, value, square if noise else None, largest)
 
 
 def _run(frame: Frame, lanes: Lanes, shape: Shape, sums: Sums) -> None:
@@ -135,7 +129,7 @@ def _run(frame: Frame, lanes: Lanes, shape: Shape, sums: Sums) -> None:
     pixels = reconstruct_lanes(frame, lanes, shape)
     failed = dr.full(arrays().Bool, False, dr.width(lanes.row))
     if not shape.exact:
-        for (weight, *_), inside in zip(pixels, _inside(lanes, shape, sums), strict=True):
+        for (weight, *_), inside in zip(pixels, _inside(frame, lanes, shape), strict=True):
             failed |= inside & (weight < LEAST_WEIGHT)
     dr.eval(pixels, failed)  # a scatter straight from the loop would repeat the loop for each array
     _put(pixels, lanes, shape, sums)
@@ -146,11 +140,11 @@ def _run(frame: Frame, lanes: Lanes, shape: Shape, sums: Sums) -> None:
         _run(frame, again, replace(shape, exact=True, bordered=True), sums)
 
 
-def _inside(lanes: Lanes, shape: Shape, sums: Sums) -> list[Any]:
-    """Whether each pixel of a lane is one to reconstruct."""
+def _inside(frame: Frame, lanes: Lanes, shape: Shape) -> list[Any]:
+    """Whether each pixel of a lane lies in the frame; those of other strips too, for all strips to decide alike."""
     unsigned = arrays().UInt
-    rows = [unsigned(lanes.row + r) - sums.first_row < sums.last_row - sums.first_row for r in range(shape.rows)]
-    columns = [unsigned(lanes.column + c) < sums.width for c in range(shape.columns)]
+    rows = [unsigned(lanes.row + r) < frame.height for r in range(shape.rows)]
+    columns = [unsigned(lanes.column + c) < frame.width for c in range(shape.columns)]
     return [rows[r] & columns[c] for r, c in shape.pixels]
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from isp.lane_shape import packet_rows, packet_width, whole_packets
 from isp.planes import fill, judged_mosaic
-from isp.settings import Settings
+from isp.settings import WINDOW, Settings
 from isp.similarity import reliability, saturation_dn, share_of_saturated
 from isp.tiles import Pattern, lane_size
 from sensor.raw import RawImage
@@ -80,8 +80,8 @@ def make_strip(raw: RawImage, rows: tuple[int, int], pattern: Pattern, settings:
     top, left = top - (top + half - pattern.start[0]) % pair, left - (left + half - pattern.start[1]) % across
     height = -(-(rows[1] + lane[0] + around - top) // pair) * pair
     groups = -(-(raw.shape[1] + lane[1] + around - left) // across) + packet_width(lane[1], settings.patch)
-    # Half a patch for sums over patches, and twice a tile for tents, from a row with the phase of the frame's first.
-    margin = half + 2 * max(pattern.size)
+    # Half a patch or window for their sums, and twice a tile for tents, from a row with the phase of the frame's first.
+    margin = max(half, WINDOW // 2) + 2 * max(pattern.size)
     last = min(top + height + margin, raw.shape[0])
     first = max(min(top - margin, last - 2 * margin), 0) // down * down
     part = replace(raw, dn=raw.dn[first:last])
@@ -89,7 +89,8 @@ def make_strip(raw: RawImage, rows: tuple[int, int], pattern: Pattern, settings:
     white_dn = fill(dn, raw.cfa, "W") if pattern.white is not None else None
     alpha = None
     if white_dn is not None and float(white_dn.max()) >= saturation_dn(raw):
-        alpha = share_of_saturated(white_dn, saturation_dn(raw), settings.patch)
+        full = (dn >= saturation_dn(raw)).astype(np.float32)
+        alpha = share_of_saturated(fill(full, raw.cfa, "W") > 0.0, WINDOW)
     return Strip(pattern, settings, rows, top, left, height, groups, part, first, dn, white_dn, alpha)
 
 
@@ -97,7 +98,7 @@ def plane_groups(strip: Strip, numbers: list[int]) -> Array:
     """Planes h_i of some letters for `isp.kernel.Frame.h`."""
     lane, letters = lane_size(strip.pattern, "white"), strip.pattern.letters
     width = packet_width(lane[1], strip.settings.patch)
-    mosaic = judged_mosaic(_electrons(strip, strip.dn), strip.part.dark_noise_e, strip.settings.distance)
+    mosaic = judged_mosaic(_electrons(strip, strip.dn), strip.part, strip.settings.distance)
     result = _empty_groups(strip, (len(numbers),), width)
     for target, number in zip(result, numbers, strict=True):
         _group(fill(mosaic, strip.part.cfa, letters[number]), strip, 0, target)
@@ -117,7 +118,7 @@ def decay(strip: Strip) -> Array:
     if strip.settings.distance == "raw":
         return np.full(strip.dn.shape, factor)
     judging_dn = strip.dn if strip.white_dn is None else strip.white_dn
-    return reliability(_electrons(strip, judging_dn), strip.part.dark_noise_e, strip.settings.patch) * factor
+    return reliability(_electrons(strip, judging_dn), strip.part.dark_noise_e, WINDOW) * factor
 
 
 def _electrons(strip: Strip, dn: Array) -> Array:

@@ -199,8 +199,8 @@ def sort_tiles(
     elif alpha is None:
         some = whole = np.zeros_like(inside)
     else:
-        box = [np.clip(top, 0, None), np.clip(bottom, None, shape[0])]
-        box += [np.clip(left, 0, None), np.clip(right, None, shape[1])]
+        box = [np.clip(edge, 0, shape[0]) for edge in (top, bottom)]
+        box += [np.clip(edge, 0, shape[1]) for edge in (left, right)]
         area = (box[1] - box[0]) * (box[3] - box[2])
         counts = [_count(condition, first_row, *box) for condition in (alpha > 0.0, alpha >= 1.0)]
         some, whole = counts[0] > 0, counts[1] == area

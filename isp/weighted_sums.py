@@ -12,7 +12,6 @@ from render.jit import arrays, dr
 HEADROOM = 55.0  # log2: squares of weights, and 16-bit samples times weights, 10^5 of each, stay under 2^127
 LOWEST_EXPONENT = -62.0  # weights end here: their squares are still normal numbers, which all processors treat alike
 LEAST_WEIGHT = 2.0**-30  # 441 weights that end at 2^-62 are 1e-7 of it
-NEVER = -1e30  # log weight of a pixel outside the frame
 FARTHEST = -1e28  # log weights end here, far under any that comes from sigmas of 0.001 and 16 bits
 NOTHING = -1e29  # largest log weight before the first sample
 # 2^f for 0 <= f <= 1, lowest power first: minimax of the relative error, 7.5e-5 (Remez exchange). Two samples that
@@ -31,21 +30,27 @@ def start_sums(*, exact: bool, noise: bool) -> tuple[float, ...]:
     return (0.0, 0.0) + (0.0,) * noise + (NOTHING,) * exact
 
 
-def add_quickly(sums: tuple[Any, ...], log_weight: Any, sample: Any) -> tuple[Any, ...]:
-    """Add one sample in fixed units; the log weight has HEADROOM added."""
+def add_quickly(sums: tuple[Any, ...], log_weight: Any, inside: Any, sample: Any) -> tuple[Any, ...]:
+    """Add one sample in fixed units where `inside`, or everywhere where that is None.
+
+    The log weight has HEADROOM added.
+    """
     weight, value, *square = sums
     new = _exp2(at_least(log_weight, LOWEST_EXPONENT))
+    if inside is not None:
+        new = dr.select(inside, new, 0.0)
     return weight + new, dr.fma(new, sample, value), *(dr.fma(new, new, old) for old in square)
 
 
 def add_exactly(sums: tuple[Any, ...], log_weight: Any, inside: Any, sample: Any) -> tuple[Any, ...]:
     """Add one sample where `inside`, in units of the largest weight: it counts as 1, so W_y is never 0."""
     weight, value, *square, largest = sums
-    bounded = dr.select(inside, at_least(log_weight, FARTHEST), NEVER)
+    bounded = dr.select(inside, at_least(log_weight, FARTHEST), largest)
     ahead = bounded - largest
     smaller = _exp2(at_least(-dr.abs(ahead), LOWEST_EXPONENT))  # one exponential: of the two weights the larger is 1
     is_larger = ahead > 0.0
-    old, new = dr.select(is_larger, smaller, 1.0), dr.select(is_larger, 1.0, smaller)
+    old = dr.select(is_larger, smaller, 1.0)
+    new = dr.select(inside, dr.select(is_larger, 1.0, smaller), 0.0)
     return (
         dr.fma(weight, old, new),
         dr.fma(value, old, new * sample),

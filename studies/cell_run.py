@@ -211,7 +211,7 @@ def _expose(cell: Cell, expected_e: Image, device: Device, rng: np.random.Genera
         return read_out(expected_e, cell.sensor, device, cell.exposure_s, rng)
     single = expected_e.astype(np.float32)
     dn = read_frame(single, cell.sensor, device, cell.exposure_s, draw_key(rng))
-    return as_raw(dn, cell.sensor, cell.exposure_s, engine=backend())
+    return as_raw(dn, cell.sensor, cell.exposure_s, engine=backend(), hot=device.hot)
 
 
 def _monte_carlo_share(cell: Cell, expected_e: Image) -> float:

@@ -8,7 +8,7 @@ import pytest
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.reference import reconstruct_reference, reference_with_noise, sum_weights
-from isp.settings import SIGMA_D, Settings
+from isp.settings import SIGMA_D, WINDOW, Settings
 from isp.similarity import noise_distance, saturated_fraction
 from isp.tiles import number_tile, sort_tiles
 from render.errors import InputError
@@ -100,13 +100,21 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
         bias = noise[i][x[0] % 2, x[1] % 2, y[0] - x[0] + reach, y[1] - x[1] + reach]
         return math.sqrt(max(total - bias, 0.0))
 
+    window = list(product(range(-(WINDOW // 2), WINDOW // 2 + 1), repeat=2))
+
     def trust(x):
-        signal = max(sum(white[reflect(x[0] + a[0], height), reflect(x[1] + a[1], width)] for a in steps), 0.0)
-        squared = (signal / patch**2) ** 2 / (signal / patch**2 + raw.dark_noise_e**2)
-        return squared / (1 + squared)
+        mean = sum(white[reflect(x[0] + a[0], height), reflect(x[1] + a[1], width)] for a in window) / WINDOW**2
+        squared = max(mean, 0.0) ** 2 / (max(mean, 0.0) + raw.dark_noise_e**2)
+        return squared**2 / (1 + squared**2)
+
+    full = {y: raw.electrons[y] >= raw.saturation_e and letters[y] == "W" for y in np.ndindex(raw.shape)}
+
+    def filled_from_full(y):
+        around = [y] if letters[y] == "W" else [(y[0] + a, y[1] + b) for a, b in product((-1, 0, 1), repeat=2)]
+        return any(full.get(s, False) for s in around)
 
     def alpha(y):
-        near = [white[s] >= raw.saturation_e for a in steps if (s := (y[0] + a[0], y[1] + a[1])) in white]
+        near = [filled_from_full(s) for a in window if (s := (y[0] + a[0], y[1] + a[1])) in white]
         return sum(near) / len(near)
 
     for x in np.ndindex(raw.shape):
@@ -159,7 +167,7 @@ def single_precision(raw, settings):
 @pytest.mark.parametrize(("shape", "tile", "level", "seed"), KERNEL_CASES)
 def test_kernel_is_the_reference_in_single_precision(shape, tile, level, seed, sigma_s):
     raw = scene(shape, level, tile, seed)
-    kernel = reconstruct_with_noise(raw, sigma_s=sigma_s)
+    kernel = reconstruct_with_noise(raw, patch=5, sigma_s=sigma_s)
     settings = Settings(21, 5, 6.0, sigma_s)
     reference = reference_with_noise(raw, settings)
     assert kernel.engine == backend()
@@ -168,7 +176,7 @@ def test_kernel_is_the_reference_in_single_precision(shape, tile, level, seed, s
 
 
 def test_all_three_ways_to_judge_occur_in_the_partly_saturated_frames():
-    alpha = saturated_fraction(scene((40, 31), 2500.0, seed=3), 5)
+    alpha = saturated_fraction(scene((40, 31), 2500.0, seed=3))
     assert (alpha == 0.0).any()
     assert ((alpha > 0.0) & (alpha < 1.0)).any()
     assert (alpha == 1.0).any()
@@ -184,7 +192,7 @@ def half_saturated(turns=0):
 @pytest.mark.parametrize("turns", [0, 1, 2, 3])
 def test_lanes_of_every_kind_are_the_reference(turns):
     raw, settings = half_saturated(turns), Settings(21, 5, 6.0, 20.0)  # so large that both halves count
-    alpha = saturated_fraction(raw, 5)
+    alpha = saturated_fraction(raw)
     work = sort_tiles(raw.shape, (0, raw.shape[0]), alpha, 0, number_tile(RGBW), settings.reach)
     assert {kind for kind, lanes in work.items() if len(lanes.row)} == {
         ("white", False),
@@ -192,17 +200,17 @@ def test_lanes_of_every_kind_are_the_reference(turns):
         ("band", True),
         ("both", True),
     }
-    error = np.abs(reconstruct(raw, sigma_s=20.0) - reconstruct_reference(raw, sigma_s=20.0))
+    error = np.abs(reconstruct(raw, patch=5, sigma_s=20.0) - reconstruct_reference(raw, patch=5, sigma_s=20.0))
     assert error.max() < 4e-5 * FULL
 
 
 @pytest.mark.skipif(backend() == "numpy", reason="nothing is compiled without Dr.Jit")
 def test_other_sizes_sigmas_and_phases_run_the_kernels_that_are_compiled_already():
-    reconstruct(half_saturated())
+    reconstruct(half_saturated(), patch=5)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         for turns, sigma in ((1, 3.0), (3, math.inf)):
-            reconstruct(half_saturated(turns), sigma_d=sigma, sigma_s=2.0 * sigma)
-        reconstruct(scene((33, 65), 2500.0, ("WB", "GR")), neighbourhood=15)
+            reconstruct(half_saturated(turns), patch=5, sigma_d=sigma, sigma_s=2.0 * sigma)
+        reconstruct(scene((33, 65), 2500.0, ("WB", "GR")), patch=5, neighbourhood=15)
         history = [kernel for kernel in dr.kernel_history() if "cache_hit" in kernel]
     assert len(history) > 6
     assert all(kernel["cache_hit"] for kernel in history)
@@ -236,7 +244,7 @@ def test_extreme_input_gives_finite_results_within_the_range_of_the_samples(name
         if function == "reference":
             result = reference_with_noise(raw, Settings(21, 5, sigma_d, sigma_s))
         else:
-            result = function(raw, sigma_d=sigma_d, sigma_s=sigma_s)
+            result = function(raw, patch=5, sigma_d=sigma_d, sigma_s=sigma_s)
         letters, electrons = letter_map(RGBW, raw.shape), raw.electrons
         for i, letter in enumerate(channels(RGBW)):
             samples = electrons[letters == letter]
@@ -251,7 +259,7 @@ def test_extreme_input_gives_finite_results_within_the_range_of_the_samples(name
 def test_with_a_tiny_sigma_the_result_lies_among_the_samples_that_tie_for_the_best(sigma_s):
     """Single precision can't tell log weights apart that differ by its rounding: any mean of those samples is right."""
     raw = scene((8, 9), 2500.0)
-    result = reconstruct(raw, neighbourhood=11, sigma_s=sigma_s)
+    result = reconstruct(raw, neighbourhood=11, patch=5, sigma_s=sigma_s)
     largest = 2 * math.sqrt(raw.electrons.max() + raw.dark_noise_e**2 + 3 / 8)
     for place, log_weights, values in transcription(raw, 11, 5, SIGMA_D, sigma_s):
         distance = -log_weights.max() * 2 * sigma_s**2

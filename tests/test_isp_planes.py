@@ -5,9 +5,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from isp.planes import fill, stabilise, tent_radius, tent_weights
+from isp.planes import LEAST_PRNU, fill, stabilise, tent_radius, tent_weights
 from sensor.cfa import BAYER, RGBW, channels, mask
-from sensor.raw import RawImage
 
 RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
 SPARSE = ("RGGG", "GGGG", "GGGG", "GGGG")
@@ -61,15 +60,40 @@ def test_weights_are_what_fill_does_inside_a_frame(tile):
             assert plane[row, column] == pytest.approx((w * around).sum(), abs=1e-13)
 
 
+@pytest.mark.parametrize("prnu", [0.0, 0.017, 0.1])
 @pytest.mark.parametrize("mean_e", [20.0, 300.0, 8000.0])
-def test_stabilised_noise_has_unit_variance(mean_e):
+def test_stabilised_noise_has_unit_variance(mean_e: float, prnu: float) -> None:
     rng = np.random.default_rng(7)
-    electrons = rng.poisson(mean_e, (400, 400)) + rng.normal(0.0, 3.0, (400, 400))
-    raw = RawImage(np.round(electrons + 100).astype(np.uint16), RGBW, 100.0, 16000.0, 1.0, 3.0, 0.0, 0.0, 0.01)
-    # 160 000 samples: the variance's standard error is 0.35 %; 5 of them and 1 % for the transform's own error.
-    assert stabilise(raw.electrons, raw.dark_noise_e).var() == pytest.approx(1.0, abs=0.028)
+    response = 1.0 + prnu * rng.standard_normal((400, 400))
+    electrons = rng.poisson(mean_e * np.maximum(response, 0.0)) + rng.normal(0.0, 3.0, (400, 400))
+    # 160 000 samples: the variance's standard error is 0.35 %; 5 of them and 1 % for the transform's own error, which a
+    # relative noise p adds to by some p^2 (the curvature of a logarithm).
+    bound = 0.028 + prnu**2 * 3
+    assert stabilise(electrons, 3.0, prnu).var() == pytest.approx(1.0, abs=bound)
 
 
-def test_stabilised_mosaic_is_0_far_under_black():
-    raw = RawImage(np.zeros((2, 2), np.uint16), RGBW, 100.0, 16000.0, 1.0, 3.0, 0.0, 0.0, 0.01)
-    assert np.array_equal(stabilise(raw.electrons, raw.dark_noise_e), np.zeros((2, 2)))
+def test_without_prnu_it_is_anscombes_and_a_little_changes_little() -> None:
+    electrons = np.array([0.0, 5.0, 100.0, 1e4, 1e6])
+    expected = 2 * np.sqrt(electrons + 0.375 + 9.0)
+    assert stabilise(electrons, 3.0, 0.0) == pytest.approx(expected, rel=1e-12)
+    least = stabilise(electrons, 3.0, LEAST_PRNU)  # less a constant that the distance of patches doesn't see
+    assert least - least[0] == pytest.approx(expected - expected[0], rel=2e-3)
+
+
+def test_its_slope_is_one_over_the_noise() -> None:
+    electrons = np.array([1.0, 30.0, 1000.0, 15000.0])
+    slope = (stabilise(electrons + 0.01, 2.0, 0.017) - stabilise(electrons - 0.01, 2.0, 0.017)) / 0.02
+    noise = np.sqrt(4.0 + electrons + 0.375 + (0.017 * (electrons + 0.375)) ** 2)
+    assert slope == pytest.approx(1 / noise, rel=1e-5)
+
+
+def test_single_precision_holds_its_digits() -> None:
+    electrons = np.linspace(-20.0, 15000.0, 10_000)
+    single = stabilise(electrons.astype(np.float32), 2.0, 0.017)
+    assert single.dtype == np.float32
+    assert single == pytest.approx(stabilise(electrons, 2.0, 0.017), abs=5e-5)
+
+
+@pytest.mark.parametrize("prnu", [0.0, 0.017])
+def test_stabilised_mosaic_is_0_far_under_black(prnu: float) -> None:
+    assert np.array_equal(stabilise(np.full((2, 2), -100.0), 3.0, prnu), np.zeros((2, 2)))

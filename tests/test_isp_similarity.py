@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from isp.planes import fill
-from isp.similarity import noise_distance, saturated_fraction
+from isp.settings import WINDOW
+from isp.similarity import noise_distance, reliability, reliability_of_mean, saturated_fraction
 from sensor.cfa import BAYER, RGBW, channels
 from sensor.raw import RawImage
 
@@ -20,26 +21,52 @@ def raw_image(electrons, tile=RGBW):
 def test_alpha_is_1_in_a_saturated_frame_and_0_in_a_dark_one(shape, tile):
     shape = tuple(max(size, len(tile)) for size in shape)
     noise = np.random.default_rng(0).uniform(-4.0, 4.0, shape)  # the well clips before the noise comes
-    assert np.array_equal(saturated_fraction(raw_image(1000.0 + noise, tile), 5), np.ones(shape))
-    assert np.array_equal(saturated_fraction(raw_image(10.0 + noise, tile), 5), np.zeros(shape))
+    assert np.array_equal(saturated_fraction(raw_image(1000.0 + noise, tile)), np.ones(shape))
+    assert np.array_equal(saturated_fraction(raw_image(10.0 + noise, tile)), np.zeros(shape))
 
 
-def test_alpha_counts_the_pixels_of_the_patch_that_lie_in_the_frame():
-    electrons = np.zeros((8, 8))
-    electrons[3, 3] = electrons[3, 5] = 1000.0  # two W sites: the plane is saturated there and between them
-    alpha = saturated_fraction(raw_image(electrons), 3)
-    assert alpha[3, 4] == pytest.approx(3 / 9)
-    assert alpha[3, 2] == pytest.approx(1 / 9)
-    assert alpha[5, 4] == 0.0
-    electrons = np.zeros((8, 8))
-    electrons[1, 1] = 1000.0  # row and column 0 have no sample but this one in reach
-    alpha = saturated_fraction(raw_image(electrons), 3)
-    assert alpha[0, 0] == 1.0
-    assert alpha[0, 1] == pytest.approx(4 / 6)
+def test_alpha_counts_every_pixel_that_a_full_sample_fills_inside_the_frame() -> None:
+    electrons = np.zeros((24, 24))
+    electrons[11, 11] = 1000.0  # a W site: it and the eight around it are filled from it
+    alpha = saturated_fraction(raw_image(electrons))
+    assert WINDOW == 9
+    assert alpha[11, 11] == pytest.approx(9 / 81, rel=1e-12)
+    assert alpha[11, 16] == pytest.approx(3 / 81, rel=1e-12)
+    assert alpha[16, 16] == pytest.approx(1 / 81, rel=1e-12)
+    assert alpha[11, 17] == 0.0
+    electrons = np.zeros((24, 24))
+    electrons[1, 1] = 1000.0
+    assert saturated_fraction(raw_image(electrons))[0, 0] == pytest.approx(9 / 25, rel=1e-12)
+
+
+def test_a_filled_pixel_beside_a_full_sample_counts_though_its_value_is_under_saturation() -> None:
+    electrons = np.zeros((24, 24))
+    electrons[11, 11] = 1000.0
+    raw = raw_image(electrons)
+    assert fill(raw.electrons, RGBW, "W")[11, 12] < raw.saturation_e
+    assert saturated_fraction(raw)[11, 12] == pytest.approx(9 / 81, rel=1e-12)
 
 
 def test_alpha_is_1_without_w():
-    assert np.array_equal(saturated_fraction(raw_image(np.zeros((4, 6)), BAYER), 5), np.ones((4, 6)))
+    assert np.array_equal(saturated_fraction(raw_image(np.zeros((4, 6)), BAYER)), np.ones((4, 6)))
+
+
+def test_similarity_is_trusted_by_the_fourth_power_of_snr() -> None:
+    dark = 3.0
+    means = np.array([-5.0, 0.0, 1.0, 3.54138127, 10.0, 1e4])  # 3.541 e- over sqrt(3.541 + 9): an SNR of 1
+    snr = np.maximum(means, 0.0) / np.sqrt(np.maximum(means, 0.0) + dark**2)
+    assert reliability_of_mean(means, dark) == pytest.approx(snr**4 / (1 + snr**4), rel=1e-9, abs=1e-15)
+    assert reliability_of_mean(means, dark)[3] == pytest.approx(0.5, abs=1e-6)
+    assert reliability_of_mean(np.array([0.0, 4.0]), 0.0) == pytest.approx([0.0, 16 / 17], rel=1e-9)
+
+
+def test_the_mean_is_that_of_w_around_each_pixel() -> None:
+    electrons = np.zeros((24, 24))
+    electrons[1::2, 1::2] = 50.0  # W's sites alone
+    judging = fill(electrons, RGBW, "W")
+    assert reliability(judging, 3.0, WINDOW) == pytest.approx(
+        reliability_of_mean(np.full((24, 24), 50.0), 3.0), rel=1e-12
+    )
 
 
 def test_a_single_plane_of_independent_pixels_has_twice_the_patch_area():

@@ -1,0 +1,92 @@
+"""Strips: the same bits whatever their height, and memory that stays bounded."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from isp.interleaved import reconstruct, reconstruct_with_noise
+from isp.strips import strip_rows
+from isp.tiles import lane_size, number_tile
+from render.jit import backend
+from sensor.cfa import BAYER, RGBW
+from sensor.raw import RawImage
+
+RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
+
+pytestmark = pytest.mark.skipif(backend() == "numpy", reason="strips serve the kernel alone")
+
+
+def frame(tile, shape=(85, 61)):
+    """Noise over a ramp into saturation, with a full square, and a black corner."""
+    rng = np.random.default_rng(5)
+    level = np.linspace(10.0, 2200.0, shape[1])[None, :] * np.ones(shape)
+    level[40:52, 20:33] = 1e5
+    level[:9, :9] = 0.0
+    dn = np.round(np.minimum(rng.poisson(level), 4000) + rng.normal(100.0, 2.0, shape))
+    return RawImage(dn.astype(np.uint16), tile, 100.0, 4100.0, 1.0, 2.0, 0.0, 0.0, 0.01)
+
+
+@pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4])
+@pytest.mark.parametrize("sigma_s", [8.0, 0.5])  # the small one needs exact sums in places
+def test_the_height_of_strips_changes_no_bit(tile, sigma_s, monkeypatch):
+    raw = frame(tile)
+    whole = reconstruct_with_noise(raw, sigma_s=sigma_s)
+    for height in (1, 2, 5):  # lanes a strip
+        lane = lane_size(number_tile(tile), "white")[0]
+        monkeypatch.setattr("isp.interleaved.strip_rows", lambda *_, rows=height * lane: rows)
+        strips = reconstruct_with_noise(raw, sigma_s=sigma_s)
+        assert np.array_equal(strips.estimate, whole.estimate)
+        assert np.array_equal(strips.noise_gain, whole.noise_gain)
+
+
+def test_asking_for_the_noise_changes_no_bit_of_the_estimate():
+    raw = frame(RGBW)
+    assert np.array_equal(reconstruct(raw), reconstruct_with_noise(raw).estimate)
+
+
+def test_strips_are_whole_lanes_and_fewer_rows_the_wider_the_frame():
+    pattern = number_tile(RGBW)
+    rows = [strip_rows(width, pattern, 5) for width in (100, 4000, 12_000, 10**9)]
+    assert all(count % lane_size(pattern, "white")[0] == 0 for count in rows)
+    assert rows == sorted(rows, reverse=True)
+    assert rows[-1] == lane_size(pattern, "white")[0]
+    assert 1.5e6 < rows[1] * 4000 < 3e6
+
+
+MEASURE = """
+import json, resource, sys
+import numpy as np
+from isp.interleaved import reconstruct
+from sensor.raw import RawImage
+height, width = int(sys.argv[1]), int(sys.argv[2])
+dn = np.full((height, width), 120, np.uint16)
+dn += np.random.default_rng(0).integers(0, 60, width, dtype=np.uint16)
+dn[height // 2 : height // 2 + 64] = 4100
+raw = RawImage(dn, ("RG", "BW"), 100.0, 4100.0, 1.0, 2.0, 0.0, 0.0, 0.01)
+result = reconstruct(raw, neighbourhood=int(sys.argv[3]))
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+print(json.dumps({"peak": peak, "finite": bool(np.isfinite(result).all()), "shape": result.shape}))
+"""
+
+
+def peak_bytes(height, width, neighbourhood):
+    arguments = [sys.executable, "-c", MEASURE, str(height), str(width), str(neighbourhood)]
+    found = json.loads(subprocess.run(arguments, check=True, capture_output=True, text=True).stdout)
+    assert found["finite"]
+    assert found["shape"] == [height, width, 4]
+    return found["peak"]
+
+
+@pytest.mark.slow
+def test_a_hundred_megapixels_take_less_than_6_gb():
+    # The raw image 0.2 GB, the result 1.6 GB, a strip 0.4 GB.
+    assert peak_bytes(8_700, 11_500, 5) < 6e9
+
+
+@pytest.mark.slow
+def test_memory_beside_the_result_does_not_grow_with_the_frame():
+    small, large = (peak_bytes(rows, 4000, 5) - rows * 4000 * 18 for rows in (1500, 6000))
+    assert large < small + 0.3e9
