@@ -1,10 +1,18 @@
-"""How long the interleaved reconstruction takes for one megapixel, 21x21 neighbourhood and 5x5 patches.
+"""Speed and error of the interleaved reconstruction, beside other non-local means, in one run.
 
-Run ``python benchmarks/bench_isp.py``. It prints the environment, then the first call in a fresh process with an empty
-kernel cache (compilation included), then the best of three calls, preparation included, on frames that take the
-kernel's different ways: dark (W judges similarity), a few per cent saturated, saturated throughout (each band judges
-itself), and at the edge of saturation (both judge nearly everywhere). Ratios are against OpenCV's fast non-local means
-on one 8-bit plane of the same size with the same windows, where `cv2` is installed; compare ratios of one run.
+Run ``python benchmarks/bench_isp.py`` (five to ten minutes; ``--large`` adds 24 megapixels). It prints the environment,
+the first call in a fresh process with an empty kernel cache, then
+
+- one megapixel, 21x21 and 5x5, on frames that take the kernel's different ways, preparation included;
+- what others take: OpenCV's ``fastNlMeansDenoising`` on one 8-bit plane with the same windows (the yardstick of the
+  ratios) and ``fastNlMeansDenoisingColored``, where `cv2` is installed, and scikit-image's ``denoise_nl_means`` on four
+  planes;
+- Mpx/s and error by patch, neighbourhood and way, the best trades marked: nothing faster in the table is as accurate
+  and looks as far;
+- the time a megapixel from 0.25 megapixels up.
+
+Times are the best of several calls, on the clock and in CPU seconds of all threads; where other programs run, trust
+the latter, and ratios of one run. Everything runs on CUDA where a device answers.
 """
 
 import os
@@ -17,8 +25,12 @@ from importlib.util import find_spec
 
 import numpy as np
 from environment import print_environment
+from skimage.restoration import denoise_nl_means
 
 from isp.interleaved import reconstruct
+from isp.reference import reconstruct_reference
+from isp.settings import PATCH, SIGMA_S
+from render.jit import backend
 from sensor.cfa import RGBW, letter_map
 from sensor.raw import RawImage
 
@@ -26,64 +38,132 @@ SIZE = 1024
 FULL_E = 15000.0
 READ_NOISE_E = 2.0
 BLACK = 20.0
+PATCHES = {"patch": 5, "sigma_s": 8.0}  # of the comparisons: the default, one pixel a patch, is faster
 
 
-def frame(mean_w_e: float, saturated_disc: float = 0.0, size: int = SIZE) -> RawImage:
+def frame(mean_w_e: float, saturated_disc: float = 0.0, size: int = SIZE, height: int | None = None) -> RawImage:
     """Textured RGBW frame; a disc over `saturated_disc` of its area is far brighter."""
-    rng = np.random.default_rng(0)
-    y, x = np.indices((size, size))
+    rng, shape = np.random.default_rng(0), (height or size, size)
+    y, x = np.indices(shape, dtype=np.float32)
     base = 1.0 + 0.5 * np.sin(x / 37.0) * np.cos(y / 23.0) + 0.4 * ((x // 24 + y // 40) % 2)
-    base[(x - size / 2) ** 2 + (y - size / 2) ** 2 < saturated_disc * size**2 / np.pi] = 1e4
-    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(letter_map(RGBW, (size, size)))
+    base[(x - size / 2) ** 2 + (y - shape[0] / 2) ** 2 < saturated_disc * base.size / np.pi] = 1e4
+    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(letter_map(RGBW, (2, 2)))
+    response = np.tile(response, (-(-shape[0] // 2), -(-shape[1] // 2)))[: shape[0], : shape[1]]
     electrons = np.minimum(rng.poisson(mean_w_e * base * response), FULL_E)
-    dn = np.round(electrons + rng.normal(BLACK, READ_NOISE_E, (size, size)))
+    dn = np.round(electrons + rng.normal(BLACK, READ_NOISE_E, shape))
     return RawImage(
         np.clip(dn, 0, 65535).astype(np.uint16), RGBW, BLACK, BLACK + FULL_E, 1.0, READ_NOISE_E, 0.0, 0.0, 0.01
     )
 
 
-def best(function: Callable[[], object], repeats: int = 3) -> float:
-    """Shortest of several calls [s], after one that doesn't count."""
+def best(function: Callable[[], object], repeats: int = 3) -> tuple[float, float]:
+    """Shortest of several calls [s] after one that doesn't count: on the clock, and in CPU time."""
     function()
-    times = []
+    clock, cpu = [], []
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = time.perf_counter(), time.process_time()
         function()
-        times.append(time.perf_counter() - start)
-    return min(times)
+        clock.append(time.perf_counter() - start[0])
+        cpu.append(time.process_time() - start[1])
+    return min(clock), min(cpu)
 
 
 def first_call() -> None:
-    """Time of the first call in this process, on a small frame that takes both of the kernel's ways."""
-    small = frame(14000.0, size=64)
-    start = time.perf_counter()
-    reconstruct(small)
-    print(f"first call, 64x64, compilation included: {time.perf_counter() - start:.2f} s", flush=True)
+    """Time of the first calls in this process: two small frames that between them run every quick kernel."""
+    # Wide enough for lanes that lie inside, and with edges of saturation.
+    small, edge = frame(300.0, size=96), frame(14000.0, size=96)
+    start = time.perf_counter(), time.process_time()
+    reconstruct(small, **PATCHES)
+    reconstruct(edge, **PATCHES)
+    seconds = time.perf_counter() - start[0], time.process_time() - start[1]
+    print(f"first calls, four kernels compiled: {seconds[0]:.2f} s, {seconds[1]:.2f} CPU s", flush=True)
+
+
+def others() -> tuple[float, float] | None:
+    """Time the other libraries; OpenCV's on one plane is returned."""
+    planes = np.random.default_rng(0).integers(0, 256, (SIZE, SIZE, 4), dtype=np.uint8)
+    yardstick = None
+    if find_spec("cv2"):
+        import cv2
+
+        plane, colour = planes[..., 0].copy(), planes[..., :3].copy()
+        yardstick = best(lambda: cv2.fastNlMeansDenoising(plane, None, 10.0, 5, 21))
+        print_time(f"OpenCV {cv2.__version__} fastNlMeansDenoising, one plane", yardstick, yardstick)
+        coloured = best(lambda: cv2.fastNlMeansDenoisingColored(colour, None, 10.0, 10.0, 5, 21), 1)
+        print_time("OpenCV fastNlMeansDenoisingColored, three planes", coloured, yardstick)
+    else:
+        print("OpenCV isn't installed (pip install opencv-python-headless): no ratios")
+    four = planes.astype(np.float32) / 255.0
+    settings = {"patch_size": 5, "patch_distance": 10, "h": 0.1, "fast_mode": True, "channel_axis": -1}
+    slow = best(lambda: denoise_nl_means(four, **settings), 1)
+    print_time("scikit-image denoise_nl_means, four planes together", slow, yardstick)
+    return yardstick
+
+
+def print_time(name: str, seconds: tuple[float, float], yardstick: tuple[float, float] | None) -> None:
+    ratio = "" if yardstick is None else f"; {seconds[0] / yardstick[0]:.2f} and {seconds[1] / yardstick[1]:.2f} x"
+    print(f"{name}: {seconds[0]:.3f} s, {seconds[1]:.3f} CPU s{ratio}", flush=True)
+
+
+def ways(yardstick: tuple[float, float] | None) -> None:
+    """Frames that take the kernel's different ways."""
+    frames = {
+        "one pixel a patch, the default": (frame(300.0), {"patch": PATCH, "sigma_s": SIGMA_S}),
+        "nothing saturated (W judges)": (frame(300.0), {}),
+        "5 % saturated": (frame(3000.0, saturated_disc=0.05), {}),
+        "all saturated (each band judges itself)": (frame(1e6), {}),
+        "at the edge of saturation (both judge)": (frame(14000.0), {}),
+        "sigma_s = 0.5 (exact sums nearly everywhere)": (frame(300.0), {"sigma_s": 0.5}),
+        "7x7 patches, nothing saturated": (frame(300.0), {"patch": 7}),
+        "raw distance": (frame(300.0), {"distance": "raw", "sigma_s": 50.0}),
+    }
+    for name, (raw, settings) in frames.items():
+        print_time(
+            name, best(lambda raw=raw, settings=settings: reconstruct(raw, **{**PATCHES, **settings})), yardstick
+        )
+
+
+def trades() -> None:
+    """Speed against error by patch, neighbourhood and way of judging."""
+    print("\n| judges | patch | neighbourhood | Mpx/s | Mpx/CPU s | largest error | RMS error | |")
+    print("|---|---|---|---|---|---|---|---|")
+    rows = []
+    for judge, mean in (("W", 300.0), ("band", 1e6), ("both", 14000.0)):
+        small, large = frame(mean, size=80), frame(mean, size=512)
+        for patch in (1, 3, 5, 7):
+            for neighbourhood in (11, 21):
+                settings = {**PATCHES, "patch": patch, "neighbourhood": neighbourhood}
+                error = np.abs(reconstruct(small, **settings) - reconstruct_reference(small, **settings)) / FULL_E
+                clock, cpu = best(lambda large=large, settings=settings: reconstruct(large, **settings), 2)
+                size = large.dn.size / 1e6
+                rows.append(
+                    (judge, patch, neighbourhood, size / clock, size / cpu, error.max(), (error**2).mean() ** 0.5)
+                )
+    for row in rows:
+        better = [other for other in rows if other[0] == row[0] and other[4] > row[4] and other[6] <= row[6]]
+        beaten = any(other[1] >= row[1] and other[2] >= row[2] for other in better)
+        numbers = f"{row[3]:.2f} | {row[4]:.2f} | {row[5]:.1e} | {row[6]:.1e}"
+        print(f"| {row[0]} | {row[1]} | {row[2]} | {numbers} | {'' if beaten else 'on the front'} |")
+
+
+def sizes(large: bool) -> None:
+    """Time a megapixel by the size of the frame."""
+    print()
+    for width, height in [(512, 512), (1024, 1024), (2048, 2048), *([(6000, 4000)] if large else [])]:
+        raw = frame(300.0, size=width, height=height)
+        clock, cpu = best(lambda raw=raw: reconstruct(raw, **PATCHES), 1 if width > 3000 else 3)
+        size = raw.dn.size / 1e6
+        print(f"{size:.2f} Mpx: {clock / size:.3f} s and {cpu / size:.3f} CPU s a megapixel", flush=True)
 
 
 def main() -> None:
     print_environment()
+    print(f"backend: {backend()}")
     with tempfile.TemporaryDirectory() as home:
         subprocess.run([sys.executable, __file__, "--first-call"], check=True, env={**os.environ, "HOME": home})
-    opencv = None
-    if find_spec("cv2"):
-        import cv2
-
-        plane = np.random.default_rng(0).integers(0, 256, (SIZE, SIZE), dtype=np.uint8)
-        opencv = best(lambda: cv2.fastNlMeansDenoising(plane, None, 10.0, 5, 21))
-        print(f"OpenCV {cv2.__version__} fastNlMeansDenoising, one 8-bit plane: {opencv:.2f} s")
-    else:
-        print("OpenCV isn't installed (pip install opencv-python-headless): no ratios")
-    frames = {
-        "dark, nothing saturated": frame(300.0),
-        "5 % saturated": frame(3000.0, saturated_disc=0.05),
-        "all saturated": frame(1e6),
-        "at the edge of saturation": frame(14000.0),
-    }
-    for name, raw in frames.items():
-        seconds = best(lambda raw=raw: reconstruct(raw))
-        ratio = f", {seconds / opencv:.1f} x OpenCV's one plane" if opencv else ""
-        print(f"{name}: {seconds:.2f} s{ratio}", flush=True)
+    ways(others())
+    trades()
+    sizes("--large" in sys.argv[1:])
 
 
 if __name__ == "__main__":
