@@ -51,7 +51,7 @@ def reconstruct_rows(
         # The bands' planes are laid out for those rows alone: mostly few.
         lane, first_rows = lane_size(pattern, "white")[0], np.concatenate([lanes.row for lanes in others.values()])
         near = max(int(first_rows.min()), rows[0]) // lane * lane, min(int(first_rows.max()) + lane, rows[1])
-        _run_all(raw, make_strip(raw, near, pattern, settings), others, sums)
+        _run_all(raw, strip if near == rows else make_strip(raw, near, pattern, settings), others, sums)
     results = finish(sums, raw, rows, pattern)
     return [np.array(values).reshape(rows[1] - rows[0], raw.shape[1], -1) for values in results]
 
