@@ -120,7 +120,7 @@ def test_a_distribution_that_wrote_into_rodcones_folder_is_found(
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: stage-tools\nVersion: 1.0\n")
     (info / "RECORD").write_text("scenes/curtain.py,,\nlights/__init__.py,,\n")
-    for file in ("scenes/curtain.py", "lights/__init__.py"):  # a backport of importlib.metadata lists only what is there
+    for file in ("scenes/curtain.py", "lights/__init__.py"):  # a backport lists only what is there
         (tmp_path / file).parent.mkdir()
         (tmp_path / file).touch()
     monkeypatch.syspath_prepend(tmp_path)
