@@ -67,8 +67,8 @@ def content(out: Path) -> list[tuple[Any, ...]]:
 
 
 def half_pictures(out: Path) -> list[Path]:
-    """Pictures whose content isn't what they are named after."""
-    found = (out / "pictures").rglob("*.png")
+    """Pictures whose content isn't what they are named after; one in a `.part-` folder hasn't got its name yet."""
+    found = [path for path in (out / "pictures").rglob("*.png") if not path.parent.name.startswith(".part-")]
     return [path for path in found if not hashlib.sha256(path.read_bytes()).hexdigest().startswith(path.stem)]
 
 
