@@ -36,9 +36,9 @@ from sensor.optics import form_image
 from sensor.readout import read_out
 from sensor.response import expected_electrons
 from studies.camera import Camera, build_camera, photograph
-from studies.demo import WAVELENGTH_NM, WHITE_AT, WHITE_PERCENTILE
+from studies.demo import WAVELENGTH_NM
 from studies.metrics import measure
-from studies.truth import Light, light_in_bands, neutral_electrons, true_srgb
+from studies.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 
 SIZE = 160
 FIXED_S, LONGEST_S = 0.020, 0.066
@@ -70,8 +70,7 @@ def open_stage(name: str, max_spp: int, max_seconds: float) -> Stage:
     spectrum = next(iter(scene.groups.values())).spectrum
     light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
     radiance = transport.relight(luminance_cd_m2=1.0)
-    luminance = radiance.luminance()[~transport.emitter_visible]
-    white = float(np.percentile(luminance, WHITE_PERCENTILE)) / WHITE_AT
+    white = shown_white_cd_m2(radiance, transport.emitter_visible)
     return Stage(radiance, light, white, encode_srgb(true_srgb(radiance, light, white)))
 
 

@@ -34,11 +34,10 @@ from studies.quiet_render import render_quietly
 from studies.radiance_file import check_radiance_file, open_radiance_file
 from studies.report import render_report
 from studies.results import environment, level_facts, notes, render_facts, sensor_facts
-from studies.truth import Light, light_in_bands, true_srgb
+from studies.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 
 # 20 bands of 20 nm: every spectrum in the demo is smooth, and the render costs half of 40 bands.
 WAVELENGTH_NM = np.arange(390.0, 780.0, 20.0)
-WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # the scene's 99th percentile of luminance is shown at 90 % of white
 
 Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 
@@ -198,14 +197,8 @@ def _cameras(demo: Demo, light: Light, shape: tuple[int, int]) -> list[Camera]:
     ]
 
 
-def _white_cd_m2(radiance: SpectralRadiance, transport: Transport) -> float:
-    """Luminance that is shown as white."""
-    luminance = radiance.luminance()[~transport.emitter_visible]
-    return float(np.percentile(luminance, WHITE_PERCENTILE)) / WHITE_AT
-
-
 def _truth(radiance: SpectralRadiance, transport: Transport, light: Light) -> NDArray[np.float64]:
-    return encode_srgb(true_srgb(radiance, light, _white_cd_m2(radiance, transport)))
+    return encode_srgb(true_srgb(radiance, light, shown_white_cd_m2(radiance, transport.emitter_visible)))
 
 
 def _photograph_level(
@@ -221,7 +214,7 @@ def _photograph_level(
     started = time.perf_counter()
     radiance = transport.relight(luminance_cd_m2=level.luminance_cd_m2)
     halves = transport.relight_halves(luminance_cd_m2=level.luminance_cd_m2)
-    white, truth = _white_cd_m2(radiance, transport), _truth(radiance, transport, light)
+    white, truth = shown_white_cd_m2(radiance, transport.emitter_visible), _truth(radiance, transport, light)
     clock.add("relight", time.perf_counter() - started)
     made = []
     for place, camera in enumerate(cameras):

@@ -15,9 +15,9 @@ from render.errors import InputError, require_range, unknown
 from sensor.cfa import channels
 from sensor.dng import is_bayer
 from sensor.raw_files import open_raw
+from studies.truth import WHITE_AT, WHITE_PERCENTILE  # the demo's rule, here on the picture's own luminance
 
 WHITE_BALANCES = ("gray-world", "as-shot")
-WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # the demo's rule, here on the picture's own luminance
 
 
 @dataclass(frozen=True)

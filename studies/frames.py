@@ -26,9 +26,8 @@ from studies.camera import colour_fit
 from studies.digests import code_version, digest
 from studies.lit_scene import OpenedScene, white_spectrum
 from studies.model import ImageModel, modelled
-from studies.truth import Light, light_in_bands, true_srgb
+from studies.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 
-WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # the scene's 99th percentile of luminance is shown at 90 % of white
 _PLAIN = ImageModel(diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0)
 _DARK_S = 1e7  # what `auto_exposure_s` answers where there is no light: longer than any exposure
 
@@ -105,8 +104,7 @@ def make_lit(folder: Path, key: str, opened: OpenedScene, transport: Transport, 
     """Make and keep a lit scene; `transport` is lit by `under` already."""
     radiance = transport.relight(luminance_cd_m2=1.0)
     light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
-    luminance = radiance.luminance()[~transport.emitter_visible]
-    white = float(np.percentile(luminance, WHITE_PERCENTILE)) / WHITE_AT
+    white = shown_white_cd_m2(radiance, transport.emitter_visible)
     lux = transport.illuminance_lux(1.0)
     facts = {
         "light": {name: value.tolist() for name, value in vars(light).items()},

@@ -22,9 +22,8 @@ from sensor.readout import read_out
 from sensor.response import expected_electrons
 from studies.camera import colour_fit
 from studies.cells import Coordinates, device_stream, exposure_stream
-from studies.frames import WHITE_AT, WHITE_PERCENTILE
 from studies.metrics import psnr_db
-from studies.truth import Light, light_in_bands, neutral_electrons, true_srgb
+from studies.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 
 Image = NDArray[np.float64]
 
@@ -55,8 +54,7 @@ class View:
 def view_of(transport: Transport, light: Spectrum, luminance_cd_m2: float | None) -> View:
     """Relight a render to a mean luminance; None: its lights' own powers."""
     radiance = transport.relight(luminance_cd_m2=luminance_cd_m2)
-    luminance = radiance.luminance()[~transport.emitter_visible]
-    white = float(np.percentile(luminance, WHITE_PERCENTILE)) / WHITE_AT
+    white = shown_white_cd_m2(radiance, transport.emitter_visible)
     return View(radiance, light_in_bands(light, transport.wavelength_nm, transport.width_nm), white)
 
 

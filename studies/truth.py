@@ -14,6 +14,8 @@ from sensor.config import SensorConfig
 from sensor.optics import camera_equation
 from sensor.response import electrons_per_irradiance
 
+WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # the scene's 99th percentile of luminance is shown at 90 % of white
+
 
 @dataclass(frozen=True)
 class Light:
@@ -33,6 +35,11 @@ def light_in_bands(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) 
     """Average a spectrum over bands and scale it to 1 cd/m^2."""
     values = spectrum.band_average(wavelength_nm, width_nm)
     return Light(wavelength_nm, width_nm, values / tristimulus(values, wavelength_nm, width_nm)[1])
+
+
+def shown_white_cd_m2(radiance: SpectralRadiance, emitter_visible: NDArray[np.bool_]) -> float:
+    """Luminance that is shown as white; pixels that see a lamp, (h, w), don't count."""
+    return float(np.percentile(radiance.luminance()[~emitter_visible], WHITE_PERCENTILE)) / WHITE_AT
 
 
 def true_srgb(radiance: SpectralRadiance, light: Light, white_cd_m2: float) -> NDArray[np.float64]:
