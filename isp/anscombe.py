@@ -1,17 +1,9 @@
-"""To units of noise and back to electrons without bias: the generalised Anscombe transform and its exact inverse."""
+"""Back from units of noise to electrons without bias: the exact inverse of the generalised Anscombe transform."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 _LEAST = 2.0 * np.sqrt(0.375)  # what stands for 0 electrons: the Anscombe transform of 0
-
-
-def anscombe(electrons: NDArray[np.float64], dark_noise_e: float) -> NDArray[np.float64]:
-    """Poisson counts with Gaussian noise in units of their own noise (Murtagh, Starck & Bijaoui 1995, eq. 7).
-
-    2 sqrt(max(e + 3/8 + s^2, 0)) for a dark standard deviation s = `dark_noise_e` [e-]; PRNU has no part in it.
-    """
-    return np.asarray(2.0 * np.sqrt(np.maximum(electrons + 0.375 + dark_noise_e**2, 0.0)))
 
 
 def unstabilise(stable: NDArray[np.floating], dark_noise_e: float) -> NDArray[np.float64]:
@@ -26,7 +18,7 @@ def unstabilise(stable: NDArray[np.floating], dark_noise_e: float) -> NDArray[np
     stable : array
         Denoised values [standard deviations of noise].
     dark_noise_e : float
-        The standard deviation that `anscombe` took [e-].
+        The standard deviation that `isp.planes.stabilise` took, with no PRNU [e-].
 
     Returns
     -------

@@ -66,14 +66,24 @@ def _gray_world(raw: RawImage, planes: Image, calibrated: Image, letters: str, u
     return gray_world(planes[..., index], usable, errors, calibrated[index], letters.index("G"))
 
 
-def saturated_nearby(raw: RawImage, letters: str) -> NDArray[np.bool_]:
-    """Pixels with a saturated sample of one of `letters` within one tile, shape (h, w)."""
+def saturated_nearby(raw: RawImage, letters: str, reach: int | None = None) -> NDArray[np.bool_]:
+    """Pixels with a saturated sample of one of `letters` within `reach` pixels along either axis, shape (h, w).
+
+    Left out, the reach is one tile.
+    """
     hit = raw.saturated & np.isin(letter_map(raw.cfa, raw.shape), list(letters))
-    return np.asarray(maximum_filter(hit, size=2 * len(raw.cfa) - 1))
+    return np.asarray(maximum_filter(hit, size=2 * (len(raw.cfa) - 1 if reach is None else reach) + 1))
 
 
-def clip_highlights(raw: RawImage, balanced: Image) -> Image:
-    """Hold every balanced colour at green's full well where a colour sample is saturated: highlights stay neutral."""
-    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
-    clipped = saturated_nearby(raw, "RGB")
-    return np.where(clipped[..., None], np.minimum(balanced, full_e), balanced)
+def full_e(raw: RawImage) -> float:
+    """Electrons of a full well."""
+    return float((raw.white_dn - raw.black_dn) * raw.gain_e_per_dn)
+
+
+def clip_highlights(raw: RawImage, balanced: Image, reach: int | None = None) -> Image:
+    """Hold every balanced colour at green's full well near a saturated colour sample: highlights stay neutral.
+
+    `reach` as in `saturated_nearby`: that of the filter which made the planes.
+    """
+    clipped = saturated_nearby(raw, "RGB", reach)
+    return np.where(clipped[..., None], np.minimum(balanced, full_e(raw)), balanced)

@@ -12,12 +12,12 @@ A mosaic becomes four pictures of half the size, one for each site of the tile, 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from isp.anscombe import anscombe, unstabilise
+from isp.anscombe import unstabilise
 from isp.demosaic import MALVAR_REACH, menon, require_bayer
 from isp.interleaved import reconstruct_with_noise
 from isp.mosaic import as_picture, balance_mosaic, to_rgb
 from isp.picture import Picture, finish
-from isp.planes import Plane
+from isp.planes import Plane, stabilise
 from render.optional import optional_library
 from sensor.raw import RawImage
 
@@ -68,7 +68,7 @@ def bm3d_mosaic(raw: RawImage) -> Plane:
     """
     bm3d = optional_library("bm3d", EXTRA)
     sides = [max(size + size % 2, 2 * _SMALLEST) - size for size in raw.shape]
-    stable = np.pad(anscombe(raw.electrons, raw.dark_noise_e), [(0, side) for side in sides], mode="reflect")
+    stable = np.pad(stabilise(raw.electrons, raw.dark_noise_e, 0.0), [(0, side) for side in sides], mode="reflect")
     sites = np.stack([stable[row::2, column::2] for row in (0, 1) for column in (0, 1)], axis=-1)
     profile = bm3d.BM3DProfile()  # its authors' "normal" one
     profile.num_threads = 1  # with more, the order of its sums, and so the last bits, change from run to run

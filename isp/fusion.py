@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import convolve1d
 
+from isp.balance import saturated_nearby
 from isp.colour import luminance_of_srgb, neutral_response
-from isp.mosaic import Image, as_picture, balance_mosaic, near_saturated, to_rgb
+from isp.mosaic import Image, as_picture, balance_mosaic, to_rgb
 from isp.picture import Picture, require_letters
 from isp.planes import Plane, fill, tent
 from sensor.cfa import Tile, mask
@@ -99,7 +100,7 @@ def _fused(raw: RawImage, rgb: Image, luminance: Plane) -> Image:
     """
     own = luminance_of_srgb(rgb)
     scale = np.where(own > luminance, luminance / np.maximum(own, 1e-12), 1.0)
-    full = near_saturated(raw, "W", 1)[..., None]
+    full = saturated_nearby(raw, "W", 1)[..., None]
     return np.where(full, rgb * scale[..., None], with_luminance(rgb, luminance))
 
 

@@ -14,8 +14,9 @@ interpolation by normalised convolution as the second.
 import numpy as np
 from numpy.typing import ArrayLike
 
+from isp.balance import saturated_nearby
 from isp.fusion import LETTERS
-from isp.mosaic import Image, as_picture, balance_mosaic, near_saturated, to_rgb
+from isp.mosaic import Image, as_picture, balance_mosaic, to_rgb
 from isp.picture import Picture, require_letters
 from isp.planes import Plane, fill
 from render.errors import InputError
@@ -35,7 +36,7 @@ def picture_gindele(
     """Develop a 2x2 RGBW raw image; parameters as `isp.pipeline.develop_interleaved`."""
     require_letters(raw, LETTERS)
     mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
-    clipped = near_saturated(raw, "W", REACH)[..., None]
+    clipped = saturated_nearby(raw, "W", REACH)[..., None]
     planes = np.where(clipped, _alone(mosaic.values, raw.cfa), adams_planes(mosaic.values, raw.cfa))
     return as_picture(raw, to_rgb(raw, planes, matrix, REACH), mosaic.balance)
 

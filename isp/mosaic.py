@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import maximum_filter
 
-from isp.balance import white_balance
+from isp.balance import clip_highlights, full_e, saturated_nearby, white_balance
 from isp.bayer import bilinear
 from isp.colour import Balance
 from isp.picture import Picture, checked_matrix
@@ -33,11 +32,6 @@ class BalancedMosaic:
     balance: Balance
 
 
-def full_e(raw: RawImage) -> float:
-    """Electrons of a full well."""
-    return float((raw.white_dn - raw.black_dn) * raw.gain_e_per_dn)
-
-
 def balance_mosaic(
     raw: RawImage, electrons: Plane, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
 ) -> BalancedMosaic:
@@ -61,20 +55,8 @@ def balance_mosaic(
     for letter, one in zip(channels(raw.cfa), white.gains, strict=True):
         gain[sites == letter] = one
     values = electrons * gain
-    held = near_saturated(raw, "RGB", 1) & (sites != "W")
+    held = saturated_nearby(raw, "RGB", 1) & (sites != "W")
     return BalancedMosaic(np.where(held, np.minimum(values, full_e(raw)), values), white)
-
-
-def near_saturated(raw: RawImage, letters: str, reach: int) -> NDArray[np.bool_]:
-    """Pixels with a saturated sample of one of `letters` within `reach` pixels along either axis, shape (h, w)."""
-    hit = raw.saturated & np.isin(letter_map(raw.cfa, raw.shape), list(letters))
-    return np.asarray(maximum_filter(hit, size=2 * reach + 1))
-
-
-def hold_highlights(raw: RawImage, planes: Image, reach: int) -> Image:
-    """Hold balanced planes at green's full well where a filter of this reach saw a saturated colour sample."""
-    held = near_saturated(raw, "RGB", reach)
-    return np.where(held[..., None], np.minimum(planes, full_e(raw)), planes)
 
 
 def as_picture(raw: RawImage, rgb: Image, balance: Balance) -> Picture:
@@ -84,4 +66,4 @@ def as_picture(raw: RawImage, rgb: Image, balance: Balance) -> Picture:
 
 def to_rgb(raw: RawImage, planes: Image, matrix: ArrayLike, reach: int) -> Image:
     """Linear sRGB of balanced planes of R, G and B that a filter of this reach made: highlights, matrix."""
-    return np.asarray(hold_highlights(raw, planes, reach) @ checked_matrix(matrix).T)
+    return np.asarray(clip_highlights(raw, planes, reach) @ checked_matrix(matrix).T)
