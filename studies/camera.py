@@ -108,8 +108,7 @@ def photograph(
     return Shot(raw, encoded, quality, picture, exposed - start, developed - exposed, done - developed)
 
 
-def mean_electrons(camera: Camera, expected_e: NDArray[np.float64]) -> dict[str, float]:
+def mean_electrons(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> dict[str, float]:
     """Mean expected electrons of each letter's pixels."""
-    tile = camera.sensor.cfa
     shape = (expected_e.shape[0], expected_e.shape[1])
-    return {letter: float(expected_e[mask(tile, letter, shape)].mean()) for letter in channels(tile)}
+    return {letter: float(expected_e[mask(sensor.cfa, letter, shape)].mean()) for letter in channels(sensor.cfa)}

@@ -16,8 +16,7 @@ from isp.processors import PROCESSORS
 from render.errors import InputError
 from render.files import replacing
 from render.jit import backend, dr
-from sensor.cfa import channels, mask
-from sensor.config import SensorConfig
+from sensor.cfa import channels
 from sensor.device import Device, draw_device
 from sensor.lanes import read_frame
 from sensor.noise import noise_variance
@@ -25,6 +24,7 @@ from sensor.optics import falloff
 from sensor.random import draw_key
 from sensor.raw import RawImage
 from sensor.readout import as_raw, read_out
+from studies.camera import mean_electrons
 from studies.cells import Cell, device_stream, exposure_stream
 from studies.digests import code_version, digest_bytes
 from studies.metrics import measure
@@ -162,7 +162,7 @@ def run_cell(cell: Cell, threads: int | None = None) -> Row:
         substitution=None if picture.substituted is None else int(picture.substituted),
         saturated=float(raw.saturated.mean()),
         balance=json.dumps(dict(picture.balance)),
-        mean_electrons=json.dumps(_mean_electrons(cell.sensor, expected_e)),
+        mean_electrons=json.dumps(mean_electrons(cell.sensor, expected_e)),
         engine=picture.engine,
         picture=_keep(cell.pictures, to_png(encoded)),
         capture_s=exposed - start,
@@ -226,11 +226,6 @@ def _monte_carlo_share(cell: Cell, expected_e: Image) -> float:
 
 def _decibels(snr: float | None) -> float | None:
     return 20 * float(np.log10(snr)) if snr is not None and snr > 0 else None
-
-
-def _mean_electrons(sensor: SensorConfig, expected_e: Image) -> dict[str, float]:
-    shape = (expected_e.shape[0], expected_e.shape[1])
-    return {letter: float(expected_e[mask(sensor.cfa, letter, shape)].mean()) for letter in channels(sensor.cfa)}
 
 
 def _keep(folder: Path, content: bytes) -> str:

@@ -249,7 +249,7 @@ def _cell(camera: Camera, shot: Shot, expected_e: NDArray[np.float64], level: in
         "substitution": shot.picture.substituted,
         "balance": dict(shot.picture.balance),
         "saturated": float(shot.raw.saturated.mean()),
-        "mean_electrons": mean_electrons(camera, expected_e),
+        "mean_electrons": mean_electrons(camera.sensor, expected_e),
         "seconds": {"capture": shot.capture_s, "develop": shot.develop_s},
         "picture": _name(level, camera.sensor_name, camera.name),
     }
