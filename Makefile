@@ -11,12 +11,13 @@ DEMO_OUT ?= out/demo
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test verify lint clean FORCE
+.PHONY: help demo test verify faults lint clean FORCE
 
 help:
 	@echo "make demo    set up $(VENV), render the still life from moonlight to daylight, write $(DEMO_OUT)/report.html"
 	@echo "make test    set up $(VENV), lint, types, import contracts and every test that is not slow"
 	@echo "make verify  the slow tests (minutes long)"
+	@echo "make faults  plant the faults of tests/faults one by one and show that a test notices each (resumable)"
 	@echo "make lint    ruff, mypy and the import contracts alone"
 	@echo "make clean   remove all that these targets make: $(VENV), out, build and caches"
 	@echo "Another Python: make PYTHON=python3.12 test"
@@ -30,6 +31,9 @@ test: lint
 
 verify: $(VENV)/installed-dev
 	@$(BIN)/python -m pytest -m slow
+
+faults: $(VENV)/installed-dev
+	@$(BIN)/python tests/faults/plant_faults.py
 
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check .

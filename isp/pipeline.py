@@ -54,8 +54,8 @@ def develop_interleaved(
         Of `isp.interleaved.reconstruct`.
     substitution_snr : float
         W gives half of the luminance where the frame's green SNR is this, more under it; 0 never, inf always.
-    sharpness : float
-        Of `isp.substitution.substitution_weight`; inf is the paper's switch.
+    octaves : float
+        Of `isp.substitution.substitution_weight`; 0 is the paper's switch.
 
     Returns
     -------

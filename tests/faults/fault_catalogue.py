@@ -1,0 +1,500 @@
+"""Faults in the physics and the reconstruction, each of which some test must notice.
+
+A fault is a piece of source text and what replaces it. The text must occur exactly once in its file, which
+``test_fault_catalogue.py`` holds, so that a change of the code can't leave a fault behind that plants nothing.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One mistake that a person could make.
+
+    Attributes
+    ----------
+    name : str
+    file : str
+        Below the repository's root.
+    edits : tuple of pairs of str
+        Text that is there, and what the mistaken author wrote.
+    tests : tuple of str
+        Files of tests that should notice, the likeliest first.
+    """
+
+    name: str
+    file: str
+    edits: tuple[tuple[str, str], ...]
+    tests: tuple[str, ...]
+
+
+def _fault(name: str, file: str, there: str, instead: str, *tests: str) -> Fault:
+    return Fault(name, file, ((there, instead),), tuple(f"tests/test_{test}.py" for test in tests))
+
+
+_READOUT = ("sensor_noise", "sensor_capture", "sensor_crosstalk", "sensor_device", "sensor_lanes", "sensor_emva")
+_LENS = ("sensor_optics", "sensor_diffraction", "sensor_hard_cases")
+_LIGHT = ("render_photometry", "render_spectrum", "render_illuminants", "sensor_optics")
+_SIMILARITY = ("isp_similarity", "isp_planes", "isp_interleaved")
+_COLOUR = ("isp_colour", "isp_colour_fit", "isp_pipeline", "studies_truth_metrics")
+
+SENSOR = (
+    Fault(
+        "PRNU after the Poisson draw",
+        "sensor/readout.py",
+        (
+            (
+                "spread_charge(expected, pixel.crosstalk) * device.photo_response",
+                "spread_charge(expected, pixel.crosstalk)",
+            ),
+            (
+                "2 * pixel.full_well_e + 1e4)).astype(np.float64)\n",
+                "2 * pixel.full_well_e + 1e4)).astype(np.float64) * device.photo_response\n",
+            ),
+        ),
+        tuple(f"tests/test_{name}.py" for name in _READOUT),
+    ),
+    Fault(
+        "PRNU on the dark current",
+        "sensor/readout.py",
+        (
+            (
+                "spread_charge(expected, pixel.crosstalk) * device.photo_response",
+                "spread_charge(expected, pixel.crosstalk)",
+            ),
+            (
+                "mean_e += pixel.dark_current_e_per_s * exposure_s  #",
+                "mean_e = (mean_e + pixel.dark_current_e_per_s * exposure_s) * device.photo_response  #",
+            ),
+        ),
+        tuple(f"tests/test_{name}.py" for name in _READOUT),
+    ),
+    _fault(
+        "conversion gain inverted",
+        "sensor/readout.py",
+        "collected_e / sensor.gain_e_per_dn",
+        "collected_e * sensor.gain_e_per_dn",
+        *_READOUT,
+    ),
+    _fault("black level missing", "sensor/readout.py", " + sensor.black_dn)", ")", *_READOUT),
+    _fault("converter rounds down", "sensor/readout.py", "np.rint(collected_e", "np.floor(collected_e", *_READOUT),
+    _fault(
+        "well does not clip",
+        "sensor/readout.py",
+        "np.minimum(collected_e, pixel.full_well_e, out=collected_e)",
+        "pass",
+        *_READOUT,
+    ),
+    _fault(
+        "read noise as variance",
+        "sensor/readout.py",
+        "pixel.read_noise_e * normals",
+        "pixel.read_noise_e**2 * normals",
+        *_READOUT,
+    ),
+    _fault(
+        "read noise the same in every exposure",
+        "sensor/readout.py",
+        "normals(key, Term.READ",
+        "normals(0, Term.READ",
+        *_READOUT,
+    ),
+    _fault(
+        "hot pixels without the exposure time",
+        "sensor/readout.py",
+        "hot_pixel_dark_current_e_per_s * exposure_s",
+        "hot_pixel_dark_current_e_per_s",
+        *_READOUT,
+    ),
+    _fault(
+        "DSNU drawn with PRNU's numbers",
+        "sensor/device.py",
+        "normals(key, Term.DSNU, shape)",
+        "normals(key, Term.PRNU, shape)",
+        "sensor_device",
+        *_READOUT,
+    ),
+    _fault(
+        "quantisation noise of gain^2 / 2",
+        "sensor/noise.py",
+        "sensor.gain_e_per_dn**2 / 12",
+        "sensor.gain_e_per_dn**2 / 2",
+        *_READOUT,
+    ),
+    _fault(
+        "PRNU not squared in the variance",
+        "sensor/noise.py",
+        "(pixel.prnu * signal) ** 2",
+        "(pixel.prnu * signal)",
+        *_READOUT,
+    ),
+    _fault(
+        "crosstalk makes charge",
+        "sensor/crosstalk.py",
+        "(1 - 4 * crosstalk)",
+        "(1 - 3 * crosstalk)",
+        "sensor_crosstalk",
+        *_READOUT,
+    ),
+    _fault(
+        "black not subtracted from the raw image",
+        "sensor/raw.py",
+        "np.float64) - self.black_dn)",
+        "np.float64))",
+        "sensor_raw",
+        *_READOUT,
+    ),
+    _fault(
+        "saturation above the full well",
+        "sensor/raw.py",
+        "full_e - SATURATION_SIGMAS",
+        "full_e + SATURATION_SIGMAS",
+        "sensor_raw",
+        "isp_pipeline",
+    ),
+    _fault(
+        "kernel leaves PRNU out",
+        "sensor/kernel.py",
+        "dr.fma(finite_e, jit.Float(chip.photo_response), chip.dark_e)",
+        "finite_e + chip.dark_e",
+        "sensor_lanes",
+        "sensor_kernel",
+    ),
+    _fault(
+        "kernel's well does not clip",
+        "sensor/kernel.py",
+        "dr.minimum(collected_e, chip.full_well_e)",
+        "collected_e",
+        "sensor_lanes",
+        "sensor_kernel",
+    ),
+    _fault(
+        "Poisson series with a wrong term",
+        "sensor/poisson.py",
+        "dr.fma(square, 1 / 6, 1 / 3)",
+        "dr.fma(square, 1 / 3, 1 / 3)",
+        "sensor_poisson",
+        "sensor_kernel",
+    ),
+    _fault("nine rounds of Philox", "sensor/random.py", "ROUNDS = 10", "ROUNDS = 9", "sensor_random"),
+    _fault(
+        "Box-Muller with half the variance",
+        "sensor/random.py",
+        "np.sqrt(-2.0 * np.log1p",
+        "np.sqrt(-1.0 * np.log1p",
+        "sensor_random",
+        "sensor_device",
+    ),
+    _fault(
+        "every row draws the same shot noise",
+        "sensor/random.py",
+        "counter=np.array([0, 0, row, int(term)]",
+        "counter=np.array([0, 0, 0, int(term)]",
+        "sensor_random",
+        *_READOUT,
+    ),
+    _fault(
+        "auto exposure forgets the share of the well",
+        "sensor/exposure.py",
+        "min(longest_s, well_share * sensor",
+        "min(longest_s, sensor",
+        "sensor_exposure",
+    ),
+    _fault(
+        "mosaic one row off",
+        "sensor/cfa.py",
+        "np.tile(cells, repeats)",
+        "np.tile(np.roll(cells, 1, 0), repeats)",
+        "sensor_cfa",
+    ),
+)
+
+LENS = (
+    _fault(
+        "camera equation without pi",
+        "sensor/optics.py",
+        "return pi * lens.transmittance",
+        "return lens.transmittance",
+        *_LENS,
+    ),
+    _fault(
+        "camera equation with 2 N^2",
+        "sensor/optics.py",
+        "(1 + 4 * lens.f_number**2",
+        "(1 + 2 * lens.f_number**2",
+        *_LENS,
+    ),
+    _fault("magnification left out", "sensor/optics.py", "* (1 + lens.magnification) ** 2)", ")", *_LENS),
+    _fault("cos^3", "sensor/optics.py", "columns**2) ** -2)", "columns**2) ** -1.5)", *_LENS),
+    _fault(
+        "cos^4 of the full angle",
+        "sensor/optics.py",
+        "radians(lens.horizontal_view_deg / 2)",
+        "radians(lens.horizontal_view_deg)",
+        *_LENS,
+    ),
+    _fault(
+        "veiling glare adds light",
+        "sensor/diffraction.py",
+        "(1 - lens.veiling_glare) * light +",
+        "light +",
+        "sensor_diffraction",
+        *_LENS,
+    ),
+    _fault(
+        "diffraction at half the f-number",
+        "sensor/diffraction.py",
+        "wavelength_nm * 1e-3 * lens.f_number",
+        "wavelength_nm * 0.5e-3 * lens.f_number",
+        "sensor_diffraction",
+    ),
+    _fault(
+        "fill factor left out",
+        "sensor/response.py",
+        " * sensor.pixel.fill_factor",
+        "",
+        "sensor_response",
+        "sensor_exposure",
+        *_LENS,
+    ),
+    _fault("band width left out", "sensor/response.py", " * inside_nm * area_m2", " * area_m2", "sensor_response"),
+)
+
+LIGHT = (
+    _fault("h in place of h c", "render/photometry.py", "/ (PLANCK_J_S * LIGHT_M_S)", "/ PLANCK_J_S", *_LIGHT),
+    _fault(
+        "680 lm/W", "render/photometry.py", "LUMINOUS_EFFICACY_LM_W = 683.0", "LUMINOUS_EFFICACY_LM_W = 680.0", *_LIGHT
+    ),
+    _fault(
+        "V is x",
+        "render/photometry.py",
+        "colour_matching_functions()[1].band_average",
+        "colour_matching_functions()[0].band_average",
+        *_LIGHT,
+    ),
+    _fault(
+        "spectra as steps",
+        "render/spectrum.py",
+        "(self.values[1:] + self.values[:-1]) / 2\n",
+        "self.values[:-1]\n",
+        *_LIGHT,
+    ),
+    _fault(
+        "Planck's law with the fourth power", "render/spectrum.py", "(560.0 / nm) ** 5", "(560.0 / nm) ** 4", *_LIGHT
+    ),
+    _fault(
+        "lines of half their power",
+        "render/spectrum.py",
+        "np.atleast_1d(powers) * (2 / LINE_BASE_NM)",
+        "np.atleast_1d(powers) * (1 / LINE_BASE_NM)",
+        *_LIGHT,
+    ),
+    _fault(
+        "level counts the lamps seen",
+        "render/transport.py",
+        "kept = ~self.emitter_visible\n",
+        "kept = np.ones_like(self.emitter_visible)\n",
+        "render_transport",
+    ),
+    _fault(
+        "variance scales as the light",
+        "render/transport.py",
+        "_combine(coefficients**2, self.variance)",
+        "_combine(coefficients, self.variance)",
+        "render_transport",
+        "render_error_estimates",
+    ),
+    _fault(
+        "lamps met and sampled, each in full",
+        "render/dense.py",
+        "weight = dr.rcp(1 + dr.square(b / a))",
+        "weight = dr.rcp(1 + 0 * dr.square(b / a))",
+        "render_engine",
+        "render_hard_cases",
+        "render_matte",
+    ),
+    _fault(
+        "roulette without its weight",
+        "render/dense.py",
+        "factor = dr.select(plays, dr.rcp(survival), 1.0)",
+        "factor = dr.select(plays, 1.0, 1.0)",
+        "render_engine",
+        "render_hard_cases",
+        "render_matte",
+    ),
+)
+
+ISP = (
+    _fault(
+        "alpha inverted",
+        "isp/reference.py",
+        "alpha[at] * np.sqrt(distance[i][at]) + (1.0 - alpha[at])",
+        "(1.0 - alpha[at]) * np.sqrt(distance[i][at]) + alpha[at]",
+        "isp_interleaved",
+        "isp_kernel",
+    ),
+    _fault(
+        "neighbourhood one short",
+        "isp/reference.py",
+        "range(-settings.reach, settings.reach + 1)",
+        "range(-settings.reach, settings.reach)",
+        "isp_interleaved",
+        "isp_kernel",
+    ),
+    _fault(
+        "wrong normaliser",
+        "isp/reference.py",
+        "sums.value / sums.weight,",
+        "sums.value / np.sqrt(sums.square),",
+        "isp_interleaved",
+        "isp_kernel",
+    ),
+    _fault(
+        "spatial weight without its 2",
+        "isp/reference.py",
+        "/ (2.0 * settings.sigma_d**2)",
+        "/ settings.sigma_d**2",
+        "isp_interleaved",
+        "isp_kernel",
+    ),
+    _fault(
+        "similarity not squared",
+        "isp/reference.py",
+        "trust[at] * beta_s**2",
+        "trust[at] * beta_s",
+        "isp_interleaved",
+        "isp_kernel",
+    ),
+    _fault(
+        "noise added to the distance",
+        "isp/reference.py",
+        "np.maximum(total - noise",
+        "np.maximum(total + noise",
+        "isp_interleaved",
+        "isp_kernel",
+    ),
+    _fault(
+        "patches repeat the border",
+        "isp/reference.py",
+        '(half, half)), mode="reflect")',
+        '(half, half)), mode="edge")',
+        "isp_interleaved",
+        "isp_kernel",
+    ),
+    _fault(
+        "alpha not normalised at the border",
+        "isp/similarity.py",
+        "np.pad(np.ones((1, size), np.uint16), ((0, 0), (window // 2,) * 2))",
+        "np.ones((1, size + window - 1), np.uint16)",
+        *_SIMILARITY,
+    ),
+    _fault(
+        "similarity always trusted",
+        "isp/similarity.py",
+        "squared / (1.0 + squared)",
+        "np.ones_like(squared)",
+        *_SIMILARITY,
+    ),
+    _fault(
+        "overlap of patches forgotten",
+        "isp/similarity.py",
+        "variance + other - 2.0 * covariance[at]",
+        "variance + other",
+        *_SIMILARITY,
+    ),
+    _fault(
+        "Anscombe without dark noise",
+        "isp/planes.py",
+        "return np.asarray(2.0 * np.sqrt(np.maximum(electrons + (0.375 + dark_noise_e**2), 0.0)))",
+        "return np.asarray(2.0 * np.sqrt(np.maximum(electrons + 0.375, 0.0)))",
+        *_SIMILARITY,
+    ),
+    _fault("PRNU left out of the transform", "isp/planes.py", "0.0) + (prnu * seen) ** 2", "0.0)", *_SIMILARITY),
+    _fault(
+        "box in place of tent",
+        "isp/planes.py",
+        "return radius + 1.0 - np.abs(np.arange(-radius, radius + 1))",
+        "return np.ones(2 * radius + 1)",
+        *_SIMILARITY,
+    ),
+    _fault(
+        "white balance inverted",
+        "isp/colour.py",
+        "np.where(certain, means[green] / np.where(certain, means, 1.0), calibrated)",
+        "np.where(certain, np.where(certain, means, 1.0) / means[green], calibrated)",
+        *_COLOUR,
+    ),
+    _fault(
+        "Gray World over saturated pixels",
+        "isp/balance.py",
+        '    colours = ~saturated_nearby(raw, "RGB")\n',
+        "    colours = np.ones(raw.shape, dtype=bool)\n",
+        "isp_pipeline",
+    ),
+    _fault(
+        "highlights not held",
+        "isp/balance.py",
+        "np.where(clipped[..., None], np.minimum(balanced, full_e(raw)), balanced)",
+        "balanced",
+        "isp_pipeline",
+        "isp_processors",
+    ),
+    _fault("gamma 2.2", "isp/colour.py", "clipped ** (1 / 2.4)", "clipped ** (1 / 2.2)", *_COLOUR),
+    _fault(
+        "adaptation the wrong way",
+        "isp/colour.py",
+        "np.diag(_BRADFORD @ xyz_from_xy(_D65_XY) / source)",
+        "np.diag(source / (_BRADFORD @ xyz_from_xy(_D65_XY)))",
+        *_COLOUR,
+    ),
+    _fault(
+        "substitution in the light",
+        "isp/substitution.py",
+        "return float(above < 0.0)",
+        "return float(above > 0.0)",
+        "isp_substitution",
+    ),
+    _fault(
+        "colours fitted without their noise",
+        "isp/colour_fit.py",
+        " + np.diag(np.broadcast_to(noise, len(index)))",
+        "",
+        *_COLOUR,
+    ),
+    _fault(
+        "inverse transform forgets dark noise",
+        "isp/anscombe.py",
+        "np.asarray(series - dark_noise_e**2)",
+        "np.asarray(series)",
+        "isp_anscombe",
+    ),
+)
+
+STUDIES = (
+    _fault(
+        "PSNR of amplitudes",
+        "studies/metrics.py",
+        "-10 * np.log10",
+        "-20 * np.log10",
+        "studies_truth_metrics",
+        "studies_metrics",
+    ),
+    _fault(
+        "white among the lamps",
+        "studies/truth.py",
+        "[~emitter_visible], WHITE_PERCENTILE",
+        "[emitter_visible | True], WHITE_PERCENTILE",
+        "studies_truth_metrics",
+        "studies_lit_scene",
+    ),
+    _fault(
+        "known scale without the lens",
+        "studies/truth.py",
+        " * camera_equation(sensor.lens))",
+        ")",
+        "studies_truth_metrics",
+        "studies_camera",
+    ),
+)
+
+FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *STUDIES)
