@@ -49,9 +49,10 @@ class Camera:
 
 @dataclass(frozen=True)
 class Shot:
-    """A photograph: raw image, developed picture (encoded sRGB), its quality, decisions, and seconds."""
+    """A photograph: raw image, developed picture (linear sRGB, then encoded), its quality, decisions, and seconds."""
 
     raw: RawImage
+    linear: NDArray[np.float64]
     encoded: NDArray[np.float64]
     quality: Quality
     picture: Picture
@@ -102,10 +103,11 @@ def photograph(
     picture = processor.develop(raw, camera.colours, neutral=neutral)
     developed = time.perf_counter()
     unit_e = neutral[channels(camera.sensor.cfa).index(processor.unit)]  # of 1 cd/m^2
-    encoded = encode_srgb(picture.rgb / (unit_e * white_cd_m2))
+    linear = picture.rgb / (unit_e * white_cd_m2)
+    encoded = encode_srgb(linear)
     quality = measure(encoded, truth)
     done = time.perf_counter()
-    return Shot(raw, encoded, quality, picture, exposed - start, developed - exposed, done - developed)
+    return Shot(raw, linear, encoded, quality, picture, exposed - start, developed - exposed, done - developed)
 
 
 def mean_electrons(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> dict[str, float]:

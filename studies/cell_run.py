@@ -5,7 +5,7 @@ import platform
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +24,13 @@ from sensor.optics import falloff
 from sensor.random import draw_key
 from sensor.raw import RawImage
 from sensor.readout import as_raw, read_out
+from studies.appearance import TruePicture, appearance, true_picture
 from studies.camera import mean_electrons
 from studies.cells import Cell, device_stream, exposure_stream
 from studies.digests import code_version, digest_bytes
 from studies.metrics import measure
 from studies.png import to_png
+from studies.target_figures import target_figures
 from studies.truth import neutral_electrons
 
 Image = NDArray[np.float64]
@@ -54,6 +56,10 @@ class Row:
         Share of the noise variance that a plan predicts for its approximations.
     psnr_db, ssim, delta_e_median, delta_e_p95 : float
         Of `studies.metrics.Quality`.
+    s_cielab_median, s_cielab_p95, flip_mean, pu21_psnr_db : float
+        Of `studies.appearance.Appearance`.
+    mtf50_cy_per_px, chart_delta_e_mean, patch_snr_db : float or None
+        Of `studies.target_figures.TargetFigures`.
     mc_share : float
         Monte Carlo variance over the sensor's own, means over the pixels below saturation.
     snr_db : float or None
@@ -66,9 +72,10 @@ class Row:
         By channel, as JSON.
     engine : str
         What developed it.
-    picture : str
-        File below the folder of pictures.
-    capture_s, develop_s, measure_s : float
+    picture, truth : str
+        Files of the developed and the noise-free picture below the folder of pictures.
+    render_s, capture_s, develop_s, measure_s : float
+        Of the render that the cell shares with others, and of its own steps.
     finished : str
         UTC.
     host : str
@@ -94,6 +101,13 @@ class Row:
     ssim: float
     delta_e_median: float
     delta_e_p95: float
+    s_cielab_median: float
+    s_cielab_p95: float
+    flip_mean: float
+    pu21_psnr_db: float
+    mtf50_cy_per_px: float | None
+    chart_delta_e_mean: float | None
+    patch_snr_db: float | None
     mc_share: float
     snr_db: float | None
     substitution: int | None
@@ -102,6 +116,8 @@ class Row:
     mean_electrons: str
     engine: str
     picture: str
+    truth: str
+    render_s: float
     capture_s: float
     develop_s: float
     measure_s: float
@@ -109,7 +125,7 @@ class Row:
     host: str
 
 
-TIME_AND_HOST = ("capture_s", "develop_s", "measure_s", "finished", "host")
+TIME_AND_HOST = ("render_s", "capture_s", "develop_s", "measure_s", "finished", "host")
 
 
 def run_cell(cell: Cell, threads: int | None = None) -> Row:
@@ -131,10 +147,10 @@ def run_cell(cell: Cell, threads: int | None = None) -> Row:
     _check_code(cell)
     if threads is not None:
         limit_threads(threads)
-    truth = _array(cell.truth)
+    truth = _truth(cell.truth)
     expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * (cell.luminance_cd_m2 * cell.exposure_s)
     processor, mosaic = PROCESSORS[cell.at.processor], PROCESSORS[cell.at.processor].mosaic
-    shape = (truth.shape[0], truth.shape[1])
+    shape = (truth.linear.shape[0], truth.linear.shape[1])
     device = draw_device(cell.sensor, shape, device_stream(cell.at, mosaic))
     start = time.perf_counter()
     raw = _expose(cell, expected_e, device, exposure_stream(cell.at, mosaic))
@@ -142,8 +158,13 @@ def run_cell(cell: Cell, threads: int | None = None) -> Row:
     neutral = neutral_electrons(cell.sensor, cell.light, cell.exposure_s)
     picture = processor.develop(raw, cell.colours, neutral=neutral)
     developed = time.perf_counter()
-    encoded = _encoded(cell, picture.rgb, float(neutral[channels(cell.sensor.cfa).index(processor.unit)]))
-    quality = measure(encoded, truth)
+    linear = _linear(cell, picture.rgb, float(neutral[channels(cell.sensor.cfa).index(processor.unit)]))
+    encoded = encode_srgb(linear)
+    figures = {
+        **vars(measure(encoded, truth.encoded)),
+        **vars(appearance(linear, truth, cell.white_cd_m2)),
+        **vars(target_figures(cell.at.scene, linear, truth.linear)),
+    }
     measured = time.perf_counter()
     return Row(
         key=cell.key,
@@ -156,7 +177,7 @@ def run_cell(cell: Cell, threads: int | None = None) -> Row:
         bands=cell.bands,
         lens=json.dumps(vars(cell.sensor.lens)),
         budget_share=cell.budget_share,
-        **vars(quality),
+        **figures,
         mc_share=_monte_carlo_share(cell, expected_e),
         snr_db=_decibels(picture.snr),
         substitution=None if picture.substituted is None else int(picture.substituted),
@@ -165,6 +186,8 @@ def run_cell(cell: Cell, threads: int | None = None) -> Row:
         mean_electrons=json.dumps(mean_electrons(cell.sensor, expected_e)),
         engine=picture.engine,
         picture=_keep(cell.pictures, to_png(encoded)),
+        truth=_keep(cell.pictures, _true_png(cell.truth, cell.truth.stat().st_mtime_ns)),
+        render_s=cell.render_s,
         capture_s=exposed - start,
         develop_s=developed - exposed,
         measure_s=measured - developed,
@@ -188,12 +211,27 @@ def _check_code(cell: Cell) -> None:
         )
 
 
-def _encoded(cell: Cell, rgb: Image, unit_e: float) -> Image:
-    """Encode a developed picture, in which a neutral of 1 cd/m^2 reads `unit_e`, shape (h, w, 3)."""
+def _linear(cell: Cell, rgb: Image, unit_e: float) -> Image:
+    """Linear sRGB, in which white is 1, of a developed picture, in which a neutral of 1 cd/m^2 reads `unit_e`."""
     linear = rgb / (unit_e * cell.white_cd_m2)
     if cell.sensor.lens.horizontal_view_deg:  # a camera corrects the falloff that it knows of its lens
         linear = linear / falloff(cell.sensor.lens, linear.shape[:2])[..., None]
-    return encode_srgb(linear)
+    return linear
+
+
+def _truth(path: Path) -> TruePicture:
+    _array(path)  # tells what can't be read
+    return _worked_out(path, path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=2)  # cells of one scene under one spectrum come one after the other
+def _worked_out(path: Path, changed_ns: int) -> TruePicture:
+    return true_picture(np.array(_array(path)))
+
+
+@lru_cache(maxsize=2)
+def _true_png(path: Path, changed_ns: int) -> bytes:
+    return to_png(_worked_out(path, changed_ns).encoded)
 
 
 def _array(path: Path) -> Image:

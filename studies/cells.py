@@ -55,7 +55,7 @@ class Cell:
         Folder that the picture goes to, under the hash of its content.
     code : str
         `studies.digests.code_version` of the process that asks.
-    spp, bands : int
+    spp, bands, render_s : int, int, float
         Of the render, for the ledger.
     budget_share : float or None
         Share of the noise variance that a plan predicts for its approximations.
@@ -78,6 +78,7 @@ class Cell:
     code: str
     spp: int
     bands: int
+    render_s: float
     budget_share: float | None = None
 
 

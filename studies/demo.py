@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour import encode_srgb
 from render.errors import InputError, require_range
 from render.files import replacing
 from render.illuminants import illuminant
-from render.radiance import SpectralRadiance
 from render.radiance_source import is_radiance_file
 from render.spectrum import Spectrum
 from render.transport import Transport
@@ -26,6 +24,7 @@ from sensor.left_out import left_out
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import expected_electrons
+from studies.appearance import TruePicture, appearance, true_picture
 from studies.budget import monte_carlo_share, pixel_share
 from studies.camera import CAMERAS, Camera, Shot, build_camera, mean_electrons, photograph
 from studies.levels import parse_level, resolve_level
@@ -34,6 +33,7 @@ from studies.quiet_render import render_quietly
 from studies.radiance_file import check_radiance_file, open_radiance_file
 from studies.report import render_report
 from studies.results import environment, level_facts, notes, render_facts, sensor_facts
+from studies.target_figures import target_figures
 from studies.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 
 # 20 bands of 20 nm: every spectrum in the demo is smooth, and the render costs half of 40 bands.
@@ -120,17 +120,17 @@ def run(demo: Demo, step: Step = lambda what, share: None) -> Outcome:
     clock.add("render", transport.seconds)
     levels = _levels(demo, transport)
     light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
+    truth = _truth(transport, light)
     cameras = _cameras(demo, light, transport.emitter_visible.shape)
     cells: list[dict[str, Any]] = []
     encoded: dict[str, NDArray[np.float64]] = {}
     for index, level in enumerate(levels):
         step(f"photographs at {level.name}", 0.6 + 0.35 * index / len(levels))
-        for cell, picture in _photograph_level(demo, transport, light, cameras, index, level, clock):
+        for cell, picture in _photograph_level(demo, transport, light, truth, cameras, index, level, clock):
             cells.append(cell)
             encoded[cell["picture"]] = picture
     step("report", 0.95)
-    truth = _truth(transport.relight(luminance_cd_m2=levels[0].luminance_cd_m2), transport, light)
-    pictures = {name: to_bytes(picture) for name, picture in {**encoded, "truth": truth}.items()}
+    pictures = {name: to_bytes(picture) for name, picture in {**encoded, "truth": truth.encoded}.items()}
     results = _results(demo, transport, levels, cells, clock, assumed)
     sheet = [
         [encoded[_name(i, sensor, camera)] for i in range(len(levels))] for sensor in demo.sensors for camera in CAMERAS
@@ -197,14 +197,17 @@ def _cameras(demo: Demo, light: Light, shape: tuple[int, int]) -> list[Camera]:
     ]
 
 
-def _truth(radiance: SpectralRadiance, transport: Transport, light: Light) -> NDArray[np.float64]:
-    return encode_srgb(true_srgb(radiance, light, shown_white_cd_m2(radiance, transport.emitter_visible)))
+def _truth(transport: Transport, light: Light) -> TruePicture:
+    """The noise-free picture: the same at every level, since the luminance of white goes with the level."""
+    radiance = transport.relight(luminance_cd_m2=1.0)
+    return true_picture(true_srgb(radiance, light, shown_white_cd_m2(radiance, transport.emitter_visible)))
 
 
 def _photograph_level(
     demo: Demo,
     transport: Transport,
     light: Light,
+    truth: TruePicture,
     cameras: Sequence[Camera],
     index: int,
     level: LightLevel,
@@ -214,7 +217,7 @@ def _photograph_level(
     started = time.perf_counter()
     radiance = transport.relight(luminance_cd_m2=level.luminance_cd_m2)
     halves = transport.relight_halves(luminance_cd_m2=level.luminance_cd_m2)
-    white, truth = shown_white_cd_m2(radiance, transport.emitter_visible), _truth(radiance, transport, light)
+    white = shown_white_cd_m2(radiance, transport.emitter_visible)
     clock.add("relight", time.perf_counter() - started)
     made = []
     for place, camera in enumerate(cameras):
@@ -224,33 +227,44 @@ def _photograph_level(
         expected_e = expected_electrons(irradiance, camera.sensor, exposure_s)
         clock.add("form image", time.perf_counter() - started)
         rng = np.random.default_rng([demo.seed, *divmod(place, len(CAMERAS)), 1, index])
-        shot = photograph(camera, expected_e, truth, light, white, exposure_s, rng)
+        shot = photograph(camera, expected_e, truth.encoded, light, white, exposure_s, rng)
         for stage, seconds in (
             ("capture", shot.capture_s),
             (f"develop {camera.name}", shot.develop_s),
-            ("metrics", shot.measure_s),
         ):
             clock.add(stage, seconds)
+        started = time.perf_counter()
+        seen = appearance(shot.linear, truth, white)
+        target = target_figures(demo.scene, shot.linear, truth.linear)
+        measure_s = shot.measure_s + time.perf_counter() - started
+        clock.add("metrics", measure_s)
         share = monte_carlo_share(expected_e, halves, camera.sensor, exposure_s)
-        made.append((_cell(camera, shot, expected_e, index, share), shot.encoded))
+        figures = {**asdict(shot.quality), **asdict(seen), **asdict(target), "mc_share": share}
+        made.append((_cell(camera, shot, expected_e, index, figures, measure_s), shot.encoded))
     return made
 
 
-def _cell(camera: Camera, shot: Shot, expected_e: NDArray[np.float64], level: int, mc_share: float) -> dict[str, Any]:
+def _cell(
+    camera: Camera,
+    shot: Shot,
+    expected_e: NDArray[np.float64],
+    level: int,
+    figures: dict[str, float | None],
+    measure_s: float,
+) -> dict[str, Any]:
     snr = shot.picture.snr
     return {
         "level": level,
         "sensor": camera.sensor_name,
         "camera": camera.name,
         "exposure_s": shot.raw.exposure_s,
-        **asdict(shot.quality),
-        "mc_share": mc_share,
+        **figures,
         "snr_db": 20 * float(np.log10(snr)) if snr is not None and snr > 0 else None,
         "substitution": shot.picture.substituted,
         "balance": dict(shot.picture.balance),
         "saturated": float(shot.raw.saturated.mean()),
         "mean_electrons": mean_electrons(camera.sensor, expected_e),
-        "seconds": {"capture": shot.capture_s, "develop": shot.develop_s},
+        "seconds": {"capture": shot.capture_s, "develop": shot.develop_s, "measure": measure_s},
         "picture": _name(level, camera.sensor_name, camera.name),
     }
 

@@ -13,7 +13,7 @@ from importlib.machinery import ModuleSpec
 from pathlib import Path
 
 PACKAGES = ("scenes", "render", "sensor", "isp", "studies")
-NEEDED = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR", "scikit-image")
+NEEDED = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR", "scikit-image", "flip-evaluator")
 LLVM_WHEEL = "karellen-llvm-core"
 FALLBACK = (
     "numpy: neither CUDA nor LLVM answers, so stock path + specfilm renders in scalar_spectral, "

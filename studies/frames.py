@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from isp.colour import encode_srgb
 from isp.colour_fit import ColourFit
 from isp.processors import Processor
 from render.files import replacing
@@ -46,7 +45,8 @@ class LitScene:
     lux_per_cd_m2 : float or None
         Illuminance of the reference plane; None without one.
     truth : Path
-        Encoded sRGB of the noise-free scene, (h, w, 3) float64; the same at every level.
+        Linear sRGB of the noise-free scene, not clipped, `white_cd_m2` reads 1, (h, w, 3) float64; the same at every
+        level.
     """
 
     key: str
@@ -111,7 +111,7 @@ def make_lit(folder: Path, key: str, opened: OpenedScene, transport: Transport, 
         "white_cd_m2": white,
         "lux_per_cd_m2": lux,
     }
-    truth = encode_srgb(true_srgb(radiance, light, white))
+    truth = true_srgb(radiance, light, white)
     with replacing(folder / f"{key}.truth.npy", folder / f"{key}.json") as (picture, text):
         np.save(picture, truth)
         text.write_text(json.dumps(facts), "utf-8")

@@ -2,19 +2,22 @@
 
 import errno
 import json
+import os
 import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields
-from pathlib import Path
+from functools import partial
+from pathlib import Path, PurePath
 from typing import Any, get_type_hints
 
 from render.errors import InputError
 from studies.cell_run import Row
 
-VERSION = 1  # of the tables; raise it with any change to them
+VERSION = 2  # of the tables; raise it with any change to them
 APPLICATION_ID = 0x726F6463  # "rodc": tells this file from other SQLite files
 FILE = "ledger.sqlite"
+_DAMAGED = (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_TOOBIG)
 _WAIT_S = 30.0  # for another process that writes: a row takes milliseconds
 _TYPES: dict[Any, str] = {str: "TEXT NOT NULL", int: "INTEGER NOT NULL", float: "REAL NOT NULL"}
 _OPTIONAL: dict[Any, str] = {float | None: "REAL", int | None: "INTEGER"}
@@ -60,10 +63,46 @@ def open_ledger(folder: Path) -> Iterator[sqlite3.Connection]:
     with _told(path):
         base = sqlite3.connect(path, timeout=_WAIT_S, isolation_level=None)
         try:
+            _distrust(base)
             _prepare(base, path)
             yield base
         finally:
             base.close()
+
+
+@contextmanager
+def read_ledger(folder: Path) -> Iterator[sqlite3.Connection]:
+    """Open the ledger of a folder to read from it alone; a sweep may go on writing to it.
+
+    Raises
+    ------
+    InputError
+        For a file that is no ledger, one of another version, or a damaged one.
+    OSError
+        Where it can't be read.
+    """
+    path = folder / FILE
+    # Beside what can't be written no log can be, which a reader otherwise looks into; and no other process writes.
+    still = not os.access(folder, os.W_OK) and not path.with_name(f"{FILE}-wal").exists()
+    with _told(path):
+        address = f"{path.resolve().as_uri()}?mode=ro{'&immutable=1' if still else ''}"
+        base = sqlite3.connect(address, timeout=_WAIT_S, isolation_level=None, uri=True)
+        try:
+            _distrust(base)
+            found = base.execute("PRAGMA quick_check(1)").fetchone()[0] if _has_tables(base, path) else "it is empty"
+            if found != "ok":
+                raise InputError(f"{path}: it is no whole ledger ({found}); run the sweep again in another folder")
+            yield base
+        finally:
+            base.close()
+
+
+def _distrust(base: sqlite3.Connection) -> None:
+    """Read a file as SQLite advises for one from elsewhere (sqlite.org/security.html), and any bytes as text."""
+    base.execute("PRAGMA trusted_schema = OFF")
+    base.execute("PRAGMA cell_size_check = ON")
+    base.execute("PRAGMA mmap_size = 0")
+    base.text_factory = partial(str, encoding="utf-8", errors="replace")
 
 
 def _prepare(base: sqlite3.Connection, path: Path) -> None:
@@ -88,8 +127,12 @@ def _has_tables(base: sqlite3.Connection, path: Path) -> bool:
         raise InputError(f"{path}: it is no ledger of rodcone; allowed: one, or none; choose another folder with --out")
     if tables and version != VERSION:
         raise InputError(
-            f"{path}: it has version {version}, this rodcone reads {VERSION}; allowed: that version; export it with "
-            "the rodcone that wrote it, and choose another folder with --out"
+            f"{path}: it has version {version}, this rodcone reads {VERSION}; allowed: that version; sweep again into "
+            "another folder with --out, or export this one with the rodcone that wrote it"
+        )
+    if tables and {sql for (sql,) in base.execute("SELECT sql FROM sqlite_master WHERE sql NOT NULL")} != {*_CREATE}:
+        raise InputError(
+            f"{path}: its tables are not a ledger's; allowed: no other tables, views or triggers; remove it"
         )
     return bool(tables)
 
@@ -103,7 +146,7 @@ def _told(path: Path) -> Iterator[None]:
         code = getattr(error, "sqlite_errorcode", None)
         if code is None:  # a fault of ours, not of the file's
             raise
-        if code == sqlite3.SQLITE_NOTADB:
+        if code & 0xFF in _DAMAGED:
             raise InputError(f"{path}: it is no ledger ({error}); move it away, or choose another folder") from error
         number = errno.ENOSPC if code == sqlite3.SQLITE_FULL else errno.EIO
         raise OSError(number, str(error), str(path)) from error
@@ -129,7 +172,11 @@ def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
         if everything
         else f"SELECT {columns} FROM wanted JOIN cells USING (key) ORDER BY place"
     )
-    return [Row(*values) for values in base.execute(chosen)]
+    found = [Row(*values) for values in base.execute(chosen)]
+    for picture in (PurePath(row.picture) for row in found):
+        if picture.is_absolute() or ".." in picture.parts:
+            raise InputError(f"ledger: picture {str(picture)!r} lies outside the folder of pictures; remove that row")
+    return found
 
 
 def want(base: sqlite3.Connection, keys: Iterable[str]) -> None:

@@ -183,5 +183,6 @@ def _cell(
         code=code_version(),
         spp=record.spp,
         bands=record.bands,
+        render_s=record.seconds,
         budget_share=job.plan.shares.get(condition),
     )

@@ -53,7 +53,8 @@ def sensor_facts(name: str) -> dict[str, Any]:
 
 def environment() -> dict[str, Any]:
     """Versions and engines that made the numbers."""
-    packages = {name: metadata.version(name) for name in ("mitsuba", "drjit", "numpy", "scipy", "scikit-image")}
+    names = ("mitsuba", "drjit", "numpy", "scipy", "scikit-image", "flip-evaluator")
+    packages = {name: metadata.version(name) for name in names}
     return {
         "python": platform.python_version(),
         **packages,

@@ -50,6 +50,11 @@ def seen_xyz(xyz: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEG
     return np.asarray(idctn(spectrum, axes=(0, 1)) @ np.linalg.inv(XYZ_TO_OPPONENT).T)
 
 
+def seen_lab(encoded: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE) -> NDArray[np.float64]:
+    """CIELAB of encoded sRGB (h, w, 3) after the eye's blur."""
+    return np.asarray(xyz2lab(seen_xyz(rgb2xyz(encoded), pixels_per_degree)))
+
+
 def s_cielab(
     picture: NDArray[np.float64], truth: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE
 ) -> NDArray[np.float64]:
@@ -70,5 +75,4 @@ def s_cielab(
     require_range("pixels_per_degree", pixels_per_degree, 1.0, 1e4, "give those of a display: 67 at arm's length")
     if picture.shape != truth.shape or picture.ndim != 3 or picture.shape[2] != 3:
         raise InputError(f"picture: shape {picture.shape} beside {truth.shape} is not allowed; give (h, w, 3) twice")
-    labs = [xyz2lab(seen_xyz(rgb2xyz(encoded), pixels_per_degree)) for encoded in (picture, truth)]
-    return np.asarray(deltaE_cie76(*labs))
+    return np.asarray(deltaE_cie76(*(seen_lab(encoded, pixels_per_degree) for encoded in (picture, truth))))
