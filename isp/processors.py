@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import wraps
+from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any
 
@@ -18,9 +19,11 @@ from isp.fusion import picture_kijima, picture_sato, picture_yamagami
 from isp.gindele import picture_gindele
 from isp.picture import Picture
 from isp.pipeline import picture_bayer, picture_interleaved
+from render.errors import InputError
 from sensor.raw import RawImage
 
 Develop = Callable[..., Picture]
+_LIBRARIES = {DEMOSAICKING: ("colour_demosaicing",), BM3D: ("bm3d", "colour_demosaicing")}  # what an extra brings
 
 
 @dataclass(frozen=True)
@@ -83,3 +86,14 @@ def _processors() -> dict[str, Processor]:
 
 
 PROCESSORS: Mapping[str, Processor] = MappingProxyType(_processors())
+
+
+def require_libraries(name: str) -> None:
+    """Raise `InputError` where the extra of a processor of `PROCESSORS` is not installed."""
+    extra = PROCESSORS[name].extra
+    for library in _LIBRARIES[extra] if extra is not None else ():
+        if find_spec(library) is None:
+            raise InputError(
+                f"processors: {name!r} needs {library}, which is not installed; allowed without it: other processors; "
+                f"leave {name} out, or pip install 'rodcone[{extra}]'"
+            )

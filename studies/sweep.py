@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from isp.processors import require_libraries
 from studies.cell_run import Row
 from studies.cells import Cell
 from studies.digests import code_version
@@ -77,6 +78,8 @@ def sweep(study: Study, out: Path, plan: Plan, runner: Runner, step: Step = lamb
     """
     started = time.perf_counter()
     check(study)
+    for name in study.processors:
+        require_libraries(name)
     scenes = open_all(study)
     out.mkdir(parents=True, exist_ok=True)
     _clear(out)

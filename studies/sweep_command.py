@@ -12,6 +12,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from isp.processors import require_libraries
 from render.errors import InputError, require_whole
 from sensor.presets import preset
 from studies.cluster import on_cluster
@@ -24,6 +25,8 @@ from studies.model import as_stated as plan_as_stated
 from studies.plan import plan as plan_study
 from studies.plan import reference_plan
 from studies.progress import progress
+from studies.report_command import FILE as REPORT
+from studies.report_command import write_report
 from studies.study import Study
 from studies.study_file import read_study
 from studies.sweep import Runner, Step, Swept, duration
@@ -49,7 +52,7 @@ def sweep(
     dry_run: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Make every picture of a study and note each in a ledger; prints the ledger's path.
+    """Make every picture of a study, note each in a ledger and write a report; prints the ledger's path.
 
     Whatever ends it (Ctrl-C, a kill, a full disk), the same command goes on with the cells that are missing.
 
@@ -85,6 +88,8 @@ def sweep(
         found = _estimated(task, out, reference, workers or cores())
         print(notation.dumps(as_facts(found)) if json else _words(found))
         return 0
+    for name in task.processors:
+        require_libraries(name)
     out.mkdir(parents=True, exist_ok=True)  # a place that can't be written is told before anything is rendered
     with _kept_told(out), ExitStack() as held:
         runner: Runner = _local(workers) if cluster is None else held.enter_context(on_cluster(cluster))
@@ -92,7 +97,9 @@ def sweep(
         swept = run_sweep(task, out, _plan(task, out, reference, as_stated, step), runner, step)
     for note in swept.notes:
         print(f"rodcone: {note}", file=sys.stderr)
-    print(notation.dumps(_facts(swept)) if json else swept.out / FILE)
+    report = write_report(out, out / REPORT)
+    print(f"rodcone: its report is {report}", file=sys.stderr)
+    print(notation.dumps(_facts(swept) | {"report": str(report)}) if json else swept.out / FILE)
     return 0
 
 
