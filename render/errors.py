@@ -2,13 +2,24 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
-from math import isfinite
+from math import isfinite, nan
 from numbers import Real
 from typing import Any
 
+MOST_TOLD = 2000  # characters: what a file says about itself may fill megabytes
+
 
 class InputError(ValueError):
-    """Bad input from the caller. The message is one line; the command line prints it and exits with code 2."""
+    """Bad input from the caller. The message is one line; the command line prints it and exits with code 2.
+
+    A message may quote a hostile file: what a terminal would take for a command (control characters, changes of writing
+    direction) stands in it as Python's escapes, and the middle of an overlong one is left out.
+    """
+
+    def __init__(self, message: str) -> None:
+        plain = "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in message)
+        half = MOST_TOLD // 2
+        super().__init__(plain if len(plain) <= MOST_TOLD else f"{plain[: half - 5]} ... {plain[-half:]}")
 
 
 def one_line(error: BaseException) -> str:
@@ -26,7 +37,11 @@ def unknown(what: str, value: object, allowed: Iterable[str]) -> InputError:
 
 def require_range(name: str, value: Any, low: float, high: float, fix: str) -> None:
     """Raise `InputError` unless `value` is a finite number and ``low <= value <= high``."""
-    if not (isinstance(value, Real) and isfinite(value) and low <= float(value) <= high):
+    try:
+        number = float(value) if isinstance(value, Real) else nan
+    except OverflowError:  # whole numbers of Python go on beyond float's
+        number = nan
+    if not (isfinite(number) and low <= number <= high):
         raise InputError(f"{name}: {value!r} is outside {low:g} to {high:g}; {fix}")
 
 

@@ -10,6 +10,9 @@ from render.spectrum import Floats, band_widths
 
 MOST_SIDE = 1 << 15  # pixels; the engine's own limit
 MOST_BYTES = 1 << 33  # of float32 pixels: 8 GiB, such as 4 Mpx with 500 bands; a render that size needs three times it
+# A black picture shrinks by 957 in ZIP, 405 in PIZ, 1264 in PXR24; more is a file that claims what it doesn't hold.
+MOST_EXPANSION = 2000
+SMALL_BYTES = 1 << 26  # of a .mat file's numbers, which is no harm: 64 MiB
 
 
 def require_file(path: Path) -> int:

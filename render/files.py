@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from render.errors import InputError
+
 
 @contextmanager
 def replacing(*paths: Path) -> Iterator[tuple[Path, ...]]:
@@ -31,6 +33,20 @@ def check_place(path: Path) -> None:
         raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     with _folder_beside(path):
         pass
+
+
+def inside(folder: Path, name: str) -> Path:
+    """Path of a file that another file names, which has to lie below a folder.
+
+    Raises
+    ------
+    InputError
+        For an absolute name, one that leads out by ``..`` or by a link, or one that no file can have.
+    """
+    path = folder / name
+    if not name or "\0" in name or not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
+        raise InputError(f"{name!r} does not lie in {folder}; allowed: names below it; correct it")
+    return path
 
 
 def _folder_beside(path: Path) -> "tempfile.TemporaryDirectory[str]":

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError
-from render.file_checks import require_extent, widths_between
+from render.file_checks import MOST_EXPANSION, SMALL_BYTES, require_extent, require_file, widths_between
 from render.mat5 import Value, read_variables
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
@@ -51,7 +51,11 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
     try:
         nm, shape, photons = _photons(found)
         widths = widths_between(nm)
-        require_extent(*shape, nm.size)
+        needed, file_bytes = require_extent(*shape, nm.size), require_file(path)
+        if needed > max(SMALL_BYTES, MOST_EXPANSION * file_bytes):
+            raise InputError(
+                f"{file_bytes} bytes can't hold the {needed} bytes of pixels that it stands for; save it again"
+            )
         planes = np.empty((nm.size, *shape), dtype=np.float32)
         with np.errstate(invalid="ignore", over="ignore"):  # SpectralRadiance tells where a value isn't finite
             for plane, band, per_joule in zip(planes, photons, photons_per_joule(nm), strict=True):

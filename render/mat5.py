@@ -8,6 +8,7 @@ chapter "Level 5 MAT-File Format". Cells, objects and sparse arrays are passed o
 import struct
 import zlib
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError
-from render.file_checks import MOST_BYTES, require_file
+from render.file_checks import MOST_BYTES, MOST_EXPANSION, SMALL_BYTES, require_file
 
 Value: TypeAlias = "NDArray[Any] | dict[str, Value] | str | None"
 
@@ -29,10 +30,25 @@ _STRUCT, _TEXT = 2, 4
 _COMPLEX = 0x0800
 _PEEK_BYTES = 512  # holds a variable's flags, dimensions and name
 _MOST_DEPTH = 16  # of structs in structs
+_FIELD_BYTES = 1 << 14  # that a field counts as, for the time that it takes: 4096 of them in a small file
+_TEXT_BYTES = 64  # that a character takes on its way
 
 
 class _DamagedError(ValueError):
     """What stands in the file contradicts itself."""
+
+
+@dataclass
+class _Memory:
+    """What the file's values may take in all, and have taken."""
+
+    most: int
+    taken: int = 0
+
+    def take(self, count: int) -> None:
+        self.taken += count
+        if self.taken > self.most:
+            raise _DamagedError(f"its values claim over {self.most} bytes, more than a file of its size may hold")
 
 
 def read_variables(path: Path, names: Collection[str]) -> dict[str, Value]:
@@ -48,15 +64,16 @@ def read_variables(path: Path, names: Collection[str]) -> dict[str, Value]:
     Raises
     ------
     InputError
-        Where there is no file, none of level 5 (MATLAB's ``-v7.3`` and ``-v4`` are named), it is damaged, or a
-        variable is over 8 GiB.
+        Where there is no file, none of level 5 (MATLAB's ``-v7.3`` and ``-v4`` are named), it is damaged, or what is
+        wanted takes over 8 GiB, or over 64 MiB and 2000 times the file.
     """
-    require_file(path)
+    memory = _Memory(min(MOST_BYTES, max(SMALL_BYTES, MOST_EXPANSION * require_file(path))))
     with path.open("rb") as file:
         order = _byte_order(path, file.read(_HEADER_BYTES))
         try:
-            return {name: _value(content, order) for name, content in _variables(file, order, names)}
-        except (_DamagedError, zlib.error, struct.error) as error:
+            wanted = _variables(file, order, names, memory)
+            return {name: _value(content, order, memory) for name, content in wanted}
+        except (ValueError, TypeError, OverflowError, zlib.error, struct.error) as error:  # such as chr of a fraction
             raise InputError(f"{path}: the .mat file is damaged: {error}; save it again") from error
 
 
@@ -70,7 +87,7 @@ def _byte_order(path: Path, header: bytes) -> str:
     return order
 
 
-def _variables(file: BinaryIO, order: str, names: Collection[str]) -> Iterator[tuple[str, memoryview]]:
+def _variables(file: BinaryIO, order: str, names: Collection[str], memory: _Memory) -> Iterator[tuple[str, memoryview]]:
     """Name and content of each wanted variable."""
     while tag := file.read(8):
         kind, size = struct.unpack(f"{order}II", tag)
@@ -81,7 +98,8 @@ def _variables(file: BinaryIO, order: str, names: Collection[str]) -> Iterator[t
             if _name(memoryview(_inflated(body, _PEEK_BYTES))[8:], order) not in names:
                 continue
             kind, size = struct.unpack(f"{order}II", _inflated(body, 8))
-            body = _inflated(body, 8 + size)[8:]
+            body = _inflated(body, 8 + min(size, memory.most + 1))[8:]
+            memory.take(len(body))
             if len(body) < size:
                 raise _DamagedError("a variable ends early")
         if kind == _MATRIX and (name := _name(memoryview(body)[:_PEEK_BYTES], order)) in names:
@@ -134,16 +152,18 @@ def _name(view: memoryview, order: str) -> str:
     return _head(view, order)[2]
 
 
-def _value(view: memoryview, order: str, depth: int = 0) -> Value:
+def _value(view: memoryview, order: str, memory: _Memory, depth: int = 0) -> Value:
     """Content of a matrix element."""
     if not len(view):
         return np.empty((0, 0))
     flags, dimensions, _, at = _head(view, order)
     kind = flags & 0xFF
     if kind == _STRUCT and dimensions == (1, 1) and depth < _MOST_DEPTH:
-        return _fields(view, at, order, depth)
+        return _fields(view, at, order, memory, depth)
     if kind == _TEXT:
-        return "".join(map(chr, _numbers(view, at, order)[0].tolist()))
+        letters, _ = _numbers(view, at, order)
+        memory.take(_TEXT_BYTES * letters.size)
+        return "".join(map(chr, letters.tolist()))
     if kind not in _NUMERIC or flags & _COMPLEX:
         return None
     numbers, _ = _numbers(view, at, order)
@@ -151,7 +171,10 @@ def _value(view: memoryview, order: str, depth: int = 0) -> Value:
         raise _DamagedError(f"{numbers.size} numbers for an array of {dimensions}")
     if numbers.dtype.kind == "f" and kind > _LAST_FLOATING:
         raise _DamagedError("fractions in an array of whole numbers")
-    return numbers.reshape(dimensions, order="F").astype(_NUMERIC[kind], copy=False)
+    wanted = np.dtype(_NUMERIC[kind])
+    if wanted != numbers.dtype:
+        memory.take(numbers.size * wanted.itemsize)
+    return numbers.reshape(dimensions, order="F").astype(wanted, copy=False)
 
 
 def _product(dimensions: tuple[int, ...]) -> int:
@@ -161,7 +184,7 @@ def _product(dimensions: tuple[int, ...]) -> int:
     return result
 
 
-def _fields(view: memoryview, at: int, order: str, depth: int) -> dict[str, Value]:
+def _fields(view: memoryview, at: int, order: str, memory: _Memory, depth: int) -> dict[str, Value]:
     """Fields of a single struct."""
     lengths, at = _numbers(view, at, order)
     names, at = _numbers(view, at, order)
@@ -170,8 +193,11 @@ def _fields(view: memoryview, at: int, order: str, depth: int) -> dict[str, Valu
     text, length = names.tobytes(), int(lengths[0])
     fields: dict[str, Value] = {}
     for start in range(0, len(text), length):
+        memory.take(_FIELD_BYTES)
         kind, content, at = _element(view, at, order)
         if kind != _MATRIX:
             raise _DamagedError(f"type {kind} where a field belongs")
-        fields[text[start : start + length].split(b"\0")[0].decode("latin-1")] = _value(content, order, depth + 1)
+        fields[text[start : start + length].split(b"\0")[0].decode("latin-1")] = _value(
+            content, order, memory, depth + 1
+        )
     return fields

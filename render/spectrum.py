@@ -39,7 +39,7 @@ class Spectrum:
     def __post_init__(self) -> None:
         nm = np.array(self.wavelength_nm, dtype=np.float64)
         values = np.array(self.values, dtype=np.float64)
-        if nm.ndim != 1 or nm.size < 2 or not np.all(np.diff(nm) > 0):
+        if nm.ndim != 1 or nm.size < 2 or not np.all(np.isfinite(nm)) or not np.all(np.diff(nm) > 0):
             raise InputError(
                 f"wavelength_nm: {nm.tolist()!r} is not allowed; give two or more strictly increasing [nm]"
             )

@@ -1,6 +1,5 @@
 """A camera from a TOML file: what a preset is, and what users copy and change."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any
 
 from render.errors import InputError, one_line, require_keys
 from render.spectrum import Spectrum
+from render.toml_file import read_toml
 from sensor.cfa import Tile, channels, tile_of
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.curves import Responses, built_in, read_csv, read_curve, rgbw
@@ -37,9 +37,8 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     """
     tile = None if cfa is None else tile_of(cfa)  # a wrong one isn't the file's fault
     try:
-        with Path(path).open("rb") as file:
-            content = tomllib.load(file)
-    except (OSError, ValueError) as error:  # TOMLDecodeError and UnicodeDecodeError are ValueErrors
+        content = read_toml(Path(path))
+    except (OSError, ValueError) as error:
         reason = one_line(error)
         raise InputError(
             f"sensor file: {str(path)!r} can't be read ({reason}); copy a preset: rodcone new preset NAME -o FILE"

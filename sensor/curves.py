@@ -5,6 +5,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from io import StringIO
 from pathlib import Path
 from types import MappingProxyType
 
@@ -23,6 +24,7 @@ _RGBW_PARAMETERS = {  # peak, centre [nm], left width [nm], left power, right wi
     "B": (0.415, 476.0, 44.227, 1.846, 32.167, 1.348),
     "W": (1.000, 620.0, 225.131, 1.955, 225.536, 2.052),
 }
+MOST_BYTES = 1 << 23  # of a file of curves: 100 columns at 0.1 nm over 300-1100 nm take 6 MB
 
 
 @dataclass(frozen=True)
@@ -158,8 +160,13 @@ def read_curve(path: str | Path) -> Spectrum:
 def _table(path: str | Path) -> tuple[list[str], Floats, list[Floats]]:
     """Names, wavelengths and columns of a CSV."""
     try:
-        with Path(path).open(newline="", encoding="utf-8-sig") as file:
-            header, *rows = [row for row in csv.reader(file) if row]
+        if Path(path).exists() and not Path(path).is_file():  # a pipe or a device may never end
+            raise ValueError("it is a folder or a device")
+        with Path(path).open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise ValueError(f"it is over {MOST_BYTES} bytes")
+        header, *rows = [row for row in csv.reader(StringIO(content.decode("utf-8-sig"), newline="")) if row]
         table = np.array([[float(cell) for cell in row] for row in rows], dtype=np.float64)
     except (OSError, ValueError, csv.Error) as error:
         raise InputError(

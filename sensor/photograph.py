@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError
+from render.errors import InputError, one_line
+from render.file_checks import require_file
 from render.optional import optional_library
 from render.spectrum import Floats
 from sensor.calibration import ColourCalibration
@@ -23,6 +24,8 @@ from sensor.raw import RawImage
 EXTRA = "photographs"
 # What is assumed where neither the file nor the frame tells: a pixel of a present-day camera.
 ASSUMED_FULL_WELL_E, ASSUMED_DARK_NOISE_E = 30_000.0, 3.0
+# Of a file's bytes, at 2 a pixel. Lossless JPEG spends a bit or more on a pixel: it swells 16 times at most.
+MOST_EXPANSION = 200
 # Linear sRGB to XYZ under D65 (IEC 61966-2-1), and adapted to D50 (the sRGB profile of ICC), rounded to four digits.
 _XYZ_OF_SRGB = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 _D50_OF_SRGB = np.array([[0.4361, 0.3851, 0.1431], [0.2225, 0.7169, 0.0606], [0.0139, 0.0971, 0.7142]])
@@ -48,8 +51,10 @@ def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
         Without `rawpy`, for a file that LibRaw can't read, or a mosaic that isn't Bayer.
     """
     rawpy = optional_library("rawpy", EXTRA)
+    size = require_file(path)
     try:
         with rawpy.imread(str(path)) as opened:
+            _check_extent(opened.sizes, size, path)
             return _raw_image(opened, path, f"LibRaw {'.'.join(map(str, rawpy.libraw_version))}")
     except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
         first = error.args[0] if error.args else ""
@@ -57,6 +62,19 @@ def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
         raise InputError(
             f"{path}: LibRaw can't read it ({reason}); allowed: raw files of cameras that LibRaw knows, or of rodcone"
         ) from None
+    except (ValueError, TypeError, IndexError, OverflowError, NotImplementedError, np.linalg.LinAlgError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"{path}: what LibRaw reads of it is no photograph ({one_line(error)}); it is damaged, copy it again"
+        ) from error
+
+
+def _check_extent(sizes: Any, file_bytes: int, path: Path) -> None:
+    """Raise `InputError` where a header claims more pixels than its file can hold: LibRaw takes memory for them all."""
+    height, width = int(sizes.raw_height), int(sizes.raw_width)
+    if 2 * height * width > MOST_EXPANSION * file_bytes:
+        raise InputError(f"{path}: {file_bytes} bytes can't hold the {height} x {width} pixels that it declares")
 
 
 def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str, Any]]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from render.errors import InputError, unknown
 from render.files import replacing
 from studies.cell_run import Row
-from studies.ledger import COLUMNS, FILE, open_ledger, rows
+from studies.ledger import COLUMNS, FILE, read_ledger, rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +29,7 @@ def read_rows(folder: Path, everything: bool = False) -> list[Row]:
     """
     if not (folder / FILE).is_file():
         raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
-    with open_ledger(folder) as base:
+    with read_ledger(folder) as base:
         return rows(base, everything)
 
 

@@ -1,6 +1,5 @@
 """Studies as TOML files: read strictly, so that a misspelt key can't go unnoticed for a night of computing."""
 
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any, get_args, get_origin
 from cattrs import AttributeValidationNote, ClassValidationError, Converter, ForbiddenExtraKeysError
 
 from render.errors import InputError, one_line, unknown
+from render.toml_file import parse_toml, read_toml
 from studies.study import SceneChoice, Study, check
 
 _FILES = (".xml", ".exr", ".mat", ".toml")  # values that name a file beside the study's
@@ -30,9 +30,8 @@ def read_study(path: str | Path, changes: Sequence[str] = ()) -> Study:
         For a file that can't be read, an unknown key (the likely one is named), or a value that isn't allowed.
     """
     try:
-        with Path(path).open("rb") as file:
-            content = tomllib.load(file)
-    except (OSError, ValueError) as error:  # TOMLDecodeError and UnicodeDecodeError are ValueErrors
+        content = read_toml(Path(path))
+    except (OSError, ValueError) as error:
         raise InputError(
             f"study: {str(path)!r} can't be read ({one_line(error)}); start from one of: rodcone new study -o FILE"
         ) from error
@@ -66,8 +65,8 @@ def _set(content: dict[str, Any], change: str) -> None:
     if not equals or not key:
         raise InputError(f"set: {change!r} is not allowed; write KEY=VALUE, such as render.spp=64")
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        value = parse_toml(f"value = {text}")["value"]
+    except ValueError:
         value = text
     *way, last = key.strip().split(".")
     table = content

@@ -1,5 +1,8 @@
 """Finished renders on disk: found again to the bit, made again where anything differs or the file is damaged."""
 
+import hashlib
+import io
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -214,6 +217,62 @@ def test_a_flipped_bit_anywhere_never_changes_a_result(tmp_path, renders, render
             file.write_bytes(flipped(position, bit)(stored))
             assert_equal(small(tmp_path), rendered)
     assert len(renders) > 100  # most places are read
+
+
+def signed(change):
+    """Damage that a digest doesn't tell, since it is made anew: what someone who means harm would write."""
+
+    def damage(stored):
+        file = io.BytesIO(stored[:-32])
+        with np.load(file) as entry:
+            arrays = dict(entry)
+        file = io.BytesIO()
+        np.savez(file, **change(arrays))
+        return file.getvalue() + hashlib.sha256(file.getvalue()).digest()
+
+    return damage
+
+
+def with_values(**changes):
+    return lambda arrays: arrays | {"values": np.array(json.dumps(json.loads(str(arrays["values"])) | changes))}
+
+
+HOSTILE = {
+    "another size": lambda arrays: arrays | {"radiance": np.zeros((1, 8, 1000, 1000), np.float32)},
+    "an array missing": lambda arrays: {name: array for name, array in arrays.items() if name != "variance"},
+    "a pickle": lambda arrays: arrays | {"radiance": np.array([print], dtype=object)},
+    "no JSON": lambda arrays: arrays | {"values": np.array("{")},
+    "deep JSON": lambda arrays: arrays | {"values": np.array(10_000 * "[")},
+    "a list": lambda arrays: arrays | {"values": np.array("[1, 2]")},
+    "no passes": with_values(passes=0),
+    "a text of samples": with_values(spp="8"),
+    "endless seconds": with_values(seconds=float("inf")),
+    "another engine": with_values(integrator="mine"),
+    "another end": with_values(stopped_by=["samples"]),
+    "groups that aren't there": with_values(shared=[0, 7]),
+    "a value more": with_values(more=1),
+}
+
+
+@pytest.mark.parametrize("change", HOSTILE.values(), ids=HOSTILE)
+def test_a_file_made_to_harm_is_rendered_again(change, tmp_path, renders, rendered):
+    results = after(tmp_path, signed(change))
+    assert len(renders) == 2
+    for result in results:
+        assert_equal(result, rendered)
+
+
+def test_the_same_file_signed_again_is_used(tmp_path, renders, rendered):
+    for result in after(tmp_path, signed(lambda arrays: arrays)):
+        assert_equal(result, rendered)
+    assert len(renders) == 1
+
+
+def test_a_scenes_name_can_not_lead_out_of_the_folder(tmp_path, renders):
+    small(tmp_path / "cache", replace(load("flat_field"), name="../../a b/c"))
+    (file,) = (tmp_path / "cache").iterdir()
+    assert file.name.startswith(".._.._a_b_c-")
+    assert sorted(path.name for path in tmp_path.rglob("*")) == sorted(["cache", file.name])
 
 
 def test_a_file_that_can_not_be_written_leaves_nothing(tmp_path, renders, monkeypatch):

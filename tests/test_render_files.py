@@ -2,7 +2,8 @@
 
 import pytest
 
-from render.files import check_place, replacing
+from render.errors import InputError
+from render.files import check_place, inside, replacing
 
 
 def test_all_files_take_their_names_at_the_end(tmp_path):
@@ -45,3 +46,17 @@ def test_a_folder_is_no_place_for_a_file_and_a_file_none_for_a_folder(tmp_path):
     assert error.value.filename == str(tmp_path)
     with pytest.raises(OSError, match="file"):
         check_place(tmp_path / "file" / "a.txt")
+
+
+@pytest.mark.parametrize("name", ["../a.png", "/a.png", "sub/../../a.png", "link/a.png", "", "a\0b"])
+def test_a_name_that_leads_out_of_its_folder_is_refused(name, tmp_path):
+    folder = tmp_path / "pictures"
+    (folder / "sub").mkdir(parents=True)
+    (folder / "link").symlink_to(tmp_path)
+    with pytest.raises(InputError, match="does not lie in"):
+        inside(folder, name)
+
+
+@pytest.mark.parametrize("name", ["a.png", "sub/a.png", "sub/../a.png", "..a.png"])
+def test_a_name_below_its_folder_is_a_place_in_it(name, tmp_path):
+    assert inside(tmp_path, name) == tmp_path / name

@@ -151,6 +151,15 @@ def test_a_basis_that_would_swell_beyond_the_limit_is_refused(tmp_path: Path) ->
         read_iset_scene(path)
 
 
+def test_a_basis_that_would_swell_beyond_its_file_is_refused(tmp_path: Path) -> None:
+    """64 kpx of one coefficient and 3000 wavelengths: 786 MB from 24 kB, where 2000 times that is allowed."""
+    nm = 300.0 + 0.1 * np.arange(3000)
+    path = save(tmp_path, mcCOEF=np.zeros((256, 256), np.uint8), basis={"basis": np.ones((3000, 1)), "wave": nm})
+    assert path.stat().st_size < 30_000
+    with pytest.raises(InputError, match="can't hold the 786432000 bytes"):
+        read_iset_scene(path)
+
+
 @settings(max_examples=100, deadline=2000, derandomize=True)
 @given(st.lists(st.tuples(st.integers(0, 1 << 16), st.integers(0, 255)), min_size=1, max_size=4))
 def test_changed_bytes_give_an_error_of_one_line_or_radiance(

@@ -1,6 +1,7 @@
 """MATLAB level 5 files against SciPy's writer and the format's own bytes; damaged and hostile ones."""
 
 import struct
+import tracemalloc
 import zlib
 from pathlib import Path
 from typing import Any
@@ -203,3 +204,46 @@ def test_changed_bytes_give_an_error_of_one_line_or_numbers(
     except InputError as refused:
         told = str(refused)
     assert "\n" not in told
+
+
+def packed(path: Path, content: bytes) -> Path:
+    deflated = zlib.compress(content, 9)
+    return file_of(path, struct.pack("<II", 15, len(deflated)) + deflated)  # alone among elements it isn't padded
+
+
+def test_bytes_that_swell_to_more_than_their_file_may_hold_are_refused_before_they_do(tmp_path: Path) -> None:
+    """20 kB hold 20 MB of zeros, each of them a double: 160 MB."""
+    path = packed(tmp_path / "a.mat", matrix(6, (20_000_000, 1), 2, bytes(20_000_000)))
+    tracemalloc.start()
+    with pytest.raises(InputError, match="more than a file of its size may hold"):
+        read_variables(path, "x")
+    taken = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert 20_000_000 < taken < 70_000_000  # inflated, and while it was being inflated
+    path = packed(path, matrix(6, (5_000_000, 1), 2, bytes(5_000_000)))  # 5 kB that stand for 40 MB do no harm
+    assert np.array_equal(read_variables(path, "x")["x"], np.zeros((5_000_000, 1)))
+
+
+def test_a_claim_of_gigabytes_is_inflated_no_further_than_allowed(tmp_path: Path) -> None:
+    """100 kB may hold 200 MB; these hold 4 GiB by their own word, and 100 MB in truth."""
+    path = packed(tmp_path / "a.mat", struct.pack("<II", 14, 0xFFFFFFF8) + matrix(6, (1, 1), 9, bytes(8))[8:])
+    with pytest.raises(InputError, match="ends early"):
+        read_variables(path, "x")
+    path = packed(path, matrix(9, (80_000_000, 1), 2, bytes(80_000_000)))
+    assert 2000 * path.stat().st_size > 80_000_000
+    assert read_variables(path, "x")["x"].shape == (80_000_000, 1)  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    "letter", [struct.pack("<f", 1.5), struct.pack("<i", -1), struct.pack("<I", 0x110000)], ids="fiI"
+)
+def test_letters_that_are_none_are_refused(letter: bytes, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    stored = {"f": 7, "i": 5, "I": 6}[request.node.callspec.id]
+    with pytest.raises(InputError, match=r"the \.mat file is damaged"):
+        read_variables(file_of(tmp_path / "a.mat", matrix(4, (1, 1), stored, letter)), "x")
+
+
+def test_a_struct_of_far_too_many_fields_is_refused_at_once(tmp_path: Path) -> None:
+    path = packed(tmp_path / "a.mat", structure(1, 100_000 * b"a", *(100_000 * [element(14, b"")])))
+    with pytest.raises(InputError, match="more than a file of its size may hold"):
+        read_variables(path, "x")

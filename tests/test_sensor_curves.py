@@ -1,5 +1,6 @@
 """Responses of R, G, B, W: peaks and electron ratios of the published sensor, and curves from a file."""
 
+import os
 import warnings
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from render.errors import InputError
 from render.illuminants import illuminant
 from render.spectrum import Spectrum
-from sensor.curves import QuantumEfficiencyWarning, Responses, read_csv, read_curve, rgbw
+from sensor.curves import MOST_BYTES, QuantumEfficiencyWarning, Responses, read_csv, read_curve, rgbw
 
 PEAKS = {"R": (0.560, 592.0), "G": (0.678, 540.0), "B": (0.415, 476.0), "W": (1.0, 620.0)}
 
@@ -226,3 +227,19 @@ def test_a_single_curve_is_read_and_a_second_column_or_per_cent_refused(tmp_path
         read_curve(write(tmp_path, FILTERS))
     with pytest.raises(InputError, match="divide per cent by 100"):
         read_curve(write(tmp_path, "wavelength_nm,t\n400,50\n500,90\n"))
+
+
+@pytest.mark.timeout(10)
+def test_a_pipe_and_a_file_too_large_are_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(InputError, match="a folder or a device"):
+        read_csv(tmp_path / "pipe.csv")
+    (tmp_path / "large.csv").write_bytes(b"wavelength_nm,R\n" + MOST_BYTES * b"1")
+    with pytest.raises(InputError, match="it is over 8388608 bytes"):
+        read_csv(tmp_path / "large.csv")
+
+
+def test_an_endless_wavelength_is_refused(tmp_path):
+    (tmp_path / "a.csv").write_text("wavelength_nm,R\n400,0.5\ninf,0.5\n")
+    with pytest.raises(InputError, match="strictly increasing"):
+        read_csv(tmp_path / "a.csv")

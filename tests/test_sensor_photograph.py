@@ -1,5 +1,6 @@
 """Raw files of other cameras through LibRaw: levels, orientation, colours and noise, and what is refused."""
 
+import struct
 import sys
 from pathlib import Path
 
@@ -218,3 +219,25 @@ def test_what_libraw_cannot_read_is_one_line(name: str, content: bytes, tmp_path
         read_raw(tmp_path / name)
     assert "\n" not in str(error.value)
     assert "b'" not in str(error.value)
+
+
+@pytest.mark.parametrize("side", [20_000, 60_000])
+def test_pixels_that_a_file_can_not_hold_are_refused_before_memory_is_taken(side: int, tmp_path: Path) -> None:
+    """LibRaw itself takes 0.8 GB for 20 000 pixels a side, whatever the file holds."""
+    content = other_camera(tmp_path / "shot.dng", levels(np.zeros(SHAPE))).read_bytes()
+    for code, held in ((256, SHAPE[1]), (257, SHAPE[0])):
+        entry = struct.pack("<HHII", code, 4, 1, held)
+        assert content.count(entry) == 1
+        content = content.replace(entry, struct.pack("<HHII", code, 4, 1, side))
+    (tmp_path / "shot.dng").write_bytes(content)
+    with pytest.raises(InputError, match=rf"bytes can't hold the {side} x {side} pixels"):
+        read_photograph(tmp_path / "shot.dng")
+
+
+def test_a_profile_in_a_damaged_directory_is_none(tmp_path: Path) -> None:
+    content = bytearray(other_camera(tmp_path / "shot.dng", levels(np.zeros(SHAPE)), noise=(1e-4, 1e-8)).read_bytes())
+    assert read_noise_profile(tmp_path / "shot.dng", 1000.0) is not None
+    start = content.index(struct.pack("<HHI", 51041, 12, 2))
+    content[start + 4 : start + 8] = struct.pack("<I", 0xFFFFFFFF)
+    (tmp_path / "shot.dng").write_bytes(content)
+    assert read_noise_profile(tmp_path / "shot.dng", 1000.0) is None

@@ -1,6 +1,7 @@
 """Raw files by their ending: any mosaic as TIFF with its sidecar, exactly back, and what goes wrong in words."""
 
 import json
+import os
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -222,3 +223,12 @@ def test_files_are_replaced_together_or_not_at_all(tmp_path: Path) -> None:
         second.write_text("beside")
     assert (one.read_text(), two.read_text()) == ("new", "beside")
     assert sorted(tmp_path.iterdir()) == [one, two]
+
+
+@pytest.mark.timeout(10)
+def test_a_sidecar_that_is_a_pipe_is_refused_and_not_waited_for(tmp_path: Path) -> None:
+    picture, sidecar = write_raw(exposure(("RG", "BW")), tmp_path / "shot.tif")
+    sidecar.unlink()
+    os.mkfifo(sidecar)
+    with pytest.raises(InputError, match="a folder or a device"):
+        read_raw(picture)

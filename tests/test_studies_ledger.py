@@ -19,6 +19,7 @@ from studies.ledger import (
     note_render,
     note_run,
     open_ledger,
+    read_ledger,
     render_record,
     rows,
     want,
@@ -129,3 +130,73 @@ def test_a_full_disk_is_told_as_such_and_the_rows_before_it_stand(tmp_path: Path
     assert 0 < kept < 1000
     with open_ledger(tmp_path) as base:
         assert [row.key for row in rows(base, everything=True)] == [f"{place:04}" for place in range(kept)]
+
+
+def test_reading_changes_nothing_and_sees_what_a_sweep_writes_meanwhile(tmp_path: Path) -> None:
+    with open_ledger(tmp_path) as writer:
+        add(writer, ROW)
+        with read_ledger(tmp_path) as reader:
+            assert rows(reader, everything=True) == [ROW]
+            add(writer, replace(ROW, key="1"))
+            assert len(rows(reader, everything=True)) == 2
+            with pytest.raises(sqlite3.OperationalError, match="readonly"):
+                reader.execute("DELETE FROM cells")
+    before = (tmp_path / FILE).read_bytes()
+    with read_ledger(tmp_path) as reader:
+        assert len(rows(reader, everything=True)) == 2
+    assert (tmp_path / FILE).read_bytes() == before
+
+
+def test_a_ledger_that_nobody_can_write_to_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_ledger(tmp_path) as base:
+        add(base, ROW)
+    monkeypatch.setattr("studies.ledger.os.access", lambda *_: False)  # root may write anywhere
+    with read_ledger(tmp_path) as reader:
+        assert rows(reader, everything=True) == [ROW]
+    assert [path.name for path in tmp_path.iterdir()] == [FILE]  # no log beside it
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("CREATE VIEW more AS SELECT * FROM cells", "its tables are not a ledger's"),
+        ("CREATE TRIGGER t AFTER INSERT ON cells BEGIN DELETE FROM wanted; END", "its tables are not a ledger's"),
+        ("DROP TABLE cells", "its tables are not a ledger's"),
+        ("UPDATE cells SET picture = '/etc/passwd'", "picture '/etc/passwd' lies outside"),
+        ("UPDATE cells SET picture = 'a/../../b.png'", r"picture 'a/\.\./\.\./b\.png' lies outside"),
+    ],
+)
+def test_what_a_sweep_never_writes_is_refused(change: str, words: str, tmp_path: Path) -> None:
+    with open_ledger(tmp_path) as base:
+        add(base, ROW)
+        base.execute(change)
+    with pytest.raises(InputError, match=words), read_ledger(tmp_path) as base:
+        rows(base, everything=True)
+
+
+def test_a_number_of_another_type_is_noticed_and_any_bytes_are_text(tmp_path: Path) -> None:
+    with open_ledger(tmp_path) as base:
+        add(base, replace(ROW, host="hostname of mine"))
+    content = (tmp_path / FILE).read_bytes()
+    (tmp_path / FILE).write_bytes(content.replace(b"hostname of mine", b"hostname\xff of min"))
+    with read_ledger(tmp_path) as base:
+        assert rows(base, everything=True)[0].host == "hostname\ufffd of min"
+    with sqlite3.connect(tmp_path / FILE) as base:  # a table without STRICT under the same words
+        base.execute("PRAGMA writable_schema = ON")
+        base.execute("UPDATE sqlite_master SET sql = replace(sql, ' STRICT', '') WHERE name = 'cells'")
+    base.close()
+    with sqlite3.connect(tmp_path / FILE) as base:
+        base.execute("UPDATE cells SET seed = 'many'")
+        base.execute("PRAGMA writable_schema = ON")
+        base.execute("UPDATE sqlite_master SET sql = sql || ' STRICT' WHERE name = 'cells'")
+    base.close()
+    with pytest.raises(InputError, match=r"it is no whole ledger .*seed"), read_ledger(tmp_path):
+        pass
+
+
+@pytest.mark.parametrize("content", [b"", b"SQLite format 3\0" + bytes(500)])
+def test_a_file_without_tables_is_no_ledger_to_read(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / FILE).write_bytes(content)
+    with pytest.raises(InputError, match="it is no"), read_ledger(tmp_path):
+        pass
+    assert (tmp_path / FILE).read_bytes() == content
