@@ -39,3 +39,18 @@ def test_green_impulse_reaches_its_four_neighbours() -> None:
     dn[4, 3] = 800  # a green site of RG/GB
     green = bilinear(raw(dn, ("RG", "GB")))[3:6, 2:5, 1]
     assert green == pytest.approx(800 * np.array([[0.0, 0.25, 0.0], [0.25, 1.0, 0.25], [0.0, 0.25, 0.0]]))
+
+
+def test_samples_at_unequal_distance_weigh_by_a_tent() -> None:
+    """On two by two letters all samples within reach lie equally far; on four by four the nearest weigh most."""
+    cfa, generator = ("WGWR", "GWRW", "WBWG", "BWGW"), np.random.default_rng(3)
+    image = raw(generator.integers(1, 60_000, (12, 12)), cfa)
+    red = bilinear(image)[..., 0]
+    for row, column in product(range(4, 8), range(4, 8)):
+        total = weight = 0.0
+        for down, across in product(range(-2, 3), range(-2, 3)):
+            if cfa[(row + down) % 4][(column + across) % 4] == "R":
+                here = (3 - abs(down)) * (3 - abs(across))
+                total, weight = total + here * image.electrons[row + down, column + across], weight + here
+        own = cfa[row % 4][column % 4] == "R"
+        assert red[row, column] == pytest.approx(image.electrons[row, column] if own else total / weight, rel=1e-12)

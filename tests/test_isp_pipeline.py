@@ -1,5 +1,6 @@
 """Both pipelines: flat fields for every phase, neutral scenes, decisions, saturation, errors."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -123,3 +124,12 @@ def test_wrong_matrix_or_neutral_is_refused() -> None:
         develop_bayer(image, IDENTITY, neutral=[1, 0, 1])
     with pytest.raises(InputError, match=r"^balance: \[1.0, inf, 1.0\]"):
         develop_bayer(image, IDENTITY, balance=[1, np.inf, 1])
+
+
+def test_gray_world_leaves_saturated_pixels_out() -> None:
+    """The right half is a brighter neutral whose green is full: counted, it would take green for weaker than it is."""
+    shape, levels = (32, 64), {"R": 500.0, "G": 1000.0, "B": 400.0}
+    left = raw(("RG", "GB"), levels, shape)
+    bright = raw(("RG", "GB"), {letter: 30 * value for letter, value in levels.items()}, shape)
+    picture = picture_bayer(replace(left, dn=np.where(np.arange(64) < 32, left.dn, bright.dn)), IDENTITY)
+    assert picture.rgb[:, :28] == pytest.approx(np.full((32, 28, 3), 1000.0), rel=1e-9)

@@ -14,7 +14,7 @@ from sensor.presets import low_noise, table1_output
 from sensor.response import channel_electrons, expected_electrons
 from studies.budget import monte_carlo_share
 from studies.metrics import measure, psnr_db
-from studies.truth import green_scale, light_in_bands, neutral_electrons, true_srgb
+from studies.truth import green_scale, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
@@ -83,3 +83,11 @@ def test_monte_carlo_share_is_the_ratio_of_variances() -> None:
     share = monte_carlo_share(expected_e, halves, sensor, 0.01)
     noise = expected_e + (0.01 * expected_e) ** 2 + 1.5**2 + 1.0 + sensor.gain_e_per_dn**2 / 12
     assert share == pytest.approx((0.02**2 / 2 * expected_e**2).mean() / noise.mean(), rel=0.03)
+
+
+def test_a_lamp_in_the_picture_does_not_set_the_white() -> None:
+    scene = neutral_scene(9.0)
+    lamps = np.zeros((16, 16), dtype=bool)
+    lamps[:4, :4] = True
+    lit = SpectralRadiance(np.where(lamps[..., None], 1e4, 1.0) * scene.values, NM)
+    assert shown_white_cd_m2(lit, lamps) == pytest.approx(10.0, rel=1e-6)

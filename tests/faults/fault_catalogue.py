@@ -35,7 +35,7 @@ def _fault(name: str, file: str, there: str, instead: str, *tests: str) -> Fault
 _READOUT = ("sensor_noise", "sensor_capture", "sensor_crosstalk", "sensor_device", "sensor_lanes", "sensor_emva")
 _LENS = ("sensor_optics", "sensor_diffraction", "sensor_hard_cases")
 _LIGHT = ("render_photometry", "render_spectrum", "render_illuminants", "sensor_optics")
-_SIMILARITY = ("isp_similarity", "isp_planes", "isp_interleaved")
+_SIMILARITY = ("isp_similarity", "isp_planes", "isp_bayer", "isp_interleaved")
 _COLOUR = ("isp_colour", "isp_colour_fit", "isp_pipeline", "studies_truth_metrics")
 
 SENSOR = (
