@@ -11,14 +11,16 @@ DEMO_OUT ?= out/demo
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test verify faults lint clean FORCE
+.PHONY: help demo test verify faults docs fuzz lint clean FORCE
 
 help:
 	@echo "make demo    set up $(VENV), render the still life from moonlight to daylight, write $(DEMO_OUT)/report.html"
 	@echo "make test    set up $(VENV), lint, types, import contracts and every test that is not slow"
 	@echo "make verify  the slow tests (minutes long)"
 	@echo "make faults  plant the faults of tests/faults one by one and show that a test notices each (resumable)"
+	@echo "make docs    the documentation, with its figures made anew where the code has changed, as out/site"
 	@echo "make lint    ruff, mypy and the import contracts alone"
+	@echo "make fuzz    a minute of damaged files for every reader; counts go on in out/fuzz"
 	@echo "make clean   remove all that these targets make: $(VENV), out, build and caches"
 	@echo "Another Python: make PYTHON=python3.12 test"
 
@@ -34,6 +36,15 @@ verify: $(VENV)/installed-dev
 
 faults: $(VENV)/installed-dev
 	@$(BIN)/python tests/faults/plant_faults.py
+
+# Pages open from the file; the search needs a server: python3 -m http.server -d out/site
+docs: $(VENV)/installed-docs
+	@$(MAKE) --no-print-directory -f docs/figures.mk BIN=$(BIN)
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	@echo "Documentation: $(abspath out/site)/index.html (open it in a browser)"
+
+fuzz: $(VENV)/installed-dev
+	@nice -n 10 $(BIN)/python tests/fuzz/run.py --seconds 60
 
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check .
@@ -74,6 +85,9 @@ $(VENV)/installed: pyproject.toml Makefile $(UNUSABLE)
 	$(call set-up,.,$@)
 
 $(VENV)/installed-dev: pyproject.toml Makefile $(UNUSABLE)
-	$(call set-up,.[dev],$@ $(VENV)/installed)
+	$(call set-up,.[dev],$@ $(VENV)/installed $(VENV)/installed-docs)
+
+$(VENV)/installed-docs: pyproject.toml Makefile $(UNUSABLE)
+	$(call set-up,.[docs],$@ $(VENV)/installed)
 
 FORCE:

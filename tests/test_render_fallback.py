@@ -25,6 +25,7 @@ from isp.interleaved import reconstruct_with_noise
 nm, width_nm = np.array([450.0, 550.0, 650.0]), np.array([100.0, 100.0, 40.0])
 made = render(load("flat_field"), (12, 16), wavelength_nm=nm, width_nm=width_nm, spp=64, seed=1)
 again = render(load("flat_field"), (12, 16), wavelength_nm=nm, width_nm=width_nm, spp=64, seed=1)
+far = render(load("color_checker"), (12, 12), wavelength_nm=[900.0], width_nm=100.0, spp=256, seed=1)
 raw = RawImage(np.full((8, 10), 1000, np.uint16), RGBW, 100.0, 4000.0, 1.0, 2.0, 0.0, 0.0, 0.01)
 result = reconstruct_with_noise(raw, neighbourhood=7)
 print(json.dumps({
@@ -36,6 +37,7 @@ print(json.dumps({
     "plane": made.irradiance[0].tolist(),
     "stop": [made.spp, made.passes, made.stopped_by, bool(made.emitter_visible.any())],
     "same": bool(np.array_equal(made.radiance, again.radiance)),
+    "far": [float(far.radiance[0, 0, 0].mean()), float(far.irradiance[0, 0])],
     "engine": result.engine,
     "flat": float(np.abs(result.estimate / 900.0 - 1).max()),
 }))
@@ -107,3 +109,10 @@ def test_importing_mitsuba_first_works_or_warns_in_one_line(before):
     warnings = [line for line in done.stderr.splitlines() if "Warning" in line]
     assert len(warnings) <= 1
     assert all("RuntimeWarning: Dr.Jit was imported before rodcone" in line for line in warnings)
+
+
+def test_stock_mitsuba_renders_the_infrared_beyond_its_own_range(fallback):
+    # the card around the chart reflects 0.2 of an even sky, but for what the chart's board hides from the first row
+    radiance, irradiance = fallback["far"]
+    assert radiance == pytest.approx(0.2, rel=0.02)
+    assert irradiance == pytest.approx(3.14159, rel=0.02)

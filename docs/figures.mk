@@ -1,0 +1,32 @@
+# The documentation's figures, made by rodcone itself: `make docs` runs this, and so does tests/test_docs_site.py.
+# A figure is made anew where the code, or the page that holds its commands, is newer.
+# Variables: BIN, the folder of python and rodcone; FIGURES, where the figures go; the commands' options.
+
+BIN ?= .venv/bin
+FIGURES ?= out/figures
+DEMO ?=
+PAPER ?=
+CODE := $(wildcard render/*.py scenes/*.py sensor/*.py sensor/data/* isp/*.py studies/*.py studies/configs/* studies/templates/*)
+# Pages whose blocks run; each in a folder of its own, from which its pictures are taken.
+PAGES := $(wildcard docs/tutorial/*.md docs/how_to/*.md)
+RAN := $(PAGES:docs/%.md=$(FIGURES)/%/ran)
+
+.DELETE_ON_ERROR:
+.PHONY: figures pages
+figures: pages $(FIGURES)/demo/report.html $(FIGURES)/paper/paper.html $(FIGURES)/photon_transfer.svg
+pages: $(RAN)
+
+$(FIGURES)/demo/report.html: $(CODE)
+	$(BIN)/rodcone demo $(DEMO) -o $(@D)
+
+$(FIGURES)/paper/paper.html: $(CODE)
+	$(BIN)/rodcone paper $(PAPER) -o $(@D)
+
+$(FIGURES)/photon_transfer.svg: $(CODE)
+	@mkdir -p $(@D)
+	$(BIN)/rodcone characterise low_noise -o $@
+
+$(RAN): $(FIGURES)/%/ran: docs/%.md docs/run_page.py $(CODE)
+	rm -rf $(@D)
+	$(BIN)/python docs/run_page.py $< $(@D)
+	@touch $@

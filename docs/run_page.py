@@ -1,0 +1,68 @@
+"""Run the code of a documentation page in order, as a reader would: `python docs/run_page.py PAGE FOLDER`.
+
+In FOLDER, block by block: one with a title is written to the file of that name, ``python`` is run (all of a page in one
+namespace), ``sh`` is run by bash. Blocks of any other language are for reading alone.
+"""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+FENCE = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block of a page; `line` is that of its first line of code."""
+
+    language: str
+    title: str
+    code: str
+    line: int
+
+
+def blocks(text: str) -> Iterator[Block]:
+    """Fenced blocks of a page, in order."""
+    for found in FENCE.finditer(text):
+        yield Block(found[1], found[2] or "", found[3], text.count("\n", 0, found.start(3)) + 1)
+
+
+def run(page: Path, folder: Path) -> None:
+    """Run a page's blocks in `folder`, which is made; what fails ends it with the page's name and line."""
+    page = page.resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    os.chdir(folder)
+    sys.path[0] = os.getcwd()  # in place of this script's folder: a page's own modules
+    os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    names: dict[str, Any] = {"__name__": "__page__"}
+    for block in blocks(page.read_text("utf-8")):
+        if block.title:
+            Path(block.title).parent.mkdir(parents=True, exist_ok=True)
+            Path(block.title).write_text(block.code, "utf-8")
+        elif block.language == "python":
+            exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), names)
+        elif block.language == "sh":
+            code = run_shell(block.code)
+            if code:
+                sys.exit(f"{page.name}:{block.line}: exit code {code}")
+
+
+def run_shell(code: str) -> int:
+    """Exit code of a shell block; what it leaves in the background is ended with it."""
+    shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", code], start_new_session=True)
+    try:
+        return shell.wait()
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(shell.pid, signal.SIGTERM)
+
+
+if __name__ == "__main__":
+    run(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -1,0 +1,111 @@
+"""Hooks of the documentation's build (mkdocs.yml): a page for every module, formulas as MathML, names as links."""
+
+import ast
+import re
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+from latex2mathml.converter import convert
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+from mkdocs.utils import get_relative_url
+
+from studies.cli import app
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = ("render", "scenes", "sensor", "isp", "studies")
+FIGURES = ("*", "demo/*", "paper/*", "tutorial/*/*", "how_to/*/*")  # what docs/figures.mk makes
+SHOWN = (".html", ".png", ".svg")
+FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
+NAME = re.compile(rf"(<a\b[^>]*>)?<code>((?:{'|'.join(PACKAGES)})(?:\.\w+)+)</code>")  # a link in front: left alone
+
+
+def on_config(config: Any) -> Any:
+    """Add to the navigation what its list lacks: pages about one part, decisions, the API."""
+    (depth,) = (entry["In depth"] for entry in config.nav if isinstance(entry, dict) and "In depth" in entry)
+    depth += sorted({path.name for path in (ROOT / "docs").glob("*.md")} - {*depth, *map(str, config.nav)})
+    decisions = sorted(path.name for path in (ROOT / "docs" / "decisions").glob("*.md"))
+    packages = [
+        {name: [f"api/{name}/index.md", *({module: f"api/{name}/{module}.md"} for module in modules(name))]}
+        for name in PACKAGES
+    ]
+    config.nav += [
+        {"Decisions": ["decisions/index.md", *(f"decisions/{name}" for name in decisions)]},
+        {"API": ["api/index.md", "api/commands.md", *packages]},
+    ]
+    return config
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the generated pages: decisions, commands, packages and modules."""
+    pages = {"decisions/index.md": decisions_page(), "api/index.md": api_page(), "api/commands.md": commands_page()}
+    for package in PACKAGES:
+        pages[f"api/{package}/index.md"] = package_page(package)
+        for module in modules(package):
+            pages[f"api/{package}/{module}.md"] = f"# {package}.{module}\n\n::: {package}.{module}\n"
+    for place, text in pages.items():
+        files.append(File.generated(config, place, content=text))
+    folder = ROOT / config.extra["figures"]
+    for place in sorted(path for pattern in FIGURES for path in folder.glob(pattern) if path.suffix in SHOWN):
+        name = f"figures/{place.relative_to(folder).as_posix()}"
+        files.append(File.generated(config, name, abs_src_path=str(place.resolve())))
+    return files
+
+
+def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
+    """Write formulas as MathML, which browsers show by themselves, and lead names of modules to their pages."""
+    html = FORMULA.sub(lambda found: mathml(found[2], block=found[1] == "div"), html)
+    return NAME.sub(lambda found: found[0] if found[1] else linked(found[2], found[0], page.url), html)
+
+
+def modules(package: str) -> list[str]:
+    """Modules of a package by name."""
+    return sorted(path.stem for path in (ROOT / package).glob("*.py") if path.stem != "__init__")
+
+
+def summary(path: Path) -> str:
+    """First line of a module's docstring."""
+    return (ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "").partition("\n")[0]
+
+
+def decisions_page() -> str:
+    """List of the decisions by their own headings."""
+    paths = sorted((ROOT / "docs" / "decisions").glob("*.md"))
+    lines = [f"- [{path.read_text('utf-8').partition(chr(10))[0].lstrip('# ')}]({path.name})" for path in paths]
+    told = "Why things are as they are: each record states the question, what was found, and what was decided."
+    return f"# Decisions\n\n{told}\n\n" + "\n".join(lines)
+
+
+def api_page() -> str:
+    """List of the packages, in the order in which light goes through them."""
+    rows = [f"| [`{name}`]({name}/index.md) | {summary(ROOT / name / '__init__.py')} |" for name in PACKAGES]
+    told = "Imports point one way: `studies > isp > (scenes | sensor) > render`. The commands: [Commands](commands.md)."
+    return f"# API\n\n{told}\n\n| package | what |\n|---|---|\n" + "\n".join(rows)
+
+
+def package_page(package: str) -> str:
+    """List of a package's modules, a line each."""
+    rows = [f"| [`{name}`]({name}.md) | {summary(ROOT / package / f'{name}.py')} |" for name in modules(package)]
+    text = summary(ROOT / package / "__init__.py")
+    return f"# {package}\n\n{text}\n\n| module | what |\n|---|---|\n" + "\n".join(rows)
+
+
+def commands_page() -> str:
+    """Text of `--help`, of all commands."""
+    text = app.generate_docs(output_format="markdown").replace("# rodcone\n", "# Commands\n", 1)
+    return re.sub(r"## Table of Contents\n.*?(?=\*\*Commands\*\*)", "", text, flags=re.DOTALL)
+
+
+def mathml(latex: str, block: bool) -> str:
+    """MathML of a formula."""
+    return convert(unescape(latex), display="block" if block else "inline")
+
+
+def linked(name: str, code: str, url: str) -> str:
+    """`code` as a link to the page of the module that `name` begins with; as it is where there is none."""
+    package, module, *rest = name.split(".")
+    if module not in modules(package):
+        return code
+    anchor = f"#{name}" if rest else ""
+    return f'<a href="{get_relative_url(f"api/{package}/{module}.html", url)}{anchor}">{code}</a>'

@@ -1,0 +1,237 @@
+"""The documentation: names on its pages exist, its code runs, it builds without a warning and fetches nothing."""
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+PACKAGES = ("render", "scenes", "sensor", "isp", "studies")
+# Pages that name modules and functions in backticks, `sensor.noise.noise_variance`, all of which have to exist.
+PAGES = sorted([DOCS / "index.md", DOCS / "model.md", *DOCS.glob("tutorial/*.md"), *DOCS.glob("how_to/*.md")])
+RUN = [page for page in PAGES if page.parent != DOCS]
+NAME = re.compile(rf"`((?:{'|'.join(PACKAGES)})(?:\.\w+)+)`")
+SMALL = ["DEMO=--size 32 --spp 16 --level 0.05cd/m2 --level 25cd/m2", "PAPER=--size 48 --spp 16 --seeds 2"]
+SEARCH = """(async () => {
+  const field = document.querySelector("[data-md-component=search-query]");
+  field.focus();
+  for (let tries = 0; tries < 100; tries++) {
+    field.value = "noise_variance";
+    field.dispatchEvent(new Event("input", {bubbles: true}));
+    field.dispatchEvent(new KeyboardEvent("keyup", {bubbles: true}));
+    await new Promise(done => setTimeout(done, 200));
+    const found = [...document.querySelectorAll(".md-search-result__link")].map(link => link.href);
+    if (found.length) return found;
+  }
+  return [];
+})()"""
+VIEWS = [(360, False), (360, True), (1280, False), (1280, True)]
+
+
+def browser_of_tests() -> ModuleType:
+    """Module `report_browser` beside this one."""
+    spec = spec_from_file_location("report_browser", Path(__file__).with_name("report_browser.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+CHROME = browser_of_tests()
+
+
+def name_of(page: Path) -> str:
+    return page.relative_to(DOCS).with_suffix("").as_posix()
+
+
+def missing_part(name: str) -> str:
+    """What of a dotted name the sources don't define, nothing where all of it is there; read, not imported."""
+    package, module, *rest = name.split(".")
+    path = ROOT / package / f"{module}.py"
+    if not path.is_file():
+        return module
+    body = ast.parse(path.read_text("utf-8")).body
+    for part in rest:
+        found = [node for node in body if part in defined(node)]
+        if not found:
+            return part
+        body = getattr(found[0], "body", [])
+    return ""
+
+
+def defined(node: ast.stmt) -> set[str]:
+    """Names that a statement defines."""
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        return {node.name}
+    targets = node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+    return {target.id for target in targets if isinstance(target, ast.Name)}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_name_of_the_code_on_a_page_exists(page: Path) -> None:
+    wrong = {name: missing_part(name) for name in NAME.findall(page.read_text("utf-8"))}
+    assert not {name: part for name, part in wrong.items() if part}
+
+
+def test_the_model_page_names_a_module_of_every_package_of_the_chain() -> None:
+    names = NAME.findall((DOCS / "model.md").read_text("utf-8"))
+    assert {name.split(".")[0] for name in names} == {"render", "sensor", "isp", "studies"}
+    assert len(set(names)) > 60
+
+
+def test_pages_name_no_command_that_is_not_there() -> None:
+    told = "\n".join(path.read_text("utf-8") for path in DOCS.rglob("*.md"))
+    blocks = "\n".join(re.findall(r"^```\w+[^\n]*\n(.*?)^```$", told, re.MULTILINE | re.DOTALL))
+    commands = set(re.findall(r"(?:^ {4,}|`)rodcone ([a-z]+)\b", told, re.MULTILINE))
+    commands |= set(re.findall(r"^rodcone ([a-z]+)\b", blocks, re.MULTILINE))
+    source = (ROOT / "studies" / "cli.py").read_text("utf-8")
+    known = set(re.findall(r'name="(\w+)"', source)) | set(re.findall(r"@app\.command\ndef (\w+)", source))
+    assert {"demo", "sweep", "doctor"} <= commands <= known
+
+
+@pytest.fixture(scope="module")
+def figures(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    if shutil.which("make") is None:
+        pytest.skip("make is not installed: docs/figures.mk can't run")
+    return tmp_path_factory.mktemp("figures")
+
+
+def make(figures: Path, *targets: str) -> None:
+    """Make figures as `make docs` does, the large ones small."""
+    command = ["make", "-f", "docs/figures.mk", f"BIN={Path(sys.executable).parent}", f"FIGURES={figures}", *SMALL]
+    done = subprocess.run([*command, *targets], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("page", RUN, ids=name_of)
+def test_the_code_of_a_page_runs(page: Path, figures: Path) -> None:
+    if page.stem == "cluster":
+        pytest.importorskip("distributed", reason="needs dask.distributed (extra cluster)")
+    make(figures, f"{figures}/{name_of(page)}/ran")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_a_processor_added_as_its_page_says_is_one_of_rodcones(tmp_path: Path) -> None:
+    """The page's module and its diff, applied to a copy of the packages, give a new name to `rodcone develop`."""
+    text = (DOCS / "how_to" / "own_processor.md").read_text("utf-8")
+    for package in PACKAGES:
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    (module,) = re.findall(r'^```python title="isp/two_by_two.py"\n(.*?)^```$', text, re.MULTILINE | re.DOTALL)
+    (tmp_path / "isp" / "two_by_two.py").write_text(module, "utf-8")
+    (change,) = re.findall(r"^```diff\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    for hunk in change.split("@@\n")[1:]:
+        lines = hunk.splitlines(keepends=True)
+        before, after = ("".join(line[1:] for line in lines if line[0] in signs) for signs in (" -", " +"))
+        source = (tmp_path / "isp" / "processors.py").read_text("utf-8")
+        assert source.count(before) == 1, before
+        (tmp_path / "isp" / "processors.py").write_text(source.replace(before, after), "utf-8")
+    program = (
+        "from studies.cli import main\n"
+        "for words in ['capture flat_field --cfa bayer --size 32 --spp 4 --level 5cd/m2 -o flat.dng',"
+        " 'develop flat.dng --isp two_by_two']:\n"
+        "    try:\n"
+        "        main(words.split())\n"
+        "    except SystemExit as end:\n"
+        "        assert not end.code, words\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "flat.png").is_file()
+
+
+@pytest.fixture(scope="module")
+def site(figures: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, built strictly: a warning, such as a missing figure or a dead link, ends the build."""
+    for library in ("mkdocs", "material", "mkdocstrings", "latex2mathml"):
+        pytest.importorskip(library, reason="needs MkDocs (extra docs)")
+    make(figures)
+    folder = tmp_path_factory.mktemp("site")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)],
+        cwd=ROOT,
+        env=os.environ | {"FIGURES": str(figures), "NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "WARNING" not in done.stderr
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_the_site_has_a_page_for_every_module_and_command_and_formulas_that_browsers_know(site: Path) -> None:
+    modules = {f"{path.parent.name}/{path.stem}" for name in PACKAGES for path in (ROOT / name).glob("*.py")}
+    built = {path.relative_to(site / "api").with_suffix("").as_posix() for path in (site / "api").glob("*/*.html")}
+    assert built == {name.replace("__init__", "index") for name in modules}
+    model = (site / "model.html").read_text("utf-8")
+    assert model.count("<math") > 50
+    assert "arithmatex" not in model
+    assert not re.findall(r"<m\w+>[^<]*\\[^<]*<", model), "a command that the converter doesn't know stays as it is"
+    assert 'href="api/sensor/noise.html#sensor.noise.noise_variance"' in model
+    assert 'id="sensor.noise.noise_variance"' in (site / "api" / "sensor" / "noise.html").read_text("utf-8")
+    assert 'id="rodcone-sweep"' in (site / "api" / "commands.html").read_text("utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_the_finished_pages_ask_no_host_for_anything(site: Path) -> None:
+    fetched = re.compile(r"""<(?:script|link|img|iframe|source)\b[^>]*\b(?:src|href)=["']?(?:https?:)?//[^"'\s>]+""")
+    wrong = {
+        page.relative_to(site).as_posix(): found
+        for page in site.rglob("*.html")
+        if (found := [tag for tag in fetched.findall(page.read_text("utf-8")) if 'rel="canonical"' not in tag])
+    }
+    assert not wrong
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.skipif(CHROME.CHROMIUM is None, reason="needs Chromium to open the documentation")
+def test_the_search_finds_a_page_where_the_site_was_opened_as_a_file(site: Path, tmp_path: Path) -> None:
+    browser = CHROME.Browser(tmp_path)
+    page = CHROME.Page(browser, site / "index.html")
+    found = page.value(SEARCH)
+    assert any("sensor/noise.html" in address for address in found), found
+    assert page.complaints() == []
+    browser.close()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.skipif(CHROME.CHROMIUM is None, reason="needs Chromium to open the documentation")
+def test_a_browser_shows_the_pages_at_two_widths_in_light_and_dark_without_a_complaint(
+    site: Path, tmp_path: Path
+) -> None:
+    for number, (width, dark) in enumerate(VIEWS):
+        browser = CHROME.Browser(tmp_path / str(number))  # a profile each: the scheme is remembered
+        for name in ("index", "model", "tutorial/first_picture", "api/commands", "api/sensor/noise"):
+            page = CHROME.Page(browser, site / f"{name}.html", width=width, dark=dark)
+            assert page.complaints() == []
+            assert all(address.startswith("file:") for address in page.requests()), page.requests()
+            assert page.value("document.documentElement.scrollWidth") == width, f"{name} scrolls sideways at {width}"
+            assert page.value("[...document.images].filter(x => x.complete && !x.naturalWidth).length") == 0
+            assert page.value("document.body.dataset.mdColorScheme") == ("slate" if dark else "default")
+            ground = page.screenshot()[300:, :, :].mean()
+            assert (ground < 100) if dark else (ground > 155), f"{name}: mean {ground:.0f}, dark: {dark}"
+        browser.close()
