@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache, lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -160,11 +161,7 @@ def run_cell(cell: Cell, threads: int | None = None) -> Row:
     developed = time.perf_counter()
     linear = _linear(cell, picture.rgb, float(neutral[channels(cell.sensor.cfa).index(processor.unit)]))
     encoded = encode_srgb(linear)
-    figures = {
-        **vars(measure(encoded, truth.encoded)),
-        **vars(appearance(linear, truth, cell.white_cd_m2)),
-        **vars(target_figures(cell.at.scene, linear, truth.linear)),
-    }
+    figures = _figures(cell, linear, encoded, truth)
     measured = time.perf_counter()
     return Row(
         key=cell.key,
@@ -194,6 +191,14 @@ def run_cell(cell: Cell, threads: int | None = None) -> Row:
         finished=datetime.now(UTC).isoformat(timespec="milliseconds"),
         host=platform.node(),
     )
+
+
+def _figures(cell: Cell, linear: Image, encoded: Image, truth: TruePicture) -> dict[str, Any]:
+    return {
+        **vars(measure(encoded, truth.encoded)),
+        **vars(appearance(linear, truth, cell.white_cd_m2)),
+        **vars(target_figures(cell.at.scene, linear, truth.linear)),
+    }
 
 
 @cache

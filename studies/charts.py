@@ -63,6 +63,7 @@ class Chart:
     guides: tuple[float, ...]
     series: tuple[Series, ...]
     rule: Tick | None
+    x_label: str
     width: float = WIDTH
     height: float = HEIGHT
     left: float = LEFT
@@ -108,6 +109,16 @@ def decades(low: float, high: float) -> list[float]:
     """Return the powers of ten within `low`..`high`; every second one where they would crowd."""
     exponents = range(ceil(log10(low) - 1e-9), floor(log10(high) + 1e-9) + 1)
     return [10.0**exponent for exponent in exponents[:: 2 if len(exponents) > 6 else 1]]
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Return the powers of ten within `low`..`high`, with 2 and 5 times them where they alone would be under two."""
+    whole = decades(low, high)
+    if len(whole) > 1:
+        return whole
+    exponents = range(floor(log10(low)), ceil(log10(high)) + 1)
+    finer = [factor * 10.0**exponent for exponent in exponents for factor in (1, 2, 5)]
+    return [value for value in finer if low <= value <= high]
 
 
 def line_path(points: Sequence[Point | None]) -> str:
@@ -188,6 +199,7 @@ def line_chart(
     percent: bool = False,
     shared: Sequence[float | None] = (),
     rule: tuple[float, str] | None = None,
+    x_label: str = "scene luminance, cd/m²",
 ) -> Chart:
     """Lay out one chart over a logarithmic x axis.
 
@@ -196,7 +208,7 @@ def line_chart(
     title, description : str
         What a screen reader says instead of the picture.
     x : sequence of float
-        Positive positions (luminance in cd/m²), one for each value of every line.
+        Positive positions, such as luminance in cd/m², one for each value of every line.
     lines : sequence of Line
         What to draw; None and values that are not finite leave a gap.
     log_y, percent : bool
@@ -205,6 +217,8 @@ def line_chart(
         Further values the value axis has to hold, so that neighbouring charts share one scale.
     rule : (value, text), optional
         A horizontal line to judge the values against.
+    x_label : str
+        Name and unit of the positions.
 
     Returns
     -------
@@ -224,9 +238,10 @@ def line_chart(
     return Chart(
         title=title,
         description=description,
-        x_ticks=tuple(Tick(across.at(value), tick_text(value)) for value in decades(across.low, across.high)),
+        x_ticks=tuple(Tick(across.at(value), tick_text(value)) for value in log_ticks(across.low, across.high)),
         y_ticks=tuple(Tick(scale.at(value), write(value)) for value in ticks),
         guides=tuple(xs),
         series=tuple(replace(one, label_y=round(y, 2)) for one, y in zip(series, labels, strict=True)),
         rule=Tick(scale.at(rule[0]), rule[1]) if rule else None,
+        x_label=x_label,
     )

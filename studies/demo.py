@@ -32,7 +32,7 @@ from studies.pictures import contact_sheet, to_bytes
 from studies.quiet_render import render_quietly
 from studies.radiance_file import check_radiance_file, open_radiance_file
 from studies.report import render_report
-from studies.results import environment, level_facts, notes, render_facts, sensor_facts
+from studies.results import DISPLAY_WHITE, environment, level_facts, notes, render_facts, sensor_facts
 from studies.target_figures import target_figures
 from studies.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 
@@ -285,7 +285,7 @@ def _results(
         "environment": environment(),
         "render": render_facts(transport) | {"brightest_share": brightest_share(demo, transport)},
         "exposure_rule": RULE.format(longest=demo.longest_s * 1e3),
-        "display_white": "the scene's 99th percentile of luminance, visible lamps excluded, is shown at 90 % of white",
+        "display_white": DISPLAY_WHITE,
         "levels": level_facts(levels, transport),
         "sensors": [sensor_facts(name) for name in demo.sensors],
         "cameras": list(CAMERAS),

@@ -36,6 +36,15 @@ PSNR = Metric("psnr_db", "PSNR", 1, "dB", higher=True)
 SSIM = Metric("ssim", "SSIM", 3, "", higher=True)
 DELTA_E = Metric("delta_e_median", "ΔE2000, median", 1, "", higher=False)
 DELTA_E_95 = Metric("delta_e_p95", "ΔE2000, 95 %", 1, "", higher=False)
+S_CIELAB = Metric("s_cielab_median", "S-CIELAB, median", 1, "", higher=False)
+S_CIELAB_95 = Metric("s_cielab_p95", "S-CIELAB, 95 %", 1, "", higher=False)
+FLIP = Metric("flip_mean", "FLIP", 3, "", higher=False)
+PU21 = Metric("pu21_psnr_db", "PU21-PSNR", 1, "dB", higher=True)
+MTF50 = Metric("mtf50_cy_per_px", "MTF50", 3, "cy/px", higher=True)
+CHART = Metric("chart_delta_e_mean", "ΔE2000 of the chart", 1, "", higher=False)
+PATCHES = Metric("patch_snr_db", "SNR of the patches", 1, "dB", higher=True)
+ON_TARGETS = (MTF50, CHART, PATCHES)  # known on the scene alone that they are made for
+METRICS = (PSNR, SSIM, DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, FLIP, PU21, *ON_TARGETS)
 
 
 def fixed(value: float | None, digits: int, unit: str = "") -> str:
@@ -203,6 +212,17 @@ def render_sentence(render: Mapping[str, Any]) -> str:
         f"{percent(render['relative_mc_error'])}. In the brightest light its noise variance is at most "
         f"{percent(render['brightest_share'])} of the sensor's own in {percent(OF_PIXELS)} of the pixels "
         f"({percent(MOST_SHARE)} is the aim)."
+    )
+
+
+def budget_sentence(cells: Sequence[Mapping[str, Any]]) -> str:
+    """Say what a plan predicts that its approximations add; empty where the pictures follow none."""
+    known = [cell["budget_share"] for cell in cells if cell.get("budget_share") is not None]
+    if not known:
+        return ""
+    return (
+        f"By the plan that the pictures follow, all its approximations together add at most {percent(max(known))} to "
+        "the variance of the sensor's own noise."
     )
 
 

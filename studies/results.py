@@ -12,6 +12,8 @@ from render.transport import Transport
 from scenes.levels import LightLevel
 from sensor.presets import preset
 
+DISPLAY_WHITE = "the scene's 99th percentile of luminance, visible lamps excluded, is shown at 90 % of white"
+
 
 def render_facts(transport: Transport) -> dict[str, Any]:
     """How the render was made, and the error it reached under the scene's own lights."""

@@ -38,6 +38,13 @@ def sample_cell(level: int, sensor: int, camera: str) -> dict[str, Any]:
         "ssim": min(0.04 + 0.02 * psnr + (0.05 if rgbw else 0), 0.97),
         "delta_e_median": 120 / psnr + (0.4 if rgbw and level > 3 else 0),
         "delta_e_p95": 380 / psnr,
+        "s_cielab_median": 60 / psnr,
+        "s_cielab_p95": 190 / psnr,
+        "flip_mean": 4 / psnr,
+        "pu21_psnr_db": psnr + 3,
+        "mtf50_cy_per_px": None,
+        "chart_delta_e_mean": None,
+        "patch_snr_db": None,
         "mc_share": 2e-4 * 3.1**level * (1.6 if rgbw else 1) * (1 + 3 * sensor),
         "snr_db": None if level == 0 else psnr - 4,
         "substitution": (level < 3 - sensor) if rgbw else None,
@@ -48,7 +55,7 @@ def sample_cell(level: int, sensor: int, camera: str) -> dict[str, Any]:
         },
         "saturated": 0.0 if level < 4 else 0.012,
         "mean_electrons": dict(zip("RGBW" if rgbw else "RGB", electrons, strict=False)),
-        "seconds": {"capture": 0.021, "develop": 0.11 if rgbw else 0.03},
+        "seconds": {"capture": 0.021, "develop": 0.11 if rgbw else 0.03, "measure": 0.2},
         "picture": f"{level}/{name}/{camera}",
     }
 
@@ -115,6 +122,38 @@ def sample_axes() -> dict[str, Any]:
     return results
 
 
+def sample_views() -> dict[str, Any]:
+    """Return small results of two scenes under two spectra, two sensors and two levels; one picture is left out.
+
+    Each cell's PSNR and picture are its own; the second scene is a chart, and wider.
+    """
+    results = sample_axes()
+    results |= {
+        "name": "two scenes",
+        "scenes": [{"name": "still_life", "size": [64, 64]}, {"name": "color_checker", "size": [48, 96]}],
+        "spectra": ["own", "A"],
+        "sensors": sample_results()["sensors"],
+        "levels": results["levels"][:2],
+        "truths": [f"truth/{scene}/{spectrum}" for scene in ("still_life", "color_checker") for spectrum in "oA"],
+        "pictures_left_out": "One picture is left out.",
+    }
+    del results["exposures"]
+    results["cells"] = [
+        {
+            **sample_cell(level, sensor, camera), "scene": scene, "spectrum": spectrum,
+            "psnr_db": 10.0 + 8 * place + 4 * colour + 2 * sensor + level + (0.5 if camera == "bayer" else 0.0),
+            "chart_delta_e_mean": 3.0 + sensor if place else None, "file": f"{scene}/{level}/{sensor}.png",
+            "picture": f"{scene}/{spectrum}/{level}/{sensor}/{camera}",
+        }
+        for place, scene in enumerate(("still_life", "color_checker"))
+        for colour, spectrum in enumerate(("own", "A"))
+        for sensor in range(2) for level in range(2) for camera in results["cameras"]
+    ]  # fmt: skip
+    for cell in results["cells"][-2:]:
+        cell["picture"] = None
+    return results
+
+
 def _encode(linear: np.ndarray) -> bytes:
     file = BytesIO()
     Image.fromarray((255 * np.clip(linear, 0, 1) ** (1 / 2.2)).round().astype(np.uint8)).save(
@@ -136,10 +175,15 @@ def sample_pictures(results: dict[str, Any]) -> dict[str, bytes]:
         scene = np.where((distance < 1)[..., None], shade, scene)
     scene = np.where(((x * 32).astype(int) + (y * 32).astype(int) & 1)[..., None] * (y < 0.2)[..., None], 0.8, scene)
     rng = np.random.default_rng(7)
-    pictures = {"truth": _encode(scene)}
-    for cell in {cell["picture"]: cell for cell in results["cells"]}.values():
-        noise = rng.standard_normal(scene.shape) * 10 ** (-float(cell["psnr_db"] or 0) / 20)
-        pictures[cell["picture"]] = _encode(scene + noise)
+    # A truth of its own for each place has a shade of its own.
+    names = results.get("truths", ["truth"])
+    pictures = {name: _encode(scene * (1 - 0.1 * place)) for place, name in enumerate(names)}
+    sizes = {one["name"]: one["size"] for one in results.get("scenes", [])}
+    for cell in {cell["picture"]: cell for cell in results["cells"] if cell["picture"]}.values():
+        rows, columns = sizes.get(cell.get("scene"), (height, width))
+        of_size = np.tile(scene, (1, 2, 1))[:rows, :columns]
+        noise = rng.standard_normal(of_size.shape) * 10 ** (-float(cell["psnr_db"] or 0) / 20)
+        pictures[cell["picture"]] = _encode(of_size + noise)
     return pictures
 
 

@@ -27,6 +27,7 @@ from sensor.optics import falloff, form_image
 from sensor.presets import preset
 from sensor.readout import read_out
 from sensor.response import expected_electrons
+from studies.appearance import appearance, true_picture
 from studies.cell_run import run_cell
 from studies.cells import Cell, device_stream, exposure_stream
 from studies.ledger import open_ledger
@@ -34,7 +35,7 @@ from studies.lit_scene import open_all
 from studies.metrics import measure
 from studies.model import ImageModel, Plan
 from studies.prepare import Job, scene_cells
-from studies.study import conditions
+from studies.study import RenderLimits, SceneChoice, conditions
 from studies.truth import light_in_bands, neutral_electrons, true_srgb
 
 
@@ -78,13 +79,21 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     raw = read_out(expected_e, sensor, device, exposure_s, exposure_stream(cell.at, "bayer"))
     neutral = neutral_electrons(sensor, light, exposure_s)
     white = float(np.percentile(radiance.luminance(), 99.0)) / 0.9
-    encoded = encode_srgb(picture_bayer(raw, colours, neutral=neutral).rgb / (neutral[1] * white))
-    quality = measure(encoded, encode_srgb(true_srgb(radiance, light, white)))
+    linear = picture_bayer(raw, colours, neutral=neutral).rgb / (neutral[1] * white)
+    truth = true_srgb(radiance, light, white)
+    encoded = encode_srgb(linear)
+    quality, seen = measure(encoded, encode_srgb(truth)), appearance(linear, true_picture(truth), white)
 
     assert row.exposure_s == pytest.approx(exposure_s, rel=1e-6)  # the level is put on before or after float32
     assert row.psnr_db == pytest.approx(quality.psnr_db, abs=1e-3)
     assert row.ssim == pytest.approx(quality.ssim, abs=1e-5)
     assert row.delta_e_median == pytest.approx(quality.delta_e_median, abs=1e-3)
+    for name, tolerance in (("s_cielab_median", 1e-3), ("s_cielab_p95", 1e-2), ("flip_mean", 1e-4)):
+        assert getattr(row, name) == pytest.approx(getattr(seen, name), abs=tolerance)
+    assert row.pu21_psnr_db == pytest.approx(seen.pu21_psnr_db, abs=1e-3)  # in absolute luminance: at 25 cd/m^2
+    assert (row.mtf50_cy_per_px, row.chart_delta_e_mean, row.patch_snr_db) == (None, None, None)
+    shown_truth = np.asarray(Image.open(tmp_path / "pictures" / row.truth), dtype=int)
+    assert (np.abs(shown_truth - np.rint(encode_srgb(truth) * 255)) <= 1).all()
     content = (tmp_path / "pictures" / row.picture).read_bytes()
     shown = np.asarray(Image.open(BytesIO(content)), dtype=int)
     assert (np.abs(shown - np.rint(encoded * 255)) <= 1).all()
@@ -96,7 +105,7 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
 def test_a_cell_gives_the_same_row_and_picture_each_time(tmp_path: Path) -> None:
     cell = made(tmp_path)[0]
     first, second = run_cell(cell), run_cell(cell)
-    times = dict.fromkeys(("capture_s", "develop_s", "measure_s"), 0.0) | {"finished": ""}
+    times = dict.fromkeys(("render_s", "capture_s", "develop_s", "measure_s"), 0.0) | {"finished": ""}
     assert replace(first, **times) == replace(second, **times)  # type: ignore[arg-type]
 
 
@@ -149,3 +158,20 @@ def test_other_code_and_arrays_out_of_reach_are_told_in_one_line(tmp_path: Path)
     cell.truth.write_bytes(b"no array")
     with pytest.raises(InputError, match="can't be read"):
         run_cell(cell)
+
+
+def test_targets_have_their_own_figures_on_their_own_scene(tmp_path: Path) -> None:
+    """A bright chart and a bright edge, nearly without noise; each figure is None on the other's scene."""
+    changes = {"levels": ("100cd/m2",), "seeds": (0,), "render": RenderLimits(size=96, spp=16)}
+    scenes = (SceneChoice("color_checker"), SceneChoice("slanted_edge"))
+    chart, edge = (run_cell(cell) for cell in made(tmp_path, scenes=scenes, **changes))
+    assert chart.mtf50_cy_per_px is None
+    assert chart.chart_delta_e_mean is not None
+    assert 0.3 < chart.chart_delta_e_mean < 8  # what the matrix's fit leaves, and some noise
+    assert chart.patch_snr_db is not None
+    assert 20 < chart.patch_snr_db < 45
+    assert (edge.chart_delta_e_mean, edge.patch_snr_db) == (None, None)
+    assert edge.mtf50_cy_per_px is not None
+    # Bilinear green keeps less than a pixel's own box does (0.6 cycles a pixel), and more than a box of three pixels.
+    assert 0.2 < edge.mtf50_cy_per_px < 0.6
+    assert chart.render_s > 0

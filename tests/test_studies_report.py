@@ -138,7 +138,7 @@ def test_hostile_text_stays_text_everywhere() -> None:
     outline, other = Outline(page_of(clean)), Outline(page_of(poisoned))
     assert [tag for tag, _ in other.tags] == [tag for tag, _ in outline.tags]
     assert "<b>bold" not in page_of(poisoned)
-    assert json.loads(other.scripts[0])["levels"][0]["name"] == "moonlight" + HOSTILE
+    assert json.loads(other.scripts[0])["views"][0]["levels"][0]["name"] == "moonlight" + HOSTILE
     assert other.scripts[1] == outline.scripts[1]
     assert unescape(page_of(poisoned)).count(HOSTILE) > 100
     # Names of channels and of the environment's entries are keys, not values.
@@ -162,7 +162,7 @@ def test_every_cell_stands_in_the_table() -> None:
             cell = cell_at(of, level, sensor["name"], camera)
             assert row[0] == of["levels"][level]["name"]
             assert row[2] == text.camera_name(camera)
-            assert row[3] == f"{cell['psnr_db']:.1f}\N{NO-BREAK SPACE}dB"
+            assert row[3] == f"{cell['psnr_db']:.1f}"
             assert row[4] == f"{cell['ssim']:.3f}"
         start += 1 + 7 * len(of["cameras"])
 
@@ -240,7 +240,7 @@ def test_inconsistent_results_are_refused(fault: Callable[[dict[str, Any]], None
 def test_unknown_numbers_become_dashes() -> None:
     of = results()
     cell = cell_at(of, 0, "low_noise", "bayer")
-    for key in ("psnr_db", "ssim", "delta_e_median", "delta_e_p95", "mc_share", "snr_db", "exposure_s", "saturated"):
+    for key in (*(metric.key for metric in text.METRICS), "mc_share", "snr_db", "exposure_s", "saturated"):
         cell[key] = None
     cell["balance"] = cell["mean_electrons"] = cell["seconds"] = None
     cell_at(of, 1, "low_noise", "bayer")["psnr_db"] = float("nan")
@@ -250,7 +250,7 @@ def test_unknown_numbers_become_dashes() -> None:
     outline = Outline(page_of(of))
     row = outline.rows[1 + 1 + 14 + 1 + 1]
     assert row[2] == "Bayer"
-    assert set(row[3:12]) == {"—"}
+    assert set(row[3:16]) == {"—"}
     assert "NaN" not in outline.scripts[0]
     assert "Infinity" not in outline.scripts[0]
     for fault in ("nan", "None"):
@@ -261,7 +261,7 @@ def test_error_budget_holds_each_picture_s_share_and_what_is_left_out() -> None:
     of = results()
     of["left_out"] = ["veiling glare: each per cent adds 1 %", "aberrations"]
     page = unescape(page_of(of))
-    budget = page[page.index('<table class="cells budget">') : page.index('<section id="time"')]
+    budget = page[page.index('<table class="cells budget">') : page.index('<section id="speed"')]
     rows = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", budget, re.DOTALL)]
     assert rows[0] == ["", "table1_output", "low_noise"]
     assert rows[1] == ["Level", *["Interleaved", "Bayer"] * 2]
@@ -284,7 +284,7 @@ def test_seeds_and_exposures_stand_in_the_page() -> None:
     cell = next(cell for cell in of["cells"] if cell["seed"] == 6 and cell["exposure"] == "10ms")
     # Deviation 0.1 dB over 3 seeds: Student's 95 % interval is 4.3027 x 0.1 / sqrt(3) = 0.248 dB wide to each side.
     assert data["cells"][6]["psnr_db"].replace("\N{NO-BREAK SPACE}", " ") == f"{cell['psnr_db']:.1f} ± 0.2 dB"
-    assert page.count('class="band"') == 2 * (3 + 1) * 2, "for each exposure, metric (and Monte Carlo share), camera"
+    assert page.count('class="band"') == 2 * (8 + 1) * 2, "for each exposure, metric (and Monte Carlo share), camera"
     assert "Means over 3 seeds" in page
     assert "seeds 5, 6, 7" in page
     assert "Sensor table1_output, exposure 10 ms" in page

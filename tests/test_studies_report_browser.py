@@ -195,11 +195,105 @@ def test_exposure_slider_changes_picture_and_numbers_and_nothing_scrolls(browser
     assert page.requests() == []
 
 
+@pytest.fixture(scope="module")
+def views(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report of two scenes under two spectra, of which one condition's pictures are left out."""
+    results = SAMPLE.sample_views()
+    file: Path = tmp_path_factory.mktemp("views") / "report.html"
+    file.write_text(render_report(results, SAMPLE.sample_pictures(results)), encoding="utf-8")
+    return file
+
+
+def choose(page: Any, view: int) -> None:
+    page.value(f"var view = document.getElementById('view'); view.value = {view};"
+               "view.dispatchEvent(new Event('input'))")  # fmt: skip
+
+
+def test_choice_of_scene_and_light_changes_pictures_truth_and_numbers(browser: Any, views: Path) -> None:
+    page = Page(browser, views)
+    truth = "document.querySelector('[data-truth] img').src"
+    names = page.value("[...document.getElementById('view').options].map((option) => option.text)")
+    assert names == [
+        f"{scene}, {light}" for scene in ("still_life", "color_checker") for light in ("own light", "under A")
+    ]
+    seen = []
+    for view in range(4):
+        choose(page, view)
+        seen.append((shown(page)["psnr"], shown(page)["picture"], page.value(truth)))
+        assert names[view] in shown(page)["status"]
+    assert [psnr for psnr, _, _ in seen] == [f"{db:.1f}\N{NO-BREAK SPACE}dB" for db in (10, 14, 18, 22)]
+    assert len({picture for _, picture, _ in seen}) == len({truth for _, _, truth in seen}) == 4
+    # The chart's picture is twice as wide as high, and its figure stands on it alone.
+    box = page.value(
+        "(({width, height}) => [width, height])(document.querySelector('#side img').getBoundingClientRect())"
+    )
+    assert box[0] == 2 * box[1]
+    target = "document.querySelector('#side [data-row=chart_delta_e_mean]').hidden"
+    assert page.value(target) is False
+    assert page.value("document.querySelector('#side [data-row=chart_delta_e_mean] dd').textContent") == "3.0"
+    choose(page, 0)
+    assert page.value(target) is True
+    # A picture of another scene in the overview, in a part that is folded until it is opened.
+    page.value("document.querySelector('[data-cell=\"9\"]').click()")
+    assert page.value("document.getElementById('view').value") == "1"
+    assert page.complaints() == []
+    assert page.requests() == []
+
+
+def test_a_picture_left_out_is_said_to_be_and_its_numbers_stand(browser: Any, views: Path) -> None:
+    page = Page(browser, views)
+    choose(page, 3)
+    page.value("document.querySelectorAll('[name=sensor]')[1].click(); document.getElementById('level').focus()")
+    gone = "getComputedStyle(document.querySelector('#side .gone')).display"
+    assert page.value(gone) == "none"
+    page.press("ArrowRight", 39)
+    assert page.value(gone) == "grid"
+    words = page.value("document.querySelector('#side .gone').textContent")
+    assert words == "Not in this page; its numbers are: color_checker/1/1.png"
+    assert shown(page)["psnr"] == f"{10 + 8 + 4 + 2 + 1:.1f}\N{NO-BREAK SPACE}dB"
+    assert page.value("document.querySelector('#side img').hasAttribute('src')") is False
+    page.value("document.querySelector('[name=view][value=wipe]').click()")
+    assert page.value("getComputedStyle(document.querySelector('.stage .gone')).display") == "grid"
+    page.value("document.getElementById('level').focus()")
+    page.press("ArrowLeft", 37)
+    assert page.value("getComputedStyle(document.querySelector('.stage .gone')).display") == "none"
+    assert page.complaints() == []
+    assert page.requests() == []
+
+
+def test_choice_of_metrics_shows_their_charts_in_every_group(browser: Any, views: Path) -> None:
+    page = Page(browser, views)
+    page.value("for (const fold of document.querySelectorAll('details')) fold.open = true")
+    drawn = "[...document.querySelectorAll('[data-metric=%s]')].filter((one) => one.getClientRects().length).length"
+    assert [page.value(drawn % key) for key in ("psnr_db", "flip_mean", "chart_delta_e_mean")] == [8, 0, 0]
+    for key in ("psnr_db", "flip_mean"):
+        page.value(f"document.querySelector('[name=metric][value={key}]').click()")
+    assert [page.value(drawn % key) for key in ("psnr_db", "flip_mean", "chart_delta_e_mean")] == [0, 8, 0]
+    assert page.value("document.querySelectorAll('[name=metric]').length") == 9, (
+        "the eight of every scene, and the chart's"
+    )
+    for width in (360, 1280, 2560):
+        page.show(width=width)
+        assert page.value("document.documentElement.scrollWidth") <= width
+    page.show(width=720, medium="print")
+    assert page.value(drawn % "flip_mean") == 8
+    assert page.complaints() == []
+
+
+def test_folded_parts_are_printed(browser: Any, views: Path) -> None:
+    page = Page(browser, views, width=720)
+    held = "[...document.querySelectorAll('.sheet img')].filter((one) => one.checkVisibility()).length"
+    assert page.value(held) == 8, "the first scene's, under its own light"
+    page.show(width=720, medium="print")
+    assert page.value(held) == 4 * 8 - 2
+
+
 def test_every_control_has_a_name_for_a_screen_reader(browser: Any, axes: Path) -> None:
     page = Page(browser, axes)
     page.value("document.querySelector('[name=view][value=wipe]').click()")
     nodes = page.send("Accessibility.getFullAXTree")["nodes"]
-    wanted = {"slider": 3, "radio": 3, "combobox": 2}  # level, exposure, wipe; one sensor, two views; left, right
+    # Level, exposure, wipe; one sensor, two views; left, right; the metrics.
+    wanted = {"slider": 3, "radio": 3, "combobox": 2, "checkbox": 8}
     for role, count in wanted.items():
         names = [node["name"]["value"] for node in nodes if node.get("role", {}).get("value") == role]
         assert len(names) == count, (role, names)
@@ -262,6 +356,8 @@ def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
     results = SAMPLE.sample_results()
     pictures = SAMPLE.sample_pictures(results)
     results["scene"] = results["levels"][0]["name"] = results["notes"][0] = results["exposure_rule"] = HOSTILE
+    results["name"] = HOSTILE
+    results["configuration"] = {HOSTILE: HOSTILE}
     file = tmp_path / "hostile.html"
     file.write_text(render_report(results, pictures), encoding="utf-8")
     page = Page(browser, file)

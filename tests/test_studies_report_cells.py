@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from render.errors import InputError
-from studies.report_cells import exposure_name, groups, ordered_cells, over_seeds, seeds
+from studies.report_cells import SCATTERED, exposure_name, groups, ordered_cells, over_seeds, seeds
 
 
 def load_sample() -> Any:
@@ -26,9 +26,9 @@ SAMPLE = load_sample()
 
 
 def test_two_seeds_give_mean_and_student_s_interval() -> None:
-    base = dict.fromkeys(("ssim", "delta_e_median", "delta_e_p95", "snr_db", "saturated", "mc_share"), 1.0)
+    base = dict.fromkeys(SCATTERED, 1.0)
     rest = {"substitution": None, "balance": None, "picture": "a"}
-    cell = over_seeds([{"psnr_db": 20.0, **base, **rest}, {"psnr_db": 21.0, **base, **rest, "picture": "b"}])
+    cell = over_seeds([{**base, **rest, "psnr_db": 20.0}, {**base, **rest, "psnr_db": 21.0, "picture": "b"}])
     # n = 2: s / sqrt(2) = 0.5, and t of one degree of freedom at 97.5 % is tan(0.475 pi) = 12.7062 (the Cauchy law).
     assert cell["psnr_db"] == 20.5
     assert cell["intervals"]["psnr_db"] == pytest.approx((20.5 - 6.3531, 20.5 + 6.3531), abs=1e-4)

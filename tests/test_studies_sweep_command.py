@@ -57,11 +57,14 @@ def test_sweep_prints_the_ledger_alone_and_the_table_follows(
 ) -> None:
     out = tmp_path / "out"
     command = ["sweep", str(study), "-o", str(out), "--workers", "1", "--as-stated"]
-    assert call(command, capsys) == (0, f"{out / 'ledger.sqlite'}\n", "")
+    told = f"rodcone: its report is {out / 'report.html'}\n"
+    assert call(command, capsys) == (0, f"{out / 'ledger.sqlite'}\n", told)
+    assert (out / "report.html").read_text("utf-8").lstrip().startswith("<!doctype html>")
     code, text, err = call([*command, "--json"], capsys)
-    assert (code, err) == (0, "")
+    assert (code, err) == (0, told)
     facts = json.loads(text)
     assert (facts["cells"], facts["made"], facts["ledger"]) == (2, 0, str(out / "ledger.sqlite"))
+    assert facts["report"] == str(out / "report.html")
     assert call(["export", str(out), "-o", str(tmp_path / "t.csv")], capsys) == (0, f"{tmp_path / 't.csv'}\n", "")
     header, *table = (tmp_path / "t.csv").read_text("utf-8").splitlines()
     assert header.startswith("key,code,scene,spectrum,level,exposure,sensor,processor,seed,luminance_cd_m2,illuminance")
@@ -74,7 +77,7 @@ def test_a_sweep_follows_the_plan_and_reference_models_everything(
     command = ["sweep", str(study), "-o", str(tmp_path / "out"), "--workers", "1"]
     for option in ([], ["--reference"], ["--as-stated"]):
         code, _, err = call([*command, *option], capsys)
-        assert (code, err) == (0, "")
+        assert (code, err) == (0, f"rodcone: its report is {tmp_path / 'out' / 'report.html'}\n")
     with closing(sqlite3.connect(tmp_path / "out" / "ledger.sqlite")) as base:
         table = base.execute("SELECT lens, budget_share FROM cells").fetchall()
     planned = [share for _, share in table if share is not None]
