@@ -62,6 +62,8 @@ def _parse(mi: Any, file: Path, trust: bool) -> Any:
         mi.parser.transform_upgrade(config, state)
     except RuntimeError as error:
         raise InputError(f"{reason(error)}; correct the file") from None
+    except UnicodeDecodeError:  # of an error that quotes a half of a letter, or a file of spectra
+        raise InputError(f"{file}: Mitsuba can't read it, nor say why in UTF-8; correct the file") from None
     finally:
         if not trust:
             mi.set_file_resolver(kept)
@@ -125,7 +127,10 @@ def _key(taken: Node, ids: Mapping[str, int], numbers: Counter[str], wanted: str
 
 def _xml_value(kind: str, value: Any) -> Any:
     if kind == "Transform":
-        return to_world(np.array(value.matrix, dtype=np.float64))
+        matrix = np.array(value.matrix, dtype=np.float64)
+        if not np.all(np.isfinite(matrix)):
+            raise InputError("a transform is not finite; allowed: finite numbers, a scale other than 0; correct it")
+        return to_world(matrix)
     if kind == "Color":
         return {"type": "rgb", "value": [float(x) for x in value]}
     if kind == "Vector":

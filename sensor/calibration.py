@@ -41,7 +41,7 @@ class ColourCalibration:
     camera_to_xyz_d65: Floats
 
     def __post_init__(self) -> None:
-        count = np.size(self.neutral)
+        count = len(self.neutral) if isinstance(self.neutral, Sequence) else np.size(self.neutral)
         shapes = [(count,), (3, 3), (count, 3), (count, 3), (3, count), (3, count)]
         for field, shape in zip(fields(self), shapes, strict=True):
             object.__setattr__(self, field.name, _numbers(field.name, getattr(self, field.name), shape))

@@ -142,6 +142,8 @@ def _told(path: Path) -> Iterator[None]:
     """Turn SQLite's errors into those that the command line tells in one line."""
     try:
         yield
+    except UnicodeDecodeError as error:  # of an error that quotes the file
+        raise InputError(f"{path}: it is no ledger (its names are no text); move it away") from error
     except sqlite3.DatabaseError as error:
         code = getattr(error, "sqlite_errorcode", None)
         if code is None:  # a fault of ours, not of the file's

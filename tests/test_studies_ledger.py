@@ -200,3 +200,12 @@ def test_a_file_without_tables_is_no_ledger_to_read(content: bytes, tmp_path: Pa
     with pytest.raises(InputError, match="it is no"), read_ledger(tmp_path):
         pass
     assert (tmp_path / FILE).read_bytes() == content
+
+
+@pytest.mark.parametrize("opened", [open_ledger, read_ledger])
+def test_what_a_file_says_of_itself_runs_no_functions(opened: Any, tmp_path: Path) -> None:
+    with open_ledger(tmp_path):
+        pass
+    with opened(tmp_path) as base:
+        values = {name: base.execute(f"PRAGMA {name}").fetchone()[0] for name in ("trusted_schema", "cell_size_check")}
+    assert values == {"trusted_schema": 0, "cell_size_check": 1}

@@ -1,0 +1,338 @@
+"""Every reader of outside files, with small valid files of the project's own writers to begin from."""
+
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import numpy as np
+from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_elements, pages, signed_archive, tiff_tags
+
+from render.cache import load_transport, save_transport
+from render.exr import read_exr, write_exr
+from render.iset import read_iset_scene
+from render.loader import Film, integrator_name, variant
+from render.radiance import SpectralRadiance
+from render.scene_file import load_scene_file
+from render.transport import Transport
+from scenes.catalog import load
+from sensor.calibration import ColourCalibration
+from sensor.config_file import read_sensor
+from sensor.curves import read_csv, read_curve
+from sensor.dng import read_dng
+from sensor.noise_profile import read_noise_profile
+from sensor.photograph import read_photograph
+from sensor.raw import RawImage
+from sensor.raw_files import write_raw
+from sensor.raw_tiff import read_tiff
+from sensor.tiff import CFA, text, write_mosaic
+from studies.cell_run import Row
+from studies.export import read_rows
+from studies.ledger import add, open_ledger, want
+from studies.study_file import read_study
+
+Sample = Mapping[str, bytes]  # files by name; the first is the one that is read
+
+
+@dataclass(frozen=True)
+class Target:
+    """A reader.
+
+    Attributes
+    ----------
+    samples : callable
+        Valid files, made once.
+    mutators : mapping of str to Mutator
+        By the ending of the file that is changed.
+    read : callable
+        Takes the path of the first file.
+    """
+
+    samples: Callable[[], list[Sample]]
+    mutators: Mapping[str, Mutator]
+    read: Callable[[Path], object]
+
+
+def _made(write: Callable[[Path], object]) -> Sample:
+    """Files that a writer leaves in an empty folder, the one that is read first; SQLite's logs are left out."""
+    with tempfile.TemporaryDirectory() as folder:
+        write(Path(folder))
+        return {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir(), reverse=True)}
+
+
+NM = np.arange(420.0, 700.0, 70.0)
+
+
+def _exr_samples() -> list[Sample]:
+    import OpenEXR
+
+    values = np.random.default_rng(1).random((5, 6, NM.size), dtype=np.float32)
+
+    def other(folder: Path, kind: Any, compression: Any, dtype: Any) -> None:
+        channels = {
+            f"S0.{nm:.1f}nm".replace(".", ",").replace("S0,", "S0."): values[:, :, 0].astype(dtype) for nm in NM
+        }
+        header = {"compression": compression, "type": kind, "emissiveUnits": "W.m^-2.sr^-1"}
+        if kind == OpenEXR.tiledimage:
+            header["tiles"] = OpenEXR.TileDescription()
+        OpenEXR.File(header, channels).write(str(folder / "a.exr"))
+
+    made = [_made(lambda folder: write_exr(folder / "a.exr", SpectralRadiance(values, NM), scene="a"))]
+    for kind, compression, dtype in (
+        (OpenEXR.scanlineimage, OpenEXR.ZIP_COMPRESSION, np.float16),
+        (OpenEXR.scanlineimage, OpenEXR.NO_COMPRESSION, np.float32),
+        (OpenEXR.scanlineimage, OpenEXR.PXR24_COMPRESSION, np.float32),
+        (OpenEXR.scanlineimage, OpenEXR.B44_COMPRESSION, np.float16),
+        (OpenEXR.scanlineimage, OpenEXR.DWAA_COMPRESSION, np.float16),
+        (OpenEXR.tiledimage, OpenEXR.RLE_COMPRESSION, np.float16),
+    ):
+        made.append(_made(lambda folder, how=(kind, compression, dtype): other(folder, *how)))
+    return made
+
+
+def _mat_samples() -> list[Sample]:
+    from scipy.io import savemat
+
+    rng = np.random.default_rng(2)
+    photons = 1e15 * rng.random((3, 4, NM.size))
+    basis = {"basis": rng.random((NM.size, 2)), "wave": NM}
+    scene = {"name": "a", "data": {"photons": photons.astype(np.float32)}, "spectrum": {"wave": NM}}
+    packed = {"photons": (photons / 1e11).astype(np.uint16), "dmin": 0.0, "dmax": 1e15}
+    forms: list[dict[str, Any]] = [
+        {"photons": photons, "wave": NM, "comment": "text"},
+        {"mcCOEF": photons[:, :, :2], "basis": basis, "imgMean": np.ones(NM.size)},
+        {"scene": scene},
+        {"scene": {**scene, "data": packed}},
+    ]
+    return [
+        _made(lambda folder, how=(form, squeezed): savemat(folder / "a.mat", how[0], do_compression=how[1]))
+        for form in forms
+        for squeezed in (False, True)
+    ]
+
+
+def _raw(cfa: tuple[str, ...], count: int) -> RawImage:
+    rng = np.random.default_rng(3)
+    shapes = [(count,), (3, 3), (count, 3), (count, 3), (3, count), (3, count)]
+    colour = ColourCalibration(*(rng.uniform(0.2, 1.0, shape) for shape in shapes))
+    dn = rng.integers(0, 1023, (24, 26)).astype(np.uint16)
+    numbers = {"black_dn": 64.0, "white_dn": 1023.0, "gain_e_per_dn": 9.5, "read_noise_e": 2.0, "dsnu_e": 1.0}
+    return RawImage(
+        dn,
+        cfa,
+        **numbers,
+        prnu=0.01,
+        exposure_s=0.01,
+        f_number=2.8,
+        iso=100.0,
+        colour=colour,
+        defects=np.array([[1, 2], [3, 4]]),
+    )
+
+
+def _dng_samples() -> list[Sample]:
+    return [
+        _made(lambda folder, raw=raw: write_raw(raw, folder / "a.dng"))
+        for raw in (_raw(("RG", "GB"), 3), _raw(("RG", "BW"), 4))
+    ]
+
+
+def _tiff_samples() -> list[Sample]:
+    return [_made(lambda folder: write_raw(_raw(("RG", "BW"), 4), folder / "a.tif"))]
+
+
+def _camera_samples() -> list[Sample]:
+    """Digital negatives of another camera, with a noise profile and colours."""
+    tags: dict[int, Any] = {
+        254: ("I", (0,)),
+        271: text("Other"),
+        272: text("Model X"),
+        33421: ("H", (2, 2)),
+        33422: ("B", (0, 1, 1, 2)),
+        50706: ("B", (1, 4, 0, 0)),
+        50708: text("Other Model X"),
+        50710: ("B", (0, 1, 2)),
+        50713: ("H", (2, 2)),
+        50714: ("H", (64, 64, 64, 64)),
+        50717: ("I", (1023,)),
+        50721: ("2i", (9, 10, -3, 10, -1, 10, -4, 10, 12, 10, 2, 10, -5, 100, 15, 100, 6, 10)),
+        50728: ("2I", (1, 2, 1, 1, 7, 10)),
+        50778: ("H", (21,)),
+        51041: ("d", (1e-4, 1e-8)),
+    }
+    dn = _raw(("RG", "GB"), 3).dn
+    exif: dict[int, Any] = {33434: ("2I", (1, 100)), 33437: ("2I", (4, 1))}
+    return [_made(lambda folder: write_mosaic(folder / "a.dng", dn, CFA, tags, exif))]
+
+
+def _study_samples() -> list[Sample]:
+    configs = files("studies").joinpath("configs")
+    examples = [item.read_bytes() for item in configs.iterdir() if item.name.endswith(".toml")]
+    examples = [text for text in examples if b"scenes" in text and b'.toml"' not in text]  # that need no other file
+    own = b"""name = "a"
+scenes = ["flat_field", { source = "still_life", light = "A" }]
+levels = ["25cd/m2", "500lux"]
+spectra = ["own", "D65"]
+exposures = ["auto", "10ms", "0.5s"]
+sensors = ["low_noise"]
+processors = ["interleaved", "bayer"]
+seeds = [0, 1]
+longest_exposure_s = 0.1
+[render]
+size = 64
+spp = 16
+max_seconds = 10.0
+[lens]
+veiling_glare = 0.01
+[budget]
+total = 0.1
+"""
+    return [{"study.toml": content} for content in (own, *examples)]
+
+
+_CURVES = b"wavelength_nm,R,G,B\n" + b"".join(b"%d,0.%d,0.5,0.25\n" % (nm, nm % 10) for nm in range(380, 790, 10))
+
+
+def _sensor_samples() -> list[Sample]:
+    curve = b"wavelength_nm,t\n380,0.9\n600,1\n780,0\n"
+    plain = b"""cfa = "bayer"
+bits = 12
+window_nm = [380, 780]
+[pixel]
+read_noise_e = 2.4
+dsnu_e = 0.2
+full_well_e = 9000
+prnu = 0.017
+pitch_um = 2.2
+fill_factor = 0.9
+crosstalk = 0.01
+[lens]
+f_number = 4
+"""
+    measured = (
+        plain
+        + b"""[responses]
+csv = "curves.csv"
+range_nm = [390, 770]
+quantum_efficiency = 0.6
+ir_cut = "filter.csv"
+"""
+    )
+    return [{"camera.toml": plain}, {"camera.toml": measured, "curves.csv": _CURVES, "filter.csv": curve}]
+
+
+def _curve_samples() -> list[Sample]:
+    return [{"curves.csv": _CURVES}, {"curves.csv": b"\xef\xbb\xbfwavelength_nm,W\r\n400,0.5\r\n700,1\r\n"}]
+
+
+def _read_curves(path: Path) -> object:
+    return read_csv(path, range_nm=(400.0, 600.0), ir_cut=650.0) if path.stat().st_size % 2 else read_curve(path)
+
+
+_XML = b"""<?xml version="1.0" encoding="utf-8"?>
+<scene version="3.0.0">
+  <default name="side" value="8"/>
+  <integrator type="path"/>
+  <sensor type="perspective" id="camera">
+    <float name="fov" value="40"/>
+    <transform name="to_world"><lookat origin="0, 1, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="$side"/><integer name="height" value="8"/></film>
+  </sensor>
+  <bsdf type="diffuse" id="grey"><spectrum name="reflectance" value="400:0.5, 500:0.6, 700:0.5"/></bsdf>
+  <bsdf type="twosided" id="red"><bsdf type="diffuse"><rgb name="reflectance" value="0.8 0.1 0.1"/></bsdf></bsdf>
+  <shape type="rectangle" id="floor"><ref id="grey"/><sensor type="irradiancemeter"/></shape>
+  <shape type="sphere"><float name="radius" value="0.5"/><ref name="bsdf" id="red"/></shape>
+  <include filename="lamp.xml"/>
+  <emitter type="constant" id="sky"><spectrum name="radiance" filename="sky.spd"/></emitter>
+</scene>
+"""
+_LAMP = b"""<scene version="3.0.0">
+  <shape type="cube" id="lamp:left">
+    <transform name="to_world"><scale value="0.1"/><translate y="2"/></transform>
+    <emitter type="area">
+      <spectrum type="blackbody" name="radiance"><float name="temperature" value="3000"/></spectrum>
+    </emitter>
+  </shape>
+</scene>
+"""
+
+
+def _scene_samples() -> list[Sample]:
+    return [{"scene.xml": _XML, "lamp.xml": _LAMP, "sky.spd": b"400 1\n500 2\n700 1\n"}]
+
+
+@cache
+def _scene() -> Any:
+    return load("flat_field")
+
+
+def _film() -> Film:
+    return Film((4, 5), NM, np.full(NM.size, 70.0), 6)
+
+
+def _cache_samples() -> list[Sample]:
+    rng = np.random.default_rng(4)
+    planes = rng.random((3, len(_scene().groups), NM.size, 4, 5), dtype=np.float32)
+    made = Transport(
+        *planes,
+        irradiance=rng.random((len(_scene().groups), NM.size)) if _scene().reference_plane else None,
+        emitter_visible=np.zeros((4, 5), dtype=np.bool_),
+        groups=_scene().groups,
+        wavelength_nm=NM,
+        width_nm=np.full(NM.size, 70.0),
+        spp=8,
+        passes=8,
+        stopped_by="samples",
+        seconds=1.0,
+        integrator=integrator_name(),
+        variant=variant(),
+    )
+    return [_made(lambda folder: save_transport(folder, _scene(), _film(), 0, made))]
+
+
+def _read_cached(path: Path) -> object:
+    found = load_transport(path.parent, _scene(), _film(), 0)
+    if found is None:
+        raise InputErrorlessRefusal
+    return found.relight()
+
+
+class InputErrorlessRefusal(Exception):
+    """What `load_transport` says by None: there is no such render."""
+
+
+def _row(key: str) -> Row:
+    made = {str: "a", int: 1, float: 0.5}
+    hints = get_type_hints(Row)
+    return Row(
+        **{field.name: made.get(hints[field.name]) for field in fields(Row)} | {"key": key, "picture": "ab/c.png"}
+    )
+
+
+def _ledger_samples() -> list[Sample]:
+    def write(folder: Path) -> None:
+        with open_ledger(folder) as base:
+            for number in range(20):
+                add(base, _row(str(number)))
+            want(base, map(str, range(20)))
+
+    return [_made(write)]
+
+
+TARGETS: dict[str, Target] = {
+    "exr": Target(_exr_samples, {".exr": any_bytes}, read_exr),
+    "mat": Target(_mat_samples, {".mat": mat_elements}, read_iset_scene),
+    "dng": Target(_dng_samples, {".dng": json_in(b"rodcone\0")}, read_dng),
+    "tiff": Target(_tiff_samples, {".tif": tiff_tags, ".json": json_values}, read_tiff),
+    "photograph": Target(_camera_samples, {".dng": tiff_tags}, read_photograph),
+    "noise_profile": Target(_camera_samples, {".dng": tiff_tags}, lambda path: read_noise_profile(path, 1000.0)),
+    "study": Target(_study_samples, {".toml": any_text}, read_study),
+    "sensor": Target(_sensor_samples, {".toml": any_text, ".csv": any_text}, read_sensor),
+    "curves": Target(_curve_samples, {".csv": any_text}, _read_curves),
+    "scene": Target(_scene_samples, {".xml": any_text, ".spd": any_text}, load_scene_file),
+    "cache": Target(_cache_samples, {".npz": signed_archive}, _read_cached),
+    "ledger": Target(_ledger_samples, {".sqlite": pages}, lambda path: read_rows(path.parent, everything=True)),
+}

@@ -1,0 +1,164 @@
+"""One process that feeds changed files to readers, and notes whatever isn't a result or an `InputError`."""
+
+import logging
+import os
+import random
+import resource
+import sys
+import time
+import traceback
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from targets import TARGETS, InputErrorlessRefusal, Sample, Target
+
+from render.errors import MOST_TOLD, InputError
+
+MOST_MIB = 256  # of memory over what the process held before
+MOST_CPU_S = 5.0  # of processor time
+MORE_ADDRESSES = 8 << 30  # that all inputs together may map: a single huge claim fails at once
+NOW, TRIED, REFUSED, ACCEPTED, FINDINGS, COLUMNS = 0, 1, 2, 3, 4, 5  # columns of the state, one row a target
+_WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+_FORBIDDEN = ("pickle.find_class", "os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect")
+_CHANGING = ("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.chmod", "os.truncate")
+
+
+class OutsideError(Exception):
+    """A reader did what reading never needs."""
+
+
+def input_files(target: Target, samples: Sequence[Sample], name: str, seed: int, number: int) -> dict[str, bytes]:
+    """Input `number` of a target: the files of a sample, one of them changed."""
+    source = random.Random(f"{seed}:{name}:{number}")
+    made = dict(source.choice(samples))
+    chosen = source.choice([each for each in made if Path(each).suffix in target.mutators])
+    made[chosen] = target.mutators[Path(chosen).suffix](source, made[chosen])
+    return made
+
+
+def judge(target: Target, made: Sample, folder: Path) -> tuple[str, str]:
+    """What a reader makes of files: ``accepted``, ``refused``, or a finding, with its words."""
+    for name in os.listdir(folder):
+        if name not in made:
+            (folder / name).unlink()
+    for name, content in made.items():
+        (folder / name).write_bytes(content)
+    before, start = _peak_mib(), time.process_time()
+    told, words = "accepted", ""
+    try:
+        with _guarded(folder):
+            target.read(folder / next(iter(made)))
+    except InputErrorlessRefusal:
+        told = "refused"
+    except InputError as error:
+        told, words = "refused", str(error)
+        if not words.isprintable() or len(words) > MOST_TOLD or not words:
+            return "message", repr(words)[:MOST_TOLD]
+    except BaseException as error:
+        return type(error).__name__, traceback.format_exc()
+    seconds, taken = time.process_time() - start, _peak_mib() - before
+    if taken > MOST_MIB:
+        return "memory", f"{taken:.0f} MiB; {words}"
+    if seconds > MOST_CPU_S:
+        return "slow", f"{seconds:.1f} s of processor time; {words}"
+    if os.listdir(folder.parent) != [folder.name]:
+        return "outside", f"{os.listdir(folder.parent)} beside its folder"
+    return told, words
+
+
+_inside: list[str] = []  # the folder while a reader is at work
+
+
+def _audit(event: str, arguments: tuple[Any, ...]) -> None:
+    if not _inside:
+        return
+    if event in _FORBIDDEN:
+        raise OutsideError(f"{event} {arguments!r:.300}")
+    if (event == "open" and isinstance(arguments[2], int) and arguments[2] & _WRITING) or event in _CHANGING:
+        path = str(arguments[0])
+        if path != os.devnull and not os.path.realpath(path).startswith(_inside[0]):
+            raise OutsideError(f"{event} {arguments!r:.300}")
+
+
+@contextmanager
+def _guarded(folder: Path) -> Iterator[None]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("error", RuntimeWarning)
+        _inside.append(os.path.realpath(folder))
+        try:
+            yield
+        finally:
+            _inside.clear()
+
+
+def _reset_peak() -> None:
+    """Let the most memory held so far be what is held now; Linux alone can."""
+    with suppress(OSError), open("/proc/self/clear_refs", "w") as file:
+        file.write("5")
+
+
+def _peak_mib() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def _memory_mib(name: str) -> float:
+    with open("/proc/self/status") as file:
+        return next(int(line.split()[1]) for line in file if line.startswith(name)) / 1024
+
+
+def work(plan: Sequence[tuple[str, int, float]], seed: int, state: Any, out: Path, place: Path) -> None:
+    """Feed targets one after the other; `state` tells the parent how far it came, also where this process dies.
+
+    Parameters
+    ----------
+    plan : sequence of (str, int, float)
+        Target, number of its first input, seconds.
+    state : shared array of int
+        `COLUMNS` for each target of the plan.
+    out, place : Path
+        Where findings are kept, and where files are put to be read.
+    """
+    quiet()
+    folder = place / "in"
+    folder.mkdir()
+    samples = {name: TARGETS[name].samples() for name, *_ in plan}
+    for name, *_ in plan:
+        for sample in samples[name]:  # loads what is loaded at first use
+            judge(TARGETS[name], sample, folder)
+    for place_in_plan, (name, first, seconds) in enumerate(plan):
+        row, end, number = COLUMNS * place_in_plan, time.monotonic() + seconds, first
+        while time.monotonic() < end:
+            state[row + NOW] = number
+            if number % 1000 == 0:
+                _reset_peak()
+            made = input_files(TARGETS[name], samples[name], name, seed, number)
+            told, words = judge(TARGETS[name], made, folder)
+            state[row + TRIED] += 1
+            state[row + {"refused": REFUSED, "accepted": ACCEPTED}.get(told, FINDINGS)] += 1
+            if told not in ("refused", "accepted"):
+                keep(out / "findings" / f"{name}-{told}-{seed}-{number}", made, words)
+            number += 1
+        state[row + NOW] = -number - 1  # done: the next to be tried
+
+
+def quiet() -> None:
+    """Bound the addresses, silence what libraries print, and listen to what readers open."""
+    logging.disable()
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
+    os.dup2(null, 2)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_AS, (int(_memory_mib("VmSize")) * (1 << 20) + MORE_ADDRESSES, -1))
+    sys.addaudithook(_audit)
+
+
+def keep(folder: Path, made: Sample, words: str) -> None:
+    """Keep a finding: its files, and what was told."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in made.items():
+        (folder / name).write_bytes(content)
+    (folder / "told.txt").write_text(words, "utf-8", errors="backslashreplace")
