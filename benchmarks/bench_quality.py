@@ -28,6 +28,7 @@ from scipy.optimize import brentq
 from isp.colour import encode_srgb
 from isp.pipeline import picture_interleaved
 from isp.processors import PROCESSORS
+from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL, substitution_weight
 from render.engine import render
 from render.errors import InputError
 from scenes.catalog import load
@@ -48,6 +49,7 @@ DAYLIGHT_CD_M2 = 1000.0
 OUT = Path("out/bench_quality")
 SNR_DB = (-16.0, -8.0, 0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)  # of Bayer's green; the claim is on 0 to 15
 FIGURE_6 = ((25.0, 0.005), (25.0, 0.010), (25.0, 0.020))  # cd/m^2 and s
+THRESHOLDS = {"table1_output": SUBSTITUTION_SNR, "table1_pixel": SUBSTITUTION_SNR_TABLE1_PIXEL}
 SEEDS = {"interleaved": 20, "bayer": 20, "bayer_bm3d": 3}  # 5 for the others
 METRICS = (("PSNR", "psnr_db", 1), ("dE2000", "delta_e_median", -1))  # sign: which way is better
 
@@ -156,13 +158,13 @@ def print_transitions(curves: dict[str, list[dict[str, float]]]) -> None:
         print("deepest drop over one octave: {:.2f} dB, up to {:.4g} cd/m2".format(*max(drops)))
 
 
-def ranking(bench: Bench, conditions: Iterable[tuple[float, float]]) -> None:
-    """Means over seeds of every processor, condition by condition: luminance [cd/m^2] and exposure time [s]."""
+def ranking(bench: Bench, conditions: Iterable[tuple[float, float]], names: Sequence[str]) -> None:
+    """Means over seeds of processors, the first interleaved; conditions are light [cd/m^2] and exposure time [s]."""
     for level, seconds in conditions:
         green, white = bench.snr_db("bayer", "G", level, seconds), bench.snr_db("interleaved", "W", level, seconds)
         print(f"\n{level:.4g} cd/m2, {seconds * 1e3:g} ms; median SNR: Bayer's G {green:.1f} dB, W {white:.1f} dB")
         found: dict[str, list[Quality]] = {}
-        for name in PROCESSORS:
+        for name in names:
             try:
                 shots = [
                     bench.shot(bench.camera(name, s), level, seconds, s).quality for s in range(SEEDS.get(name, 5))
@@ -210,24 +212,24 @@ def daylight(bench: Bench) -> None:
     """In bright light, with an exposure by green as all cameras choose it, and one that keeps W below saturation."""
     for name, channel in (("bayer", "G"), ("bayer_menon", "G"), ("interleaved", "G"), ("interleaved", "W")):
         shots = [bench.shot(bench.camera(name, s), DAYLIGHT_CD_M2, channel, s) for s in range(5)]
-        white = [float(shot.raw.saturated[mask(shot.raw.cfa, "W", shot.raw.shape)].mean()) for shot in shots]
-        print(
-            f"  {name:12s} exposed for {channel}, {shots[0].raw.exposure_s * 1e3:.3g} ms:"
-            f" {np.mean([shot.quality.psnr_db for shot in shots]):.2f} dB"
-            f"  dE {np.mean([shot.quality.delta_e_median for shot in shots]):.2f}"
-            + (f"  W full {np.mean(white):.2f}" if name == "interleaved" else ""),
-            flush=True,
-        )
+        psnr, delta_e = ([getattr(shot.quality, x) for shot in shots] for x in ("psnr_db", "delta_e_median"))
+        print(f"  {name:12s} exposed for {channel}, {shots[0].raw.exposure_s * 1e3:.3g} ms:", end="")
+        print(f" {np.mean(psnr):.2f} dB  dE {np.mean(delta_e):.2f}", end="")
+        if name == "interleaved":
+            full = [shot.raw.saturated[mask(shot.raw.cfa, "W", shot.raw.shape)].mean() for shot in shots]
+            print(f"  W full {np.mean(full):.2f}", end="")
+        print(flush=True)
 
 
 def substitution(bench: Bench) -> None:
-    """Figure 6: 25 cd/m^2 at 5, 10 and 20 ms."""
-    for exposure_s in (0.005, 0.010, 0.020):
-        pictures = [bench.shot(bench.camera("interleaved", s), 25.0, exposure_s, s).picture for s in range(20)]
-        on = sum(bool(picture.substituted) for picture in pictures)
-        snr = [picture.snr for picture in pictures]
+    """Figure 6: 25 cd/m^2 at 5, 10 and 20 ms, each reading of Table 1 with its own threshold."""
+    threshold = THRESHOLDS[bench.sensor]
+    for level, seconds in FIGURE_6:
+        snr = [bench.shot(bench.camera("interleaved", s), level, seconds, s).picture.snr for s in range(20)]
+        on = sum(substitution_weight(each, threshold) > 0.5 for each in snr)
         print(
-            f"  {exposure_s * 1e3:g} ms: on for {on} of 20 seeds; SNR {np.mean(snr):.3f} +- {np.std(snr):.3f}",
+            f"  {seconds * 1e3:g} ms: on for {on} of 20 seeds; SNR {np.mean(snr):.3f} +- {np.std(snr):.3f},"
+            f" threshold {threshold}",
             flush=True,
         )
 
@@ -263,19 +265,20 @@ def main() -> None:
     parser.add_argument("--sensor", nargs="+", default=["low_noise", "table1_output"])
     parser.add_argument("--level", nargs="+", type=float, default=[0.0625, 0.25, 1.0, 4.0, 16.0, 64.0, 256.0])
     parser.add_argument("--snr", nargs="+", type=float, default=SNR_DB)
+    parser.add_argument("--opponent", nargs="*", choices=list(PROCESSORS)[2:], default=list(PROCESSORS)[2:])
     parser.add_argument("--seeds", type=int, default=3)
     options = parser.parse_args()
     print_environment()
     for scene in options.scene:
         stage = open_stage(scene, max_spp=768)
-        for sensor in options.sensor if options.what != "substitution" else ["table1_output"]:
+        for sensor in options.sensor if options.what != "substitution" else THRESHOLDS:
             print(f"\n== {scene}, {sensor}", flush=True)
             bench = Bench(stage, sensor)
             if options.what == "transitions":
                 print_transitions(transitions(bench, options.seeds))
             elif options.what == "ranking":
                 lit = [(bench.level_of_snr(snr, FIXED_S), FIXED_S) for snr in options.snr]
-                ranking(bench, [*lit, *FIGURE_6])
+                ranking(bench, [*lit, *FIGURE_6], ["interleaved", "bayer", *options.opponent])
             elif options.what == "daylight":
                 daylight(bench)
             elif options.what == "substitution":
