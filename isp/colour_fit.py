@@ -17,6 +17,9 @@ from render.errors import InputError
 from sensor.cfa import channels
 from sensor.raw import RawImage
 
+# Noise variance that is always there, far under any camera's. Under a light of one wavelength balanced channels are all
+# the same, and without noise any matrix fits; with the same noise in each they count alike.
+LEAST_NOISE = 1e-13
 LEAST_SIGNAL = 1e-3  # of the noise: keeps the fit's equations solvable in a frame of pure noise
 
 
@@ -66,7 +69,7 @@ class ColourFit:
                 f"letters: {tuple(letters)} are not allowed; fitted were {self.letters}; fit these channels"
             )
         index = [self.letters.index(letter) for letter in letters]
-        moments = self.moments[np.ix_(index, index)] + np.diag(np.broadcast_to(noise, len(index)))
+        moments = self.moments[np.ix_(index, index)] + np.diag(np.broadcast_to(noise, len(index)) + LEAST_NOISE)
         # Rows sum to 1: the last coefficient is 1 minus the others, so fit differences from the last channel.
         difference = np.hstack([np.eye(len(index) - 1), -np.ones((len(index) - 1, 1))])
         target = difference @ (self.cross[index] - moments[:, -1:])

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from render.errors import InputError, unknown
-from render.spectrum import Spectrum
+from render.spectrum import VISIBLE_NM, Spectrum
 
 Node: TypeAlias = dict[str, Any]
 
@@ -107,12 +107,24 @@ class Scene:
         return kinds == ["constant"] and not lights.own_colour
 
     def check_range(self, shortest_nm: float, longest_nm: float) -> None:
-        """Raise `InputError` where a light's data end within the wavelengths asked for."""
+        """Raise `InputError` where data of a light or a surface end within the wavelengths asked for.
+
+        Tables of surfaces may end anywhere within 380-780 nm, and are black from there on; beyond, black would pass for
+        knowledge that nobody has.
+        """
         low, high = SUNSKY_NM
         if "sunsky" in _emitter_paths(self.geometry).values() and (shortest_nm < low or longest_nm > high):
             raise InputError(
                 f"scene {self.name}: bands reach {shortest_nm:g}-{longest_nm:g} nm, and a sunsky is known over "
                 f"{low:g}-{high:g} nm alone; give wavelength_nm within, or light by area, constant and directional"
+            )
+        tables = _tables_nm(self.geometry)
+        low = max((min(start, VISIBLE_NM[0]) for start, _ in tables), default=0.0)
+        high = min((max(end, VISIBLE_NM[1]) for _, end in tables), default=np.inf)
+        if shortest_nm < low or longest_nm > high:
+            raise InputError(
+                f"scene {self.name}: bands reach {shortest_nm:g}-{longest_nm:g} nm, and its surfaces are known over "
+                f"{low:g}-{high:g} nm alone; give bands within, or a scene with longer tables, such as color_checker"
             )
 
     def check_meter(self) -> None:
@@ -156,8 +168,23 @@ def spectrum_node(spectrum: Spectrum) -> Node:
 
 
 def uniform_node(value: float) -> Node:
-    """Write a spectrum of one value at every wavelength as Mitsuba's ``uniform`` plug-in."""
+    """Write a spectrum of one value as Mitsuba's ``uniform`` plug-in."""
     return {"type": "uniform", "value": value}
+
+
+def _tables_nm(node: Node) -> list[tuple[float, float]]:
+    """First and last wavelength of each spectrum that a scene's dict holds as a table."""
+    found: list[tuple[float, float]] = []
+    for value in node.values():
+        if not isinstance(value, dict):
+            continue
+        if value.get("type") == "regular":
+            found.append((float(value["wavelength_min"]), float(value["wavelength_max"])))
+        elif value.get("type") == "irregular":
+            nm = str(value["wavelengths"]).split(",")
+            found.append((float(nm[0]), float(nm[-1])))
+        found += _tables_nm(value)
+    return found
 
 
 def _emitter_paths(node: Node, prefix: str = "") -> dict[str, str]:

@@ -11,6 +11,7 @@ from scenes.cornell_box import cornell_box
 from scenes.flat_field import flat_field
 from scenes.furnace import furnace
 from scenes.lit_and_shadowed import lit_and_shadowed
+from scenes.metamers import metamers
 from scenes.night_street import night_street
 from scenes.siemens_star import siemens_star
 from scenes.slanted_edge import slanted_edge
@@ -23,6 +24,7 @@ _BUILDERS: dict[str, Callable[..., Scene]] = {
     "flat_field": flat_field,
     "furnace": furnace,
     "lit_and_shadowed": lit_and_shadowed,
+    "metamers": metamers,
     "night_street": night_street,
     "siemens_star": siemens_star,
     "slanted_edge": slanted_edge,

@@ -1,22 +1,30 @@
-"""The 24-patch ColorChecker on grey card, under an even sky."""
+"""The 24-patch ColorChecker on grey card, under an even sky; a chart of any other 24 reflectances in its place."""
+
+from collections.abc import Sequence
+
+import numpy as np
 
 from render.errors import require_range
 from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
-from render.spectrum import Floats
+from render.spectrum import Floats, Spectrum
 from scenes.materials import matte, panel
 from scenes.reflectances import color_checker as patches
-from scenes.reflectances import grey
+from scenes.reflectances import grey, held
 
 SKY_LUMINANCE_CD_M2 = 100.0
 PATCH_M, GAP_M = 0.040, 0.005  # the classic chart's 40 mm patches
 COLUMNS, ROWS = 6, 4
+BOARD = 0.04  # reflectance of the board between the patches: the chart's black frame
 FACING = look_at((0, 0, 0), (0, 0, 1))  # towards the camera
 
 
 def color_checker(light: str = "D65", surround: float = 0.2) -> Scene:
     """ColorChecker, facing the camera; each patch's radiance is its reflectance times the sky's.
+
+    Beyond 780 nm, where its tables end, every surface keeps its reflectance there, up to 1100 nm: an assumption, for
+    studies of the near infrared.
 
     Parameters
     ----------
@@ -26,6 +34,12 @@ def color_checker(light: str = "D65", surround: float = 0.2) -> Scene:
         Reflectance of the grey card around the chart.
     """
     require_range("surround", surround, 0.0, 1.0, "give a reflectance: 18 % is 0.18")
+    curves = [held(curve) for _, curve in patches()]
+    return chart_scene("color_checker", curves, held(grey(surround)), light)
+
+
+def chart_scene(name: str, curves: Sequence[Spectrum], surround: Spectrum, light: str) -> Scene:
+    """Make a scene of a chart of 24 reflectances on a card, all on one grid, under an even sky."""
     camera = {
         "type": "perspective",
         "fov": 20.0,
@@ -35,19 +49,25 @@ def color_checker(light: str = "D65", surround: float = 0.2) -> Scene:
     geometry: Node = {
         "type": "scene",
         "sensor": camera,
-        "card": panel(FACING, 4.0, 4.0, matte(grey(surround))),
+        "card": panel(FACING, 4.0, 4.0, matte(surround)),
         "sky": {"type": "constant"},
     }
     groups = {"sky": LightGroup(("sky",), illuminant(light), SKY_LUMINANCE_CD_M2)}
-    return Scene("color_checker", geometry | chart(translate(0, 0, 0.0002) @ FACING), groups, reference_plane="card")
+    board = Spectrum(surround.wavelength_nm, np.full(surround.values.shape, BOARD))
+    nodes = chart(translate(0, 0, 0.0002) @ FACING, curves, board)
+    return Scene(name, geometry | nodes, groups, reference_plane="card")
 
 
-def chart(place: Floats) -> dict[str, Node]:
-    """Nodes of the chart's board and patches, centred on `place` and facing its +z."""
+def color_checker_nodes(place: Floats) -> dict[str, Node]:
+    """Nodes of a ColorChecker centred on `place` and facing its +z, 380-780 nm."""
+    return chart(place, [curve for _, curve in patches()], grey(BOARD))
+
+
+def chart(place: Floats, curves: Sequence[Spectrum], board: Spectrum) -> dict[str, Node]:
+    """Nodes of a chart's board and 24 patches, row by row, centred on `place` and facing its +z."""
     step = PATCH_M + GAP_M
-    board = panel(place, COLUMNS * step + GAP_M, ROWS * step + GAP_M, matte(grey(0.04)))
-    nodes = {"chart_board": board}
-    for index, (_, reflectance) in enumerate(patches()):
+    nodes = {"chart_board": panel(place, COLUMNS * step + GAP_M, ROWS * step + GAP_M, matte(board))}
+    for index, reflectance in enumerate(curves):
         row, column = divmod(index, COLUMNS)
         x, y = (column - (COLUMNS - 1) / 2) * step, ((ROWS - 1) / 2 - row) * step
         nodes[f"patch{index:02d}"] = panel(place @ translate(x, y, 0.0005), PATCH_M, PATCH_M, matte(reflectance))

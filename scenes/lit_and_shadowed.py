@@ -8,7 +8,7 @@ from render.geometry import look_at, rotate, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Floats
-from scenes.color_checker import chart
+from scenes.color_checker import color_checker_nodes
 from scenes.materials import ball, block, checks, disk, floor, glossy, matte, metal, panel, rod, star
 from scenes.reflectances import band, edge, grey
 
@@ -87,7 +87,7 @@ def _upper(middle: Floats) -> dict[str, Node]:
     on_shelf = middle @ translate(0, SHELF_M, 0)
     card = on_shelf @ translate(-0.10, 0.115, -0.36) @ rotate((1, 0, 0), -10)
     return {
-        **chart(card),
+        **color_checker_nodes(card),
         "star": star(middle @ translate(-0.10, 0.90, -0.4395), 0.13, BLACK, WHITE, 36),
         **{
             f"book{i}": block(on_shelf @ translate(x, 0, -0.36), 0.032, height, 0.16, matte(cover))

@@ -7,6 +7,7 @@ import numpy as np
 from render.spectrum import Floats, Spectrum
 from render.tables import colour_science
 
+LONGEST_NM = 1100.0  # as far as lights are known (`render.spectrum.flat`), beyond any response here
 _NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all materials keeps scenes quick to compile
 
 
@@ -15,6 +16,14 @@ def color_checker() -> tuple[tuple[str, Spectrum], ...]:
     """Name and reflectance of the 24 patches, row by row, 380-780 nm (Ohta 1997, as colour-science holds them)."""
     table = colour_science().SDS_COLOURCHECKERS["cc_ohta"]
     return tuple((name, Spectrum(curve.wavelengths, np.clip(curve.values, 0, 1))) for name, curve in table.items())
+
+
+def held(curve: Spectrum) -> Spectrum:
+    """Curve that goes on to 1100 nm at its last value, in its own steps: an assumption where nothing was measured."""
+    step = curve.wavelength_nm[-1] - curve.wavelength_nm[-2]
+    beyond = np.arange(curve.wavelength_nm[-1] + step, LONGEST_NM + step / 2, step)
+    values = np.concatenate([curve.values, np.full(beyond.shape, curve.values[-1])])
+    return Spectrum(np.concatenate([curve.wavelength_nm, beyond]), values)
 
 
 def grey(reflectance: float) -> Spectrum:

@@ -6,7 +6,7 @@ from render.geometry import look_at, rotate, scale, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Spectrum
-from scenes.color_checker import chart
+from scenes.color_checker import color_checker_nodes
 from scenes.materials import ball, checks, floor, glass, glossy, matte, metal, panel, rod
 from scenes.reflectances import band, edge, grey
 
@@ -54,7 +54,7 @@ def _things() -> dict[str, Node]:
         "steel_rod": rod((0.335, 0.0, 0.02), (0.335, 0.36, 0.02), 0.018, metal("Al", 0.15)),
         "box": _box(0.30, 0.08, 0.26, 0.16, 0.16, 24, matte(band(465, 38, 0.06, 0.55))),
         "book": _box(0.29, 0.175, 0.26, 0.20, 0.03, 10, matte(edge(605, 16, 0.05, 0.55))),
-        **chart(card),
+        **color_checker_nodes(card),
         "star_back": panel(translate(-0.24, 0.19, -0.32), 0.34, 0.34, matte(WHITE)),
         **_star(-0.24, 0.19, -0.318, 0.155),
         **_combs(),

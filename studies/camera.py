@@ -10,7 +10,7 @@ from isp.colour import encode_srgb
 from isp.colour_fit import ColourFit, fit_colours
 from isp.picture import Picture
 from isp.processors import PROCESSORS, Processor
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker, held
 from sensor.cfa import channels, mask
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
@@ -71,7 +71,7 @@ def build_camera(name: str, sensor_name: str, light: Light, shape: tuple[int, in
 def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> ColourFit:
     """Fit of the processor's balanced colours, and the mosaic's other letters, under a light on the ColorChecker."""
     nm, width = light.wavelength_nm, light.width_nm
-    surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
+    surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker()])
     letters = (*processor.colours, *(x for x in channels(sensor.cfa) if x not in processor.colours))
     responses = sensor.responses.band_average(letters, nm, width)
     return fit_colours(letters, responses, nm, light.spectrum, surfaces, width)

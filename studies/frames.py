@@ -15,7 +15,7 @@ from isp.colour_fit import ColourFit
 from isp.processors import Processor
 from render.files import replacing
 from render.radiance import SpectralRadiance
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
+from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
 from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
@@ -162,8 +162,11 @@ def _auto_s(radiance: SpectralRadiance, preset: SensorConfig) -> float:
 
 
 def colours_under(sensor: SensorConfig, processor: Processor, spectrum: Spectrum) -> ColourFit:
-    """Fit a processor's colours under a light, in bands of its own: calibration doesn't depend on the render."""
-    nm: Floats = DEFAULT_WAVELENGTH_NM
+    """Fit a processor's colours under a light, in bands of its own: calibration doesn't depend on the render.
+
+    The bands go on as far as the sensor's window does: a camera is calibrated with the infrared that it sees.
+    """
+    nm: Floats = np.arange(DEFAULT_WAVELENGTH_NM[0], max(sensor.window_nm[1], VISIBLE_NM[1]), 10.0)
     return colour_fit(sensor, processor, light_in_bands(spectrum, nm, band_widths(nm)))
 
 

@@ -73,6 +73,7 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         asked_level(scene, level)
     for spectrum in study.spectra:
         _check_relit(scene, spectrum)
+    scene.check_range(*study.render.range_nm)
     size = _size(own_size, study.render.size)
     return OpenedScene(choice, scene, size, digest([digest_scene(scene), size]), tuple(notes))
 

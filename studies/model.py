@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from render.spectrum import VISIBLE_NM
 from sensor.config import LensConfig, SensorConfig
 from studies.plan_ledger import Ledger
 from studies.study import Condition, SceneChoice, Study, conditions
@@ -64,7 +63,7 @@ def modelled(sensor: SensorConfig, model: ImageModel) -> SensorConfig:
 
 def as_stated(study: Study, lenses: Mapping[str, LensConfig]) -> Plan:
     """Plan without a budget: bands and samples as the study states, lenses as the sensors state."""
-    low, high = VISIBLE_NM
+    low, high = study.render.range_nm
     edges = np.linspace(low, high, max(1, round((high - low) / study.render.band_nm)) + 1)
     render = RenderModel(
         tuple(((edges[1:] + edges[:-1]) / 2).tolist()), tuple(np.diff(edges).tolist()), study.render.spp

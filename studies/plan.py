@@ -17,7 +17,7 @@ from sensor.presets import preset
 from sensor.variations import vary
 from studies.lit_scene import OpenedScene, level_luminance, open_all, under, white_spectrum
 from studies.model import ImageModel, Plan, RenderModel
-from studies.plan_bands import COUNTS, fine_bands, groups_of, wide_bands
+from studies.plan_bands import counts, fine_bands, groups_of, wide_bands
 from studies.plan_choice import Choice, choose
 from studies.plan_ledger import KERNEL, Ledger, PilotNoise, Weighed, ledger, weigh
 from studies.plan_terms import LENS_TERMS, effects, horizontal_view_deg, level_error
@@ -87,7 +87,7 @@ def reference_plan(study: Study) -> Plan:
     renders, images = {}, {}
     for opened in open_all(study).values():
         if opened.scene is not None:
-            nm, width_nm = fine_bands(_spectra(opened, study))
+            nm, width_nm = fine_bands(_spectra(opened, study), study.render.range_nm)
             spp = min(REFERENCE_SAMPLES * study.render.spp, 1 << 16)
             renders[opened.choice] = RenderModel(tuple(nm.tolist()), tuple(width_nm.tolist()), spp)
         for condition in conditions(study):
@@ -106,7 +106,7 @@ def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> 
         transport = open_radiance_file(opened.choice.source, opened.choice.light)[0]
         single = [np.array([band]) for band in range(transport.wavelength_nm.size)]
         return Pilot(opened, transport, {len(single): single}, False, 0.0)
-    nm, width_nm = fine_bands(_spectra(opened, study))
+    nm, width_nm = fine_bands(_spectra(opened, study), study.render.range_nm)
     scale = min(1.0, PILOT_SIDE / max(opened.size))
     size = max(1, round(opened.size[0] * scale)), max(1, round(opened.size[1] * scale))
     transport = render(
@@ -118,7 +118,7 @@ def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> 
         max_spp=min(study.render.spp, FULL_PASSES_SPP),
         cache=cache,
     )
-    groups = {count: groups_of(width_nm, count) for count in COUNTS}
+    groups = {count: groups_of(width_nm, count) for count in counts(width_nm)}
     return Pilot(opened, transport, groups, True, _view_deg(opened))
 
 

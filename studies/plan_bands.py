@@ -30,6 +30,11 @@ def fine_bands(spectra: Iterable[Spectrum], range_nm: tuple[float, float] = VISI
     return line_bands(lines[(lines > range_nm[0] + 1) & (lines < range_nm[1] - 1)], range_nm, FINE_NM)
 
 
+def counts(width_nm: Floats) -> tuple[int, ...]:
+    """Numbers of bands that a plan may choose: those of the visible, and all of a wider range's fine bands."""
+    return (*COUNTS, width_nm.size) if width_nm.size > COUNTS[-1] else COUNTS
+
+
 def groups_of(width_nm: Floats, count: int) -> list[NDArray[np.intp]]:
     """Indices of the fine bands of each of about `count` wide ones, neighbours and as even as can be.
 

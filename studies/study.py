@@ -9,8 +9,9 @@ from typing import Any
 
 from isp.processors import PROCESSORS
 from render.errors import InputError, require_range, require_whole, unknown
-from render.illuminants import illuminant
+from render.illuminants import illuminant, lines_nm
 from render.radiance_source import is_radiance_file
+from render.spectrum import VISIBLE_NM
 from sensor.cfa import channels
 from sensor.exposure import LONGEST_S
 from sensor.presets import preset
@@ -18,7 +19,12 @@ from sensor.variations import vary
 from studies.levels import parse_level
 
 OWN = "own"  # the spectrum that the scene's lights have
+LOWEST_NM, HIGHEST_NM = 300.0, 1100.0  # of `render.spectrum.flat`, black bodies and the sun's table
+LEAST_RANGE_NM = 100.0  # the widest band that `RenderLimits.band_nm` takes
 AUTO = "auto"  # the exposure by `sensor.exposure.auto_exposure_s`
+# A light whose table ends short of the bands, at no more than this share of its peak, is taken as dark from there on;
+# white LEDs of the CIE end at 780 nm with 0.6 to 5 %.
+_RUN_OUT = 0.01
 _FILES = (".xml", ".exr", ".mat", ".toml")
 _TIME = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+)\s*(us|ms|s)\s*$")
 _SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
@@ -48,12 +54,14 @@ class RenderLimits:
     size : int, optional
         Longer side in pixels; left out, 256, or what a Mitsuba scene's film has. A picture file keeps its own size.
     band_nm : float
-        Width of the bands over 380-780 nm without a plan; 20 nm do for smooth spectra.
+        Width of the bands without a plan; 20 nm do for smooth spectra.
     spp : int
         Samples a pixel.
     max_seconds : float, optional
         Time for each render; with it results depend on the machine's speed.
     seed : int
+    range_nm : (float, float)
+        Wavelengths that are rendered; a sensor whose window reaches beyond 380-780 nm needs them.
     """
 
     size: int | None = None
@@ -61,6 +69,7 @@ class RenderLimits:
     spp: int = 512
     max_seconds: float | None = None
     seed: int = 0
+    range_nm: tuple[float, float] = VISIBLE_NM
 
 
 @dataclass(frozen=True)
@@ -183,6 +192,7 @@ def check(study: Study) -> None:
         if spectrum != OWN:
             illuminant(spectrum)
             _check_relit(study, spectrum)
+            _check_known(spectrum, study.render.range_nm)
     for level in study.levels:
         parse_level(level)
     for exposure in study.exposures:
@@ -220,11 +230,37 @@ def _check_relit(study: Study, spectrum: str) -> None:
             )
 
 
+def _check_known(spectrum: str, range_nm: tuple[float, float]) -> None:
+    """Raise `InputError` where a light is not known as far as a study renders beyond 380-780 nm."""
+    if range_nm[0] >= VISIBLE_NM[0] and range_nm[1] <= VISIBLE_NM[1]:
+        return
+    light = illuminant(spectrum)
+    ends = zip(light.wavelength_nm[[0, -1]], light.values[[0, -1]], (range_nm[0], -range_nm[1]), (1, -1), strict=True)
+    short = [nm for nm, value, asked, sign in ends if sign * nm > asked and value > _RUN_OUT * light.values.max()]
+    if short or lines_nm(spectrum):
+        raise InputError(
+            f"spectra: {spectrum!r} is known over {light.wavelength_nm[0]:g}-{light.wavelength_nm[-1]:g} nm, and "
+            f"render.range_nm asks for {range_nm[0]:g}-{range_nm[1]:g} nm; allowed: sunlight, moonlight, temperatures "
+            "such as 2856K, LEDs that have run out there such as LED-B5; take one of them"
+        )
+
+
+def _check_range(range_nm: tuple[float, ...]) -> None:
+    if len(range_nm) != 2 or not LOWEST_NM <= range_nm[0] < range_nm[1] <= HIGHEST_NM:
+        raise InputError(
+            f"render.range_nm: {list(range_nm)!r} is not allowed; give [shortest, longest] within "
+            f"{LOWEST_NM:g} to {HIGHEST_NM:g} nm, where lights are known"
+        )
+    if range_nm[1] - range_nm[0] < LEAST_RANGE_NM:
+        raise InputError(f"render.range_nm: {list(range_nm)!r} is less than {LEAST_RANGE_NM:g} nm; widen it")
+
+
 def _check_numbers(study: Study) -> None:
     require_range("longest_exposure_s", study.longest_exposure_s, 1e-9, 1e6, "give seconds above 0")
     limits, lens, budget = study.render, study.lens, study.budget
     if limits.size is not None:
         require_whole("render.size", limits.size, 16, 8192, "give the picture's longer side in pixels")
+    _check_range(limits.range_nm)
     require_range("render.band_nm", limits.band_nm, 1.0, 100.0, "give nanometres")
     require_whole("render.spp", limits.spp, 1, 1 << 16, "give samples per pixel")
     require_whole("render.seed", limits.seed, 0, 2**31, "give a whole number")

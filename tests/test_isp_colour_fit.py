@@ -95,3 +95,11 @@ def test_letters_that_do_not_fit_are_refused(fit: ColourFit) -> None:
         fit.matrix(("C",))
     with pytest.raises(InputError, match=r"^responses: 4 channels don't fit the letters \('R', 'G', 'B'\)"):
         fit_colours("RGB", RESPONSES, NM, LIGHT, SURFACES)
+
+
+def test_under_one_wavelength_all_channels_count_alike_and_neutrals_stay_neutral() -> None:
+    light = np.where(np.arange(NM.size) == 20, 1.0, 0.0)
+    alone = fit_colours(LETTERS, RESPONSES, NM, light, SURFACES)
+    # the sums cancel to some 1e-17 beside a least noise of 1e-13
+    assert np.asarray(alone) == pytest.approx(np.full((3, 3), 1 / 3), abs=1e-3)
+    assert np.asarray(alone).sum(axis=1) == pytest.approx(np.ones(3), abs=1e-12)

@@ -81,9 +81,12 @@ def test_what_a_scene_cannot_do_is_told_when_it_is_opened(tmp_path: Path) -> Non
     Path(sky.source).write_text(
         '<scene version="3.0.0"><sensor type="perspective"/><emitter type="sunsky"/></scene>', "utf-8"
     )
-    assert white_spectrum(open_choice(sky, STUDY), OWN) is illuminant("D65")
+    study = replace(STUDY, render=replace(STUDY.render, range_nm=(380.0, 720.0)))
+    assert white_spectrum(open_choice(sky, study), OWN) is illuminant("D65")
+    with pytest.raises(InputError, match="a sunsky is known over 320-720 nm alone"):
+        open_choice(sky, STUDY)
     with pytest.raises(InputError, match="colours of their own"):
-        open_choice(sky, replace(STUDY, spectra=("own", "A")))
+        open_choice(sky, replace(study, spectra=("own", "A")))
 
 
 def test_colours_are_set_to_the_scenes_light_or_the_one_that_is_put_in_its_place() -> None:

@@ -78,3 +78,19 @@ def test_faults_are_told_in_one_line(changes: dict[str, object], words: str) -> 
         check(replace(STUDY, **changes))  # type: ignore[arg-type]
     assert words in str(told.value)
     assert "\n" not in str(told.value)
+
+
+def test_the_near_infrared_asks_for_lights_that_are_known_there() -> None:
+    far = replace(STUDY.render, range_nm=(380.0, 1070.0))
+    check(replace(STUDY, render=far, spectra=("own", "sunlight", "moonlight", "2856K", "E", "LED-B5")))
+    for light in ("D65", "A", "LED-V1", "sodium_high", "sodium_low"):
+        check(replace(STUDY, spectra=(light,)))
+        with pytest.raises(InputError, match=f"spectra: '{light}' is known over .* take one of them") as error:
+            check(replace(STUDY, render=far, spectra=(light,)))
+        assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("range_nm", [(380.0,), (780.0, 380.0), (200.0, 780.0), (380.0, 1200.0), (380.0, 400.0)])
+def test_a_range_without_lights_or_without_a_band_is_refused(range_nm: tuple[float, ...]) -> None:
+    with pytest.raises(InputError, match=r"render\.range_nm: \["):
+        check(replace(STUDY, render=replace(STUDY.render, range_nm=range_nm)))

@@ -59,7 +59,7 @@ def test_changes_take_toml_values_and_plain_words_and_make_tables(tmp_path: Path
     [
         (["lvels=3"], "key: 'lvels' is unknown; allowed: budget, exposures"),
         (["lvels=3"], "did you mean 'levels'?"),
-        (["render.ssp=3"], "render: key: 'ssp' is unknown; allowed: band_nm, max_seconds, seed, size, spp"),
+        (["render.ssp=3"], "render: key: 'ssp' is unknown; allowed: band_nm, max_seconds, range_nm, seed, size, spp"),
         (['scenes=[{sorce="x"}]'], "did you mean 'source'?"),
         (["seeds=[true]"], "seeds: True is not a whole number"),
         (['seeds=["1"]'], "seeds: '1' is not a whole number"),

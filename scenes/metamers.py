@@ -1,0 +1,81 @@
+"""Pairs of surfaces that look alike under D65 and apart under other lights, on a chart."""
+
+from functools import cache
+
+import numpy as np
+
+from render.illuminants import illuminant
+from render.photometry import tristimulus
+from render.scene import Scene
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
+from scenes.color_checker import chart_scene
+from scenes.reflectances import color_checker, grey
+
+TWINS_UNDER = "D65"
+OTHER_LIGHT = "A"  # the light under which the two of a pair are made to differ most
+PAIRS = 12
+LOW, HIGH = 0.02, 0.95  # range of the made reflectances: soot to white paper
+SHARE = 0.5  # at most this much of a base's room is used, so that the curves stay like dyes'
+BUMP_NM = 30.0  # standard deviation of the bumps that a difference is made of: dyes' bands are no narrower
+# Bases by their place in the ColorChecker: muted ones, which leave room on both sides.
+_BASES = (0, 1, 2, 4, 5, 9, 19, 20, 21, 7, 3, 10)
+
+
+def metamers(light: str = TWINS_UNDER) -> Scene:
+    """Chart of 12 pairs, side by side: patches 0 and 1, 2 and 3, ...; each pair is one colour under D65.
+
+    Parameters
+    ----------
+    light : str
+        Illuminant of the sky, whose luminance is 100 cd/m^2.
+    """
+    curves = [curve for pair in pairs() for curve in pair]
+    return chart_scene("metamers", curves, grey(0.2), light)
+
+
+@cache
+def pairs() -> tuple[tuple[Spectrum, Spectrum], ...]:
+    """Two reflectances of each pair: a base plus and minus a metameric black (Wyszecki & Stiles 1982, 3.8.4).
+
+    The black is a sum of smooth bumps with XYZ of zero under D65, for the CIE 1931 observer; of all such sums it is the
+    one of unit size whose XYZ under `OTHER_LIGHT` is the largest.
+    """
+    nm = grey(0.0).wavelength_nm
+    black = _black(nm)
+    return tuple(_pair(nm, base.values, black) for base in (color_checker()[index][1] for index in _BASES))
+
+
+def _pair(nm: Floats, base: Floats, black: Floats) -> tuple[Spectrum, Spectrum]:
+    room = np.minimum(np.clip(base - LOW, 0.0, None), np.clip(HIGH - base, 0.0, None))
+    seen = np.abs(black) > 1e-3 * np.abs(black).max()
+    size = SHARE * float(np.min(room[seen] / np.abs(black[seen])))
+    return Spectrum(nm, base + size * black), Spectrum(nm, base - size * black)
+
+
+def _black(nm: Floats) -> Floats:
+    """Metameric black on a grid of reflectances, its largest value 1."""
+    bumps = np.exp(-0.5 * ((nm[:, None] - np.arange(400.0, 721.0, 20.0)) / BUMP_NM) ** 2)
+    # Colours of every bump at fine resolution and in the renderer's bands: a black of both, so that pairs are as equal
+    # in a picture as they are on paper.
+    twin = np.vstack([_colours(nm, bumps, TWINS_UNDER, *bands) for bands in (_fine(), _rendered())])
+    other = _colours(nm, bumps, OTHER_LIGHT, *_fine())
+    free = np.linalg.svd(twin)[2][np.linalg.matrix_rank(twin) :].T  # weights of the bumps that leave no colour
+    strongest = np.linalg.svd(other @ free)[2][0]
+    black = bumps @ (free @ strongest)
+    return np.asarray(black / black[np.argmax(np.abs(black))])
+
+
+def _colours(nm: Floats, curves: Floats, light: str, at_nm: Floats, width_nm: Floats) -> Floats:
+    """XYZ of curves (nm, curve) under a light, summed over bands: shape (3, curve)."""
+    # A signed curve is no `Spectrum`: take the matrix that averages a grid over the bands instead.
+    averages = np.array([Spectrum(nm, row).band_average(at_nm, width_nm) for row in np.eye(nm.size)]).T
+    return tristimulus((averages @ curves).T * illuminant(light).band_average(at_nm, width_nm), at_nm, width_nm).T
+
+
+def _fine() -> tuple[Floats, Floats]:
+    nm: Floats = np.arange(380.5, 780.0)
+    return nm, np.ones_like(nm)
+
+
+def _rendered() -> tuple[Floats, Floats]:
+    return DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM)
