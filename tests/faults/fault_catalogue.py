@@ -457,7 +457,7 @@ ISP = (
     _fault(
         "colours fitted without their noise",
         "isp/colour_fit.py",
-        " + np.diag(np.broadcast_to(noise, len(index)))",
+        "np.broadcast_to(noise, len(index)) + LEAST_NOISE",
         "",
         *_COLOUR,
     ),

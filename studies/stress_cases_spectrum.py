@@ -1,0 +1,85 @@
+"""Hard cases of spectra: lines, narrow peaks, one band and 401."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from render.illuminants import lines_nm
+from render.photometry import photons_per_joule
+from render.radiance import SpectralRadiance
+from render.spectrum import VISIBLE_NM
+from sensor.cfa import channels, letter_map
+from sensor.optics import camera_equation
+from studies.stress_case import Case, Margin, Situation, worse, worst_of
+from studies.stress_chain import expected
+from studies.stress_light import BANDS_NM, at_level, even_lines, in_bands, of_lines
+
+SODIUM = "sodium_low"
+
+
+def _line_closed_form(situation: Situation) -> Margin:
+    """Electrons of a doublet: its power times the response and the photons per joule at the lines themselves."""
+    lines, powers = np.array(lines_nm(SODIUM)), np.array([2.0, 1.0]) / 3.0
+    sensor, area_m2 = situation.sensor, (situation.sensor.pixel.pitch_um * 1e-6) ** 2
+    reach = np.array([lines[0] - 0.5, lines[1] + 0.5])  # the lines' band: within it response and photons may differ
+    at, edges = (sensor.responses.band_average(channels(sensor.cfa), nm, np.full(2, 1e-3)) for nm in (lines, reach))
+    # Of 1 cd/m^2: V weighs the lines as `render.illuminants` does, so the radiance is what the picture itself holds.
+    radiance = float(np.median(situation.radiance.values @ situation.radiance.widths_nm))
+    factor = camera_equation(sensor.lens) * area_m2 * sensor.pixel.fill_factor * situation.exposure_s * radiance
+    exact = (at * photons_per_joule(lines)) @ powers * factor
+    letters = letter_map(sensor.cfa, situation.shape)
+    found = expected(situation)
+    margins = []
+    for number, letter in enumerate(channels(sensor.cfa)):
+        slack = float(np.ptp(edges[number]) / at[number].min() + np.ptp(reach) / lines[0])
+        margins.append(worst_of(found[letters == letter] - exact[number], slack * exact[number], "e⁻"))
+    return worse(*margins)
+
+
+def _parts_add(situation: Situation) -> Margin:
+    """Odd bands and even bands alone add up to all bands."""
+    every = situation.radiance
+    halves = [_bands(every, np.arange(every.wavelength_nm.size) % 2 == odd) for odd in (0, 1)]
+    both = expected(situation)
+    parts = sum(expected(replace(situation, radiance=half)) for half in halves)
+    return worst_of(both - parts, 1e-6 * both, "e⁻")
+
+
+def _bands(radiance: SpectralRadiance, kept: np.ndarray) -> SpectralRadiance:
+    """The same bands, those that aren't kept dark."""
+    planes = np.moveaxis(radiance.values, -1, 0) * kept[:, None, None].astype(radiance.values.dtype)
+    return SpectralRadiance(np.moveaxis(planes, 0, -1), radiance.wavelength_nm, 0.0, radiance.width_nm)
+
+
+def _some_bands(*kept_nm: float) -> SpectralRadiance:
+    return _bands(at_level(100.0), np.isin(BANDS_NM, kept_nm))
+
+
+def _fine() -> SpectralRadiance:
+    edges_nm = np.linspace(*VISIBLE_NM, 402)
+    return in_bands(tuple((edges_nm[1:] + edges_nm[:-1]) / 2), tuple(np.diff(edges_nm)), 32, 4)
+
+
+SPECTRUM_CASES = (
+    Case("sodium", "low-pressure sodium: two lines in 1 nm", lambda: Situation(of_lines(SODIUM))),
+    Case(
+        "sodium_even",
+        "an even field under the same lamp, 10 cd/m²",
+        lambda: Situation(even_lines(SODIUM, 10.0)),
+        _line_closed_form,
+        "electrons as the response at the lines says",
+    ),
+    Case("fluorescent", "F11: narrow peaks in bands of 20 nm", lambda: Situation(at_level(10.0, "F11"))),
+    Case("led_rgb", "three LEDs as white", lambda: Situation(at_level(10.0, "LED-RGB1"))),
+    Case("violet_alone", "light in one band at 390 nm alone", lambda: Situation(_some_bands(390.0))),
+    Case("red_alone", "light in one band at 770 nm alone", lambda: Situation(_some_bands(770.0))),
+    Case("one_band", "one band of 400 nm", lambda: Situation(in_bands((580.0,), (400.0,)))),
+    Case("one_narrow_band", "one band of 1 nm at 555 nm", lambda: Situation(in_bands((555.0,), (1.0,)))),
+    Case(
+        "bands_401",
+        "401 bands, 1 nm each: a render of its own",
+        lambda: Situation(_fine()),
+        _parts_add,
+        "bands add up",
+    ),
+)

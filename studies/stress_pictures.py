@@ -1,0 +1,103 @@
+"""Invariant of pictures: a raw image that is flipped or shifted, with its mosaic, develops into the same picture."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.reference import sum_weights
+from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, WINDOW, Settings
+from sensor.cfa import Tile, channels, letter_map
+from sensor.raw import RawImage
+from studies.stress_case import Margin, Situation, worse, worst_of
+from studies.stress_chain import CAMERAS, develop_fixed, shoot, to_picture
+
+Image = NDArray[np.float64]
+
+# What the kernel states: 1e-4 of the samples' range, or what single precision makes of the largest log weight, some 16
+# roundings of it (isp.weighted_sums, isp.kernel). Two developments differ by twice that.
+KERNEL_ERROR = 1e-4
+KERNEL_ROUNDINGS = 16 * 2.0**-24
+DOUBLE_ROUNDINGS = 64 * 2.0**-53  # bilinear planes and their matrix, all in double precision
+NOTHING_E = 1e-12
+
+
+def equivariant(situation: Situation) -> Margin | None:
+    """Mirrored both ways, and without its first row and column: the same picture, mirrored or cut."""
+    margins = []
+    for name in CAMERAS:
+        raw = shoot(situation, name)
+        picture = develop_fixed(raw, situation)
+        pairs = [
+            (develop_fixed(mirrored(raw, axis), situation), np.flip(picture, axis), np.s_[:, :]) for axis in (0, 1)
+        ]
+        inside = _interior(raw, situation)
+        if inside is not None:
+            pairs.append((develop_fixed(cut(raw), situation), picture[1:, 1:], inside))
+        for found, same, where in pairs:
+            margins.append(_judge(found[where] - same[where], raw, situation))
+    return worse(*margins)
+
+
+def mirrored(raw: RawImage, axis: int) -> RawImage:
+    """The frame as it reads from its other end along an axis, with the mosaic and the defects there."""
+    lines = raw.shape[axis]
+    period = (len(raw.cfa), len(raw.cfa[0]))[axis]
+    turned = _turn(raw.cfa, lines % period, axis)
+    cfa = turned[::-1] if axis == 0 else tuple(row[::-1] for row in turned)
+    defects = raw.defects
+    if defects is not None:
+        defects = defects.copy()
+        defects[:, axis] = lines - 1 - defects[:, axis]
+    return replace(raw, dn=np.ascontiguousarray(np.flip(raw.dn, axis)), cfa=cfa, defects=defects)
+
+
+def cut(raw: RawImage) -> RawImage:
+    """The frame without its first row and column: the mosaic begins at another phase."""
+    defects = raw.defects
+    if defects is not None:
+        defects = defects[np.all(defects > 0, axis=1)] - 1
+    cfa = _turn(_turn(raw.cfa, 1, 0), 1, 1)
+    return replace(raw, dn=np.ascontiguousarray(raw.dn[1:, 1:]), cfa=cfa, defects=defects)
+
+
+def _turn(cfa: Tile, steps: int, axis: int) -> Tile:
+    if axis == 0:
+        return cfa[steps % len(cfa) :] + cfa[: steps % len(cfa)]
+    return tuple(row[steps % len(row) :] + row[: steps % len(row)] for row in cfa)
+
+
+def _interior(raw: RawImage, situation: Situation) -> tuple[slice, slice] | None:
+    """Pixels of the cut frame that nothing at the border reaches; None where the frame has none."""
+    develop = situation.develop
+    reach = develop.get("neighbourhood", NEIGHBOURHOOD) // 2 + max(develop.get("patch", PATCH), WINDOW) // 2
+    margin = reach + 4 * len(raw.cfa)  # tents of a sample's plane and of its alpha, mended pixels
+    if min(raw.shape) - 1 <= 2 * margin:
+        return None
+    return np.s_[margin:-margin, margin:-margin]
+
+
+def _judge(error: Image, raw: RawImage, situation: Situation) -> Margin:
+    """Error beside what the arithmetic may differ by; the reference is asked only where the plain bound is passed."""
+    if "W" not in channels(raw.cfa):
+        return _beside(error, raw, situation, DOUBLE_ROUNDINGS * float(np.abs(raw.electrons).max()))
+    settings = _settings(situation)
+    samples = settings.neighbourhood**2 / np.size(letter_map(raw.cfa, (len(raw.cfa), len(raw.cfa[0]))))
+    spread = float(np.ptp(raw.electrons))
+    sums = 2 * samples * 2.0**-24 * float(np.abs(raw.electrons).max())  # roundings of the weights' sum and the values'
+    plain = _beside(error, raw, situation, KERNEL_ERROR * spread + sums)
+    if plain.kept:
+        return plain
+    largest = float(-sum_weights(raw, settings).largest.min())
+    return _beside(error, raw, situation, np.clip(KERNEL_ROUNDINGS * largest, KERNEL_ERROR, 0.5) * spread + sums)
+
+
+def _beside(error: Image, raw: RawImage, situation: Situation, channel_e: float) -> Margin:
+    """Error of a picture beside twice an error of its channels, through balance and matrix."""
+    through = np.abs(to_picture(raw.cfa, situation.develop)).sum(axis=1)
+    return worst_of(error, np.broadcast_to(2 * channel_e * through + NOTHING_E, error.shape), "e⁻")
+
+
+def _settings(situation: Situation) -> Settings:
+    defaults = {"neighbourhood": NEIGHBOURHOOD, "patch": PATCH, "sigma_d": SIGMA_D, "sigma_s": SIGMA_S}
+    return Settings(**{name: situation.develop.get(name, value) for name, value in defaults.items()})
