@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import poisson
 
 from isp.colour import encode_srgb
 from isp.interleaved import reconstruct
@@ -27,6 +28,7 @@ from sensor.presets import low_noise
 from sensor.random import Term, philox
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance, expected_electrons
+from studies.stress_case import Margin, worse
 from studies.stress_chain import to_picture
 from studies.stress_light import at_level, transport
 from studies.stress_precision import Found, Parameters, Stage, beside_noise
@@ -36,6 +38,9 @@ Image = NDArray[np.float64]
 ROUNDING = 2.0**-24  # u: half a step of single precision
 MOST_E = 1e6  # the largest well
 SHAPE = (32, 32)
+# Mean error of a normal draw and of what a quantile makes of it: the angle has three roundings of up to 2 pi, the
+# radius four, its logarithm's argument one, which counts over the radius; means of radius and of its inverse are 1.25.
+NORMAL_ERROR = (3 * 2 * np.pi * 1.25 + 4 * 1.25 + 1.25 + 4) * ROUNDING
 LEVELS_E = (1e-3, MOST_E)
 SEEDS = (1.0, 1e9)
 BAND_COUNTS = (1, 5, 20, 40, 401)
@@ -124,7 +129,10 @@ def _read(at: Parameters) -> Found:
     drawn = _drawn(mean.astype(np.float64), key, at["read_noise_e"])
     double = np.clip(np.rint(drawn + 8192.0), 0, 65_535)
     # one electron where the draw's floor falls on the other side, one where rounding to DN does
-    return beside_noise(single - double, _shot(mean.astype(np.float64), at["read_noise_e"]), np.full(SHAPE, 2.0))
+    found = beside_noise(single - double, _shot(mean.astype(np.float64), at["read_noise_e"]), np.full(SHAPE, 2.0))
+    shift_e = NORMAL_ERROR * (at["level_e"] ** 0.5 + at["read_noise_e"])
+    flips = Margin(float((single != double).sum()), max(float(poisson.isf(1e-9, shift_e * single.size)), 1.0), "pixels")
+    return replace(found, bound=worse(found.bound, flips))
 
 
 def _drawn(mean: Image, key: int, read_noise_e: float) -> Image:
@@ -212,7 +220,7 @@ STAGES = (
     ),
     Stage(
         "noise and readout",
-        "1 e⁻ where a draw, and 1 where a DN falls on the other side",
+        "1 e⁻ where a draw or a DN falls on the other side, in no more pixels than roundings move there",
         {"level_e": (30.0, 5e4), "read_noise_e": (1e-3, 1e3), "seed": SEEDS},
         _read,
     ),
