@@ -1,17 +1,21 @@
 """Run the code of a documentation page in order, as a reader would: `python docs/run_page.py PAGE FOLDER`.
 
 In FOLDER, block by block: one with a title is written to the file of that name, ``python`` is run (all of a page in one
-namespace), ``sh`` is run by bash. Blocks of any other language are for reading alone.
+namespace), ``sh`` is run by bash. Blocks of any other language are for reading alone. What a block prints is kept in
+FOLDER/output.json, by the block's number: the built page shows it.
 """
 
+import json
 import os
 import re
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -42,26 +46,33 @@ def run(page: Path, folder: Path) -> None:
     sys.path[0] = os.getcwd()  # in place of this script's folder: a page's own modules
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     names: dict[str, Any] = {"__name__": "__page__"}
-    for block in blocks(page.read_text("utf-8")):
+    printed = {}
+    for number, block in enumerate(blocks(page.read_text("utf-8"))):
         if block.title:
             Path(block.title).parent.mkdir(parents=True, exist_ok=True)
             Path(block.title).write_text(block.code, "utf-8")
         elif block.language == "python":
-            exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), names)
+            with redirect_stdout(StringIO()) as told:
+                exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), names)
+            printed[number] = told.getvalue()
         elif block.language == "sh":
-            code = run_shell(block.code)
+            code, printed[number] = run_shell(block.code)
             if code:
                 sys.exit(f"{page.name}:{block.line}: exit code {code}")
+    Path("output.json").write_text(json.dumps(printed, indent=1), "utf-8")
 
 
-def run_shell(code: str) -> int:
-    """Exit code of a shell block; what it leaves in the background is ended with it."""
-    shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", code], start_new_session=True)
-    try:
-        return shell.wait()
-    finally:
-        with suppress(ProcessLookupError):
-            os.killpg(shell.pid, signal.SIGTERM)
+def run_shell(code: str) -> tuple[int, str]:
+    """Exit code and output of a shell block; what it leaves in the background is ended with it."""
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as told:
+        shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", code], stdout=told, start_new_session=True)
+        try:
+            shell.wait()
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(shell.pid, signal.SIGTERM)
+        told.seek(0)
+        return shell.returncode, told.read()
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
 """Hooks of the documentation's build (mkdocs.yml): a page for every module, formulas as MathML, names as links."""
 
 import ast
+import json
 import re
 from html import unescape
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ from latex2mathml.converter import convert
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 from mkdocs.utils import get_relative_url
+from run_page import FENCE
 
 from studies.cli import app
 
@@ -51,6 +54,21 @@ def on_files(files: Files, config: Any) -> Files:
         name = f"figures/{place.relative_to(folder).as_posix()}"
         files.append(File.generated(config, name, abs_src_path=str(place.resolve())))
     return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> str:
+    """Show beneath each block that docs/run_page.py ran what it printed."""
+    outputs = ROOT / config.extra["figures"] / page.file.src_uri.removesuffix(".md") / "output.json"
+    if not outputs.is_file():
+        return markdown
+    printed = json.loads(outputs.read_text("utf-8"))
+    numbers = count()
+
+    def with_output(found: re.Match[str]) -> str:
+        told = printed.get(str(next(numbers)), "").rstrip()
+        return found[0] + (f'\n\n``` {{ .text .output title="prints" }}\n{told}\n```' if told else "")
+
+    return FENCE.sub(with_output, markdown)
 
 
 def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
@@ -98,8 +116,10 @@ def commands_page() -> str:
 
 
 def mathml(latex: str, block: bool) -> str:
-    """MathML of a formula."""
-    return convert(unescape(latex), display="block" if block else "inline")
+    """MathML of a formula; one on a line of its own scrolls by itself where it is too wide."""
+    if not block:
+        return convert(unescape(latex))
+    return f'<div class="formula">{convert(unescape(latex), display="block")}</div>'
 
 
 def linked(name: str, code: str, url: str) -> str:
