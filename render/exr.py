@@ -117,7 +117,7 @@ def read_exr(path: str | Path) -> SpectralRadiance:
     Parameters
     ----------
     path : path
-        File of at most 32768 pixels a side and 8 GiB of pixels.
+        File of at most 32768 pixels a side, 4096 channels and 8 GiB of pixels.
 
     Returns
     -------

@@ -10,6 +10,7 @@ from render.spectrum import Floats, band_widths
 
 MOST_SIDE = 1 << 15  # pixels; the engine's own limit
 MOST_BYTES = 1 << 33  # of float32 pixels: 8 GiB, such as 4 Mpx with 500 bands; a render that size needs three times it
+MOST_CHANNELS = 4096  # ten times the bands of 1 nm over the visible; OpenEXR's time grows with their square
 # A black picture shrinks by 957 in ZIP, 405 in PIZ, 1264 in PXR24; more is a file that claims what it doesn't hold.
 MOST_EXPANSION = 2000
 SMALL_BYTES = 1 << 26  # of a .mat file's numbers, which is no harm: 64 MiB
@@ -34,10 +35,12 @@ def require_extent(height: int, width: int, channels: int) -> int:
     Raises
     ------
     InputError
-        Where a side is not 1 to 32768 pixels, or the pixels of all channels are over 8 GiB.
+        Where a side is not 1 to 32768 pixels, there are over 4096 channels, or all pixels take over 8 GiB.
     """
     if not (0 < height <= MOST_SIDE and 0 < width <= MOST_SIDE):
         raise InputError(f"{height} x {width} pixels are not allowed; each side is 1 to {MOST_SIDE}; crop or scale it")
+    if channels > MOST_CHANNELS:
+        raise InputError(f"{channels} channels are not allowed; give at most {MOST_CHANNELS}; keep fewer bands")
     needed = 4 * height * width * channels
     if needed > MOST_BYTES:
         raise InputError(

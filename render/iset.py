@@ -57,7 +57,7 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
                 f"{file_bytes} bytes can't hold the {needed} bytes of pixels that it stands for; save it again"
             )
         planes = np.empty((nm.size, *shape), dtype=np.float32)
-        with np.errstate(invalid="ignore", over="ignore"):  # SpectralRadiance tells where a value isn't finite
+        with np.errstate(all="ignore"):  # SpectralRadiance tells where a value isn't finite
             for plane, band, per_joule in zip(planes, photons, photons_per_joule(nm), strict=True):
                 plane[:] = band / per_joule
         return SpectralRadiance(np.moveaxis(planes, 0, -1), nm, width_nm=widths)

@@ -174,7 +174,8 @@ def _value(view: memoryview, order: str, memory: _Memory, depth: int = 0) -> Val
     wanted = np.dtype(_NUMERIC[kind])
     if wanted != numbers.dtype:
         memory.take(numbers.size * wanted.itemsize)
-    return numbers.reshape(dimensions, order="F").astype(wanted, copy=False)
+    with np.errstate(all="ignore"):  # a double that single doesn't hold becomes infinite, as in MATLAB
+        return numbers.reshape(dimensions, order="F").astype(wanted, copy=False)
 
 
 def _product(dimensions: tuple[int, ...]) -> int:

@@ -41,7 +41,8 @@ class ColourCalibration:
     camera_to_xyz_d65: Floats
 
     def __post_init__(self) -> None:
-        count = len(self.neutral) if isinstance(self.neutral, Sequence) else np.size(self.neutral)
+        neutral: Any = self.neutral  # from a file it may be anything, a list of lists of unequal length too
+        count = len(neutral) if isinstance(neutral, Sequence) else np.size(neutral)
         shapes = [(count,), (3, 3), (count, 3), (count, 3), (3, count), (3, count)]
         for field, shape in zip(fields(self), shapes, strict=True):
             object.__setattr__(self, field.name, _numbers(field.name, getattr(self, field.name), shape))

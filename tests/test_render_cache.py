@@ -16,6 +16,7 @@ from render.spectrum import flat
 from scenes.catalog import load
 
 BANDS_NM = np.arange(405.0, 780.0, 50.0)
+NARROWER_NM = np.linspace(410.0, 750.0, 8)
 SIZE = (3, 4)
 ARRAYS = ("radiance", "half_difference", "variance", "irradiance", "emitter_visible", "wavelength_nm", "width_nm")
 VALUES = ("spp", "passes", "stopped_by", "seconds", "integrator", "variant", "relative_mc_error")
@@ -85,7 +86,7 @@ def test_the_folder_is_made_and_holds_one_whole_file_an_entry(tmp_path, renders)
         {"seed": 1},
         {"size": (4, 3)},
         {"max_depth": 7},
-        {"wavelength_nm": BANDS_NM + 1.0},
+        {"wavelength_nm": NARROWER_NM},
         {"width_nm": 40.0},
         {"scene": load("flat_field", reflectance=0.25)},
         {"scene": replace(load("flat_field"), name="other")},
@@ -240,6 +241,8 @@ def with_values(**changes):
 HOSTILE = {
     "another size": lambda arrays: arrays | {"radiance": np.zeros((1, 8, 1000, 1000), np.float32)},
     "an array missing": lambda arrays: {name: array for name, array in arrays.items() if name != "variance"},
+    "endless numbers": lambda arrays: arrays | {"variance": np.full_like(arrays["variance"], np.inf)},
+    "no numbers": lambda arrays: arrays | {"radiance": np.full_like(arrays["radiance"], np.nan)},
     "a pickle": lambda arrays: arrays | {"radiance": np.array([print], dtype=object)},
     "no JSON": lambda arrays: arrays | {"values": np.array("{")},
     "deep JSON": lambda arrays: arrays | {"values": np.array(10_000 * "[")},

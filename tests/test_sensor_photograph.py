@@ -2,11 +2,13 @@
 
 import struct
 import sys
+import time
 from pathlib import Path
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
+import tifffile
 
 from render.errors import InputError
 from sensor.dng import rational
@@ -246,11 +248,41 @@ def test_what_comes_of_a_damaged_file_by_chance_is_one_line(
         read_photograph(path)
 
 
-@pytest.mark.parametrize("error", [ZeroDivisionError, RecursionError, MemoryError])
-def test_a_profile_that_can_not_be_read_is_none(
-    error: type[Exception], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("below", [False, True])
+def test_a_profile_is_found_in_either_byte_order_and_below_the_first_picture(
+    order: str, below: bool, tmp_path: Path
 ) -> None:
-    path = other_camera(tmp_path / "shot.dng", levels(np.zeros(SHAPE)), noise=(1e-4, 1e-8))
-    assert read_noise_profile(path, 1000.0) is not None
-    monkeypatch.setattr("tifffile.TiffFile", Mock(side_effect=error))
-    assert read_noise_profile(path, 1000.0) is None
+    """Cameras keep a small picture in the first directory and the raw one below it; tifffile writes both here."""
+    profile, picture = [(51041, 12, 6, (1e-4, 1e-8) * 3, True)], np.zeros((8, 8), np.uint16)
+    with tifffile.TiffWriter(tmp_path / "a.dng", byteorder=order) as file:  # type: ignore[arg-type]
+        file.write(picture, subifds=2 if below else 0, extratags=[] if below else profile)
+        if below:
+            file.write(picture, subfiletype=1)
+            file.write(picture, extratags=profile)
+    read = read_noise_profile(tmp_path / "a.dng", 1000.0)
+    assert read is not None
+    assert read.gain_e_per_dn == pytest.approx(10.0)
+    assert read.dark_noise_e == pytest.approx(1.0)
+
+
+def test_directories_without_end_are_left_at_once(tmp_path: Path) -> None:
+    """Each of 100 000 directories of no tag names the next; the profile stands in the last, and one names itself."""
+    starts = range(8, 8 + 6 * 100_000, 6)
+    chain = b"".join(struct.pack("<HI", 0, start + 6) for start in starts)
+    last = struct.pack("<HHHIII", 1, 51041, 12, 2, 0, 0)
+    (tmp_path / "a.dng").write_bytes(b"II*\0" + struct.pack("<I", 8) + chain + last)
+    start = time.process_time()
+    assert read_noise_profile(tmp_path / "a.dng", 1000.0) is None
+    (tmp_path / "b.dng").write_bytes(b"II*\0" + struct.pack("<IHI", 8, 0, 8))
+    assert read_noise_profile(tmp_path / "b.dng", 1000.0) is None
+    assert time.process_time() - start < 0.5
+
+
+def test_a_profile_cut_off_anywhere_is_none_or_the_same(tmp_path: Path) -> None:
+    whole = other_camera(tmp_path / "whole.dng", levels(np.zeros(SHAPE)), noise=(1e-4, 1e-8)).read_bytes()
+    read = read_noise_profile(tmp_path / "whole.dng", 1000.0)
+    assert read is not None
+    for length in range(900):
+        (tmp_path / "cut.dng").write_bytes(whole[:length])
+        assert read_noise_profile(tmp_path / "cut.dng", 1000.0) in (None, read)
