@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage.color import deltaE_cie76
+from skimage.color import deltaE_cie76, rgb2lab
 
 from isp.colour import encode_srgb, luminance_of_srgb
 from studies.flip import flip
@@ -22,13 +22,15 @@ class TruePicture:
     ----------
     linear : (h, w, 3) float64
         sRGB, not clipped; white is 1.
-    encoded : (h, w, 3) float64
+    encoded, lab : (h, w, 3) float64
+        As a display shows it, and its CIELAB.
     seen : (h, w, 3) float64
         CIELAB after the eye's blur.
     """
 
     linear: Image
     encoded: Image
+    lab: Image
     seen: Image
 
 
@@ -55,7 +57,7 @@ class Appearance:
 def true_picture(linear: Image) -> TruePicture:
     """Work out what comparisons need of linear sRGB (h, w, 3)."""
     encoded = encode_srgb(linear)
-    return TruePicture(linear, encoded, seen_lab(encoded))
+    return TruePicture(linear, encoded, rgb2lab(encoded), seen_lab(encoded))
 
 
 def appearance(linear: Image, truth: TruePicture, white_cd_m2: float) -> Appearance:

@@ -195,7 +195,7 @@ def run_cell(cell: Cell, threads: int | None = None) -> Row:
 
 def _figures(cell: Cell, linear: Image, encoded: Image, truth: TruePicture) -> dict[str, Any]:
     return {
-        **vars(measure(encoded, truth.encoded)),
+        **vars(measure(encoded, truth.encoded, truth.lab)),
         **vars(appearance(linear, truth, cell.white_cd_m2)),
         **vars(target_figures(cell.at.scene, linear, truth.linear)),
     }

@@ -10,13 +10,13 @@ from studies.study import SceneChoice, Study, conditions
 
 # Measured on two shared cores of a server (AVX-512): `benchmarks/bench_sweep.py` prints them for another machine.
 RENDER_S = 1e-7  # a pixel, sample, band and light group
-CELL_S = 4e-6  # a pixel: capture, development, metrics and file together, mean of the interleaved and Bayer cameras
+CELL_S = 6e-6  # a pixel: capture, development, metrics and file together, mean of the interleaved and Bayer cameras
 CELL_LEAST_S = 0.05  # a cell of any size
 START_S = 4.0  # a worker's imports
 # Bytes a pixel, counted from the arrays held at once.
 _TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
 _VIEW_ARRAYS = 5  # relit radiance, its halves, and an image forming, float32, each by band
-_CELL_BYTES = 600  # mosaic, planes, patches' packed planes, picture, truth and CIELAB of both
+_CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
 WORKER_BYTES = 350e6  # libraries and compiled kernels
 
 

@@ -24,10 +24,13 @@ def psnr_db(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
     return float(-10 * np.log10(mean_square)) if mean_square > 0 else float("inf")
 
 
-def measure(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> Quality:
+def measure(
+    picture: NDArray[np.float64], truth: NDArray[np.float64], truth_lab: NDArray[np.float64] | None = None
+) -> Quality:
     """Compare encoded sRGB pictures (h, w, 3) in [0, 1].
 
-    SSIM is Wang et al. 2004 with its Gaussian window; CIEDE2000 takes D65 as the white.
+    SSIM is Wang et al. 2004 with its Gaussian window; CIEDE2000 takes D65 as the white. Who compares many pictures with
+    one truth gives the truth's CIELAB too.
     """
     ssim = structural_similarity(
         picture,
@@ -39,5 +42,5 @@ def measure(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> Quality
         use_sample_covariance=False,
         win_size=min(11, (min(picture.shape[:2]) - 1) // 2 * 2 + 1),
     )
-    delta_e = deltaE_ciede2000(rgb2lab(picture), rgb2lab(truth))
+    delta_e = deltaE_ciede2000(rgb2lab(picture), rgb2lab(truth) if truth_lab is None else truth_lab)
     return Quality(psnr_db(picture, truth), float(ssim), float(np.median(delta_e)), float(np.percentile(delta_e, 95)))

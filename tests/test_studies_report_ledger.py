@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from render.errors import InputError
@@ -116,6 +116,7 @@ def test_fewer_pictures_than_there_are_leave_whole_groups_and_say_so(out: Path) 
     assert len(json.loads(page.split('id="data">')[1].split("</script>")[0])["cells"]) == 16
 
 
+@settings(deadline=None)
 @given(st.integers(1, 12), st.integers(1, 9), st.integers(1, 120))
 def test_chosen_conditions_keep_to_their_number_and_take_whole_groups(groups: int, levels: int, most: int) -> None:
     chosen = chosen_conditions(groups * levels, levels, most)
