@@ -60,6 +60,10 @@ LIMITS: Mapping[tuple[str, str], str] = MappingProxyType(
         ): "similarity of noisy samples takes those that noise raised alike together: 0.5 % of a sample's "
         "noise in W at 6 e⁻; from 10 e⁻ a pixel on under 0.1 %, which 48 frames don't tell from none",
         ("largest_number", "linear"): "the readout holds means at 1e30 e⁻, over any well",
+        (
+            "read_noise_0",
+            "raw unbiased",
+        ): "whole electrons on steps of 0.92 e⁻: without dark noise their rounding isn't evened out",
         ("well_1e6_8bit", "raw unbiased"): _COARSE,
         ("well_1e6_8bit", "pictures unbiased"): _COARSE,
         ("prnu_50", OWN): "a response can't be negative: of a normal spread of 50 %, 2 % of the pixels are cut at 0, "

@@ -35,9 +35,9 @@ def _lens(**terms: float) -> SensorConfig:
 
 
 def _quiet() -> SensorConfig:
-    """No noise but the light's own: every electron counts."""
+    """No noise but the light's own, in steps of a quarter of an electron: every one counts."""
     sensor = low_noise()
-    pixel = replace(sensor.pixel, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
+    pixel = replace(sensor.pixel, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0, full_well_e=65_535 / 4)
     return replace(sensor, pixel=pixel, bits=16)
 
 

@@ -29,7 +29,7 @@ from studies.stress_chain import (
 Image = NDArray[np.float64]
 
 ROUNDING = 1e-5  # a weighted mean in single precision leaves the range of its samples by less
-FRAMES = 12  # each with a chip and noise of its own
+RAW_FRAMES, PICTURES = 32, 12  # each with a chip and noise of its own; a picture takes five times as long
 FALSE_ALARM = 1e-6  # of each mean that is judged; all cases judge about a thousand
 FLAT_SIDE = 32
 ROOM_SIGMAS = 6.0  # between a mean and the full well: less than 1e-9 of the draws reach it
@@ -73,7 +73,7 @@ def raw_unbiased(situation: Situation) -> Margin | None:
         mean_e = _collected(behind(situation, name))
         room = _leaves_room(mean_e, sensor, situation.exposure_s)
         letters = letter_map(sensor.cfa, mean_e.shape)
-        frames = [shoot(situation, name, 100 + seed) for seed in range(FRAMES)] if room.any() else []
+        frames = [shoot(situation, name, 100 + seed) for seed in range(RAW_FRAMES)] if room.any() else []
         for letter in channels(sensor.cfa):
             here = room & (letters == letter)
             sound = [(raw.electrons - mean_e)[here & ~_defective(raw)] for raw in frames]
@@ -95,7 +95,7 @@ def pictures_unbiased(situation: Situation) -> Margin | None:
         letters = letter_map(sensor.cfa, mean_e.shape)
         means = np.array([mean_e[letters == letter].mean() for letter in channels(sensor.cfa)])
         shown = to_picture(sensor.cfa, level.develop) @ means
-        pictures = [develop_fixed(shoot(level, name, 200 + seed), level) for seed in range(FRAMES)]
+        pictures = [develop_fixed(shoot(level, name, 200 + seed), level) for seed in range(PICTURES)]
         found = np.array([picture.mean(axis=(0, 1)) for picture in pictures])
         margins += [bias(found[:, i] - shown[i], float(np.abs(means).max())) for i in range(3)]
     return worse(*margins) if margins else None
