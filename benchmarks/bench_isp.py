@@ -76,7 +76,7 @@ def first_call() -> None:
     reconstruct(small, **PATCHES)
     reconstruct(edge, **PATCHES)
     seconds = time.perf_counter() - start[0], time.process_time() - start[1]
-    print(f"first calls, four kernels compiled: {seconds[0]:.2f} s, {seconds[1]:.2f} CPU s", flush=True)
+    print(f"first calls, all quick kernels compiled: {seconds[0]:.2f} s, {seconds[1]:.2f} CPU s", flush=True)
 
 
 def others() -> tuple[float, float] | None:

@@ -1,18 +1,22 @@
 """Eqs. (1)-(5) for a group of tiles of pixels in Dr.Jit: one source for LLVM and CUDA.
 
-A lane owns a dense tile of adjacent pixels x and goes through the offsets d = y - x of one class: those that lead from
-its tile to one place in the tile of letters. The letter at y then depends on the pixel's place in the lane alone, so
-each pair (x, y) is met once, and one compiled kernel serves all classes. Patches of neighbours overlap: the lane forms
-the rows' sums of squared differences once (`isp.window_sums`).
+A lane owns pixels x of a dense tile, all of them or those of one cell of the tile of letters, and goes through the
+offsets d = y - x of one class: those that lead from its tile to one place in the tile of letters. The letter at y then
+depends on the pixel's place in the lane alone, so each pair (x, y) is met once, and one compiled kernel serves all
+classes and cells. Where W judges alone the letter at y doesn't matter, and a lane owns all pixels; where a band's own
+plane judges, it owns those at whose y that band is sampled. Patches of neighbours overlap: the lane forms the rows'
+sums of squared differences once (`isp.window_sums`).
 
 Loading is what costs. Rows are therefore stored in groups, one at every column where patches around y may begin: each
-holds all the values that a lane reads from there on, of one row or two, to be loaded with one instruction a lane.
+holds all the values that a lane reads from there on, of one row or two, to be loaded with one instruction a lane; and
+an iteration of a lane of one cell goes through two offsets, one a tile below the other, which read mostly the same
+rows.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
-from isp.lane_shape import HEAD, PACKET, Pixel, Shape, entry_size, packet_width, whole_packets
+from isp.lane_shape import PACKET, Pixel, Shape, entry_length, packet_rows, packet_width, whole_packets
 from isp.weighted_sums import HEADROOM, add_exactly, add_quickly, at_least, start_sums
 from isp.window_sums import window_sums
 from render.jit import arrays, dr
@@ -25,12 +29,15 @@ class Frame:
     Attributes
     ----------
     h : Float
-        Planes, [plane, row // packet_rows, group, row % packet_rows, `packet_width`].
-    samples, alpha, decay : Float
-        At patches' centres, [row // packet_rows, group, row % packet_rows, `whole_packets(columns)`]: samples; alpha,
-        or None; log2(e) r(x) / (2 sigma_s^2).
+        Planes, [slot, row // packet_rows, group, row % packet_rows, `packet_width`]: W's plane for dense lanes; for
+        the others a slot for the band sampled at each cell, then W's plane for each cell, moved by the cell's place.
+    samples, alpha : Float
+        At patches' centres, [cell, row // packet_rows, group, row % packet_rows, `whole_packets(columns)`], moved by
+        the cell's place: samples, NO_SAMPLE outside the frame; alpha, or None.
+    decay : Float
+        log2(e) r(x) / (2 sigma_s^2) at patches' centres, for the first cell alone.
     entries : Float
-        Lists of offsets, [class, entry, `entry_size`].
+        Lists of offsets, [list, entry, `whole_packets(entry_length)`].
     counts : UInt
         Entries of each list.
     length, height, width, plane_groups, groups : UInt
@@ -62,10 +69,12 @@ class Lanes:
         First pixel of its patches in the arrays.
     group : UInt
         Number of the group where its list's steps begin.
+    cell : UInt
+        Slot of its own band's plane, samples and alpha: 0 where dense.
     list : UInt
-        Class of offsets.
-    line : UInt
-        Where its first row of sums goes.
+        List of offsets.
+    place : UInt
+        Where its first sum goes.
     """
 
     row: Any
@@ -73,84 +82,97 @@ class Lanes:
     window_row: Any
     window_column: Any
     group: Any
+    cell: Any
     list: Any
-    line: Any
+    place: Any
 
 
 def reconstruct_lanes(frame: Frame, lanes: Lanes, shape: Shape) -> list[tuple[Any, ...]]:
-    """Sums of eqs. (1) and (3) at each pixel of the lanes, row by row.
+    """Sums of eqs. (1) and (3) at each of the lanes' pixels, in the order of `Shape.pixels`.
 
     Returns
     -------
     list of (weight, value[, square][, largest])
         As `isp.weighted_sums.start_sums`: sums of w, of w times the sample, of w^2 where asked for.
     """
-    jit, count, width = arrays(), dr.width(lanes.row), packet_width(shape.columns, shape.patch)
-    here = {}
-    for plane in shape.slots:
-        rows, columns = _window(shape, plane)
-        here[plane] = _load_here(frame, lanes, frame.h, shape.slots.index(plane), width, rows, columns, shape)
-    around = range(shape.rows), range(shape.columns)
-    decay = _load_here(frame, lanes, frame.decay, 0, whole_packets(shape.columns), *around, shape)
+    jit, count = arrays(), dr.width(lanes.row)
+    own = lanes.cell * frame.plane_groups
+    slots = [own, own + shape.tile[0] * shape.tile[1] * frame.plane_groups][: shape.judges]
+    width = packet_width(shape.columns, shape.patch), whole_packets(shape.columns)
+    place = lanes.window_row, lanes.window_column
+    here = [_load_here(frame.h, slot, place, width[0], *shape.window, frame, shape) for slot in slots]
+    place = place[0] + lanes.cell // shape.tile[1], place[1] + lanes.cell % shape.tile[1]
+    decay = _load_here(frame.decay, jit.UInt(0), place, width[1], *shape.places, frame, shape)
     first_entry, entries = lanes.list * frame.length, dr.gather(jit.UInt, frame.counts, lanes.list)
+    length, add = entry_length(shape.tile, dense=shape.dense), add_exactly if shape.exact else add_quickly
 
-    add = add_exactly if shape.exact else add_quickly
-
-    def add_offset(k: Any, sums: list[tuple[Any, ...]]) -> tuple[Any, list[tuple[Any, ...]]]:
-        entry = _entry(frame, first_entry + k, shape)
+    def add_offsets(k: Any, sums: list[tuple[Any, ...]]) -> tuple[Any, list[tuple[Any, ...]]]:
+        entry = _load(frame.entries, first_entry + k, whole_packets(length), 0, length)
         group = lanes.group + dr.reinterpret_array(jit.UInt, entry[0])
-        distances = _distances(frame, group, here, entry, shape)
-        samples = _samples(frame.samples, group, frame, shape)
-        alpha = _samples(frame.alpha, group, frame, shape) if shape.judge == "both" else {}
-        spatial = entry[3] if shape.exact else entry[3] + HEADROOM
-        inside = _inside(frame, lanes, entry, shape) if shape.bordered else {}
-        updated = []
-        for pixel, old in zip(shape.pixels, sums, strict=True):
-            squared = _beta_squared(distances[pixel], alpha.get(pixel))
-            log_weight = dr.fma(-decay[pixel], squared, spatial)
-            updated.append(add(old, log_weight, inside.get(pixel), samples[pixel]))
-        return k + 1, updated
+        rows = _rows_together(shape.window[0], shape)
+        there = [
+            _load_rows(frame.h, slot + group, rows, len(shape.window[1]), width[0], frame, shape) for slot in slots
+        ]
+        centres = [frame.samples] + [frame.alpha] * (shape.judges == 2)
+        rows = _rows_together(shape.places[0], shape)
+        samples, *alpha = (
+            _load_rows(array, own + group, rows, shape.places[1][-1] + 1, width[1], frame, shape) for array in centres
+        )
+        for i in range(shape.together):
+            first = 1 + i * (1 + shape.noises)
+            spatial = entry[first] if shape.exact else entry[first] + HEADROOM
+            noise, below = entry[first + 1 : first + 1 + shape.noises], i * shape.tile[0]
+            distances = [
+                _distances(near, far, below, noise, judge, shape)
+                for judge, (near, far) in enumerate(zip(here, there, strict=True))
+            ]
+            updated = []
+            for (r, c), old in zip(shape.pixels, sums, strict=True):
+                squared = _beta_squared([d[r, c] for d in distances], [a[r + below][c] for a in alpha])
+                log_weight = dr.fma(-decay[r, c], squared, spatial)
+                updated.append(add(old, log_weight, samples[r + below][c]))
+            sums = updated
+        return k + 1, sums
 
     start = start_sums(exact=shape.exact, noise=shape.noise)
     sums = [tuple(dr.full(jit.Float, value, count) for value in start) for _ in shape.pixels]
-    _, sums = dr.while_loop((jit.UInt(0), sums), lambda k, _: k < entries, add_offset)
+    _, sums = dr.while_loop((jit.UInt(0), sums), lambda k, _: k < entries, add_offsets)
     return sums
 
 
-def _window(shape: Shape, plane: int) -> tuple[range, range]:
-    """Rows and columns under the patches that a plane judges."""
-    rows, columns = shape.judged(plane)
-    return range(rows[0], rows[-1] + shape.patch), range(columns[0], columns[-1] + shape.patch)
+def _rows_together(rows: range, shape: Shape) -> list[int]:
+    """Rows that one of the offsets of an iteration reads."""
+    return sorted({r + i * shape.tile[0] for r in rows for i in range(shape.together)})
 
 
 def _load_here(
-    frame: Frame, lanes: Lanes, source: Any, slot: int, width: int, rows: range, columns: range, shape: Shape
+    source: Any, slot: Any, place: tuple[Any, Any], width: int, rows: range, columns: range, frame: Frame, shape: Shape
 ) -> dict[Pixel, Any]:
-    """Values around x: lanes may begin between groups, so the values that follow are loaded too, and shifted."""
-    pair, across = shape.packet_rows, shape.across
-    group = slot * frame.plane_groups + lanes.window_row // pair * frame.groups + lanes.window_column // across
-    more = range(rows.start, rows.stop + pair - 1)
-    first, second = (_load_rows(source, group + i, more, width, width, frame, shape) for i in (0, 1))
-    lines = {i: first[i] + second[i][width - across :] for i in more}
-    values = {}
+    """Values around x: lanes may begin between groups, so some values that follow are loaded too, and shifted."""
+    pair, across = packet_rows(shape.tile[0]), shape.tile[1]
+    group, values = slot * pair + place[1] // across * pair, {}
+    shifts = [place[1] % across == shift for shift in range(1, across)]
+    needed = columns[-1] + across
     for i in rows:
-        line = lines[i]
-        for shift in range(1, pair):
-            chosen = lanes.window_row % pair == shift
-            line = [dr.select(chosen, new, old) for new, old in zip(lines[i + shift], line, strict=True)]
+        row = place[0] + i
+        first = group + row // pair * (frame.groups * pair) + row % pair
+        line = _load(source, first, width, 0, min(needed, width))
+        if needed > width:
+            tail = whole_packets(across)
+            line += _load(source, first + pair, width, width - tail, tail)[tail - across :]
         for j in columns:
             values[i, j] = line[j]
-            for shift in range(1, across):
-                values[i, j] = dr.select(lanes.window_column % across == shift, line[j + shift], values[i, j])
+            for shift, chosen in enumerate(shifts, 1):
+                values[i, j] = dr.select(chosen, line[j + shift], values[i, j])
     return values
 
 
 def _load_rows(
-    source: Any, group: Any, rows: range, needed: int, width: int, frame: Frame, shape: Shape
+    source: Any, group: Any, rows: list[int], needed: int, width: int, frame: Frame, shape: Shape
 ) -> dict[int, list[Any]]:
     """First `needed` values of some rows from a group on: one packet for all rows of a group, or one each."""
-    pair, values = shape.packet_rows, {}
-    for i in range(rows.start // pair, (rows.stop - 1) // pair + 1):
+    pair, values = packet_rows(shape.tile[0]), {}
+    for i in sorted({r // pair for r in rows}):
         lines = [r for r in range(i * pair, i * pair + pair) if r in rows]
         first = group + i * frame.groups
         if len(lines) == pair and pair * width <= 2 * PACKET:
@@ -172,61 +194,28 @@ def _load(source: Any, group: Any, size: int, offset: int, needed: int) -> list[
     return values[:needed]
 
 
-def _entry(frame: Frame, number: Any, shape: Shape) -> list[Any]:
-    """Head of a list's entry and the noise distances that the judges need."""
-    needed = HEAD + shape.cell_count * (1 if shape.judge == "white" else 2)
-    return _load(frame.entries, number, entry_size(shape.cell_count), 0, needed)
-
-
 def _distances(
-    frame: Frame, group: Any, here: dict[int, dict[Pixel, Any]], entry: list[Any], shape: Shape
-) -> dict[Pixel, list[Any]]:
-    """Squared distances of each pixel's patch by its judges, less what noise alone makes, 0 or more."""
-    results: dict[Pixel, list[Any]] = {pixel: [] for pixel in shape.pixels}
-    width = packet_width(shape.columns, shape.patch)
-    for slot, (plane, values) in enumerate(here.items()):
-        rows, columns = shape.judged(plane)
-        lines, places = _window(shape, plane)
-        there = _load_rows(frame.h, group + slot * frame.plane_groups, lines, places.stop, width, frame, shape)
-        row_sums = {}
-        for i in lines:
-            # y - x, not x - y: the x stay in memory, and a processor subtracts memory from a register.
-            change = {j: there[i][j] - values[i, j] for j in places}
-            row_sums[i] = window_sums(change, columns, shape.patch, dr.square, lambda total, v: dr.fma(v, v, total))
-        for k, column in enumerate(columns):
-            line = {i: sums[k] for i, sums in row_sums.items()}
-            totals = window_sums(line, rows, shape.patch, lambda v: v, lambda total, v: total + v)
-            for row, total in zip(rows, totals, strict=True):
-                if plane in shape.judges((row, column)):
-                    own = 0 if shape.judge != "band" and plane == shape.white else shape.cell_count
-                    noise = entry[HEAD + own + shape.cell((row, column))]
-                    results[row, column].append(at_least(total - noise, 0.0))
+    here: dict[Pixel, Any], there: dict[int, list[Any]], below: int, noise: list[Any], judge: int, shape: Shape
+) -> dict[Pixel, Any]:
+    """Squared distance of each pixel's patch in one plane, less what noise alone makes, 0 or more."""
+    (rows, columns), (lines, places), row_sums, results = shape.places, shape.window, {}, {}
+    for i in lines:
+        # y - x, not x - y: the x stay in memory, and a processor subtracts memory from a register.
+        change = {j: there[i + below][j] - here[i, j] for j in places}
+        row_sums[i] = window_sums(change, columns, shape.patch, dr.square, lambda total, v: dr.fma(v, v, total))
+    for k, column in enumerate(columns):
+        line = {i: sums[k] for i, sums in row_sums.items()}
+        totals = window_sums(line, rows, shape.patch, lambda v: v, lambda total, v: total + v)
+        for row, total in zip(rows, totals, strict=True):
+            results[row, column] = at_least(total - noise[shape.noise_number((row, column), judge)], 0.0)
     return results
 
 
-def _samples(source: Any, group: Any, frame: Frame, shape: Shape) -> dict[Pixel, Any]:
-    """Samples (or alpha) at each y."""
-    rows = range(shape.rows)
-    lines = _load_rows(source, group, rows, shape.columns, whole_packets(shape.columns), frame, shape)
-    return {(r, c): lines[r][c] for r, c in shape.pixels}
-
-
-def _inside(frame: Frame, lanes: Lanes, entry: list[Any], shape: Shape) -> dict[Pixel, Any]:
-    """Whether each y lies in the frame: Omega ends at its border."""
-    jit = arrays()
-    # Unsigned, a negative coordinate is a large one.
-    row = jit.UInt(lanes.row) + dr.reinterpret_array(jit.UInt, entry[1])
-    column = jit.UInt(lanes.column) + dr.reinterpret_array(jit.UInt, entry[2])
-    rows = [row + r < frame.height for r in range(shape.rows)]
-    columns = [column + c < frame.width for c in range(shape.columns)]
-    return {(r, c): rows[r] & columns[c] for r, c in shape.pixels}
-
-
-def _beta_squared(distances: list[Any], alpha: Any) -> Any:
+def _beta_squared(distances: list[Any], alpha: list[Any]) -> Any:
     """Square of eq. (5), expanded: exactly one distance where alpha is 0 or 1."""
     if len(distances) == 1:
         return distances[0]
-    white, band = distances
-    rest = 1.0 - alpha
-    cross = 2.0 * alpha * rest * dr.sqrt(band) * dr.sqrt(white)
-    return dr.fma(dr.square(alpha), band, dr.fma(dr.square(rest), white, cross))
+    (band, white), (share,) = distances, alpha
+    rest = 1.0 - share
+    cross = 2.0 * share * rest * dr.sqrt(band) * dr.sqrt(white)
+    return dr.fma(dr.square(share), band, dr.fma(dr.square(rest), white, cross))

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.kernel import Frame, Lanes, reconstruct_lanes
-from isp.lane_shape import PACKET, Judge, Shape, packet_rows, slots, whole_packets
+from isp.lane_shape import PACKET, Judge, Shape, packet_rows
 from isp.settings import Settings
 from isp.strips import ALIGNMENT, Strip, aligned, centre_groups, decay, make_strip, plane_groups
 from isp.tiles import Pattern, Work, first_offset, lane_size, list_offsets, sort_tiles, tile_grid
-from isp.weighted_sums import HEADROOM, LEAST_WEIGHT, NOTHING
+from isp.weighted_sums import HEADROOM, LEAST_WEIGHT, NO_SAMPLE, NOTHING
 from render.jit import arrays, dr
 from sensor.cfa import channels
 from sensor.raw import RawImage
@@ -20,7 +20,7 @@ from sensor.raw import RawImage
 
 @dataclass(frozen=True)
 class Sums:
-    """Sums of all lanes of a strip in Dr.Jit arrays, [class, tile down, tile across, row, column].
+    """Sums of all lanes of a strip in Dr.Jit arrays, [class, tile down, tile across, pixel]; pixels as `Shape.pixels`.
 
     Attributes
     ----------
@@ -45,49 +45,48 @@ def reconstruct_rows(
     """
     strip, sums = make_strip(raw, rows, pattern, settings), _empty_sums(raw, rows, pattern, noise)
     work = sort_tiles(raw.shape, rows, strip.alpha, strip.first_row, pattern, settings.reach)
-    _run_all(raw, strip, {kind: lanes for kind, lanes in work.items() if kind[0] == "white"}, sums)
-    others = {kind: lanes for kind, lanes in work.items() if kind[0] != "white" and len(lanes.row)}
+    _run_all(raw, strip, {"white": work["white"]}, sums)
+    others: dict[Judge, Work] = {judge: lanes for judge, lanes in work.items() if judge != "white" and len(lanes.row)}
     if others:
         # The bands' planes are laid out for those rows alone: mostly few.
-        lane, first_rows = lane_size(pattern, "white")[0], np.concatenate([lanes.row for lanes in others.values()])
+        lane, first_rows = lane_size(pattern)[0], np.concatenate([lanes.row for lanes in others.values()])
         near = max(int(first_rows.min()), rows[0]) // lane * lane, min(int(first_rows.max()) + lane, rows[1])
         _run_all(raw, strip if near == rows else make_strip(raw, near, pattern, settings), others, sums)
     results = finish(sums, raw, rows, pattern)
     return [np.array(values).reshape(rows[1] - rows[0], raw.shape[1], -1) for values in results]
 
 
-def _run_all(raw: RawImage, strip: Strip, work: Mapping[tuple[Judge, bool], Work], sums: Sums) -> None:
-    """Load a strip and run the kernels of its lanes."""
-    work = {kind: lanes for kind, lanes in work.items() if len(lanes.row)}
+def _run_all(raw: RawImage, strip: Strip, work: Mapping[Judge, Work], sums: Sums) -> None:
+    """Load a strip and run the kernels of its lanes: W's alone, or the others."""
+    work = {judge: lanes for judge, lanes in work.items() if len(lanes.row)}
     if not work:
         return
-    frame, pattern, noise = load(raw, strip, {judge for judge, _ in work}), strip.pattern, sums.square is not None
-    for (judge, bordered), lanes in work.items():
-        size, exact = lane_size(pattern, judge), judge == "both"
-        shape = Shape(pattern.cells, pattern.white, *size, strip.settings.patch, judge, exact, bordered, noise)
-        _run(frame, _upload_lanes(lanes, strip), shape, sums)
+    frame, pattern, noise = load(raw, strip, set(work)), strip.pattern, sums.square is not None
+    for judge, lanes in work.items():
+        both, dense, size = judge == "both", judge == "white", lane_size(pattern)
+        shape = Shape(pattern.size, *size, dense, strip.settings.patch, 1 + both, both, noise)
+        _run(frame, _upload_lanes(lanes, strip, shape), shape, sums)
 
 
 def load(raw: RawImage, strip: Strip, judges: set[Judge]) -> Frame:
     """Lay out and upload what the lanes read."""
-    jit, pattern = arrays(), strip.pattern
-    entries, counts = list_offsets(raw.cfa, pattern, strip.settings, strip.groups)
-    planes = slots(pattern.cells, pattern.white)[: 1 if judges == {"white"} else None]
+    jit, pattern, dense = arrays(), strip.pattern, judges == {"white"}
+    letters = [number for row in pattern.cells for number in row]
+    cells = [0] if dense else list(range(len(letters)))
+    slots = [] if dense else list(zip(letters, cells, strict=True))
+    slots += [(white, cell) for white in [pattern.white] if white is not None for cell in cells if judges != {"band"}]
+    entries, counts = list_offsets(raw.cfa, pattern, strip.settings, strip.groups, dense=dense)
     mixed = strip.alpha if "both" in judges else None
+    rows_of_groups = strip.height // packet_rows(pattern.size[0])
     opaque = (
         dr.opaque(jit.UInt, number)
-        for number in (
-            entries.shape[1],
-            *raw.shape,
-            strip.height // packet_rows(pattern.cells) * strip.groups,
-            strip.groups,
-        )
+        for number in (entries.shape[1], *raw.shape, rows_of_groups * strip.groups, strip.groups)
     )
     return Frame(
-        _upload(plane_groups(strip, planes)),
-        _upload(centre_groups(strip.dn - np.float32(raw.black_dn), strip)),
-        None if mixed is None else _upload(centre_groups(mixed, strip)),
-        _upload(centre_groups(decay(strip), strip)),
+        _upload(plane_groups(strip, slots)),
+        _upload(centre_groups(strip.dn - np.float32(raw.black_dn), strip, cells, NO_SAMPLE)),
+        None if mixed is None else _upload(centre_groups(mixed, strip, cells)),
+        _upload(centre_groups(decay(strip), strip, [0])),
         _upload(entries),
         _upload(counts),
         *opaque,
@@ -105,20 +104,23 @@ def _upload(values: NDArray[Any]) -> Any:
     return kinds[values.dtype.kind](values.ravel())
 
 
-def _upload_lanes(work: Work, strip: Strip) -> Lanes:
-    half, across, pair = strip.settings.patch // 2, strip.pattern.size[1], packet_rows(strip.pattern.cells)
+def _upload_lanes(work: Work, strip: Strip, shape: Shape) -> Lanes:
+    half, (down, across), pair = strip.settings.patch // 2, shape.tile, packet_rows(shape.tile[0])
     row, column = work.row - half - strip.top, work.column - half - strip.left
     first = first_offset(strip.pattern, work.shift_row, work.shift_column)
     group = (row + first[0]) // pair * strip.groups + (column + first[1]) // across
-    unsigned = (row, column, group, work.shift_row * across + work.shift_column)
-    parts = (work.row, work.column, *(part.astype(np.uint32) for part in (*unsigned, work.line)))
-    return Lanes(*(_upload(part) for part in parts))
+    number, count = work.shift_row * across + work.shift_column, shape.rows * shape.columns
+    offsets = number if shape.dense else number * (down * across) + work.cell
+    place = work.tile * count + work.cell * (count // (down * across))
+    parts = (part.astype(np.uint32) for part in (row, column, group, work.cell, offsets, place))
+    own = work.row + work.cell // across, work.column + work.cell % across
+    return Lanes(*(_upload(part) for part in (*own, *parts)))
 
 
 def _empty_sums(raw: RawImage, rows: tuple[int, int], pattern: Pattern, noise: bool) -> Sums:
-    jit, size = arrays(), lane_size(pattern, "white")
+    jit = arrays()
     tiles = int(np.prod(tile_grid(raw.shape[1], rows, pattern))) * int(np.prod(pattern.size))
-    size_of_all = tiles * size[0] * whole_packets(size[1]) + PACKET  # the last ones stay empty
+    size_of_all = tiles * int(np.prod(lane_size(pattern))) + PACKET  # the last ones stay empty
     full = [dr.full(jit.Float, value, size_of_all) for value in (0.0, 0.0, 0.0, -HEADROOM)]
     weight, value, square, largest = full
     return Sums(weight, value, square if noise else None, largest)
@@ -137,29 +139,28 @@ def _run(frame: Frame, lanes: Lanes, shape: Shape, sums: Sums) -> None:
     if dr.width(chosen):
         again = Lanes(**{name: dr.gather(type(part), part, chosen) for name, part in vars(lanes).items()})
         dr.eval(vars(again))
-        _run(frame, again, replace(shape, exact=True, bordered=True), sums)
+        _run(frame, again, replace(shape, exact=True), sums)
 
 
 def _inside(frame: Frame, lanes: Lanes, shape: Shape) -> list[Any]:
     """Whether each pixel of a lane lies in the frame; those of other strips too, for all strips to decide alike."""
     unsigned = arrays().UInt
-    rows = [unsigned(lanes.row + r) < frame.height for r in range(shape.rows)]
-    columns = [unsigned(lanes.column + c) < frame.width for c in range(shape.columns)]
+    # Unsigned, a negative coordinate is a large one.
+    rows = {r: unsigned(lanes.row + r) < frame.height for r in shape.places[0]}
+    columns = {c: unsigned(lanes.column + c) < frame.width for c in shape.places[1]}
     return [rows[r] & columns[c] for r, c in shape.pixels]
 
 
 def _put(pixels: list[tuple[Any, ...]], lanes: Lanes, shape: Shape, sums: Sums) -> None:
-    """Store sums, a row of a lane at once."""
-    jit, width = arrays(), whole_packets(shape.columns)
+    """Store sums, a packet at once: a lane's lie side by side."""
+    jit, count = arrays(), len(pixels)
+    packet = min(PACKET, count & -count)  # the largest power of two that divides it
     targets = [sums.weight, sums.value] + [sums.square] * shape.noise + [sums.largest] * shape.exact
-    packet = min(PACKET, width)
     for number, target in enumerate(targets):
-        for r in range(shape.rows):
-            row = [pixels[r * shape.columns + c][number] for c in range(shape.columns)]
-            row += [row[-1]] * (width - shape.columns)
-            for first in range(0, width, packet):
-                place = (lanes.line + r) * (width // packet) + first // packet
-                dr.scatter(target, jit.ArrayXf(row[first : first + packet]), place, mode=dr.ReduceMode.NoConflicts)
+        for first in range(0, count, packet):
+            values = jit.ArrayXf([pixel[number] for pixel in pixels[first : first + packet]])
+            place = lanes.place // packet + first // packet
+            dr.scatter(target, values, place, mode=dr.ReduceMode.NoConflicts)
     dr.eval(targets)
 
 
@@ -215,12 +216,13 @@ def _places(raw: RawImage, rows: tuple[int, int], pattern: Pattern) -> tuple[NDA
 
     A letter has a layer for each of its cells; where it has fewer than another, they lead to sums that stay empty.
     """
-    (down, across), size = pattern.size, lane_size(pattern, "white")
-    grid, line = tile_grid(raw.shape[1], rows, pattern), whole_packets(size[1])
+    (down, across), size = pattern.size, lane_size(pattern)
+    grid, count = tile_grid(raw.shape[1], rows, pattern), size[0] * size[1]
+    by_cell, by_column = count // (down * across), size[0] // down
     cells, order = np.array(pattern.cells), channels(raw.cfa)
     own = [np.argwhere(cells == pattern.letters.index(letter)) for letter in order]
     layers = max(len(places) for places in own)
-    tile, by_class = size[0] * line, grid[0] * grid[1] * size[0] * line
+    by_class = grid[0] * grid[1] * count
     tables = [np.empty((len(order), layers, n), np.uint32) for n in (rows[1] - rows[0], raw.shape[1])]
     row, column = np.arange(*rows), np.arange(raw.shape[1])
     for channel, places in enumerate(own):
@@ -232,6 +234,7 @@ def _places(raw: RawImage, rows: tuple[int, int], pattern: Pattern) -> tuple[NDA
             back = (cell[0] - row) % down, (cell[1] - column) % across
             tile_row, r = np.divmod(row - rows[0] + back[0], size[0])
             tile_column, c = np.divmod(column + back[1], size[1])
-            tables[0][channel, layer] = back[0] * across * by_class + tile_row * grid[1] * tile + r * line
-            tables[1][channel, layer] = back[1] * by_class + tile_column * tile + c
+            in_row, in_column = r % down * across * by_cell + r // down, c % across * by_cell + c // across * by_column
+            tables[0][channel, layer] = back[0] * across * by_class + tile_row * grid[1] * count + in_row
+            tables[1][channel, layer] = back[1] * by_class + tile_column * count + in_column
     return tables[0], tables[1]

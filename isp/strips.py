@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.lane_shape import packet_rows, packet_width, whole_packets
+from isp.lane_shape import TOGETHER, packet_rows, packet_width, whole_packets
 from isp.planes import fill, judged_mosaic
 from isp.settings import WINDOW, Settings
 from isp.similarity import reliability, saturation_dn, share_of_saturated
 from isp.tiles import Pattern, lane_size
 from sensor.raw import RawImage
 
-STRIP_BYTES = 400_000_000  # of all that a strip takes: two megapixels of RGBW
+STRIP_BYTES = 400_000_000  # of all that a strip takes: one megapixel of RGBW
 ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel for memory that isn't aligned, and refuses it packet loads
 
 Array = NDArray[Any]
@@ -65,20 +65,20 @@ class Strip:
 
 def strip_rows(width: int, pattern: Pattern, patch: int) -> int:
     """Rows of a strip that takes STRIP_BYTES or less, a whole number of lanes."""
-    lane, cells = lane_size(pattern, "white"), pattern.size[0] * pattern.size[1]
-    packed = len(pattern.letters) * packet_width(lane[1], patch) + 3 * whole_packets(lane[1])
+    lane, cells = lane_size(pattern), pattern.size[0] * pattern.size[1]
+    packed = cells * (2 * packet_width(lane[1], patch) + 3 * whole_packets(lane[1]))
     floats = 4 * cells + packed / pattern.size[1] + 4 * len(pattern.letters) + 8
     return max(int(STRIP_BYTES / (4 * floats * width)) // lane[0], 1) * lane[0]
 
 
 def make_strip(raw: RawImage, rows: tuple[int, int], pattern: Pattern, settings: Settings) -> Strip:
     """Lay out room for all patches: Omega and half a patch around lanes that begin up to a tile early."""
-    half, (down, across), lane = settings.patch // 2, pattern.size, lane_size(pattern, "white")
-    around, pair = settings.reach + half, packet_rows(pattern.cells)
+    half, (down, across), lane = settings.patch // 2, pattern.size, lane_size(pattern)
+    around, pair = settings.reach + half, packet_rows(down)
     # Groups begin where lanes' patches around y do, whose first pixels are at the pattern's start.
     top, left = rows[0] - (down - 1) - around, -(across - 1) - around
     top, left = top - (top + half - pattern.start[0]) % pair, left - (left + half - pattern.start[1]) % across
-    height = -(-(rows[1] + lane[0] + around - top) // pair) * pair
+    height = -(-(rows[1] + lane[0] + around + (TOGETHER - 1) * down - top) // pair) * pair
     groups = -(-(raw.shape[1] + lane[1] + around - left) // across) + packet_width(lane[1], settings.patch)
     # Half a patch or window for their sums, and twice a tile for tents, from a row with the phase of the frame's first.
     margin = max(half, WINDOW // 2) + 2 * max(pattern.size)
@@ -94,22 +94,25 @@ def make_strip(raw: RawImage, rows: tuple[int, int], pattern: Pattern, settings:
     return Strip(pattern, settings, rows, top, left, height, groups, part, first, dn, white_dn, alpha)
 
 
-def plane_groups(strip: Strip, numbers: list[int]) -> Array:
-    """Planes h_i of some letters for `isp.kernel.Frame.h`."""
-    lane, letters = lane_size(strip.pattern, "white"), strip.pattern.letters
-    width = packet_width(lane[1], strip.settings.patch)
+def plane_groups(strip: Strip, slots: list[tuple[int, int]]) -> Array:
+    """Planes h_i for `isp.kernel.Frame.h`: a letter's number and the cell at which groups begin, for each slot."""
+    width = packet_width(lane_size(strip.pattern)[1], strip.settings.patch)
     mosaic = judged_mosaic(_electrons(strip, strip.dn), strip.part, strip.settings.distance)
-    result = _empty_groups(strip, (len(numbers),), width)
-    for target, number in zip(result, numbers, strict=True):
-        _group(fill(mosaic, strip.part.cfa, letters[number]), strip, 0, target)
+    result = _empty_groups(strip, len(slots), width)
+    for number in {letter for letter, _ in slots}:
+        plane = fill(mosaic, strip.part.cfa, strip.pattern.letters[number])
+        for target, (letter, cell) in zip(result, slots, strict=True):
+            if letter == number:
+                _group(plane, strip, 0, cell, None, target)
     return result
 
 
-def centre_groups(values: Array, strip: Strip) -> Array:
-    """Values at patches' centres for `isp.kernel.Frame`."""
-    target = _empty_groups(strip, (), whole_packets(lane_size(strip.pattern, "white")[1]))
-    _group(values, strip, strip.settings.patch // 2, target)
-    return target
+def centre_groups(values: Array, strip: Strip, cells: list[int], outside: float | None = None) -> Array:
+    """Values at patches' centres for `isp.kernel.Frame`, groups beginning at each of some cells."""
+    result = _empty_groups(strip, len(cells), whole_packets(lane_size(strip.pattern)[1]))
+    for target, cell in zip(result, cells, strict=True):
+        _group(values, strip, strip.settings.patch // 2, cell, outside, target)
+    return result
 
 
 def decay(strip: Strip) -> Array:
@@ -125,22 +128,26 @@ def _electrons(strip: Strip, dn: Array) -> Array:
     return np.asarray((dn - np.float32(strip.part.black_dn)) * np.float32(strip.part.gain_e_per_dn))
 
 
-def _empty_groups(strip: Strip, before: tuple[int, ...], width: int) -> Array:
-    pair = packet_rows(strip.pattern.cells)
-    return aligned((*before, strip.height // pair, strip.groups, pair, width), np.float32)
+def _empty_groups(strip: Strip, count: int, width: int) -> Array:
+    pair = packet_rows(strip.pattern.size[0])
+    return aligned((count, strip.height // pair, strip.groups, pair, width), np.float32)
 
 
-def _group(values: Array, strip: Strip, shift: int, target: Array) -> None:
-    """Fill groups with a part of the frame, reflected at the frame's border as far as patches reach."""
+def _group(values: Array, strip: Strip, shift: int, cell: int, outside: float | None, target: Array) -> None:
+    """Fill groups with a part of the frame, beyond whose border stands `outside`, or its reflection for patches."""
     half, across, (_, groups, pair, width) = strip.settings.patch // 2, strip.pattern.size[1], target.shape
-    rows = _reflected(strip.top + shift - strip.first_row, strip.height, values.shape[0], half)
-    columns = _reflected(strip.left + shift, groups * across + width, values.shape[1], half)
-    before = max(-(strip.left + shift), 0)
+    first = strip.top + shift + cell // across - strip.first_row, strip.left + shift + cell % across
+    count = strip.height, groups * across + width
+    rows, columns = (_reflected(*line, half) for line in zip(first, count, values.shape, strict=True))
+    before, size = max(-first[1], 0), values.shape[1]
     spread = np.empty((len(rows), len(columns)), np.float32)
     lines = values[rows]
     spread[:, :before] = lines[:, columns[:before]]
-    spread[:, before : before + values.shape[1]] = lines[:, : len(columns) - before]
-    spread[:, before + values.shape[1] :] = lines[:, columns[before + values.shape[1] :]]
+    spread[:, before : before + size] = lines[:, : len(columns) - before]
+    spread[:, before + size :] = lines[:, columns[before + size :]]
+    if outside is not None:
+        spread[: max(-first[0], 0)] = spread[max(len(values) - first[0], 0) :] = outside
+        spread[:, :before] = spread[:, before + size :] = outside
     windows = np.lib.stride_tricks.sliding_window_view(spread, width, axis=1)[:, ::across][:, :groups]
     target[:] = windows.reshape(-1, pair, groups, width).swapaxes(1, 2)
 

@@ -12,15 +12,16 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.lane_shape import HEAD, Cells, Judge, entry_size, packet_rows
+from isp.lane_shape import Cells, Judge, entry_length, noise_count, offsets_together, packet_rows, whole_packets
 from isp.planes import Plane
 from isp.settings import Settings
 from isp.similarity import noise_distance
+from isp.weighted_sums import NO_OFFSET
 from sensor.cfa import Tile
 
-# Pixels of a lane on a CPU: 8 x 4 at most, or one tile. Measured: more sharing than 4 x 4 (a tenth less time), and
-# 12 x 4 or 8 x 8 gain nothing more. Where two planes judge, half as many: such lanes are few, and compile for long.
-LANE_ROWS, LANE_COLUMNS, MIXED_LANE_ROWS = 8, 4, 4
+# Pixels that a lane spans on a CPU: 8 x 4 at most, or one tile. Measured: more sharing than 4 x 4 (a tenth less time),
+# and 12 x 4 or 8 x 8 gain nothing more.
+LANE_ROWS, LANE_COLUMNS = 8, 4
 
 Index = NDArray[np.int32]
 Places = NDArray[np.intp]
@@ -67,14 +68,14 @@ def number_tile(tile: Tile) -> Pattern:
     return min(patterns, key=lambda pattern: (pattern.cells, -(pattern.white or 0), pattern.start))
 
 
-def lane_size(pattern: Pattern, judge: Judge) -> tuple[int, int]:
-    """Rows and columns of a lane: whole tiles."""
-    (down, across), rows = pattern.size, MIXED_LANE_ROWS if judge == "both" else LANE_ROWS
-    return down * max(rows // down, 1), across * max(LANE_COLUMNS // across, 1)
+def lane_size(pattern: Pattern) -> tuple[int, int]:
+    """Rows and columns that a lane spans: whole tiles."""
+    down, across = pattern.size
+    return down * max(LANE_ROWS // down, 1), across * max(LANE_COLUMNS // across, 1)
 
 
 def list_offsets(
-    tile: Tile, pattern: Pattern, settings: Settings, groups: int
+    tile: Tile, pattern: Pattern, settings: Settings, groups: int, *, dense: bool
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Every offset of Omega by class.
 
@@ -82,35 +83,46 @@ def list_offsets(
     ----------
     groups : int
         Groups of packets in a row (`isp.strips`).
+    dense : bool
+        Whether for dense lanes, a list a class, or for those of one cell at y, a list a class and cell.
 
     Returns
     -------
-    entries : (class, length, entry_size) float32
-        Whole numbers (step in groups, rows, columns) by their bits, log2 G(beta_d, sigma_d) of eqs. (2) and (4), then
-        the noise distance of W's plane and of the band's own by cell of the tile.
-    counts : (class,) uint32
+    entries : (list, length, whole_packets(entry_length)) float32
+        The step in groups by its bits; then for `offsets_together`, one a tile below the other, log2 G(beta_d, sigma_d)
+        of eqs. (2) and (4), NO_OFFSET beyond Omega, and the noise distances: W's plane by cell, or the plane of the
+        letter at y and W's.
+    counts : (list,) uint32
         Entries that hold; the rest is padding.
     """
     (down, across), reach = pattern.size, settings.reach
-    noise = noise_by_class(tile, pattern, settings.patch, reach)
-    lists = []
+    noise, count = noise_by_class(tile, pattern, settings.patch, reach), noise_count(pattern.size, dense=dense)
+    lists, together = [], offsets_together(dense=dense)
     for shift in np.ndindex(down, across):
         first = first_offset(pattern, *shift)
         rows, columns = (
             np.array([d for d in range(-reach, reach + 1) if d % size == first[axis]])
             for axis, size in enumerate(pattern.size)
         )
-        d = np.stack(np.meshgrid(rows, columns, indexing="ij"), axis=-1).reshape(-1, 2)
-        table = np.zeros((len(d), entry_size(down * across)), dtype=np.float32)
-        lines = (d[:, 0] - first[0]) // packet_rows(pattern.cells)
-        steps = np.column_stack((lines * groups + (d[:, 1] - first[1]) // across, d))
-        table[:, : HEAD - 1] = steps.astype(np.int32).view(np.float32)
-        table[:, HEAD - 1] = -np.log2(np.e) * (d**2).sum(1) / (2.0 * settings.sigma_d**2)
-        if settings.distance == "noise":
-            table[:, HEAD : HEAD + noise.shape[2]] = noise[shift][:, d[:, 0] + reach, d[:, 1] + reach].T
-        lists.append(table)
+        d = np.stack(np.meshgrid(rows[::together], columns, indexing="ij"), axis=-1).reshape(-1, 2)
+        table = np.zeros((len(d), whole_packets(entry_length(pattern.size, dense=dense))), dtype=np.float32)
+        lines = (d[:, 0] - first[0]) // packet_rows(down)
+        steps = lines * groups + (d[:, 1] - first[1]) // across
+        table[:, 0] = steps.astype(np.int32).view(np.float32)
+        all_cells = down * across
+        parts = [slice(all_cells)] if dense else [slice(k + all_cells, None, -all_cells) for k in range(all_cells)]
+        copies = [table.copy() for _ in parts]
+        for i in range(together):
+            row, at = d[:, 0] + i * down, 1 + i * (1 + count)
+            log_weight = -np.log2(np.e) * (row**2 + d[:, 1] ** 2) / (2.0 * settings.sigma_d**2)
+            for target, part in zip(copies, parts, strict=True):
+                target[:, at] = np.where(row <= reach, log_weight, NO_OFFSET)
+                if settings.distance == "noise":
+                    distances = noise[shift][part][:, np.minimum(row, reach) + reach, d[:, 1] + reach]
+                    target[:, at + 1 : at + 1 + count] = distances.T
+        lists += copies
     counts = np.array([len(table) for table in lists], dtype=np.uint32)
-    entries = np.zeros((len(lists), int(counts.max()), entry_size(down * across)), dtype=np.float32)
+    entries = np.zeros((len(lists), int(counts.max()), lists[0].shape[1]), dtype=np.float32)
     for target, table in zip(entries, lists, strict=True):
         target[: len(table)] = table
     return entries, counts
@@ -150,33 +162,36 @@ class Work:
     Attributes
     ----------
     row, column : (n,) int32
-        First pixel in the frame; -1 or less where the class begins before it.
+        First pixel that it spans in the frame; -1 or less where the class begins before it.
     shift_row, shift_column : (n,) int32
         Class.
-    line : (n,) int32
-        Number of its first row among the rows of all tiles, class by class (`tile_grid`).
+    cell : (n,) int32
+        Number of the cell whose pixels it owns; 0 where it owns them all.
+    tile : (n,) int32
+        Its number among the tiles of all classes (`tile_grid`).
     """
 
     row: Index
     column: Index
     shift_row: Index
     shift_column: Index
-    line: Index
+    cell: Index
+    tile: Index
 
 
 def tile_grid(width: int, rows: tuple[int, int], pattern: Pattern) -> tuple[int, int]:
     """Tiles of lanes down and across that cover some rows of a frame in every class."""
-    size = lane_size(pattern, "white")
+    size = lane_size(pattern)
     return (rows[1] - rows[0] + size[0]) // size[0] + 1, width // size[1] + 2
 
 
 def sort_tiles(
     shape: tuple[int, int], rows: tuple[int, int], alpha: Plane | None, first_row: int, pattern: Pattern, reach: int
-) -> dict[tuple[Judge, bool], Work]:
-    """Lanes for some rows of a frame by what judges in them, and whether y may lie outside the frame.
+) -> dict[Judge, Work]:
+    """Lanes for some rows of a frame by what judges in them.
 
     Where no alpha > 0 is in reach of a tile, eq. (5) holds W's distance alone; where all alpha are 1, the band's own
-    alone. Exact, at a part of the work.
+    alone, as it does wherever that band is W. Exact, at a part of the work.
 
     Parameters
     ----------
@@ -187,33 +202,33 @@ def sort_tiles(
     alpha : (n, w) array or None
         Eq. (6) from row `first_row` of the frame on, as far as it is in reach; None where all are 0.
     """
-    height, width = lane_size(pattern, "white")
+    height, width = lane_size(pattern)
     down, across = tile_grid(shape[1], rows, pattern)
     tiles = np.meshgrid(rows[0] + np.arange(down) * height, np.arange(across) * width, indexing="ij")
-    before = np.array([size - 1 for size in pattern.size])
-    top, left = (place - back - reach for place, back in zip(tiles, before, strict=True))
-    bottom, right = (place + size + reach for place, size in zip(tiles, (height, width), strict=True))
-    inside = (top >= 0) & (left >= 0) & (bottom <= shape[0]) & (right <= shape[1])
-    if pattern.white is None:
-        some = whole = np.ones_like(inside)
-    elif alpha is None:
-        some = whole = np.zeros_like(inside)
-    else:
+    some = np.full((down, across), pattern.white is None)
+    whole = some
+    if pattern.white is not None and alpha is not None:
+        before = np.array([size - 1 for size in pattern.size])
+        top, left = (place - back - reach for place, back in zip(tiles, before, strict=True))
+        bottom, right = (place + size + reach for place, size in zip(tiles, (height, width), strict=True))
         box = [np.clip(edge, 0, shape[0]) for edge in (top, bottom)]
         box += [np.clip(edge, 0, shape[1]) for edge in (left, right)]
         area = (box[1] - box[0]) * (box[3] - box[2])
         counts = [_count(condition, first_row, *box) for condition in (alpha > 0.0, alpha >= 1.0)]
         some, whole = counts[0] > 0, counts[1] == area
-    kinds: dict[tuple[Judge, bool], NDArray[np.bool_]] = {
-        ("white", False): ~some & inside,
-        ("white", True): ~some & ~inside,
-        ("band", True): some & whole,
-        ("both", True): some & ~whole,
+    numbers = [number for row in pattern.cells for number in row]
+    white = [k for k, number in enumerate(numbers) if number == pattern.white]
+    colours = [k for k in range(len(numbers)) if k not in white]
+    kinds: dict[Judge, list[tuple[NDArray[np.bool_], list[int]]]] = {
+        "white": [(~some, [0])],
+        "band": [(some & whole, colours), (some, white)],
+        "both": [(some & ~whole, colours)],
     }
-    return {
-        (judge, bordered): _lanes(tiles, chosen, pattern, judge, (rows[1], shape[1]))
-        for (judge, bordered), chosen in kinds.items()
-    }
+    work: dict[Judge, Work] = {}
+    for judge, groups in kinds.items():
+        parts = [part for group in groups for part in _lanes(tiles, *group, pattern, (rows[1], shape[1]))]
+        work[judge] = Work(*np.concatenate(parts, axis=1).astype(np.int32))
+    return work
 
 
 def _count(
@@ -231,15 +246,14 @@ def _count(
 
 
 def _lanes(
-    tiles: Sequence[Places], chosen: NDArray[np.bool_], pattern: Pattern, judge: Judge, end: tuple[int, int]
-) -> Work:
+    tiles: Sequence[Places], chosen: NDArray[np.bool_], cells: list[int], pattern: Pattern, end: tuple[int, int]
+) -> list[Places]:
     """All classes' lanes in the chosen tiles, class by class, without those that hold no pixel to reconstruct."""
-    height, own_height = lane_size(pattern, "white")[0], lane_size(pattern, judge)[0]
-    place, parts = np.flatnonzero(chosen), []
+    place, parts = np.flatnonzero(chosen), [np.empty((6, 0), np.intp)]
     for number, shift in enumerate(np.ndindex(*pattern.size)):
-        for down in range(0, height, own_height):
-            row, column = tiles[0][chosen] + down - shift[0], tiles[1][chosen] - shift[1]
-            line = (number * chosen.size + place) * height + down
-            kept = (row < end[0]) & (column < end[1])
-            parts.append(np.stack([row, column, *(np.full_like(row, s) for s in shift), line])[:, kept])
-    return Work(*np.concatenate(parts, axis=1).astype(np.int32))
+        row, column = (place_of[chosen] - back for place_of, back in zip(tiles, shift, strict=True))
+        kept = (row < end[0]) & (column < end[1])
+        for cell in cells:
+            constant = (np.full_like(row, value) for value in (*shift, cell))
+            parts.append(np.stack([row, column, *constant, number * chosen.size + place])[:, kept])
+    return parts
