@@ -193,7 +193,7 @@ def level_table(of_group: Sequence[Case], camera: str) -> list[str]:
     for letter, words in (("G", "SNR of mean green [dB]"), ("W", "SNR of mean W [dB]")):
         values = [snr_db(case, camera, letter) for case in of_group]
         if not all(isnan(value) for value in values):
-            lines.append(f"| *{words}* | {' | '.join(fixed(value, 0) for value in values)} |")
+            lines.append(f"| *{words}* | {' | '.join(_whole(value) for value in values)} |")
     return lines
 
 
@@ -225,8 +225,13 @@ def _where(found: Sequence[Duel], ranked: Sequence[Case], camera: str) -> str:
     snrs = sorted(snr_db(duel.case, camera, "G") for duel in found)
     if any(isnan(snr) for snr in snrs):
         return count
-    low, high = fixed(snrs[0], 0), fixed(snrs[-1], 0, "dB")
-    return f"{count}, with {high if len(snrs) == 1 else f'{low} to {high}'} SNR of mean green"
+    low, high = _whole(snrs[0]), _whole(snrs[-1])
+    return f"{count}, where mean green has an SNR of {high if low == high else f'{low} to {high}'}{NBSP}dB"
+
+
+def _whole(decibels: float) -> str:
+    """Write whole decibels, 0 without a sign."""
+    return fixed(decibels if isnan(decibels) else round(decibels), 0)
 
 
 def _both(case: Case, name: str) -> str:

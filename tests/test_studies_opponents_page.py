@@ -10,12 +10,22 @@ import pytest
 from isp import processors
 from isp.processors import PROCESSORS, require_libraries
 from render.errors import InputError
+from studies import opponents_page
 from studies.cell_run import Row
 from studies.cli import main
 from studies.opponents import cases_of
 from studies.opponents_figure import figure_of, hardest
 from studies.opponents_page import page_of, write_page
-from studies.opponents_text import beside, best_by_light, code, duel_table, in_short, level_text, loss_table
+from studies.opponents_text import (
+    beside,
+    best_by_light,
+    code,
+    duel_table,
+    in_short,
+    level_table,
+    level_text,
+    loss_table,
+)
 from studies.paper_drawing import Line, Text
 from studies.report_text import PSNR
 from studies.study_file import read_study
@@ -90,6 +100,24 @@ def test_a_camera_that_never_loses_is_said_to_lose_nowhere() -> None:
     assert hardest(cases, "a") is None
 
 
+def test_the_snr_of_green_says_where_a_camera_is_best() -> None:
+    electrons = {20.0: '{"G": 20.3, "W": 99.0}', 21.0: '{"G": 400.0, "W": 999.0}', 22.0: '{"G": 4000.0, "W": 9999.0}'}
+    figures = {"interleaved": (20.0, 21.0, 22.0), "bayer": (15.0, 22.0, 23.0)}
+    rows = [
+        ROWS.row(name, seed, psnr_db=x + 0.02 * seed, level=level, luminance_cd_m2=light, sensor="table1_output",
+                 mean_electrons=electrons[ours])
+        for name, line in figures.items()
+        for x, ours, (level, light) in zip(line, electrons, LEVELS.items(), strict=True)
+        for seed in (0, 1)
+    ]  # fmt: skip
+    cases = cases_of(rows)
+    # Dark noise of 31.6 e-: 20.3 e- give -3.9 dB, 400 give 20.6, 4000 give 35.05.
+    told = in_short(cases, "interleaved")[1].replace("\N{NO-BREAK SPACE}", " ")
+    assert "from the best, in 1 of 3 conditions, where mean green has an SNR of −4 dB; behind" in told
+    assert "in 2 of 3 conditions, where mean green has an SNR of 21 to 35 dB, by 1.0 dB at most" in told
+    assert level_table(cases, "interleaved")[-2] == "| *SNR of mean green [dB]* | −4 | 21 | 35 |"
+
+
 def test_where_nothing_is_ranked_the_page_says_so() -> None:
     dark = {"sensor": "low_noise", "mean_electrons": '{"W": 0.01}'}
     figures = {"interleaved": (5.0, 5.0, 5.0), "bayer": (4.0, 4.0, 4.0)}
@@ -132,7 +160,7 @@ def test_the_figure_has_a_line_for_each_processor_and_the_camera_in_its_colour()
     assert figure_of(cases_of(one_level), "a") is None
 
 
-def test_page_and_figure_are_written_both_or_neither(tmp_path: Path) -> None:
+def test_page_and_figure_are_written_both_or_neither(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_page(made(), {}, tmp_path, tmp_path / "p.md", "a")
     assert "](p.svg)" in (tmp_path / "p.md").read_text("utf-8")
     assert (tmp_path / "p.svg").read_text("utf-8").startswith("<svg")
@@ -140,6 +168,9 @@ def test_page_and_figure_are_written_both_or_neither(tmp_path: Path) -> None:
         write_page(made()[1:], {}, tmp_path, tmp_path / "q.md", "a")
     with pytest.raises(OSError, match="absent"):
         write_page(made(), {}, tmp_path, tmp_path / "absent" / "p.md", "a")
+    monkeypatch.setattr(opponents_page, "to_svg", lambda drawing: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        write_page(made(), {}, tmp_path, tmp_path / "r.md", "a")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["p.md", "p.svg"]
 
 
