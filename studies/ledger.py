@@ -7,7 +7,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields
-from functools import partial
+from functools import cache, partial
 from pathlib import Path, PurePath
 from typing import Any, get_type_hints
 
@@ -161,9 +161,10 @@ def add(base: sqlite3.Connection, row: Row) -> None:
 
 
 def done(base: sqlite3.Connection, pictures: Path) -> set[str]:
-    """Keys of the cells that have a row, and a picture that isn't empty: a power cut may have taken that."""
-    rows = base.execute("SELECT key, picture FROM cells")
-    return {key for key, picture in rows if _stands(pictures / picture)}
+    """Keys of the cells that have a row, and pictures that aren't empty: a power cut may have taken these."""
+    rows = base.execute("SELECT key, picture, truth FROM cells")
+    standing = cache(lambda name: _stands(pictures / name))  # many cells share a truth
+    return {key for key, picture, truth in rows if standing(picture) and standing(truth)}
 
 
 def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
@@ -175,7 +176,7 @@ def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
         else f"SELECT {columns} FROM wanted JOIN cells USING (key) ORDER BY place"
     )
     found = [Row(*values) for values in base.execute(chosen)]
-    for picture in (PurePath(row.picture) for row in found):
+    for picture in (PurePath(name) for row in found for name in (row.picture, row.truth)):
         if picture.is_absolute() or ".." in picture.parts:
             raise InputError(f"ledger: picture {str(picture)!r} lies outside the folder of pictures; remove that row")
     return found

@@ -20,11 +20,11 @@ limit. The scene is `cornell_box` at 64 × 64 pixels, rendered once and lit anew
 a Bayer mosaic, 10 ms, unless a case says otherwise.
 """
 
-MEANING = """Numbers are the worst error found as a share of what is allowed: up to 1 it is kept. A dash: the invariant
-says nothing about the case. What is allowed is 10⁻⁶ of a pixel's expected electrons for the invariants of electrons; for
-bias the mean of 32 raw images or 12 pictures, each with a chip of its own, at a false-alarm rate of 10⁻⁶ (a thirtieth of
-a sample's noise in the mean of a letter, and up to a fifth in a picture); for mirrored and cut pictures what the
-arithmetic's rounding makes of the samples."""
+MEANING = """Numbers are the worst error found as a share of what is allowed: up to 1 it is kept. A dash: the
+invariant says nothing about the case. What is allowed is 10⁻⁶ of a pixel's expected electrons for the invariants of
+electrons; for bias the mean of 32 raw images or 12 pictures, each with a chip of its own, at a false-alarm rate of 10⁻⁶
+(a thirtieth of a sample's noise in the mean of a letter, and up to a fifth in a picture); for mirrored and cut pictures
+what the arithmetic's rounding makes of the samples."""
 
 
 PRECISION = """Where stages run in single precision, the same arithmetic in double precision stands beside it. A search

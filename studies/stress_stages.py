@@ -28,7 +28,7 @@ from sensor.presets import low_noise
 from sensor.random import Term, philox
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance, expected_electrons
-from studies.stress_case import Margin, worse
+from studies.stress_case import Margin, worse, worst_of
 from studies.stress_chain import to_picture
 from studies.stress_light import at_level, transport
 from studies.stress_precision import Found, Parameters, Stage, beside_noise
@@ -77,7 +77,8 @@ def _relit(at: Parameters) -> Found:
         for v in (lit.values.astype(np.float64), exact)
     )
     level = at["level_e"] / max(two.mean(), 1e-300)
-    return _within_well((one - two) * level, two * level, (ROUNDING + 1e-13) * two * level)
+    found = _within_well((one - two) * level, two * level, ROUNDING * 1.001 * two * level)
+    return replace(found, bound=worse(found.bound, _band_by_band(lit.values, exact, 1)))
 
 
 def _within_well(error_e: Image, electrons: Image, bound_e: Image) -> Found:
@@ -101,7 +102,18 @@ def _imaged(spread: bool, at: Parameters) -> Found:
     )
     level = at["level_e"] / two.mean()
     # lens factor, its product, falloff, its product; a lens that spreads light works in double and rounds once
-    return _within_well((one - two) * level, two * level, ((1 if spread else 4) * ROUNDING * 1.001) * two * level)
+    roundings = 1 if spread else 4
+    found = _within_well((one - two) * level, two * level, roundings * ROUNDING * 1.001 * two * level)
+    return replace(
+        found, bound=worse(found.bound, _band_by_band(single.values, form_image(double, camera).values, roundings))
+    )
+
+
+def _band_by_band(single: NDArray[np.floating], double: NDArray[np.floating], roundings: int) -> Margin:
+    """Error of each band beside its roundings, before sums over bands even them out [of the band's own value]."""
+    lit = double > 0
+    relative = single.astype(np.float64)[lit] / double[lit] - 1.0
+    return worst_of(relative, roundings * ROUNDING * 1.001, "of a band's value")
 
 
 def _summed(at: Parameters) -> Found:

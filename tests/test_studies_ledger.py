@@ -56,10 +56,12 @@ def test_a_second_process_reads_while_the_first_is_open(tmp_path: Path) -> None:
             assert rows(reader, everything=True) == [ROW]
 
 
-def test_a_row_counts_as_done_only_with_a_picture_that_is_not_empty(tmp_path: Path) -> None:
+@pytest.mark.parametrize("column", ["picture", "truth"])
+def test_a_row_counts_as_done_only_with_pictures_that_are_not_empty(column: str, tmp_path: Path) -> None:
     with open_ledger(tmp_path) as base:
         for name in ("whole", "empty", "gone"):
-            add(base, replace(ROW, key=name, picture=f"{name}.png"))
+            files = {"picture": "whole.png", "truth": "whole.png"} | {column: f"{name}.png"}
+            add(base, replace(ROW, key=name, **files))
         (tmp_path / "whole.png").write_bytes(b"x")
         (tmp_path / "empty.png").write_bytes(b"")
         assert done(base, tmp_path) == {"whole"}

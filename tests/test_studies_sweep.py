@@ -121,7 +121,7 @@ def test_a_full_disk_leaves_nothing_half_done_and_the_next_run_goes_on(
     def full(path: Path, data: bytes) -> int:
         nonlocal pictures
         pictures += 1
-        if pictures > 2:
+        if pictures > 4:  # two cells, each with its picture and the truth
             write(path, data[:100])
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
         return write(path, data)
@@ -135,13 +135,21 @@ def test_a_full_disk_leaves_nothing_half_done_and_the_next_run_goes_on(
     assert swept(study, tmp_path / "out").made == 2
 
 
-def test_a_picture_that_is_gone_is_made_again(tmp_path: Path) -> None:
-    study = small_study(tmp_path)
-    swept(study, tmp_path / "out")
-    before = content(tmp_path / "out")
-    next((tmp_path / "out" / "pictures").rglob("*.png")).unlink()
-    assert swept(study, tmp_path / "out").made == 1
-    assert content(tmp_path / "out") == before
+def rows_of(out: Path) -> list[Row]:
+    with open_ledger(out) as base:
+        return rows(base)
+
+
+@pytest.mark.parametrize(("column", "cells"), [("picture", 1), ("truth", 4)])
+def test_a_picture_that_is_gone_is_made_again(column: str, cells: int, tmp_path: Path) -> None:
+    """All four cells are compared with one truth: white is white at both levels."""
+    study, out = small_study(tmp_path), tmp_path / "out"
+    swept(study, out)
+    before = content(out)
+    (out / "pictures" / getattr(rows_of(out)[0], column)).unlink()
+    assert swept(study, out).made == cells
+    assert content(out) == before
+    assert (out / "pictures" / getattr(rows_of(out)[0], column)).exists()
 
 
 def test_what_a_killed_run_had_begun_to_write_is_cleared_when_it_is_old(tmp_path: Path) -> None:
@@ -166,7 +174,7 @@ def test_shared_files_that_are_damaged_or_gone_are_made_again(tmp_path: Path) ->
     before = content(tmp_path / "out")
     for path in (tmp_path / "out" / "frames").iterdir():
         path.write_text("{", "utf-8") if path.suffix == ".json" else path.unlink()
-    next((tmp_path / "out" / "pictures").rglob("*.png")).unlink()
+    (tmp_path / "out" / "pictures" / rows_of(tmp_path / "out")[0].picture).unlink()
     assert swept(study, tmp_path / "out").made == 1
     assert content(tmp_path / "out") == before
 

@@ -2,7 +2,10 @@
 
 import pytest
 
+from render.jit import backend
 from studies.stress import CASES, INVARIANTS, LIMITS, OWN, choose, run_case, run_cases, unexpected
+
+needs_kernel = pytest.mark.skipif(backend() == "numpy", reason="without Dr.Jit a case takes minutes")
 
 # One or two of each kind, on the shared render alone and without a long search.
 QUICK = (
@@ -17,11 +20,13 @@ QUICK = (
 )
 
 
+@needs_kernel
 @pytest.mark.parametrize("name", QUICK)
 def test_a_quick_hard_case_keeps_its_invariants_but_for_its_known_limits(name):
     assert unexpected(run_cases(choose([name]))) == []
 
 
+@needs_kernel
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_every_hard_case_keeps_its_invariants_and_the_list_of_limits_is_exact():
@@ -40,6 +45,7 @@ def test_the_catalogue_names_each_of_at_least_60_cases_once():
     assert set(QUICK) <= set(names)
 
 
+@needs_kernel
 def test_every_invariant_says_something_about_an_ordinary_scene():
     margins = run_case(choose(["starlight"])[0]).margins
     assert [name for name, margin in margins.items() if margin is None] == [OWN]

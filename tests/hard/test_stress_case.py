@@ -10,6 +10,7 @@ import pytest
 
 from isp.bayer import bilinear
 from render.errors import InputError
+from render.jit import backend
 from sensor.cfa import letter_map
 from sensor.raw import RawImage
 from studies.cli import main
@@ -122,6 +123,7 @@ def test_an_unknown_case_is_one_line_of_advice():
         choose(["starlite"])
 
 
+@pytest.mark.skipif(backend() == "numpy", reason="without Dr.Jit a case takes minutes")
 def test_the_command_prints_the_table_writes_the_page_and_fails_for_what_is_not_kept(tmp_path, capsys, monkeypatch):
     with pytest.raises(SystemExit) as ended:
         main(["stress", "--case", "well_1e6_8bit", "-o", str(tmp_path / "a")])
