@@ -9,7 +9,7 @@ Cells = tuple[tuple[int, ...], ...]
 
 PACKET = 8  # floats loaded at once: one AVX register, and a good size for the others
 # Offsets an iteration, one tile below the other, in lanes of one cell: they share most rows that they load. Dense lanes
-# would save a seventh of their instructions too, but were 5 to 15 % slower: presumably too many for a cache.
+# would save a seventh of their instructions too, but were slower in separate runs: presumably too many for a cache.
 TOGETHER = 2
 
 
