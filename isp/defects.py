@@ -1,6 +1,7 @@
 """Defective pixels of a raw image's list, replaced before anything else is done with it."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +24,18 @@ def mend(raw: RawImage) -> RawImage:
     bad = np.zeros(raw.shape, dtype=np.bool_)
     bad[tuple(raw.defects.T)] = True
     letters = letter_map(raw.cfa, raw.shape)
+    of_frame = cache(lambda letter: _median_dn(raw, raw.dn[~bad & (letters == letter)]))
     for row, column in raw.defects:
-        dn[row, column] = np.rint(np.median(_neighbours(raw, bad, letters, int(row), int(column))))
+        found = _neighbours(raw, bad, letters, int(row), int(column))
+        dn[row, column] = _median_dn(raw, found) if found.size else of_frame(str(letters[row, column]))
     return replace(raw, dn=dn, defects=None)
 
 
 def _neighbours(
     raw: RawImage, bad: NDArray[np.bool_], letters: NDArray[np.str_], row: int, column: int
 ) -> NDArray[np.uint16]:
-    """Sound samples of the pixel's letter in the smallest window that holds some [DN]."""
+    """Sound samples of the pixel's letter in the smallest window that holds some [DN]; none where none does."""
+    found = np.empty(0, dtype=np.uint16)
     for ring in range(1, _RINGS + 1):
         window = tuple(
             slice(max(at - ring * period, 0), at + ring * period + 1)
@@ -39,6 +43,10 @@ def _neighbours(
         )
         found = np.asarray(raw.dn[window][~bad[window] & (letters[window] == letters[row, column])])
         if found.size:
-            return found
-    found = np.asarray(raw.dn[~bad & (letters == letters[row, column])])
-    return found if found.size else np.array([raw.black_dn])
+            break
+    return found
+
+
+def _median_dn(raw: RawImage, samples: NDArray[np.uint16]) -> float:
+    """Median of samples, black where there are none."""
+    return float(np.rint(np.median(samples))) if samples.size else float(np.rint(raw.black_dn))

@@ -96,8 +96,12 @@ def read_lit(folder: Path, key: str) -> LitScene | None:
     truth = folder / f"{key}.truth.npy"
     if facts is None or not truth.is_file():
         return None
-    light = Light(*(np.array(facts["light"][name]) for name in ("wavelength_nm", "width_nm", "spectrum")))
-    return LitScene(key, light, facts["white_cd_m2"], facts["lux_per_cd_m2"], truth)
+    try:
+        light = Light(*(np.array(facts["light"][name], float) for name in ("wavelength_nm", "width_nm", "spectrum")))
+        white, lux = float(facts["white_cd_m2"]), facts["lux_per_cd_m2"]
+        return LitScene(key, light, white, None if lux is None else float(lux), truth)
+    except (KeyError, TypeError, ValueError):  # damaged: made again
+        return None
 
 
 def make_lit(folder: Path, key: str, opened: OpenedScene, transport: Transport, spectrum: str) -> LitScene:
@@ -124,7 +128,10 @@ def read_frame(folder: Path, key: str, sensor: SensorConfig) -> Frame | None:
     facts = _read(folder / f"{key}.json")
     if facts is None or not (electrons.is_file() and difference.is_file()):
         return None
-    return Frame(key, sensor, facts["auto_s"], electrons, difference)
+    try:
+        return Frame(key, sensor, float(facts["auto_s"]), electrons, difference)
+    except (KeyError, TypeError, ValueError):  # damaged: made again
+        return None
 
 
 def make_frame(
@@ -175,4 +182,4 @@ def _read(path: Path) -> dict[str, Any] | None:
         facts: dict[str, Any] = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError):
         return None
-    return facts
+    return facts if isinstance(facts, dict) else None

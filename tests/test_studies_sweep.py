@@ -168,12 +168,13 @@ def test_what_a_killed_run_had_begun_to_write_is_cleared_when_it_is_old(tmp_path
     assert content(out) == before
 
 
-def test_shared_files_that_are_damaged_or_gone_are_made_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("damage", ["{", "{}", "[]", '{"light": 1, "auto_s": [], "white_cd_m2": "x"}'])
+def test_shared_files_that_are_damaged_or_gone_are_made_again(damage: str, tmp_path: Path) -> None:
     study = small_study(tmp_path)
     swept(study, tmp_path / "out")
     before = content(tmp_path / "out")
     for path in (tmp_path / "out" / "frames").iterdir():
-        path.write_text("{", "utf-8") if path.suffix == ".json" else path.unlink()
+        path.write_text(damage, "utf-8") if path.suffix == ".json" else damage == "{" and path.unlink()
     (tmp_path / "out" / "pictures" / rows_of(tmp_path / "out")[0].picture).unlink()
     assert swept(study, tmp_path / "out").made == 1
     assert content(tmp_path / "out") == before
