@@ -40,6 +40,7 @@ _XYZ_TO_SRGB = np.array(  # IEC 61966-2-1
     [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
 )
 _HALF_MAX, _FLOAT = 65504.0, np.finfo(np.float32)
+MOST_TILE_BYTES = 64 << 20  # of one tile, however small the file: 1024 x 1024 pixels in 16 channels
 
 
 def write_exr(path: str | Path, radiance: SpectralRadiance, *, scene: str = "") -> None:
@@ -159,6 +160,10 @@ def _extent(header: dict[str, Any], file_bytes: int) -> tuple[int, int]:
     needed = require_extent(height, width, len(channels))
     if needed > MOST_EXPANSION * file_bytes:
         raise InputError(f"{file_bytes} bytes can't hold the {needed} bytes of pixels that it declares; save it again")
+    if kind == OpenEXR.tiledimage:  # the library takes a whole tile's memory, however small the picture
+        across, down = int(header["tiles"].xSize), int(header["tiles"].ySize)
+        if across * down * len(channels) * _FLOAT.dtype.itemsize > max(MOST_TILE_BYTES, MOST_EXPANSION * file_bytes):
+            raise InputError(f"its tiles have {across} x {down} pixels, far more than it holds; save it again")
     return height, width
 
 

@@ -1,6 +1,7 @@
 """Spectral OpenEXR: bits kept, the layout's names and attributes, other readers and writers, hostile files."""
 
 import warnings
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -266,6 +267,21 @@ def test_tiled_files_and_windows_off_the_origin_are_read(tmp_path: Path) -> None
     read = read_exr(path)
     assert read.shape == (20, 30)
     assert np.array_equal(read.values[:, :, 1], values + 1)
+
+
+@pytest.mark.parametrize(("tile", "read"), [((4096, 2048), True), ((4096, 2049), False), ((1, 1 << 23 | 1), False)])
+def test_a_tile_far_larger_than_the_picture_is_refused(tmp_path: Path, tile: tuple[int, int], read: bool) -> None:
+    path = write_by_hand(
+        tmp_path / "a.exr",
+        {"S0.500nm": plane(1), "S0.510nm": plane(1)},
+        type=OpenEXR.tiledimage,
+        tiles=OpenEXR.TileDescription(),
+    )
+    content = path.read_bytes()
+    name = content.index(b"tiles\0tiledesc\0") + len(b"tiles\0tiledesc\0") + 4
+    path.write_bytes(content[:name] + np.array(tile, "<u4").tobytes() + content[name + 8 :])
+    with nullcontext() if read else pytest.raises(InputError, match=f"its tiles have {tile[0]} x {tile[1]} pixels"):
+        read_exr(path)
 
 
 def test_stokes_vector_is_read_as_its_radiance(tmp_path: Path) -> None:
