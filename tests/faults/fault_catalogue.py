@@ -470,6 +470,50 @@ ISP = (
     ),
 )
 
+_KERNEL = ("isp_interleaved", "isp_kernel")
+
+KERNEL = (
+    _fault(
+        "kernel's alpha inverted",
+        "isp/kernel.py",
+        "(band, white), (share,) = distances, alpha",
+        "(white, band), (share,) = distances, alpha",
+        *_KERNEL,
+    ),
+    _fault(
+        "kernel mixes without the cross term", "isp/kernel.py", "cross = 2.0 * share", "cross = 0.0 * share", *_KERNEL
+    ),
+    _fault(
+        "kernel forgets what noise alone makes",
+        "isp/kernel.py",
+        "at_least(total - noise[shape.noise_number((row, column), judge)], 0.0)",
+        "at_least(total, 0.0)",
+        *_KERNEL,
+    ),
+    _fault(
+        "kernel's neighbourhood one short",
+        "isp/tiles.py",
+        "range(-reach, reach + 1) if d % size",
+        "range(-reach, reach) if d % size",
+        *_KERNEL,
+    ),
+    _fault(
+        "kernel's spatial weight in base e",
+        "isp/tiles.py",
+        "log_weight = -np.log2(np.e) * (row**2",
+        "log_weight = -(row**2",
+        *_KERNEL,
+    ),
+    _fault(
+        "kernel counts samples outside the frame",
+        "isp/weighted_sums.py",
+        "dr.select(sample > NO_SAMPLE, _exp2(at_least(log_weight, LOWEST_EXPONENT)), 0.0)",
+        "_exp2(at_least(log_weight, LOWEST_EXPONENT))",
+        *_KERNEL,
+    ),
+    _fault("2^x with a wrong coefficient", "isp/weighted_sums.py", "0.22606716", "0.22906716", *_KERNEL),
+)
+
 STUDIES = (
     _fault(
         "PSNR of amplitudes",
@@ -497,4 +541,4 @@ STUDIES = (
     ),
 )
 
-FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *STUDIES)
+FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *KERNEL, *STUDIES)
