@@ -92,16 +92,20 @@ def alone(out: Path, cells: int) -> Memory:
 def killed(out: Path, cells: int, rng: random.Random) -> tuple[int, int]:
     """Sweep under random kills until it is done; gives the kills of workers and of the whole."""
     of_workers = of_all = 0
+    most = min(30, max(2, cells // 12))  # cells between two kills: by progress, so that any machine sees as many
     while True:
-        process, started_at = start(out, cells), rows_in(out)
+        process = start(out, cells)
+        due = rows_in(out) + rng.randint(1, most)
         while process.poll() is None:
-            time.sleep(rng.uniform(0.05, 3.0))
+            time.sleep(rng.uniform(0.0, 0.05))  # anywhere within a cell
+            if rows_in(out) < due:
+                continue
+            due = rows_in(out) + rng.randint(1, most)
             workers = workers_of(process)
-            if rows_in(out) == started_at:
-                continue  # let it get into its work first, else nothing but starts is tested
             if rng.random() < 0.3:
                 process.kill()
                 of_all += 1
+                process.wait()
             elif workers:
                 with suppress(ProcessLookupError):
                     os.kill(rng.choice(workers), signal.SIGKILL)
