@@ -72,7 +72,9 @@ def _entry(file: BinaryIO, scene: Scene, film: Film) -> tuple[dict[str, NDArray[
     except ValueError:  # two groups along the same paths
         arrays, text = read_arrays(file, forms | {"correlation": ("<f4", (bands, *film.size))}, "values")
     extremes = [(array.min(), array.max()) for array in arrays.values()]  # NaN carries through
-    if not np.all(np.isfinite(np.array(extremes, dtype=np.float64))):
+    with np.errstate(invalid="ignore"):  # a NaN that signals does so when it is converted
+        finite = np.isfinite(np.array(extremes, dtype=np.float64))
+    if not np.all(finite):
         raise ValueError("it holds numbers that are not finite")
     values = json.loads(text)
     if not isinstance(values, dict) or values.keys() != {*_VALUES, "shared"}:

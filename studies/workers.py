@@ -4,19 +4,23 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from collections import Counter
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
+from multiprocessing import active_children
 from multiprocessing.connection import wait as wait_for
+from multiprocessing.process import BaseProcess
 from typing import Any
 
 from render.errors import InputError
 from studies.cell_run import Row, run_cell
 from studies.cells import Cell
 
+LEAVE_S = 10.0  # that a worker without work may take to end; libraries let go of threads and memory
 MOST_DEATHS = 3  # of workers with the same cell in their hands, before it is given up: the last two times alone
 # What BLAS libraries and OpenMP read at their import: set before a worker starts.
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
@@ -148,14 +152,25 @@ def run_in_processes(cells: Sequence[Cell], workers: int) -> Generator[Row, None
 @contextmanager
 def _pool(workers: int, threads: int) -> Iterator[ProcessPoolExecutor]:
     """Pool of spawned processes, all of them started: forked ones would share locks of Dr.Jit's and BLAS's threads."""
-    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin)
+    pool, others = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin), active_children()
     with _inherited(threads):
         for _ in range(workers):  # each submission starts one, as none is idle yet
             pool.submit(cores)
+    started = [process for process in active_children() if process not in others]
     try:
         yield pool
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        pool.shutdown(wait=False, cancel_futures=True)
+        _see_off(started)
+        pool.shutdown(wait=True)
+
+
+def _see_off(processes: Sequence[BaseProcess]) -> None:
+    """Let workers leave, and end those that can't: one killed while it held the queue's lock leaves it locked."""
+    end = time.monotonic() + LEAVE_S
+    for process in processes:
+        if not wait_for([process.sentinel], max(0.0, end - time.monotonic())):
+            process.kill()
 
 
 @contextmanager

@@ -1,6 +1,9 @@
 """Running cells: any executor, pools that outlive deaths, threads shared out, no process left behind."""
 
+import multiprocessing
 import os
+import signal
+import time
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from importlib.util import module_from_spec, spec_from_file_location
@@ -107,3 +110,18 @@ def test_workers_share_the_cores_and_the_environment_is_left_as_it_was(monkeypat
         assert isinstance(pool, ProcessPoolExecutor)
         assert [pool.submit(os.getenv, name).result() for name in workers._THREAD_VARIABLES] == ["3"] * 4
     assert (os.environ["OMP_NUM_THREADS"], os.environ.get("MKL_NUM_THREADS")) == ("7", None)
+
+
+def test_a_worker_that_can_not_leave_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As one whose neighbour was killed with the queue's lock in its hands, just when all cells were done."""
+    monkeypatch.setattr(workers, "LEAVE_S", 0.5)
+    context = multiprocessing.get_context("spawn")
+    stuck, done = context.Process(target=time.sleep, args=(600,)), context.Process(target=time.sleep, args=(0,))
+    for process in (stuck, done):
+        process.start()
+    done.join()
+    began = time.monotonic()
+    workers._see_off([done, stuck])
+    stuck.join(30)
+    assert (done.exitcode, stuck.exitcode) == (0, -signal.SIGKILL)
+    assert time.monotonic() - began < 30
