@@ -46,6 +46,11 @@ class Picture:
     engine: Backend
     substitution: float | None = None
 
+    @property
+    def snr_db(self) -> float | None:
+        """`snr` in decibels; None where there is none, or no signal."""
+        return 20 * float(np.log10(self.snr)) if self.snr is not None and self.snr > 0 else None
+
     def _repr_png_(self) -> bytes:
         return preview_png(self.rgb)
 

@@ -176,7 +176,7 @@ def run_cell(cell: Cell, threads: int | None = None) -> Row:
         budget_share=cell.budget_share,
         **figures,
         mc_share=_monte_carlo_share(cell, expected_e),
-        snr_db=_decibels(picture.snr),
+        snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),
         saturated=float(raw.saturated.mean()),
         balance=json.dumps(dict(picture.balance)),
@@ -265,10 +265,6 @@ def _monte_carlo_share(cell: Cell, expected_e: Image) -> float:
     error_e = _array(cell.half_difference) * (cell.luminance_cd_m2 * cell.exposure_s)
     own = noise_variance(expected_e, cell.sensor, cell.exposure_s)[inside].mean()
     return float((error_e[inside] ** 2).mean() / own)
-
-
-def _decibels(snr: float | None) -> float | None:
-    return 20 * float(np.log10(snr)) if snr is not None and snr > 0 else None
 
 
 def _keep(folder: Path, content: bytes) -> str:

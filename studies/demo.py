@@ -252,14 +252,13 @@ def _cell(
     figures: dict[str, float | None],
     measure_s: float,
 ) -> dict[str, Any]:
-    snr = shot.picture.snr
     return {
         "level": level,
         "sensor": camera.sensor_name,
         "camera": camera.name,
         "exposure_s": shot.raw.exposure_s,
         **figures,
-        "snr_db": 20 * float(np.log10(snr)) if snr is not None and snr > 0 else None,
+        "snr_db": shot.picture.snr_db,
         "substitution": shot.picture.substituted,
         "balance": dict(shot.picture.balance),
         "saturated": float(shot.raw.saturated.mean()),

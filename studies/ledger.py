@@ -182,6 +182,12 @@ def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
     return found
 
 
+def last_run(base: sqlite3.Connection) -> tuple[dict[str, Any], dict[str, Any]] | None:
+    """Study and environment of the last run, as `note_run` had them; None before there is one."""
+    found = base.execute("SELECT study, environment FROM runs ORDER BY rowid DESC LIMIT 1").fetchone()
+    return None if found is None else (json.loads(found[0]), json.loads(found[1]))
+
+
 def want(base: sqlite3.Connection, keys: Iterable[str]) -> None:
     """Note which cells the run under way asks for, in place of what the last one did."""
     base.execute("BEGIN IMMEDIATE")

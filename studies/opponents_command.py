@@ -1,8 +1,7 @@
 """The command `rodcone opponents`."""
 
-import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -30,20 +29,14 @@ def opponents(
     from render.errors import InputError
     from render.files import check_place
     from studies.export import read_rows
+    from studies.ledger import last_run, read_ledger
     from studies.opponents_page import write_page
 
     if out.suffix != ".md":
         raise InputError(f"out: {str(out)!r} doesn't end in .md; allowed: that ending; write {out.stem}.md")
     check_place(out)
     rows = read_rows(folder)
-    write_page(rows, _last_study(folder), folder, out, camera)
+    with read_ledger(folder) as base:
+        study, _ = last_run(base) or ({}, {})
+    write_page(rows, study, folder, out, camera)
     print(out)
-
-
-def _last_study(folder: Path) -> dict[str, Any]:
-    """Return the study of a ledger's last run, as it is noted there."""
-    from studies.ledger import open_ledger
-
-    with open_ledger(folder) as base:
-        noted = base.execute("SELECT study FROM runs ORDER BY rowid DESC LIMIT 1").fetchone()
-    return dict(json.loads(noted[0])) if noted else {}

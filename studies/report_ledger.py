@@ -1,7 +1,6 @@
 """The report of a sweep: its ledger's rows as the results that `studies.report` takes, and the pictures to show."""
 
 import json
-import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import metadata
 from io import BytesIO
@@ -12,9 +11,10 @@ from typing import Any, NamedTuple
 from PIL import Image
 
 from render.errors import InputError
+from render.files import inside
 from sensor.exposure import RULE
 from studies.cell_run import Row
-from studies.ledger import FILE, open_ledger, rows
+from studies.ledger import FILE, last_run, read_ledger, rows
 from studies.prepare import PICTURES
 from studies.report_cells import SCATTERED
 from studies.report_choice import chosen_conditions
@@ -35,7 +35,7 @@ class Ledger(NamedTuple):
     rows: list[Row]
 
 
-def read_ledger(folder: Path) -> Ledger:
+def read_run(folder: Path) -> Ledger:
     """Read the last run of a sweep.
 
     Raises
@@ -45,20 +45,13 @@ def read_ledger(folder: Path) -> Ledger:
     """
     if not (folder / FILE).is_file():
         raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
-    with open_ledger(folder) as base:
+    with read_ledger(folder) as base:
         found, wanted = rows(base), base.execute("SELECT count(*) FROM wanted").fetchone()[0]
-        run = _last_run(base)
+        run = last_run(base)
     if not found or run is None:
         raise InputError(f"{folder}: its last run has made no cell yet; run rodcone sweep, which goes on")
-    study, environment = (json.loads(text) for text in run)
+    study, environment = run
     return Ledger(study, environment, wanted, found)
-
-
-def _last_run(base: sqlite3.Connection) -> tuple[str, str] | None:
-    found: tuple[str, str] | None = base.execute(
-        "SELECT study, environment FROM runs ORDER BY rowid DESC LIMIT 1"
-    ).fetchone()
-    return found
 
 
 def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[dict[str, Any], dict[str, bytes]]:
@@ -74,9 +67,9 @@ def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[dict
     Raises
     ------
     InputError
-        As `read_ledger`, and for a picture that is gone.
+        As `read_run`, and for a picture that is gone.
     """
-    ledger = read_ledger(folder)
+    ledger = read_run(folder)
     study, cells = ledger.study, list(_cells(ledger))
     names = [label(choice["source"]) for choice in study["scenes"]]
     truths = _truths(ledger, names)
@@ -159,7 +152,7 @@ def _truths(ledger: Ledger, names: Sequence[str]) -> list[str | None]:
 
 
 def _bytes(folder: Path, name: str) -> bytes:
-    path = folder / PICTURES / name
+    path = inside(folder / PICTURES, name)
     try:
         return path.read_bytes()
     except OSError as error:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from render.errors import InputError, unknown
+from render.files import inside
 from scenes.catalog import load, names
 from scenes.metamers import TWINS_UNDER
 from studies.cell_run import Row
@@ -126,7 +127,7 @@ def _figure(row: Row, name: str, folder: Path) -> float | None:
         raise InputError(f"show: {name} is known of scene {scene}, not of {row.scene}; leave it out, or give --where")
     if name == TRUE_PAIRS:
         return float(true_pair_delta_e(TWINS_UNDER if row.spectrum == OWN else row.spectrum).mean())
-    picture = _linear(folder / PICTURES / row.picture)
+    picture = _linear(inside(folder / PICTURES, row.picture))
     return float(measure(picture, patch_masks(load(scene), (picture.shape[0], picture.shape[1]))).mean())
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import sqlite3
 from contextlib import closing
 from html import unescape
@@ -176,3 +177,15 @@ def test_the_command_writes_the_page_whole_and_prints_its_path(
         assert stopped.value.code == code
         assert capsys.readouterr().err.count("\n") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["r.html"]
+
+
+def test_a_picture_that_is_a_link_out_of_the_folder_is_not_read(out: Path, tmp_path: Path) -> None:
+    shutil.copytree(out / "pictures", tmp_path / "swept" / "pictures")
+    with closing(sqlite3.connect(out / FILE)) as base, closing(sqlite3.connect(tmp_path / "swept" / FILE)) as copy:
+        base.backup(copy)
+    (tmp_path / "secret").write_bytes(b"not for the report")
+    picture = tmp_path / "swept" / "pictures" / read_rows(out)[0].picture
+    picture.unlink()
+    picture.symlink_to(tmp_path / "secret")
+    with pytest.raises(InputError, match="does not lie in"):
+        ledger_results(tmp_path / "swept")
