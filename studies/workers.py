@@ -4,11 +4,10 @@ import multiprocessing
 import os
 import signal
 import threading
-import time
 from collections import Counter
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import islice
 from multiprocessing import active_children
@@ -156,20 +155,19 @@ def _pool(workers: int, threads: int) -> Iterator[ProcessPoolExecutor]:
     with _inherited(threads):
         for _ in range(workers):  # each submission starts one, as none is idle yet
             pool.submit(cores)
-    started = [process for process in active_children() if process not in others]
+    impatience = threading.Timer(LEAVE_S, _end, ([process for process in active_children() if process not in others],))
     try:
         yield pool
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-        _see_off(started)
-        pool.shutdown(wait=True)
+        impatience.start()
+        pool.shutdown(cancel_futures=True)
+        impatience.cancel()
 
 
-def _see_off(processes: Sequence[BaseProcess]) -> None:
-    """Let workers leave, and end those that can't: one killed while it held the queue's lock leaves it locked."""
-    end = time.monotonic() + LEAVE_S
+def _end(processes: Sequence[BaseProcess]) -> None:
+    """End workers that can't leave: one killed while it held the queue's lock leaves it locked for the others."""
     for process in processes:
-        if not wait_for([process.sentinel], max(0.0, end - time.monotonic())):
+        with suppress(ProcessLookupError):  # gone just now
             process.kill()
 
 

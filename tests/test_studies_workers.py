@@ -1,17 +1,15 @@
 """Running cells: any executor, pools that outlive deaths, threads shared out, no process left behind."""
 
-import multiprocessing
 import os
-import signal
 import time
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
-from importlib.util import module_from_spec, spec_from_file_location
 from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
 import pytest
+import sweep_sample as SAMPLE
 
 from render.errors import InputError
 from studies import workers
@@ -20,18 +18,6 @@ from studies.ledger import open_ledger
 from studies.lit_scene import open_all
 from studies.prepare import Job, scene_cells
 from studies.workers import InThisProcess, WorkerLostError, run, run_in_processes
-
-
-def beside(name: str) -> Any:
-    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SAMPLE = beside("sweep_sample")
 
 
 class Deadly:
@@ -115,13 +101,11 @@ def test_workers_share_the_cores_and_the_environment_is_left_as_it_was(monkeypat
 def test_a_worker_that_can_not_leave_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     """As one whose neighbour was killed with the queue's lock in its hands, just when all cells were done."""
     monkeypatch.setattr(workers, "LEAVE_S", 0.5)
-    context = multiprocessing.get_context("spawn")
-    stuck, done = context.Process(target=time.sleep, args=(600,)), context.Process(target=time.sleep, args=(0,))
-    for process in (stuck, done):
-        process.start()
-    done.join()
     began = time.monotonic()
-    workers._see_off([done, stuck])
-    stuck.join(30)
-    assert (done.exitcode, stuck.exitcode) == (0, -signal.SIGKILL)
-    assert time.monotonic() - began < 30
+    with workers._pool(2, 1) as pool:
+        endless = pool.submit(time.sleep, 600)
+        while not endless.running():
+            time.sleep(0.05)
+    assert isinstance(endless.exception(), BrokenExecutor)
+    assert active_children() == []
+    assert time.monotonic() - began < 60
