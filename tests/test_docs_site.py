@@ -6,11 +6,10 @@ import re
 import shutil
 import subprocess
 import sys
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from types import ModuleType
 
 import pytest
+import report_browser as CHROME
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -34,19 +33,6 @@ SEARCH = """(async () => {
   return [];
 })()"""
 VIEWS = [(360, False), (360, True), (1280, False), (1280, True)]
-
-
-def browser_of_tests() -> ModuleType:
-    """Module `report_browser` beside this one."""
-    spec = spec_from_file_location("report_browser", Path(__file__).with_name("report_browser.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-CHROME = browser_of_tests()
 
 
 def name_of(page: Path) -> str:

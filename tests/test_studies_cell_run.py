@@ -4,13 +4,13 @@ import hashlib
 import json
 import pickle
 from dataclasses import replace
-from importlib.util import module_from_spec, spec_from_file_location
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import sweep_sample as SAMPLE
 from PIL import Image
 
 from isp.colour import encode_srgb
@@ -37,18 +37,6 @@ from studies.model import ImageModel, Plan
 from studies.prepare import Job, scene_cells
 from studies.study import RenderLimits, SceneChoice, conditions
 from studies.truth import light_in_bands, neutral_electrons, true_srgb
-
-
-def beside(name: str) -> Any:
-    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SAMPLE = beside("sweep_sample")
 
 
 def made(folder: Path, plan: Plan | None = None, **changes: Any) -> list[Cell]:

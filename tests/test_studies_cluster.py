@@ -9,11 +9,11 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
 import pytest
+import sweep_sample as SAMPLE
 
 from render.errors import InputError
 from studies import cluster as module
@@ -22,18 +22,6 @@ from studies.cells import Cell
 from studies.cluster import TRIM, check_address, on_cluster
 
 SETTINGS = Path(module.__file__).parent / "data" / "dask.yaml"
-
-
-def beside(name: str) -> Any:
-    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SAMPLE = beside("sweep_sample")
 
 
 def free_port() -> int:

@@ -3,11 +3,11 @@
 import errno
 import sqlite3
 from dataclasses import replace
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
 import pytest
+from test_studies_export import ROW
 
 from render.errors import InputError
 from studies.ledger import (
@@ -24,18 +24,6 @@ from studies.ledger import (
     rows,
     want,
 )
-
-
-def beside(name: str) -> Any:
-    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-ROW = beside("test_studies_export").ROW
 
 
 def test_rows_outlive_the_connection_and_a_key_stands_once(tmp_path: Path) -> None:

@@ -1,11 +1,12 @@
 """The page of a camera beside its opponents: sentences follow the numbers, losses are all there, names stay text."""
 
 import re
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
 import pytest
+import sweep_sample as SAMPLE
+import test_studies_opponents as ROWS
 
 from isp import processors
 from isp.processors import PROCESSORS, require_libraries
@@ -33,18 +34,6 @@ from studies.study_file import read_study
 LEVELS = {"0.1cd/m2": 0.1, "1cd/m2": 1.0, "10cd/m2": 10.0}
 # PSNR [dB] at the three levels: `a` is ahead of all in the dark, `b` by 2 and 3 dB in the light; `c` never.
 FIGURES = {"a": (20.0, 21.0, 22.0), "b": (15.0, 23.0, 25.0), "c": (10.0, 11.0, 12.0)}
-
-
-def beside_this(name: str) -> Any:
-    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SAMPLE, ROWS = beside_this("sweep_sample"), beside_this("test_studies_opponents")
 
 
 def made(figures: dict[str, tuple[float, ...]] = FIGURES, **values: Any) -> list[Row]:

@@ -2,12 +2,11 @@
 
 import json
 import sys
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+import report_browser as CHROME
 from PIL import Image
 
 from isp.colour import encode_srgb
@@ -152,19 +151,6 @@ def test_numbers_and_ranges_in_words() -> None:
     assert value_text(Check("", 9.5424, 9.04, 10.04, "dB")) == "9.54\N{NO-BREAK SPACE}dB"
     # 0.9496 would read 0.95 beside "at least 0.95", and fail: another digit tells why
     assert value_text(at_least("", 0.94996, 0.95)) == "0.94996"
-
-
-def _browser_module() -> Any:
-    """The helper beside this file; pytest's importlib mode puts no folder on the path."""
-    spec = spec_from_file_location("report_browser", Path(__file__).with_name("report_browser.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-CHROME = _browser_module()
 
 
 @pytest.mark.skipif(

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from hashlib import sha256
 from html import unescape
 from html.parser import HTMLParser
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
 import pytest
+import report_sample as SAMPLE
 
 from render.errors import InputError
 from studies import report_text as text
@@ -19,19 +19,6 @@ from studies.report import render_report
 
 HOSTILE = "</script><b>bold</b><!--\"'&{{ 7*7 }}"
 PNG = b"\x89PNG\r\n\x1a\n" + b"rest"
-
-
-def load_sample() -> Any:
-    """Return the module beside this one that makes up results."""
-    spec = spec_from_file_location("report_sample", Path(__file__).with_name("report_sample.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SAMPLE = load_sample()
 
 
 def results() -> dict[str, Any]:

@@ -3,13 +3,14 @@
 import json
 import sys
 from collections.abc import Iterator
-from importlib.util import module_from_spec, spec_from_file_location
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import report_browser as CHROME
+import report_sample as SAMPLE
 from PIL import Image
 
 from studies.report import render_report
@@ -17,18 +18,6 @@ from studies.report import render_report
 HOSTILE = "</script><b>x</b><img src=x onerror=document.title='owned'><script>document.title='owned'</script>"
 
 
-def beside(name: str) -> Any:
-    """Return the helper module `name` beside this file; pytest's importlib mode puts no folder on the path."""
-    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SAMPLE = beside("report_sample")
-CHROME = beside("report_browser")
 Browser = CHROME.Browser
 Page = CHROME.Page
 pytestmark = pytest.mark.skipif(

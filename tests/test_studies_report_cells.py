@@ -2,27 +2,13 @@
 
 import re
 from collections.abc import Callable
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 from typing import Any
 
 import pytest
+import report_sample as SAMPLE
 
 from render.errors import InputError
 from studies.report_cells import SCATTERED, exposure_name, groups, ordered_cells, over_seeds, seeds
-
-
-def load_sample() -> Any:
-    """Return the module beside this one that makes up results."""
-    spec = spec_from_file_location("report_sample", Path(__file__).with_name("report_sample.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SAMPLE = load_sample()
 
 
 def test_two_seeds_give_mean_and_student_s_interval() -> None:

@@ -6,11 +6,10 @@ import shutil
 import sqlite3
 from contextlib import closing
 from html import unescape
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import Any
 
 import pytest
+import sweep_sample as SAMPLE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,18 +25,6 @@ from studies.study import SceneChoice
 
 NAME = "</script><b>study"
 FILES = ("<b>bold.exr", "other.exr")
-
-
-def beside(name: str) -> Any:
-    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SAMPLE = beside("sweep_sample")
 
 
 @pytest.fixture(scope="module")

@@ -1,27 +1,14 @@
 """Speed against error: who is fastest, what the others' time buys, and an axis with ticks for less than a decade."""
 
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 from typing import Any
 
 import pytest
+import report_sample as SAMPLE
 
 from studies.charts import log_ticks
 from studies.report_cells import ordered_cells
 from studies.report_charts import speed_charts, speed_rows
 from studies.report_view import render_rows
-
-
-def load_sample() -> Any:
-    spec = spec_from_file_location("report_sample", Path(__file__).with_name("report_sample.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SAMPLE = load_sample()
 
 
 def made() -> dict[str, Any]:

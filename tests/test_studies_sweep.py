@@ -12,12 +12,12 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from importlib.util import module_from_spec, spec_from_file_location
 from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
 import pytest
+import sweep_sample as SAMPLE
 
 from render.engine import render
 from render.errors import InputError
@@ -34,17 +34,6 @@ from studies.study import RenderLimits, SceneChoice, Study
 from studies.sweep import LEFT_S
 from studies.workers import run, run_in_processes
 
-
-def beside(name: str) -> Any:
-    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SAMPLE = beside("sweep_sample")
 content, half_pictures, here, parts_left, small_study, swept = (
     getattr(SAMPLE, name) for name in ("content", "half_pictures", "here", "parts_left", "small_study", "swept")
 )

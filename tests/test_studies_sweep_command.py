@@ -8,28 +8,17 @@ import subprocess
 import sys
 import time
 from contextlib import closing
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
 import pytest
+import sweep_sample as SAMPLE
 
 from studies.cli import app, main
 from studies.ledger import VERSION
 from studies.study_file import read_study
 from studies.sweep import duration
 
-
-def beside(name: str) -> Any:
-    spec = spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-SAMPLE = beside("sweep_sample")
 TEXT = """
 scenes = [{source = "scene.exr", light = "E"}]
 levels = ["1cd/m2", "25cd/m2"]
