@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
-from isp.planes import Plane, fill, planes
+from isp.interpolation import certainty
+from isp.planes import Plane, fill, judged_mosaic, planes
 from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, WINDOW, Distance, Reconstruction, Settings
 from isp.similarity import noise_distance, reliability, saturated_fraction
 from sensor.cfa import channels, mask
@@ -96,15 +97,16 @@ def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
         channel=np.argmax([mask(raw.cfa, letter, raw.shape) for letter in letters], axis=0),
         h=np.pad(planes(raw, settings.distance), ((0, 0), (half, half), (half, half)), mode="reflect"),
         alpha=saturated_fraction(raw),
-        reliability=_reliability(raw) if in_noise else np.ones(raw.shape),
+        reliability=_reliability(raw, settings) if in_noise else np.ones(raw.shape),
         noise=noise if in_noise else [np.zeros_like(table) for table in noise],
         white=letters.index("W") if "W" in letters else None,
     )
 
 
-def _reliability(raw: RawImage) -> Plane:
+def _reliability(raw: RawImage, settings: Settings) -> Plane:
     judging_e = fill(raw.electrons, raw.cfa, "W") if "W" in channels(raw.cfa) else raw.electrons
-    return reliability(judging_e, raw.dark_noise_e, WINDOW)
+    mosaic = judged_mosaic(raw.electrons, raw, settings.distance)
+    return np.asarray(reliability(judging_e, raw.dark_noise_e, WINDOW) * certainty(mosaic, raw.cfa, settings.patch))
 
 
 def _add_offset(sums: Sums, inputs: _Inputs, settings: Settings, offset: tuple[int, int]) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from isp.interpolation import certainty
 from isp.lane_shape import TOGETHER, packet_rows, packet_width, whole_packets
 from isp.planes import fill, judged_mosaic
 from isp.settings import WINDOW, Settings
@@ -43,6 +44,8 @@ class Strip:
         Frame row where `part` begins.
     dn : (n, w) float32
         Its digital numbers.
+    judged : (n, w) float32
+        Its mosaic as patches are read from it (`isp.planes.judged_mosaic`).
     white_dn : (n, w) float32 or None
         W's plane of them; None without W.
     alpha : (n, w) float64 or None
@@ -59,6 +62,7 @@ class Strip:
     part: RawImage
     first_row: int
     dn: Array
+    judged: Array
     white_dn: Array | None
     alpha: Array | None
 
@@ -91,16 +95,16 @@ def make_strip(raw: RawImage, rows: tuple[int, int], pattern: Pattern, settings:
     if white_dn is not None and float(white_dn.max()) >= saturation_dn(raw):
         full = (dn >= saturation_dn(raw)).astype(np.float32)
         alpha = share_of_saturated(fill(full, raw.cfa, "W") > 0.0, WINDOW)
-    return Strip(pattern, settings, rows, top, left, height, groups, part, first, dn, white_dn, alpha)
+    judged = judged_mosaic(_electrons(part, dn), part, settings.distance)
+    return Strip(pattern, settings, rows, top, left, height, groups, part, first, dn, judged, white_dn, alpha)
 
 
 def plane_groups(strip: Strip, slots: list[tuple[int, int]]) -> Array:
     """Planes h_i for `isp.kernel.Frame.h`: a letter's number and the cell at which groups begin, for each slot."""
     width = packet_width(lane_size(strip.pattern)[1], strip.settings.patch)
-    mosaic = judged_mosaic(_electrons(strip, strip.dn), strip.part, strip.settings.distance)
     result = _empty_groups(strip, len(slots), width)
     for number in {letter for letter, _ in slots}:
-        plane = fill(mosaic, strip.part.cfa, strip.pattern.letters[number])
+        plane = fill(strip.judged, strip.part.cfa, strip.pattern.letters[number])
         for target, (letter, cell) in zip(result, slots, strict=True):
             if letter == number:
                 _group(plane, strip, 0, cell, None, target)
@@ -121,11 +125,12 @@ def decay(strip: Strip) -> Array:
     if strip.settings.distance == "raw":
         return np.full(strip.dn.shape, factor)
     judging_dn = strip.dn if strip.white_dn is None else strip.white_dn
-    return reliability(_electrons(strip, judging_dn), strip.part.dark_noise_e, WINDOW) * factor
+    reliable = reliability(_electrons(strip.part, judging_dn), strip.part.dark_noise_e, WINDOW)
+    return np.asarray(reliable * certainty(strip.judged, strip.part.cfa, strip.settings.patch) * factor)
 
 
-def _electrons(strip: Strip, dn: Array) -> Array:
-    return np.asarray((dn - np.float32(strip.part.black_dn)) * np.float32(strip.part.gain_e_per_dn))
+def _electrons(raw: RawImage, dn: Array) -> Array:
+    return np.asarray((dn - np.float32(raw.black_dn)) * np.float32(raw.gain_e_per_dn))
 
 
 def _empty_groups(strip: Strip, count: int, width: int) -> Array:

@@ -105,7 +105,18 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
     def trust(x):
         mean = sum(white[reflect(x[0] + a[0], height), reflect(x[1] + a[1], width)] for a in window) / WINDOW**2
         squared = max(mean, 0.0) ** 2 / (max(mean, 0.0) + raw.dark_noise_e**2)
-        return squared**2 / (1 + squared**2)
+        return squared**2 / (1 + squared**2) / (1 + spread(x) / 9)
+
+    def spread(x):
+        """Half differences of opposite samples, squared, less their noise; the four letters of the tile in turn."""
+        total = 0.0
+        for a in steps:
+            c = reflect(x[0] + a[0], height), reflect(x[1] + a[1], width)
+            for p, share in {(0, 1): 1 / 4, (1, 0): 1 / 4, (1, 1): 1 / 8, (1, -1): 1 / 8}.items():
+                ends = [(c[0] + sign * p[0], c[1] + sign * p[1]) for sign in (-1, 1)]
+                if all(end in white for end in ends):
+                    total += share * ((stable[ends[0]] - stable[ends[1]]) ** 2 / 4 - 1 / 2)
+        return max(total, 0.0)
 
     full = {y: raw.electrons[y] >= raw.saturation_e and letters[y] == "W" for y in np.ndindex(raw.shape)}
 

@@ -396,6 +396,22 @@ ISP = (
         *_SIMILARITY,
     ),
     _fault(
+        "noise taken for interpolation error",
+        "isp/interpolation.py",
+        "change -= 2.0",
+        "change -= 0.0",
+        "isp_interpolation",
+        *_SIMILARITY,
+    ),
+    _fault(
+        "distances trusted between samples that differ",
+        "isp/interpolation.py",
+        "1.0 / (1.0 + interpolation_variance(mosaic, tile, patch) / NOISE_OVER_INTERPOLATION)",
+        "np.ones_like(mosaic)",
+        "isp_interpolation",
+        *_SIMILARITY,
+    ),
+    _fault(
         "overlap of patches forgotten",
         "isp/similarity.py",
         "variance + other - 2.0 * covariance[at]",

@@ -1,0 +1,98 @@
+"""How far the distance of patches can be trusted where the planes h_i are interpolated.
+
+Between two samples of a letter that differ, a plane holds a value that neither side has. The sample nearest to it wins
+all weight, on another side in each colour, and edges get coloured fringes. So the similarity weight is told by how much
+its distance may be wrong, and both sides count (docs/decisions/0025).
+"""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.planes import Plane, box_sums, tent_weights
+from sensor.cfa import Tile
+
+NOISE_OVER_INTERPOLATION = 9.0  # best of 4.5, 9 and 18: so sigma_s = 3 and V add as variances, sigma_s^2 + V
+
+
+def certainty(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDArray[Any]:
+    """The factor 1 / (1 + V(x) / 9) on the exponent of the similarity weight; parameters as `interpolation_variance`.
+
+    Returns
+    -------
+    (h, w) of the same type
+        0 to 1; 1 where planes aren't interpolated between different samples.
+    """
+    return np.asarray(1.0 / (1.0 + interpolation_variance(mosaic, tile, patch) / NOISE_OVER_INTERPOLATION))
+
+
+def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDArray[Any]:
+    """V(x): the variance of the samples that fill a pixel, mean over the letters, summed over the patch around x.
+
+    Taken from pairs of samples on opposite sides, as good as all of them and a fifth of the work; less what noise alone
+    makes of it.
+
+    Parameters
+    ----------
+    mosaic : (h, w) float32 or float64
+        In units of noise, as `isp.planes.judged_mosaic`; begins at the tile's first phase.
+    tile : tuple of str
+    patch : int
+        Width of the patches.
+
+    Returns
+    -------
+    (h, w) of the same type
+        V(x) [noise variances], 0 or more. Pairs that the border cuts count as equal; patches go on by reflection.
+    """
+    total = np.zeros_like(mosaic)
+    for (row, column), weight in opposite_pairs(tile).items():
+        across, (height, width) = abs(column), mosaic.shape
+        if min(height - 2 * row, width - 2 * across) <= 0:
+            continue
+        left, right = slice(None, width - 2 * across), slice(2 * across, None)
+        before, behind = (left, right) if column >= 0 else (right, left)
+        change = mosaic[2 * row :, behind] - mosaic[: height - 2 * row, before]
+        change *= change
+        change -= 2.0  # the noise of both, of unit variance
+        inside = slice(row, height - row), slice(across, width - across)
+        change *= _by_phase((weight / 4.0).astype(mosaic.dtype), inside)  # of half the change, squared
+        total[inside] += change
+    if patch > 1:
+        total = box_sums(np.pad(total, patch // 2, mode="reflect"), (patch, patch))
+    return np.asarray(np.maximum(total, 0.0))
+
+
+@lru_cache(maxsize=16)
+def opposite_pairs(tile: Tile) -> dict[tuple[int, int], Plane]:
+    """Sites x + p and x - p that hold the same letter and fill x, by p: the pair's weight in V at each phase of x.
+
+    Returns
+    -------
+    mapping of (row, column) to (th, tw) float64
+        Of p and -p the one with the larger row, or column. The weights of a letter's pairs add up to 1 / letters, or to
+        0 where a pixel is one of its samples and isn't interpolated.
+    """
+    letters, pairs = sorted(set("".join(tile))), dict[tuple[int, int], Plane]()
+    for letter in letters:
+        weights = tent_weights(tile, letter)
+        radius = weights.shape[2] // 2
+        both = np.where(weights[:, :, ::-1, ::-1] > 0.0, weights, 0.0)
+        both[:, :, radius, radius] = 0.0
+        total = both.sum((2, 3), keepdims=True) * len(letters)
+        share = 2.0 * np.divide(both, total, out=np.zeros_like(both), where=total > 0.0)
+        for row, column in (np.argwhere(share.any((0, 1))) - radius).tolist():
+            if (row, column) > (0, 0):
+                at = share[:, :, row + radius, column + radius]
+                pairs[row, column] = pairs[row, column] + at if (row, column) in pairs else at
+    return pairs
+
+
+def _by_phase(weight: NDArray[Any], inside: tuple[slice, slice]) -> NDArray[Any]:
+    """Weight at each pixel of a part of the frame; one number where all phases have the same."""
+    if (weight == weight[0, 0]).all():
+        return np.asarray(weight[0, 0])
+    rows, columns = (np.arange(part.start, part.stop) % size for part, size in zip(inside, weight.shape, strict=True))
+    return np.asarray(weight[np.ix_(rows, columns)])

@@ -1,0 +1,109 @@
+"""How far distances are trusted between samples that differ: closed forms, noise, any tile, edges without fringes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from isp.interleaved import reconstruct
+from isp.interpolation import certainty, interpolation_variance, opposite_pairs
+from isp.planes import fill, tent_weights
+from sensor.cfa import MOSAICS, channels
+from sensor.raw import RawImage
+
+RGBW, BAYER = MOSAICS["rgbw"], MOSAICS["bayer"]
+TILES = list(MOSAICS.values())
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+@pytest.mark.parametrize("tile", TILES)
+def test_an_even_mosaic_is_certain(tile, kind):
+    mosaic = np.full((11, 14), 70.0, dtype=kind)
+    assert interpolation_variance(mosaic, tile, 5).dtype == kind
+    assert (interpolation_variance(mosaic, tile, 5) == 0.0).all()
+    assert (certainty(mosaic, tile, 1) == 1.0).all()
+
+
+@pytest.mark.parametrize("tile", TILES)
+def test_weights_of_a_pixels_pairs_add_up_to_the_share_of_interpolated_letters(tile):
+    total = sum(opposite_pairs(tile).values())
+    letters = sorted(set("".join(tile)))
+    has_pairs = np.zeros((len(letters), len(tile), len(tile[0])))
+    for i, letter in enumerate(letters):
+        weights = tent_weights(tile, letter)
+        radius = weights.shape[2] // 2
+        both = (weights > 0.0) & (weights[:, :, ::-1, ::-1] > 0.0)
+        both[:, :, radius, radius] = False
+        has_pairs[i] = both.any((2, 3))
+    assert np.broadcast_to(total, has_pairs[0].shape) == pytest.approx(has_pairs.mean(axis=0))
+
+
+def test_pairs_of_the_papers_tile():
+    pairs = opposite_pairs(RGBW)
+    expected = {(0, 1): 1 / 4, (1, 0): 1 / 4, (1, 1): 1 / 8, (1, -1): 1 / 8}
+    assert {p: pytest.approx(weight) for p, weight in expected.items()} == {p: w[0, 0] for p, w in pairs.items()}
+    assert all(np.ptp(weight) == 0.0 for weight in pairs.values())
+
+
+@pytest.mark.parametrize("step", [3.0, 40.0])
+@pytest.mark.parametrize("column", [8, 9])
+def test_a_step_in_closed_form(column, step):
+    """One column on either side: three of the four kinds of pairs differ by the step (RGBW: all at any phase)."""
+    mosaic = np.where(np.arange(18) < column, 20.0, 20.0 + step) * np.ones((16, 18))
+    share = 1 / 4 + 1 / 8 + 1 / 8  # along the row, and both diagonals
+    expected = np.zeros(18)
+    expected[[column - 1, column]] = max(share * step**2 / 4 - 3 / 8, 0.0)
+    variance = interpolation_variance(mosaic, RGBW, 1)
+    assert variance[1:-1] == pytest.approx(np.tile(expected, (14, 1)), abs=1e-12)
+    assert certainty(mosaic, RGBW, 1)[5, column] == pytest.approx(1 / (1 + expected[column] / 9))
+    # A patch adds up what its pixels have: rows alike, columns under it.
+    five = interpolation_variance(mosaic, RGBW, 5)
+    before_noise_is_cut = np.full(18, -3 / 8)
+    before_noise_is_cut[[column - 1, column]] += share * step**2 / 4
+    sums = np.convolve(before_noise_is_cut, np.ones(5), "same") * 5
+    assert five[5:-5, 4:-4] == pytest.approx(np.tile(np.maximum(sums, 0.0), (6, 1))[:, 4:-4], abs=1e-9)
+
+
+@pytest.mark.parametrize("tile", TILES)
+def test_noise_alone_makes_none_on_average(tile):
+    """The mean before the cut at 0 is 0: shown where a wide sum leaves little of the scatter."""
+    noise = np.random.default_rng(5).normal(size=(200, 200))
+    patch = 41
+    # Far from the border no pair is cut. A sum scatters by less than patch * sqrt(10), as few neighbours correlate; cut
+    # at 0 its mean is 0.4 of that, so once that is far beyond chance.
+    variance = interpolation_variance(noise, tile, patch)[60:-60, 60:-60]
+    assert variance.mean() < patch * math.sqrt(10)
+    loud = interpolation_variance(1.1 * noise, tile, patch)[60:-60, 60:-60].mean()
+    share = float(np.mean(sum(opposite_pairs(tile).values())))
+    assert loud == pytest.approx(patch**2 * share * (1.1**2 - 1) / 2, abs=3 * patch * math.sqrt(10))
+
+
+@pytest.mark.parametrize("tile", TILES)
+def test_pairs_tell_what_all_samples_of_the_planes_would(tile):
+    """Variance of all samples that fill each pixel, mean over the letters, on smooth light: an independent way."""
+    y, x = np.indices((60, 64))
+    mosaic = 100.0 + 40.0 * np.sin(x / 5.0) * np.cos(y / 4.0)
+    letters = channels(tile)
+    full = sum(fill(mosaic**2, tile, i) - fill(mosaic, tile, i) ** 2 for i in letters) / len(letters)
+    ours = interpolation_variance(mosaic, tile, 1)
+    inside = slice(6, -6)
+    assert ours[inside, inside].mean() == pytest.approx(full[inside, inside].mean(), rel=0.35)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (2, 2), (9, 1), (3, 3)])
+def test_tiny_frames(size):
+    mosaic = np.arange(size[0] * size[1], dtype=float).reshape(size) * 10.0
+    for tile in TILES:
+        variance = interpolation_variance(mosaic, tile, 1)
+        assert variance.shape == size
+        assert np.isfinite(variance).all()
+
+
+@pytest.mark.parametrize("start", [(0, 0), (0, 1), (1, 0), (1, 1)])
+def test_a_neutral_edge_between_samples_gets_no_coloured_fringe(start):
+    """All letters see the same step. Trusting the distances, each colour chooses a side: half the step between them."""
+    tile = tuple(row[start[1] :] + row[: start[1]] for row in RGBW[start[0] :] + RGBW[: start[0]])
+    electrons = np.where(np.arange(32) < 15, 400.0, 4000.0) * np.ones((24, 32))
+    raw = RawImage(electrons.astype(np.uint16), tile, 0.0, 60000.0, 1.0, 2.0, 0.0, 0.0, 0.01)
+    spread = np.ptp(reconstruct(raw), axis=2)[8:-8]
+    assert spread.max() < 0.2 * 3600.0
