@@ -94,7 +94,7 @@ def _reconstruct(raw: RawImage, settings: Settings, *, noise: bool) -> list[NDAr
     """Estimate and, where asked for, noise gain, strip by strip."""
     pattern, count = number_tile(raw.cfa), len(channels(raw.cfa))
     results = [np.empty((*raw.shape, count), np.float32) for _ in range(1 + noise)]
-    step = strip_rows(raw.shape[1], pattern, settings.patch)
+    step = strip_rows(raw.shape, pattern, settings.patch)
     for first in range(0, raw.shape[0], step):
         rows = first, min(first + step, raw.shape[0])
         for result, values in zip(results, reconstruct_rows(raw, rows, pattern, settings, noise=noise), strict=True):

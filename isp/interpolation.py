@@ -25,7 +25,8 @@ def certainty(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDArray[Any]:
     (h, w) of the same type
         0 to 1; 1 where planes aren't interpolated between different samples.
     """
-    return np.asarray(1.0 / (1.0 + interpolation_variance(mosaic, tile, patch) / NOISE_OVER_INTERPOLATION))
+    variance = interpolation_variance(mosaic, tile, patch)
+    return np.asarray(NOISE_OVER_INTERPOLATION / (variance + NOISE_OVER_INTERPOLATION))
 
 
 def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDArray[Any]:
@@ -62,7 +63,7 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
         total[inside] += change
     if patch > 1:
         total = box_sums(np.pad(total, patch // 2, mode="reflect"), (patch, patch))
-    return np.asarray(np.maximum(total, 0.0))
+    return np.asarray(np.maximum(total, 0.0, out=total))
 
 
 @lru_cache(maxsize=16)

@@ -87,15 +87,18 @@ class Lanes:
     place: Any
 
 
-def reconstruct_lanes(frame: Frame, lanes: Lanes, shape: Shape) -> list[tuple[Any, ...]]:
-    """Sums of eqs. (1) and (3) at each of the lanes' pixels, in the order of `Shape.pixels`.
+def reconstruct_lanes(frame: Frame, lanes: Lanes, shape: Shape) -> dict[Pixel, tuple[Any, ...]]:
+    """Sums of eqs. (1) and (3) at each of the lanes' pixels, row by row.
+
+    Instructions come in the order in which sums are evaluated: in this one a row of patches is loaded when the first
+    pixel needs it, and a seventh fewer values go through memory.
 
     Returns
     -------
-    list of (weight, value[, square][, largest])
+    mapping of pixel to (weight, value[, square][, largest])
         As `isp.weighted_sums.start_sums`: sums of w, of w times the sample, of w^2 where asked for.
     """
-    jit, count = arrays(), dr.width(lanes.row)
+    jit, count, pixels = arrays(), dr.width(lanes.row), sorted(shape.pixels)
     own = lanes.cell * frame.plane_groups
     slots = [own, own + shape.tile[0] * shape.tile[1] * frame.plane_groups][: shape.judges]
     width = packet_width(shape.columns, shape.patch), whole_packets(shape.columns)
@@ -127,7 +130,7 @@ def reconstruct_lanes(frame: Frame, lanes: Lanes, shape: Shape) -> list[tuple[An
                 for judge, (near, far) in enumerate(zip(here, there, strict=True))
             ]
             updated = []
-            for (r, c), old in zip(shape.pixels, sums, strict=True):
+            for (r, c), old in zip(pixels, sums, strict=True):
                 squared = _beta_squared([d[r, c] for d in distances], [a[r + below][c] for a in alpha])
                 log_weight = dr.fma(-decay[r, c], squared, spatial)
                 updated.append(add(old, log_weight, samples[r + below][c]))
@@ -135,9 +138,9 @@ def reconstruct_lanes(frame: Frame, lanes: Lanes, shape: Shape) -> list[tuple[An
         return k + 1, sums
 
     start = start_sums(exact=shape.exact, noise=shape.noise)
-    sums = [tuple(dr.full(jit.Float, value, count) for value in start) for _ in shape.pixels]
+    sums = [tuple(dr.full(jit.Float, value, count) for value in start) for _ in pixels]
     _, sums = dr.while_loop((jit.UInt(0), sums), lambda k, _: k < entries, add_offsets)
-    return sums
+    return dict(zip(pixels, sums, strict=True))
 
 
 def _rows_together(rows: range, shape: Shape) -> list[int]:

@@ -73,10 +73,17 @@ def reliability_of_mean(mean_e: NDArray[Any], dark_noise_e: float) -> NDArray[An
     1, patches differ by noise alone, and what is left is the distance weight. The fourth power, as the second takes up
     to 0.25 dB at an SNR of 1 to 3 (docs/decisions/0015).
     """
-    signal_e = np.maximum(mean_e, 0.0)
-    noise_squared = np.maximum(signal_e + dark_noise_e**2, SMALLEST_VARIANCE)
-    squared = np.minimum(signal_e * (signal_e / noise_squared), MOST_SNR_SQUARED) ** 2
-    return np.asarray(squared / (1.0 + squared))
+    signal_e = np.asarray(np.maximum(mean_e, 0.0))
+    # In place: new memory costs more than what is computed in it.
+    result = np.asarray(signal_e + dark_noise_e**2)
+    np.maximum(result, SMALLEST_VARIANCE, out=result)
+    np.divide(signal_e, result, out=result)
+    result *= signal_e
+    np.minimum(result, MOST_SNR_SQUARED, out=result)
+    np.square(result, out=result)
+    np.add(result, 1.0, out=signal_e)
+    result /= signal_e
+    return result
 
 
 def noise_distance(tile: Tile, letter: str, patch: int, reach: int) -> NDArray[np.float64]:

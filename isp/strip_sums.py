@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.kernel import Frame, Lanes, reconstruct_lanes
-from isp.lane_shape import PACKET, Judge, Shape, packet_rows
+from isp.lane_shape import PACKET, Judge, Pixel, Shape, packet_rows
 from isp.settings import Settings
 from isp.strips import ALIGNMENT, Strip, aligned, centre_groups, decay, make_strip, plane_groups
 from isp.tiles import Pattern, Work, first_offset, lane_size, list_offsets, sort_tiles, tile_grid
@@ -43,17 +43,27 @@ def reconstruct_rows(
 
     The first row is a whole number of lanes; apart from this the result doesn't depend on the rows chosen.
     """
-    strip, sums = make_strip(raw, rows, pattern, settings), _empty_sums(raw, rows, pattern, noise)
+    strip, sums = make_strip(raw, rows, (0, raw.shape[1]), pattern, settings), _empty_sums(raw, rows, pattern, noise)
     work = sort_tiles(raw.shape, rows, strip.alpha, strip.first_row, pattern, settings.reach)
     _run_all(raw, strip, {"white": work["white"]}, sums)
     others: dict[Judge, Work] = {judge: lanes for judge, lanes in work.items() if judge != "white" and len(lanes.row)}
     if others:
-        # The bands' planes are laid out for those rows alone: mostly few.
-        lane, first_rows = lane_size(pattern)[0], np.concatenate([lanes.row for lanes in others.values()])
-        near = max(int(first_rows.min()), rows[0]) // lane * lane, min(int(first_rows.max()) + lane, rows[1])
-        _run_all(raw, strip if near == rows else make_strip(raw, near, pattern, settings), others, sums)
+        # The bands' planes are laid out around those lanes alone: mostly few.
+        lane, lanes = lane_size(pattern), list(others.values())
+        near = (
+            _around([w.row for w in lanes], lane[0], rows),
+            _around([w.column for w in lanes], lane[1], strip.columns),
+        )
+        whole = near == (strip.rows, strip.columns)
+        _run_all(raw, strip if whole else make_strip(raw, *near, pattern, settings), others, sums)
     results = finish(sums, raw, rows, pattern)
-    return [np.array(values).reshape(rows[1] - rows[0], raw.shape[1], -1) for values in results]
+    return [values.numpy().reshape(rows[1] - rows[0], raw.shape[1], -1) for values in results]
+
+
+def _around(places: list[NDArray[np.int32]], lane: int, whole: tuple[int, int]) -> tuple[int, int]:
+    """First and past the last row, or column, of a strip that holds the lanes that begin at some places."""
+    first = np.concatenate(places)
+    return max(int(first.min()), whole[0]) // lane * lane, min(int(first.max()) + lane, whole[1])
 
 
 def _run_all(raw: RawImage, strip: Strip, work: Mapping[Judge, Work], sums: Sums) -> None:
@@ -131,10 +141,11 @@ def _run(frame: Frame, lanes: Lanes, shape: Shape, sums: Sums) -> None:
     pixels = reconstruct_lanes(frame, lanes, shape)
     failed = dr.full(arrays().Bool, False, dr.width(lanes.row))
     if not shape.exact:
-        for (weight, *_), inside in zip(pixels, _inside(frame, lanes, shape), strict=True):
-            failed |= inside & (weight < LEAST_WEIGHT)
+        inside = _inside(frame, lanes, shape)
+        for pixel, (weight, *_) in pixels.items():
+            failed |= inside[pixel] & (weight < LEAST_WEIGHT)
     dr.eval(pixels, failed)  # a scatter straight from the loop would repeat the loop for each array
-    _put(pixels, lanes, shape, sums)
+    _put([pixels[pixel] for pixel in shape.pixels], lanes, shape, sums)
     chosen: Any = dr.compress(failed)
     if dr.width(chosen):
         again = Lanes(**{name: dr.gather(type(part), part, chosen) for name, part in vars(lanes).items()})
@@ -142,13 +153,13 @@ def _run(frame: Frame, lanes: Lanes, shape: Shape, sums: Sums) -> None:
         _run(frame, again, replace(shape, exact=True), sums)
 
 
-def _inside(frame: Frame, lanes: Lanes, shape: Shape) -> list[Any]:
+def _inside(frame: Frame, lanes: Lanes, shape: Shape) -> dict[Pixel, Any]:
     """Whether each pixel of a lane lies in the frame; those of other strips too, for all strips to decide alike."""
     unsigned = arrays().UInt
     # Unsigned, a negative coordinate is a large one.
     rows = {r: unsigned(lanes.row + r) < frame.height for r in shape.places[0]}
     columns = {c: unsigned(lanes.column + c) < frame.width for c in shape.places[1]}
-    return [rows[r] & columns[c] for r, c in shape.pixels]
+    return {(r, c): rows[r] & columns[c] for r, c in shape.pixels}
 
 
 def _put(pixels: list[tuple[Any, ...]], lanes: Lanes, shape: Shape, sums: Sums) -> None:

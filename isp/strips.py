@@ -18,7 +18,7 @@ from isp.similarity import reliability, saturation_dn, share_of_saturated
 from isp.tiles import Pattern, lane_size
 from sensor.raw import RawImage
 
-STRIP_BYTES = 400_000_000  # of all that a strip takes: one megapixel of RGBW
+STRIP_BYTES = 1_200_000_000  # of all that a strip takes: three megapixels of RGBW
 ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel for memory that isn't aligned, and refuses it packet loads
 
 Array = NDArray[Any]
@@ -32,16 +32,16 @@ class Strip:
     ----------
     pattern : Pattern
     settings : Settings
-    rows : (int, int)
-        First and past the last row to reconstruct.
+    rows, columns : (int, int)
+        First and past the last row and column to reconstruct.
     top, left : int
         Row and column of the frame where the arrays begin; may be negative.
     height, groups : int
         Rows of the arrays, and groups of packets in a row.
     part : RawImage
-        The rows of the mosaic that the arrays depend on.
-    first_row : int
-        Frame row where `part` begins.
+        The part of the mosaic that the arrays depend on.
+    first_row, first_column : int
+        Where in the frame `part` begins.
     dn : (n, w) float32
         Its digital numbers.
     judged : (n, w) float32
@@ -55,40 +55,49 @@ class Strip:
     pattern: Pattern
     settings: Settings
     rows: tuple[int, int]
+    columns: tuple[int, int]
     top: int
     left: int
     height: int
     groups: int
     part: RawImage
     first_row: int
+    first_column: int
     dn: Array
     judged: Array
     white_dn: Array | None
     alpha: Array | None
 
 
-def strip_rows(width: int, pattern: Pattern, patch: int) -> int:
-    """Rows of a strip that takes STRIP_BYTES or less, a whole number of lanes."""
+def strip_rows(shape: tuple[int, int], pattern: Pattern, patch: int) -> int:
+    """Rows of strips that take STRIP_BYTES or less, as even as whole lanes allow."""
     lane, cells = lane_size(pattern), pattern.size[0] * pattern.size[1]
     packed = cells * (2 * packet_width(lane[1], patch) + 3 * whole_packets(lane[1]))
     floats = 4 * cells + packed / pattern.size[1] + 4 * len(pattern.letters) + 8
-    return max(int(STRIP_BYTES / (4 * floats * width)) // lane[0], 1) * lane[0]
+    most, lanes = max(int(STRIP_BYTES / (4 * floats * shape[1])) // lane[0], 1), -(-shape[0] // lane[0])
+    return -(-lanes // -(-lanes // most)) * lane[0]
 
 
-def make_strip(raw: RawImage, rows: tuple[int, int], pattern: Pattern, settings: Settings) -> Strip:
+def make_strip(
+    raw: RawImage, rows: tuple[int, int], columns: tuple[int, int], pattern: Pattern, settings: Settings
+) -> Strip:
     """Lay out room for all patches: Omega and half a patch around lanes that begin up to a tile early."""
-    half, (down, across), lane = settings.patch // 2, pattern.size, lane_size(pattern)
-    around, pair = settings.reach + half, packet_rows(down)
+    half, size, lane = settings.patch // 2, pattern.size, lane_size(pattern)
+    around, pair = settings.reach + half, packet_rows(size[0])
     # Groups begin where lanes' patches around y do, whose first pixels are at the pattern's start.
-    top, left = rows[0] - (down - 1) - around, -(across - 1) - around
-    top, left = top - (top + half - pattern.start[0]) % pair, left - (left + half - pattern.start[1]) % across
-    height = -(-(rows[1] + lane[0] + around + (TOGETHER - 1) * down - top) // pair) * pair
-    groups = -(-(raw.shape[1] + lane[1] + around - left) // across) + packet_width(lane[1], settings.patch)
+    top, left = (part[0] - (step - 1) - around for part, step in zip((rows, columns), size, strict=True))
+    top, left = top - (top + half - pattern.start[0]) % pair, left - (left + half - pattern.start[1]) % size[1]
+    height = -(-(rows[1] + lane[0] + around + (TOGETHER - 1) * size[0] - top) // pair) * pair
+    groups = -(-(columns[1] + lane[1] + around - left) // size[1]) + packet_width(lane[1], settings.patch)
     # Half a patch or window for their sums, and twice a tile for tents, from a row with the phase of the frame's first.
-    margin = max(half, WINDOW // 2) + 2 * max(pattern.size)
-    last = min(top + height + margin, raw.shape[0])
-    first = max(min(top - margin, last - 2 * margin), 0) // down * down
-    part = replace(raw, dn=raw.dn[first:last])
+    margin = max(half, WINDOW // 2) + 2 * max(size)
+    ends = top + height + margin, left + groups * size[1] + margin
+    last = [min(end, length) for end, length in zip(ends, raw.shape, strict=True)]
+    first = [
+        max(min(start - margin, end - 2 * margin), 0) // step * step
+        for start, end, step in zip((top, left), last, size, strict=True)
+    ]
+    part = replace(raw, dn=raw.dn[first[0] : last[0], first[1] : last[1]])
     dn = part.dn.astype(np.float32)
     white_dn = fill(dn, raw.cfa, "W") if pattern.white is not None else None
     alpha = None
@@ -96,7 +105,8 @@ def make_strip(raw: RawImage, rows: tuple[int, int], pattern: Pattern, settings:
         full = (dn >= saturation_dn(raw)).astype(np.float32)
         alpha = share_of_saturated(fill(full, raw.cfa, "W") > 0.0, WINDOW)
     judged = judged_mosaic(_electrons(part, dn), part, settings.distance)
-    return Strip(pattern, settings, rows, top, left, height, groups, part, first, dn, judged, white_dn, alpha)
+    place = rows, columns, top, left, height, groups
+    return Strip(pattern, settings, *place, part, first[0], first[1], dn, judged, white_dn, alpha)
 
 
 def plane_groups(strip: Strip, slots: list[tuple[int, int]]) -> Array:
@@ -141,15 +151,18 @@ def _empty_groups(strip: Strip, count: int, width: int) -> Array:
 def _group(values: Array, strip: Strip, shift: int, cell: int, outside: float | None, target: Array) -> None:
     """Fill groups with a part of the frame, beyond whose border stands `outside`, or its reflection for patches."""
     half, across, (_, groups, pair, width) = strip.settings.patch // 2, strip.pattern.size[1], target.shape
-    first = strip.top + shift + cell // across - strip.first_row, strip.left + shift + cell % across
+    first = (
+        strip.top + shift + cell // across - strip.first_row,
+        strip.left + shift + cell % across - strip.first_column,
+    )
     count = strip.height, groups * across + width
     rows, columns = (_reflected(*line, half) for line in zip(first, count, values.shape, strict=True))
-    before, size = max(-first[1], 0), values.shape[1]
+    before, start = max(-first[1], 0), max(first[1], 0)
+    size = min(values.shape[1] - start, len(columns) - before)
     spread = np.empty((len(rows), len(columns)), np.float32)
-    lines = values[rows]
-    spread[:, :before] = lines[:, columns[:before]]
-    spread[:, before : before + size] = lines[:, : len(columns) - before]
-    spread[:, before + size :] = lines[:, columns[before + size :]]
+    spread[:, before : before + size] = values[rows, start : start + size]
+    for beside in (slice(before), slice(before + size, None)):
+        spread[:, beside] = values[rows[:, None], columns[beside]]
     if outside is not None:
         spread[: max(-first[0], 0)] = spread[max(len(values) - first[0], 0) :] = outside
         spread[:, :before] = spread[:, before + size :] = outside

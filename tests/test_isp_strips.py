@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+import isp.strip_sums
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.strips import strip_rows
 from isp.tiles import lane_size, number_tile
@@ -42,6 +43,28 @@ def test_the_height_of_strips_changes_no_bit(tile, sigma_s, monkeypatch):
         assert np.array_equal(strips.noise_gain, whole.noise_gain)
 
 
+@pytest.mark.parametrize("place", [(24, 90), (0, 0), (60, 199)])
+def test_laying_out_planes_around_saturated_pixels_alone_changes_no_bit(place, monkeypatch):
+    electrons = np.random.default_rng(3).poisson(300.0, (64, 200)).astype(float)
+    electrons[max(place[0] - 3, 0) : place[0] + 4, max(place[1] - 3, 0) : place[1] + 4] = 1e5
+    raw = RawImage(
+        np.minimum(electrons + 100.0, 4100.0).astype(np.uint16), RGBW, 100.0, 4100.0, 1.0, 2.0, 0.0, 0.0, 0.01
+    )
+    around, parts = isp.strip_sums._around, []
+
+    def seen(places, lane, whole):
+        parts.append((around(places, lane, whole), whole))
+        return parts[-1][0]
+
+    monkeypatch.setattr("isp.strip_sums._around", seen)
+    near = reconstruct_with_noise(raw)
+    assert any(part != whole for part, whole in parts)
+    monkeypatch.setattr("isp.strip_sums._around", lambda places, lane, whole: whole)
+    everywhere = reconstruct_with_noise(raw)
+    assert np.array_equal(near.estimate, everywhere.estimate)
+    assert np.array_equal(near.noise_gain, everywhere.noise_gain)
+
+
 def test_asking_for_the_noise_changes_no_bit_of_the_estimate():
     raw = frame(RGBW)
     assert np.array_equal(reconstruct(raw), reconstruct_with_noise(raw).estimate)
@@ -49,11 +72,24 @@ def test_asking_for_the_noise_changes_no_bit_of_the_estimate():
 
 def test_strips_are_whole_lanes_and_fewer_rows_the_wider_the_frame():
     pattern = number_tile(RGBW)
-    rows = [strip_rows(width, pattern, 5) for width in (100, 4000, 12_000, 10**9)]
-    assert all(count % lane_size(pattern)[0] == 0 for count in rows)
+    lane = lane_size(pattern)[0]
+    rows = [strip_rows((100_000, width), pattern, 5) for width in (100, 4000, 12_000, 10**9)]
+    assert all(count % lane == 0 for count in rows)
     assert rows == sorted(rows, reverse=True)
-    assert rows[-1] == lane_size(pattern)[0]
-    assert 0.8e6 < rows[1] * 4000 < 1.6e6
+    assert rows[-1] == lane
+    assert 2.4e6 < rows[1] * 4000 < 4.8e6
+
+
+def test_strips_of_a_frame_are_even():
+    """A frame a little higher than a strip isn't a strip and a rest, whose surroundings would cost as much."""
+    pattern = number_tile(RGBW)
+    lane, most = lane_size(pattern)[0], strip_rows((10**6, 4000), pattern, 5)
+    for height in (1, lane, most, most + 1, most + lane + 1, 5 * most // 2):
+        rows = strip_rows((height, 4000), pattern, 5)
+        count = -(-height // rows)
+        assert rows <= most
+        assert count == -(-height // most)
+        assert rows * count - height < lane * count
 
 
 MEASURE = """

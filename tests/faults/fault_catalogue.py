@@ -391,8 +391,8 @@ ISP = (
     _fault(
         "similarity always trusted",
         "isp/similarity.py",
-        "squared / (1.0 + squared)",
-        "np.ones_like(squared)",
+        "    result /= signal_e\n",
+        "    result[...] = 1.0\n",
         *_SIMILARITY,
     ),
     _fault(
@@ -406,7 +406,7 @@ ISP = (
     _fault(
         "distances trusted between samples that differ",
         "isp/interpolation.py",
-        "1.0 / (1.0 + interpolation_variance(mosaic, tile, patch) / NOISE_OVER_INTERPOLATION)",
+        "NOISE_OVER_INTERPOLATION / (variance + NOISE_OVER_INTERPOLATION)",
         "np.ones_like(mosaic)",
         "isp_interpolation",
         *_SIMILARITY,
