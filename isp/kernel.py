@@ -8,15 +8,14 @@ plane judges, it owns those at whose y that band is sampled. Patches of neighbou
 sums of squared differences once (`isp.window_sums`).
 
 Loading is what costs. Rows are therefore stored in groups, one at every column where patches around y may begin: each
-holds all the values that a lane reads from there on, of one row or two, to be loaded with one instruction a lane; and
-an iteration of a lane of one cell goes through two offsets, one a tile below the other, which read mostly the same
-rows.
+holds all the values that a lane reads from there on, of one row or two, to be loaded with one instruction a lane. An
+iteration goes through two offsets, one a tile below the other, which read mostly the same rows.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
-from isp.lane_shape import PACKET, Pixel, Shape, entry_length, packet_rows, packet_width, whole_packets
+from isp.lane_shape import PACKET, TOGETHER, Pixel, Shape, entry_length, packet_rows, packet_width, whole_packets
 from isp.weighted_sums import HEADROOM, add_exactly, add_quickly, at_least, start_sums
 from isp.window_sums import window_sums
 from render.jit import arrays, dr
@@ -121,7 +120,7 @@ def reconstruct_lanes(frame: Frame, lanes: Lanes, shape: Shape) -> dict[Pixel, t
         samples, *alpha = (
             _load_rows(array, own + group, rows, shape.places[1][-1] + 1, width[1], frame, shape) for array in centres
         )
-        for i in range(shape.together):
+        for i in range(TOGETHER):
             first = 1 + i * (1 + shape.noises)
             spatial = entry[first] if shape.exact else entry[first] + HEADROOM
             noise, below = entry[first + 1 : first + 1 + shape.noises], i * shape.tile[0]
@@ -145,7 +144,7 @@ def reconstruct_lanes(frame: Frame, lanes: Lanes, shape: Shape) -> dict[Pixel, t
 
 def _rows_together(rows: range, shape: Shape) -> list[int]:
     """Rows that one of the offsets of an iteration reads."""
-    return sorted({r + i * shape.tile[0] for r in rows for i in range(shape.together)})
+    return sorted({r + i * shape.tile[0] for r in rows for i in range(TOGETHER)})
 
 
 def _load_here(

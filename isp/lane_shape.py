@@ -8,9 +8,7 @@ Pixel = tuple[int, int]
 Cells = tuple[tuple[int, ...], ...]
 
 PACKET = 8  # floats loaded at once: one AVX register, and a good size for the others
-# Offsets an iteration, one tile below the other, in lanes of one cell: they share most rows that they load. Dense lanes
-# would save a seventh of their instructions too, but were slower in separate runs: presumably too many for a cache.
-TOGETHER = 2
+TOGETHER = 2  # offsets an iteration, one a tile below the other: they share most rows that they load
 
 
 @dataclass(frozen=True)
@@ -65,11 +63,6 @@ class Shape:
         return range(rows[-1] + self.patch), range(columns[-1] + self.patch)
 
     @property
-    def together(self) -> int:
-        """Offsets an iteration."""
-        return offsets_together(dense=self.dense)
-
-    @property
     def noises(self) -> int:
         """Noise distances of an offset: one a cell, or one a judge."""
         return noise_count(self.tile, dense=self.dense)
@@ -94,11 +87,6 @@ def whole_packets(count: int) -> int:
     return int(2 ** (count - 1).bit_length()) if count <= PACKET else -(-count // PACKET) * PACKET
 
 
-def offsets_together(*, dense: bool) -> int:
-    """Offsets of an entry of a list."""
-    return 1 if dense else TOGETHER
-
-
 def noise_count(tile: tuple[int, int], *, dense: bool) -> int:
     """Noise distances of one offset in a list: W's plane by cell, or the lane's own plane and W's."""
     return tile[0] * tile[1] if dense else 2
@@ -106,4 +94,4 @@ def noise_count(tile: tuple[int, int], *, dense: bool) -> int:
 
 def entry_length(tile: tuple[int, int], *, dense: bool) -> int:
     """Floats of an entry: a step in groups, then for each offset log2 of the spatial weight and noise distances."""
-    return 1 + offsets_together(dense=dense) * (1 + noise_count(tile, dense=dense))
+    return 1 + TOGETHER * (1 + noise_count(tile, dense=dense))

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.lane_shape import Cells, Judge, entry_length, noise_count, offsets_together, packet_rows, whole_packets
+from isp.lane_shape import TOGETHER, Cells, Judge, entry_length, noise_count, packet_rows, whole_packets
 from isp.planes import Plane
 from isp.settings import Settings
 from isp.similarity import noise_distance
@@ -89,7 +89,7 @@ def list_offsets(
     Returns
     -------
     entries : (list, length, whole_packets(entry_length)) float32
-        The step in groups by its bits; then for `offsets_together`, one a tile below the other, log2 G(beta_d, sigma_d)
+        The step in groups by its bits; then for TOGETHER offsets, one a tile below the other, log2 G(beta_d, sigma_d)
         of eqs. (2) and (4), NO_OFFSET beyond Omega, and the noise distances: W's plane by cell, or the plane of the
         letter at y and W's.
     counts : (list,) uint32
@@ -97,14 +97,14 @@ def list_offsets(
     """
     (down, across), reach = pattern.size, settings.reach
     noise, count = noise_by_class(tile, pattern, settings.patch, reach), noise_count(pattern.size, dense=dense)
-    lists, together = [], offsets_together(dense=dense)
+    lists = []
     for shift in np.ndindex(down, across):
         first = first_offset(pattern, *shift)
         rows, columns = (
             np.array([d for d in range(-reach, reach + 1) if d % size == first[axis]])
             for axis, size in enumerate(pattern.size)
         )
-        d = np.stack(np.meshgrid(rows[::together], columns, indexing="ij"), axis=-1).reshape(-1, 2)
+        d = np.stack(np.meshgrid(rows[::TOGETHER], columns, indexing="ij"), axis=-1).reshape(-1, 2)
         table = np.zeros((len(d), whole_packets(entry_length(pattern.size, dense=dense))), dtype=np.float32)
         lines = (d[:, 0] - first[0]) // packet_rows(down)
         steps = lines * groups + (d[:, 1] - first[1]) // across
@@ -112,7 +112,7 @@ def list_offsets(
         all_cells = down * across
         parts = [slice(all_cells)] if dense else [slice(k + all_cells, None, -all_cells) for k in range(all_cells)]
         copies = [table.copy() for _ in parts]
-        for i in range(together):
+        for i in range(TOGETHER):
             row, at = d[:, 0] + i * down, 1 + i * (1 + count)
             log_weight = -np.log2(np.e) * (row**2 + d[:, 1] ** 2) / (2.0 * settings.sigma_d**2)
             for target, part in zip(copies, parts, strict=True):
