@@ -62,7 +62,7 @@ def reconstruct(
     Notes
     -----
     Other sizes, sigmas and neighbourhoods run the kernels compiled already; another patch or size of tile compiles its
-    own. Besides the result a call takes some 400 MB at most.
+    own. Besides the result a call takes some 1.2 GB at most.
     """
     settings = Settings(neighbourhood, patch, sigma_d, sigma_s, distance)
     settings.check_reaches(raw.cfa)
