@@ -32,8 +32,8 @@ def certainty(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDArray[Any]:
 def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDArray[Any]:
     """V(x): the variance of the samples that fill a pixel, mean over the letters, summed over the patch around x.
 
-    Taken from pairs of samples on opposite sides, as good as all of them and a fifth of the work; less what noise alone
-    makes of it.
+    Taken from pairs of samples on opposite sides, as good as all of them and less work; less what noise alone makes of
+    it.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
     Returns
     -------
     (h, w) of the same type
-        V(x) [noise variances], 0 or more. Pairs that the border cuts count as equal; patches go on by reflection.
+        V(x) [noise variances], 0 or more. Pairs that the border cuts count as noise; patches go on by reflection.
     """
     total = np.zeros_like(mosaic)
     for (row, column), weight in opposite_pairs(tile).items():
