@@ -92,11 +92,13 @@ def reconstruct_with_noise(
 
 def _reconstruct(raw: RawImage, settings: Settings, *, noise: bool) -> list[NDArray[np.float32]]:
     """Estimate and, where asked for, noise gain, strip by strip."""
-    pattern, count = number_tile(raw.cfa), len(channels(raw.cfa))
-    results = [np.empty((*raw.shape, count), np.float32) for _ in range(1 + noise)]
+    pattern, height = number_tile(raw.cfa), raw.shape[0]
     step = strip_rows(raw.shape, pattern, settings.patch)
-    for first in range(0, raw.shape[0], step):
-        rows = first, min(first + step, raw.shape[0])
+    if height <= step:
+        return reconstruct_rows(raw, (0, height), pattern, settings, noise=noise)
+    results = [np.empty((*raw.shape, len(channels(raw.cfa))), np.float32) for _ in range(1 + noise)]
+    for first in range(0, height, step):
+        rows = first, min(first + step, height)
         for result, values in zip(results, reconstruct_rows(raw, rows, pattern, settings, noise=noise), strict=True):
             result[rows[0] : rows[1]] = values
     return results

@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-import isp.strip_sums
 from isp.interleaved import reconstruct, reconstruct_with_noise
+from isp.strip_sums import _around
 from isp.strips import strip_rows
 from isp.tiles import lane_size, number_tile
 from render.jit import backend
@@ -50,10 +50,10 @@ def test_laying_out_planes_around_saturated_pixels_alone_changes_no_bit(place, m
     raw = RawImage(
         np.minimum(electrons + 100.0, 4100.0).astype(np.uint16), RGBW, 100.0, 4100.0, 1.0, 2.0, 0.0, 0.0, 0.01
     )
-    around, parts = isp.strip_sums._around, []
+    parts = []
 
     def seen(places, lane, whole):
-        parts.append((around(places, lane, whole), whole))
+        parts.append((_around(places, lane, whole), whole))
         return parts[-1][0]
 
     monkeypatch.setattr("isp.strip_sums._around", seen)
