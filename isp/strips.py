@@ -102,11 +102,22 @@ def make_strip(
     white_dn = fill(dn, raw.cfa, "W") if pattern.white is not None else None
     alpha = None
     if white_dn is not None and float(white_dn.max()) >= saturation_dn(raw):
-        full = (dn >= saturation_dn(raw)).astype(np.float32)
-        alpha = share_of_saturated(fill(full, raw.cfa, "W") > 0.0, WINDOW)
+        alpha = _alpha(dn >= saturation_dn(raw), pattern.size, raw)
     judged = judged_mosaic(_electrons(part, dn), part, settings.distance)
     place = rows, columns, top, left, height, groups
     return Strip(pattern, settings, *place, part, first[0], first[1], dn, judged, white_dn, alpha)
+
+
+def _alpha(full: NDArray[np.bool_], size: tuple[int, int], raw: RawImage) -> Array:
+    """Eq. (6), computed around full samples alone: further away than the window and a tent reach it is 0."""
+    margin, box = WINDOW + 2 * max(size), []  # half a window to reach, and half to count the pixels in it
+    for axis, step in enumerate(size):
+        places = np.flatnonzero(full.any(axis=1 - axis))
+        box.append(slice(max(int(places[0]) - margin, 0) // step * step, int(places[-1]) + margin + 1))
+    near = full[box[0], box[1]].astype(np.float32)
+    alpha = np.zeros(full.shape)
+    alpha[box[0], box[1]] = share_of_saturated(fill(near, raw.cfa, "W") > 0.0, WINDOW)
+    return alpha
 
 
 def plane_groups(strip: Strip, slots: list[tuple[int, int]]) -> Array:

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
+from isp.settings import Settings
+from isp.similarity import saturated_fraction
 from isp.strip_sums import _around
-from isp.strips import strip_rows
+from isp.strips import make_strip, strip_rows
 from isp.tiles import lane_size, number_tile
 from render.jit import backend
 from sensor.cfa import BAYER, RGBW
@@ -63,6 +65,18 @@ def test_laying_out_planes_around_saturated_pixels_alone_changes_no_bit(place, m
     everywhere = reconstruct_with_noise(raw)
     assert np.array_equal(near.estimate, everywhere.estimate)
     assert np.array_equal(near.noise_gain, everywhere.noise_gain)
+
+
+@pytest.mark.parametrize("tile", [RGBW, RGBW_4X4])
+@pytest.mark.parametrize("place", [(24, 90), (0, 0), (60, 199), (31, 1)])
+def test_alpha_around_full_samples_is_alpha_of_the_frame(place, tile):
+    dn = np.full((64, 200), 500, np.uint16)
+    dn[max(place[0] - 1, 0) : place[0] + 2, max(place[1] - 1, 0) : place[1] + 2] = 4100
+    raw = RawImage(dn, tile, 100.0, 4100.0, 1.0, 2.0, 0.0, 0.0, 0.01)
+    strip = make_strip(raw, (0, 64), (0, 200), number_tile(tile), Settings(21, 5, 6.0, 3.0))
+    whole = saturated_fraction(raw)
+    assert 0.0 < whole.max() <= 1.0
+    assert np.array_equal(strip.alpha, whole)
 
 
 def test_asking_for_the_noise_changes_no_bit_of_the_estimate():
