@@ -7,12 +7,12 @@ the first call in a fresh process with an empty kernel cache, then
 - what others take: OpenCV's ``fastNlMeansDenoising`` on one 8-bit plane with the same windows (the yardstick of the
   ratios) and ``fastNlMeansDenoisingColored``, where `cv2` is installed, and scikit-image's ``denoise_nl_means`` on four
   planes;
+- the time a megapixel from 0.25 megapixels up;
 - Mpx/s and error by patch, neighbourhood and way, the best trades marked: nothing faster in the table is as accurate
-  and looks as far;
-- the time a megapixel from 0.25 megapixels up.
+  and looks as far.
 
-Times are the best of several calls, on the clock and in CPU seconds of all threads; where other programs run, trust
-the latter, and ratios of one run. Everything runs on CUDA where a device answers.
+Times are the best of several calls, on the clock and in CPU seconds of all threads; ratios are medians over pairs of
+calls in turn. Where other programs run, trust the ratios of CPU seconds. All of it runs on CUDA where a device answers.
 """
 
 import os
@@ -21,6 +21,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -56,56 +57,75 @@ def frame(mean_w_e: float, saturated_disc: float = 0.0, size: int = SIZE, height
     )
 
 
-def best(function: Callable[[], object], repeats: int = 3) -> tuple[float, float]:
-    """Shortest of several calls [s] after one that doesn't count: on the clock, and in CPU time."""
+Call = Callable[[], object]
+
+
+def timed(function: Call) -> tuple[float, float]:
+    """Seconds of one call: on the clock, and in CPU time."""
+    start = time.perf_counter(), time.process_time()
     function()
-    clock, cpu = [], []
-    for _ in range(repeats):
-        start = time.perf_counter(), time.process_time()
-        function()
-        clock.append(time.perf_counter() - start[0])
-        cpu.append(time.process_time() - start[1])
+    return time.perf_counter() - start[0], time.process_time() - start[1]
+
+
+def best(function: Call, repeats: int = 3) -> tuple[float, float]:
+    """Shortest of several calls after one that doesn't count, each kind of seconds by itself."""
+    function()
+    clock, cpu = zip(*(timed(function) for _ in range(repeats)), strict=True)
     return min(clock), min(cpu)
+
+
+def beside(name: str, function: Call, yardstick: Call | None, repeats: int = 9, size: float = 1.0) -> None:
+    """Print the shortest of several calls, and the median ratio to the yardstick's calls in turn with these.
+
+    Where other programs run, a call is twice as long as a minute before; two calls in turn meet much the same machine.
+    """
+    if yardstick is None:
+        clock, cpu = (seconds / size for seconds in best(function, repeats))
+        print(f"{name}: {clock:.3f} s, {cpu:.3f} CPU s", flush=True)
+        return
+    function()
+    yardstick()
+    pairs = np.array([(timed(function), timed(yardstick)) for _ in range(repeats)])
+    pairs[:, 0] /= size
+    (clock, cpu), ratios = pairs[:, 0].min(axis=0), pairs[:, 0] / pairs[:, 1]
+    low, median, high = np.percentile(ratios, [25, 50, 75], axis=0)
+    spread = f"(middle half {low[1]:.2f} to {high[1]:.2f})"
+    print(f"{name}: {clock:.3f} s, {cpu:.3f} CPU s; {median[0]:.2f} and {median[1]:.2f} x {spread}", flush=True)
 
 
 def first_call() -> None:
     """Time of the first calls in this process: two small frames that between them run every quick kernel."""
     # Wide enough for lanes that lie inside, and with edges of saturation.
     small, edge = frame(300.0, size=96), frame(14000.0, size=96)
-    start = time.perf_counter(), time.process_time()
-    reconstruct(small, **PATCHES)
-    reconstruct(edge, **PATCHES)
-    seconds = time.perf_counter() - start[0], time.process_time() - start[1]
-    print(f"first calls, all quick kernels compiled: {seconds[0]:.2f} s, {seconds[1]:.2f} CPU s", flush=True)
+    clock, cpu = timed(lambda: [reconstruct(raw, **PATCHES) for raw in (small, edge)])
+    print(f"first calls, all quick kernels compiled: {clock:.2f} s, {cpu:.2f} CPU s", flush=True)
 
 
-def others() -> tuple[float, float] | None:
-    """Time the other libraries; OpenCV's on one plane is returned."""
+def others() -> Call | None:
+    """Time the other libraries; OpenCV's call on one plane, the yardstick, is returned."""
     planes = np.random.default_rng(0).integers(0, 256, (SIZE, SIZE, 4), dtype=np.uint8)
-    yardstick = None
+    yardstick: Call | None = None
     if find_spec("cv2"):
         import cv2
 
         plane, colour = planes[..., 0].copy(), planes[..., :3].copy()
-        yardstick = best(lambda: cv2.fastNlMeansDenoising(plane, None, 10.0, 5, 21))
-        print_time(f"OpenCV {cv2.__version__} fastNlMeansDenoising, one plane", yardstick, yardstick)
-        coloured = best(lambda: cv2.fastNlMeansDenoisingColored(colour, None, 10.0, 10.0, 5, 21), 1)
-        print_time("OpenCV fastNlMeansDenoisingColored, three planes", coloured, yardstick)
+
+        def yardstick() -> object:
+            return cv2.fastNlMeansDenoising(plane, None, 10.0, 5, 21)
+
+        beside(f"OpenCV {cv2.__version__} fastNlMeansDenoising, one plane", yardstick, yardstick)
+        coloured = partial(cv2.fastNlMeansDenoisingColored, colour, None, 10.0, 10.0, 5, 21)
+        beside("OpenCV fastNlMeansDenoisingColored, three planes", coloured, yardstick, 3)
     else:
         print("OpenCV isn't installed (pip install opencv-python-headless): no ratios")
     four = planes.astype(np.float32) / 255.0
     settings = {"patch_size": 5, "patch_distance": 10, "h": 0.1, "fast_mode": True, "channel_axis": -1}
-    slow = best(lambda: denoise_nl_means(four, **settings), 1)
-    print_time("scikit-image denoise_nl_means, four planes together", slow, yardstick)
+    slow = partial(denoise_nl_means, four, **settings)
+    beside("scikit-image denoise_nl_means, four planes together", slow, yardstick, 3)
     return yardstick
 
 
-def print_time(name: str, seconds: tuple[float, float], yardstick: tuple[float, float] | None) -> None:
-    ratio = "" if yardstick is None else f"; {seconds[0] / yardstick[0]:.2f} and {seconds[1] / yardstick[1]:.2f} x"
-    print(f"{name}: {seconds[0]:.3f} s, {seconds[1]:.3f} CPU s{ratio}", flush=True)
-
-
-def ways(yardstick: tuple[float, float] | None) -> None:
+def ways(yardstick: Call | None) -> None:
     """Frames that take the kernel's different ways."""
     frames = {
         "one pixel a patch, the default": (frame(300.0), {"patch": PATCH, "sigma_s": SIGMA_S}),
@@ -118,9 +138,7 @@ def ways(yardstick: tuple[float, float] | None) -> None:
         "raw distance": (frame(300.0), {"distance": "raw", "sigma_s": 50.0}),
     }
     for name, (raw, settings) in frames.items():
-        print_time(
-            name, best(lambda raw=raw, settings=settings: reconstruct(raw, **{**PATCHES, **settings})), yardstick
-        )
+        beside(name, partial(reconstruct, raw, **{**PATCHES, **settings}), yardstick)
 
 
 def trades() -> None:
@@ -146,14 +164,13 @@ def trades() -> None:
         print(f"| {row[0]} | {row[1]} | {row[2]} | {numbers} | {'' if beaten else 'on the front'} |")
 
 
-def sizes(large: bool) -> None:
+def sizes(yardstick: Call | None, large: bool) -> None:
     """Time a megapixel by the size of the frame."""
     print()
     for width, height in [(512, 512), (1024, 1024), (2048, 2048), *([(6000, 4000)] if large else [])]:
         raw = frame(300.0, size=width, height=height)
-        clock, cpu = best(lambda raw=raw: reconstruct(raw, **PATCHES), 1 if width > 3000 else 3)
-        size = raw.dn.size / 1e6
-        print(f"{size:.2f} Mpx: {clock / size:.3f} s and {cpu / size:.3f} CPU s a megapixel", flush=True)
+        size, repeats = raw.dn.size / SIZE**2, 3 if width > 3000 else 9
+        beside(f"{size:.2f} x 1024 x 1024, each", partial(reconstruct, raw, **PATCHES), yardstick, repeats, size)
 
 
 def main() -> None:
@@ -161,9 +178,10 @@ def main() -> None:
     print(f"backend: {backend()}")
     with tempfile.TemporaryDirectory() as home:
         subprocess.run([sys.executable, __file__, "--first-call"], check=True, env={**os.environ, "HOME": home})
-    ways(others())
+    yardstick = others()
+    ways(yardstick)
+    sizes(yardstick, "--large" in sys.argv[1:])
     trades()
-    sizes("--large" in sys.argv[1:])
 
 
 if __name__ == "__main__":
