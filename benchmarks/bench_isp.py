@@ -109,10 +109,7 @@ def others() -> Call | None:
         import cv2
 
         plane, colour = planes[..., 0].copy(), planes[..., :3].copy()
-
-        def yardstick() -> object:
-            return cv2.fastNlMeansDenoising(plane, None, 10.0, 5, 21)
-
+        yardstick = partial(cv2.fastNlMeansDenoising, plane, None, 10.0, 5, 21)
         beside(f"OpenCV {cv2.__version__} fastNlMeansDenoising, one plane", yardstick, yardstick)
         coloured = partial(cv2.fastNlMeansDenoisingColored, colour, None, 10.0, 10.0, 5, 21)
         beside("OpenCV fastNlMeansDenoisingColored, three planes", coloured, yardstick, 3)

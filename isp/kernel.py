@@ -34,7 +34,7 @@ class Frame:
         At patches' centres, [cell, row // packet_rows, group, row % packet_rows, `whole_packets(columns)`], moved by
         the cell's place: samples, NO_SAMPLE outside the frame; alpha, or None.
     decay : Float
-        log2(e) r(x) / (2 sigma_s^2) at patches' centres, for the first cell alone.
+        `isp.strips.decay` at patches' centres: the factor on beta_s^2; for the first cell alone.
     entries : Float
         Lists of offsets, [list, entry, `whole_packets(entry_length)`].
     counts : UInt

@@ -141,7 +141,7 @@ def centre_groups(values: Array, strip: Strip, cells: list[int], outside: float 
 
 
 def decay(strip: Strip) -> Array:
-    """log2(e) r(x) / (2 sigma_s^2) of each pixel of the strip's part of the mosaic."""
+    """log2(e) r(x) c(x) / (2 sigma_s^2) at each pixel of the strip's part: `reliability` times `certainty`."""
     factor = np.float32(np.log2(np.e) / (2.0 * strip.settings.sigma_s**2))
     if strip.settings.distance == "raw":
         return np.full(strip.dn.shape, factor)

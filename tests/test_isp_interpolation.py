@@ -11,7 +11,7 @@ from isp.planes import fill, tent_weights
 from sensor.cfa import MOSAICS, channels
 from sensor.raw import RawImage
 
-RGBW, BAYER = MOSAICS["rgbw"], MOSAICS["bayer"]
+RGBW = MOSAICS["rgbw"]
 TILES = list(MOSAICS.values())
 
 
@@ -48,7 +48,7 @@ def test_pairs_of_the_papers_tile():
 @pytest.mark.parametrize("step", [3.0, 40.0])
 @pytest.mark.parametrize("column", [8, 9])
 def test_a_step_in_closed_form(column, step):
-    """One column on either side: three of the four kinds of pairs differ by the step (RGBW: all at any phase)."""
+    """One column on either side: of the four kinds of pairs all but those along a column differ by the step."""
     mosaic = np.where(np.arange(18) < column, 20.0, 20.0 + step) * np.ones((16, 18))
     share = 1 / 4 + 1 / 8 + 1 / 8  # along the row, and both diagonals
     expected = np.zeros(18)
