@@ -27,8 +27,17 @@ def saturated_fraction(raw: RawImage, window: int = WINDOW) -> Plane:
     """
     if "W" not in "".join(raw.cfa):
         return np.ones(raw.shape)
-    full = (raw.dn >= saturation_dn(raw)).astype(np.float32)
-    return share_of_saturated(fill(full, raw.cfa, "W") > 0.0, window)
+    full, alpha, box = raw.dn >= saturation_dn(raw), np.zeros(raw.shape), []
+    if not full.any():
+        return alpha
+    # Around full samples alone: half a window and a tent to reach, and half a window to count the pixels in it.
+    margin = window + 2 * max(len(raw.cfa), len(raw.cfa[0]))
+    for axis, step in enumerate((len(raw.cfa), len(raw.cfa[0]))):
+        places = np.flatnonzero(full.any(axis=1 - axis))
+        box.append(slice(max(int(places[0]) - margin, 0) // step * step, int(places[-1]) + margin + 1))
+    near = full[box[0], box[1]].astype(np.float32)
+    alpha[box[0], box[1]] = share_of_saturated(fill(near, raw.cfa, "W") > 0.0, window)
+    return alpha
 
 
 def share_of_saturated(saturated: NDArray[np.bool_], window: int) -> Plane:

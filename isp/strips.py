@@ -14,7 +14,7 @@ from isp.interpolation import certainty
 from isp.lane_shape import TOGETHER, packet_rows, packet_width, whole_packets
 from isp.planes import fill, judged_mosaic
 from isp.settings import WINDOW, Settings
-from isp.similarity import reliability, saturation_dn, share_of_saturated
+from isp.similarity import reliability, saturated_fraction, saturation_dn
 from isp.tiles import Pattern, lane_size
 from sensor.raw import RawImage
 
@@ -102,22 +102,10 @@ def make_strip(
     white_dn = fill(dn, raw.cfa, "W") if pattern.white is not None else None
     alpha = None
     if white_dn is not None and float(white_dn.max()) >= saturation_dn(raw):
-        alpha = _alpha(dn >= saturation_dn(raw), pattern.size, raw)
+        alpha = saturated_fraction(part)
     judged = judged_mosaic(_electrons(part, dn), part, settings.distance)
     place = rows, columns, top, left, height, groups
     return Strip(pattern, settings, *place, part, first[0], first[1], dn, judged, white_dn, alpha)
-
-
-def _alpha(full: NDArray[np.bool_], size: tuple[int, int], raw: RawImage) -> Array:
-    """Eq. (6), computed around full samples alone: further away than the window and a tent reach it is 0."""
-    margin, box = WINDOW + 2 * max(size), []  # half a window to reach, and half to count the pixels in it
-    for axis, step in enumerate(size):
-        places = np.flatnonzero(full.any(axis=1 - axis))
-        box.append(slice(max(int(places[0]) - margin, 0) // step * step, int(places[-1]) + margin + 1))
-    near = full[box[0], box[1]].astype(np.float32)
-    alpha = np.zeros(full.shape)
-    alpha[box[0], box[1]] = share_of_saturated(fill(near, raw.cfa, "W") > 0.0, WINDOW)
-    return alpha
 
 
 def plane_groups(strip: Strip, slots: list[tuple[int, int]]) -> Array:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
-from isp.settings import Settings
-from isp.similarity import saturated_fraction
+from isp.planes import fill
+from isp.settings import WINDOW, Settings
+from isp.similarity import saturated_fraction, share_of_saturated
 from isp.strip_sums import _around
 from isp.strips import make_strip, strip_rows
 from isp.tiles import lane_size, number_tile
@@ -74,9 +75,10 @@ def test_alpha_around_full_samples_is_alpha_of_the_frame(place, tile):
     dn[max(place[0] - 1, 0) : place[0] + 2, max(place[1] - 1, 0) : place[1] + 2] = 4100
     raw = RawImage(dn, tile, 100.0, 4100.0, 1.0, 2.0, 0.0, 0.0, 0.01)
     strip = make_strip(raw, (0, 64), (0, 200), number_tile(tile), Settings(21, 5, 6.0, 3.0))
-    whole = saturated_fraction(raw)
+    whole = share_of_saturated(fill((dn == 4100).astype(np.float32), tile, "W") > 0.0, WINDOW)
     assert 0.0 < whole.max() <= 1.0
     assert np.array_equal(strip.alpha, whole)
+    assert np.array_equal(saturated_fraction(raw), whole)
 
 
 def test_asking_for_the_noise_changes_no_bit_of_the_estimate():
