@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.planes import Plane, box_sums, tent_weights
+from isp.planes import BLOCK_ROWS, Plane, box_sums, tent_weights
 from sensor.cfa import Tile
 
 NOISE_OVER_INTERPOLATION = 9.0  # best of 4.5, 9 and 18: so sigma_s = 3 and V add as variances, sigma_s^2 + V
@@ -25,8 +25,9 @@ def certainty(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDArray[Any]:
     (h, w) of the same type
         0 to 1; 1 where planes aren't interpolated between different samples.
     """
-    variance = interpolation_variance(mosaic, tile, patch)
-    return np.asarray(NOISE_OVER_INTERPOLATION / (variance + NOISE_OVER_INTERPOLATION))
+    result = interpolation_variance(mosaic, tile, patch)
+    result += NOISE_OVER_INTERPOLATION
+    return np.asarray(np.divide(NOISE_OVER_INTERPOLATION, result, out=result))
 
 
 def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDArray[Any]:
@@ -48,19 +49,20 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
     (h, w) of the same type
         V(x) [noise variances], 0 or more. Pairs that the border cuts count as noise; patches go on by reflection.
     """
-    total = np.zeros_like(mosaic)
+    total, (height, width) = np.zeros_like(mosaic), mosaic.shape
+    phases = np.arange(BLOCK_ROWS + len(tile))[:, None] % len(tile), np.arange(width) % len(tile[0])
     for (row, column), weight in opposite_pairs(tile).items():
-        across, (height, width) = abs(column), mosaic.shape
-        if min(height - 2 * row, width - 2 * across) <= 0:
-            continue
-        left, right = slice(None, width - 2 * across), slice(2 * across, None)
+        across, shares = abs(column), (weight / 4.0).astype(mosaic.dtype)[phases]  # of half the change, squared
+        left, right = slice(None, max(width - 2 * across, 0)), slice(2 * across, None)
         before, behind = (left, right) if column >= 0 else (right, left)
-        change = mosaic[2 * row :, behind] - mosaic[: height - 2 * row, before]
-        change *= change
-        change -= 2.0  # the noise of both, of unit variance
-        inside = slice(row, height - row), slice(across, width - across)
-        change *= _by_phase((weight / 4.0).astype(mosaic.dtype), inside)  # of half the change, squared
-        total[inside] += change
+        for first in range(row, height - row, BLOCK_ROWS):
+            last = min(first + BLOCK_ROWS, height - row)
+            change = mosaic[first + row : last + row, behind] - mosaic[first - row : last - row, before]
+            change *= change
+            change -= 2.0  # the noise of both, of unit variance
+            own, inside = first % len(tile), slice(across, max(width - across, across))
+            change *= shares[own : own + last - first, inside]
+            total[first:last, inside] += change
     if patch > 1:
         total = box_sums(np.pad(total, patch // 2, mode="reflect"), (patch, patch))
     return np.asarray(np.maximum(total, 0.0, out=total))
@@ -89,11 +91,3 @@ def opposite_pairs(tile: Tile) -> dict[tuple[int, int], Plane]:
                 at = share[:, :, row + radius, column + radius]
                 pairs[row, column] = pairs[row, column] + at if (row, column) in pairs else at
     return pairs
-
-
-def _by_phase(weight: NDArray[Any], inside: tuple[slice, slice]) -> NDArray[Any]:
-    """Weight at each pixel of a part of the frame; one number where all phases have the same."""
-    if (weight == weight[0, 0]).all():
-        return np.asarray(weight[0, 0])
-    rows, columns = (np.arange(part.start, part.stop) % size for part, size in zip(inside, weight.shape, strict=True))
-    return np.asarray(weight[np.ix_(rows, columns)])

@@ -4,6 +4,7 @@ Planes are filled by normalised convolution (Knutsson & Westin 1993) of the samp
 flat up to the border. They serve only to judge similarity: what is averaged are the samples themselves.
 """
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ Plane = NDArray[np.float64]
 
 # Under it PRNU adds less than 1 % to shot noise up to a million electrons, and ln(1 + p) runs out of digits.
 LEAST_PRNU = 1e-4
+
+BLOCK_ROWS = 128  # rows that go through several sums together, for what lies between to stay in the cache
 
 
 def stabilise(electrons: NDArray[Any], dark_noise_e: float, prnu: float) -> NDArray[Any]:
@@ -55,6 +58,7 @@ def tent(radius: int) -> Plane:
     return radius + 1.0 - np.abs(np.arange(-radius, radius + 1))
 
 
+@lru_cache(maxsize=64)
 def tent_radius(tile: Tile, letter: str) -> int:
     """Smallest radius of a tent that reaches a sample of `letter` from every phase of an endless mosaic."""
     sampled = np.array([list(row) for row in tile]) == letter
@@ -100,41 +104,42 @@ def fill(values: NDArray[Any], tile: Tile, letter: str) -> NDArray[Any]:
         Where the frame's edge cuts off every sample within the tent's radius, the next radius that reaches one serves.
         The sums run in one order at every pixel: a part of the frame gives the same bits.
     """
-    radius = tent_radius(tile, letter)
-    total, weight = _tent_sums(values, tile, letter, radius)
-    while not np.all(weight):
-        radius += 1
-        more, more_weight = _tent_sums(values, tile, letter, radius)
-        total, weight = np.where(weight > 0.0, total, more), np.where(weight > 0.0, weight, more_weight)
-    total /= weight
-    return total
-
-
-def _tent_sums(values: NDArray[Any], tile: Tile, letter: str, radius: int) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Sums of tent times sample, and of the tent, over the samples in the frame; a sampled site is its own sum."""
-    padded, size = np.pad(values, radius), (len(tile), len(tile[0]))
-    inside = [np.pad(np.ones(length, values.dtype), radius) for length in values.shape]
-    total, weight = np.empty_like(values), np.empty_like(values)
-    for phase in np.ndindex(*size):
-        at = slice(phase[0], None, size[0]), slice(phase[1], None, size[1])
+    result, down, across = np.empty_like(values), len(tile), len(tile[0])
+    for phase in np.ndindex(down, across):
+        at, radius = (slice(phase[0], None, down), slice(phase[1], None, across)), tent_radius(tile, letter)
         if tile[phase[0]][phase[1]] == letter:
-            total[at], weight[at] = values[at], 1.0
+            result[at] = values[at]
             continue
-        # Row and column of the first pixel of this phase, moved by each step of the tent.
-        lines = [
-            [slice(first + step, length + step, pace) for step in range(2 * radius + 1)]
-            for first, length, pace in zip(phase, values.shape, size, strict=True)
-        ]
-        tents = _phase_tent(tile, letter, phase, radius).astype(values.dtype)
-        total[at] = sum(tents[i, j] * padded[lines[0][i], lines[1][j]] for i, j in np.argwhere(tents))
-        rows, columns = (
-            np.stack([line[place] for place in places]) for line, places in zip(inside, lines, strict=True)
-        )
-        # Small whole numbers: exact. Outer products, for a product of matrices would keep its threads spinning.
-        weight[at] = sum(np.outer(row, line @ columns) for row, line in zip(rows, tents, strict=True) if line.any())
+        total, weight = _tent_sums(values, tile, letter, phase, radius)
+        while not np.all(weight):
+            radius += 1
+            more, more_weight = _tent_sums(values, tile, letter, phase, radius)
+            total, weight = np.where(weight > 0.0, total, more), np.where(weight > 0.0, weight, more_weight)
+        np.divide(total, weight, out=result[at])
+    return result
+
+
+def _tent_sums(
+    values: NDArray[Any], tile: Tile, letter: str, phase: tuple[int, ...], radius: int
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Sums of tent times sample, and of the tent, over the samples in the frame, for the pixels at one phase."""
+    size, tents = (len(tile), len(tile[0])), _phase_tent(tile, letter, phase, radius).astype(values.dtype)
+    counts = [len(range(first, length, pace)) for first, length, pace in zip(phase, values.shape, size, strict=True)]
+    total, weight = np.zeros(counts, values.dtype), np.zeros(counts, values.dtype)
+    for i, j in np.argwhere(tents).tolist():
+        # Pixels whose sample at this step of the tent lies in the frame, and these samples.
+        own, seen = [], []
+        for start, length, pace, count in zip((phase[0] + i, phase[1] + j), values.shape, size, counts, strict=True):
+            low = max(-((start - radius) // pace), 0)
+            high = max(min(-((start - radius - length) // pace), count), low)
+            own.append(slice(low, high))
+            seen.append(slice(start - radius + low * pace, start - radius + high * pace, pace))
+        total[tuple(own)] += tents[i, j] * values[tuple(seen)]
+        weight[tuple(own)] += tents[i, j]
     return total, weight
 
 
+@lru_cache(maxsize=256)
 def _phase_tent(tile: Tile, letter: str, phase: tuple[int, ...], radius: int) -> Plane:
     """Tent around a pixel of some phase of the tile, 0 where there is no sample of the letter."""
     size = 2 * radius + 1
@@ -147,9 +152,12 @@ def _phase_tent(tile: Tile, letter: str, phase: tuple[int, ...], radius: int) ->
 
 def box_sums(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
     """Sum of each box of `size` that lies in the array, added up in one order everywhere: pairs, fours, eights."""
-    for axis, count in enumerate(size):
-        values = _line_sums(values.swapaxes(0, axis), count).swapaxes(0, axis)
-    return values
+    height, width = (length - count + 1 for length, count in zip(values.shape, size, strict=True))
+    result = np.empty((height, width), values.dtype)
+    for first in range(0, height, BLOCK_ROWS):
+        lines = _line_sums(values[first : first + BLOCK_ROWS + size[0] - 1], size[0])
+        result[first : first + BLOCK_ROWS] = _line_sums(lines.T, size[1]).T
+    return result
 
 
 def _line_sums(values: NDArray[Any], count: int) -> NDArray[Any]:
