@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from isp.reference import reference_with_noise
 from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Distance, Reconstruction, Settings
-from isp.strip_sums import reconstruct_rows
+from isp.strip_sums import Started, end_rows, start_rows
 from isp.strips import strip_rows
 from isp.tiles import number_tile
-from render.jit import backend
+from render.jit import arrays, backend, dr
 from sensor.cfa import channels
 from sensor.raw import RawImage
 
@@ -92,13 +92,14 @@ def reconstruct_with_noise(
 
 def _reconstruct(raw: RawImage, settings: Settings, *, noise: bool) -> list[NDArray[np.float32]]:
     """Estimate and, where asked for, noise gain, strip by strip."""
-    pattern, height = number_tile(raw.cfa), raw.shape[0]
-    step = strip_rows(raw.shape, pattern, settings.patch)
-    if height <= step:
-        return reconstruct_rows(raw, (0, height), pattern, settings, noise=noise)
-    results = [np.empty((*raw.shape, len(channels(raw.cfa))), np.float32) for _ in range(1 + noise)]
+    pattern, jit, height = number_tile(raw.cfa), arrays(), raw.shape[0]
+    step, started = strip_rows(raw.shape, pattern, settings.patch), list[Started]()
+    shape = (*raw.shape, len(channels(raw.cfa)))
+    results = [dr.empty(jit.Float, int(np.prod(shape))) for _ in range(1 + noise)]
     for first in range(0, height, step):
         rows = first, min(first + step, height)
-        for result, values in zip(results, reconstruct_rows(raw, rows, pattern, settings, noise=noise), strict=True):
-            result[rows[0] : rows[1]] = values
-    return results
+        started.append(start_rows(raw, rows, pattern, settings, noise=noise))
+        if len(started) > 1:
+            end_rows(started.pop(0), raw, pattern, results)
+    end_rows(started.pop(), raw, pattern, results)
+    return [values.numpy().reshape(shape) for values in results]

@@ -9,16 +9,19 @@ sums of squared differences once (`isp.window_sums`).
 
 Loading is what costs. Rows are therefore stored in groups, one at every column where patches around y may begin: each
 holds all the values that a lane reads from there on, of one row or two, to be loaded with one instruction a lane. An
-iteration goes through two offsets, one a tile below the other, which read mostly the same rows.
+iteration of a lane that isn't dense goes through two offsets, one a tile below the other: they read mostly the same
+rows.
 """
 
 from dataclasses import dataclass
 from typing import Any
 
-from isp.lane_shape import PACKET, TOGETHER, Pixel, Shape, entry_length, packet_rows, packet_width, whole_packets
+from isp.lane_shape import PACKET, Pixel, Shape, entry_length, packet_rows, whole_packets
 from isp.weighted_sums import HEADROOM, add_exactly, add_quickly, at_least, start_sums
 from isp.window_sums import window_sums
 from render.jit import arrays, dr
+
+ROOT_SCALE = 2.0**-32  # the product of two scaled distances is finite, whatever they are, and under 1e-19 no number
 
 
 @dataclass(frozen=True)
@@ -27,12 +30,12 @@ class Frame:
 
     Attributes
     ----------
-    h : Float
-        Planes, [slot, row // packet_rows, group, row % packet_rows, `packet_width`]: W's plane for dense lanes; for
-        the others a slot for the band sampled at each cell, then W's plane for each cell, moved by the cell's place.
+    h : list of Float
+        Planes, [slot, row // packet_rows, group, row % packet_rows, width], for each of `row_parts`: W's one for dense
+        lanes; for the others a slot for the band sampled at each cell, then W's for each, moved by the cell's place.
     samples, alpha : Float
         At patches' centres, [cell, row // packet_rows, group, row % packet_rows, `whole_packets(columns)`], moved by
-        the cell's place: samples, NO_SAMPLE outside the frame; alpha, or None.
+        the cell's place: samples and alpha, 0 outside the frame; alpha may be None.
     decay : Float
         `isp.strips.decay` at patches' centres: the factor on beta_s^2; for the first cell alone.
     entries : Float
@@ -43,7 +46,7 @@ class Frame:
         Entries a list has room for; size of the whole frame; groups of a plane, and of a row.
     """
 
-    h: Any
+    h: list[Any]
     samples: Any
     alpha: Any
     decay: Any
@@ -100,27 +103,26 @@ def reconstruct_lanes(frame: Frame, lanes: Lanes, shape: Shape) -> dict[Pixel, t
     jit, count, pixels = arrays(), dr.width(lanes.row), sorted(shape.pixels)
     own = lanes.cell * frame.plane_groups
     slots = [own, own + shape.tile[0] * shape.tile[1] * frame.plane_groups][: shape.judges]
-    width = packet_width(shape.columns, shape.patch), whole_packets(shape.columns)
-    place = lanes.window_row, lanes.window_column
-    here = [_load_here(frame.h, slot, place, width[0], *shape.window, frame, shape) for slot in slots]
+    place, width = (lanes.window_row, lanes.window_column), whole_packets(shape.columns)
+    here = [_planes_here(slot, place, frame, shape) for slot in slots]
     place = place[0] + lanes.cell // shape.tile[1], place[1] + lanes.cell % shape.tile[1]
-    decay = _load_here(frame.decay, jit.UInt(0), place, width[1], *shape.places, frame, shape)
+    decay = _load_here(frame.decay, jit.UInt(0), place, width, *shape.places, frame, shape)
     first_entry, entries = lanes.list * frame.length, dr.gather(jit.UInt, frame.counts, lanes.list)
-    length, add = entry_length(shape.tile, dense=shape.dense), add_exactly if shape.exact else add_quickly
+    length, add = (
+        entry_length(shape.tile, shape.together, dense=shape.dense),
+        add_exactly if shape.exact else add_quickly,
+    )
 
     def add_offsets(k: Any, sums: list[tuple[Any, ...]]) -> tuple[Any, list[tuple[Any, ...]]]:
         entry = _load(frame.entries, first_entry + k, whole_packets(length), 0, length)
         group = lanes.group + dr.reinterpret_array(jit.UInt, entry[0])
-        rows = _rows_together(shape.window[0], shape)
-        there = [
-            _load_rows(frame.h, slot + group, rows, len(shape.window[1]), width[0], frame, shape) for slot in slots
-        ]
+        there = [_planes_there(slot + group, frame, shape) for slot in slots]
         centres = [frame.samples] + [frame.alpha] * (shape.judges == 2)
         rows = _rows_together(shape.places[0], shape)
         samples, *alpha = (
-            _load_rows(array, own + group, rows, shape.places[1][-1] + 1, width[1], frame, shape) for array in centres
+            _load_rows(array, own + group, rows, shape.places[1][-1] + 1, width, frame, shape) for array in centres
         )
-        for i in range(TOGETHER):
+        for i in range(shape.together):
             first = 1 + i * (1 + shape.noises)
             spatial = entry[first] if shape.exact else entry[first] + HEADROOM
             noise, below = entry[first + 1 : first + 1 + shape.noises], i * shape.tile[0]
@@ -144,7 +146,25 @@ def reconstruct_lanes(frame: Frame, lanes: Lanes, shape: Shape) -> dict[Pixel, t
 
 def _rows_together(rows: range, shape: Shape) -> list[int]:
     """Rows that one of the offsets of an iteration reads."""
-    return sorted({r + i * shape.tile[0] for r in rows for i in range(TOGETHER)})
+    return sorted({r + i * shape.tile[0] for r in rows for i in range(shape.together)})
+
+
+def _planes_here(slot: Any, place: tuple[Any, Any], frame: Frame, shape: Shape) -> dict[Pixel, Any]:
+    """Values of a plane under the patches around x, part by part of a row."""
+    values = {}
+    for source, (first, width, count) in zip(frame.h, shape.row_parts, strict=False):
+        part = _load_here(source, slot, place, width, shape.window[0], range(count), frame, shape)
+        values.update({(i, first + j): value for (i, j), value in part.items()})
+    return values
+
+
+def _planes_there(group: Any, frame: Frame, shape: Shape) -> dict[int, list[Any]]:
+    """Values of a plane under the patches around y, row by row."""
+    rows, values = _rows_together(shape.window[0], shape), dict[int, list[Any]]()
+    for source, (_, width, count) in zip(frame.h, shape.row_parts, strict=False):
+        for i, part in _load_rows(source, group, rows, count, width, frame, shape).items():
+            values[i] = values.get(i, []) + part
+    return values
 
 
 def _load_here(
@@ -214,10 +234,11 @@ def _distances(
 
 
 def _beta_squared(distances: list[Any], alpha: list[Any]) -> Any:
-    """Square of eq. (5), expanded: exactly one distance where alpha is 0 or 1."""
+    """Square of eq. (5), expanded: exactly one distance where alpha is 0 or 1. One root serves for both."""
     if len(distances) == 1:
         return distances[0]
     (band, white), (share,) = distances, alpha
     rest = 1.0 - share
-    cross = 2.0 * share * rest * dr.sqrt(band) * dr.sqrt(white)
+    root = dr.sqrt(band * ROOT_SCALE * (white * ROOT_SCALE))
+    cross = share * rest * (2.0 / ROOT_SCALE) * root
     return dr.fma(dr.square(share), band, dr.fma(dr.square(rest), white, cross))

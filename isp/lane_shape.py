@@ -8,7 +8,7 @@ Pixel = tuple[int, int]
 Cells = tuple[tuple[int, ...], ...]
 
 PACKET = 8  # floats loaded at once: one AVX register, and a good size for the others
-TOGETHER = 2  # offsets an iteration, one a tile below the other: they share most rows that they load
+MOST_TOGETHER = 2
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,17 @@ class Shape:
         return range(rows[-1] + self.patch), range(columns[-1] + self.patch)
 
     @property
+    def together(self) -> int:
+        """Offsets of an iteration."""
+        return offsets_together(dense=self.dense)
+
+    @property
+    def row_parts(self) -> list[tuple[int, int, int]]:
+        """First value, width and values needed of the packets in which it reads a row of its window."""
+        count, parts = len(self.window[1]), row_parts(self.columns, self.patch, self.tile[1])
+        return [(first, width, min(count - first, PACKET)) for first, width in parts if first < count]
+
+    @property
     def noises(self) -> int:
         """Noise distances of an offset: one a cell, or one a judge."""
         return noise_count(self.tile, dense=self.dense)
@@ -77,9 +88,16 @@ def packet_rows(down: int) -> int:
     return 2 if down % 2 == 0 else 1
 
 
-def packet_width(columns: int, patch: int) -> int:
-    """Values that a lane reads of a row, rounded up to what packets make."""
-    return whole_packets(columns + patch - 1)
+def row_parts(columns: int, patch: int, across: int) -> list[tuple[int, int]]:
+    """Packets in which a lane reads a row under its patches: the first value of each and its width.
+
+    Each has room for the columns of a tile, by which one group of packets follows another.
+    """
+    count = columns + patch - 1
+    return [
+        (first, max(whole_packets(min(count - first, PACKET)), whole_packets(across)))
+        for first in range(0, count, PACKET)
+    ]
 
 
 def whole_packets(count: int) -> int:
@@ -87,11 +105,19 @@ def whole_packets(count: int) -> int:
     return int(2 ** (count - 1).bit_length()) if count <= PACKET else -(-count // PACKET) * PACKET
 
 
+def offsets_together(*, dense: bool) -> int:
+    """Offsets an iteration, one a tile below the other: they share most rows that they load.
+
+    Two are too much code for dense lanes: a processor decodes it anew each time (docs/decisions/0026).
+    """
+    return 1 if dense else MOST_TOGETHER
+
+
 def noise_count(tile: tuple[int, int], *, dense: bool) -> int:
     """Noise distances of one offset in a list: W's plane by cell, or the lane's own plane and W's."""
     return tile[0] * tile[1] if dense else 2
 
 
-def entry_length(tile: tuple[int, int], *, dense: bool) -> int:
+def entry_length(tile: tuple[int, int], together: int, *, dense: bool) -> int:
     """Floats of an entry: a step in groups, then for each offset log2 of the spatial weight and noise distances."""
-    return 1 + TOGETHER * (1 + noise_count(tile, dense=dense))
+    return 1 + together * (1 + noise_count(tile, dense=dense))

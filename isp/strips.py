@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.interpolation import certainty
-from isp.lane_shape import TOGETHER, packet_rows, packet_width, whole_packets
+from isp.lane_shape import MOST_TOGETHER, packet_rows, row_parts, whole_packets
 from isp.planes import fill, judged_mosaic
 from isp.settings import WINDOW, Settings
-from isp.similarity import reliability, saturated_fraction, saturation_dn
+from isp.similarity import reliability, saturated_fraction
 from isp.tiles import Pattern, lane_size
+from render.jit import arrays
 from sensor.raw import RawImage
 
-STRIP_BYTES = 1_200_000_000  # of all that a strip takes: three megapixels of RGBW
+STRIP_BYTES = 600_000_000  # of all that a strip takes: one and a half megapixels of RGBW
 ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel for memory that isn't aligned, and refuses it packet loads
+FAR = 1e13  # h_i where y lies outside the frame: ten thousand times as far as a billion electrons
+LEAST_DECAY = np.float32(2e-24)  # times FAR^2 2^-200; times 25 squares of a billion electrons 2^-0.00005
 
 Array = NDArray[Any]
 
@@ -46,8 +49,6 @@ class Strip:
         Its digital numbers.
     judged : (n, w) float32
         Its mosaic as patches are read from it (`isp.planes.judged_mosaic`).
-    white_dn : (n, w) float32 or None
-        W's plane of them; None without W.
     alpha : (n, w) float64 or None
         Eq. (6); None where it is 0 everywhere, or without W.
     """
@@ -65,14 +66,14 @@ class Strip:
     first_column: int
     dn: Array
     judged: Array
-    white_dn: Array | None
     alpha: Array | None
 
 
 def strip_rows(shape: tuple[int, int], pattern: Pattern, patch: int) -> int:
     """Rows of strips that take STRIP_BYTES or less, as even as whole lanes allow."""
     lane, cells = lane_size(pattern), pattern.size[0] * pattern.size[1]
-    packed = cells * (2 * packet_width(lane[1], patch) + 3 * whole_packets(lane[1]))
+    planes = sum(width for _, width in row_parts(lane[1], patch, pattern.size[1]))
+    packed = cells * (2 * planes + 3 * whole_packets(lane[1]))
     floats = 4 * cells + packed / pattern.size[1] + 4 * len(pattern.letters) + 8
     most, lanes = max(int(STRIP_BYTES / (4 * floats * shape[1])) // lane[0], 1), -(-shape[0] // lane[0])
     return -(-lanes // -(-lanes // most)) * lane[0]
@@ -82,60 +83,107 @@ def make_strip(
     raw: RawImage, rows: tuple[int, int], columns: tuple[int, int], pattern: Pattern, settings: Settings
 ) -> Strip:
     """Lay out room for all patches: Omega and half a patch around lanes that begin up to a tile early."""
+    place, first, last = _room(raw.shape, rows, columns, pattern, settings)
+    part = replace(raw, dn=raw.dn[first[0] : last[0], first[1] : last[1]])
+    dn = part.dn.astype(np.float32)
+    alpha = saturated_fraction(part) if pattern.white is not None else None
+    if alpha is not None and not alpha.any():
+        alpha = None
+    judged = judged_mosaic(_electrons(part, dn), part, settings.distance)
+    return Strip(pattern, settings, rows, columns, *place, part, *first, dn, judged, alpha)
+
+
+def crop(strip: Strip, shape: tuple[int, int], rows: tuple[int, int], columns: tuple[int, int]) -> Strip:
+    """Room for fewer rows and columns of a frame of some shape, with what the strip holds already."""
+    (top, left, height, groups), first, last = _room(shape, rows, columns, strip.pattern, strip.settings)
+    at = tuple(
+        slice(start - whole, end - whole)
+        for start, end, whole in zip(first, last, (strip.first_row, strip.first_column), strict=True)
+    )
+    return replace(
+        strip,
+        rows=rows,
+        columns=columns,
+        top=top,
+        left=left,
+        height=height,
+        groups=groups,
+        part=replace(strip.part, dn=strip.part.dn[at]),
+        first_row=first[0],
+        first_column=first[1],
+        dn=strip.dn[at],
+        judged=strip.judged[at],
+        alpha=None if strip.alpha is None else strip.alpha[at],
+    )
+
+
+def part_of(values: Array, strip: Strip, part: Strip) -> Array:
+    """Of values at each pixel of a strip's part of the mosaic those that belong to a crop of it."""
+    row, column = part.first_row - strip.first_row, part.first_column - strip.first_column
+    return values[row : row + part.dn.shape[0], column : column + part.dn.shape[1]]
+
+
+def _room(
+    shape: tuple[int, int], rows: tuple[int, int], columns: tuple[int, int], pattern: Pattern, settings: Settings
+) -> tuple[tuple[int, int, int, int], tuple[int, int], tuple[int, int]]:
+    """First row and column, rows and groups of a strip's arrays; where its part of the mosaic begins and ends."""
     half, size, lane = settings.patch // 2, pattern.size, lane_size(pattern)
     around, pair = settings.reach + half, packet_rows(size[0])
     # Groups begin where lanes' patches around y do, whose first pixels are at the pattern's start.
     top, left = (part[0] - (step - 1) - around for part, step in zip((rows, columns), size, strict=True))
     top, left = top - (top + half - pattern.start[0]) % pair, left - (left + half - pattern.start[1]) % size[1]
-    height = -(-(rows[1] + lane[0] + around + (TOGETHER - 1) * size[0] - top) // pair) * pair
-    groups = -(-(columns[1] + lane[1] + around - left) // size[1]) + packet_width(lane[1], settings.patch)
+    height = -(-(rows[1] + lane[0] + around + (MOST_TOGETHER - 1) * size[0] - top) // pair) * pair
+    groups = -(-(columns[1] + lane[1] + around - left) // size[1]) + lane[1] + settings.patch
     # Half a patch or window for their sums, and twice a tile for tents, from a row with the phase of the frame's first.
     margin = max(half, WINDOW // 2) + 2 * max(size)
-    ends = top + height + margin, left + groups * size[1] + margin
-    last = [min(end, length) for end, length in zip(ends, raw.shape, strict=True)]
-    first = [
+    last = min(top + height + margin, shape[0]), min(left + groups * size[1] + margin, shape[1])
+    row, column = (
         max(min(start - margin, end - 2 * margin), 0) // step * step
         for start, end, step in zip((top, left), last, size, strict=True)
-    ]
-    part = replace(raw, dn=raw.dn[first[0] : last[0], first[1] : last[1]])
-    dn = part.dn.astype(np.float32)
-    white_dn = fill(dn, raw.cfa, "W") if pattern.white is not None else None
-    alpha = None
-    if white_dn is not None and float(white_dn.max()) >= saturation_dn(raw):
-        alpha = saturated_fraction(part)
-    judged = judged_mosaic(_electrons(part, dn), part, settings.distance)
-    place = rows, columns, top, left, height, groups
-    return Strip(pattern, settings, *place, part, first[0], first[1], dn, judged, white_dn, alpha)
+    )
+    return (top, left, height, groups), (row, column), last
 
 
-def plane_groups(strip: Strip, slots: list[tuple[int, int]]) -> Array:
-    """Planes h_i for `isp.kernel.Frame.h`: a letter's number and the cell at which groups begin, for each slot."""
-    width = packet_width(lane_size(strip.pattern)[1], strip.settings.patch)
-    result = _empty_groups(strip, len(slots), width)
+def plane_groups(strip: Strip, slots: list[tuple[int, int]]) -> list[Array]:
+    """Planes h_i for `isp.kernel.Frame.h`: a letter's number and the cell at which groups begin, for each slot.
+
+    Patches read them by reflection up to half a patch beyond the frame; further on they are FAR.
+    """
+    half, parts = (
+        strip.settings.patch // 2,
+        row_parts(lane_size(strip.pattern)[1], strip.settings.patch, strip.pattern.size[1]),
+    )
+    results = [_empty_groups(strip, len(slots), width) for _, width in parts]
     for number in {letter for letter, _ in slots}:
         plane = fill(strip.judged, strip.part.cfa, strip.pattern.letters[number])
-        for target, (letter, cell) in zip(result, slots, strict=True):
-            if letter == number:
-                _group(plane, strip, 0, cell, None, target)
-    return result
+        for k, (letter, cell) in enumerate(slots):
+            for result, (first, _) in zip(results, parts, strict=True):
+                if letter == number:
+                    _group(plane, strip, (0, first), cell, half, FAR, result[k])
+    return results
 
 
-def centre_groups(values: Array, strip: Strip, cells: list[int], outside: float | None = None) -> Array:
-    """Values at patches' centres for `isp.kernel.Frame`, groups beginning at each of some cells."""
+def centre_groups(values: Array, strip: Strip, cells: list[int]) -> Array:
+    """Values at patches' centres for `isp.kernel.Frame`, groups beginning at each of some cells; 0 beyond the frame."""
     result = _empty_groups(strip, len(cells), whole_packets(lane_size(strip.pattern)[1]))
     for target, cell in zip(result, cells, strict=True):
-        _group(values, strip, strip.settings.patch // 2, cell, outside, target)
+        _group(values, strip, (strip.settings.patch // 2,) * 2, cell, 0, 0.0, target)
     return result
 
 
 def decay(strip: Strip) -> Array:
-    """log2(e) r(x) c(x) / (2 sigma_s^2) at each pixel of the strip's part: `reliability` times `certainty`."""
+    """log2(e) r(x) c(x) / (2 sigma_s^2) at each pixel of the strip's part: `reliability` times `certainty`.
+
+    LEAST_DECAY or more, for what is FAR to count as nothing even where similarity is not trusted at all.
+    """
     factor = np.float32(np.log2(np.e) / (2.0 * strip.settings.sigma_s**2))
     if strip.settings.distance == "raw":
-        return np.full(strip.dn.shape, factor)
-    judging_dn = strip.dn if strip.white_dn is None else strip.white_dn
-    reliable = reliability(_electrons(strip.part, judging_dn), strip.part.dark_noise_e, WINDOW)
-    return np.asarray(reliable * certainty(strip.judged, strip.part.cfa, strip.settings.patch) * factor)
+        return np.full(strip.dn.shape, max(factor, LEAST_DECAY), np.float32)
+    judging_dn = strip.dn if strip.pattern.white is None else fill(strip.dn, strip.part.cfa, "W")
+    result = reliability(_electrons(strip.part, judging_dn), strip.part.dark_noise_e, WINDOW)
+    result *= certainty(strip.judged, strip.part.cfa, strip.settings.patch)
+    result *= factor
+    return np.asarray(np.maximum(result, LEAST_DECAY, out=result))
 
 
 def _electrons(raw: RawImage, dn: Array) -> Array:
@@ -147,32 +195,39 @@ def _empty_groups(strip: Strip, count: int, width: int) -> Array:
     return aligned((count, strip.height // pair, strip.groups, pair, width), np.float32)
 
 
-def _group(values: Array, strip: Strip, shift: int, cell: int, outside: float | None, target: Array) -> None:
-    """Fill groups with a part of the frame, beyond whose border stands `outside`, or its reflection for patches."""
-    half, across, (_, groups, pair, width) = strip.settings.patch // 2, strip.pattern.size[1], target.shape
+def _group(
+    values: Array, strip: Strip, shift: tuple[int, int], cell: int, most: int, outside: float, target: Array
+) -> None:
+    """Fill groups with a part of the frame, reflected up to `most` beyond its border; `outside` further on."""
+    across, (_, groups, pair, width) = strip.pattern.size[1], target.shape
     first = (
-        strip.top + shift + cell // across - strip.first_row,
-        strip.left + shift + cell % across - strip.first_column,
+        strip.top + shift[0] + cell // across - strip.first_row,
+        strip.left + shift[1] + cell % across - strip.first_column,
     )
-    count = strip.height, groups * across + width
-    rows, columns = (_reflected(*line, half) for line in zip(first, count, values.shape, strict=True))
-    before, start = max(-first[1], 0), max(first[1], 0)
-    size = min(values.shape[1] - start, len(columns) - before)
-    spread = np.empty((len(rows), len(columns)), np.float32)
-    spread[:, before : before + size] = values[rows, start : start + size]
-    for beside in (slice(before), slice(before + size, None)):
-        spread[:, beside] = values[rows[:, None], columns[beside]]
-    if outside is not None:
-        spread[: max(-first[0], 0)] = spread[max(len(values) - first[0], 0) :] = outside
-        spread[:, :before] = spread[:, before + size :] = outside
-    windows = np.lib.stride_tricks.sliding_window_view(spread, width, axis=1)[:, ::across][:, :groups]
-    target[:] = windows.reshape(-1, pair, groups, width).swapaxes(1, 2)
+    spread = _spread(values, first, (strip.height, groups * across + width), most, outside)
+    # A group's values of one row as one item: they lie side by side in both arrays, and one copy is made of each.
+    item, line = np.dtype((np.void, 4 * width)), spread.strides[0]
+    windows = np.ndarray((strip.height // pair, groups, pair), item, spread, 0, (pair * line, 4 * across, line))
+    target.view(item)[..., 0] = windows
 
 
-def _reflected(first: int, count: int, size: int, most: int) -> NDArray[np.intp]:
-    """Places 0 to size - 1 for `count` places from `first` on; reflected up to `most` beyond, then the last."""
-    places = np.pad(np.arange(size), most, mode="reflect" if size > 1 else "edge")
-    return np.asarray(places[np.clip(np.arange(first, first + count) + most, 0, len(places) - 1)])
+def _spread(values: Array, first: tuple[int, int], count: tuple[int, int], most: int, outside: float) -> Array:
+    """`count` rows and columns of an array from `first` on, as `_group` wants them."""
+    result, within, inside, sources = np.full(count, outside, np.float32), [], [], []
+    for start, number, size in zip(first, count, values.shape, strict=True):
+        ends = max(start, -most), min(start + number, size + most)
+        places = np.pad(np.arange(size), most, mode="reflect" if size > 1 else "edge")
+        within.append(slice(ends[0] - start, ends[1] - start))
+        inside.append(slice(max(-ends[0], 0), min(size, ends[1]) - ends[0]))
+        sources.append(places[ends[0] + most : ends[1] + most])
+    target, (rows, columns) = result[within[0], within[1]], sources
+    own = [slice(int(source[part][0]), int(source[part][-1]) + 1) for source, part in zip(sources, inside, strict=True)]
+    target[inside[0], inside[1]] = values[own[0], own[1]]
+    for beside in (slice(inside[0].start), slice(inside[0].stop, None)):
+        target[beside, inside[1]] = values[rows[beside], own[1]]
+    for beside in (slice(inside[1].start), slice(inside[1].stop, None)):
+        target[:, beside] = values[rows[:, None], columns[beside]]
+    return result
 
 
 def aligned(shape: tuple[int, ...], kind: Any) -> Array:
@@ -181,3 +236,14 @@ def aligned(shape: tuple[int, ...], kind: Any) -> Array:
     memory = np.empty(size + ALIGNMENT, dtype=np.uint8)
     start = -memory.ctypes.data % ALIGNMENT
     return np.asarray(memory[start : start + size].view(kind).reshape(shape))
+
+
+def upload(values: NDArray[Any]) -> Any:
+    """Evaluated Dr.Jit array of the same type, in aligned memory."""
+    jit = arrays()
+    kinds = {"f": jit.Float, "u": jit.UInt, "i": jit.Int}
+    if values.ctypes.data % ALIGNMENT:
+        memory = aligned(values.shape, values.dtype)
+        memory[:] = values
+        values = memory
+    return kinds[values.dtype.kind](values.ravel())

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.lane_shape import TOGETHER, Cells, Judge, entry_length, noise_count, packet_rows, whole_packets
+from isp.lane_shape import Cells, Judge, entry_length, noise_count, offsets_together, packet_rows, whole_packets
 from isp.planes import Plane
 from isp.settings import Settings
 from isp.similarity import noise_distance
@@ -24,7 +24,6 @@ from sensor.cfa import Tile
 LANE_ROWS, LANE_COLUMNS = 8, 4
 
 Index = NDArray[np.int32]
-Places = NDArray[np.intp]
 Number = TypeVar("Number", int, Index)
 
 
@@ -74,6 +73,7 @@ def lane_size(pattern: Pattern) -> tuple[int, int]:
     return down * max(LANE_ROWS // down, 1), across * max(LANE_COLUMNS // across, 1)
 
 
+@lru_cache(maxsize=16)
 def list_offsets(
     tile: Tile, pattern: Pattern, settings: Settings, groups: int, *, dense: bool
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
@@ -89,7 +89,7 @@ def list_offsets(
     Returns
     -------
     entries : (list, length, whole_packets(entry_length)) float32
-        The step in groups by its bits; then for TOGETHER offsets, one a tile below the other, log2 G(beta_d, sigma_d)
+        The step in groups by its bits; then for `offsets_together`, one a tile below the other, log2 G(beta_d, sigma_d)
         of eqs. (2) and (4), NO_OFFSET beyond Omega, and the noise distances: W's plane by cell, or the plane of the
         letter at y and W's.
     counts : (list,) uint32
@@ -97,22 +97,22 @@ def list_offsets(
     """
     (down, across), reach = pattern.size, settings.reach
     noise, count = noise_by_class(tile, pattern, settings.patch, reach), noise_count(pattern.size, dense=dense)
-    lists = []
+    together, lists = offsets_together(dense=dense), []
     for shift in np.ndindex(down, across):
         first = first_offset(pattern, *shift)
         rows, columns = (
             np.array([d for d in range(-reach, reach + 1) if d % size == first[axis]])
             for axis, size in enumerate(pattern.size)
         )
-        d = np.stack(np.meshgrid(rows[::TOGETHER], columns, indexing="ij"), axis=-1).reshape(-1, 2)
-        table = np.zeros((len(d), whole_packets(entry_length(pattern.size, dense=dense))), dtype=np.float32)
+        d = np.stack(np.meshgrid(rows[::together], columns, indexing="ij"), axis=-1).reshape(-1, 2)
+        table = np.zeros((len(d), whole_packets(entry_length(pattern.size, together, dense=dense))), dtype=np.float32)
         lines = (d[:, 0] - first[0]) // packet_rows(down)
         steps = lines * groups + (d[:, 1] - first[1]) // across
         table[:, 0] = steps.astype(np.int32).view(np.float32)
         all_cells = down * across
         parts = [slice(all_cells)] if dense else [slice(k + all_cells, None, -all_cells) for k in range(all_cells)]
         copies = [table.copy() for _ in parts]
-        for i in range(TOGETHER):
+        for i in range(together):
             row, at = d[:, 0] + i * down, 1 + i * (1 + count)
             log_weight = -np.log2(np.e) * (row**2 + d[:, 1] ** 2) / (2.0 * settings.sigma_d**2)
             for target, part in zip(copies, parts, strict=True):
@@ -204,17 +204,16 @@ def sort_tiles(
     """
     height, width = lane_size(pattern)
     down, across = tile_grid(shape[1], rows, pattern)
-    tiles = np.meshgrid(rows[0] + np.arange(down) * height, np.arange(across) * width, indexing="ij")
+    places = rows[0] + np.arange(down, dtype=np.int32) * height, np.arange(across, dtype=np.int32) * width
+    tiles = np.meshgrid(*places, indexing="ij")
     some = np.full((down, across), pattern.white is None)
     whole = some
     if pattern.white is not None and alpha is not None:
-        before = np.array([size - 1 for size in pattern.size])
-        top, left = (place - back - reach for place, back in zip(tiles, before, strict=True))
-        bottom, right = (place + size + reach for place, size in zip(tiles, (height, width), strict=True))
-        box = [np.clip(edge, 0, shape[0]) for edge in (top, bottom)]
-        box += [np.clip(edge, 0, shape[1]) for edge in (left, right)]
-        area = (box[1] - box[0]) * (box[3] - box[2])
-        counts = [_count(condition, first_row, *box) for condition in (alpha > 0.0, alpha >= 1.0)]
+        edges = []
+        for first, size, back, length in zip(places, (height, width), pattern.size, shape, strict=True):
+            edges.append((np.clip(first - back + 1 - reach, 0, length), np.clip(first + size + reach, 0, length)))
+        area = np.outer(*(end - start for start, end in edges))
+        counts = [_count(condition, first_row, *edges) for condition in (alpha > 0.0, alpha >= 1.0)]
         some, whole = counts[0] > 0, counts[1] == area
     numbers = [number for row in pattern.cells for number in row]
     white = [k for k, number in enumerate(numbers) if number == pattern.white]
@@ -227,33 +226,38 @@ def sort_tiles(
     work: dict[Judge, Work] = {}
     for judge, groups in kinds.items():
         parts = [part for group in groups for part in _lanes(tiles, *group, pattern, (rows[1], shape[1]))]
-        work[judge] = Work(*np.concatenate(parts, axis=1).astype(np.int32))
+        work[judge] = Work(*np.concatenate(parts, axis=1))
     return work
 
 
 def _count(
-    condition: NDArray[np.bool_], first_row: int, top: Places, bottom: Places, left: Places, right: Places
-) -> Places:
-    """Pixels where the condition holds in each box of a grid: rows by the first index, columns by the second."""
-    rows = np.flatnonzero(condition.any(axis=1))
-    if not rows.size:
-        return np.zeros_like(top)
-    kept = condition[rows[0] : rows[-1] + 1]
+    condition: NDArray[np.bool_], first_row: int, rows: tuple[Index, Index], columns: tuple[Index, Index]
+) -> NDArray[np.int32]:
+    """Pixels where the condition holds in each box between starts and ends of rows and columns, (row, column)."""
+    near = [np.flatnonzero(condition.any(axis=axis)) for axis in (1, 0)]
+    if not near[0].size:
+        return np.zeros((len(rows[0]), len(columns[0])), np.int32)
+    top, left = (int(places[0]) for places in near)
+    kept = condition[top : near[0][-1] + 1, left : near[1][-1] + 1]
     lines = np.pad(kept, ((1, 0), (0, 0))).cumsum(0, dtype=np.int32)
-    upper, lower = (np.clip(edge[:, 0] - first_row - rows[0], 0, len(kept)) for edge in (top, bottom))
+    upper, lower = (np.clip(edge - first_row - top, 0, kept.shape[0]) for edge in rows)
     bands = np.pad(lines[lower] - lines[upper], ((0, 0), (1, 0))).cumsum(1, dtype=np.int32)
-    return np.asarray(bands[:, right[0]] - bands[:, left[0]], dtype=np.intp)
+    before, behind = (np.clip(edge - left, 0, kept.shape[1]) for edge in columns)
+    return np.asarray(bands[:, behind] - bands[:, before])
 
 
 def _lanes(
-    tiles: Sequence[Places], chosen: NDArray[np.bool_], cells: list[int], pattern: Pattern, end: tuple[int, int]
-) -> list[Places]:
+    tiles: Sequence[Index], chosen: NDArray[np.bool_], cells: list[int], pattern: Pattern, end: tuple[int, int]
+) -> list[Index]:
     """All classes' lanes in the chosen tiles, class by class, without those that hold no pixel to reconstruct."""
-    place, parts = np.flatnonzero(chosen), [np.empty((6, 0), np.intp)]
+    parts = [np.empty((6, 0), np.int32)]
+    places = *(place_of[chosen] for place_of in tiles), np.flatnonzero(chosen).astype(np.int32)
     for number, shift in enumerate(np.ndindex(*pattern.size)):
-        row, column = (place_of[chosen] - back for place_of, back in zip(tiles, shift, strict=True))
-        kept = (row < end[0]) & (column < end[1])
+        kept = (places[0] < end[0] + shift[0]) & (places[1] < end[1] + shift[1])
+        row, column, place = (place[kept] for place in places)
         for cell in cells:
-            constant = (np.full_like(row, value) for value in (*shift, cell))
-            parts.append(np.stack([row, column, *constant, number * chosen.size + place])[:, kept])
+            part = np.empty((6, len(row)), np.int32)
+            part[0], part[1], part[2], part[3], part[4] = row - shift[0], column - shift[1], *shift, cell
+            part[5] = place + number * chosen.size
+            parts.append(part)
     return parts

@@ -14,8 +14,7 @@ LOWEST_EXPONENT = -62.0  # weights end here: their squares are still normal numb
 LEAST_WEIGHT = 2.0**-30  # 441 weights that end at 2^-62 are 1e-7 of it
 FARTHEST = -1e28  # log weights end here, far under any that comes from sigmas of 0.001 and 16 bits
 NOTHING = -1e29  # largest log weight before the first sample
-NO_SAMPLE = -1e30  # stands where y lies outside the frame: finite, so that no weight times it is nothing
-NO_OFFSET = -1e30  # log weight that fills up a list: it ends at 2^-62, under any rounding of the sums
+NO_OFFSET = -1e30  # log weight that fills up a list: it ends at 2^-62, under any rounding of the sums, as what is far
 # 2^f for 0 <= f <= 1, lowest power first: minimax of the relative error, 7.5e-5 (Remez exchange). Two samples that
 # share a pixel share it wrongly by a quarter of twice this: 3.8e-5 of their difference. One power more takes a tenth
 # more time.
@@ -33,22 +32,21 @@ def start_sums(*, exact: bool, noise: bool) -> tuple[float, ...]:
 
 
 def add_quickly(sums: tuple[Any, ...], log_weight: Any, sample: Any) -> tuple[Any, ...]:
-    """Add one sample, if it is one, in fixed units. The log weight has HEADROOM added."""
+    """Add one sample in fixed units. The log weight has HEADROOM added."""
     weight, value, *square = sums
-    new = dr.select(sample > NO_SAMPLE, _exp2(at_least(log_weight, LOWEST_EXPONENT)), 0.0)
+    new = _exp2(at_least(log_weight, LOWEST_EXPONENT))
     return weight + new, dr.fma(new, sample, value), *(dr.fma(new, new, old) for old in square)
 
 
 def add_exactly(sums: tuple[Any, ...], log_weight: Any, sample: Any) -> tuple[Any, ...]:
-    """Add one sample, if it is one, in units of the largest weight: it counts as 1, so W_y is never 0."""
+    """Add one sample in units of the largest weight: it counts as 1, so W_y is never 0."""
     weight, value, *square, largest = sums
-    inside = sample > NO_SAMPLE
-    bounded = dr.select(inside, at_least(log_weight, FARTHEST), largest)
+    bounded = at_least(log_weight, FARTHEST)
     ahead = bounded - largest
     smaller = _exp2(at_least(-dr.abs(ahead), LOWEST_EXPONENT))  # one exponential: of the two weights the larger is 1
     is_larger = ahead > 0.0
     old = dr.select(is_larger, smaller, 1.0)
-    new = dr.select(inside, dr.select(is_larger, 1.0, smaller), 0.0)
+    new = dr.select(is_larger, 1.0, smaller)
     return (
         dr.fma(weight, old, new),
         dr.fma(value, old, new * sample),

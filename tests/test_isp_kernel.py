@@ -128,6 +128,22 @@ def test_hard_frames_give_finite_results_within_the_range_of_the_samples(name, d
 
 
 @needs_kernel
+@needs_kernel
+@pytest.mark.parametrize("patch", [1, 5])
+@pytest.mark.parametrize("white", [0.0, 100.0, 2 * FULL])  # in the dark, where W judges, where bands do
+@pytest.mark.parametrize(
+    "settings", [{}, {"sigma_s": math.inf}, {"sigma_s": 0.001}, {"distance": "raw", "sigma_s": math.inf}]
+)
+def test_nothing_beyond_the_frame_is_averaged(patch, white, settings):
+    """Flat planes stay flat at the border, also where similarity counts for nothing."""
+    flat = {"R": 30.0, "G": 900.0, "B": 300.0, "W": white}
+    raw = raw_image(np.vectorize(flat.get)(letter_map(RGBW, (17, 22))))
+    expected = [min(flat[letter], 65535 - BLACK) for letter in channels(RGBW)]
+    np.testing.assert_allclose(
+        reconstruct(raw, patch=patch, **settings), np.broadcast_to(expected, (17, 22, 4)), rtol=1e-6
+    )
+
+
 def test_a_pixel_without_a_similar_neighbour_keeps_its_sample_and_takes_the_nearest_of_the_others():
     raw = raw_image(HARD_FRAMES["no similar neighbour"][0])
     exact = reconstruct_reference(raw, sigma_s=0.05, patch=5)

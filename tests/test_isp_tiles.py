@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from isp.lane_shape import TOGETHER, entry_length, noise_count, packet_rows
+from isp.lane_shape import entry_length, noise_count, offsets_together, packet_rows
 from isp.settings import Settings
 from isp.similarity import noise_distance, saturated_fraction
 from isp.tiles import first_offset, lane_size, list_offsets, number_tile, sort_tiles
@@ -35,8 +35,9 @@ def unpacked(tile, settings, *, dense, groups=50):
     """By list: steps between groups, then for each of the offsets together its log weight and noise distances."""
     pattern, count = number_tile(tile), noise_count((len(tile), len(tile[0])), dense=dense)
     entries, counts = list_offsets(tile, pattern, settings, groups, dense=dense)
+    together = offsets_together(dense=dense)
     for table, n in zip(entries, counts, strict=True):
-        values = table[:n, 1 : entry_length(pattern.size, dense=dense)].reshape(n, TOGETHER, -1)
+        values = table[:n, 1 : entry_length(pattern.size, together, dense=dense)].reshape(n, together, -1)
         assert values.shape[2] == 1 + count
         yield table[:n, 0].copy().view(np.int32), values[..., 0], values[..., 1:]
 

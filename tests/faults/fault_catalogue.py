@@ -406,8 +406,8 @@ ISP = (
     _fault(
         "distances trusted between samples that differ",
         "isp/interpolation.py",
-        "NOISE_OVER_INTERPOLATION / (variance + NOISE_OVER_INTERPOLATION)",
-        "np.ones_like(mosaic)",
+        "    result += NOISE_OVER_INTERPOLATION\n",
+        "    result[...] = NOISE_OVER_INTERPOLATION\n",
         "isp_interpolation",
         *_SIMILARITY,
     ),
@@ -497,7 +497,7 @@ KERNEL = (
         *_KERNEL,
     ),
     _fault(
-        "kernel mixes without the cross term", "isp/kernel.py", "cross = 2.0 * share", "cross = 0.0 * share", *_KERNEL
+        "kernel mixes without the cross term", "isp/kernel.py", "(2.0 / ROOT_SCALE)", "(0.0 / ROOT_SCALE)", *_KERNEL
     ),
     _fault(
         "kernel forgets what noise alone makes",
@@ -522,9 +522,16 @@ KERNEL = (
     ),
     _fault(
         "kernel counts samples outside the frame",
-        "isp/weighted_sums.py",
-        "dr.select(sample > NO_SAMPLE, _exp2(at_least(log_weight, LOWEST_EXPONENT)), 0.0)",
-        "_exp2(at_least(log_weight, LOWEST_EXPONENT))",
+        "isp/strips.py",
+        "FAR = 1e13",
+        "FAR = 0.0",
+        *_KERNEL,
+    ),
+    _fault(
+        "kernel counts samples outside the frame where similarity isn't trusted",
+        "isp/strips.py",
+        "np.maximum(result, LEAST_DECAY, out=result)",
+        "np.maximum(result, np.float32(0.0), out=result)",
         *_KERNEL,
     ),
     _fault("2^x with a wrong coefficient", "isp/weighted_sums.py", "0.22606716", "0.22906716", *_KERNEL),
