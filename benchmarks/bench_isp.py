@@ -127,6 +127,7 @@ def ways(yardstick: Call | None) -> None:
     frames = {
         "one pixel a patch, the default": (frame(300.0), {"patch": PATCH, "sigma_s": SIGMA_S}),
         "nothing saturated (W judges)": (frame(300.0), {}),
+        "3 % saturated": (frame(3000.0, saturated_disc=0.03), {}),
         "5 % saturated": (frame(3000.0, saturated_disc=0.05), {}),
         "all saturated (each band judges itself)": (frame(1e6), {}),
         "at the edge of saturation (both judge)": (frame(14000.0), {}),
