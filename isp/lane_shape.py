@@ -8,7 +8,7 @@ Pixel = tuple[int, int]
 Cells = tuple[tuple[int, ...], ...]
 
 PACKET = 8  # floats loaded at once: one AVX register, and a good size for the others
-MOST_TOGETHER = 2
+MOST_TOGETHER = 2  # offsets an iteration (`offsets_together`)
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,10 @@ class Shape:
 
     @property
     def row_parts(self) -> list[tuple[int, int, int]]:
-        """First value, width and values needed of the packets in which it reads a row of its window."""
+        """First value, width and values needed of the packets in which it reads a row of its window.
+
+        The lanes of one cell may end a packet before the dense ones, whose rows are as wide as all.
+        """
         count, parts = len(self.window[1]), row_parts(self.columns, self.patch, self.tile[1])
         return [(first, width, min(count - first, PACKET)) for first, width in parts if first < count]
 

@@ -47,8 +47,8 @@ def empty_sums(raw: RawImage, rows: tuple[int, int], pattern: Pattern, noise: bo
     return Sums(weight, mean, noise_gain if noise else None, dr.full(jit.Float, -HEADROOM, count))
 
 
-def put(pixels: list[tuple[Any, ...]], lanes: Lanes, shape: Shape, sums: Sums) -> None:
-    """Store sums, a packet at once: a lane's lie side by side."""
+def put(pixels: list[tuple[Any, ...]], lanes: Lanes, shape: Shape, sums: Sums) -> list[Any]:
+    """Store sums, a packet at once: a lane's lie side by side. What is stored into is returned, not evaluated yet."""
     jit, count = arrays(), len(pixels)
     packet = min(PACKET, count & -count)  # the largest power of two that divides it
     stored = [
@@ -61,6 +61,7 @@ def put(pixels: list[tuple[Any, ...]], lanes: Lanes, shape: Shape, sums: Sums) -
             values = jit.ArrayXf([pixel[number] for pixel in stored[first : first + packet]])
             place = lanes.place // packet + first // packet
             dr.scatter(target, values, place, mode=dr.ReduceMode.NoConflicts)
+    return targets
 
 
 def finish(sums: Sums, raw: RawImage, rows: tuple[int, int], pattern: Pattern, results: list[Any]) -> None:

@@ -152,8 +152,8 @@ def _run(frame: Frame, lanes: Lanes, shape: Shape, sums: Sums) -> Run:
         inside = _inside(frame, lanes, shape)
         for pixel, (weight, *_) in pixels.items():
             failed |= inside[pixel] & (weight < LEAST_WEIGHT)
-    put([pixels[pixel] for pixel in shape.pixels], lanes, shape, sums)
-    dr.eval(failed, vars(sums))  # all at once, for the loop to run once
+    stored = put([pixels[pixel] for pixel in shape.pixels], lanes, shape, sums)
+    dr.eval(failed, stored)  # all at once, for the loop to run once
     return Run(frame, lanes, shape, failed)
 
 

@@ -149,17 +149,15 @@ def plane_groups(strip: Strip, slots: list[tuple[int, int]]) -> list[Array]:
 
     Patches read them by reflection up to half a patch beyond the frame; further on they are FAR.
     """
-    half, parts = (
-        strip.settings.patch // 2,
-        row_parts(lane_size(strip.pattern)[1], strip.settings.patch, strip.pattern.size[1]),
-    )
+    pattern, patch = strip.pattern, strip.settings.patch
+    parts = row_parts(lane_size(pattern)[1], patch, pattern.size[1])
     results = [_empty_groups(strip, len(slots), width) for _, width in parts]
     for number in {letter for letter, _ in slots}:
-        plane = fill(strip.judged, strip.part.cfa, strip.pattern.letters[number])
+        plane = fill(strip.judged, strip.part.cfa, pattern.letters[number])
         for k, (letter, cell) in enumerate(slots):
             for result, (first, _) in zip(results, parts, strict=True):
                 if letter == number:
-                    _group(plane, strip, (0, first), cell, half, FAR, result[k])
+                    _group(plane, strip, (0, first), cell, patch // 2, FAR, result[k])
     return results
 
 
