@@ -211,15 +211,19 @@ def _group(
 
 def _spread(values: Array, first: tuple[int, int], count: tuple[int, int], most: int, outside: float) -> Array:
     """`count` rows and columns of an array from `first` on, as `_group` wants them."""
-    result, within, inside, sources = np.full(count, outside, np.float32), [], [], []
+    result, sources = np.full(count, outside, np.float32), []
+    within, inside, own = list[slice](), list[slice](), list[slice]()
     for start, number, size in zip(first, count, values.shape, strict=True):
-        ends = max(start, -most), min(start + number, size + most)
+        begin, end = np.maximum.accumulate([max(start, -most), min(start + number, size + most)]).tolist()
+        low, high = np.maximum.accumulate(
+            [max(begin, 0), min(end, size)]
+        ).tolist()  # maybe none: a packet beyond the frame
         places = np.pad(np.arange(size), most, mode="reflect" if size > 1 else "edge")
-        within.append(slice(ends[0] - start, ends[1] - start))
-        inside.append(slice(max(-ends[0], 0), min(size, ends[1]) - ends[0]))
-        sources.append(places[ends[0] + most : ends[1] + most])
+        within.append(slice(begin - start, end - start))
+        inside.append(slice(low - begin, high - begin))
+        own.append(slice(low, high))
+        sources.append(places[begin + most : end + most])
     target, (rows, columns) = result[within[0], within[1]], sources
-    own = [slice(int(source[part][0]), int(source[part][-1]) + 1) for source, part in zip(sources, inside, strict=True)]
     target[inside[0], inside[1]] = values[own[0], own[1]]
     for beside in (slice(inside[0].start), slice(inside[0].stop, None)):
         target[beside, inside[1]] = values[rows[beside], own[1]]

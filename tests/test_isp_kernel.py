@@ -144,6 +144,15 @@ def test_nothing_beyond_the_frame_is_averaged(patch, white, settings):
     )
 
 
+@needs_kernel
+@pytest.mark.parametrize("shape", [(2, 2), (3, 9), (9, 3), (2, 30), (30, 2)])
+@pytest.mark.parametrize("tile", [("RW",), ("R", "W")])
+def test_frames_may_be_smaller_than_a_patch_and_than_a_packet(shape, tile):
+    raw = raw_image(np.random.default_rng(6).uniform(0.0, FULL / 2, shape), tile)
+    settings = {"patch": 7, "neighbourhood": 3}
+    assert np.abs(reconstruct(raw, **settings) - reconstruct_reference(raw, **settings)).max() < 1e-4 * FULL
+
+
 def test_a_pixel_without_a_similar_neighbour_keeps_its_sample_and_takes_the_nearest_of_the_others():
     raw = raw_image(HARD_FRAMES["no similar neighbour"][0])
     exact = reconstruct_reference(raw, sigma_s=0.05, patch=5)
