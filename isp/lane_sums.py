@@ -52,7 +52,7 @@ def put(pixels: list[tuple[Any, ...]], lanes: Lanes, shape: Shape, sums: Sums) -
     jit, count = arrays(), len(pixels)
     packet = min(PACKET, count & -count)  # the largest power of two that divides it
     stored = [
-        (weight, value / weight, *(more[0] / dr.square(weight) for _ in range(shape.noise)), *more[shape.noise :])
+        (weight, value / weight, *(square / dr.square(weight) for square in more[: shape.noise]), *more[shape.noise :])
         for weight, value, *more in pixels
     ]
     targets = [sums.weight, sums.mean] + [sums.noise_gain] * shape.noise + [sums.largest] * shape.exact

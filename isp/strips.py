@@ -96,10 +96,7 @@ def make_strip(
 def crop(strip: Strip, shape: tuple[int, int], rows: tuple[int, int], columns: tuple[int, int]) -> Strip:
     """Room for fewer rows and columns of a frame of some shape, with what the strip holds already."""
     (top, left, height, groups), first, last = _room(shape, rows, columns, strip.pattern, strip.settings)
-    at = tuple(
-        slice(start - whole, end - whole)
-        for start, end, whole in zip(first, last, (strip.first_row, strip.first_column), strict=True)
-    )
+    at = _within(strip, first, last)
     return replace(
         strip,
         rows=rows,
@@ -119,8 +116,14 @@ def crop(strip: Strip, shape: tuple[int, int], rows: tuple[int, int], columns: t
 
 def part_of(values: Array, strip: Strip, part: Strip) -> Array:
     """Of values at each pixel of a strip's part of the mosaic those that belong to a crop of it."""
-    row, column = part.first_row - strip.first_row, part.first_column - strip.first_column
-    return values[row : row + part.dn.shape[0], column : column + part.dn.shape[1]]
+    first = part.first_row, part.first_column
+    return values[_within(strip, first, (first[0] + part.dn.shape[0], first[1] + part.dn.shape[1]))]
+
+
+def _within(strip: Strip, first: tuple[int, int], last: tuple[int, int]) -> tuple[slice, slice]:
+    """Where rows and columns of the frame lie in the strip's part of the mosaic."""
+    row, column = strip.first_row, strip.first_column
+    return slice(first[0] - row, last[0] - row), slice(first[1] - column, last[1] - column)
 
 
 def _room(
@@ -214,10 +217,11 @@ def _spread(values: Array, first: tuple[int, int], count: tuple[int, int], most:
     result, sources = np.full(count, outside, np.float32), []
     within, inside, own = list[slice](), list[slice](), list[slice]()
     for start, number, size in zip(first, count, values.shape, strict=True):
-        begin, end = np.maximum.accumulate([max(start, -most), min(start + number, size + most)]).tolist()
-        low, high = np.maximum.accumulate(
-            [max(begin, 0), min(end, size)]
-        ).tolist()  # maybe none: a packet beyond the frame
+        # A packet may begin beyond a narrow frame: none of its places is inside then.
+        begin = max(start, -most)
+        end = max(min(start + number, size + most), begin)
+        low = max(begin, 0)
+        high = max(min(end, size), low)
         places = np.pad(np.arange(size), most, mode="reflect" if size > 1 else "edge")
         within.append(slice(begin - start, end - start))
         inside.append(slice(low - begin, high - begin))

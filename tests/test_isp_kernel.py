@@ -128,7 +128,6 @@ def test_hard_frames_give_finite_results_within_the_range_of_the_samples(name, d
 
 
 @needs_kernel
-@needs_kernel
 @pytest.mark.parametrize("patch", [1, 5])
 @pytest.mark.parametrize("white", [0.0, 100.0, 2 * FULL])  # in the dark, where W judges, where bands do
 @pytest.mark.parametrize(
@@ -153,6 +152,7 @@ def test_frames_may_be_smaller_than_a_patch_and_than_a_packet(shape, tile):
     assert np.abs(reconstruct(raw, **settings) - reconstruct_reference(raw, **settings)).max() < 1e-4 * FULL
 
 
+@needs_kernel
 def test_a_pixel_without_a_similar_neighbour_keeps_its_sample_and_takes_the_nearest_of_the_others():
     raw = raw_image(HARD_FRAMES["no similar neighbour"][0])
     exact = reconstruct_reference(raw, sigma_s=0.05, patch=5)
