@@ -92,7 +92,7 @@ def test_under_low_pressure_sodium_all_colours_collapse_and_under_d65_none_do() 
     for name in ("D65", "A", "sodium_low"):
         lit = under(chart, name).relight(luminance_cd_m2=1.0)
         light = light_in_bands(illuminant(name), nm, width)
-        linear = true_srgb(lit, light, shown_white_cd_m2(lit, chart.emitter_visible))
+        linear = true_srgb(lit, light, shown_white_cd_m2(under(chart, name), 1.0))
         errors[name] = daylight_delta_e(linear, masks)[:18].mean()
         spread[name] = max(float(np.ptp(linear[mask].mean(axis=0))) for mask in masks)
     assert spread["sodium_low"] < 1e-3  # grey, whatever the surface
