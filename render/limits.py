@@ -62,7 +62,7 @@ class Limits:
         return self.spp or self.max_spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
 
     def pass_spp(self, drawn: Callable[[int], int], earlier: Sequence[int] = ()) -> int:
-        """Samples a pixel of each pass to come: the most with which the render stops at no more than `MOST_ROUNDING`.
+        """Samples a pixel of each pass to come: the most that keep to `PASSES` and `MOST_ROUNDING`.
 
         Parameters
         ----------
@@ -77,7 +77,8 @@ class Limits:
         for spp in range(earlier[-1] if earlier else wanted, 1, -1):
             held = drawn(spp)
             pairs = -(-missing // (2 * held))
-            if sum(earlier) + 2 * held * pairs <= MOST_ROUNDING * self.most_spp:
+            enough = len(earlier) + 2 * pairs >= PASSES
+            if enough and sum(earlier) + 2 * held * pairs <= MOST_ROUNDING * self.most_spp:
                 return held
         return 1
 

@@ -1,7 +1,8 @@
 """From a `Scene` to Mitsuba objects: variant, film, and the scene at unit emission."""
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
+from operator import getitem
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from render.jit import backend
 from render.matte import matte_surface, with_matte_surfaces
 from render.reflectance_table import band_offsets, reflectance_table, with_rows
 from render.scattered_path import scattered_path
-from render.scene import Node, Scene, uniform_node
+from render.scene import EMISSION_PARAMETER, OWN_COLOUR_EMITTERS, Node, Scene, uniform_node
 from render.scene_paths import search_path
 from render.spectrum import Floats, Spectrum
 
@@ -86,6 +87,9 @@ class Loaded:
     curves : tuple of Spectrum
         Reflectances that are read from a table, row by row. None where lights have colours of their own: a line in them
         would be met at few of the table's wavelengths.
+    covering : mitsuba.Scene or None
+        The same scene with a film of one band and lights of 1 whatever their colours: it shows what they cover. None
+        with Dr.Jit, where the camera's paths tell.
     """
 
     mi_scene: Any
@@ -93,6 +97,7 @@ class Loaded:
     own_colour: bool
     sample_lights: bool
     curves: tuple[Spectrum, ...] = ()
+    covering: Any = None
 
     @property
     def camera(self) -> Any:
@@ -142,11 +147,25 @@ def _load_unit(scene: Scene, group: str, film: Film) -> Loaded:
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
     place, own_colour = (list(scene.groups).index(group),), scene.groups[group].own_colour
     if backend() == "numpy":
-        return Loaded(_load(scene, description), place, own_colour, sample_lights=True)
+        covering = _load(scene, _covering(scene, group, film))
+        return Loaded(_load(scene, description), place, own_colour, sample_lights=True, covering=covering)
     matte = with_matte_surfaces(description)
     tabulated, curves = (matte, ()) if own_colour else with_rows(matte)
     mi_scene = _load(scene, tabulated)
     return Loaded(mi_scene, place, own_colour, not _is_even_sky(mi_scene), curves)
+
+
+def _covering(scene: Scene, group: str, film: Film) -> Node:
+    """Describe the scene with the group's lights at 1, on a film of one band."""
+    description = scene.lit({group: uniform_node(1.0)})
+    one_band = replace(film, wavelength_nm=film.wavelength_nm[:1], width_nm=film.width_nm[:1])
+    description["sensor"] = {**description["sensor"], "film": _recorder(one_band, film.size), "sampler": _SAMPLER}
+    for path in scene.groups[group].emitters if scene.groups[group].own_colour else ():
+        *way, key = path.split("/")
+        holder = reduce(getitem, way, description)
+        kind = "constant" if holder[key]["type"] in OWN_COLOUR_EMITTERS else holder[key]["type"]
+        holder[key] = {"type": kind, EMISSION_PARAMETER[kind]: uniform_node(1.0)}
+    return description
 
 
 def _load(scene: Scene, description: Node) -> Any:

@@ -172,10 +172,15 @@ def camera_parts(unit: Loaded, film: Film, spp: int, seed: int) -> Iterator[Part
     """Render the camera's picture, at most `PART_BANDS` bands at a time; every part sees the same paths."""
     first, count = 0, len(unit.groups)
     for part, integrator in zip(parts(film, PART_BANDS), integrators(film, PART_BANDS, unit, seed), strict=True):
-        scattered, others = _bands(_rendered(unit, unit.camera, integrator, spp, seed), count, film.width_nm[part])
+        image = _rendered(unit.mi_scene, unit.camera, integrator, spp, seed)
+        scattered, others = _bands(image, count, film.width_nm[part])
         shares, of_light = others[:count], others[count : count + part.size]
-        if unit.own_colour and variant() == "scalar_spectral":
-            of_light = _bands(_rendered(unit, unit.camera, seen_directly(), spp, seed), 1, film.width_nm)[0][0]
+        if unit.covering is not None:
+            image = _rendered(unit.covering, unit.covering.sensors()[0], seen_directly(), spp, seed)
+            shares = _bands(image, 1, film.width_nm[:1])[0][0]
+            if unit.own_colour:
+                image = _rendered(unit.mi_scene, unit.camera, seen_directly(), spp, seed)
+                of_light = _bands(image, 1, film.width_nm)[0][0]
         seen = (of_light if unit.own_colour else shares[:1], *shares[1:, None])
         yield Part(first, scattered, seen, shares.sum(axis=0))
         first += part.size
@@ -187,7 +192,7 @@ def _irradiance(unit: Loaded, film: Film, spp: int, seed: int) -> Floats:
     for part, integrator in zip(
         parts(film, METER_BANDS), integrators(film, METER_BANDS, unit, seed, meter=True), strict=True
     ):
-        image = _rendered(unit, unit.meter, integrator, spp, seed)
+        image = _rendered(unit.mi_scene, unit.meter, integrator, spp, seed)
         means.append(_bands(image, len(unit.groups), film.width_nm[part])[0].mean(axis=(2, 3), dtype=np.float64))
     # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
     return np.concatenate(means, axis=1) * (1 if variant() == "scalar_spectral" else np.pi)
@@ -209,10 +214,10 @@ def _bands(image: Planes, groups: int, width_nm: Floats) -> tuple[Planes, Planes
     return bands.reshape(groups, filled, *image.shape[1:])[:, :size], others
 
 
-def _rendered(unit: Loaded, sensor: Any, integrator: Any, spp: int, seed: int) -> Planes:
+def _rendered(mi_scene: Any, sensor: Any, integrator: Any, spp: int, seed: int) -> Planes:
     """Channels of a picture, shape (channel, h, w)."""
     try:
-        image = mitsuba_module().render(unit.mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
+        image = mitsuba_module().render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
     except RuntimeError as error:
         cause = _root_cause(error)
         if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
