@@ -50,7 +50,9 @@ def load_scene_file(path: str | Path, *, trust: bool = False) -> SceneFile:
     screen(file, folder)
     mi = mitsuba_module()
     state = _parse(mi, file, trust)
-    return assemble(mi, file.stem, _from_xml(mi, state, file.parent, folder))
+    # A trusted scene's <path> folders are on Mitsuba's search path by now.
+    searched = [Path(str(place)) for place in mi.file_resolver()] if trust else [file.parent]
+    return assemble(mi, file.stem, _from_xml(mi, state, searched, folder))
 
 
 def _parse(mi: Any, file: Path, trust: bool) -> Any:
@@ -70,7 +72,7 @@ def _parse(mi: Any, file: Path, trust: bool) -> Any:
     return state
 
 
-def _from_xml(mi: Any, state: Any, searched: Path, folder: Path | None) -> Node:
+def _from_xml(mi: Any, state: Any, searched: list[Path], folder: Path | None) -> Node:
     """Nested dict of a parsed scene: every part is checked before they are put together."""
     nodes, index_of = list(state.nodes), state.id_to_index
     if nodes[0].props.plugin_name() != "scene":
@@ -91,7 +93,9 @@ def _from_xml(mi: Any, state: Any, searched: Path, folder: Path | None) -> Node:
     return parts[0]
 
 
-def _xml_part(node: Any, nodes: list[Any], index_of: Mapping[str, int], searched: Path, folder: Path | None) -> Node:
+def _xml_part(
+    node: Any, nodes: list[Any], index_of: Mapping[str, int], searched: list[Path], folder: Path | None
+) -> Node:
     """One node of a parsed scene without its children."""
     properties = node.props
     if folder is not None:
@@ -109,7 +113,7 @@ def _xml_part(node: Any, nodes: list[Any], index_of: Mapping[str, int], searched
             target = nodes[index_of[value.id()]]  # an <alias> has no node of its own
             result[key] = {"type": "ref", "id": target.props.id()}
         elif kind == "String" and key == "filename":
-            result[key] = str(find_file(value, [searched], folder))
+            result[key] = str(find_file(value, searched, folder))
         elif kind != "ResolvedReference":
             result[key] = _xml_value(kind, value)
     return result
