@@ -426,7 +426,7 @@ def test_a_trusted_scene_may_load_native_code_and_files_from_anywhere(tmp_path: 
 
 
 def test_files_of_a_trusted_scene_are_looked_for_in_the_folders_of_its_paths(tmp_path: Path) -> None:
-    """Mesh, bitmap, spectrum, include: each in the folder beside the scene that holds it; the last <path> goes first."""
+    """Mesh, bitmap, spectrum, include: each in a folder beside the scene; the last <path> goes first."""
     for name, height in (("models", 1), ("later", 2), ("a", 9)):
         (tmp_path / name).mkdir()
         (tmp_path / name / "quad.obj").write_text(QUAD.replace(" 0\n", f" {height}\n"))
