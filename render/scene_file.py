@@ -19,7 +19,7 @@ from render.scene_parts import SceneFile, assemble
 from render.scene_paths import find_file, screen, search_path
 
 
-def load_scene_file(path: str | Path, *, trust: bool = False) -> SceneFile:
+def load_scene_file(path: str | Path, *, trust: bool = False, extend: str | None = None) -> SceneFile:
     """Read a Mitsuba XML scene.
 
     A Mitsuba scene can load native code. So it is read without Mitsuba first, then by Mitsuba's parser, which
@@ -32,6 +32,8 @@ def load_scene_file(path: str | Path, *, trust: bool = False) -> SceneFile:
     path : path
     trust : bool
         Lets the scene name folders, plug-ins of its own and files anywhere. Its native code then runs.
+    extend : "hold", optional
+        As of `Scene`: surfaces go on at their end values outside their tables.
 
     Returns
     -------
@@ -52,7 +54,7 @@ def load_scene_file(path: str | Path, *, trust: bool = False) -> SceneFile:
     state = _parse(mi, file, trust)
     # A trusted scene's <path> folders are on Mitsuba's search path by now.
     searched = [Path(str(place)) for place in mi.file_resolver()] if trust else [file.parent]
-    return assemble(mi, file.stem, _from_xml(mi, state, searched, folder))
+    return assemble(mi, file.stem, _from_xml(mi, state, searched, folder), extend)
 
 
 def _parse(mi: Any, file: Path, trust: bool) -> Any:

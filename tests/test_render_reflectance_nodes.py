@@ -65,7 +65,13 @@ REFLECTANCES = {
     "checkerboard": CHECKS.format(COLOUR.format("color0"), POINTS.format("color1")),
     "checkerboard of tables": CHECKS.format(EVEN.format("color0", 0.7, 0.1), EVEN.format("color1", 0.2, 0.7)),
 }
-IN_ROWS = ("regular", "checkerboard of tables")  # read from the engine's own table of reflectances
+IN_ROWS = (
+    "regular",
+    "irregular",
+    "points",
+    "file",
+    "checkerboard of tables",
+)  # read from the engine's own table of reflectances
 
 PAINTS = {name: f'<bsdf type="diffuse" id="paint">{node}</bsdf>' for name, node in REFLECTANCES.items()} | {
     "two-sided rgb": f'<bsdf type="twosided" id="paint"><bsdf type="diffuse">{RGB}</bsdf></bsdf>',
