@@ -18,6 +18,7 @@ from render.limits import Limits
 from render.loader import Film, integrator_name, load_units, samples_drawn, variant
 from render.passes import Sums, add_pass, let_go, no_passes, sums_of
 from render.scene import Scene
+from render.scene_range import check_range, warn_of_own_colours
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from render.transport import Stop, Transport, emission
 
@@ -81,10 +82,16 @@ def render(
     Raises
     ------
     InputError
-        For a bad size, band or limit, a scene without light, a material that picks lobes by wavelength, a light whose
-        data end within the bands, or an earlier result of another size, bands or lights.
+        For a bad size, band or limit, a scene without light, a material that picks lobes by wavelength, a surface
+        or sunsky whose data end within the bands, or an earlier result of another size, bands or lights.
+
+    Warns
+    -----
+    UserWarning
+        Where data of a light with colours of its own end within the bands: it gives no light beyond.
     """
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
+    warn_of_own_colours(scene, film.wavelength_nm, film.width_nm)
     limits = Limits(spp, max_spp, noise, max_seconds, seed)
     earlier = _checked_earlier(resume, scene, film)
     if cache is not None:
@@ -116,7 +123,7 @@ def _checked_film(
     require_whole("max_depth", max_depth, 2, 1 << 16, "2 is direct light")
     nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)
     widths = band_widths(nm, width_nm)
-    scene.check_range((nm - widths / 2).min(), (nm + widths / 2).max())
+    check_range(scene, float((nm - widths / 2).min()), float((nm + widths / 2).max()))
     return Film((int(size[0]), int(size[1])), nm, widths, int(max_depth))
 
 

@@ -16,6 +16,7 @@ from render.notebook import html_of
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
+from render.scene_range import warn_of_dark_ends
 from render.spectrum import Floats, Spectrum
 
 Stop = Literal["samples", "noise", "seconds", "interrupt"]
@@ -110,6 +111,11 @@ class Transport:
         InputError
             For an unknown group or illuminant, a negative power or level, both levels at once, a level of a scene
             that gives no light, or illuminance without a reference plane.
+
+        Warns
+        -----
+        UserWarning
+            Where a light's spectrum ends within the bands at a value other than 0: it gives no light beyond.
         """
         lights = self._lights(spectra, powers)
         coefficients, level_error = self._at_level(self._emission(lights), luminance_cd_m2, illuminance_lux)
@@ -213,7 +219,10 @@ class Transport:
             own = (spectra or {}).get(name, group.spectrum)
             power = float((powers or {}).get(name, group.power))
             require_range(f"powers[{name!r}]", power, 0.0, 1e30, "give a factor of 0 or more")
-            lights[name] = replace(group, spectrum=illuminant(own) if isinstance(own, str) else own, power=power)
+            spectrum = illuminant(own) if isinstance(own, str) else own
+            if power > 0:
+                warn_of_dark_ends(f"light group {name!r}", spectrum, self.wavelength_nm, self.width_nm)
+            lights[name] = replace(group, spectrum=spectrum, power=power)
         return lights
 
     def _emission(self, lights: Mapping[str, LightGroup]) -> Floats:

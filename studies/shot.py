@@ -54,6 +54,7 @@ class Order:
     spp: int = 64
     seed: int = 0
     trust: bool = False
+    extend: str | None = None
 
 
 @dataclass(frozen=True)
@@ -110,9 +111,11 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
     if is_radiance_file(order.source):
         if order.trust:
             raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")
+        if order.extend:
+            raise InputError(f"extend: {order.source!r} is a picture, which has no surfaces; leave --extend out")
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         return sensor, None
-    opened = open_scene(order.source, order.trust)
+    opened = open_scene(order.source, order.trust, order.extend)
     asked_level(opened.scene, order.level)
     check_covers(sensor.cfa, _size(order, opened))
     return sensor, opened

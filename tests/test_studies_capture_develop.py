@@ -146,6 +146,8 @@ def test_the_file_carries_the_calibration_for_the_white_balance_asked_for(
         (["flat_field", "--cfa", "bayr"], ["rodcone: cfa: 'bayr' is unknown", "did you mean 'bayer'"]),
         (["flat_field", "--trust-scene"], ["'flat_field' is no .xml scene"]),
         (["scene.exr", "--trust-scene"], ["'scene.exr' is no .xml scene"]),
+        (["scene.exr", "--extend", "hold"], ["'scene.exr' is a picture", "leave --extend out"]),
+        (["flat_field", "--extend", "zero"], ["extend: 'zero' is unknown; allowed: hold"]),
         (["none.xml"], ["'none.xml' is missing"]),
         (["flat_field", "--cfa", "rccc"], ["can't hold the mosaic", "shot.tif"]),
         (["flat_field", "--cfa", "rccc", "-o", "o/shot.tif"], ["has no G", "give exposure_s"]),
@@ -205,7 +207,7 @@ def test_light_with_colours_of_its_own_leaves_the_balance_at_daylight_and_says_s
 ) -> None:
     scene, out = tmp_path / "room.xml", tmp_path / "shot.dng"
     two = '<spectrum name="irradiance" value="2"/></emitter><emitter type="directional" id="sun:b">'
-    scene.write_text(SCENE.format(two + '<spectrum name="irradiance" value="400:1, 700:2"/>'))
+    scene.write_text(SCENE.format(two + '<spectrum name="irradiance" value="380:1, 780:2"/>'))
     arguments = ["capture", str(scene), "-o", str(out), "--cfa", "bayer", "--spp", "1", "--level", "25cd/m2"]
     code, _, err = call(arguments, capsys)
     assert (code, err.count("\n")) == (0, 1)

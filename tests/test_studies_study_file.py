@@ -40,6 +40,11 @@ def test_a_file_becomes_a_study_with_files_beside_it(tmp_path: Path) -> None:
     assert study == replace(expected, render=replace(expected.render, spp=16))
 
 
+def test_a_scenes_surfaces_may_be_held_beyond_their_tables(tmp_path: Path) -> None:
+    text = TEXT.replace('{source = "desk.exr", light = "A"}', '{source = "room.xml", extend = "hold"}')
+    assert read_study(written(tmp_path, text)).scenes[1] == SceneChoice(str(tmp_path / "room.xml"), extend="hold")
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=[path.stem for path in EXAMPLES])
 def test_every_example_is_a_study(path: Path) -> None:
     assert read_study(path).name == path.stem.replace("_", " ")
