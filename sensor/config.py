@@ -1,7 +1,7 @@
 """What a camera is: pixel, lens, mosaic, responses, converter. Zero switches a term off; there are no mode flags."""
 
 from dataclasses import dataclass, field
-from math import hypot, inf
+from math import ceil, hypot, inf
 from numbers import Real
 
 import numpy as np
@@ -172,8 +172,8 @@ class SensorConfig:
         Electrons per photon of each letter.
     bits : int
         Of the converter, 1 to 16.
-    black_level_dn : float or None
-        Reading of no light; None gives five standard deviations of the dark.
+    black_level_dn : int or None
+        Reading of no light; None gives five standard deviations of the dark, rounded up.
     window_nm : (float, float)
         Wavelengths that the camera lets in: an ideal filter in front of the responses.
     """
@@ -183,16 +183,14 @@ class SensorConfig:
     cfa: Tile = RGBW
     responses: Responses = field(default_factory=rgbw)
     bits: int = 14
-    black_level_dn: float | None = None
+    black_level_dn: int | None = None
     window_nm: tuple[float, float] = VISIBLE_NM
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
         require_whole("bits", self.bits, 1, 16, "give the converter's resolution")
         if self.black_level_dn is not None:
-            require_range(
-                "black_level_dn", self.black_level_dn, 0.0, self.white_dn - 0.5, "give DN under the white level"
-            )
+            require_whole("black_level_dn", self.black_level_dn, 0, self.white_dn - 1, "give DN under the white level")
         if not (isinstance(self.window_nm, tuple | list) and len(self.window_nm) == 2 and _increasing(self.window_nm)):
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give (shortest, longest) in nm")
         self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every letter has a curve
@@ -203,20 +201,21 @@ class SensorConfig:
         return int(2**self.bits - 1)
 
     @property
-    def black_e(self) -> float:
-        """Black level in electrons."""
+    def black_dn(self) -> int:
+        """Black level in DN: whole, for raw converters cut a fraction off and tint the dark by what they cut."""
         if self.black_level_dn is not None:
-            return self.black_level_dn * self.gain_e_per_dn
-        return float(BLACK_SIGMAS * (self.pixel.read_noise_e**2 + self.pixel.fixed_dark_e**2) ** 0.5)
+            return int(self.black_level_dn)
+        dark_e = BLACK_SIGMAS * hypot(self.pixel.read_noise_e, self.pixel.fixed_dark_e)
+        # The converter spans black and well: b / white = dark / (dark + well). Rounding errors make no DN more.
+        least = self.white_dn * dark_e / (self.pixel.full_well_e + dark_e)
+        return min(ceil(least - 1e-9), self.white_dn - 1)
 
     @property
     def gain_e_per_dn(self) -> float:
-        """Electrons per DN: black level and full well span the converter."""
-        if self.black_level_dn is not None:
-            return self.pixel.full_well_e / (self.white_dn - self.black_level_dn)
-        return (self.pixel.full_well_e + self.black_e) / self.white_dn
+        """Electrons per DN: the full well reads the converter's top."""
+        return self.pixel.full_well_e / (self.white_dn - self.black_dn)
 
     @property
-    def black_dn(self) -> float:
-        """Black level in DN (a fraction is allowed, as in DNG)."""
-        return self.black_e / self.gain_e_per_dn
+    def black_e(self) -> float:
+        """Black level in electrons."""
+        return self.black_dn * self.gain_e_per_dn

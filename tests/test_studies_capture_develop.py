@@ -373,7 +373,7 @@ def test_a_photograph_of_another_camera_is_developed_and_says_what_was_assumed(
     assert (code, facts["isp"], facts["noise"], facts["as_shot"]) == (0, "bayer", "assumed", "file")
     assert facts["reader"].startswith("LibRaw 0.")
     with Image.open(tmp_path / "other.png") as picture:
-        # LibRaw cuts black's fraction off: up to one DN of the well's 16 000, and the levels' rounding as above
+        # the levels' rounding as above
         assert np.abs(np.asarray(picture) - 255 * encode_srgb(np.array(0.25))).max() <= 0.7
         assert picture.size == raw.shape[::-1]
 
