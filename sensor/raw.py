@@ -160,7 +160,9 @@ def _checked_dn(dn: ArrayLike) -> NDArray[np.uint16]:
         raise InputError(f"dn: samples of type {samples.dtype} are not allowed; give whole numbers or finite floats")
     if samples.dtype.kind == "f" and not np.isfinite(samples).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(samples))[0])
-        raise InputError(f"dn: {samples[where]} at {where} is not allowed; give finite numbers: mend or mask that pixel")
+        raise InputError(
+            f"dn: {samples[where]} at {where} is not allowed; give finite numbers: mend or mask that pixel"
+        )
     return samples
 
 

@@ -25,7 +25,9 @@ def require_finite(**arrays: ArrayLike) -> None:
     for name, values in arrays.items():
         if not np.isfinite(values).all():
             where = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
-            raise InputError(f"{name}: {np.asarray(values)[where]} at {where}; allowed: finite numbers; mend that pixel")
+            raise InputError(
+                f"{name}: {np.asarray(values)[where]} at {where}; allowed: finite numbers; mend that pixel"
+            )
 
 
 def psnr_db(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:

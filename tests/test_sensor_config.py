@@ -37,7 +37,9 @@ def test_default_black_level_is_the_whole_dn_from_five_sigmas_of_the_dark_and_th
 
 
 def test_a_black_level_that_is_whole_already_is_not_raised_by_rounding_errors():
-    for black_dn in range(1, 2000):  # five sigmas read `black_dn` where read noise is well / (white - black) * black / 5
+    for black_dn in range(
+        1, 2000
+    ):  # five sigmas read `black_dn` where read noise is well / (white - black) * black / 5
         read_noise_e = 15_000 / (16_383 - black_dn) * black_dn / 5
         sensor = SensorConfig(replace(PIXEL, read_noise_e=read_noise_e, dsnu_e=0.0), LENS)
         assert sensor.black_dn == black_dn
