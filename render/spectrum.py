@@ -164,7 +164,7 @@ def _require_nm(shortest: float, longest: float) -> None:
         return
     fix = "give nanometres"
     for unit, factor in (("metres", 1e9), ("micrometres", 1e3)):
-        if SHORTEST_NM <= shortest * factor and longest * factor <= LONGEST_NM:
+        if shortest * factor >= SHORTEST_NM and longest * factor <= LONGEST_NM:
             fix = f"they seem to be {unit}: multiply them by {factor:g}"
             break
     raise InputError(

@@ -4,10 +4,8 @@ from dataclasses import dataclass, field
 from math import ceil, hypot, inf
 from numbers import Real
 
-import numpy as np
-
 from render.errors import InputError, require_range, require_whole
-from render.spectrum import VISIBLE_NM, Floats
+from render.spectrum import VISIBLE_NM
 from sensor.cfa import RGBW, Tile, channels, check_tile
 from sensor.curves import Responses, rgbw
 
@@ -135,23 +133,6 @@ class LensConfig:
         }
         for name, (low, high, fix) in limits.items():
             require_range(name, getattr(self, name), low, high, fix)
-
-
-def check_window(window_nm: tuple[float, float], wavelength_nm: Floats, width_nm: Floats) -> None:
-    """Raise `InputError` where a camera's window opens beyond 380-780 nm and the bands don't reach there.
-
-    Bands that are absent count as dark. Within 380-780 nm that is a choice of the scene; beyond, it would hide that a
-    W pixel may collect 16-35 % of its electrons there. Less than one more band may be missing.
-    """
-    first, last = wavelength_nm - width_nm / 2, wavelength_nm + width_nm / 2
-    beyond = ((window_nm[0], min(VISIBLE_NM[0], window_nm[1]), 0), (max(VISIBLE_NM[1], window_nm[0]), window_nm[1], -1))
-    for low, high, outermost in beyond:
-        seen = np.clip(np.minimum(last, high) - np.maximum(first, low), 0.0, None).sum()
-        if high - low - seen >= width_nm[outermost]:
-            raise InputError(
-                f"window_nm: {window_nm!r} asks for light at {low:g} to {high:g} nm and the scene's bands, "
-                f"{first[0]:g} to {last[-1]:g} nm, hold {seen:g} nm of it; narrow the window or render those bands"
-            )
 
 
 def _increasing(window_nm: tuple[float, float]) -> bool:

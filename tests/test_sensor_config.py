@@ -9,11 +9,12 @@ from render.errors import InputError
 from render.radiance import SpectralRadiance
 from render.spectrum import flat
 from sensor.cfa import BAYER, RGBW
-from sensor.config import LensConfig, PixelConfig, SensorConfig, check_window
+from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.optics import form_image
 from sensor.presets import low_noise, names, preset, table1_output, table1_pixel
 from sensor.response import expected_electrons
+from sensor.window import check_window
 
 PIXEL = PixelConfig(pitch_um=2.2, fill_factor=0.9, full_well_e=15_000.0, read_noise_e=3.0, dsnu_e=4.0, prnu=0.01)
 LENS = LensConfig(f_number=2.8)

@@ -16,6 +16,7 @@ from scipy.io import loadmat
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
+from render.spectrum import VISIBLE_NM
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.curves import read_csv, rgbw
 from sensor.optics import camera_equation, form_image
@@ -56,10 +57,10 @@ def scene(light, luminance_cd_m2, nm=NM):
     return SpectralRadiance(values * (luminance_cd_m2 / unit), nm)
 
 
-def camera(f_number, magnification=0.0, pitch_um=2.2, fill_factor=0.9, responses=None):
+def camera(f_number, magnification=0.0, pitch_um=2.2, fill_factor=0.9, responses=None, window_nm=(395.0, 705.0)):
     pixel = PixelConfig(pitch_um, fill_factor, full_well_e=15_000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
     lens = LensConfig(f_number, magnification=magnification)
-    return SensorConfig(pixel, lens, responses=responses or rgbw())
+    return SensorConfig(pixel, lens, responses=responses or rgbw(), window_nm=window_nm)
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +125,7 @@ def test_electrons_with_the_project_s_own_curves(key, letter):
 @pytest.mark.parametrize(("own", "tolerance"), [(False, TOLERANCE), (True, OWN_CURVES_TOLERANCE)])
 def test_w_s_electron_ratios_over_380_to_780_nm(light, own, tolerance, measured):
     # rectangle sums at 1 nm from 380 to 780 nm: bands of 1 nm, the outermost half a nanometre wider than the window
-    sensor = camera(4.0, responses=rgbw() if own else measured)
+    sensor = camera(4.0, responses=rgbw() if own else measured, window_nm=VISIBLE_NM)
     image = form_image(scene(light, 1.0, np.arange(380.0, 781.0)), sensor)
     red, green, blue, white = expected_electrons(image, sensor, 1.0).ravel()
     for value, expected in zip((white / red, white / green, white / blue), golden()[RATIOS[light]], strict=True):

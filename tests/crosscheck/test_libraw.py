@@ -3,7 +3,8 @@
 LibRaw balances with AsShotNeutral, goes to sRGB through ColorMatrix2 (D65) alone whatever the light, each row of
 camera-from-sRGB scaled to sum 1, and calls the least amplified channel's white level 1. The prediction here does the
 same arithmetic on the patches' expected signals, from tags read by tifffile. What separates the two: the raw
-data's and the output's rounding. Under D65 our own white balance by AsShotNeutral and our fitted matrix are the same line.
+data's and the output's rounding. Under D65 our own white balance by AsShotNeutral and our fitted matrix are the same
+line.
 """
 
 from dataclasses import replace
