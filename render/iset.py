@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError
-from render.file_checks import MOST_EXPANSION, SMALL_BYTES, require_extent, require_file, widths_between
+from render.file_checks import MOST_EXPANSION, SMALL_BYTES, bands_between, require_extent, require_file
 from render.mat5 import Value, read_variables
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
@@ -52,7 +52,7 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
     found = read_variables(path, _VARIABLES)
     try:
         nm, shape, photons = _photons(found)
-        widths = widths_between(nm)
+        centres, widths = bands_between(nm)
         needed, file_bytes = require_extent(*shape, nm.size), require_file(path)
         if needed > max(SMALL_BYTES, MOST_EXPANSION * file_bytes):
             raise InputError(
@@ -63,7 +63,7 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
             for plane, band, per_joule in zip(planes, photons, photons_per_joule(nm), strict=True):
                 plane[:] = band / per_joule
         _clip_negative(planes, 1.0 if _is_basis(found) else MOST_NEGATIVE)
-        return SpectralRadiance(np.moveaxis(planes, 0, -1), nm, width_nm=widths)
+        return SpectralRadiance(np.moveaxis(planes, 0, -1), centres, width_nm=widths)
     except InputError as refused:
         raise InputError(f"{path}: {refused}") from None
 

@@ -37,7 +37,8 @@ class SpectralRadiance:
     Raises
     ------
     InputError
-        Where the shape is wrong or a value is negative, NaN or infinite (its position is named).
+        Where the shape is wrong, a value is negative, NaN or infinite (its position is named), or bands reach beyond
+        100 to 20 000 nm or overlap (`render.spectrum.band_widths`).
     """
 
     values: NDArray[np.floating]

@@ -10,7 +10,7 @@ from render.iset import read_iset_scene
 from render.level import one_picture
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
-from render.spectrum import Spectrum
+from render.spectrum import LONGEST_NM, SHORTEST_NM, Spectrum
 from render.transport import Transport
 
 _READERS = {".exr": read_exr, ".mat": read_iset_scene}
@@ -50,7 +50,8 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
     """
     planes = np.ascontiguousarray(np.moveaxis(radiance.values, -1, 0), dtype=np.float32)[None]
     nm, width = radiance.wavelength_nm, radiance.widths_nm
-    whole = Spectrum(np.array([(nm - width).min(), (nm + width).max()]), np.ones(2))
+    ends = np.clip([(nm - width).min(), (nm + width).max()], SHORTEST_NM, LONGEST_NM)
+    whole = Spectrum(ends, np.ones(2))
     none = np.broadcast_to(np.float32(0), planes.shape)
     error = radiance.relative_mc_error
     variance = np.minimum((error * planes.astype(np.float64)) ** 2, np.finfo(np.float32).max).astype(np.float32)

@@ -220,6 +220,7 @@ def _facts(order: Order, opened: SceneFile, transport: Transport, radiance: Spec
         "size": list(radiance.shape[:2]),
         **render_facts(transport),
         "relative_mc_error": radiance.relative_mc_error,
+        "relative_level_error": radiance.relative_level_error,
         "largest_band_error": None if radiance.band_error is None else float(np.max(radiance.band_error)),
         "mean_luminance_cd_m2": float(radiance.luminance().mean()),
         "groups": groups,

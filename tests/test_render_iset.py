@@ -137,6 +137,7 @@ def test_uneven_wavelengths_are_told(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="half-way"):
         read = read_iset_scene(save(tmp_path, photons=PHOTONS[:, :, :3], wave=np.array([400.0, 410.0, 430.0])))
     assert read.widths_nm.tolist() == [10, 15, 20]
+    assert read.wavelength_nm.tolist() == [400, 412.5, 430]  # bands meet at 405 and 420 nm
 
 
 @pytest.mark.parametrize(

@@ -53,7 +53,10 @@ def test_a_pass_averages_the_steepest_reflectance_to_a_ten_thousandth():
 
 
 def test_the_table_holds_each_curve_at_each_wavelength_and_zero_outside():
-    ramp, flat = Spectrum(np.array([400.0, 500.0]), np.array([0.0, 1.0])), Spectrum(np.array([1.0, 999.0]), np.ones(2))
+    ramp, flat = (
+        Spectrum(np.array([400.0, 500.0]), np.array([0.0, 1.0])),
+        Spectrum(np.array([100.0, 999.0]), np.ones(2)),
+    )
     nm = np.array([[390.0, 400.0, 450.0, 475.0], [500.0, 500.1, 425.0, 410.0]])
     table = reflectance_table((ramp, flat), nm)
     assert table.dtype == np.float32

@@ -19,7 +19,7 @@ from outside_truth import (
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
-from render.spectrum import Spectrum
+from render.spectrum import VISIBLE_NM, Spectrum
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.curves import Responses, rgbw
 from sensor.optics import camera_equation, form_image
@@ -39,10 +39,10 @@ def scene(light, luminance_cd_m2, nm=NM):
     return SpectralRadiance(values * (luminance_cd_m2 / unit), nm)
 
 
-def camera(f_number, magnification=0.0, pitch_um=2.2, fill_factor=0.9, responses=None):
+def camera(f_number, magnification=0.0, pitch_um=2.2, fill_factor=0.9, responses=None, window_nm=(395.0, 705.0)):
     pixel = PixelConfig(pitch_um, fill_factor, full_well_e=15_000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
     lens = LensConfig(f_number, magnification=magnification)
-    return SensorConfig(pixel, lens, responses=responses or rgbw())
+    return SensorConfig(pixel, lens, responses=responses or rgbw(), window_nm=window_nm)
 
 
 @pytest.mark.parametrize("light", PHOTON_RADIANCE)
@@ -81,7 +81,7 @@ def test_electrons(curves, case, letter):
 def test_w_s_electron_ratios_over_380_to_780_nm(curves, light):
     # rectangle sums at 1 nm from 380 to 780 nm: bands of 1 nm, the outermost half a nanometre wider than the window
     responses, tolerance = CURVES[curves]
-    sensor = camera(4.0, responses=responses)
+    sensor = camera(4.0, responses=responses, window_nm=VISIBLE_NM)
     image = form_image(scene(light, 1.0, np.arange(380.0, 781.0)), sensor)
     red, green, blue, white = expected_electrons(image, sensor, 1.0).ravel()
     assert (white / red, white / green, white / blue) == pytest.approx(W_RATIOS[light], rel=tolerance)

@@ -291,9 +291,9 @@ LIGHT = (
     ),
     _fault(
         "level counts the lamps seen",
-        "render/transport.py",
-        "kept = ~self.emitter_visible\n",
-        "kept = np.ones_like(self.emitter_visible)\n",
+        "render/level.py",
+        "uncovered = float(self.spp @ self.uncovered) / float(self.spp.sum())",
+        "uncovered = 1.0",
         "render_transport",
     ),
     _fault(
@@ -549,8 +549,8 @@ STUDIES = (
     _fault(
         "white among the lamps",
         "studies/truth.py",
-        "[~emitter_visible], WHITE_PERCENTILE",
-        "[emitter_visible | True], WHITE_PERCENTILE",
+        "weights = 1.0 - transport.coverage.astype(np.float64)",
+        "weights, luminance = None, transport.relight().luminance()",
         "studies_truth_metrics",
         "studies_lit_scene",
     ),
