@@ -347,6 +347,22 @@ def test_an_error_asked_for_is_reached():
     assert made.relight().relative_mc_error > 0.006 / 1.5  # and not by far more work than it needs
 
 
+def test_an_error_is_not_believed_before_eight_passes():
+    assert small(noise=10.0, spp=None, max_spp=4096).passes == PASSES
+
+
+def test_seconds_are_those_of_all_the_calls_that_a_render_took():
+    part = replace(small(spp=8), seconds=1000.0)
+    start = time.perf_counter()
+    on = small(spp=16, resume=part)
+    took = time.perf_counter() - start
+    assert 1000.0 < on.seconds <= 1000.0 + took
+    start = time.perf_counter()
+    one = small(spp=512)
+    took = time.perf_counter() - start
+    assert 0.3 * took < one.seconds <= took  # what is left out is checks and the start of Mitsuba
+
+
 def test_samples_end_a_render_before_an_error_out_of_reach():
     made = small(noise=1e-6, spp=16)
     assert (made.spp, made.stopped_by) == (16, "samples")

@@ -8,7 +8,7 @@ from render.errors import InputError
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, flat
 from render.tables import colour_science
 from sensor.exposure import LONGEST_S, auto_exposure_s
 from sensor.optics import form_image
@@ -96,3 +96,11 @@ def test_a_lamp_in_the_picture_does_not_set_the_white() -> None:
     planes = (np.moveaxis(scene.values, -1, 0) / 1e4 + coverage).astype(np.float32)[None]
     lit = transport_of(planes, {"lamp": LightGroup(("lamp",), lamp)}, NM, scene.widths_nm, seen=coverage)
     assert shown_white_cd_m2(lit, None) == pytest.approx(10.0, rel=1e-4)
+
+
+def test_white_is_the_percentile_of_the_area_that_shows_no_light() -> None:
+    """Hundred greys of 1 to 100 cd/m^2: the 99th percentile is 99, at 90 % of white."""
+    unit = neutral_scene(1.0, shape=(10, 10))
+    planes = (np.moveaxis(unit.values, -1, 0) * np.arange(1, 101).reshape(10, 10)).astype(np.float32)[None]
+    lit = transport_of(planes, {"sky": LightGroup(("sky",), flat())}, NM, unit.widths_nm)
+    assert shown_white_cd_m2(lit, None) == pytest.approx(99 / 0.9, rel=1e-5)

@@ -564,4 +564,83 @@ STUDIES = (
     ),
 )
 
-FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *KERNEL, *STUDIES)
+# What the program states of its own work.
+RENDERS = (
+    _fault(
+        "samples told as asked",
+        "render/limits.py",
+        "                return held\n",
+        "                return spp\n",
+        "render_samples",
+        "studies_stated_numbers",
+    ),
+    _fault(
+        "one sampler for camera and meter",
+        "render/loader.py",
+        '_SAMPLER | {"seed": 1}',
+        "_SAMPLER",
+        "render_samples",
+        "render_meter",
+    ),
+    _fault(
+        "passes of equal weight",
+        "render/passes.py",
+        "mean += delta * (weight / drawn)",
+        "mean += delta / np.float32(sums.passes)",
+        "render_samples",
+        "render_engine",
+    ),
+    _fault(
+        "an error believed after two passes",
+        "render/limits.py",
+        "passes >= PASSES and error",
+        "passes >= 2 and error",
+        "render_engine",
+    ),
+    _fault(
+        "seconds of the earlier render forgotten",
+        "render/engine.py",
+        "start = time.perf_counter() - (earlier.seconds if earlier else 0.0)",
+        "start = time.perf_counter()",
+        "render_engine",
+        "render_cache",
+    ),
+    _fault(
+        "a level's error without the passes' scatter",
+        "render/level.py",
+        "variance = float(share @ off**2) / (self.spp.size - 1)",
+        "variance = float(share @ off**2)",
+        "render_transport",
+    ),
+    _fault(
+        "lamps of the picture in its level",
+        "render/dense.py",
+        "emitted, dr.select(indirect, share, 0.0)",
+        "emitted, share",
+        "render_engine",
+    ),
+    _fault(
+        "halves clipped at 0",
+        "render/transport.py",
+        "SpectralRadiance(_view(half),",
+        "SpectralRadiance(_view(np.maximum(half, 0)),",
+        "render_transport",
+    ),
+    _fault(
+        "another band than rendered",
+        "studies/prepare.py",
+        "bands=record.bands,",
+        "bands=record.bands + 1,",
+        "studies_stated_numbers",
+    ),
+    _fault(
+        "the longest exposure as the shortest",
+        "studies/prepare.py",
+        "min(job.study.longest_exposure_s, ",
+        "max(job.study.longest_exposure_s, ",
+        "studies_stated_numbers",
+    ),
+    _fault("white at another percentile", "studies/truth.py", "= 99.0, 0.9", "= 90.0, 0.9", "studies_truth_metrics"),
+)
+
+FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *KERNEL, *STUDIES, *RENDERS)
