@@ -62,7 +62,7 @@ def test_every_scene_tells_the_samples_it_drew(name, plane, paths):
     assert bool(paths.pop("meter", 0)) == (scene.reference_plane is not None)
 
 
-@pytest.mark.parametrize("asked", [*range(1, 70), 100, 128, 136, 512, 1000])
+@pytest.mark.parametrize("asked", [1, 2, 3, 4, 5, 7, 9, 11, 13, 17, 23, 33, 41, 67, 100, 128, 136, 512, 1000])
 @pytest.mark.parametrize("limit", ["spp", "max_spp"])
 def test_at_most_a_fifth_more_is_drawn_than_asked_for(limit, asked, paths):
     made = render(replace(load("flat_field"), reference_plane=None), SIZE, **{limit: asked}, **BANDS)

@@ -575,14 +575,6 @@ RENDERS = (
         "studies_stated_numbers",
     ),
     _fault(
-        "one sampler for camera and meter",
-        "render/loader.py",
-        '_SAMPLER | {"seed": 1}',
-        "_SAMPLER",
-        "render_samples",
-        "render_meter",
-    ),
-    _fault(
         "passes of equal weight",
         "render/passes.py",
         "mean += delta * (weight / drawn)",
