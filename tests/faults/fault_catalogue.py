@@ -582,8 +582,8 @@ SCENES_FROM_OUTSIDE = (
     _fault(
         "a surface's table may end one side within the bands",
         "render/scene_range.py",
-        "if shortest_nm < low - _ROUNDING_NM or longest_nm > high + _ROUNDING_NM:",
-        "if shortest_nm < low - _ROUNDING_NM and longest_nm > high + _ROUNDING_NM:",
+        "if shortest_nm < low - _SLACK_NM or longest_nm > high + _SLACK_NM:",
+        "if shortest_nm < low - _SLACK_NM and longest_nm > high + _SLACK_NM:",
         "render_scene_range",
     ),
     _fault(
