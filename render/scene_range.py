@@ -14,7 +14,7 @@ SUNSKY_NM = (320.0, 720.0)  # Mitsuba's tables (Hosek & Wilkie 2012) end here, a
 CIE_NM = (360.0, 830.0)  # Mitsuba's MI_CIE_MIN and MI_CIE_MAX, likewise for the two below
 _WITHIN_CIE = ("blackbody", "d65")
 _EMISSION_WITHIN_CIE = (*_WITHIN_CIE, "envmap", "rgb")  # as reflectance, rgb is known at every wavelength
-_ROUNDING_NM = 1e-6  # of band edges
+_SLACK_NM = 0.01  # a thousandth of a band: of rounded edges
 
 
 def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:
@@ -31,7 +31,7 @@ def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:
             "constant and directional"
         )
     for path, (low, high), held in _surfaces(scene.geometry, paths):
-        if shortest_nm < low - _ROUNDING_NM or longest_nm > high + _ROUNDING_NM:
+        if shortest_nm < low - _SLACK_NM or longest_nm > high + _SLACK_NM:
             extend = ", or hold its end values beyond: extend='hold' or --extend hold" if held else ""
             raise InputError(f"{asked} {path} is known over {low:g}-{high:g} nm alone; give bands within{extend}")
 
@@ -49,8 +49,8 @@ def warn_of_dark_ends(light: str, spectrum: Spectrum, wavelength_nm: Floats, wid
     """Tell by a `UserWarning` where a light's spectrum ends within the bands at a value other than 0."""
     shortest, longest = (wavelength_nm - width_nm / 2).min(), (wavelength_nm + width_nm / 2).max()
     low, high = spectrum.wavelength_nm[[0, -1]]
-    below = shortest < low - _ROUNDING_NM and spectrum.values[0] > 0
-    if below or (longest > high + _ROUNDING_NM and spectrum.values[-1] > 0):
+    below = shortest < low - _SLACK_NM and spectrum.values[0] > 0
+    if below or (longest > high + _SLACK_NM and spectrum.values[-1] > 0):
         warnings.warn(
             f"{light} is known over {low:g}-{high:g} nm, and bands reach {shortest:g}-{longest:g} nm: "
             "it gives no light beyond what is known",

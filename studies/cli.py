@@ -144,9 +144,16 @@ def main(arguments: list[str] | None = None) -> Any:
 
 @contextmanager
 def _warnings_in_one_line() -> Iterator[None]:
-    """Print warnings as errors are, without the place in the code."""
+    """Print warnings as errors are, without the place in the code, each once."""
+    told: set[str] = set()
+
+    def tell(message: str) -> None:
+        if message not in told:
+            told.add(message)
+            print(f"rodcone: {message}", file=sys.stderr)
+
     with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_: print(f"rodcone: {message}", file=sys.stderr)
+        warnings.showwarning = lambda message, *_: tell(str(message))
         yield
 
 

@@ -8,9 +8,9 @@ import scipy.io
 
 from render.errors import InputError
 from render.exr import write_exr
-from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_source import as_transport, is_radiance_file, load_radiance
+from render.spectrum import Spectrum
 
 NM = np.array([350.0, 450.0, 589.3, 1200.0])
 WIDTHS = np.array([100 / 3, 20.0, 1.0, 0.7])
@@ -43,7 +43,7 @@ def test_illuminance_has_no_plane_and_the_group_has_a_name() -> None:
 
 
 def test_spectrum_of_the_group_is_a_factor() -> None:
-    light = illuminant("A")
+    light = Spectrum(np.array([300.0, 600.0, 1300.0]), np.array([1.0, 3.0, 0.5]))
     relit = as_transport(SpectralRadiance(VALUES, NM, width_nm=WIDTHS)).relight({"scene": light})
     assert relit.values == pytest.approx(VALUES * light.band_average(NM, WIDTHS), rel=1e-6)
 

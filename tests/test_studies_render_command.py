@@ -1,6 +1,7 @@
 """`rodcone render`: the file it writes, its facts, and one line with exit code 2 for bad input."""
 
 import json
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -116,6 +117,16 @@ def test_surfaces_go_on_at_their_ends_where_it_is_asked_for(
     assert "--extend hold" in err
     assert call([str(scene), "-o", str(out), *QUICK, "--extend", "hold"], capsys) == (0, f"{out}\n", "")
     np.testing.assert_allclose(read_exr(out).values, 0.5 * 2 / np.pi, rtol=1e-5)
+
+
+def test_a_light_that_ends_within_the_bands_is_told_once(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(warnings, "filters", [("always", None, Warning, None, 0)])  # not as errors, as in these tests
+    scene.write_text(scene.read_text().replace('"irradiance" value="2"', '"irradiance" value="450:2, 700:2"'))
+    code, _, err = call([str(scene), "-o", str(tmp_path / "o.exr"), *QUICK], capsys)
+    known = "light group 'sun' is known over 450-700 nm, and bands reach 400-720 nm"
+    assert (code, err) == (0, f"rodcone: {known}: it gives no light beyond what is known\n")
 
 
 BAD = {

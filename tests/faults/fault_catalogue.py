@@ -635,4 +635,50 @@ RENDERS = (
     _fault("white at another percentile", "studies/truth.py", "= 99.0, 0.9", "= 90.0, 0.9", "studies_truth_metrics"),
 )
 
-FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *KERNEL, *STUDIES, *RENDERS)
+SCENES_FROM_OUTSIDE = (
+    _fault(
+        "reflectance read as a plain property",
+        "render/matte.py",
+        'props.get_texture("reflectance")',
+        'props["reflectance"]',
+        "render_reflectance_nodes",
+    ),
+    _fault(
+        "held ends are zero",
+        "render/scene.py",
+        "np.interp(far, nm, table.values)",
+        "np.interp(far, nm, table.values, left=0.0, right=0.0)",
+        "render_scene_range",
+    ),
+    _fault(
+        "a surface's table may end one side within the bands",
+        "render/scene_range.py",
+        "if shortest_nm < low - _SLACK_NM or longest_nm > high + _SLACK_NM:",
+        "if shortest_nm < low - _SLACK_NM and longest_nm > high + _SLACK_NM:",
+        "render_scene_range",
+    ),
+    _fault(
+        "no warning of a light that ends within the bands",
+        "render/transport.py",
+        "if power > 0:",
+        "if power > 1e30:",
+        "render_scene_range",
+        "studies_render_command",
+    ),
+    _fault(
+        "folders of a trusted scene forgotten",
+        "render/scene_file.py",
+        "[Path(str(place)) for place in mi.file_resolver()] if trust else [file.parent]",
+        "[file.parent]",
+        "render_scene_file",
+    ),
+    _fault(
+        "any share of stored photons may be negative",
+        "render/iset.py",
+        "MOST_NEGATIVE = 0.01",
+        "MOST_NEGATIVE = 1.0",
+        "render_iset",
+    ),
+)
+
+FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *KERNEL, *STUDIES, *RENDERS, *SCENES_FROM_OUTSIDE)
