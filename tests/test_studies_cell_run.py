@@ -139,7 +139,7 @@ def test_a_cell_weighs_the_same_whatever_the_pictures_size_and_travels_as_it_is(
 def test_other_code_and_arrays_out_of_reach_are_told_in_one_line(tmp_path: Path) -> None:
     cell = made(tmp_path)[0]
     with pytest.raises(InputError, match="install the same rodcone"):
-        run_cell(replace(cell, code="0.0.0+other"))
+        run_cell(replace(cell, made_by=replace(cell.made_by, versions='{"rodcone": "0.0.0+other"}')))
     with pytest.raises(InputError, match="a folder that all workers see") as told:
         run_cell(replace(cell, electrons=tmp_path / "absent.npy"))
     assert "\n" not in str(told.value)

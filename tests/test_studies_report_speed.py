@@ -40,7 +40,7 @@ def test_a_condition_unknown_for_one_camera_counts_for_none() -> None:
 
 def test_the_chart_has_a_mark_a_camera_slower_ones_to_the_right_and_better_ones_above() -> None:
     of = made()
-    chart = speed_charts(of, speed_rows(of, ordered_cells(of)))[0]
+    chart = speed_charts(speed_rows(of, ordered_cells(of)))[0]
     assert [len(line.points) for line in chart.series] == [1, 1]
     slow, fast = (line.points[0] for line in chart.series)
     assert slow.x > fast.x
@@ -56,10 +56,10 @@ def test_an_unknown_time_or_psnr_has_no_mark() -> None:
             cell["seconds"] = None
     rows = speed_rows(of, ordered_cells(of))
     assert [row["develop"] for row in rows] == [pytest.approx(0.11), None] * 2
-    assert [len(chart.series) for chart in speed_charts(of, rows)] == [1, 1]
+    assert [len(chart.series) for chart in speed_charts(rows)] == [1, 1]
     for cell in of["cells"]:
         cell["psnr_db"] = None
-    assert speed_charts(of, speed_rows(of, ordered_cells(of))) == []
+    assert speed_charts(speed_rows(of, ordered_cells(of))) == []
 
 
 def test_ticks_of_less_than_two_decades_are_1_2_and_5() -> None:
