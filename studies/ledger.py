@@ -110,7 +110,7 @@ def read_ledger(folder: Path) -> Iterator[sqlite3.Connection]:
 
 
 def _check_whole(base: sqlite3.Connection, path: Path) -> None:
-    found = base.execute("PRAGMA quick_check(1)").fetchone()[0]
+    found = base.execute("PRAGMA integrity_check(1)").fetchone()[0]
     if found != "ok":
         raise InputError(f"{path}: it is no whole ledger ({one_line(found)}); run the sweep again in another folder")
 
