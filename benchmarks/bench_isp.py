@@ -7,25 +7,24 @@ the first call in a fresh process with an empty kernel cache, then
 - what others take: OpenCV's ``fastNlMeansDenoising`` on one 8-bit plane with the same windows (the yardstick of the
   ratios) and ``fastNlMeansDenoisingColored``, where `cv2` is installed, and scikit-image's ``denoise_nl_means`` on four
   planes;
-- the time a megapixel from 0.25 megapixels up;
+- frames from 0.25 megapixels up;
 - Mpx/s and error by patch, neighbourhood and way, the best trades marked: nothing faster in the table is as accurate
   and looks as far.
 
-Times are the best of several calls, on the clock and in CPU seconds of all threads; ratios are medians over pairs of
-calls in turn. Where other programs run, trust the ratios of CPU seconds. All of it runs on CUDA where a device answers.
+Times are medians of calls in turn, on the clock and of the processor; ratios are medians over pairs of calls. Where
+other programs run, trust the ratios of processor time. All of it runs on CUDA where a device answers.
 """
 
 import os
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
-from environment import print_environment
+from environment import beside, in_turn, print_environment, seconds_of
 from skimage.restoration import denoise_nl_means
 
 from isp.interleaved import reconstruct
@@ -60,69 +59,40 @@ def frame(mean_w_e: float, saturated_disc: float = 0.0, size: int = SIZE, height
 Call = Callable[[], object]
 
 
-def timed(function: Call) -> tuple[float, float]:
-    """Seconds of one call: on the clock, and in CPU time."""
-    start = time.perf_counter(), time.process_time()
-    function()
-    return time.perf_counter() - start[0], time.process_time() - start[1]
-
-
-def best(function: Call, repeats: int = 3) -> tuple[float, float]:
-    """Shortest of several calls after one that doesn't count, each kind of seconds by itself."""
-    function()
-    clock, cpu = zip(*(timed(function) for _ in range(repeats)), strict=True)
-    return min(clock), min(cpu)
-
-
-def beside(name: str, function: Call, yardstick: Call | None, repeats: int = 9, size: float = 1.0) -> None:
-    """Print the shortest of several calls, and the median ratio to the yardstick's calls in turn with these.
-
-    Where other programs run, a call is twice as long as a minute before; two calls in turn meet much the same machine.
-    """
-    if yardstick is None:
-        clock, cpu = (seconds / size for seconds in best(function, repeats))
-        print(f"{name}: {clock:.3f} s, {cpu:.3f} CPU s", flush=True)
-        return
-    function()
-    yardstick()
-    pairs = np.array([(timed(function), timed(yardstick)) for _ in range(repeats)])
-    pairs[:, 0] /= size
-    (clock, cpu), ratios = pairs[:, 0].min(axis=0), pairs[:, 0] / pairs[:, 1]
-    low, median, high = np.percentile(ratios, [25, 50, 75], axis=0)
-    spread = f"(middle half {low[1]:.2f} to {high[1]:.2f})"
-    print(f"{name}: {clock:.3f} s, {cpu:.3f} CPU s; {median[0]:.2f} and {median[1]:.2f} x {spread}", flush=True)
+def compare(name: str, function: Call, yardstick: Call, rounds: int = 9) -> None:
+    """Print a call's seconds beside the yardstick's."""
+    print(beside(name, in_turn({name: function, "yardstick": yardstick}, rounds), "yardstick"), flush=True)
 
 
 def first_call() -> None:
     """Time of the first calls in this process: two small frames that between them run every quick kernel."""
     # Wide enough for lanes that lie inside, and with edges of saturation.
     small, edge = frame(300.0, size=96), frame(14000.0, size=96)
-    clock, cpu = timed(lambda: [reconstruct(raw, **PATCHES) for raw in (small, edge)])
-    print(f"first calls, all quick kernels compiled: {clock:.2f} s, {cpu:.2f} CPU s", flush=True)
+    wall, cpu = seconds_of(lambda: [reconstruct(raw, **PATCHES) for raw in (small, edge)])
+    print(f"first calls, all quick kernels compiled: {wall:.2f} s, processor {cpu:.2f} s", flush=True)
 
 
-def others() -> Call | None:
-    """Time the other libraries; OpenCV's call on one plane, the yardstick, is returned."""
+def others() -> Call:
+    """Time the other libraries; the yardstick is returned: OpenCV's call on one plane, or scikit-image's."""
     planes = np.random.default_rng(0).integers(0, 256, (SIZE, SIZE, 4), dtype=np.uint8)
-    yardstick: Call | None = None
-    if find_spec("cv2"):
-        import cv2
-
-        plane, colour = planes[..., 0].copy(), planes[..., :3].copy()
-        yardstick = partial(cv2.fastNlMeansDenoising, plane, None, 10.0, 5, 21)
-        beside(f"OpenCV {cv2.__version__} fastNlMeansDenoising, one plane", yardstick, yardstick)
-        coloured = partial(cv2.fastNlMeansDenoisingColored, colour, None, 10.0, 10.0, 5, 21)
-        beside("OpenCV fastNlMeansDenoisingColored, three planes", coloured, yardstick, 3)
-    else:
-        print("OpenCV isn't installed (pip install opencv-python-headless): no ratios")
     four = planes.astype(np.float32) / 255.0
     settings = {"patch_size": 5, "patch_distance": 10, "h": 0.1, "fast_mode": True, "channel_axis": -1}
     slow = partial(denoise_nl_means, four, **settings)
-    beside("scikit-image denoise_nl_means, four planes together", slow, yardstick, 3)
+    if not find_spec("cv2"):
+        print("OpenCV isn't installed (pip install rodcone[bench]): ratios are to scikit-image's denoise_nl_means")
+        return slow
+    import cv2
+
+    plane, colour = planes[..., 0].copy(), planes[..., :3].copy()
+    yardstick = partial(cv2.fastNlMeansDenoising, plane, None, 10.0, 5, 21)
+    print(f"ratios are to OpenCV {cv2.__version__}'s fastNlMeansDenoising of one plane")
+    coloured = partial(cv2.fastNlMeansDenoisingColored, colour, None, 10.0, 10.0, 5, 21)
+    compare("OpenCV's, three planes in colour", coloured, yardstick, 3)
+    compare("scikit-image, four planes together", slow, yardstick, 3)
     return yardstick
 
 
-def ways(yardstick: Call | None) -> None:
+def ways(yardstick: Call) -> None:
     """Frames that take the kernel's different ways."""
     frames = {
         "one pixel a patch, the default": (frame(300.0), {"patch": PATCH, "sigma_s": SIGMA_S}),
@@ -136,7 +106,7 @@ def ways(yardstick: Call | None) -> None:
         "raw distance": (frame(300.0), {"distance": "raw", "sigma_s": 50.0}),
     }
     for name, (raw, settings) in frames.items():
-        beside(name, partial(reconstruct, raw, **{**PATCHES, **settings}), yardstick)
+        compare(name, partial(reconstruct, raw, **{**PATCHES, **settings}), yardstick)
 
 
 def trades() -> None:
@@ -150,7 +120,8 @@ def trades() -> None:
             for neighbourhood in (11, 21):
                 settings = {**PATCHES, "patch": patch, "neighbourhood": neighbourhood}
                 error = np.abs(reconstruct(small, **settings) - reconstruct_reference(small, **settings)) / FULL_E
-                clock, cpu = best(lambda large=large, settings=settings: reconstruct(large, **settings), 2)
+                times = in_turn({"": partial(reconstruct, large, **settings)}, 3)[""]
+                clock, cpu = np.median(times, axis=0)
                 size = large.dn.size / 1e6
                 rows.append(
                     (judge, patch, neighbourhood, size / clock, size / cpu, error.max(), (error**2).mean() ** 0.5)
@@ -162,13 +133,13 @@ def trades() -> None:
         print(f"| {row[0]} | {row[1]} | {row[2]} | {numbers} | {'' if beaten else 'on the front'} |")
 
 
-def sizes(yardstick: Call | None, large: bool) -> None:
-    """Time a megapixel by the size of the frame."""
+def sizes(yardstick: Call, large: bool) -> None:
+    """Frames of other sizes; a ratio over the size is the ratio a megapixel."""
     print()
     for width, height in [(512, 512), (1024, 1024), (2048, 2048), *([(6000, 4000)] if large else [])]:
         raw = frame(300.0, size=width, height=height)
-        size, repeats = raw.dn.size / SIZE**2, 3 if width > 3000 else 9
-        beside(f"{size:.2f} x 1024 x 1024, each", partial(reconstruct, raw, **PATCHES), yardstick, repeats, size)
+        name = f"{raw.dn.size / SIZE**2:.2f} x 1024 x 1024"
+        compare(name, partial(reconstruct, raw, **PATCHES), yardstick, 3 if width > 3000 else 9)
 
 
 def main() -> None:

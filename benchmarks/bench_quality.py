@@ -76,7 +76,7 @@ def open_stage(name: str, max_spp: int) -> Stage:
     spectrum = next(iter(scene.groups.values())).spectrum
     light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
     radiance = transport.relight(luminance_cd_m2=1.0)
-    white = shown_white_cd_m2(radiance, transport.emitter_visible)
+    white = shown_white_cd_m2(transport, 1.0)
     return Stage(radiance, light, white, encode_srgb(true_srgb(radiance, light, white)))
 
 

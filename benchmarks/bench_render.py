@@ -1,34 +1,31 @@
 """Time against error of the spectral render, beside stock Mitsuba in the same run.
 
 Run ``python benchmarks/bench_render.py``; ``--scene``, ``--bands``, ``--size``, ``--spp`` and ``--repeats`` narrow it
-down. It prints the environment, then for each scene and number of bands between 380 and 780 nm: seconds of one render
-and its error, for rodcone, for Mitsuba's ``path`` into a ``specfilm`` of the same bands with the same sampler
-(``multijitter``), and for the same with Mitsuba's default sampler (``independent``).
+down. It prints the environment, then for each scene and number of bands between 380 and 780 nm: seconds of one call and
+the error of what it returns, for rodcone's ``render(...).relight()``, the scene's loading included, for Mitsuba's
+``path`` into a ``specfilm`` of the same bands with the same sampler (``multijitter``), and for the same with Mitsuba's
+default sampler (``independent``); stock's scene is loaded beforehand.
 
 The error is the standard deviation over independent renders over their mean, the median over pixels and bands. Times
-are the least of the repeats, which take turns, after one that compiles. The ratio is stock's time for rodcone's error
-over rodcone's time: (t_stock e_stock^2) / (t_rodcone e_rodcone^2), since error falls with one over the root of time.
-Below it the same for the four wide channels of the RGBW sensor, which stock records as such (four channels) and
-rodcone sums from its bands. A scene of two light groups is rendered twice by rodcone, which can then be relit; both
-its renders count. An even sky needs no render of its own.
+are medians of repeats in turn, on the clock and of the processor, after one that compiles. The ratio is stock's time
+for rodcone's error over rodcone's time: (t_stock e_stock^2) / (t_rodcone e_rodcone^2), since error falls with one over
+the root of time. Below it the same for the four wide channels of the RGBW sensor, which stock records as such (four
+channels) and rodcone sums from its bands.
 """
 
 import argparse
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
-from environment import print_environment
+from environment import in_turn, print_environment
 from numpy.typing import NDArray
 
-from render.loader import PART_BANDS, Film, load_units, mitsuba_module, variant
-from render.passes import band_parts
+from render.engine import render
+from render.loader import mitsuba_module, variant
 from render.photometry import photons_per_joule
 from render.scene import Scene
-from render.spectrum import band_widths
-from render.transport import emission
 from scenes.catalog import load
 from sensor.curves import rgbw
 
@@ -37,40 +34,18 @@ BANDS = (4, 8, 16, 32, 64)
 LETTERS = ("R", "G", "B", "W")
 DEPTH = 8
 CURVE_NM = np.arange(380.0, 781.0, 5.0)
-Render = Callable[[int], NDArray[np.float64]]  # seed -> (channel, h, w)
+Draw = Callable[[int], NDArray[np.float64]]  # seed -> (channel, h, w)
 
 
-@dataclass(frozen=True)
-class Measured:
-    """Seconds of one render, and the relative error of it."""
-
-    seconds: float
-    error: float
-
-
-def film_of(bands: int, size: int) -> Film:
-    edges = np.linspace(380.0, 780.0, bands + 1)
-    centres = (edges[1:] + edges[:-1]) / 2
-    return Film((size, size), centres, band_widths(centres, np.diff(edges)), DEPTH)
-
-
-def ours(scene: Scene, film: Film, spp: int) -> Render:
-    loaded = load_units(scene, film)
-    lights = emission(scene.groups, film.wavelength_nm, film.width_nm)
-
+def ours(scene: Scene, nm: NDArray[np.float64], size: int, spp: int) -> Draw:
     def draw(seed: int) -> NDArray[np.float64]:
-        total = np.zeros((film.wavelength_nm.size, *film.size))
-        for index, unit in enumerate(loaded):
-            camera, groups = unit.mi_scene.sensors()[0], list(unit.groups)
-            for first, planes in band_parts(unit, camera, film, PART_BANDS, spp, 1000 * index + seed):
-                here = slice(first, first + planes.shape[1])
-                total[here] += (lights[groups, here, None, None] * planes).sum(axis=0)
-        return total
+        made = render(scene, (size, size), wavelength_nm=nm, spp=spp, max_depth=DEPTH, seed=seed)
+        return np.moveaxis(made.relight().values, -1, 0).astype(np.float64)
 
     return draw
 
 
-def stock(scene: Scene, channels: dict[str, dict[str, Any]], size: int, spp: int, sampler: str) -> Render:
+def stock(scene: Scene, channels: dict[str, dict[str, Any]], size: int, spp: int, sampler: str) -> Draw:
     mi, description = mitsuba_module(), scene.description
     film = {"type": "specfilm", "width": size, "height": size, "component_format": "float32", **channels}
     film["rfilter"] = {"type": "box"}
@@ -85,11 +60,11 @@ def stock(scene: Scene, channels: dict[str, dict[str, Any]], size: int, spp: int
     return draw
 
 
-def boxes(film: Film) -> dict[str, dict[str, Any]]:
-    edges = zip(film.wavelength_nm - film.width_nm / 2, film.wavelength_nm + film.width_nm / 2, strict=True)
+def boxes(nm: NDArray[np.float64]) -> dict[str, dict[str, Any]]:
+    half = (nm[1] - nm[0]) / 2
     return {
-        f"band{i:03d}": {"type": "regular", "wavelength_min": float(a), "wavelength_max": float(b), "values": "1,1"}
-        for i, (a, b) in enumerate(edges)
+        f"band{i:03d}": {"type": "regular", "wavelength_min": x - half, "wavelength_max": x + half, "values": "1,1"}
+        for i, x in enumerate(nm.tolist())
     }
 
 
@@ -104,44 +79,34 @@ def responses() -> dict[str, dict[str, Any]]:
     }
 
 
-def into_channels(draw: Render, film: Film) -> Render:
+def into_channels(draw: Draw, nm: NDArray[np.float64]) -> Draw:
     """Wide channels summed from bands."""
-    weights = rgbw().band_average(LETTERS, film.wavelength_nm, film.width_nm) * film.width_nm
-    weights = weights * photons_per_joule(film.wavelength_nm) / photons_per_joule(550.0)
+    width_nm = np.full(nm.size, nm[1] - nm[0])
+    weights = rgbw().band_average(LETTERS, nm, width_nm) * width_nm
+    weights = weights * photons_per_joule(nm) / photons_per_joule(550.0)
     return lambda seed: np.tensordot(weights, draw(seed), axes=1)
 
 
-def measure(renders: dict[str, Render], repeats: int) -> dict[str, Measured]:
-    """Render in turns, so that what else the machine does falls on all alike."""
-    for draw in renders.values():
-        draw(0)
-    seconds: dict[str, list[float]] = {name: [] for name in renders}
-    sums: dict[str, Any] = dict.fromkeys(renders, 0.0)
-    squares: dict[str, Any] = dict.fromkeys(renders, 0.0)
-    for seed in range(1, repeats + 1):
-        for name, draw in renders.items():
-            start = time.process_time()
-            image = draw(seed)
-            seconds[name].append(time.process_time() - start)
-            sums[name], squares[name] = sums[name] + image, squares[name] + image**2
+def compare(label: str, draws: dict[str, Draw], repeats: int) -> None:
+    """Print each one's seconds and error, and how much longer the others take to rodcone's error."""
+    made: dict[str, list[NDArray[np.float64]]] = {name: [] for name in draws}
 
-    found = {}
-    for name in renders:
-        mean = sums[name] / repeats
-        variance = np.maximum(squares[name] / repeats - mean**2, 0.0) * repeats / (repeats - 1)
-        lit = mean > 0
-        found[name] = Measured(min(seconds[name]), float(np.median(np.sqrt(variance[lit]) / mean[lit])))
-    return found
+    def keep(name: str, draw: Draw) -> None:
+        made[name].append(draw(len(made[name])))
 
-
-def line(label: str, found: dict[str, Measured], own: str, others: tuple[str, ...]) -> None:
-    us = found[own]
-    parts = [f"{label:34s} rodcone {us.seconds:6.2f} s {us.error:8.5f}"]
-    for name in others:
-        it = found[name]
-        ratio = it.seconds * it.error**2 / (us.seconds * us.error**2)
-        parts.append(f"{name} {it.seconds:6.2f} s {it.error:8.5f} ratio {ratio:7.1f}")
-    print(" | ".join(parts), flush=True)
+    times = in_turn({name: partial(keep, name, draw) for name, draw in draws.items()}, repeats)
+    costs = {}
+    for name, images in made.items():
+        mean, deviation = np.mean(images, axis=0), np.std(images, axis=0, ddof=1)
+        lit, (wall, cpu) = mean > 0, np.median(times[name], axis=0)
+        error = float(np.median(deviation[lit] / mean[lit]))
+        costs[name] = times[name] * error**2
+        wall_ratio, cpu_ratio = np.median(costs[name] / costs["rodcone"], axis=0)
+        print(
+            f"{label:28s} {name:13s} {wall:6.2f} s, processor {cpu:6.2f} s, error {error:8.5f}; "
+            f"to rodcone's error {wall_ratio:7.1f} x, processor {cpu_ratio:7.1f} x",
+            flush=True,
+        )
 
 
 def main() -> None:
@@ -158,20 +123,16 @@ def main() -> None:
     for name in given.scene or SCENES:
         scene = load(name)
         for bands in given.bands or BANDS:
-            film = film_of(bands, given.size)
-            own = ours(scene, film, given.spp)
-            narrow = {
-                "rodcone": own,
-                "same sampler": stock(scene, boxes(film), given.size, given.spp, "multijitter"),
-                "independent": stock(scene, boxes(film), given.size, given.spp, "independent"),
-            }
-            line(f"{name}, {bands} bands", measure(narrow, given.repeats), "rodcone", ("same sampler", "independent"))
-            wide = {
-                "rodcone": into_channels(own, film),
-                "same sampler": stock(scene, responses(), given.size, given.spp, "multijitter"),
-                "independent": stock(scene, responses(), given.size, given.spp, "independent"),
-            }
-            line(f"{name}, RGBW from {bands}", measure(wide, given.repeats), "rodcone", ("same sampler", "independent"))
+            nm = 380.0 + 400.0 / bands * (np.arange(bands) + 0.5)
+            own, size_spp = ours(scene, nm, given.size, given.spp), (given.size, given.spp)
+            wide = into_channels(own, nm)
+            for label, mine, channels in (
+                (f"{name}, {bands} bands", own, boxes(nm)),
+                (f"{name}, RGBW from {bands}", wide, responses()),
+            ):
+                draws = {"rodcone": mine, "same sampler": stock(scene, channels, *size_spp, "multijitter")}
+                draws["independent"] = stock(scene, channels, *size_spp, "independent")
+                compare(label, draws, given.repeats)
 
 
 if __name__ == "__main__":

@@ -29,8 +29,11 @@ def dense_path(mi: Any) -> Any:
     ``meter``: whether paths begin on the shape of the scene's irradiance meter, instead of with the camera's ray. Its
     bands are irradiance over pi.
     ``even_sky``: whether the light of an even sky, which isn't in the scene, is told as well, by the paths that escape.
-    Channels after the first (alpha-less luminance film) hold the bands, then the sky's, and one more the share of paths
-    whose BSDF chose by wavelength.
+
+    Channels after the first (alpha-less luminance film) hold the bands, then the sky's. The camera's bands leave out
+    the light that is seen directly, which has channels of its own: the share of paths that meet a light first, which is
+    that light at unit emission; the share that meet the even sky; with ``own_colour`` the light's bands. The last
+    channel is the share of paths whose BSDF chose by wavelength.
     """
 
     class DensePath(mi.SamplingIntegrator):  # type: ignore[misc]
@@ -51,21 +54,22 @@ def dense_path(mi: Any) -> Any:
             self.offsets, self.table = mi.Float(offsets), TableReader(mi, reflectances)
 
         def aov_names(self) -> list[str]:
-            count = self.centres.size * (1 + self.even_sky)
-            return [*(f"band{i:04d}" for i in range(count)), "wavelength_dependent_choice"]
+            bands = self.centres.size
+            seen = 0 if self.meter else 1 + self.even_sky + self.own_colour * bands
+            count = bands * (1 + self.even_sky)
+            names = [*(f"band{i:04d}" for i in range(count)), *(f"seen{i:04d}" for i in range(seen))]
+            return [*names, "wavelength_dependent_choice"]
 
         def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
             offset, step = _jitter(mi, self.offsets, sampler.next_1d(active))
             wavelengths = _band_wavelengths(mi, self.centres, self.widths, offset)
-            if self.max_depth == 1:  # light seen directly: no material needs to be compiled
-                result, chosen = _seen(mi, scene, ray, wavelengths), mi.Bool(False)
-            else:
-                begin = _at_meter if self.meter else _at_camera
-                how = (self.own_colour, self.sample_lights)
-                start = begin(mi, scene, sampler, ray, wavelengths, *how)
-                path = (wavelengths, step, self.table, self.max_depth, *how, self.even_sky)
-                result, chosen = _trace(mi, scene, sampler, start, *path, mi.Bool(active))
+            how = (self.own_colour, self.sample_lights)
+            start = (_at_meter if self.meter else _at_camera)(mi, scene, sampler, ray, wavelengths, *how)
+            path = (wavelengths, step, self.table, self.max_depth, *how, self.even_sky, self.meter)
+            result, chosen = _trace(mi, scene, sampler, start, *path, mi.Bool(active))
             bands = [value for group in result for value in group]
+            if not self.meter:
+                bands += _seen(mi, scene, ray, wavelengths, self.own_colour, self.even_sky)
             return mi.Spectrum(0.0), mi.Bool(True), [*bands, dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
 
     return DensePath
@@ -124,10 +128,16 @@ def _arriving(direction: Any, sampled: Any, interaction: Any, wavelengths: list[
     return [sampled[0]] * len(wavelengths)
 
 
-def _seen(mi: Any, scene: Any, ray: Any, wavelengths: list[Any]) -> list[Any]:
-    """Emission of what the camera's ray meets first."""
-    si = scene.ray_intersect(mi.Ray3f(ray))
-    return list(dr.dispatch(si.emitter(scene), _emission, si, wavelengths))
+def _seen(mi: Any, scene: Any, ray: Any, wavelengths: list[Any], own_colour: bool, even_sky: bool) -> list[Any]:
+    """Channels of what the camera's ray meets first, if that is a light."""
+    si = scene.ray_intersect(mi.Ray3f(ray), mi.RayFlags.All, coherent=True)
+    emitted = _emitted(si.emitter(scene), si, wavelengths, own_colour)
+    bands = [value for group in emitted for value in group] if own_colour else []
+    shines = mi.Bool(False)
+    for value in bands or emitted[:1]:
+        shines |= value != 0
+    lights = [shines, ~si.is_valid()] if even_sky else [shines]
+    return [*(dr.select(light, mi.Float(1.0), mi.Float(0.0)) for light in lights), *bands]
 
 
 def _share(
@@ -256,11 +266,13 @@ def _trace(
     own_colour: bool,
     sample_lights: bool,
     even_sky: bool,
+    meter: bool,
     active: Any,
 ) -> tuple[list[Any], Any]:
     """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``).
 
-    A path that escapes meets the even sky, and then carries what the sky would give it: its throughput.
+    A path that escapes meets the even sky, and then carries what the sky would give it: its throughput. A light that
+    the camera's ray meets first counts for `_seen` alone.
     """
     bounce = _bounce_by_light if sample_lights else _bounce
     ray, previous, previous_pdf, previous_delta, result = start
@@ -271,9 +283,11 @@ def _trace(
     while dr.hint(active, label="dense path"):
         si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
         share = _share(mi, scene, si, previous, previous_pdf, previous_delta, sample_lights)
-        result = _plus(result, throughput, _emitted(si.emitter(scene), si, wavelengths, own_colour), share)
+        emitted = _emitted(si.emitter(scene), si, wavelengths, own_colour)
+        indirect = (depth > 0) | meter
+        result = _plus(result, throughput, emitted, dr.select(indirect, share, 0.0))
 
-        go_on, escaped = (depth + 1 < max_depth) & si.is_valid(), ~si.is_valid()
+        go_on, escaped = (depth + 1 < max_depth) & si.is_valid(), indirect & ~si.is_valid()
         received, sample, weights, by_wavelength = bounce(
             mi, scene, sampler, si.bsdf(ray), si, go_on, wavelengths, step, table, own_colour
         )

@@ -15,9 +15,10 @@ from render.cache import load_transport, save_transport
 from render.error_estimates import relative_error
 from render.errors import InputError, require_whole
 from render.limits import Limits
-from render.loader import Film, integrator_name, load_units, variant
-from render.passes import Sums, add_pass, emitter_visible, let_go, no_passes, sums_of
+from render.loader import Film, integrator_name, load_units, samples_drawn, variant
+from render.passes import Sums, add_pass, let_go, no_passes, sums_of
 from render.scene import Scene
+from render.scene_range import check_range, warn_of_own_colours
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from render.transport import Stop, Transport, emission
 
@@ -54,7 +55,8 @@ def render(
         Band centres and widths; 40 bands of 10 nm over 380-780 nm by default. `render.spectrum.line_bands` gives
         emission lines bands of their own.
     spp : int, optional
-        Samples a pixel, in eight passes; rounded up to what the passes and the stratified sampler can hold.
+        Samples a pixel, in eight passes or some more; rounded up by a fifth at most to what an even number of passes
+        and the stratified sampler can hold (below 5, to the next even number). `Transport.spp` tells the samples drawn.
     max_spp : int, optional
         The same as a ceiling beside `noise` or `max_seconds`: in passes of 16 or fewer.
     noise : float, optional
@@ -80,10 +82,16 @@ def render(
     Raises
     ------
     InputError
-        For a bad size, band or limit, a scene without light, a material that picks lobes by wavelength, a light whose
-        data end within the bands, or an earlier result of another size, bands or lights.
+        For a bad size, band or limit, a scene without light, a material that picks lobes by wavelength, a surface
+        or sunsky whose data end within the bands, or an earlier result of another size, bands or lights.
+
+    Warns
+    -----
+    UserWarning
+        Where data of a light with colours of its own end within the bands: it gives no light beyond.
     """
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
+    warn_of_own_colours(scene, film.wavelength_nm, film.width_nm)
     limits = Limits(spp, max_spp, noise, max_seconds, seed)
     earlier = _checked_earlier(resume, scene, film)
     if cache is not None:
@@ -115,7 +123,7 @@ def _checked_film(
     require_whole("max_depth", max_depth, 2, 1 << 16, "2 is direct light")
     nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)
     widths = band_widths(nm, width_nm)
-    scene.check_range((nm - widths / 2).min(), (nm + widths / 2).max())
+    check_range(scene, float((nm - widths / 2).min()), float((nm + widths / 2).max()))
     return Film((int(size[0]), int(size[1])), nm, widths, int(max_depth))
 
 
@@ -138,8 +146,8 @@ def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film) -> Tra
 
 def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None, progress: Progress) -> Transport:
     start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
-    sums = sums_of(earlier) if earlier else no_passes(len(scene.groups), film)
-    pass_spp = earlier.spp // earlier.passes if earlier else limits.pass_spp
+    sums = sums_of(earlier) if earlier else no_passes(scene, film)
+    pass_spp = limits.pass_spp(samples_drawn, sums.spp)
     loaded = load_units(scene, film)
     lights, stopped_by = _lights(scene, film), None
     with _told_to_stop() as told:
@@ -154,28 +162,22 @@ def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None,
             stopped_by = limits.stop(sums.drawn, sums.passes, error, now - start, now - pass_start)
             if stopped_by is None and told():
                 stopped_by = "interrupt"
-    return _transport(scene, film, sums, stopped_by, earlier, limits.seed, start)
+    return _transport(scene, film, sums, stopped_by, start)
 
 
-def _transport(
-    scene: Scene,
-    film: Film,
-    sums: Sums,
-    stopped_by: Stop,
-    earlier: Transport | None,
-    seed: int,
-    start: float,
-) -> Transport:
+def _transport(scene: Scene, film: Film, sums: Sums, stopped_by: Stop, start: float) -> Transport:
     """Turn the sums into a result, in place: they are used up."""
-    shared = sums.shared
+    shared, samples = sums.shared, np.float32(sums.drawn)
     sums.scatter *= sums.variance_factor
-    sums.signed /= np.float32(sums.passes)
+    for planes in (sums.signed, sums.coverage, *sums.seen):
+        np.divide(planes, samples, out=planes)
     return Transport(
         radiance=sums.mean,
         half_difference=sums.signed,
         variance=sums.scatter,
-        irradiance=sums.plane / sums.passes if scene.reference_plane else None,
-        emitter_visible=earlier.emitter_visible if earlier else emitter_visible(scene, film, seed),
+        coverage=np.minimum(sums.coverage, np.float32(1)),  # each group is found by paths of its own
+        seen=tuple(sums.seen),
+        pass_means=sums.pass_means(),
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,
         width_nm=film.width_nm,

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from render.errors import InputError, require_range
-from render.file_checks import widths_between
+from render.file_checks import bands_between
 from render.spectrum import Floats, band_widths
 
 VERSION = "1.0"
@@ -85,8 +85,8 @@ def write_bands(wavelength_nm: Floats, width_nm: Floats) -> str:
 def read_bands(channels: Mapping[str, float], header: Mapping[str, Any]) -> tuple[Floats, Floats]:
     """Band centres and widths [nm] of a file's radiance channels.
 
-    As rodcone's own attribute states them, if it still fits the channels; else the names' wavelengths, and widths as
-    `widths_between` finds them. What has to be assumed is told by a `UserWarning`.
+    As rodcone's own attribute states them, if it still fits the channels; else the names' wavelengths, as
+    `bands_between` takes them. What has to be assumed is told by a `UserWarning`.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def read_bands(channels: Mapping[str, float], header: Mapping[str, Any]) -> tupl
             f"one band at {nm[0]:g} nm has no width; allowed: two bands or more, or the attribute {BANDS}; "
             f"add it, such as '{nm[0]:.1f}:10.0'"
         )
-    return nm, widths_between(nm)
+    return bands_between(nm)
 
 
 def _parsed(text: str) -> tuple[Floats, Floats] | None:

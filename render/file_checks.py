@@ -50,10 +50,11 @@ def require_extent(height: int, width: int, channels: int) -> int:
     return needed
 
 
-def widths_between(wavelength_nm: Floats) -> Floats:
-    """Band widths [nm] of a file that states none: the spacing of its wavelengths.
+def bands_between(wavelength_nm: Floats) -> tuple[Floats, Floats]:
+    """Band centres and widths [nm] of a file that states its samples' wavelengths alone: they are as wide as spaced.
 
-    Where that is uneven, edges half-way between neighbours (the trapezoidal rule), which a `UserWarning` tells.
+    Where the spacing is uneven, bands meet half-way between neighbours (widths as in the trapezoidal rule), which a
+    `UserWarning` tells: a sample then lies beside its band's centre.
 
     Raises
     ------
@@ -63,12 +64,13 @@ def widths_between(wavelength_nm: Floats) -> Floats:
     nm = np.asarray(wavelength_nm, dtype=np.float64)
     steps = np.diff(nm)
     if nm.size < 2 or not np.all((steps > 0) & np.isfinite(steps)) or nm[0] <= 0:
-        return band_widths(nm)  # which refuses it
+        return nm, band_widths(nm)  # which refuses it
     if np.allclose(steps, steps[0], rtol=1e-6):
-        return band_widths(nm)
+        return nm, band_widths(nm)
     warnings.warn(
         "its wavelengths are not evenly spaced and no widths are stated: edges half-way between them are taken",
         UserWarning,
         stacklevel=2,
     )
-    return np.asarray((np.append(steps[0], steps) + np.append(steps, steps[-1])) / 2)
+    edges = np.concatenate([[nm[0] - steps[0] / 2], (nm[1:] + nm[:-1]) / 2, [nm[-1] + steps[-1] / 2]])
+    return (edges[1:] + edges[:-1]) / 2, np.diff(edges)

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.errors import InputError
-from render.file_checks import MOST_EXPANSION, SMALL_BYTES, require_extent, require_file, widths_between
+from render.file_checks import MOST_EXPANSION, SMALL_BYTES, bands_between, require_extent, require_file
 from render.mat5 import Value, read_variables
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from render.spectrum import Floats
 
+MOST_NEGATIVE = 0.01  # of the samples of stored photons; more is no noise
 _VARIABLES = ("scene", "mcCOEF", "basis", "imgMean", "photons", "data", "wave", "wavelength")
 
 
@@ -26,9 +27,10 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
     """Read an ISETCam multispectral scene as radiance.
 
     Three forms are known, and looked for in this order: a saved ``scene`` struct; ``mcCOEF`` and ``basis``, with
-    ``imgMean`` where the mean was taken out; ``photons`` (or ``data``) with ``wave`` (or ``wavelength``). Photons that
-    a basis makes negative become 0, as in ISETCam, which a `UserWarning` tells. Wavelength samples stand for bands as
-    wide as their spacing. The illuminant in the file is not needed for radiance and not read.
+    ``imgMean`` where the mean was taken out; ``photons`` (or ``data``) with ``wave`` (or ``wavelength``). Negative
+    photons become 0, as in ISETCam, which a `UserWarning` tells: any that a basis gives, and up to 1 % of those that
+    stand in the file. Wavelength samples stand for bands as wide as their spacing. The illuminant in the file is not
+    needed for radiance and not read.
 
     Parameters
     ----------
@@ -44,13 +46,13 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
     ------
     InputError
         Where there is no such file or form in it, it is ``-v7.3`` or damaged, shapes don't fit, its
-        size is over 32768 pixels a side or 8 GiB, or a value is negative or not finite.
+        size is over 32768 pixels a side or 8 GiB, over 1 % of stored photons are negative, or a value is not finite.
     """
     path = Path(path)
     found = read_variables(path, _VARIABLES)
     try:
         nm, shape, photons = _photons(found)
-        widths = widths_between(nm)
+        centres, widths = bands_between(nm)
         needed, file_bytes = require_extent(*shape, nm.size), require_file(path)
         if needed > max(SMALL_BYTES, MOST_EXPANSION * file_bytes):
             raise InputError(
@@ -60,9 +62,15 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
         with np.errstate(all="ignore"):  # SpectralRadiance tells where a value isn't finite
             for plane, band, per_joule in zip(planes, photons, photons_per_joule(nm), strict=True):
                 plane[:] = band / per_joule
-        return SpectralRadiance(np.moveaxis(planes, 0, -1), nm, width_nm=widths)
+        _clip_negative(planes, 1.0 if _is_basis(found) else MOST_NEGATIVE)
+        return SpectralRadiance(np.moveaxis(planes, 0, -1), centres, width_nm=widths)
     except InputError as refused:
         raise InputError(f"{path}: {refused}") from None
+
+
+def _is_basis(found: Mapping[str, Value]) -> bool:
+    """Whether the file holds coefficients of basis functions instead of photons."""
+    return "mcCOEF" in found and "scene" not in found
 
 
 def _photons(found: Mapping[str, Value]) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
@@ -71,7 +79,7 @@ def _photons(found: Mapping[str, Value]) -> tuple[Floats, tuple[int, int], Itera
         scene = _struct(found, "scene")
         data = _struct(scene, "data")
         return _stored(_struct(scene, "spectrum"), "wave", data, "photons")
-    if "mcCOEF" in found:
+    if _is_basis(found):
         return _from_basis(found)
     photons = "photons" if "photons" in found else "data"
     return _stored(found, "wave" if "wave" in found else "wavelength", found, photons)
@@ -109,22 +117,17 @@ def _from_basis(found: Mapping[str, Value]) -> tuple[Floats, tuple[int, int], It
     mean = _numbers(found, "imgMean").ravel().astype(np.float64) if "imgMean" in found else np.zeros(nm.size)
     if mean.size != nm.size:
         raise InputError(f"imgMean: {mean.size} values don't fit {nm.size} wavelengths; give one each")
-    return nm, coefficients.shape[:2], _bands(coefficients, functions, mean)
+    bands = (coefficients @ weights + offset for weights, offset in zip(functions, mean, strict=True))
+    return nm, coefficients.shape[:2], bands
 
 
-def _bands(
-    coefficients: NDArray[np.float64], functions: NDArray[np.float64], mean: Floats
-) -> Iterator[NDArray[np.float64]]:
-    """Photons of one band after another, never negative; how many were is told at the end."""
-    cut = 0
-    for weights, offset in zip(functions, mean, strict=True):
-        band = coefficients @ weights + offset
-        cut += int(np.count_nonzero(band < 0))
-        yield np.maximum(band, 0.0)
-    if cut:
-        share = cut / (mean.size * coefficients[:, :, 0].size)
+def _clip_negative(planes: NDArray[np.float32], most: float) -> None:
+    """Set negative values to 0 and tell their share; where it is over `most` they stay, to be refused."""
+    share = sum(int(np.count_nonzero(plane < 0)) for plane in planes) / planes.size
+    if 0 < share <= most and np.isfinite(planes.min()):
+        np.maximum(planes, 0.0, out=planes)
         warnings.warn(
-            f"{share:.2%} of its photons were negative and became 0, as in ISETCam", UserWarning, stacklevel=4
+            f"{100 * share:.3g}% of its photons were negative and became 0, as in ISETCam", UserWarning, stacklevel=3
         )
 
 

@@ -1,5 +1,6 @@
 """When a render stops: samples, error or time, whichever comes first."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ DEFAULT_SPP = 64
 PASSES = 8  # scatter of fewer passes says little about the error
 PASS_SPP = 16  # samples a pixel and pass where only an error or a time is asked for
 MOST_SPP = 1 << 16  # ceiling where only an error is asked for
+MOST_ROUNDING = 1.2  # samples drawn over those asked for, at most; below 5 an even number of passes may draw more
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,7 @@ class Limits:
     Attributes
     ----------
     spp : int or None
-        Samples a pixel, drawn in `PASSES` passes.
+        Samples a pixel, drawn in `PASSES` passes or some more.
     max_spp : int or None
         The same, drawn in passes of at most `PASS_SPP`: for a render that is to stop earlier.
     noise : float or None
@@ -59,11 +61,26 @@ class Limits:
         """Samples a pixel after which the render stops in any case."""
         return self.spp or self.max_spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
 
-    @property
-    def pass_spp(self) -> int:
-        """Samples a pixel of each pass."""
+    def pass_spp(self, drawn: Callable[[int], int], earlier: Sequence[int] = ()) -> int:
+        """Samples a pixel of each pass to come: the most that keep to `PASSES` and `MOST_ROUNDING`.
+
+        Parameters
+        ----------
+        drawn : callable
+            Samples that the sampler draws where so many are asked for.
+        earlier : sequence of int
+            Samples of each pass that was made already; passes of the last one's size are preferred.
+        """
         whole = -(-self.most_spp // PASSES)
-        return min(whole, PASS_SPP) if self.max_spp or self.most_spp == MOST_SPP else whole
+        wanted = min(whole, PASS_SPP) if self.max_spp or self.most_spp == MOST_SPP else whole
+        missing = self.most_spp - sum(earlier)
+        for spp in range(earlier[-1] if earlier else wanted, 1, -1):
+            held = drawn(spp)
+            pairs = -(-missing // (2 * held))
+            enough = len(earlier) + 2 * pairs >= PASSES
+            if enough and sum(earlier) + 2 * held * pairs <= MOST_ROUNDING * self.most_spp:
+                return held
+        return 1
 
     def met_by(self, earlier: Transport) -> bool:
         """Whether a render that was made earlier leaves nothing to do."""

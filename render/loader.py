@@ -1,7 +1,8 @@
 """From a `Scene` to Mitsuba objects: variant, film, and the scene at unit emission."""
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
+from operator import getitem
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,8 @@ from render.errors import InputError, one_line
 from render.jit import backend
 from render.matte import matte_surface, with_matte_surfaces
 from render.reflectance_table import band_offsets, reflectance_table, with_rows
-from render.scene import Node, Scene, uniform_node
+from render.scattered_path import scattered_path
+from render.scene import EMISSION_PARAMETER, OWN_COLOUR_EMITTERS, Node, Scene, uniform_node
 from render.scene_paths import search_path
 from render.spectrum import Floats, Spectrum
 
@@ -23,6 +25,7 @@ METER_PIXELS = 64  # film of the irradiance meter, each side
 # one, and compile in 5 and 12 s.
 PART_BANDS = 40
 _SAMPLER = {"type": "multijitter"}  # 8.7 times less error than "independent" under sun and sky at 64 samples, as fast
+_METER_SAMPLER = _SAMPLER | {"seed": 1}  # Mitsuba makes equal objects one: they would share a count
 _VARIANTS = {"cuda": "cuda_ad_spectral", "llvm": "llvm_ad_spectral", "numpy": "scalar_spectral"}
 
 
@@ -40,7 +43,9 @@ def mitsuba_module() -> Any:
     mi.set_variant(variant())
     mi.set_log_level(mi.LogLevel.Error)
     mi.set_file_resolver(search_path(mi))
-    if backend() != "numpy":
+    if backend() == "numpy":
+        mi.register_integrator("scatteredpath", scattered_path(mi))
+    else:
         mi.register_integrator("densepath", dense_path(mi))
         mi.register_bsdf("matte", matte_surface(mi))
     return mi
@@ -67,7 +72,7 @@ class Film:
 
 @dataclass(frozen=True)
 class Loaded:
-    """Mitsuba's scene of one light group, or of one and an even sky: sensor 0 is the camera, 1 the meter if any.
+    """Mitsuba's scene of one light group, or of one and an even sky.
 
     Attributes
     ----------
@@ -82,6 +87,9 @@ class Loaded:
     curves : tuple of Spectrum
         Reflectances that are read from a table, row by row. None where lights have colours of their own: a line in them
         would be met at few of the table's wavelengths.
+    covering : mitsuba.Scene or None
+        The same scene with a film of one band and lights of 1 whatever their colours: it shows what they cover. None
+        with Dr.Jit, where the camera's paths tell.
     """
 
     mi_scene: Any
@@ -89,6 +97,24 @@ class Loaded:
     own_colour: bool
     sample_lights: bool
     curves: tuple[Spectrum, ...] = ()
+    covering: Any = None
+
+    @property
+    def camera(self) -> Any:
+        """Mitsuba's sensor."""
+        return self.mi_scene.sensors()[0]
+
+    @property
+    def meter(self) -> Any | None:
+        """Mitsuba's irradiance meter on the reference plane, if the scene states one."""
+        return next(iter(self.mi_scene.sensors()[1:]), None)
+
+
+def samples_drawn(spp: int) -> int:
+    """Samples a pixel that Mitsuba's stratified sampler draws where so many are asked for: it fills a grid."""
+    sampler = mitsuba_module().load_dict(_SAMPLER)
+    sampler.set_sample_count(spp)
+    return int(sampler.sample_count())
 
 
 def integrator_name() -> str:
@@ -116,23 +142,30 @@ def _load_unit(scene: Scene, group: str, film: Film) -> Loaded:
         meter = {
             "type": "irradiancemeter",
             "film": _recorder(film, (METER_PIXELS, METER_PIXELS)),
-            "sampler": _SAMPLER,
+            "sampler": _METER_SAMPLER,
         }
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
     place, own_colour = (list(scene.groups).index(group),), scene.groups[group].own_colour
     if backend() == "numpy":
-        return Loaded(_load(scene, description), place, own_colour, sample_lights=True)
+        covering = _load(scene, _covering(scene, group, film))
+        return Loaded(_load(scene, description), place, own_colour, sample_lights=True, covering=covering)
     matte = with_matte_surfaces(description)
     tabulated, curves = (matte, ()) if own_colour else with_rows(matte)
     mi_scene = _load(scene, tabulated)
     return Loaded(mi_scene, place, own_colour, not _is_even_sky(mi_scene), curves)
 
 
-def load_direct(scene: Scene, film: Film) -> Loaded:
-    """Load a scene for one question: which pixels see a light directly. All groups at unit emission, depth 1."""
-    description = scene.lit({name: uniform_node(1.0) for name in scene.groups})
-    description["sensor"] = {**description["sensor"], "film": _recorder(film, film.size), "sampler": _SAMPLER}
-    return Loaded(_load(scene, description), (0,), own_colour=True, sample_lights=True)
+def _covering(scene: Scene, group: str, film: Film) -> Node:
+    """Describe the scene with the group's lights at 1, on a film of one band."""
+    description = scene.lit({group: uniform_node(1.0)})
+    one_band = replace(film, wavelength_nm=film.wavelength_nm[:1], width_nm=film.width_nm[:1])
+    description["sensor"] = {**description["sensor"], "film": _recorder(one_band, film.size), "sampler": _SAMPLER}
+    for path in scene.groups[group].emitters if scene.groups[group].own_colour else ():
+        *way, key = path.split("/")
+        holder = reduce(getitem, way, description)
+        kind = "constant" if holder[key]["type"] in OWN_COLOUR_EMITTERS else holder[key]["type"]
+        holder[key] = {"type": kind, EMISSION_PARAMETER[kind]: uniform_node(1.0)}
+    return description
 
 
 def _load(scene: Scene, description: Node) -> Any:
@@ -173,7 +206,8 @@ def integrators(film: Film, part_bands: int, unit: Loaded, seed: int, meter: boo
     """
     mi = mitsuba_module()
     if backend() == "numpy":
-        return [mi.load_dict({"type": "path", "max_depth": film.max_depth})]
+        kind = "path" if meter else "scatteredpath"
+        return [mi.load_dict({"type": kind, "max_depth": film.max_depth})]
     how = {"own_colour": unit.own_colour, "sample_lights": unit.sample_lights, "even_sky": len(unit.groups) > 1}
     offsets, made = band_offsets(seed), []
     for part in parts(film, part_bands):
@@ -189,7 +223,14 @@ def integrators(film: Film, part_bands: int, unit: Loaded, seed: int, meter: boo
     return made
 
 
+def seen_directly() -> Any:
+    """Integrator of the light that the camera sees directly, without LLVM or CUDA."""
+    return mitsuba_module().load_dict({"type": "path", "max_depth": 1})
+
+
 def parts(film: Film, part_bands: int) -> list[NDArray[np.int64]]:
-    """Indices of the bands in each part, as even as can be: their sizes differ by one at most."""
+    """Indices of the bands in each part, as even as can be: their sizes differ by one at most. One without Dr.Jit."""
     count = film.wavelength_nm.size
+    if backend() == "numpy":
+        return [np.arange(count)]
     return np.array_split(np.arange(count), -(-count // part_bands))

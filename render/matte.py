@@ -22,7 +22,7 @@ def matte_surface(mi: Any) -> Any:
     class Matte(mi.BSDF):  # type: ignore[misc]
         def __init__(self, props: Any) -> None:
             super().__init__(props)
-            self.reflectance = props["reflectance"]
+            self.reflectance = props.get_texture("reflectance")
             self.twosided = bool(props.get("twosided", False))
             # As data of the surface: written into the code, each would be compiled apart.
             self.row = dr.opaque(mi.UInt32, int(props["row"])) if "row" in props else None

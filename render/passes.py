@@ -2,15 +2,17 @@
 
 import traceback
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from render.dense import LANES
 from render.error_estimates import SharedPaths
 from render.errors import InputError, one_line
-from render.loader import PART_BANDS, Film, Loaded, integrators, load_direct, mitsuba_module, parts, variant
+from render.level import PassMeans
+from render.loader import PART_BANDS, Film, Loaded, integrators, mitsuba_module, parts, seen_directly, variant
 from render.scene import Scene
 from render.spectrum import Floats
 from render.transport import Transport
@@ -19,29 +21,43 @@ Planes = NDArray[np.float32]  # (band, h, w)
 
 METER_BANDS = 4  # traced together by the irradiance meter: its film is small, and its kernel another one to compile
 METER_SPP = 16  # most samples a pixel and pass of its 64x64 film: 65 536 paths a pass for one number a band
-VISIBLE_SPP = 16  # samples a pixel to find where a light is seen directly
 
 
 @dataclass
 class Sums:
-    """Running sums over passes (Welford), (group, band, h, w); the only mutable state of a render.
+    """Running sums over passes, each weighed by its samples (Welford; West 1979); the only mutable state of a render.
 
-    `product` (band, h, w) is the scatter's counterpart of two groups that `share` their paths: their covariance's.
+    `mean`, `scatter` and `signed` have the shape (group, band, h, w). `seen` and `coverage` are as of `Transport`,
+    times the samples. `product` (band, h, w) is the scatter's counterpart of two groups that `share` their paths.
+    `spp`, `uncovered`, `radiance` and `irradiance` hold a value a pass, as `PassMeans`.
     """
 
     mean: NDArray[np.float32]
     scatter: NDArray[np.float32]
     signed: NDArray[np.float32]
-    plane: Floats
+    seen: list[Planes]
+    coverage: NDArray[np.float32]
     share: tuple[int, int] | None = None
     product: Planes | None = None
-    passes: int = 0
-    drawn: int = 0
+    spp: list[int] = field(default_factory=list)
+    uncovered: list[float] = field(default_factory=list)
+    radiance: list[Floats] = field(default_factory=list)
+    irradiance: list[Floats] = field(default_factory=list)
+
+    @property
+    def passes(self) -> int:
+        """Passes so far."""
+        return len(self.spp)
+
+    @property
+    def drawn(self) -> int:
+        """Samples a pixel so far."""
+        return sum(self.spp)
 
     @property
     def variance_factor(self) -> np.float32:
         """What turns the scatter into the variance of the mean."""
-        return np.float32(1 / ((self.passes - 1) * self.passes))
+        return np.float32(1 / ((self.passes - 1) * self.drawn))
 
     @property
     def shared(self) -> SharedPaths | None:
@@ -53,26 +69,35 @@ class Sums:
         found = np.divide(self.product, both, out=np.zeros_like(both), where=both > 0)
         return SharedPaths(self.share, np.clip(found, -1, 1, out=found))
 
+    def pass_means(self) -> PassMeans:
+        """What each pass gives for levels."""
+        plane = np.array(self.irradiance) if self.irradiance else None
+        return PassMeans(np.array(self.spp), np.array(self.uncovered), np.array(self.radiance), plane)
 
-def no_passes(groups: int, film: Film) -> Sums:
-    """Sums of nothing."""
-    shape = (groups, film.wavelength_nm.size, *film.size)
-    mean, scatter, signed = (np.zeros(shape, np.float32) for _ in range(3))
-    return Sums(mean, scatter, signed, plane=np.zeros(shape[:2]))
+
+def no_passes(scene: Scene, film: Film) -> Sums:
+    """Sums before the first pass."""
+    bands = film.wavelength_nm.size
+    mean, scatter, signed = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(3))
+    seen = [np.zeros((bands if x.own_colour else 1, *film.size), np.float32) for x in scene.groups.values()]
+    return Sums(mean, scatter, signed, seen, np.zeros(film.size, np.float32))
 
 
 def sums_of(transport: Transport) -> Sums:
     """Sums that an earlier render stopped at, to go on from: its radiance to the bit."""
-    passes, drawn, shared = transport.passes, transport.spp, transport.shared
+    means, samples = transport.pass_means, np.float32(transport.spp)
     sums = Sums(
         mean=transport.radiance.copy(),
-        scatter=transport.variance * np.float32((passes - 1) * passes),
-        signed=transport.half_difference * np.float32(passes),
-        plane=np.zeros(transport.radiance.shape[:2]) if transport.irradiance is None else transport.irradiance * passes,
-        passes=passes,
-        drawn=drawn,
+        scatter=transport.variance * np.float32((transport.passes - 1) * transport.spp),
+        signed=transport.half_difference * samples,
+        seen=[planes * samples for planes in transport.seen],
+        coverage=transport.coverage * samples,
+        spp=means.spp.tolist(),
+        uncovered=means.uncovered.tolist(),
+        radiance=list(means.radiance),
+        irradiance=[] if means.irradiance is None else list(means.irradiance),
     )
-    if shared:
+    if shared := transport.shared:
         one, other = (np.sqrt(sums.scatter[group]) for group in shared.groups)
         sums.share, sums.product = shared.groups, shared.correlation * one * other
     return sums
@@ -80,86 +105,125 @@ def sums_of(transport: Transport) -> Sums:
 
 def add_pass(loaded: list[Loaded], sums: Sums, film: Film, pass_spp: int, seed: int) -> None:
     """Render every group once more, with a seed of its own, and add it to the sums."""
-    sums.passes += 1
+    groups, bands = sums.mean.shape[:2]
+    index, covered = sums.passes, 0.0
+    radiance, irradiance = np.zeros((groups, bands)), np.zeros((groups, bands))
+    sums.spp.append(pass_spp)
     for unit in loaded:
-        camera, *meter = unit.mi_scene.sensors()
-        of_pass = pass_seed(seed, unit.groups[0], sums.passes - 1)
-        for first, planes in band_parts(unit, camera, film, PART_BANDS, pass_spp, of_pass):
-            _add(sums, unit.groups, slice(first, first + planes.shape[1]), planes)
-        if meter:
-            sums.plane[list(unit.groups)] += _meter(unit, meter[0], film, min(pass_spp, METER_SPP), of_pass)
-    sums.drawn += int(camera.sampler().sample_count())  # what the stratified sampler really drew
+        of_pass = pass_seed(seed, unit.groups[0], index)
+        for part in camera_parts(unit, film, pass_spp, of_pass):
+            chosen = slice(part.first, part.first + part.scattered.shape[1])
+            _add(sums, unit.groups, chosen, part)
+            radiance[unit.groups, chosen] = part.scattered.mean(axis=(2, 3), dtype=np.float64)
+            if part.first == 0:  # every part of the bands sees the same paths
+                sums.coverage += np.float32(pass_spp) * part.coverage
+                covered += float(part.coverage.mean(dtype=np.float64))
+        if unit.meter is not None:
+            irradiance[list(unit.groups)] = _irradiance(unit, film, min(pass_spp, METER_SPP), of_pass)
+    sums.uncovered.append(1 - covered)
+    sums.radiance.append(radiance)
+    if any(unit.meter is not None for unit in loaded):
+        sums.irradiance.append(irradiance)
 
 
-def _add(sums: Sums, groups: tuple[int, ...], bands: slice, planes: Planes) -> None:
-    """Add some bands of one pass; `planes` holds the groups in the order given."""
-    count, off_mean = np.float32(sums.passes), []
-    for group, of_group in zip(groups, planes, strict=True):
+@dataclass(frozen=True)
+class Part:
+    """Some bands of one pass, as a camera sees them.
+
+    Attributes
+    ----------
+    first : int
+        Index of the first band.
+    scattered : (group, band, h, w) float32
+        Band averages without the light that is seen directly, of the unit's groups in order.
+    seen : tuple of (band or 1, h, w) float32
+        Light that is seen directly, of each group: by band where it has a colour of its own.
+    coverage : (h, w) float32
+        Share of the samples that meet a light first.
+    """
+
+    first: int
+    scattered: Planes
+    seen: tuple[Planes, ...]
+    coverage: Planes
+
+
+def _add(sums: Sums, groups: tuple[int, ...], bands: slice, part: Part) -> None:
+    """Add some bands of the pass whose samples were noted last."""
+    weight, drawn, off_mean, told = np.float32(sums.spp[-1]), np.float32(sums.drawn), [], []
+    for group, scattered, seen in zip(groups, part.scattered, part.seen, strict=True):
+        of_group = scattered + seen
         mean = sums.mean[group, bands]
         delta = of_group - mean
-        mean += delta / count
-        sums.scatter[group, bands] += delta * (of_group - mean)
-        sums.signed[group, bands] += of_group if sums.passes % 2 else -of_group
+        mean += delta * (weight / drawn)
+        sums.scatter[group, bands] += weight * delta * (of_group - mean)
+        sums.signed[group, bands] += weight * (of_group if sums.passes % 2 else -of_group)
+        if len(seen) > 1 or bands.start == 0:
+            sums.seen[group][bands if len(seen) > 1 else slice(None)] += weight * seen
         off_mean.append(delta)
+        told.append(of_group)
     if len(groups) == 2:
         if sums.product is None:
             sums.share, sums.product = (groups[0], groups[1]), np.zeros_like(sums.mean[0])
-        sums.product[bands] += off_mean[0] * (planes[1] - sums.mean[groups[1], bands])
+        sums.product[bands] += weight * off_mean[0] * (told[1] - sums.mean[groups[1], bands])
 
 
-def _meter(unit: Loaded, sensor: Any, film: Film, spp: int, seed: int) -> Floats:
-    """Irradiance on the reference plane, shape (group, band); summed in float64, so that threads don't change it."""
-    parts_of = band_parts(unit, sensor, film, METER_BANDS, spp, seed, meter=True)
-    meter = np.concatenate([planes.mean(axis=(2, 3), dtype=np.float64) for _, planes in parts_of], axis=1)
-    # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
-    return meter if variant() == "scalar_spectral" else meter * np.pi
-
-
-def band_parts(
-    unit: Loaded, sensor: Any, film: Film, most: int, spp: int, seed: int, meter: bool = False
-) -> Iterator[tuple[int, Planes]]:
-    """Render one sensor, at most `most` bands at a time: index of the first band, and band averages.
-
-    These have shape (group, band, h, w), the groups being those of the unit. Every part of the bands sees the same
-    paths.
-    """
-    first, tracers = 0, integrators(film, most, unit, seed, meter)
-    if variant() == "scalar_spectral":  # specfilm integrates over the band
-        image = _rendered(unit, sensor, tracers[0], spp, seed)
-        yield 0, (image / film.width_nm.astype(np.float32)[:, None, None])[None]
-        return
-    for part, integrator in zip(parts(film, most), tracers, strict=True):
-        image = _rendered(unit, sensor, integrator, spp, seed)
-        if image[-1].any():
-            raise InputError(
-                "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
-                "allowed: materials whose sampling doesn't depend on wavelength; replace it"
-            )
-        # Channel 0 is the film's own luminance, the last one the mark above; between them each group's bands.
-        groups = image[1:-1].reshape(len(unit.groups), -1, *image.shape[1:])
-        yield first, groups[:, : part.size]
+def camera_parts(unit: Loaded, film: Film, spp: int, seed: int) -> Iterator[Part]:
+    """Render the camera's picture, at most `PART_BANDS` bands at a time; every part sees the same paths."""
+    first, count = 0, len(unit.groups)
+    for part, integrator in zip(parts(film, PART_BANDS), integrators(film, PART_BANDS, unit, seed), strict=True):
+        image = _rendered(unit.mi_scene, unit.camera, integrator, spp, seed)
+        scattered, others = _bands(image, count, film.width_nm[part])
+        shares, of_light = others[:count], others[count : count + part.size]
+        if unit.covering is not None:
+            image = _rendered(unit.covering, unit.covering.sensors()[0], seen_directly(), spp, seed)
+            shares = _bands(image, 1, film.width_nm[:1])[0][0]
+            if unit.own_colour:
+                image = _rendered(unit.mi_scene, unit.camera, seen_directly(), spp, seed)
+                of_light = _bands(image, 1, film.width_nm)[0][0]
+        seen = (of_light if unit.own_colour else shares[:1], *shares[1:, None])
+        yield Part(first, scattered, seen, shares.sum(axis=0))
         first += part.size
 
 
-def _rendered(unit: Loaded, sensor: Any, integrator: Any, spp: int, seed: int) -> Planes:
+def _irradiance(unit: Loaded, film: Film, spp: int, seed: int) -> Floats:
+    """Irradiance on the reference plane, shape (group, band); summed in float64, so that threads don't change it."""
+    means = []
+    for part, integrator in zip(
+        parts(film, METER_BANDS), integrators(film, METER_BANDS, unit, seed, meter=True), strict=True
+    ):
+        image = _rendered(unit.mi_scene, unit.meter, integrator, spp, seed)
+        means.append(_bands(image, len(unit.groups), film.width_nm[part])[0].mean(axis=(2, 3), dtype=np.float64))
+    # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
+    return np.concatenate(means, axis=1) * (1 if variant() == "scalar_spectral" else np.pi)
+
+
+def _bands(image: Planes, groups: int, width_nm: Floats) -> tuple[Planes, Planes]:
+    """Band averages (group, band, h, w) of a rendered part, and the channels after them."""
+    size = width_nm.size
+    if variant() == "scalar_spectral":  # specfilm integrates over the band
+        return (image[:size] / width_nm.astype(np.float32)[:, None, None])[None], image[size:]
+    if image[-1].any():
+        raise InputError(
+            "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
+            "allowed: materials whose sampling doesn't depend on wavelength; replace it"
+        )
+    # Channel 0 is the film's own luminance; a group has its bands, filled up to a multiple of four.
+    filled = size + -size % LANES
+    bands, others = np.split(image[1:-1], [groups * filled])
+    return bands.reshape(groups, filled, *image.shape[1:])[:, :size], others
+
+
+def _rendered(mi_scene: Any, sensor: Any, integrator: Any, spp: int, seed: int) -> Planes:
+    """Channels of a picture, shape (channel, h, w)."""
     try:
-        image = mitsuba_module().render(unit.mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
+        image = mitsuba_module().render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
     except RuntimeError as error:
         cause = _root_cause(error)
         if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
             raise
         raise InputError(f"scene: Mitsuba can't render it: {one_line(cause)}; correct the description") from None
     return np.ascontiguousarray(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
-
-
-def emitter_visible(scene: Scene, film: Film, seed: int) -> NDArray[np.bool_]:
-    """Pixels in which a light is seen directly, shape (h, w)."""
-    loaded = load_direct(scene, film)
-    one_band = Film(film.size, film.wavelength_nm[:1], film.width_nm[:1], 1)
-    of_pass = pass_seed(seed, len(scene.groups), 0)
-    camera = loaded.mi_scene.sensors()[0]
-    _, planes = next(band_parts(loaded, camera, one_band, PART_BANDS, VISIBLE_SPP, of_pass))
-    return np.asarray(planes[0, 0] > 0)
 
 
 def pass_seed(seed: int, group: int, index: int) -> int:

@@ -18,7 +18,7 @@ class SpectralRadiance:
     Attributes
     ----------
     values : (h, w, band) floating
-        Band means [W m^-2 sr^-1 nm^-1], finite and not negative.
+        Band means [W m^-2 sr^-1 nm^-1], finite and, unless `signed`, not negative.
     wavelength_nm : (band,) float64
         Band centres, increasing.
     relative_mc_error : float
@@ -28,11 +28,17 @@ class SpectralRadiance:
     band_error : (band,) float64, optional
         What light that varies within a band adds to each band, relative, RMS over pixels: the product of band averages
         of transport and emission misses their covariance (`render.error_estimates.within_band_error`).
+    relative_level_error : float, optional
+        Monte Carlo standard error over the value of the level that the light was brought to; None where none was asked
+        for, or nothing tells it.
+    signed : bool
+        Whether values may be negative: half of a render's passes, whose noise may cross 0.
 
     Raises
     ------
     InputError
-        Where the shape is wrong or a value is negative, NaN or infinite (its position is named).
+        Where the shape is wrong, a value is negative, NaN or infinite (its position is named), or bands reach beyond
+        100 to 20 000 nm or overlap (`render.spectrum.band_widths`).
     """
 
     values: NDArray[np.floating]
@@ -40,6 +46,8 @@ class SpectralRadiance:
     relative_mc_error: float = 0.0
     width_nm: Floats | None = None
     band_error: Floats | None = None
+    relative_level_error: float | None = None
+    signed: bool = False
 
     def __post_init__(self) -> None:
         values = np.asarray(self.values)
@@ -49,7 +57,7 @@ class SpectralRadiance:
         widths = band_widths(centres, self.width_nm)
         if values.ndim != 3 or values.shape[2] != centres.size or 0 in values.shape:
             raise InputError(f"radiance: shape {values.shape} is not (h, w, {centres.size}); give one value a band")
-        check_values("radiance", values)
+        check_values("radiance", values, self.signed)
         require_range("relative_mc_error", self.relative_mc_error, 0.0, np.inf, "give a standard error over the mean")
         object.__setattr__(self, "values", values)
         object.__setattr__(self, "wavelength_nm", centres)
@@ -83,13 +91,13 @@ class SpectralRadiance:
         return html_of("SpectralRadiance", facts, self._repr_png_())
 
 
-def check_values(name: str, values: NDArray[np.floating]) -> None:
-    """Raise `InputError` at the first value of (h, w, band) that is negative, NaN or infinite."""
+def check_values(name: str, values: NDArray[np.floating], signed: bool = False) -> None:
+    """Raise `InputError` at the first value of (h, w, band) that is NaN, infinite or, unless `signed`, negative."""
     least, most = float(values.min()), float(values.max())  # two passes without a temporary; NaN carries through
-    if least >= 0 and most < np.inf:
+    if least >= (-np.finfo(values.dtype).max if signed else 0) and most < np.inf:
         return
-    row, column, band = (int(i) for i in np.argwhere(~(np.isfinite(values) & (values >= 0)))[0])
+    row, column, band = (int(i) for i in np.argwhere(~(np.isfinite(values) & ((values >= 0) | signed)))[0])
     raise InputError(
         f"{name}: {values[row, column, band]} at row {row}, column {column}, band {band}; "
-        "allowed: finite numbers >= 0; repair or mask that pixel"
+        f"allowed: finite numbers{'' if signed else ' >= 0'}; repair or mask that pixel"
     )

@@ -7,9 +7,10 @@ import numpy as np
 from render.errors import unknown
 from render.exr import read_exr
 from render.iset import read_iset_scene
+from render.level import one_picture
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
-from render.spectrum import Spectrum
+from render.spectrum import LONGEST_NM, SHORTEST_NM, Spectrum
 from render.transport import Transport
 
 _READERS = {".exr": read_exr, ".mat": read_iset_scene}
@@ -37,7 +38,7 @@ def load_radiance(path: str | Path) -> SpectralRadiance:
 def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
     """Transport whose one light group gives the radiance as it is at a spectrum of 1.
 
-    It has no reference plane, and no pixel counts as a light seen directly. The variance is what the radiance's
+    It has no reference plane, and no light counts as seen directly. The variance is what the radiance's
     relative Monte Carlo error says, the same share in every pixel; `half_difference` is 0, since one picture holds no
     two halves.
 
@@ -49,7 +50,8 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
     """
     planes = np.ascontiguousarray(np.moveaxis(radiance.values, -1, 0), dtype=np.float32)[None]
     nm, width = radiance.wavelength_nm, radiance.widths_nm
-    whole = Spectrum(np.array([(nm - width).min(), (nm + width).max()]), np.ones(2))
+    ends = np.clip([(nm - width).min(), (nm + width).max()], SHORTEST_NM, LONGEST_NM)
+    whole = Spectrum(ends, np.ones(2))
     none = np.broadcast_to(np.float32(0), planes.shape)
     error = radiance.relative_mc_error
     variance = np.minimum((error * planes.astype(np.float64)) ** 2, np.finfo(np.float32).max).astype(np.float32)
@@ -57,8 +59,9 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
         radiance=planes,
         half_difference=none,
         variance=variance if error else none,
-        irradiance=None,
-        emitter_visible=np.zeros(radiance.shape, dtype=np.bool_),
+        coverage=np.zeros(radiance.shape, np.float32),
+        seen=(np.zeros((1, *radiance.shape), np.float32),),
+        pass_means=one_picture(planes),
         groups={name: LightGroup((), whole)},
         wavelength_nm=nm,
         width_nm=width,

@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.jit import dr
-from render.scene import Node, uniform_node
+from render.scene import Node, table_of, uniform_node
 from render.spectrum import Floats, Spectrum
 
 STEPS = 16  # offsets within a band: a pass's mean over them is off by under 1e-4 of the steepest reflectance here
-_TABULATED = {"type", "wavelength_min", "wavelength_max", "values"}
 
 
 def band_offsets(seed: int) -> Floats:
@@ -52,38 +51,33 @@ class TableReader:
 def with_rows(node: Node) -> tuple[Node, tuple[Spectrum, ...]]:
     """Copy of a scene's dict in which matte surfaces name the rows of the table; and its curves.
 
-    A surface of one evenly spaced spectrum gets ``row``, a checkerboard of two ``row``, ``other_row`` and ``which``,
-    a texture of 0 and 1. Others, such as bitmaps, stay as they are, and are evaluated wavelength by wavelength.
+    A surface of one tabulated spectrum gets ``row``, a checkerboard of two ``row``, ``other_row`` and ``which``, a
+    texture of 0 and 1. Others, such as bitmaps, stay as they are, and are evaluated wavelength by wavelength.
     """
-    curves: dict[tuple[float, float, str], Spectrum] = {}
+    curves: dict[bytes, Spectrum] = {}
     made = _with_rows(node, curves)
     return made, tuple(curves.values())
 
 
-def _with_rows(node: Node, curves: dict[tuple[float, float, str], Spectrum]) -> Node:
+def _with_rows(node: Node, curves: dict[bytes, Spectrum]) -> Node:
     made = {key: _with_rows(value, curves) if isinstance(value, dict) else value for key, value in node.items()}
     texture = node.get("reflectance")
     if node.get("type") != "matte" or not isinstance(texture, dict):
         return made
-    if _is_tabulated(texture):
-        return {**made, "row": _row(texture, curves)}
-    colours = texture.get("color0"), texture.get("color1")
-    if texture.get("type") == "checkerboard" and all(map(_is_tabulated, colours)):
-        row, other = (_row(colour, curves) for colour in colours if colour)
-        which = {**texture, "color0": uniform_node(0.0), "color1": uniform_node(1.0)}
-        return {**made, "row": row, "other_row": other, "which": which}
+    if (table := table_of(texture)) is not None:
+        return {**made, "row": _row(table, curves)}
+    if texture.get("type") == "checkerboard":
+        colours = [texture.get(colour) for colour in ("color0", "color1")]
+        tables = [table_of(colour) if isinstance(colour, dict) else None for colour in colours]
+        if tables[0] and tables[1]:
+            row, other = _row(tables[0], curves), _row(tables[1], curves)
+            which = {**texture, "color0": uniform_node(0.0), "color1": uniform_node(1.0)}
+            return {**made, "row": row, "other_row": other, "which": which}
     return made
 
 
-def _is_tabulated(node: Node | None) -> bool:
-    return isinstance(node, dict) and node.get("type") == "regular" and node.keys() == _TABULATED
-
-
-def _row(node: Node, curves: dict[tuple[float, float, str], Spectrum]) -> int:
-    """Row of a ``regular`` spectrum; equal ones share it."""
-    low, high, text = float(node["wavelength_min"]), float(node["wavelength_max"]), str(node["values"])
-    values = np.array([float(x) for x in text.split(",")])
-    curve = Spectrum(np.linspace(low, high, values.size), values)
-    key = (low, high, text)
-    curves.setdefault(key, curve)
+def _row(table: Spectrum, curves: dict[bytes, Spectrum]) -> int:
+    """Row of a spectrum; equal ones share it."""
+    key = np.stack([table.wavelength_nm, table.values]).tobytes()
+    curves.setdefault(key, table)
     return list(curves).index(key)

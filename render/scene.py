@@ -6,8 +6,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from render.errors import InputError, unknown
-from render.spectrum import VISIBLE_NM, Spectrum
+from render.errors import InputError, one_line, unknown
+from render.optical_constants import optical_constant
+from render.spectrum import Floats, Spectrum
 
 Node: TypeAlias = dict[str, Any]
 
@@ -21,7 +22,7 @@ EMISSION_PARAMETER = {
 }
 # Emitter plug-ins with colours of their own, which differ over directions: a spectrum can only filter them.
 OWN_COLOUR_EMITTERS = ("envmap", "sunsky")
-SUNSKY_NM = (320.0, 720.0)  # Mitsuba's tables (Hosek & Wilkie 2012) end here, and give 0 beyond: found by evaluating it
+HELD_NM = (100.0, 20_000.0)  # as far as held ends go
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
 _SIZELESS_EMITTERS = ("point", "spot", "directional")  # rays can't meet them
 
@@ -62,22 +63,26 @@ class Scene:
         All of the scene's lights, each in one group.
     reference_plane : str or None
         Key of the shape on whose front illuminance is measured.
+    extend : "hold" or None
+        What surfaces do outside their tables (reflectance, transmittance, refractive index): ``"hold"`` continues the
+        end values, None refuses bands beyond them.
 
     Raises
     ------
     InputError
         Where a light is missing, of a kind that can't be relit, or in no group; where an ``envmap`` or ``sunsky`` is in
-        a group without `own_colour`; or the plane isn't in the scene.
+        a group without `own_colour`; or the plane isn't in the scene; or `extend` is something else.
     """
 
     name: str
     geometry: Node
     groups: Mapping[str, LightGroup]
     reference_plane: str | None = None
+    extend: str | None = None
 
     def __post_init__(self) -> None:
         grouped = [path for group in self.groups.values() for path in group.emitters]
-        present = _emitter_paths(self.geometry)
+        present = emitter_paths(self.geometry)
         for path in grouped:
             if path not in present:
                 raise unknown(f"scene {self.name}: emitter", path, present)
@@ -99,37 +104,20 @@ class Scene:
                 )
         if self.reference_plane is not None and self.reference_plane not in self.geometry:
             raise unknown(f"scene {self.name}: reference_plane", self.reference_plane, self.geometry)
+        if self.extend not in (None, "hold"):
+            raise unknown(f"scene {self.name}: extend", self.extend, ("hold",))
+        if self.extend:
+            object.__setattr__(self, "geometry", _hold(self.geometry, present))
 
     def is_even_sky(self, group: str) -> bool:
         """Whether a group is one light of one spectrum and of the same radiance from all around."""
         lights = self.groups[group]
-        kinds = [_emitter_paths(self.geometry)[path] for path in lights.emitters]
+        kinds = [emitter_paths(self.geometry)[path] for path in lights.emitters]
         return kinds == ["constant"] and not lights.own_colour
-
-    def check_range(self, shortest_nm: float, longest_nm: float) -> None:
-        """Raise `InputError` where data of a light or a surface end within the wavelengths asked for.
-
-        Tables of surfaces may end anywhere within 380-780 nm, and are black from there on; beyond, black would pass for
-        knowledge that nobody has.
-        """
-        low, high = SUNSKY_NM
-        if "sunsky" in _emitter_paths(self.geometry).values() and (shortest_nm < low or longest_nm > high):
-            raise InputError(
-                f"scene {self.name}: bands reach {shortest_nm:g}-{longest_nm:g} nm, and a sunsky is known over "
-                f"{low:g}-{high:g} nm alone; give wavelength_nm within, or light by area, constant and directional"
-            )
-        tables = _tables_nm(self.geometry)
-        low = max((min(start, VISIBLE_NM[0]) for start, _ in tables), default=0.0)
-        high = min((max(end, VISIBLE_NM[1]) for _, end in tables), default=np.inf)
-        if shortest_nm < low or longest_nm > high:
-            raise InputError(
-                f"scene {self.name}: bands reach {shortest_nm:g}-{longest_nm:g} nm, and its surfaces are known over "
-                f"{low:g}-{high:g} nm alone; give bands within, or a scene with longer tables, such as color_checker"
-            )
 
     def check_meter(self) -> None:
         """Raise `InputError` where Mitsuba's own irradiance meter, whose rays have to meet a light, would read 0."""
-        for path, kind in _emitter_paths(self.geometry).items():
+        for path, kind in emitter_paths(self.geometry).items():
             if self.reference_plane and kind in _SIZELESS_EMITTERS:
                 raise InputError(
                     f"scene {self.name}: without LLVM or CUDA light of {path!r} of type {kind!r} can't be measured; "
@@ -172,22 +160,59 @@ def uniform_node(value: float) -> Node:
     return {"type": "uniform", "value": value}
 
 
-def _tables_nm(node: Node) -> list[tuple[float, float]]:
-    """First and last wavelength of each spectrum that a scene's dict holds as a table."""
-    found: list[tuple[float, float]] = []
-    for value in node.values():
-        if not isinstance(value, dict):
-            continue
-        if value.get("type") == "regular":
-            found.append((float(value["wavelength_min"]), float(value["wavelength_max"])))
-        elif value.get("type") == "irregular":
-            nm = str(value["wavelengths"]).split(",")
-            found.append((float(nm[0]), float(nm[-1])))
-        found += _tables_nm(value)
-    return found
+def table_of(node: Node) -> Spectrum | None:
+    """Spectrum that a node states point by point; None for one of another kind.
+
+    Raises
+    ------
+    InputError
+        Where what it states is no such table.
+    """
+    kind, keys = node.get("type"), node.keys() - {"type", "id"}
+    try:
+        if kind == "irregular" and keys == {"wavelengths", "values"}:
+            return Spectrum(_numbers(node["wavelengths"]), _numbers(node["values"]))
+        if kind == "regular" and keys == {"wavelength_min", "wavelength_max", "values"}:
+            values = _numbers(node["values"])
+            nm = np.linspace(float(node["wavelength_min"]), float(node["wavelength_max"]), values.size)
+            return Spectrum(nm, values)
+    except (ValueError, TypeError) as error:  # InputError is a ValueError
+        raise InputError(f"{kind} spectrum: {one_line(error)}; give numbers, separated by commas") from None
+    return None
 
 
-def _emitter_paths(node: Node, prefix: str = "") -> dict[str, str]:
+def _numbers(text: Any) -> Floats:
+    return np.array(str(text).replace(",", " ").split(), dtype=np.float64)
+
+
+def _hold(node: Node, emitters: Mapping[str, str], prefix: str = "") -> Node:
+    """Copy of a node in which the tables outside of lights go on at their end values."""
+    if (table := table_of(node)) is not None:
+        return spectrum_node(_held(table))
+    result: Node = {}
+    for key, value in node.items():
+        path = f"{prefix}{key}"
+        nested = isinstance(value, dict) and path not in emitters
+        result[key] = _hold(value, emitters, f"{path}/") if nested else value
+    material = result.get("material")
+    if (
+        isinstance(material, str)
+        and (eta := optical_constant(material, "eta"))
+        and (k := optical_constant(material, "k"))
+    ):
+        del result["material"]
+        result |= {"eta": spectrum_node(_held(eta)), "k": spectrum_node(_held(k))}
+    return result
+
+
+def _held(table: Spectrum) -> Spectrum:
+    """Table that goes on at its end values."""
+    nm = table.wavelength_nm
+    far = np.unique([min(HELD_NM[0], nm[0]), *nm, max(HELD_NM[1], nm[-1])])
+    return Spectrum(far, np.interp(far, nm, table.values))
+
+
+def emitter_paths(node: Node, prefix: str = "") -> dict[str, str]:
     """Path and type of each emitter in a scene's dict."""
     found: dict[str, str] = {}
     for key, value in node.items():
@@ -196,7 +221,7 @@ def _emitter_paths(node: Node, prefix: str = "") -> dict[str, str]:
         path, kind = f"{prefix}{key}", value.get("type")
         if kind in (*EMISSION_PARAMETER, *OWN_COLOUR_EMITTERS, *_REFUSED_EMITTERS):
             found[path] = str(kind)
-        found |= _emitter_paths(value, f"{path}/")
+        found |= emitter_paths(value, f"{path}/")
     return found
 
 

@@ -19,7 +19,7 @@ from render.scene_parts import SceneFile, assemble
 from render.scene_paths import find_file, screen, search_path
 
 
-def load_scene_file(path: str | Path, *, trust: bool = False) -> SceneFile:
+def load_scene_file(path: str | Path, *, trust: bool = False, extend: str | None = None) -> SceneFile:
     """Read a Mitsuba XML scene.
 
     A Mitsuba scene can load native code. So it is read without Mitsuba first, then by Mitsuba's parser, which
@@ -32,6 +32,8 @@ def load_scene_file(path: str | Path, *, trust: bool = False) -> SceneFile:
     path : path
     trust : bool
         Lets the scene name folders, plug-ins of its own and files anywhere. Its native code then runs.
+    extend : "hold", optional
+        As of `Scene`: surfaces go on at their end values outside their tables.
 
     Returns
     -------
@@ -50,7 +52,9 @@ def load_scene_file(path: str | Path, *, trust: bool = False) -> SceneFile:
     screen(file, folder)
     mi = mitsuba_module()
     state = _parse(mi, file, trust)
-    return assemble(mi, file.stem, _from_xml(mi, state, file.parent, folder))
+    # A trusted scene's <path> folders are on Mitsuba's search path by now.
+    searched = [Path(str(place)) for place in mi.file_resolver()] if trust else [file.parent]
+    return assemble(mi, file.stem, _from_xml(mi, state, searched, folder), extend)
 
 
 def _parse(mi: Any, file: Path, trust: bool) -> Any:
@@ -70,7 +74,7 @@ def _parse(mi: Any, file: Path, trust: bool) -> Any:
     return state
 
 
-def _from_xml(mi: Any, state: Any, searched: Path, folder: Path | None) -> Node:
+def _from_xml(mi: Any, state: Any, searched: list[Path], folder: Path | None) -> Node:
     """Nested dict of a parsed scene: every part is checked before they are put together."""
     nodes, index_of = list(state.nodes), state.id_to_index
     if nodes[0].props.plugin_name() != "scene":
@@ -91,7 +95,9 @@ def _from_xml(mi: Any, state: Any, searched: Path, folder: Path | None) -> Node:
     return parts[0]
 
 
-def _xml_part(node: Any, nodes: list[Any], index_of: Mapping[str, int], searched: Path, folder: Path | None) -> Node:
+def _xml_part(
+    node: Any, nodes: list[Any], index_of: Mapping[str, int], searched: list[Path], folder: Path | None
+) -> Node:
     """One node of a parsed scene without its children."""
     properties = node.props
     if folder is not None:
@@ -109,7 +115,7 @@ def _xml_part(node: Any, nodes: list[Any], index_of: Mapping[str, int], searched
             target = nodes[index_of[value.id()]]  # an <alias> has no node of its own
             result[key] = {"type": "ref", "id": target.props.id()}
         elif kind == "String" and key == "filename":
-            result[key] = str(find_file(value, [searched], folder))
+            result[key] = str(find_file(value, searched, folder))
         elif kind != "ResolvedReference":
             result[key] = _xml_value(kind, value)
     return result

@@ -9,10 +9,11 @@ import numpy as np
 from render.allowed_plugins import ALLOWED, SPECTRA
 from render.errors import InputError, one_line
 from render.jit import backend, dr
-from render.scene import EMISSION_PARAMETER, LightGroup, Node
+from render.scene import EMISSION_PARAMETER, LightGroup, Node, table_of
 from render.spectrum import Floats, Spectrum, flat
 
-# MI_CIE_MIN to MI_CIE_MAX, outside of which Mitsuba's own spectra (rgb, d65, blackbody) are zero; 472 points, by fours.
+# MI_CIE_MIN to MI_CIE_MAX, outside of which Mitsuba's own spectra (rgb, d65, blackbody) are zero, and one point more,
+# which makes 472, by fours.
 _GRID_NM: Floats = np.arange(360.0, 832.0)
 
 Path = tuple[str, ...]  # keys from the scene to one of its parts
@@ -116,24 +117,14 @@ def _emission(mi: Any, where: str, emitter: Node, parts: Mapping[str, Node]) -> 
         probe = mi.load_dict({"type": "constant"} | ({} if value is None else {"radiance": value}))
     except RuntimeError as error:
         raise InputError(f"{where}: {reason(error)}; correct its spectrum") from None
-    return _tabulated(value) or Spectrum(_GRID_NM, np.maximum(_evaluate(mi, probe), 0.0))
+    return _stated(value) or Spectrum(_GRID_NM[:-1], np.maximum(_evaluate(mi, probe)[:-1], 0.0))
 
 
-def _tabulated(value: Any) -> Spectrum | None:
+def _stated(value: Any) -> Spectrum | None:
     """Spectrum that states its own points: taken as it is, since a line may lie between those of any grid."""
-    kind, keys = type_of(value), set(value) - {"type", "id"} if isinstance(value, dict) else set()
-    if kind in ("uniform", "spectrum") and keys == {"value"}:
+    if type_of(value) in ("uniform", "spectrum") and set(value) - {"type", "id"} == {"value"}:
         return flat(float(value["value"]))
-    if kind == "irregular" and keys == {"wavelengths", "values"}:
-        return Spectrum(_numbers(value["wavelengths"]), _numbers(value["values"]))
-    if kind == "regular" and keys == {"wavelength_min", "wavelength_max", "values"}:
-        values = _numbers(value["values"])
-        return Spectrum(np.linspace(value["wavelength_min"], value["wavelength_max"], values.size), values)
-    return None
-
-
-def _numbers(text: str) -> Floats:
-    return np.array(text.replace(",", " ").split(), dtype=np.float64)
+    return table_of(value) if isinstance(value, dict) else None
 
 
 def _evaluate(mi: Any, emitter: Any) -> Floats:

@@ -33,7 +33,7 @@ class SceneFile:
     notes: tuple[str, ...]
 
 
-def assemble(mi: Any, name: str, description: Node) -> SceneFile:
+def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -> SceneFile:
     """Build the scene: first camera, groups of lights by id, a shape with an ``irradiancemeter`` as reference plane.
 
     Lights belong to a group by their own id, or else their shape's, up to a colon: ``lamp:left`` and ``lamp:right``
@@ -46,6 +46,8 @@ def assemble(mi: Any, name: str, description: Node) -> SceneFile:
     name : str
     description : dict
         Plain nested dict, its plug-ins and files already checked.
+    extend : str, optional
+        As of `Scene`.
 
     Raises
     ------
@@ -80,7 +82,7 @@ def assemble(mi: Any, name: str, description: Node) -> SceneFile:
     groups = light_groups(mi, name, geometry, _check_references(name, geometry))
     if not groups:
         raise InputError(f"scene {name}: it has no light; allowed: one emitter or more; add one")
-    return SceneFile(Scene(name, geometry, groups, planes[0] if planes else None), size, tuple(notes))
+    return SceneFile(Scene(name, geometry, groups, planes[0] if planes else None, extend), size, tuple(notes))
 
 
 def _kind(mi: Any, part: Any) -> str:

@@ -46,7 +46,8 @@ def find_file(name: str, searched: list[Path], folder: Path | None) -> Path:
     if folder is not None and not Path(os.path.realpath(chosen)).is_relative_to(os.path.realpath(folder)):
         raise InputError(f"file {name!r} lies outside the scene's folder; move it there, or, {TRUST}")
     if not os.path.exists(chosen):
-        raise InputError(f"file {name!r} is missing in {searched[0]}; put it there or correct the name")
+        places = ", ".join(map(str, searched))
+        raise InputError(f"file {name!r} is missing in {places}; put it there or correct the name")
     if not os.path.isfile(chosen):
         raise InputError(f"file {name!r} is a folder or a device; allowed: a plain file; correct the name")
     return Path(chosen)
@@ -82,7 +83,8 @@ def screen(path: Path, folder: Path | None) -> None:
     path : Path
         Scene file, absolute.
     folder : Path or None
-        Where included files and spectra have to lie; None lets files anywhere and ``<path>`` through.
+        Where included files and spectra have to lie; None lets files anywhere and ``<path>`` through, in whose folders
+        they are then looked for.
     """
     _screen(path, [path.parent], folder, 0, _Spent())
 
@@ -103,6 +105,8 @@ def _screen(path: Path, searched: list[Path], folder: Path | None, level: int, s
             # As Mitsuba: a file's own folder counts for its includes alone, its includer's for both.
             places = [path.parent, *searched] if tag == "include" else searched
             named = _checked_element(tag, attributes, depth, places, folder, spent)
+            if tag == "path":  # the latest comes first; one of an included file counts in that file alone
+                searched.insert(0, _named_folder(attributes.get("value", ""), [path.parent, *searched], spent))
         except InputError as error:
             refuse(error)
         if named and tag == "include":
@@ -158,6 +162,15 @@ def _checked_element(
     if tag not in ("include", "spectrum") or "filename" not in attributes:
         return None
     return find_file(_substitute(attributes["filename"], spent.parameters), searched, folder)
+
+
+def _named_folder(value: str, searched: list[Path], spent: _Spent) -> Path:
+    """Folder that a ``<path>`` adds to the search path."""
+    name = _substitute(value, spent.parameters)
+    for base in searched:
+        if (base / name).is_dir():
+            return base / name
+    raise InputError(f"<path> folder {name!r} is missing in {searched[0]}; put it there or correct the name")
 
 
 def _substitute(text: str, parameters: Mapping[str, str]) -> str:

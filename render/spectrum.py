@@ -11,6 +11,8 @@ from render.errors import InputError
 Floats: TypeAlias = NDArray[np.float64]
 
 VISIBLE_NM = (380.0, 780.0)
+SHORTEST_NM, LONGEST_NM = 100.0, 20_000.0  # what is taken for a wavelength in nm: from the far ultraviolet to heat
+MOST_OVERLAP = 0.01  # of the narrower of two bands: rounding of stated edges, not light that counts twice
 LINE_BASE_NM = 0.1  # far under any band, so that a line's shape doesn't matter
 LINE_REACH_NM = 0.5  # from a line to the edges of its band: wide enough for a lamp's own width and tabulation
 DEFAULT_WAVELENGTH_NM: Floats = np.arange(385.0, 780.0, 10.0)  # centres of 40 bands that fill 380-780 nm
@@ -30,7 +32,7 @@ class Spectrum:
     Raises
     ------
     InputError
-        Where the points are not as above.
+        Where the points are not as above, or not within 100 to 20 000 nm.
     """
 
     wavelength_nm: Floats
@@ -43,6 +45,7 @@ class Spectrum:
             raise InputError(
                 f"wavelength_nm: {nm.tolist()!r} is not allowed; give two or more strictly increasing [nm]"
             )
+        _require_nm(float(nm[0]), float(nm[-1]))
         if values.shape != nm.shape or not np.all(np.isfinite(values) & (values >= 0)):
             raise InputError(
                 f"spectrum values: allowed are {nm.size} finite numbers >= 0, one a wavelength; correct them"
@@ -126,7 +129,8 @@ def band_widths(wavelength_nm: ArrayLike, width_nm: ArrayLike | None = None) -> 
     Raises
     ------
     InputError
-        Where centres don't increase, widths aren't positive, or the spacing isn't even and no widths are given.
+        Where centres don't increase, widths aren't positive, or the spacing isn't even and no widths are given; where
+        bands reach beyond 100 to 20 000 nm, or overlap by more than 1 % of a width.
     """
     nm = np.asarray(wavelength_nm, dtype=np.float64)
     if nm.ndim != 1 or nm.size == 0 or not np.all(np.isfinite(nm)) or np.any(np.diff(nm) <= 0) or nm[0] <= 0:
@@ -135,11 +139,37 @@ def band_widths(wavelength_nm: ArrayLike, width_nm: ArrayLike | None = None) -> 
         widths = np.broadcast_to(np.asarray(width_nm, dtype=np.float64), nm.shape).copy()
         if not np.all(np.isfinite(widths) & (widths > 0)):
             raise InputError(f"width_nm: {widths.tolist()!r} is not allowed; give positive band widths in nm")
-        return widths
-    steps = np.diff(nm)
-    if nm.size == 1 or not np.allclose(steps, steps[0], rtol=1e-6):
-        raise InputError(f"wavelength_nm: {nm.size} bands without even spacing have no width; give width_nm as well")
-    return np.full(nm.shape, steps.mean())
+    else:
+        steps = np.diff(nm)
+        if nm.size == 1 or not np.allclose(steps, steps[0], rtol=1e-6):
+            raise InputError(
+                f"wavelength_nm: {nm.size} bands without even spacing have no width; give width_nm as well"
+            )
+        widths = np.full(nm.shape, steps.mean())
+    first, last = nm - widths / 2, nm + widths / 2
+    _require_nm(float(first.min()), float(last.max()))
+    twice = np.flatnonzero(last[:-1] - first[1:] > MOST_OVERLAP * np.minimum(widths[:-1], widths[1:]))
+    if twice.size:
+        i = int(twice[0])
+        raise InputError(
+            f"width_nm: bands {i} and {i + 1}, {first[i]:g} to {last[i]:g} nm and {first[i + 1]:g} to "
+            f"{last[i + 1]:g} nm, overlap, and the light of both would count twice; give widths that don't"
+        )
+    return widths
+
+
+def _require_nm(shortest: float, longest: float) -> None:
+    """Raise `InputError` for wavelengths that are no nanometres, naming the unit that they seem to have."""
+    if shortest >= SHORTEST_NM and longest <= LONGEST_NM:
+        return
+    fix = "give nanometres"
+    for unit, factor in (("metres", 1e9), ("micrometres", 1e3)):
+        if shortest * factor >= SHORTEST_NM and longest * factor <= LONGEST_NM:
+            fix = f"they seem to be {unit}: multiply them by {factor:g}"
+            break
+    raise InputError(
+        f"wavelength_nm: {shortest:g} to {longest:g} is outside {SHORTEST_NM:g} to {LONGEST_NM:g} nm; {fix}"
+    )
 
 
 def black_body(temperature_k: float) -> Spectrum:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -12,10 +11,12 @@ from render.error_estimates import SharedPaths, relative_error, within_band_erro
 from render.errors import InputError, require_keys, require_range
 from render.illuminants import illuminant
 from render.jit import arrays, backend, dr
+from render.level import Level, PassMeans
 from render.notebook import html_of
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
+from render.scene_range import warn_of_dark_ends
 from render.spectrum import Floats, Spectrum
 
 Stop = Literal["samples", "noise", "seconds", "interrupt"]
@@ -33,10 +34,13 @@ class Transport:
         Half the difference between even and odd passes: one draw of the error of `radiance`, all correlations kept.
     variance : (group, band, h, w) float32
         Variance of `radiance`, from the scatter of the passes.
-    irradiance : (group, band) float64 or None
-        On the scene's reference plane, at unit spectral emission; None where the scene states no plane.
-    emitter_visible : (h, w) bool
-        Pixels in which a light is seen directly.
+    coverage : (h, w) float32
+        Share of each pixel's samples in which a light is seen directly.
+    seen : tuple of (1 or band, h, w) float32
+        The light in `radiance` that is seen directly, of each group: one plane for all bands, or by band where the
+        group has a colour of its own.
+    pass_means : PassMeans
+        What the passes give for levels.
     groups : mapping of str to LightGroup
         The scene's own spectra and powers, in the order of the first axis.
     wavelength_nm, width_nm : (band,) float64
@@ -55,8 +59,9 @@ class Transport:
     radiance: NDArray[np.float32]
     half_difference: NDArray[np.float32]
     variance: NDArray[np.float32]
-    irradiance: Floats | None
-    emitter_visible: NDArray[np.bool_]
+    coverage: NDArray[np.float32]
+    seen: tuple[NDArray[np.float32], ...]
+    pass_means: PassMeans
     groups: Mapping[str, LightGroup]
     wavelength_nm: Floats
     width_nm: Floats
@@ -68,6 +73,11 @@ class Transport:
     variant: str
     relative_mc_error: float = 0.0
     shared: SharedPaths | None = None
+
+    @property
+    def irradiance(self) -> Floats | None:
+        """On the scene's reference plane at unit spectral emission, shape (group, band); None without a plane."""
+        return None if self.pass_means.irradiance is None else self.pass_means.mean_irradiance()
 
     def relight(
         self,
@@ -86,29 +96,36 @@ class Transport:
         powers : mapping of group name to float, optional
             Replaces the groups' own powers.
         luminance_cd_m2 : float, optional
-            Mean luminance to reach, pixels that see a light directly left out; all groups are scaled together.
+            Mean luminance to reach of what is no light (`level`); all groups are scaled together.
         illuminance_lux : float, optional
             Illuminance to reach on the scene's reference plane; the same.
 
         Returns
         -------
         SpectralRadiance
-            float32, each value rounded once from float64. Its `band_error` tells what products of band averages miss.
+            float32, each value rounded once from float64. Its `band_error` tells what products of band averages miss,
+            its `relative_level_error` how far the level that was asked for may be off.
 
         Raises
         ------
         InputError
             For an unknown group or illuminant, a negative power or level, both levels at once, a level of a scene
             that gives no light, or illuminance without a reference plane.
+
+        Warns
+        -----
+        UserWarning
+            Where a light's spectrum ends within the bands at a value other than 0: it gives no light beyond.
         """
         lights = self._lights(spectra, powers)
-        coefficients = self._at_level(self._emission(lights), luminance_cd_m2, illuminance_lux)
+        coefficients, level_error = self._at_level(self._emission(lights), luminance_cd_m2, illuminance_lux)
         return SpectralRadiance(
-            _view(_combine(coefficients, self.radiance)),
-            self.wavelength_nm,
-            relative_error(coefficients, self.radiance, self.variance, shared=self.shared),
-            self.width_nm,
-            within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm),
+            values=_view(_combine(coefficients, self.radiance)),
+            wavelength_nm=self.wavelength_nm,
+            relative_mc_error=relative_error(coefficients, self.radiance, self.variance, shared=self.shared),
+            width_nm=self.width_nm,
+            band_error=within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm),
+            relative_level_error=level_error,
         )
 
     def relight_halves(
@@ -122,28 +139,61 @@ class Transport:
         """Two independent estimates of `relight` with the same arguments, from even and from odd passes.
 
         Their mean is `relight`'s result; a quarter of the squared difference of any linear function of them is an
-        unbiased estimate of that function's Monte Carlo variance.
+        unbiased estimate of that function's Monte Carlo variance. Where an error is larger than the value, a half may
+        be under 0: both are `signed`.
         """
         emitted = self._emission(self._lights(spectra, powers))
-        coefficients = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
+        coefficients, _ = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         values, difference = _combine(coefficients, self.radiance), _combine(coefficients, self.half_difference)
-        halves = (np.maximum(values + difference, 0.0), np.maximum(values - difference, 0.0))
-        even, odd = (SpectralRadiance(_view(half), self.wavelength_nm, 0.0, self.width_nm) for half in halves)
+        even, odd = (
+            SpectralRadiance(_view(half), self.wavelength_nm, width_nm=self.width_nm, signed=True)
+            for half in (values + difference, values - difference)
+        )
         return even, odd
 
     def relight_variance(self, *, luminance_cd_m2: float) -> NDArray[np.float32]:
         """Monte Carlo variance of `relight` at a level of the scene's own lights, shape (band, h, w)."""
-        coefficients = self._at_level(self._emission(self._lights(None, None)), luminance_cd_m2, None)
+        coefficients = self._own_at(luminance_cd_m2)
         independent = _combine(coefficients**2, self.variance)
         if self.shared is None:
             return independent
         return np.asarray(np.maximum(independent + self.shared.term(coefficients, self.variance), np.float32(0)))
 
+    def level(
+        self, spectra: Mapping[str, Spectrum | str] | None = None, *, powers: Mapping[str, float] | None = None
+    ) -> Level:
+        """Mean luminance [cd m^-2] of what is no light, under given lights: what a level in cd/m^2 sets.
+
+        The light that is seen directly is left out of the sum, and what it covers out of the area.
+
+        Raises
+        ------
+        InputError
+            As `relight`, and where lights fill the picture.
+        """
+        return self.pass_means.luminance_level(self._luminance_weights(self._emission(self._lights(spectra, powers))))
+
     def illuminance_lux(self, luminance_cd_m2: float) -> float | None:
         """Illuminance on the reference plane at a mean luminance under the scene's own lights; None without a plane."""
-        if self.irradiance is None:
+        if self.pass_means.irradiance is None:
             return None
-        return self._plane_lux(self._at_level(self._emission(self._lights(None, None)), luminance_cd_m2, None))
+        return self.pass_means.illuminance_level(self._luminance_weights(self._own_at(luminance_cd_m2))).value
+
+    def mean_radiance(self, *, luminance_cd_m2: float) -> Floats:
+        """Mean radiance of what is no light, at a level of the scene's own lights, shape (band,)."""
+        return np.asarray((self._own_at(luminance_cd_m2) * self.pass_means.mean_radiance()).sum(axis=0))
+
+    def scattered_luminance(self, *, luminance_cd_m2: float | None = None) -> NDArray[np.float64]:
+        """Luminance [cd m^-2] of each pixel without light that is seen directly, shape (h, w).
+
+        At a level of the scene's own lights; None: at their own powers.
+        """
+        emitted = self._emission(self._lights(None, None))
+        weights = self._luminance_weights(self._at_level(emitted, luminance_cd_m2, None)[0])
+        total = np.einsum("gb,gbyx->yx", weights, self.radiance, optimize=True)
+        for of_group, seen in zip(weights, self.seen, strict=True):
+            total -= np.tensordot(of_group if len(seen) > 1 else of_group.sum(keepdims=True), seen, axes=1)
+        return np.asarray(np.maximum(total, 0.0), dtype=np.float64)
 
     def _repr_png_(self) -> bytes:
         return self.relight()._repr_png_()
@@ -169,48 +219,41 @@ class Transport:
             own = (spectra or {}).get(name, group.spectrum)
             power = float((powers or {}).get(name, group.power))
             require_range(f"powers[{name!r}]", power, 0.0, 1e30, "give a factor of 0 or more")
-            lights[name] = replace(group, spectrum=illuminant(own) if isinstance(own, str) else own, power=power)
+            spectrum = illuminant(own) if isinstance(own, str) else own
+            if power > 0:
+                warn_of_dark_ends(f"light group {name!r}", spectrum, self.wavelength_nm, self.width_nm)
+            lights[name] = replace(group, spectrum=spectrum, power=power)
         return lights
 
     def _emission(self, lights: Mapping[str, LightGroup]) -> Floats:
         return emission(lights, self.wavelength_nm, self.width_nm)
 
-    def _at_level(self, emitted: Floats, luminance_cd_m2: float | None, illuminance_lux: float | None) -> Floats:
-        """Emission brought to the level asked for, shape (group, band)."""
+    def _own_at(self, luminance_cd_m2: float) -> Floats:
+        """Emission of the scene's own lights brought to a level, shape (group, band)."""
+        return self._at_level(self._emission(self._lights(None, None)), luminance_cd_m2, None)[0]
+
+    def _at_level(
+        self, emitted: Floats, luminance_cd_m2: float | None, illuminance_lux: float | None
+    ) -> tuple[Floats, float | None]:
+        """Emission brought to the level asked for, shape (group, band), and the relative error of that level."""
         if luminance_cd_m2 is not None and illuminance_lux is not None:
             raise InputError("luminance_cd_m2 and illuminance_lux: both given; allowed: one of them; leave one out")
+        weights = self._luminance_weights(emitted)
         if luminance_cd_m2 is not None:
             require_range("luminance_cd_m2", luminance_cd_m2, 0.0, 1e15, "give a mean luminance of 0 or more")
-            asked, present = luminance_cd_m2, self._mean_luminance(emitted)
+            asked, present = luminance_cd_m2, self.pass_means.luminance_level(weights)
         elif illuminance_lux is not None:
             require_range("illuminance_lux", illuminance_lux, 0.0, 1e15, "give an illuminance of 0 or more")
-            asked, present = illuminance_lux, self._plane_lux(emitted)
+            asked, present = illuminance_lux, self.pass_means.illuminance_level(weights)
         else:
-            return emitted
-        if present <= 0:
+            return emitted, None
+        if present.value <= 0:
             raise InputError(f"level: {asked} can't be reached, the scene gives no light; raise a power or spectrum")
-        return emitted * (asked / present)
+        return emitted * (asked / present.value), present.relative_error
 
-    @cached_property
-    def _mean_radiance(self) -> Floats:
-        """Mean over pixels that see no light directly, shape (group, band)."""
-        kept = ~self.emitter_visible
-        if not kept.any():
-            raise InputError(
-                "luminance_cd_m2: every pixel sees a light directly; give illuminance_lux or powers instead"
-            )
-        planes = self.radiance.reshape(-1, *kept.shape)
-        means = [(plane if kept.all() else plane[kept]).mean(dtype=np.float64) for plane in planes]
-        return np.reshape(means, self.radiance.shape[:2])
-
-    def _mean_luminance(self, emitted: Floats) -> float:
-        spectral = (emitted * self._mean_radiance).sum(axis=0)
-        return float(luminance(spectral, self.wavelength_nm, self.width_nm))
-
-    def _plane_lux(self, emitted: Floats) -> float:
-        if self.irradiance is None:
-            raise InputError("illuminance_lux: the scene states no reference plane; give luminance_cd_m2 instead")
-        return float(luminance((emitted * self.irradiance).sum(axis=0), self.wavelength_nm, self.width_nm))
+    def _luminance_weights(self, emitted: Floats) -> Floats:
+        """Luminance of a transport of 1 in each group and band, shape (group, band)."""
+        return emitted * luminance(np.eye(self.wavelength_nm.size), self.wavelength_nm, self.width_nm)
 
 
 def emission(lights: Mapping[str, LightGroup], wavelength_nm: Floats, width_nm: Floats) -> Floats:

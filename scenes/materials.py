@@ -1,11 +1,8 @@
 """Mitsuba nodes for surfaces and flat shapes, so that each scene reads as a list of things."""
 
-from functools import cache
-from importlib import metadata
-
-import numpy as np
-
+from render.errors import InputError
 from render.geometry import rotate, scale, to_world, translate
+from render.optical_constants import optical_constant
 from render.scene import Node, spectrum_node
 from render.spectrum import Floats, Spectrum
 from scenes.reflectances import resampled
@@ -32,15 +29,15 @@ def metal(material: str, roughness: float) -> Node:
 
     On the common grid: named as Mitsuba's `material`, each metal has a grid of its own and takes 7 s more to compile.
     """
-    eta, k = (spectrum_node(_optical_constant(f"{material}.{part}.spd")) for part in ("eta", "k"))
+    eta, k = (spectrum_node(_on_common_grid(material, part)) for part in ("eta", "k"))
     return {"type": "twosided", "bsdf": {"type": "roughconductor", "eta": eta, "k": k, "alpha": roughness}}
 
 
-@cache
-def _optical_constant(file: str) -> Spectrum:
-    """Table of two columns, nm and value, from Mitsuba's own data; found without importing it."""
-    table = np.loadtxt(str(metadata.distribution("mitsuba").locate_file(f"mitsuba/data/ior/{file}")))
-    return resampled(table[:, 0], table[:, 1])
+def _on_common_grid(material: str, part: str) -> Spectrum:
+    table = optical_constant(material, part)
+    if table is None:
+        raise InputError(f"metal: Mitsuba has no {material!r}; allowed: names such as Au, Cu, Al; correct it")
+    return resampled(table.wavelength_nm, table.values)
 
 
 def checks(first: Spectrum, second: Spectrum, columns: float, rows: float) -> Node:

@@ -56,7 +56,13 @@ def capture(
     ------
     InputError
         For a frame that isn't the device's size or doesn't hold a tile, a negative exposure, a window beyond
-        380-780 nm that the bands don't reach, or no Generator.
+        380-780 nm that the bands don't reach, bands that leave out more than half of a channel's response, or no
+        Generator.
+
+    Warns
+    -----
+    UserWarning
+        Where the bands don't fill the camera's window: what each channel loses.
     """
     if samples_per_pixel == 1 and not spreads(sensor.lens):
         return capture_strips([radiance], sensor, exposure_s, device, rng, exact=exact)

@@ -1,13 +1,11 @@
 """What a camera is: pixel, lens, mosaic, responses, converter. Zero switches a term off; there are no mode flags."""
 
 from dataclasses import dataclass, field
-from math import hypot, inf
+from math import ceil, hypot, inf
 from numbers import Real
 
-import numpy as np
-
 from render.errors import InputError, require_range, require_whole
-from render.spectrum import VISIBLE_NM, Floats
+from render.spectrum import VISIBLE_NM
 from sensor.cfa import RGBW, Tile, channels, check_tile
 from sensor.curves import Responses, rgbw
 
@@ -137,23 +135,6 @@ class LensConfig:
             require_range(name, getattr(self, name), low, high, fix)
 
 
-def check_window(window_nm: tuple[float, float], wavelength_nm: Floats, width_nm: Floats) -> None:
-    """Raise `InputError` where a camera's window opens beyond 380-780 nm and the bands don't reach there.
-
-    Bands that are absent count as dark. Within 380-780 nm that is a choice of the scene; beyond, it would hide that a
-    W pixel may collect 16-35 % of its electrons there. Less than one more band may be missing.
-    """
-    first, last = wavelength_nm - width_nm / 2, wavelength_nm + width_nm / 2
-    beyond = ((window_nm[0], min(VISIBLE_NM[0], window_nm[1]), 0), (max(VISIBLE_NM[1], window_nm[0]), window_nm[1], -1))
-    for low, high, outermost in beyond:
-        seen = np.clip(np.minimum(last, high) - np.maximum(first, low), 0.0, None).sum()
-        if high - low - seen >= width_nm[outermost]:
-            raise InputError(
-                f"window_nm: {window_nm!r} asks for light at {low:g} to {high:g} nm and the scene's bands, "
-                f"{first[0]:g} to {last[-1]:g} nm, hold {seen:g} nm of it; narrow the window or render those bands"
-            )
-
-
 def _increasing(window_nm: tuple[float, float]) -> bool:
     return all(isinstance(nm, Real) for nm in window_nm) and 0 < window_nm[0] < window_nm[1] < inf
 
@@ -172,8 +153,8 @@ class SensorConfig:
         Electrons per photon of each letter.
     bits : int
         Of the converter, 1 to 16.
-    black_level_dn : float or None
-        Reading of no light; None gives five standard deviations of the dark.
+    black_level_dn : int or None
+        Reading of no light; None gives five standard deviations of the dark, rounded up.
     window_nm : (float, float)
         Wavelengths that the camera lets in: an ideal filter in front of the responses.
     """
@@ -183,16 +164,14 @@ class SensorConfig:
     cfa: Tile = RGBW
     responses: Responses = field(default_factory=rgbw)
     bits: int = 14
-    black_level_dn: float | None = None
+    black_level_dn: int | None = None
     window_nm: tuple[float, float] = VISIBLE_NM
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
         require_whole("bits", self.bits, 1, 16, "give the converter's resolution")
         if self.black_level_dn is not None:
-            require_range(
-                "black_level_dn", self.black_level_dn, 0.0, self.white_dn - 0.5, "give DN under the white level"
-            )
+            require_whole("black_level_dn", self.black_level_dn, 0, self.white_dn - 1, "give DN under the white level")
         if not (isinstance(self.window_nm, tuple | list) and len(self.window_nm) == 2 and _increasing(self.window_nm)):
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give (shortest, longest) in nm")
         self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every letter has a curve
@@ -203,20 +182,21 @@ class SensorConfig:
         return int(2**self.bits - 1)
 
     @property
-    def black_e(self) -> float:
-        """Black level in electrons."""
+    def black_dn(self) -> int:
+        """Black level in DN: whole, for raw converters cut a fraction off and tint the dark by what they cut."""
         if self.black_level_dn is not None:
-            return self.black_level_dn * self.gain_e_per_dn
-        return float(BLACK_SIGMAS * (self.pixel.read_noise_e**2 + self.pixel.fixed_dark_e**2) ** 0.5)
+            return int(self.black_level_dn)
+        dark_e = BLACK_SIGMAS * hypot(self.pixel.read_noise_e, self.pixel.fixed_dark_e)
+        # The converter spans black and well: b / white = dark / (dark + well). Rounding errors make no DN more.
+        least = self.white_dn * dark_e / (self.pixel.full_well_e + dark_e)
+        return min(ceil(least - 1e-9), self.white_dn - 1)
 
     @property
     def gain_e_per_dn(self) -> float:
-        """Electrons per DN: black level and full well span the converter."""
-        if self.black_level_dn is not None:
-            return self.pixel.full_well_e / (self.white_dn - self.black_level_dn)
-        return (self.pixel.full_well_e + self.black_e) / self.white_dn
+        """Electrons per DN: the full well reads the converter's top."""
+        return self.pixel.full_well_e / (self.white_dn - self.black_dn)
 
     @property
-    def black_dn(self) -> float:
-        """Black level in DN (a fraction is allowed, as in DNG)."""
-        return self.black_e / self.gain_e_per_dn
+    def black_e(self) -> float:
+        """Black level in electrons."""
+        return self.black_dn * self.gain_e_per_dn

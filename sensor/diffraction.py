@@ -97,6 +97,7 @@ def spread_light(
         light = radiance.values[..., band] * scale
         if lens.diffraction or lens.defocus_um:
             light = _blur(light, pitch_um / samples, float(radiance.wavelength_nm[band]), lens, folded=samples > 1)
+            light = light if radiance.signed else _without_undershoot(light)
         light = light.reshape(height, samples, width, samples).mean(axis=(1, 3))
         planes[band] = (1 - lens.veiling_glare) * light + lens.veiling_glare * light.mean()
 
@@ -108,14 +109,16 @@ def spread_light(
 def _blur(
     light: NDArray[np.float64], step_um: float, wavelength_nm: float, lens: LensConfig, folded: bool
 ) -> NDArray[np.float64]:
-    """One band behind the lens; where the result would fall under 0 it is 0, and the rest gives that light back."""
+    """One band behind the lens."""
     shape = (light.shape[0], light.shape[1])
     spectrum = dctn(light, type=2)
     spectrum *= sampled_otf(shape, step_um, wavelength_nm, lens, folded)
-    blurred = np.asarray(idctn(spectrum, type=2, overwrite_x=True))
-    if blurred.min() < 0:
-        total = blurred.sum()
-        np.maximum(blurred, 0.0, out=blurred)
-        kept = blurred.sum()
-        blurred *= total / kept if total > 0 else 0.0
-    return blurred
+    return np.asarray(idctn(spectrum, type=2, overwrite_x=True))
+
+
+def _without_undershoot(light: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Light with 0 where it would fall under 0; the rest gives that light back."""
+    if light.min() >= 0:
+        return light
+    total, kept = light.sum(), np.maximum(light, 0.0)
+    return np.asarray(kept * (total / kept.sum() if total > 0 else 0.0))

@@ -63,6 +63,11 @@ def write_dng(raw: RawImage, path: Path) -> Path:
     OSError
         Where the folder is missing or can't be written.
     """
+    if raw.black_dn != int(raw.black_dn):
+        raise InputError(
+            f"black_dn: {raw.black_dn!r} is no whole number, and raw converters cut its fraction off; allowed: whole "
+            "DN; write a .tif instead"
+        )
     tags = dng_tags(raw)
     with replacing(path) as (place,):
         write_mosaic(place, raw.dn, CFA, tags, exif_tags(raw))

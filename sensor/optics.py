@@ -25,12 +25,15 @@ class SpectralIrradiance:
     wavelength_nm : (band,) float64
     pitch_um : float
     width_nm : (band,) float64, optional
+    signed : bool
+        As of `SpectralRadiance`.
     """
 
     values: NDArray[np.floating]
     wavelength_nm: Floats
     pitch_um: float
     width_nm: Floats | None = None
+    signed: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "wavelength_nm", np.array(self.wavelength_nm, dtype=np.float64))
@@ -39,7 +42,7 @@ class SpectralIrradiance:
             raise InputError(
                 f"irradiance: shape {self.values.shape} is not (h, w, {self.wavelength_nm.size}); give one value a band"
             )
-        check_values("irradiance", self.values)
+        check_values("irradiance", self.values, self.signed)
 
     @property
     def widths_nm(self) -> Floats:
@@ -110,4 +113,6 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     else:
         plane = camera_equation(lens) * falloff(lens, radiance.shape)
         values = spread_light(radiance, plane, lens, sensor.pixel.pitch_um, samples)
-    return SpectralIrradiance(values, radiance.wavelength_nm, sensor.pixel.pitch_um, radiance.widths_nm)
+    return SpectralIrradiance(
+        values, radiance.wavelength_nm, sensor.pixel.pitch_um, radiance.widths_nm, radiance.signed
+    )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from render.errors import InputError, require_range
 from render.notebook import html_of, preview_png
@@ -22,7 +22,7 @@ class RawImage:
     Attributes
     ----------
     dn : (h, w) uint16
-        Mosaic in digital numbers.
+        Mosaic in digital numbers; other whole numbers, or finite floats, are taken as they are.
     cfa : tuple of str
         Tile of letters, row 0 first.
     black_dn, white_dn : float
@@ -52,7 +52,8 @@ class RawImage:
     Raises
     ------
     InputError
-        For a frame without a whole tile, a number out of its range, or a defect that isn't in the frame.
+        For a frame without a whole tile or with samples that are no finite real numbers, a number out of its range, or
+        a defect that isn't in the frame.
     """
 
     dn: NDArray[np.uint16]
@@ -74,7 +75,8 @@ class RawImage:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
-        check_covers(self.cfa, np.shape(self.dn))
+        object.__setattr__(self, "dn", _checked_dn(self.dn))
+        check_covers(self.cfa, self.dn.shape)
         if self.defects is not None:
             object.__setattr__(self, "defects", _checked_defects(self.defects, self.shape))
         limits = {
@@ -146,6 +148,22 @@ class RawImage:
     def saturated(self) -> NDArray[np.bool_]:
         """Where the pixel counts as saturated, shape (h, w)."""
         return self.electrons >= self.saturation_e
+
+
+def _checked_dn(dn: ArrayLike) -> NDArray[np.uint16]:
+    """Samples as an array, or `InputError`: what isn't a finite real number would come out as a picture."""
+    try:
+        samples = np.asarray(dn)
+    except (ValueError, OverflowError):  # lists of unequal length
+        samples = np.empty(0, dtype=np.object_)
+    if samples.dtype.kind not in "uif":
+        raise InputError(f"dn: samples of type {samples.dtype} are not allowed; give whole numbers or finite floats")
+    if samples.dtype.kind == "f" and not np.isfinite(samples).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(samples))[0])
+        raise InputError(
+            f"dn: {samples[where]} at {where} is not allowed; give finite numbers: mend or mask that pixel"
+        )
+    return samples
 
 
 def _checked_defects(defects: NDArray[np.intp], shape: tuple[int, int]) -> NDArray[np.intp] | None:

@@ -7,8 +7,9 @@ from render.errors import require_range
 from render.photometry import photons_per_joule
 from render.spectrum import Floats
 from sensor.cfa import channels, check_covers, mask
-from sensor.config import SensorConfig, check_window
+from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
+from sensor.window import check_covered, check_window, inside_nm
 
 
 def electrons_per_irradiance(
@@ -21,16 +22,21 @@ def electrons_per_irradiance(
     Raises
     ------
     InputError
-        For a negative exposure, or a window beyond 380-780 nm that the bands don't reach.
+        For a negative exposure, a window beyond 380-780 nm that the bands don't reach, or bands that leave out more
+        than half of a channel's response.
+
+    Warns
+    -----
+    UserWarning
+        Where the bands don't fill the camera's window: what each channel loses.
     """
     require_range("exposure_s", exposure_s, 0.0, 1e7, "give seconds, 0 or more")
     check_window(sensor.window_nm, wavelength_nm, width_nm)
-    low, high = sensor.window_nm
-    first, last = wavelength_nm - width_nm / 2, wavelength_nm + width_nm / 2
-    inside_nm = np.clip(np.minimum(last, high) - np.maximum(first, low), 0.0, None)
+    check_covered(sensor, wavelength_nm, width_nm)
+    seen_nm = inside_nm(sensor.window_nm, wavelength_nm, width_nm)
     response = sensor.responses.band_average(channels(sensor.cfa), wavelength_nm, width_nm)
     area_m2 = (sensor.pixel.pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
-    return np.asarray(response * photons_per_joule(wavelength_nm) * inside_nm * area_m2 * exposure_s)
+    return np.asarray(response * photons_per_joule(wavelength_nm) * seen_nm * area_m2 * exposure_s)
 
 
 def channel_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
@@ -48,7 +54,7 @@ def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exp
     Parameters
     ----------
     irradiance : SpectralIrradiance
-        Bands that it lacks count as dark.
+        Bands that it lacks count as dark, which is told, and refused where a channel loses more than half.
     sensor : SensorConfig
     exposure_s : float
         0 or more [s].
@@ -56,7 +62,7 @@ def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exp
     Raises
     ------
     InputError
-        For a negative exposure, or a frame smaller than the mosaic's tile.
+        For a negative exposure, a frame smaller than the mosaic's tile, and as `electrons_per_irradiance`.
     """
     electrons = channel_electrons(irradiance, sensor, exposure_s)
     shape = (electrons.shape[0], electrons.shape[1])

@@ -8,6 +8,7 @@ from skimage.color import deltaE_cie76, rgb2lab
 
 from isp.colour import encode_srgb, luminance_of_srgb
 from studies.flip import flip
+from studies.metrics import require_finite
 from studies.pu21 import pu21_psnr_db
 from studies.s_cielab import seen_lab
 
@@ -55,7 +56,8 @@ class Appearance:
 
 
 def true_picture(linear: Image) -> TruePicture:
-    """Work out what comparisons need of linear sRGB (h, w, 3)."""
+    """Work out what comparisons need of linear sRGB (h, w, 3); `InputError` for a value that is NaN or infinite."""
+    require_finite(truth=linear)
     encoded = encode_srgb(linear)
     return TruePicture(linear, encoded, rgb2lab(encoded), seen_lab(encoded))
 
@@ -71,7 +73,13 @@ def appearance(linear: Image, truth: TruePicture, white_cd_m2: float) -> Appeara
     white_cd_m2 : float
         Luminance of white. FLIP and S-CIELAB see the pictures as a display shows them, whatever this is; PU21 sees the
         scene's own luminance, adapted to D65.
+
+    Raises
+    ------
+    InputError
+        For a value that is NaN or infinite.
     """
+    require_finite(picture=linear)
     encoded = encode_srgb(linear)
     difference = deltaE_cie76(seen_lab(encoded), truth.seen)
     luminances = (luminance_of_srgb(picture) * white_cd_m2 for picture in (linear, truth.linear))

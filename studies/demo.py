@@ -111,7 +111,7 @@ def run(demo: Demo, step: Step = lambda what, share: None) -> Outcome:
     levels = _levels(demo, transport)
     light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
     truth = _truth(transport, light)
-    cameras = _cameras(demo, light, transport.emitter_visible.shape)
+    cameras = _cameras(demo, light, transport.coverage.shape)
     cells: list[dict[str, Any]] = []
     encoded: dict[str, NDArray[np.float64]] = {}
     for index, level in enumerate(levels):
@@ -191,7 +191,7 @@ def _cameras(demo: Demo, light: Light, shape: tuple[int, int]) -> list[Camera]:
 def _truth(transport: Transport, light: Light) -> TruePicture:
     """The noise-free picture: the same at every level, since the luminance of white goes with the level."""
     radiance = transport.relight(luminance_cd_m2=1.0)
-    return true_picture(true_srgb(radiance, light, shown_white_cd_m2(radiance, transport.emitter_visible)))
+    return true_picture(true_srgb(radiance, light, shown_white_cd_m2(transport, 1.0)))
 
 
 def _photograph_level(
@@ -208,7 +208,7 @@ def _photograph_level(
     with clock.stage("relight"):
         radiance = transport.relight(luminance_cd_m2=level.luminance_cd_m2)
         halves = transport.relight_halves(luminance_cd_m2=level.luminance_cd_m2)
-        white = shown_white_cd_m2(radiance, transport.emitter_visible)
+        white = shown_white_cd_m2(transport, level.luminance_cd_m2)
     made = []
     for place, camera in enumerate(cameras):
         with clock.stage("form image"):
@@ -275,7 +275,7 @@ def _results(
         "rodcone": metadata.version("rodcone"),
         "seed": demo.seed,
         "scene": Path(demo.scene).name,
-        "size": list(transport.emitter_visible.shape),
+        "size": list(transport.coverage.shape),
         "environment": environment() | engines_told(cells),
         "render": render_facts(transport) | {"brightest_share": brightest_share(demo, transport)},
         "exposure_rule": RULE.format(longest=demo.longest_s * 1e3),

@@ -107,7 +107,7 @@ def make_lit(folder: Path, key: str, opened: OpenedScene, transport: Transport, 
     """Make and keep a lit scene; `transport` is lit by `under` already."""
     radiance = transport.relight(luminance_cd_m2=1.0)
     light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
-    white = shown_white_cd_m2(radiance, transport.emitter_visible)
+    white = shown_white_cd_m2(transport, 1.0)
     lux = transport.illuminance_lux(1.0)
     facts: dict[str, Any] = {
         "light": {name: value.tolist() for name, value in vars(light).items()},

@@ -13,6 +13,7 @@ from render.illuminants import illuminant
 from render.photometry import luminance
 from render.radiance_source import is_radiance_file
 from render.scene import Scene
+from render.scene_range import check_range
 from render.spectrum import Floats, Spectrum
 from render.transport import Transport
 from scenes.catalog import load
@@ -59,21 +60,24 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         lights that have colours of their own.
     """
     if is_radiance_file(choice.source):
+        if choice.extend:
+            raise InputError(f"scenes: extend for {choice.source}, a picture without surfaces; leave it out")
         check_radiance_file(choice.source, study.levels)
         return OpenedScene(choice, None, (0, 0), digest([digest_file(choice.source), choice.light]))
     if choice.source.endswith(".xml"):
         if choice.light is not None:
             raise InputError(f"scenes: light {choice.light!r} for {choice.source}; allowed: none, a file has its own")
-        opened = open_scene(choice.source)
+        opened = open_scene(choice.source, extend=choice.extend)
         scene, own_size, notes = opened.scene, opened.size, opened.notes
     else:
         scene = load(choice.source, **({} if choice.light is None else {"light": choice.light}))
+        scene = replace(scene, extend=choice.extend)
         own_size, notes = (CATALOGUE_SIDE, CATALOGUE_SIDE), ()
     for level in study.levels:
         asked_level(scene, level)
     for spectrum in study.spectra:
         _check_relit(scene, spectrum)
-    scene.check_range(*study.render.range_nm)
+    check_range(scene, *study.render.range_nm)
     size = _size(own_size, study.render.size)
     return OpenedScene(choice, scene, size, digest([digest_scene(scene), size]), tuple(notes))
 

@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from skimage.color import deltaE_ciede2000, rgb2lab
 from skimage.metrics import structural_similarity
+
+from render.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -18,8 +20,25 @@ class Quality:
     delta_e_p95: float
 
 
+def require_finite(**arrays: ArrayLike) -> None:
+    """Raise `InputError` at the first NaN or infinity of an array: no figure of quality would tell it."""
+    for name, values in arrays.items():
+        if not np.isfinite(values).all():
+            where = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
+            raise InputError(
+                f"{name}: {np.asarray(values)[where]} at {where}; allowed: finite numbers; mend that pixel"
+            )
+
+
 def psnr_db(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
-    """Peak signal-to-noise ratio of values in [0, 1]; inf where they are equal."""
+    """Peak signal-to-noise ratio of values in [0, 1]; inf where they are equal.
+
+    Raises
+    ------
+    InputError
+        For a value that is NaN or infinite.
+    """
+    require_finite(picture=picture, truth=truth)
     mean_square = float(np.mean((picture - truth) ** 2))
     return float(-10 * np.log10(mean_square)) if mean_square > 0 else float("inf")
 
@@ -31,7 +50,13 @@ def measure(
 
     SSIM is Wang et al. 2004 with its Gaussian window; CIEDE2000 takes D65 as the white. Who compares many pictures with
     one truth gives the truth's CIELAB too.
+
+    Raises
+    ------
+    InputError
+        For a value that is NaN or infinite.
     """
+    require_finite(picture=picture, truth=truth)
     ssim = structural_similarity(
         picture,
         truth,

@@ -54,7 +54,7 @@ class View:
 def view_of(transport: Transport, light: Spectrum, luminance_cd_m2: float | None) -> View:
     """Relight a render to a mean luminance; None: its lights' own powers."""
     radiance = transport.relight(luminance_cd_m2=luminance_cd_m2)
-    white = shown_white_cd_m2(radiance, transport.emitter_visible)
+    white = shown_white_cd_m2(transport, luminance_cd_m2)
     return View(radiance, light_in_bands(light, transport.wavelength_nm, transport.width_nm), white)
 
 

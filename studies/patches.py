@@ -70,12 +70,14 @@ def patch_snr_db(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float
     """SNR 20 log10(mean / standard deviation) of each patch and channel [dB], shape (patch, channel).
 
     Of a linear picture (h, w, channel), as ISO 15739 has it. Patches are taken as evenly lit. A mean that isn't above 0
-    gives -inf; a patch without noise gives inf.
+    gives -inf, without noise too; a patch above 0 without noise gives inf.
     """
     mean = patch_means(picture, masks)
-    deviation = np.stack([picture[mask].std(axis=0, ddof=1) for mask in masks])
-    with np.errstate(divide="ignore"):
-        return np.asarray(20 * (np.log10(np.maximum(mean, 0.0)) - np.log10(deviation)))
+    # About each patch's first pixel: an even patch has no deviation then, in whatever order a processor adds.
+    deviation = np.stack([(picture[mask] - picture[mask][0]).std(axis=0, ddof=1) for mask in masks])
+    lit = mean > 0
+    with np.errstate(divide="ignore"):  # no noise at all
+        return np.where(lit, 20 * (np.log10(np.where(lit, mean, 1.0)) - np.log10(deviation)), -np.inf)
 
 
 def patch_colour_errors(picture: NDArray[np.float64], truth: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:

@@ -20,7 +20,7 @@ from studies.model import ImageModel, Plan, RenderModel
 from studies.plan_bands import counts, fine_bands, groups_of, wide_bands
 from studies.plan_choice import Choice, choose
 from studies.plan_ledger import KERNEL, Ledger, PilotNoise, Weighed, ledger, weigh
-from studies.plan_terms import LENS_TERMS, effects, horizontal_view_deg, level_error
+from studies.plan_terms import LENS_TERMS, effects, horizontal_view_deg
 from studies.radiance_file import open_radiance_file
 from studies.study import OWN, Condition, Study, conditions, mosaics, parse_exposure
 
@@ -172,10 +172,10 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
 def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:
     """What Monte Carlo noise the pilot has; a picture file tells none."""
     if not pilot.rendered:
-        return PilotNoise(0, 1, (0.0, 0.0))
-    fewer = lit.emitter_visible.size / (pilot.opened.size[0] * pilot.opened.size[1])
-    paths, rim = level_error(lit)
-    return PilotNoise(lit.spp, lit.spp // lit.passes, (paths * lit.spp * fewer, rim * fewer))
+        return PilotNoise(spp=0, pass_spp=1, level=0.0)
+    fewer = lit.coverage.size / (pilot.opened.size[0] * pilot.opened.size[1])
+    error = lit.level().relative_error or 0.0
+    return PilotNoise(spp=lit.spp, pass_spp=lit.spp // lit.passes, level=error**2 * lit.spp * fewer)
 
 
 def _auto_s(transport: Transport, sensor: SensorConfig) -> float:

@@ -63,13 +63,18 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
     The variance is that of bands which rise and fall together: the most that it can be.
     """
     nm, width_nm = wide_bands(transport, groups)
-    matrix = _means(transport.width_nm, groups)
+    matrix, means = _means(transport.width_nm, groups), transport.pass_means
     return replace(
         transport,
         radiance=_merge(matrix, transport.radiance),
         half_difference=_merge(matrix, transport.half_difference),
         variance=_merge(matrix, np.sqrt(np.maximum(transport.variance, 0.0))) ** 2,
-        irradiance=None if transport.irradiance is None else transport.irradiance @ matrix.T,
+        seen=tuple(planes if len(planes) == 1 else _merge(matrix, planes[None])[0] for planes in transport.seen),
+        pass_means=replace(
+            means,
+            radiance=means.radiance @ matrix.T,
+            irradiance=None if means.irradiance is None else means.irradiance @ matrix.T,
+        ),
         wavelength_nm=nm,
         width_nm=width_nm,
         shared=transport.shared
@@ -81,7 +86,7 @@ def merge_radiance(radiance: SpectralRadiance, groups: Sequence[NDArray[np.intp]
     """Radiance averaged over wide bands: what bands that follow light and scene within themselves would hold."""
     nm, width_nm = wide_bands(radiance, groups)
     values = radiance.values @ _means(radiance.widths_nm, groups).T.astype(radiance.values.dtype)
-    return SpectralRadiance(values, nm, radiance.relative_mc_error, width_nm)
+    return SpectralRadiance(values, nm, radiance.relative_mc_error, width_nm, signed=radiance.signed)
 
 
 def _means(width_nm: Floats, groups: Sequence[NDArray[np.intp]]) -> Floats:

@@ -59,14 +59,19 @@ class Ledger:
 
 @dataclass(frozen=True)
 class PilotNoise:
-    """Samples of the pilot, of a pass of the render, and the level's error over the signal's square.
+    """Noise of a pilot.
 
-    `level` is as `studies.plan_terms.level_error` finds it, for as many pixels as the render has.
+    Attributes
+    ----------
+    spp, pass_spp : int
+        Samples of the pilot, and of one of its passes.
+    level : float
+        Variance of the level over its square, of one sample a pixel and for as many pixels as the render has.
     """
 
     spp: int
     pass_spp: int
-    level: tuple[float, float]
+    level: float
 
 
 @dataclass(frozen=True)
@@ -81,8 +86,8 @@ class Weighed:
         Monte Carlo variance of one sample a pixel, with diffraction and without.
     jitter : mapping of int to float
         The same of the wavelengths within bands, by number of bands.
-    level : (float, float)
-        Of the mean luminance that a level scales the picture by: of one sample a pixel, and at any number of them.
+    level : float
+        Variance from the mean luminance that a level scales the picture by, of one sample a pixel [e-^2].
     bands : mapping of int to (float, float)
         By number of bands: response and light within them.
     lens : mapping of str to float
@@ -98,7 +103,7 @@ class Weighed:
     blurred: float
     sharp: float
     jitter: Mapping[int, float]
-    level: tuple[float, float]
+    level: float
     bands: Mapping[int, tuple[float, float]]
     lens: Mapping[str, float]
     kernel: float
@@ -131,7 +136,7 @@ def weigh(
     if not below.any():  # all saturated: no error reaches the raw image
         counts = dict.fromkeys(found.bands, 0.0)
         bands = dict.fromkeys(found.bands, (0.0, 0.0))
-        none = Weighed(condition, mosaic, exposure_s, 1.0, 0.0, 0.0, counts, (0.0, 0.0), bands, {}, 0.0)
+        none = Weighed(condition, mosaic, exposure_s, 1.0, 0.0, 0.0, counts, 0.0, bands, {}, 0.0)
         return replace(none, lens=dict.fromkeys(found.lens, 0.0))
     own = noise_variance(expected_e, sensor, exposure_s)[below].mean()
     blurred, sharp = found.blurred**2 * pilot.spp, found.sharp**2 * pilot.spp
@@ -147,7 +152,7 @@ def weigh(
         blurred=scale**2 * _upper(blurred[:, below], NOISE_MARGIN),
         sharp=scale**2 * _upper(sharp[:, below], NOISE_MARGIN),
         jitter={n: scale**2 * _upper((some.jitter * spread)[below], NOISE_MARGIN) for n, some in found.bands.items()},
-        level=(square * pilot.level[0], square * pilot.level[1]),
+        level=square * pilot.level,
         bands={n: (scale * _rms(b.response, below), scale * _rms(b.light, below)) for n, b in found.bands.items()},
         lens={name: scale * _rms(pair, below) for name, pair in found.lens.items()},
         kernel=float(np.sqrt(np.mean(kernel_rms_e(expected_e, max(found.bands))[below] ** 2))),
@@ -158,7 +163,7 @@ def ledger(weighed: Weighed, count: int, spp: int, left_out: frozenset[str]) -> 
     """Ledger of one model: its number of bands, samples (0 for a picture file), terms of lens and kernel left out."""
     own = weighed.noise_variance
     monte_carlo = weighed.monte_carlo(count, spp, left_out) if spp else 0.0
-    level = weighed.level[0] / spp + weighed.level[1] if spp else 0.0
+    level = weighed.level / spp if spp else 0.0
     response, light = weighed.bands[count]
     systematic = {RESPONSE: response, LIGHT: light, **weighed.lens, KERNEL: weighed.kernel}
     random = [Term(MONTE_CARLO, monte_carlo**0.5, monte_carlo / own), Term(LEVEL, level**0.5, level / own)]

@@ -11,9 +11,7 @@ from math import radians, tan
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
 
-from render.passes import VISIBLE_SPP
 from render.radiance import SpectralRadiance
 from render.transport import Transport
 from sensor.config import LensConfig, SensorConfig
@@ -139,27 +137,6 @@ def horizontal_view_deg(camera: Mapping[str, object], size: tuple[int, int]) -> 
     return float(2 * np.degrees(np.arctan(half)))
 
 
-def level_error(transport: Transport) -> tuple[float, float]:
-    """Variance of a picture's mean luminance over its square: of one sample a pixel, and at any number of samples.
-
-    A level scales the whole picture by that mean. Pixels that see a light are left out of it; by `VISIBLE_SPP` samples
-    a lamp's rim is found or missed, with the chance that they all pass it by.
-    """
-    seen, level = transport.emitter_visible, 1.0
-    luminance = transport.relight(luminance_cd_m2=level).luminance()
-    deviation = SpectralRadiance(
-        np.moveaxis(np.sqrt(np.maximum(transport.relight_variance(luminance_cd_m2=level), 0.0)), 0, -1),
-        transport.wavelength_nm,
-        0.0,
-        transport.width_nm,
-    ).luminance()
-    kept = np.count_nonzero(~seen)
-    paths = float((deviation[~seen] ** 2).sum() / kept**2)
-    covered = np.where(maximum_filter(seen, 3), luminance / luminance.max(), 0.0)
-    missed = (1 - covered) ** VISIBLE_SPP
-    return paths, float((missed * (1 - missed) * luminance**2)[covered > 0].sum() / kept**2)
-
-
 def _noise(transport: Transport, sensor: SensorConfig, rng: np.random.Generator) -> NDArray[np.float64]:
     """Draws of the transport's Monte Carlo noise in electrons: each pixel's bands rise and fall together."""
     deviation = np.moveaxis(np.sqrt(np.maximum(transport.relight_variance(luminance_cd_m2=1.0), 0.0)), 0, -1)
@@ -182,11 +159,12 @@ def _band_errors(
     sensor: SensorConfig,
     groups: Sequence[NDArray[np.intp]],
 ) -> BandErrors:
-    seen = ~transport.emitter_visible
     averaged = [merge_radiance(half, groups) for half in halves]
     # A level is reached by the luminance that the wide bands tell, so their share in that error is counted here.
-    told = np.mean([half.luminance()[seen].mean() for half in averaged])
-    followed = _electrons(averaged, sensor) / told
+    mean = SpectralRadiance(
+        transport.mean_radiance(luminance_cd_m2=1.0)[None, None], transport.wavelength_nm, width_nm=transport.width_nm
+    )
+    followed = _electrons(averaged, sensor) / merge_radiance(mean, groups).luminance().item()
     wide = _electrons(merge_transport(transport, groups).relight_halves(luminance_cd_m2=1.0), sensor)
     return BandErrors(followed - plain, wide - followed, _jitter(halves, sensor, groups))
 
@@ -198,7 +176,7 @@ def _jitter(
     places = max(len(group) for group in groups)
     if places == 1:
         return np.zeros(halves[0].shape)
-    values = (halves[0].values + halves[1].values) / 2
+    values = np.maximum(halves[0].values + halves[1].values, 0) / 2
     drawn = []
     for place in range(places):
         chosen = np.zeros_like(values)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from render.errors import InputError
+from studies.metrics import require_finite
 
 LEAST_CD_M2, MOST_CD_M2 = 0.005, 10_000.0  # the encoding's range: what lies outside reads as its end
 PEAK = 256.0  # the authors' peak for PSNR: nearly what white of a 100 cd/m^2 display reads, as 255 does in 8 bits
@@ -23,11 +24,10 @@ def pu21_encode(luminance_cd_m2: ArrayLike) -> NDArray[np.float64]:
     Raises
     ------
     InputError
-        For values that aren't numbers.
+        For a value that is NaN or infinite.
     """
     given = np.asarray(luminance_cd_m2, dtype=np.float64)
-    if np.isnan(given).any():
-        raise InputError("luminance_cd_m2: nan is not allowed; give cd/m^2")
+    require_finite(luminance_cd_m2=given)
     power = np.clip(given, LEAST_CD_M2, MOST_CD_M2) ** _P[3]
     return np.maximum(_P[6] * (((_P[0] + _P[1] * power) / (1 + _P[2] * power)) ** _P[4] - _P[5]), 0.0)
 
@@ -43,7 +43,7 @@ def pu21_psnr_db(picture_cd_m2: ArrayLike, truth_cd_m2: ArrayLike) -> float:
     Raises
     ------
     InputError
-        Where the shapes differ.
+        Where the shapes differ, or a value is NaN or infinite.
     """
     first, second = pu21_encode(picture_cd_m2), pu21_encode(truth_cd_m2)
     if first.shape != second.shape:

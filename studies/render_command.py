@@ -41,6 +41,7 @@ class Order:
     level: str | None = None
     limits: dict[str, Any] = field(default_factory=dict)  # spp, noise, max_seconds, max_depth, seed, cache
     trust: bool = False
+    extend: str | None = None
 
 
 def render(
@@ -59,6 +60,7 @@ def render(
     seed: int = 0,
     cache: Path | None = None,
     trust_scene: Annotated[bool, Parameter(negative="")] = False,
+    extend: str | None = None,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Render a scene into a spectral OpenEXR file; prints its path.
@@ -100,11 +102,20 @@ def render(
         Folder of finished renders, to use and to add to.
     trust_scene
         Let the scene file load plug-ins of its own, which are native code, and files from anywhere.
+    extend
+        Give hold to let surfaces go on at their end values outside their tables; bands beyond are refused by default.
     json
         Print one JSON object with the path and facts of the render instead of the path.
     """
-    limits = {"spp": spp, "noise": noise, "max_seconds": max_seconds, "max_depth": max_depth, "seed": seed}
-    order = Order(source, out, height, width, bands, tuple(light or ()), level, {**limits, "cache": cache}, trust_scene)
+    limits: dict[str, Any] = {
+        "spp": spp,
+        "noise": noise,
+        "max_seconds": max_seconds,
+        "max_depth": max_depth,
+        "seed": seed,
+    }
+    limits["cache"] = cache
+    order = Order(source, out, height, width, bands, tuple(light or ()), level, limits, trust_scene, extend)
     facts = run(order)
     for note in facts["notes"]:
         print(f"rodcone: {note}", file=sys.stderr)
@@ -127,7 +138,7 @@ def run(order: Order) -> dict[str, Any]:
     if order.out.suffix.lower() != ".exr":
         raise InputError(f"out: {str(order.out)!r} is not allowed; give a file ending in .exr")
     nm, widths = _bands(order.bands)
-    opened = open_scene(order.source, order.trust)
+    opened = open_scene(order.source, order.trust, order.extend)
     scene, size = opened.scene, _size(opened.size, order.height, order.width)
     spectra = _spectra(scene, order.light)
     luminance_cd_m2, illuminance_lux = asked_level(scene, order.level)
@@ -209,6 +220,7 @@ def _facts(order: Order, opened: SceneFile, transport: Transport, radiance: Spec
         "size": list(radiance.shape[:2]),
         **render_facts(transport),
         "relative_mc_error": radiance.relative_mc_error,
+        "relative_level_error": radiance.relative_level_error,
         "largest_band_error": None if radiance.band_error is None else float(np.max(radiance.band_error)),
         "mean_luminance_cd_m2": float(radiance.luminance().mean()),
         "groups": groups,

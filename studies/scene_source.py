@@ -1,5 +1,6 @@
 """A scene to render: one of the catalogue by name, or a Mitsuba scene of the user's own."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from render.errors import InputError
@@ -12,8 +13,8 @@ from studies.levels import parse_level
 CATALOGUE_SIDE = 256  # pixels, where neither the scene nor the user states a size
 
 
-def open_scene(source: str, trust: bool = False) -> SceneFile:
-    """Scene, the size of its film and notes; `trust` lets a scene file load plug-ins and files from anywhere.
+def open_scene(source: str, trust: bool = False, extend: str | None = None) -> SceneFile:
+    """Scene, the size of its film and notes; `trust` and `extend` as of `load_scene_file`.
 
     Raises
     ------
@@ -21,10 +22,10 @@ def open_scene(source: str, trust: bool = False) -> SceneFile:
         For an unknown name, a scene file that isn't allowed, or trust in a scene by name.
     """
     if Path(source).suffix.lower() == ".xml":
-        return load_scene_file(source, trust=trust)
+        return load_scene_file(source, trust=trust, extend=extend)
     if trust:
         raise InputError(f"trust-scene: {source!r} is no .xml scene; leave --trust-scene out")
-    return SceneFile(load(source), (CATALOGUE_SIDE, CATALOGUE_SIDE), ())
+    return SceneFile(replace(load(source), extend=extend), (CATALOGUE_SIDE, CATALOGUE_SIDE), ())
 
 
 def asked_level(scene: Scene, text: str | None) -> tuple[float | None, float | None]:

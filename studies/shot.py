@@ -36,6 +36,7 @@ from studies.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.scene_source import asked_level, open_scene
 
 Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
+MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
 _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
 
 
@@ -54,6 +55,7 @@ class Order:
     spp: int = 64
     seed: int = 0
     trust: bool = False
+    extend: str | None = None
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,12 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
     step("exposure", 0.9)
     radiance = _lit(order, opened, transport)
     raw = _expose(order, sensor, radiance, colour)
+    share = float(raw.saturated.mean())
+    if share > MOST_SATURATED:
+        notes += [
+            f"{share:.0%} of the pixels are saturated at {raw.exposure_s:g} s; give a shorter --exposure-s (seconds: "
+            "20 ms is 0.02), or leave it out"
+        ]
     bayer = remosaic(raw) if order.out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) else None
     paths = write_raw(raw, order.out)
     if bayer is not None:
@@ -110,9 +118,11 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
     if is_radiance_file(order.source):
         if order.trust:
             raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")
+        if order.extend:
+            raise InputError(f"extend: {order.source!r} is a picture, which has no surfaces; leave --extend out")
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         return sensor, None
-    opened = open_scene(order.source, order.trust)
+    opened = open_scene(order.source, order.trust, order.extend)
     asked_level(opened.scene, order.level)
     check_covers(sensor.cfa, _size(order, opened))
     return sensor, opened
@@ -180,6 +190,7 @@ def _facts(
         "engine": raw.engine,
         "luminance_cd_m2": float(radiance.luminance().mean()),
         "relative_mc_error": radiance.relative_mc_error,
+        "relative_level_error": radiance.relative_level_error,
         "saturated": float(raw.saturated.mean()),
         "left_out": list(left_out(sensor)),
     }

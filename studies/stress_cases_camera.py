@@ -160,12 +160,12 @@ PIXEL_CASES = (
     Case(
         "black_0",
         "black level 0: half of the dark is cut",
-        lambda: Situation(at_level(1e-3), replace(low_noise(), black_level_dn=0.0)),
+        lambda: Situation(at_level(1e-3), replace(low_noise(), black_level_dn=0)),
     ),
     Case(
         "black_at_half",
         "black level at half of the converter's range",
-        lambda: _seen(100.0, replace(low_noise(), black_level_dn=8192.0)),
+        lambda: _seen(100.0, replace(low_noise(), black_level_dn=8192)),
     ),
     Case("pitch_0.5um", "pixels of 0.5 µm", lambda: Situation(at_level(100.0), _pixel(pitch_um=0.5))),
     Case("pitch_100um", "pixels of 100 µm", lambda: Situation(at_level(0.01), _pixel(pitch_um=100.0))),

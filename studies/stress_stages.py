@@ -134,7 +134,7 @@ def _summed(at: Parameters) -> Found:
 
 def _read(at: Parameters) -> Found:
     """Poisson draws of 30 e- and more, read noise and rounding, beside the same in double precision."""
-    camera = replace(_camera(read_noise_e=at["read_noise_e"], full_well_e=57_343.0), black_level_dn=8192.0)  # 1 e- a DN
+    camera = replace(_camera(read_noise_e=at["read_noise_e"], full_well_e=57_343.0), black_level_dn=8192)  # 1 e- a DN
     mean = np.full(SHAPE, at["level_e"], dtype=np.float32)
     device, key = Device(np.ones(SHAPE), np.zeros(SHAPE)), int(_rng(at).integers(0, 2**63))
     single = read_frame(mean, camera, device, 0.0, key).astype(np.float64)

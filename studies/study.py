@@ -39,10 +39,13 @@ class SceneChoice:
     source : str
     light : str, optional
         Option ``light`` of a catalogue scene's builder; for a picture file the light that its colours are judged under.
+    extend : str, optional
+        ``hold``: surfaces go on at their end values outside their tables.
     """
 
     source: str
     light: str | None = None
+    extend: str | None = None
 
 
 @dataclass(frozen=True)

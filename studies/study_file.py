@@ -7,10 +7,11 @@ from typing import Any, get_args, get_origin
 
 from cattrs import AttributeValidationNote, ClassValidationError, Converter, ForbiddenExtraKeysError
 
-from render.errors import InputError, one_line, unknown
+from render.errors import InputError, one_line, require_whole, unknown
 from render.toml_file import parse_toml, read_toml
 from studies.study import SceneChoice, Study, check
 
+MOST_SEEDS = 100_000
 _FILES = (".xml", ".exr", ".mat", ".toml")  # values that name a file beside the study's
 
 
@@ -46,13 +47,17 @@ def read_study(path: str | Path, changes: Sequence[str] = ()) -> Study:
 
 
 def study_of(content: Mapping[str, Any]) -> Study:
-    """Study of a TOML file's content, its values not checked beyond their types.
+    """Study of a TOML file's content, its values not checked beyond their types; ``seeds = 3`` are seeds 0, 1 and 2.
 
     Raises
     ------
     InputError
         For an unknown key, a missing one, or a value of another type.
     """
+    seeds = content.get("seeds")
+    if isinstance(seeds, int) and not isinstance(seeds, bool):
+        require_whole("seeds", seeds, 1, MOST_SEEDS, "give how many, from 0 on, or a list such as [7]")
+        content = {**content, "seeds": list(range(seeds))}
     try:
         return _CONVERTER.structure(content, Study)
     except ClassValidationError as error:

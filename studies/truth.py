@@ -9,6 +9,7 @@ from isp.colour import adapt_to_d65, xyz_to_srgb
 from render.photometry import tristimulus
 from render.radiance import SpectralRadiance
 from render.spectrum import Floats, Spectrum
+from render.transport import Transport
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation
@@ -37,9 +38,14 @@ def light_in_bands(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) 
     return Light(wavelength_nm, width_nm, values / tristimulus(values, wavelength_nm, width_nm)[1])
 
 
-def shown_white_cd_m2(radiance: SpectralRadiance, emitter_visible: NDArray[np.bool_]) -> float:
-    """Luminance that is shown as white; pixels that see a lamp, (h, w), don't count."""
-    return float(np.percentile(radiance.luminance()[~emitter_visible], WHITE_PERCENTILE)) / WHITE_AT
+def shown_white_cd_m2(transport: Transport, luminance_cd_m2: float | None) -> float:
+    """Luminance that is shown as white at a level of the transport's lights; None: at their own powers.
+
+    Light that is seen directly doesn't count, nor the part of a pixel that it covers.
+    """
+    luminance = transport.scattered_luminance(luminance_cd_m2=luminance_cd_m2)
+    weights = 1.0 - transport.coverage.astype(np.float64)
+    return float(np.percentile(luminance, WHITE_PERCENTILE, weights=weights, method="inverted_cdf")) / WHITE_AT
 
 
 def true_srgb(radiance: SpectralRadiance, light: Light, white_cd_m2: float) -> NDArray[np.float64]:

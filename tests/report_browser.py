@@ -117,11 +117,17 @@ class Page:
         return self._browser.send(method, self._session, **params)
 
     def show(self, *, width: int, height: int = 900, dark: bool = False, medium: str = "") -> None:
-        """Set the window's size, the colour scheme and the medium (``print``, or the window's own)."""
+        """Set the window's size, the colour scheme and the medium (``print``, or the window's own), once they hold.
+
+        A page hears of its new size with the next frame, before that frame's own callbacks.
+        """
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.send("Emulation.setDeviceMetricsOverride", **size)
         scheme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
         self.send("Emulation.setEmulatedMedia", media=medium, features=scheme)
+        here = f"innerWidth === {width} && innerHeight === {height}"
+        self.value(f"new Promise(f => requestAnimationFrame(function now() {{ {here} ? requestAnimationFrame(f)"
+                   " : requestAnimationFrame(now) }))")  # fmt: skip
 
     def value(self, script: str) -> Any:
         """Return what `script` evaluates to in the page."""

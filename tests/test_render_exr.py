@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from render.errors import InputError
 from render.exr import MOST_EXPANSION, read_exr, write_exr
 from render.exr_layout import LAYOUT_UNITS, TRUE_UNITS, channel_name, radiance_channels, read_bands
-from render.file_checks import MOST_BYTES, MOST_SIDE, require_extent, widths_between
+from render.file_checks import MOST_BYTES, MOST_SIDE, bands_between, require_extent
 from render.loader import mitsuba_module
 from render.radiance import SpectralRadiance
 
@@ -74,10 +74,10 @@ def test_float64_is_rounded_once_to_float32(tmp_path: Path) -> None:
 
 
 def test_channel_names_are_of_one_width_and_in_the_order_of_wavelength(tmp_path: Path) -> None:
-    radiance = SpectralRadiance(np.ones((1, 1, 3)), np.array([95.5, 550.0, 1050.25]), width_nm=np.ones(3))
+    radiance = SpectralRadiance(np.ones((1, 1, 3)), np.array([105.5, 550.0, 1050.25]), width_nm=np.ones(3))
     write_exr(tmp_path / "a.exr", radiance)
     names, _, _ = layout_of(tmp_path / "a.exr")
-    assert names == ["B", "G", "R", "S0.0095,500000nm", "S0.0550,000000nm", "S0.1050,250000nm"]
+    assert names == ["B", "G", "R", "S0.0105,500000nm", "S0.0550,000000nm", "S0.1050,250000nm"]
 
 
 def test_header_states_layout_units_and_lossless_compression(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_preview_stays_finite_at_both_ends_of_float32(tmp_path: Path, value: flo
 def test_what_the_layout_cannot_hold_is_refused_and_nothing_is_written(
     tmp_path: Path, values: np.ndarray, nm: list[float], told: str
 ) -> None:
-    radiance = SpectralRadiance(values, np.array(nm), width_nm=np.ones(len(nm)))
+    radiance = SpectralRadiance(values, np.array(nm), width_nm=np.full(len(nm), 1e-8))
     with pytest.raises(InputError, match=told):
         write_exr(tmp_path / "a.exr", radiance)
     assert not list(tmp_path.iterdir())
@@ -294,6 +294,7 @@ def test_uneven_wavelengths_get_edges_half_way_and_say_so(tmp_path: Path) -> Non
     with pytest.warns(UserWarning, match="half-way"):
         read = read_exr(path)
     assert read.widths_nm.tolist() == [10, 15, 30, 40]
+    assert read.wavelength_nm.tolist() == [400, 412.5, 435, 470]  # bands meet at 405, 420 and 450 nm
 
 
 def test_missing_units_are_assumed_and_told(tmp_path: Path) -> None:
@@ -498,7 +499,7 @@ def test_extent_is_allowed_up_to_its_limits() -> None:
 def test_widths_of_wavelengths_that_do_not_increase_are_refused() -> None:
     for nm in ([500.0], [500.0, 500.0], [510.0, 500.0], [0.0, 10.0], [500.0, np.nan]):
         with pytest.raises(InputError, match="wavelength_nm"):
-            widths_between(np.array(nm))
+            bands_between(np.array(nm))
 
 
 def test_true_units_are_per_nanometre(tmp_path: Path) -> None:

@@ -98,7 +98,7 @@ def test_a_black_scene_is_black_at_no_error_and_has_no_level():
     lit = made.relight({"lamp": "sodium_low"})
     assert not made.radiance.any()
     assert not made.variance.any()
-    assert not made.emitter_visible.any()
+    assert not made.coverage.any()
     assert not lit.values.any()
     assert lit.relative_mc_error == 0.0
     assert not lit.band_error.any()
@@ -178,7 +178,7 @@ dr.set_thread_count(int(sys.argv[1]))
 from render.engine import render
 from scenes.catalog import load
 made = render(load("cornell_box"), (40, 56), wavelength_nm=np.arange(430.0, 780.0, 100.0), spp=32, seed=4)
-for name in ("radiance", "variance", "half_difference", "irradiance", "emitter_visible"):
+for name in ("radiance", "variance", "half_difference", "irradiance", "coverage"):
     print(name, hashlib.sha256(np.ascontiguousarray(getattr(made, name)).tobytes()).hexdigest())
 print(made.radiance.any(), made.irradiance.any())
 """

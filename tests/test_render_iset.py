@@ -102,10 +102,42 @@ def test_photons_that_a_basis_makes_negative_become_zero_and_are_told(tmp_path: 
     assert read.values == pytest.approx(np.maximum(photons + mean, 0) * JOULE, rel=1e-6)
 
 
+def in_form(form: str, photons: np.ndarray, tmp_path: Path) -> Path:
+    """The same photons in one of the three forms that ISETCam writes."""
+    if form == "basis":  # one function a wavelength: coefficients are photons
+        return save(tmp_path, mcCOEF=photons, basis={"basis": np.eye(NM.size), "wave": NM})
+    if form == "struct":
+        return save(tmp_path, scene={"data": {"photons": photons}, "spectrum": {"wave": NM}})
+    return save(tmp_path, photons=photons, wave=NM)
+
+
+@pytest.mark.parametrize("form", ["basis", "struct", "photons"])
+@pytest.mark.parametrize(("count", "share"), [(1, "0.108"), (9, "0.968")])  # of 5 x 6 x 31 = 930 samples
+def test_a_few_photons_below_zero_become_zero_and_are_told_in_every_form(
+    form: str, count: int, share: str, tmp_path: Path
+) -> None:
+    photons = PHOTONS.copy()
+    photons.flat[100 : 100 + count] = -1e9  # a hair below 0 beside 1e15
+    with pytest.warns(UserWarning, match=rf"^{share}% of its photons were negative and became 0") as told:
+        read = read_iset_scene(in_form(form, photons, tmp_path))
+    assert len(told) == 1
+    assert np.count_nonzero(read.values == 0) == count
+    assert read.values == pytest.approx(np.maximum(photons, 0) * JOULE, rel=6e-7)
+
+
+@pytest.mark.parametrize("form", ["struct", "photons"])
+def test_stored_photons_of_which_over_a_hundredth_is_below_zero_are_refused(form: str, tmp_path: Path) -> None:
+    photons = PHOTONS.copy()
+    photons.flat[100:110] = -1e9  # 10 of 930 are 1.08 %
+    with pytest.raises(InputError, match="at row 0, column 3, band 7"):  # 100 = 3 x 31 + 7
+        read_iset_scene(in_form(form, photons, tmp_path))
+
+
 def test_uneven_wavelengths_are_told(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="half-way"):
         read = read_iset_scene(save(tmp_path, photons=PHOTONS[:, :, :3], wave=np.array([400.0, 410.0, 430.0])))
     assert read.widths_nm.tolist() == [10, 15, 20]
+    assert read.wavelength_nm.tolist() == [400, 412.5, 430]  # bands meet at 405 and 420 nm
 
 
 @pytest.mark.parametrize(
@@ -118,6 +150,7 @@ def test_uneven_wavelengths_are_told(tmp_path: Path) -> None:
         ({"photons": -PHOTONS, "wave": NM}, "at row 0, column 0, band 0"),
         ({"photons": PHOTONS * np.nan, "wave": NM}, "nan"),
         ({"photons": PHOTONS * 1e60, "wave": NM}, "inf"),
+        ({"photons": np.where(np.arange(PHOTONS.size).reshape(PHOTONS.shape), PHOTONS, -np.inf), "wave": NM}, "-inf"),
         ({"photons": np.ones(PHOTONS.shape, np.int32), "wave": NM}, "int32"),
         ({"photons": np.ones(PHOTONS.shape, np.uint16), "wave": NM}, "dmin"),
         ({"photons": PHOTONS[:, :, 0], "wave": 550.0}, "width"),

@@ -53,7 +53,10 @@ def test_a_pass_averages_the_steepest_reflectance_to_a_ten_thousandth():
 
 
 def test_the_table_holds_each_curve_at_each_wavelength_and_zero_outside():
-    ramp, flat = Spectrum(np.array([400.0, 500.0]), np.array([0.0, 1.0])), Spectrum(np.array([1.0, 999.0]), np.ones(2))
+    ramp, flat = (
+        Spectrum(np.array([400.0, 500.0]), np.array([0.0, 1.0])),
+        Spectrum(np.array([100.0, 999.0]), np.ones(2)),
+    )
     nm = np.array([[390.0, 400.0, 450.0, 475.0], [500.0, 500.1, 425.0, 410.0]])
     table = reflectance_table((ramp, flat), nm)
     assert table.dtype == np.float32
@@ -74,12 +77,19 @@ def test_surfaces_get_the_row_of_their_curve_and_equal_curves_share_one():
     assert "row" not in scene["a"]
 
 
+def test_uneven_tables_get_rows_as_even_ones_do():
+    uneven = {"type": "irregular", "wavelengths": "400, 500, 700", "values": "0, 1, 0.5", "id": "paint"}
+    made, (curve, other) = with_rows({"a": matte(uneven), "b": matte({**CHECKS, "color0": uneven})})
+    assert (made["a"]["row"], made["b"]["row"], made["b"]["other_row"]) == (0, 0, 1)
+    assert (curve.wavelength_nm.tolist(), curve.values.tolist()) == ([400, 500, 700], [0, 1, 0.5])
+    assert other.wavelength_nm.size == 81
+
+
 @pytest.mark.parametrize(
     "reflectance",
     [
         uniform_node(0.0),
         {"type": "bitmap", "filename": "x.png"},
-        {"type": "irregular", "wavelengths": "400,500,700", "values": "0,1,0"},
         {**CHECKS, "color1": uniform_node(0.0)},
         {**RED, "to_uv": 1},
     ],

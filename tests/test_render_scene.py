@@ -211,27 +211,3 @@ def test_a_spectrum_of_zeros_loads_as_black():
 def test_a_spectrum_node_keeps_every_digit():
     spectrum = Spectrum(np.array([400.0, 410.0]), np.array([1 / 3, 1e-300]))
     assert spectrum_node(spectrum)["values"] == f"{1 / 3!r},1e-300"
-
-
-@pytest.mark.parametrize(("longest_nm", "known"), [(780.0, True), (790.0, False), (1100.0, False)])
-def test_bands_beyond_a_surfaces_table_are_refused(longest_nm, known):
-    table = {"type": "irregular", "wavelengths": "400.0,700.0", "values": "0.5,0.5"}
-    for surface, end_nm in (
-        (spectrum_node(Spectrum(np.array([380.0, 580.0, 780.0]), np.ones(3))), 780.0),
-        (table, 780.0),
-    ):
-        ball = {"type": "sphere", "bsdf": {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": surface}}}
-        made = Scene(
-            "ball", {"type": "scene", "ball": ball, "sky": {"type": "constant"}}, {"sky": LightGroup(("sky",), flat())}
-        )
-        if known:
-            made.check_range(380.0, longest_nm)
-            continue
-        with pytest.raises(InputError, match=f"its surfaces are known over 380-{end_nm:g} nm alone"):
-            made.check_range(380.0, longest_nm)
-
-
-def test_a_surface_of_one_value_is_known_everywhere():
-    ball = {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": uniform_node(0.5)}}
-    geometry = {"type": "scene", "ball": ball, "sky": {"type": "constant"}}
-    Scene("ball", geometry, {"sky": LightGroup(("sky",), flat())}).check_range(300.0, 1100.0)

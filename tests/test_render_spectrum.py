@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from render.errors import InputError
 from render.photometry import LIGHT_M_S, PLANCK_J_S
+from render.radiance import SpectralRadiance
 from render.spectrum import (
     DEFAULT_WAVELENGTH_NM,
     Spectrum,
@@ -16,6 +17,7 @@ from render.spectrum import (
     line_bands,
     line_spectrum,
 )
+from sensor.optics import SpectralIrradiance
 
 BOLTZMANN_J_K = 1.380649e-23  # exact, SI 2019
 WIEN_NM_K = 2.897771955e6  # CODATA 2018
@@ -133,6 +135,58 @@ def test_centres_that_do_not_increase_from_above_zero_are_refused_with_their_val
 @pytest.mark.parametrize("width", [0.0, -1.0, np.nan, np.inf])
 def test_widths_that_are_not_positive_are_refused_with_their_values(width):
     assert complaint(band_widths, [400.0, 500.0], [10.0, width]).startswith(f"width_nm: {[10.0, width]!r} is not")
+
+
+NOT_NM = [
+    (np.array([0.38, 0.58, 0.78]), "0.38 to 0.78 is outside 100 to 20000 nm; they seem to be micrometres: multiply"),
+    (np.array([3.8e-7, 5.8e-7, 7.8e-7]), "they seem to be metres: multiply them by 1e+09"),
+    (np.array([0.0, 400.0, 800.0]), "0 to 800 is outside 100 to 20000 nm; give nanometres"),
+    (np.array([400.0, 10_400.0, 20_400.0]), "is outside 100 to 20000 nm; give nanometres"),
+]
+
+
+@pytest.mark.parametrize(("nm", "words"), NOT_NM)
+def test_a_spectrum_over_what_is_no_nanometres_is_refused_and_the_unit_named(nm, words):
+    assert words in complaint(Spectrum, nm, np.ones(3))
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e-3, "micrometres"), (1e-9, "metres")])
+def test_bands_and_pictures_in_other_units_are_refused_and_the_unit_named(factor, unit):
+    nm = np.arange(385.0, 780.0, 10.0) * factor
+    for refuse in (
+        lambda: complaint(band_widths, nm, None),
+        lambda: complaint(band_widths, nm, 10.0 * factor),
+        lambda: complaint(SpectralRadiance, np.ones((2, 2, 40)), nm),
+        lambda: complaint(SpectralIrradiance, np.ones((2, 2, 40)), nm, 2.2),
+    ):
+        text = refuse()
+        assert text.startswith(f"wavelength_nm: {380 * factor:g} to {780 * factor:g} is outside 100 to 20000 nm")
+        assert f"they seem to be {unit}: multiply them" in text
+
+
+def test_the_ends_of_what_counts_as_nanometres_are_taken():
+    assert band_widths([105.0, 19_990.0], [10.0, 20.0]).tolist() == [10.0, 20.0]
+    assert "99.9 to" in complaint(band_widths, [105.0, 500.0], [10.2, 10.0])
+    assert Spectrum(np.array([100.0, 20_000.0]), np.ones(2)).band_average(550.0, 10.0) == 1.0
+
+
+@pytest.mark.parametrize("width", [20.0, [10.0, 10.3, 10.0], [10.0, 10.0, 10.3]])
+def test_bands_that_overlap_by_over_a_hundredth_are_refused(width):
+    text = complaint(band_widths, [400.0, 410.0, 420.0], width)
+    assert "overlap, and the light of both would count twice; give widths that don't" in text
+    assert "overlap" in complaint(SpectralRadiance, np.ones((2, 2, 3)), [400.0, 410.0, 420.0], 0.0, width)
+
+
+def test_a_narrow_band_inside_a_wide_one_is_refused():
+    assert "bands 0 and 1, 380 to 480 nm and 450 to 452 nm" in complaint(band_widths, [430.0, 451.0], [100.0, 2.0])
+
+
+def test_bands_that_touch_or_overlap_by_rounding_are_taken():
+    assert band_widths([400.0, 410.0], [10.1, 10.0]).tolist() == [10.1, 10.0]
+    line_and_rest = line_bands([435.8, 546.1, 577.0, 579.1])
+    assert np.array_equal(band_widths(*line_and_rest), line_and_rest[1])
+    edges = np.linspace(380.0, 780.0, 31)  # a third of a width isn't a float
+    assert band_widths((edges[1:] + edges[:-1]) / 2, np.diff(edges)).size == 30
 
 
 @pytest.mark.parametrize("temperature_k", [2856.0, 4200.0, 6504.0])

@@ -9,11 +9,12 @@ from render.errors import InputError
 from render.radiance import SpectralRadiance
 from render.spectrum import flat
 from sensor.cfa import BAYER, RGBW
-from sensor.config import LensConfig, PixelConfig, SensorConfig, check_window
+from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.optics import form_image
 from sensor.presets import low_noise, names, preset, table1_output, table1_pixel
 from sensor.response import expected_electrons
+from sensor.window import check_window
 
 PIXEL = PixelConfig(pitch_um=2.2, fill_factor=0.9, full_well_e=15_000.0, read_noise_e=3.0, dsnu_e=4.0, prnu=0.01)
 LENS = LensConfig(f_number=2.8)
@@ -26,17 +27,32 @@ def one_line(error, *parts):
         assert part in message, message
 
 
-@pytest.mark.parametrize("bits", [1, 8, 14, 16])
-def test_default_black_level_is_five_sigmas_of_the_dark_and_the_well_ends_at_the_top(bits):
+@pytest.mark.parametrize(("bits", "black_dn"), [(8, 1), (14, 28), (16, 110)])  # 0.42, 27.3 and 109.04 rounded up
+def test_default_black_level_is_the_whole_dn_from_five_sigmas_of_the_dark_and_the_well_ends_at_the_top(bits, black_dn):
     sensor = SensorConfig(PIXEL, LENS, bits=bits)
     assert sensor.white_dn == 2**bits - 1
-    assert sensor.black_e == pytest.approx(5 * 5.0, rel=1e-15)  # read 3, DSNU 4: sigma 5
-    assert sensor.gain_e_per_dn == pytest.approx((15_000 + 25) / (2**bits - 1), rel=1e-15)
-    assert sensor.black_dn * sensor.gain_e_per_dn == pytest.approx(25.0, rel=1e-14)
+    assert (type(sensor.black_dn), sensor.black_dn) == (int, black_dn)
+    assert sensor.gain_e_per_dn == 15_000 / (2**bits - 1 - black_dn)
+    assert 25.0 <= sensor.black_e < 25.0 + 1.01 * sensor.gain_e_per_dn  # read 3, DSNU 4: sigma 5
     assert sensor.black_dn + 15_000 / sensor.gain_e_per_dn == pytest.approx(sensor.white_dn, rel=1e-14)
 
 
-@pytest.mark.parametrize("black_level_dn", [0.0, 64.0, 99.5])
+def test_a_black_level_that_is_whole_already_is_not_raised_by_rounding_errors():
+    for black_dn in range(
+        1, 2000
+    ):  # five sigmas read `black_dn` where read noise is well / (white - black) * black / 5
+        read_noise_e = 15_000 / (16_383 - black_dn) * black_dn / 5
+        sensor = SensorConfig(replace(PIXEL, read_noise_e=read_noise_e, dsnu_e=0.0), LENS)
+        assert sensor.black_dn == black_dn
+
+
+def test_a_converter_too_coarse_for_its_dark_keeps_a_step_for_light():
+    assert SensorConfig(PIXEL, LENS, bits=1).black_dn == 0
+    sensor = SensorConfig(replace(PIXEL, read_noise_e=1e6), LENS, bits=2)
+    assert (sensor.black_dn, sensor.gain_e_per_dn) == (2, 15_000.0)
+
+
+@pytest.mark.parametrize("black_level_dn", [0, 64, 99.0])
 def test_explicit_black_level_stays_where_it_is_put_and_the_well_still_ends_at_the_top(black_level_dn):
     sensor = SensorConfig(PIXEL, LENS, bits=10, black_level_dn=black_level_dn)
     assert sensor.black_dn == pytest.approx(black_level_dn, rel=1e-15)
@@ -144,7 +160,8 @@ def test_a_lens_out_of_range_is_refused_by_name_and_value(field, value):
         ({"bits": 17}, ("bits: 17", "1 to 16")),
         ({"bits": 10.5}, ("bits: 10.5", "1 to 16", "round it")),
         ({"black_level_dn": -1.0}, ("black_level_dn: -1.0", "give DN under the white level")),
-        ({"black_level_dn": 255.0, "bits": 8}, ("black_level_dn: 255.0", "254.5")),
+        ({"black_level_dn": 255.0, "bits": 8}, ("black_level_dn: 255.0", "0 to 254")),
+        ({"black_level_dn": 9.84}, ("black_level_dn: 9.84 is not a whole number", "round it")),
         ({"window_nm": (780.0, 380.0)}, ("window_nm: (780.0, 380.0)", "shortest")),
         ({"window_nm": (np.nan, 780.0)}, ("window_nm", "shortest")),
         ({"cfa": ("RG", "B")}, ("cfa", "rectangle")),

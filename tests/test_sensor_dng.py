@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from render.errors import InputError
 from sensor.calibration import ColourCalibration
 from sensor.cfa import MOSAICS, RGBW, Tile, channels
-from sensor.dng import PRIVATE, PRIVATE_DATA, dng_tags, is_bayer, is_rgbw, rational, read_dng, write_dng
+from sensor.dng import PRIVATE, PRIVATE_DATA, dng_tags, exif_tags, is_bayer, is_rgbw, rational, read_dng, write_dng
 from sensor.raw import RawImage
-from sensor.tiff import EXIF
+from sensor.tiff import CFA, EXIF, write_mosaic
 
 rawpy = pytest.importorskip("rawpy", reason="rawpy (LibRaw) is not installed")
 
@@ -46,7 +46,7 @@ def exposure(cfa: Tile = ("RG", "GB"), shape: tuple[int, int] = (30, 41), bits: 
     return RawImage(
         dn,
         cfa,
-        black_dn=9.839516129 if bits > 4 else 0.25,
+        black_dn=10 if bits > 4 else 0,
         white_dn=2**bits - 1,
         gain_e_per_dn=0.1 + 0.2,
         read_noise_e=1.5,
@@ -86,7 +86,7 @@ def test_libraw_reads_every_phase_bit_for_bit(cfa: Tile, shape: tuple[int, int],
         letters = "RGBG" if is_bayer(cfa) else "RGBW"  # LibRaw counts a Bayer tile's second green as number 3
         assert tuple("".join(letters[i] for i in row) for row in theirs.raw_pattern) == cfa
         assert theirs.white_level == 2**14 - 1
-        assert theirs.black_level_per_channel == [9, 9, 9, 9]  # LibRaw cuts fractions off
+        assert theirs.black_level_per_channel == [10, 10, 10, 10]
         gains = np.array(theirs.camera_whitebalance[: theirs.num_colors])
         assert raw.colour is not None
         assert gains / gains[1] == pytest.approx(raw.colour.neutral[1] / raw.colour.neutral, rel=1e-6)
@@ -118,7 +118,7 @@ def test_the_way_back_is_exact(cfa: Tile, tmp_path: Path) -> None:
 
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 @given(
-    st.floats(0.0, 1000.0),
+    st.integers(0, 1000),
     st.floats(1e-12, 1e12),
     st.floats(0.0, 1e9),
     st.floats(0.0, 1.0),
@@ -126,7 +126,7 @@ def test_the_way_back_is_exact(cfa: Tile, tmp_path: Path) -> None:
     st.none() | st.floats(0.1, 1e4),
 )
 def test_the_way_back_is_exact_for_any_number(
-    tmp_path: Path, black: float, gain: float, noise: float, prnu: float, seconds: float, f_number: float | None
+    tmp_path: Path, black: int, gain: float, noise: float, prnu: float, seconds: float, f_number: float | None
 ) -> None:
     raw = replace(
         exposure(shape=(2, 2)),
@@ -139,6 +139,12 @@ def test_the_way_back_is_exact_for_any_number(
         iso=None,
     )
     assert same(read_dng(write_dng(raw, tmp_path / "shot.dng")), raw)
+
+
+def test_a_file_of_an_earlier_version_with_a_fraction_in_its_black_level_is_still_read(tmp_path: Path) -> None:
+    raw = replace(exposure(), black_dn=9.84)
+    write_mosaic(tmp_path / "shot.dng", raw.dn, CFA, dng_tags(raw), exif_tags(raw))
+    assert same(read_dng(tmp_path / "shot.dng"), raw)
 
 
 def test_public_tags_hold_what_the_specification_asks_for(tmp_path: Path) -> None:
@@ -213,6 +219,7 @@ def test_tiles_are_told_apart(cfa: Tile, bayer: bool, rgbw: bool) -> None:
         ({"cfa": ("RC", "CC"), "colour": None}, r"cfa: .* is not written as DNG; allowed: Bayer or 2x2 RGBW"),
         ({"colour": None}, r"colour: the raw image holds no colour calibration"),
         ({"black_dn": -1.0}, r"levels: black -1\.0 .* don't fit a DNG"),
+        ({"black_dn": 9.84}, r"black_dn: 9\.84 is no whole number, .* allowed: whole DN; write a \.tif instead"),
         ({"white_dn": 1000.5}, r"levels: .*white 1000\.5 don't fit a DNG"),
         ({"dn": np.zeros((4, 4), np.int32)}, r"dn: int32 of shape \(4, 4\) is not allowed"),
     ],

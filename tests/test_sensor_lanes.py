@@ -117,8 +117,8 @@ def test_counts_follow_the_exact_law(mean_e):
 def test_totals_and_variances_of_a_megapixel_are_the_exact_law_s_after_rounding(mean_e, gain_e_per_dn):
     sensor = COUNTS
     if gain_e_per_dn != 1:
-        well_e = gain_e_per_dn * (65_535 - 10.3)
-        sensor = replace(COUNTS, pixel=replace(PIXEL, full_well_e=well_e), black_level_dn=10.3)
+        well_e = gain_e_per_dn * (65_535 - 10)
+        sensor = replace(COUNTS, pixel=replace(PIXEL, full_well_e=well_e), black_level_dn=10)
     dn = read(mean_e, sensor, key=int(mean_e * 100)).astype(np.float64)
     counts = np.arange(stats.poisson.ppf(1e-13, mean_e), stats.poisson.isf(1e-13, mean_e) + 1)
     weights = stats.poisson.pmf(counts, np.float32(mean_e))

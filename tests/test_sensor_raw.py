@@ -76,6 +76,13 @@ def test_a_frame_that_does_not_hold_a_tile_is_refused(shape):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint16, np.int64, np.float32, np.float64, list])
+def test_whole_numbers_and_finite_floats_are_taken_as_they_are(dtype):
+    dn = np.array([[101, 102], [103, 104]], np.int64)
+    given = dn.tolist() if dtype is list else dn.astype(dtype)
+    np.testing.assert_array_equal(replace(RAW, dn=given).electrons, [[2.0, 4.0], [6.0, 8.0]])
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -89,6 +96,13 @@ def test_a_frame_that_does_not_hold_a_tile_is_refused(shape):
         ({"f_number": 0.0}, r"f_number: 0\.0 is outside"),
         ({"iso": -100.0}, r"iso: -100\.0 is outside"),
         ({"white_dn": 65_536.0}, r"white_dn: 65536\.0 is outside .*give digital numbers of 16 bits"),
+        ({"dn": np.full((2, 2), np.nan)}, r"dn: nan at \(0, 0\) is not allowed; give finite numbers"),
+        ({"dn": np.array([[1.0, 2.0], [-np.inf, 0.0]])}, r"dn: -inf at \(1, 0\)"),
+        ({"dn": np.ones((2, 2), complex)}, r"dn: samples of type complex128 are not allowed; give whole numbers or"),
+        ({"dn": np.ones((2, 2), bool)}, r"dn: samples of type bool"),
+        ({"dn": np.full((2, 2), None)}, r"dn: samples of type object"),
+        ({"dn": [["1", "2"], ["3", "4"]]}, r"dn: samples of type <U1"),
+        ({"dn": [[1, 2], [3]]}, r"dn: samples of type object"),
         ({"black_dn": -np.inf}, r"black_dn: -inf is outside"),
         ({"camera": ""}, r"camera: '' is not allowed; give a name in printable ASCII"),
         ({"camera": "Käfer"}, r"camera: 'Käfer' is not allowed"),

@@ -25,9 +25,14 @@ def camera(**changes):
     return replace(plain, **changes)
 
 
-def uniform(value, nm, width_nm=None, shape=(4, 6)):
+def uniform(value, nm, width_nm=10.0, shape=(4, 6)):
+    """Light in bands that touch, and dark bands beside them, so that no window is left open."""
     nm = np.atleast_1d(np.asarray(nm, dtype=np.float64))
-    return SpectralRadiance(np.full((*shape, nm.size), value), nm, width_nm=width_nm)
+    edges = np.array([200.0, nm[0] - width_nm / 2, nm[-1] + width_nm / 2, 1100.0])
+    centres = np.concatenate([edges[:2].mean(keepdims=True), nm, edges[2:].mean(keepdims=True)])
+    widths = np.concatenate([[edges[1] - edges[0]], np.full(nm.size, width_nm), [edges[3] - edges[2]]])
+    values = np.concatenate([[0.0], np.full(nm.size, value), [0.0]])
+    return SpectralRadiance(np.broadcast_to(values, (*shape, values.size)), centres, width_nm=widths)
 
 
 def expected(radiance, sensor, exposure_s):
@@ -45,9 +50,10 @@ def test_a_uniform_scene_gives_each_letter_its_closed_form(tile):
 
 
 def test_bands_add_up_each_with_its_own_wavelength_and_width():
-    nm, width_nm = np.array([450.0, 600.0, 700.0]), np.array([5.0, 30.0, 2.0])
-    weights = np.array([3.0, 1.0, 2.0])
-    radiance = SpectralRadiance(np.broadcast_to(weights * 1e-3, (2, 2, 3)), nm, width_nm=width_nm)
+    edges = np.array([380.0, 447.5, 452.5, 585.0, 615.0, 699.0, 701.0, 780.0])
+    nm, width_nm = (edges[1:] + edges[:-1]) / 2, np.diff(edges)  # 5 nm at 450, 30 at 600, 2 at 700, dark between
+    weights = np.array([0.0, 3.0, 0.0, 1.0, 0.0, 2.0, 0.0])
+    radiance = SpectralRadiance(np.broadcast_to(weights * 1e-3, (2, 2, 7)), nm, width_nm=width_nm)
     photons = np.sum(weights * 1e-3 * width_nm * nm) * 1e-9 / JOULES * pi / 17 * 4.5e-12 * 0.01
     electrons = expected(radiance, camera(), 0.01)
     np.testing.assert_allclose(electrons, photons * np.array([[QE["R"], QE["G"]], [QE["B"], QE["W"]]]), rtol=1e-12)
@@ -115,7 +121,7 @@ def test_single_precision_radiance_agrees_with_double_to_1e_6():
 
 
 def test_each_pixel_takes_its_own_letter_s_plane():
-    nm = np.arange(405.0, 700.0, 10.0)
+    nm = np.arange(385.0, 780.0, 10.0)
     radiance = SpectralRadiance(np.random.default_rng(3).random((5, 7, nm.size)), nm)
     sensor = SensorConfig(PIXEL, LensConfig(2.0))
     image = form_image(radiance, sensor)
@@ -127,7 +133,7 @@ def test_each_pixel_takes_its_own_letter_s_plane():
 
 
 def test_memory_order_of_the_bands_does_not_matter():
-    nm = np.arange(405.0, 700.0, 10.0)
+    nm = np.arange(385.0, 780.0, 10.0)
     values = np.random.default_rng(4).random((6, 8, nm.size))
     planar = np.moveaxis(np.ascontiguousarray(np.moveaxis(values, -1, 0)), 0, -1)
     sensor = SensorConfig(PIXEL, LensConfig(2.0))

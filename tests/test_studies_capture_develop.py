@@ -106,6 +106,63 @@ def test_the_signal_is_that_of_the_level_and_exposure_asked_for(
         assert abs((read_raw(out).electrons - expected).mean()) < 5 * sigma
 
 
+@pytest.mark.parametrize(("columns", "told"), [(31, False), (33, True), (64, True)])
+def test_a_frame_more_than_half_saturated_is_told(
+    columns: int, told: bool, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    values = wall().values.copy()
+    values[:, :columns] *= 1e4
+    write_exr(tmp_path / "lit.exr", SpectralRadiance(values, NM, 0.0, WIDTH))
+    arguments = ["capture", str(tmp_path / "lit.exr"), "-o", str(tmp_path / "shot.dng"), "--exposure-s", "0.01"]
+    code, _, err = call(arguments, capsys)
+    words = (
+        f"rodcone: {columns / 64:.0%} of the pixels are saturated at 0.01 s; give a shorter --exposure-s (seconds: "
+        "20 ms is 0.02), or leave it out\n"
+    )
+    assert (code, words in err, "saturated" in err) == (0, told, told)
+
+
+def cut(path: Path, first_nm: float, last_nm: float) -> Path:
+    """A wall of whose bands those between two wavelengths alone are kept."""
+    kept = (first_nm < NM) & (last_nm > NM)
+    write_exr(path, SpectralRadiance(wall().values[..., kept], NM[kept], 0.0, WIDTH[kept]))
+    return path
+
+
+@pytest.mark.filterwarnings("default:radiance")
+def test_a_cube_that_ends_inside_the_window_is_photographed_with_a_warning(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "shot.dng"
+    code, printed, err = call(["capture", str(cut(tmp_path / "cut.exr", 380, 650)), "-o", str(out)], capsys)
+    assert (code, printed.split()[0], err.count("radiance: its bands, 380 to 650 nm, don't fill")) == (0, str(out), 1)
+    assert "they leave out 5.6% of R, 0.0% of G, 0.0% of B, 41.3% of W; give those bands, or narrow" in err
+
+
+def test_a_cube_that_lacks_more_than_half_of_a_channel_is_not_photographed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "shot.dng"
+    code, printed, err = call(["capture", str(cut(tmp_path / "cut.exr", 380, 550)), "-o", str(out)], capsys)
+    assert (code, printed, out.exists()) == (2, "", False)
+    assert "% of R, " in err
+    assert "allowed: half; give those bands, or narrow the camera's window_nm" in err.splitlines()[-1]
+
+
+@pytest.mark.filterwarnings("default:radiance")
+def test_a_sweep_of_such_a_cube_tells_and_refuses_alike(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    study = 'scenes = [{ source = "cut.exr", light = "D65" }]\nlevels = ["25cd/m2"]\nprocessors = ["bayer"]\n'
+    (tmp_path / "study.toml").write_text(study, "utf-8")
+    arguments = ["sweep", str(tmp_path / "study.toml"), "--workers", "1", "--as-stated", "-o"]
+    cut(tmp_path / "cut.exr", 450, 780)
+    code, _, err = call([*arguments, str(tmp_path / "out")], capsys)
+    # once for the processor's mosaic, and once for the preset's own, whose auto exposure it is
+    assert (code, err.count("radiance: its bands, 450 to 780 nm, don't fill")) == (0, 2)
+    cut(tmp_path / "cut.exr", 540, 780)
+    code, _, err = call([*arguments, str(tmp_path / "other")], capsys)
+    assert (code, "allowed: half; give those bands" in err.splitlines()[-1]) == (2, True)
+
+
 def test_seeds_draw_another_chip_and_another_exposure(
     exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -146,6 +203,8 @@ def test_the_file_carries_the_calibration_for_the_white_balance_asked_for(
         (["flat_field", "--cfa", "bayr"], ["rodcone: cfa: 'bayr' is unknown", "did you mean 'bayer'"]),
         (["flat_field", "--trust-scene"], ["'flat_field' is no .xml scene"]),
         (["scene.exr", "--trust-scene"], ["'scene.exr' is no .xml scene"]),
+        (["scene.exr", "--extend", "hold"], ["'scene.exr' is a picture", "leave --extend out"]),
+        (["flat_field", "--extend", "zero"], ["extend: 'zero' is unknown; allowed: hold"]),
         (["none.xml"], ["'none.xml' is missing"]),
         (["flat_field", "--cfa", "rccc"], ["can't hold the mosaic", "shot.tif"]),
         (["flat_field", "--cfa", "rccc", "-o", "o/shot.tif"], ["has no G", "give exposure_s"]),
@@ -205,7 +264,7 @@ def test_light_with_colours_of_its_own_leaves_the_balance_at_daylight_and_says_s
 ) -> None:
     scene, out = tmp_path / "room.xml", tmp_path / "shot.dng"
     two = '<spectrum name="irradiance" value="2"/></emitter><emitter type="directional" id="sun:b">'
-    scene.write_text(SCENE.format(two + '<spectrum name="irradiance" value="400:1, 700:2"/>'))
+    scene.write_text(SCENE.format(two + '<spectrum name="irradiance" value="380:1, 780:2"/>'))
     arguments = ["capture", str(scene), "-o", str(out), "--cfa", "bayer", "--spp", "1", "--level", "25cd/m2"]
     code, _, err = call(arguments, capsys)
     assert (code, err.count("\n")) == (0, 1)
@@ -373,7 +432,7 @@ def test_a_photograph_of_another_camera_is_developed_and_says_what_was_assumed(
     assert (code, facts["isp"], facts["noise"], facts["as_shot"]) == (0, "bayer", "assumed", "file")
     assert facts["reader"].startswith("LibRaw 0.")
     with Image.open(tmp_path / "other.png") as picture:
-        # LibRaw cuts black's fraction off: up to one DN of the well's 16 000, and the levels' rounding as above
+        # the levels' rounding as above
         assert np.abs(np.asarray(picture) - 255 * encode_srgb(np.array(0.25))).max() <= 0.7
         assert picture.size == raw.shape[::-1]
 

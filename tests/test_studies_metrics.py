@@ -5,7 +5,11 @@ import pytest
 from scipy.ndimage import correlate
 from skimage.color import deltaE_ciede2000, rgb2lab
 
+from render.errors import InputError
+from studies.appearance import appearance, true_picture
 from studies.metrics import measure, psnr_db
+from studies.pu21 import pu21_psnr_db
+from studies.s_cielab import s_cielab
 
 # Sharma, Wu & Dalal, Color Res. Appl. 30(1), 2005, table 1: pairs 1, 4, 7, 10, 12, 13, 17, 18, 19, 25, 28, 34. They
 # hold the hue's jumps at 180 and 360 degrees, greys, blues' rotation, large and small differences.
@@ -75,3 +79,23 @@ def test_the_95th_percentile_sees_what_the_median_does_not() -> None:
     plain = float(deltaE_ciede2000(rgb2lab(picture[0, 0]), rgb2lab(truth[0, 0])))
     assert plain > 20
     assert (quality.delta_e_median, quality.delta_e_p95) == (0.0, pytest.approx(plain))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize(
+    "metric",
+    [
+        psnr_db,
+        measure,
+        s_cielab,
+        lambda picture, truth: appearance(picture, true_picture(truth), 40.0),
+        lambda picture, truth: pu21_psnr_db(picture[..., 0], truth[..., 0]),
+    ],
+    ids=["psnr_db", "measure", "s_cielab", "appearance", "pu21_psnr_db"],
+)
+def test_a_picture_that_is_not_finite_has_no_quality(metric, value) -> None:
+    sound, broken = np.full((24, 24, 3), 0.5), np.full((24, 24, 3), 0.5)
+    broken[3, 4, 0] = value
+    for pictures in ((broken, sound), (sound, broken)):
+        with pytest.raises(InputError, match=rf"^(picture|truth|luminance_cd_m2): {value} at \(3, 4.*finite numbers"):
+            metric(*pictures)

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import transport_of
 
 from render.engine import render
 from render.illuminants import illuminant
 from render.scene import LightGroup
-from render.transport import Transport
 from scenes.catalog import load
 from sensor.noise import noise_variance
 from sensor.presets import low_noise, table1_output
@@ -23,21 +23,13 @@ LONGEST_S = 0.066
 def grey(relative_error, size=(8, 10), **changes):
     """An even picture whose bands all have the same relative standard error."""
     shape = (1, NM.size, *size)
-    made = Transport(
-        radiance=np.full(shape, 0.5, np.float32),
-        half_difference=np.zeros(shape, np.float32),
+    made = transport_of(
+        np.full(shape, 0.5, np.float32),
+        {"sky": LightGroup(("sky",), illuminant("D65"), 100.0)},
+        NM,
+        WIDTH_NM,
         variance=np.full(shape, (0.5 * relative_error) ** 2, np.float32),
-        irradiance=None,
-        emitter_visible=np.zeros(size, dtype=bool),
-        groups={"sky": LightGroup(("sky",), illuminant("D65"), 100.0)},
-        wavelength_nm=NM,
-        width_nm=WIDTH_NM,
         spp=128,
-        passes=8,
-        stopped_by="samples",
-        seconds=1.0,
-        integrator="none",
-        variant="none",
     )
     return replace(made, **changes)
 

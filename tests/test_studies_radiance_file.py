@@ -13,7 +13,7 @@ from render.radiance import SpectralRadiance
 from studies.demo import Demo, check, run, write
 from studies.radiance_file import open_radiance_file
 
-NM = 405.0 + 10 * np.arange(30)
+NM = 385.0 + 10 * np.arange(40)
 
 
 def ramp(path: Path, height: int = 20, width: int = 26, error: float = 0.0) -> Path:
@@ -31,7 +31,7 @@ def test_demo_runs_from_a_file_in_the_files_own_size(tmp_path: Path) -> None:
     assert results["size"] == [20, 26]
     assert results["levels"][0]["illuminance_lux"] is None
     assert results["render"]["integrator"] == "file"
-    assert results["render"]["bands"] == 30
+    assert results["render"]["bands"] == 40
     assert len(results["cells"]) == 2
     assert any("relative Monte Carlo error of 0.250" in note for note in results["notes"])
     assert "my scene.exr" in write(outcome, tmp_path / "out").read_text("utf-8")
@@ -46,7 +46,7 @@ def test_grey_picture_is_grey_under_its_own_light_alone(tmp_path: Path) -> None:
         with Image.open(BytesIO(outcome.pictures["truth"])) as truth:
             pixels = np.asarray(truth.convert("RGB"), dtype=int)
         spread[light] = (pixels[:, :, 0] - pixels[:, :, 2]).max()
-    assert spread["E"] <= 1  # 30 bands round the neutral by less than a step of 8 bits
+    assert spread["E"] <= 1  # 40 bands round the neutral by less than a step of 8 bits
     assert spread[None] > 10
 
 

@@ -105,6 +105,19 @@ def test_what_an_interrupt_left_is_written_and_told(
     assert read_exr(out).shape == (6, 8)
 
 
+def test_surfaces_go_on_at_their_ends_where_it_is_asked_for(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene.write_text(scene.read_text().replace('"reflectance" value="0.5"', '"reflectance" value="450:0.5, 700:0.5"'))
+    out = tmp_path / "o.exr"
+    code, _, err = call([str(scene), "-o", str(out), *QUICK], capsys)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "bands reach 400-720 nm, and grey/reflectance is known over 450-700 nm alone; give bands within" in err
+    assert "--extend hold" in err
+    assert call([str(scene), "-o", str(out), *QUICK, "--extend", "hold"], capsys) == (0, f"{out}\n", "")
+    np.testing.assert_allclose(read_exr(out).values, 0.5 * 2 / np.pi, rtol=1e-5)
+
+
 BAD = {
     "unknown scene": (["stil_life"], ["scene", "'stil_life'", "did you mean 'still_life'?"]),
     "missing file": (["none.xml"], ["'none.xml' is missing"]),
@@ -122,6 +135,7 @@ BAD = {
     "endless bands": (["{scene}", "--bands", "400:inf:10"], ["'400:inf:10'"]),
     "noise": (["{scene}", "--noise", "-1"], ["noise: -1", "0.02"]),
     "trust without file": (["still_life", "--trust-scene"], ["'still_life' is no .xml scene"]),
+    "no way to extend": (["{scene}", "--extend", "hol"], ["extend: 'hol'", "did you mean 'hold'?"]),
     "hostile": (["{hostile}"], ["(line 2, col 1)", "<path> lets a scene load native code", "--trust-scene"]),
 }
 

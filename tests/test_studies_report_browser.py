@@ -108,7 +108,7 @@ def test_detail_holds_the_pixels_it_names(browser: Any, report: Path) -> None:
         """(async () => {
              document.getElementById("column").value = 100; document.getElementById("row").value = 180;
              document.getElementById("row").dispatchEvent(new Event("input"));
-             await new Promise((done) => setTimeout(done, 200));
+             await document.querySelector("[data-truth] img").decode();  // the page asked first, and draws first
              const canvas = document.querySelector("[data-truth] canvas");
              return [...canvas.getContext("2d").getImageData(0, 0, 1, 1).data].slice(0, 3)})()"""
     )

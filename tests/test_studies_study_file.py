@@ -40,6 +40,11 @@ def test_a_file_becomes_a_study_with_files_beside_it(tmp_path: Path) -> None:
     assert study == replace(expected, render=replace(expected.render, spp=16))
 
 
+def test_a_scenes_surfaces_may_be_held_beyond_their_tables(tmp_path: Path) -> None:
+    text = TEXT.replace('{source = "desk.exr", light = "A"}', '{source = "room.xml", extend = "hold"}')
+    assert read_study(written(tmp_path, text)).scenes[1] == SceneChoice(str(tmp_path / "room.xml"), extend="hold")
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=[path.stem for path in EXAMPLES])
 def test_every_example_is_a_study(path: Path) -> None:
     assert read_study(path).name == path.stem.replace("_", " ")
@@ -54,6 +59,14 @@ def test_changes_take_toml_values_and_plain_words_and_make_tables(tmp_path: Path
     assert (study.budget.total, study.levels) == (0.2, ("2cd/m2",))
 
 
+@pytest.mark.parametrize(("given", "seeds"), [("3", (0, 1, 2)), ("1", (0,)), ("[3]", (3,)), ("[5, 2]", (5, 2))])
+def test_a_number_of_seeds_counts_from_0_and_a_list_names_them(
+    given: str, seeds: tuple[int, ...], tmp_path: Path
+) -> None:
+    study = read_study(written(tmp_path), [f"seeds={given}", "scenes=still_life"])
+    assert (study.seeds, study.scenes) == (seeds, (SceneChoice("still_life"),))
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -63,6 +76,9 @@ def test_changes_take_toml_values_and_plain_words_and_make_tables(tmp_path: Path
         (['scenes=[{sorce="x"}]'], "did you mean 'source'?"),
         (["seeds=[true]"], "seeds: True is not a whole number"),
         (['seeds=["1"]'], "seeds: '1' is not a whole number"),
+        (["seeds=0"], "seeds: 0 is outside 1 to 100000; give how many, from 0 on, or a list such as [7]"),
+        (["seeds=-3"], "seeds: -3 is outside 1 to"),
+        (["seeds=true"], "seeds: True is not a whole number"),
         (["render.spp=1.5"], "render: spp: 1.5 is not a whole number"),
         (["name=3"], "name: 3 is not a text in quotes"),
         (["render=3"], "render: what stands there is not a table"),

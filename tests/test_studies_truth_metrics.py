@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from builders import transport_of
 
 from render.errors import InputError
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from render.scene import LightGroup
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, flat
 from render.tables import colour_science
 from sensor.exposure import LONGEST_S, auto_exposure_s
 from sensor.optics import form_image
@@ -86,8 +88,19 @@ def test_monte_carlo_share_is_the_ratio_of_variances() -> None:
 
 
 def test_a_lamp_in_the_picture_does_not_set_the_white() -> None:
+    """Nor does its rim: there the surface counts, as far as it is seen."""
     scene = neutral_scene(9.0)
-    lamps = np.zeros((16, 16), dtype=bool)
-    lamps[:4, :4] = True
-    lit = SpectralRadiance(np.where(lamps[..., None], 1e4, 1.0) * scene.values, NM)
-    assert shown_white_cd_m2(lit, lamps) == pytest.approx(10.0, rel=1e-6)
+    coverage = np.zeros((1, 16, 16), np.float32)
+    coverage[0, :4, :4], coverage[0, :4, 4] = 1.0, 0.3
+    lamp = Spectrum(np.array([300.0, 1100.0]), np.array([1e4, 1e4]))
+    planes = (np.moveaxis(scene.values, -1, 0) / 1e4 + coverage).astype(np.float32)[None]
+    lit = transport_of(planes, {"lamp": LightGroup(("lamp",), lamp)}, NM, scene.widths_nm, seen=coverage)
+    assert shown_white_cd_m2(lit, None) == pytest.approx(10.0, rel=1e-4)
+
+
+def test_white_is_the_percentile_of_the_area_that_shows_no_light() -> None:
+    """Hundred greys of 1 to 100 cd/m^2: the 99th percentile is 99, at 90 % of white."""
+    unit = neutral_scene(1.0, shape=(10, 10))
+    planes = (np.moveaxis(unit.values, -1, 0) * np.arange(1, 101).reshape(10, 10)).astype(np.float32)[None]
+    lit = transport_of(planes, {"sky": LightGroup(("sky",), flat())}, NM, unit.widths_nm)
+    assert shown_white_cd_m2(lit, None) == pytest.approx(99 / 0.9, rel=1e-5)

@@ -291,9 +291,9 @@ LIGHT = (
     ),
     _fault(
         "level counts the lamps seen",
-        "render/transport.py",
-        "kept = ~self.emitter_visible\n",
-        "kept = np.ones_like(self.emitter_visible)\n",
+        "render/level.py",
+        "uncovered = float(self.spp @ self.uncovered) / float(self.spp.sum())",
+        "uncovered = 1.0",
         "render_transport",
     ),
     _fault(
@@ -549,8 +549,8 @@ STUDIES = (
     _fault(
         "white among the lamps",
         "studies/truth.py",
-        "[~emitter_visible], WHITE_PERCENTILE",
-        "[emitter_visible | True], WHITE_PERCENTILE",
+        "weights = 1.0 - transport.coverage.astype(np.float64)",
+        "weights, luminance = None, transport.relight().luminance()",
         "studies_truth_metrics",
         "studies_lit_scene",
     ),
@@ -562,6 +562,85 @@ STUDIES = (
         "studies_truth_metrics",
         "studies_camera",
     ),
+)
+
+# What the program states of its own work.
+RENDERS = (
+    _fault(
+        "samples told as asked",
+        "render/limits.py",
+        "                return held\n",
+        "                return spp\n",
+        "render_samples",
+        "studies_stated_numbers",
+    ),
+    _fault(
+        "one sampler for camera and meter",
+        "render/loader.py",
+        '_SAMPLER | {"seed": 1}',
+        "_SAMPLER",
+        "render_samples",
+        "render_meter",
+    ),
+    _fault(
+        "passes of equal weight",
+        "render/passes.py",
+        "mean += delta * (weight / drawn)",
+        "mean += delta / np.float32(sums.passes)",
+        "render_samples",
+        "render_engine",
+    ),
+    _fault(
+        "an error believed after two passes",
+        "render/limits.py",
+        "passes >= PASSES and error",
+        "passes >= 2 and error",
+        "render_engine",
+    ),
+    _fault(
+        "seconds of the earlier render forgotten",
+        "render/engine.py",
+        "start = time.perf_counter() - (earlier.seconds if earlier else 0.0)",
+        "start = time.perf_counter()",
+        "render_engine",
+        "render_cache",
+    ),
+    _fault(
+        "a level's error without the passes' scatter",
+        "render/level.py",
+        "variance = float(share @ off**2) / (self.spp.size - 1)",
+        "variance = float(share @ off**2)",
+        "render_transport",
+    ),
+    _fault(
+        "lamps of the picture in its level",
+        "render/dense.py",
+        "emitted, dr.select(indirect, share, 0.0)",
+        "emitted, share",
+        "render_engine",
+    ),
+    _fault(
+        "halves clipped at 0",
+        "render/transport.py",
+        "SpectralRadiance(_view(half),",
+        "SpectralRadiance(_view(np.maximum(half, 0)),",
+        "render_transport",
+    ),
+    _fault(
+        "another band than rendered",
+        "studies/prepare.py",
+        "bands=record.bands,",
+        "bands=record.bands + 1,",
+        "studies_stated_numbers",
+    ),
+    _fault(
+        "the longest exposure as the shortest",
+        "studies/prepare.py",
+        "min(job.study.longest_exposure_s, ",
+        "max(job.study.longest_exposure_s, ",
+        "studies_stated_numbers",
+    ),
+    _fault("white at another percentile", "studies/truth.py", "= 99.0, 0.9", "= 90.0, 0.9", "studies_truth_metrics"),
 )
 
 _ACCOUNTS = ("studies_clock", "studies_cell_run", "studies_provenance")
@@ -651,4 +730,4 @@ ACCOUNTING = (
     _fault("no digest of rows", "studies/ledger.py", "digest(values[:-1]) == values[-1]", "True", "studies_stored"),
 )
 
-FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *KERNEL, *STUDIES, *ACCOUNTING)
+FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *KERNEL, *STUDIES, *RENDERS, *ACCOUNTING)

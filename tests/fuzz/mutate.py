@@ -3,12 +3,9 @@
 Every change is drawn from a `random.Random`, so that a seed and a number name an input.
 """
 
-import hashlib
-import io
 import json
 import re
 import struct
-import zipfile
 import zlib
 from collections.abc import Callable, Sequence
 from random import Random
@@ -245,40 +242,6 @@ def mat_elements(random: Random, content: bytes) -> bytes:
             new = any_bytes(random, body)
         changed += struct.pack("<II", kind, len(new)) + new
     return changed
-
-
-def signed_archive(random: Random, content: bytes) -> bytes:
-    """A cached render changed by someone who means harm: archive and digest are made anew."""
-    if random.random() < 0.1:
-        return any_bytes(random, content)
-    body = content[:-32]
-    if random.random() < 0.3:
-        body = any_bytes(random, body)
-    else:
-        with zipfile.ZipFile(io.BytesIO(body)) as archive:
-            held = {name: archive.read(name) for name in archive.namelist()}
-        name = random.choice(list(held))
-        held[name] = any_bytes(random, held[name])
-        if name == "values.npy" and random.random() < 0.7:
-            text = json_values(random, held[name][128:].decode("utf-32-le", "replace").encode()).decode(
-                "utf-8", "replace"
-            )
-            packed = text.encode("utf-32-le", "replace")
-            head = held[name][:128].replace(b"<U", b"<U") if random.random() < 0.2 else _text_head(len(text))
-            held[name] = head + packed
-        if random.random() < 0.1:
-            held[random.choice(("more.npy", "../more.npy", name))] = held.pop(random.choice(list(held)))
-        file = io.BytesIO()
-        with zipfile.ZipFile(file, "w", random.choice((zipfile.ZIP_STORED,) * 4 + (zipfile.ZIP_DEFLATED,))) as archive:
-            for each, part in held.items():
-                archive.writestr(each, part)
-        body = file.getvalue()
-    return body + hashlib.sha256(body).digest()
-
-
-def _text_head(length: int) -> bytes:
-    text = f"{{'descr': '<U{length}', 'fortran_order': False, 'shape': (), }}".ljust(117) + "\n"
-    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text.encode()
 
 
 def pages(random: Random, content: bytes) -> bytes:

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 import numpy as np
-from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_elements, pages, signed_archive, tiff_tags
+from builders import transport_of
+from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_elements, pages, tiff_tags
 
 from render.cache import load_transport, save_transport
 from render.exr import read_exr, write_exr
@@ -17,7 +18,6 @@ from render.iset import read_iset_scene
 from render.loader import Film, integrator_name, variant
 from render.radiance import SpectralRadiance
 from render.scene_file import load_scene_file
-from render.transport import Transport
 from scenes.catalog import load
 from sensor.calibration import ColourCalibration
 from sensor.config_file import read_sensor
@@ -276,17 +276,15 @@ def _film() -> Film:
 def _cache_samples() -> list[Sample]:
     rng = np.random.default_rng(4)
     planes = rng.random((3, len(_scene().groups), NM.size, 4, 5), dtype=np.float32)
-    made = Transport(
-        *planes,
-        irradiance=rng.random((len(_scene().groups), NM.size)) if _scene().reference_plane else None,
-        emitter_visible=np.zeros((4, 5), dtype=np.bool_),
-        groups=_scene().groups,
-        wavelength_nm=NM,
-        width_nm=np.full(NM.size, 70.0),
-        spp=8,
-        passes=8,
-        stopped_by="samples",
-        seconds=1.0,
+    irradiance = rng.random((len(_scene().groups), NM.size)) if _scene().reference_plane else None
+    made = transport_of(
+        planes[0],
+        _scene().groups,
+        NM,
+        np.full(NM.size, 70.0),
+        irradiance=irradiance,
+        half_difference=planes[1],
+        variance=planes[2],
         integrator=integrator_name(),
         variant=variant(),
     )
@@ -333,6 +331,6 @@ TARGETS: dict[str, Target] = {
     "sensor": Target(_sensor_samples, {".toml": any_text, ".csv": any_text}, read_sensor),
     "curves": Target(_curve_samples, {".csv": any_text}, _read_curves),
     "scene": Target(_scene_samples, {".xml": any_text, ".spd": any_text}, load_scene_file),
-    "cache": Target(_cache_samples, {".npz": signed_archive}, _read_cached),
+    "cache": Target(_cache_samples, {".npz": any_bytes}, _read_cached),
     "ledger": Target(_ledger_samples, {".sqlite": pages}, lambda path: read_rows(path.parent, everything=True)),
 }

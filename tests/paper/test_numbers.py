@@ -18,9 +18,9 @@ MOONLIGHT_CD_M2 = 0.036
 FIGURE_2_NM = np.arange(400.0, 701.0, 10.0)  # 400-700 nm, where the paper shows its curves
 
 
-def camera(pitch_um, f_number):
+def camera(pitch_um, f_number, window_nm=(395.0, 705.0)):
     pixel = PixelConfig(pitch_um, 1.0, full_well_e=1e6, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
-    return SensorConfig(pixel, LensConfig(f_number))
+    return SensorConfig(pixel, LensConfig(f_number), window_nm=window_nm)
 
 
 def scene(light, luminance_cd_m2, nm=FIGURE_2_NM, shape=(2, 2)):
@@ -90,7 +90,7 @@ def test_6_um_against_2_um_is_9_54_db_as_read_out():
 
 def ratios(light, nm):
     """Electrons of W over those of R, G and B."""
-    sensor = camera(2.0, 4.0)
+    sensor = camera(2.0, 4.0, window_nm=(nm[0] - 0.5, nm[-1] + 0.5))
     red, green, blue, white = channel_electrons(form_image(scene(light, 1.0, nm), sensor), sensor, 1.0)[0, 0]
     return white / red, white / green, white / blue
 

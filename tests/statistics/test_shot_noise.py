@@ -18,7 +18,7 @@ MEANS_E = (0.3, 1.0, 10.0, 24.0, 26.0, 1000.0)  # 24 and 26 lie beside a known f
 GAINS = (0.31, 1.7, 4.0)  # electrons per DN: finer than an electron, and coarser
 
 
-def camera(gain_e_per_dn, read_noise_e, bits=14, black_level_dn=60.25):
+def camera(gain_e_per_dn, read_noise_e, bits=14, black_level_dn=60):
     well_e = gain_e_per_dn * (2**bits - 1 - black_level_dn)
     pixel = PixelConfig(2.2, 0.9, well_e, read_noise_e, dsnu_e=0.0, prnu=0.0)
     return SensorConfig(pixel, LensConfig(2.8), bits=bits, black_level_dn=black_level_dn)
@@ -91,7 +91,7 @@ def test_clipping_at_0_without_a_pedestal_has_its_exact_moments_too(mean_e):
 @pytest.mark.parametrize("mean_e", [90.0, 100.0, 110.0])
 def test_a_well_that_clips_in_the_midst_of_the_distribution_has_its_exact_moments(mean_e, read_noise_e):
     pixel = PixelConfig(2.2, 0.9, 100.0, read_noise_e, dsnu_e=0.0, prnu=0.0)
-    sensor = SensorConfig(pixel, LensConfig(2.8), bits=10, black_level_dn=60.25)
+    sensor = SensorConfig(pixel, LensConfig(2.8), bits=10, black_level_dn=60)
     assert_moments(frame(mean_e, sensor, 12), exact_probabilities(mean_e, sensor))
 
 
@@ -100,7 +100,7 @@ def test_a_well_that_clips_in_the_midst_of_the_distribution_has_its_exact_moment
 @pytest.mark.parametrize("mean_e", [10.0, 26.0])
 def test_one_bit_and_sixteen_bits_have_their_exact_moments(mean_e, read_noise_e, bits):
     pixel = PixelConfig(2.2, 0.9, 50.0, read_noise_e, dsnu_e=0.0, prnu=0.0)
-    sensor = SensorConfig(pixel, LensConfig(2.8), bits=bits, black_level_dn=0.1)
+    sensor = SensorConfig(pixel, LensConfig(2.8), bits=bits, black_level_dn=0)
     assert_moments(frame(mean_e, sensor, 13), exact_probabilities(mean_e, sensor))
 
 

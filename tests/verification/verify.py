@@ -1,8 +1,9 @@
 """All that is too long for `make test`, part by part: ``python tests/verification/verify.py [--part NAME]``.
 
-Slow tests, the catalogue of hard cases, planted faults, damaged files and the soak. What a part found is kept in
-out/verify.json beside the state of the code it was found with, so an ended run goes on where it was; a part that fails
-is tried again the next time. Prints the table that docs/verification.md holds.
+Slow tests, the tests of `make test` with NumPy's baseline alone, the catalogue of hard cases, planted faults, damaged
+files and the soak. What a part found is kept in out/verify.json beside the state of the code it was found with, so an
+ended run goes on where it was; a part that fails is tried again the next time. Prints the table that
+docs/verification.md holds.
 """
 
 import argparse
@@ -62,6 +63,11 @@ def tried() -> dict[str, int]:
     return {name: sum(row[name] for row in rows) for name in ("tried", "refused", "accepted", "findings")}
 
 
+def plain_processor() -> Found:
+    code, said = command("tests/plain_cpu.py", "-q", "-m", "not slow")
+    return code == 0, said.strip().splitlines()[-1].strip("= ")
+
+
 def damaged_files() -> Found:
     before = tried()
     while tried()["tried"] < FUZZ_INPUTS:
@@ -85,7 +91,8 @@ def code_digest() -> str:
 
 def parts(wanted: str | None) -> list[tuple[str, Callable[[], Found]]]:
     """Steps by name; the slow tests a step a file."""
-    alone = {"hard cases": hard_cases, "faults": faults, "damaged files": damaged_files, "soak": soak}
+    alone = {"plain processor": plain_processor, "hard cases": hard_cases, "faults": faults}
+    alone |= {"damaged files": damaged_files, "soak": soak}
     if wanted in alone:
         return [(str(wanted), alone[str(wanted)])]
     if wanted not in (None, "slow tests"):
@@ -97,7 +104,7 @@ def parts(wanted: str | None) -> list[tuple[str, Callable[[], Found]]]:
 def main() -> int:
     """Run what isn't done with this code yet and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--part", metavar="NAME", help="slow tests, hard cases, faults, damaged files or soak")
+    parser.add_argument("--part", metavar="NAME", help="one part alone, by its name in the table")
     steps, digest = parts(parser.parse_args().part), code_digest()
     known: dict[str, Any] = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
     for name, step in steps:

@@ -1,0 +1,111 @@
+"""Level of a scene: mean luminance of what is no light, or illuminance on the reference plane, each with its error.
+
+A lamp in view is thousands of times brighter than what it lights, and a few of its pixels would set the level. So the
+light that the camera sees directly is left out of the sum of light, and the part of the picture that it covers is left
+out of the area: the ratio knows no threshold, and has the same expectation at any size of one aspect ratio.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.errors import InputError
+from render.spectrum import Floats
+
+
+@dataclass(frozen=True)
+class Level:
+    """A mean over the picture or the reference plane, and its standard error.
+
+    Attributes
+    ----------
+    value : float
+        Mean luminance [cd m^-2], or illuminance [lux].
+    relative_error : float or None
+        Monte Carlo standard error over the value; None where fewer than two passes tell it.
+    """
+
+    value: float
+    relative_error: float | None
+
+
+@dataclass(frozen=True)
+class PassMeans:
+    """What each pass of a render gives for levels, at unit spectral emission.
+
+    Attributes
+    ----------
+    spp : (pass,) int64
+        Samples a pixel: the weights of the passes.
+    uncovered : (pass,) float64
+        Part of the picture in which no light is seen directly.
+    radiance : (pass, group, band) float64
+        Mean over the picture, without the light that is seen directly.
+    irradiance : (pass, group, band) float64 or None
+        Mean on the reference plane.
+    """
+
+    spp: NDArray[np.int64]
+    uncovered: Floats
+    radiance: Floats
+    irradiance: Floats | None
+
+    def mean_radiance(self) -> Floats:
+        """Mean radiance of what is no light, shape (group, band).
+
+        Raises
+        ------
+        InputError
+            Where lights fill the picture.
+        """
+        uncovered = float(self.spp @ self.uncovered) / float(self.spp.sum())
+        if uncovered <= 0:
+            raise InputError(
+                "luminance_cd_m2: every pixel sees a light directly; give illuminance_lux or powers instead"
+            )
+        return np.average(self.radiance, axis=0, weights=self.spp) / uncovered
+
+    def mean_irradiance(self) -> Floats:
+        """Irradiance on the reference plane, shape (group, band).
+
+        Raises
+        ------
+        InputError
+            Where the scene states no plane.
+        """
+        if self.irradiance is None:
+            raise InputError("illuminance_lux: the scene states no reference plane; give luminance_cd_m2 instead")
+        return np.average(self.irradiance, axis=0, weights=self.spp)
+
+    def luminance_level(self, weights: Floats) -> Level:
+        """Mean luminance of what is no light.
+
+        Parameters
+        ----------
+        weights : (group, band) float64
+            Luminance of a radiance of 1 times the emission.
+        """
+        value = float((weights * self.mean_radiance()).sum())
+        return Level(value, self._relative_error(self.radiance, self.uncovered, weights, value))
+
+    def illuminance_level(self, weights: Floats) -> Level:
+        """Illuminance on the reference plane; `weights` as of `luminance_level`."""
+        value = float((weights * self.mean_irradiance()).sum())
+        assert self.irradiance is not None
+        return Level(value, self._relative_error(self.irradiance, np.ones(self.spp.size), weights, value))
+
+    def _relative_error(self, per_pass: Floats, area: Floats, weights: Floats, value: float) -> float | None:
+        """Standard error of a ratio of sums over passes (linearised; Cochran, "Sampling Techniques", 2.11)."""
+        if self.spp.size < 2 or value <= 0:
+            return None
+        share = self.spp / self.spp.sum()
+        off = (per_pass * weights).sum(axis=(1, 2)) - value * area
+        variance = float(share @ off**2) / (self.spp.size - 1)
+        return float(np.sqrt(variance)) / float(share @ area) / value
+
+
+def one_picture(planes: NDArray[np.float32]) -> PassMeans:
+    """What a picture without passes gives for levels: its mean (group, band, h, w), whose error nothing tells."""
+    mean = planes.mean(axis=(2, 3), dtype=np.float64)[None]
+    return PassMeans(np.ones(1, np.int64), np.ones(1), mean, None)

@@ -1,0 +1,97 @@
+"""Whether the data of a scene's surfaces and lights reach as far as the bands asked for."""
+
+import warnings
+from collections.abc import Container, Iterator
+
+import numpy as np
+
+from render.errors import InputError
+from render.optical_constants import optical_constant
+from render.scene import Node, Scene, emitter_paths, table_of
+from render.spectrum import Floats, Spectrum
+
+SUNSKY_NM = (320.0, 720.0)  # Mitsuba's tables (Hosek & Wilkie 2012) end here, and give 0 beyond: found by evaluating it
+CIE_NM = (360.0, 830.0)  # Mitsuba's MI_CIE_MIN and MI_CIE_MAX, likewise for the two below
+_WITHIN_CIE = ("blackbody", "d65")
+_EMISSION_WITHIN_CIE = (*_WITHIN_CIE, "envmap", "rgb")  # as reflectance, rgb is known at every wavelength
+_ROUNDING_NM = 1e-6  # of band edges
+
+
+def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:
+    """Raise `InputError` where data of a surface or a sunsky end within the bands asked for.
+
+    Mitsuba makes a surface black outside its table, and a metal a perfect mirror: both would pass for knowledge.
+    """
+    asked = f"scene {scene.name}: bands reach {shortest_nm:g}-{longest_nm:g} nm, and"
+    paths = emitter_paths(scene.geometry)
+    low, high = SUNSKY_NM
+    if "sunsky" in paths.values() and (shortest_nm < low or longest_nm > high):
+        raise InputError(
+            f"{asked} a sunsky is known over {low:g}-{high:g} nm alone; give wavelength_nm within, or light by area, "
+            "constant and directional"
+        )
+    for path, (low, high), held in _surfaces(scene.geometry, paths):
+        if shortest_nm < low - _ROUNDING_NM or longest_nm > high + _ROUNDING_NM:
+            extend = ", or hold its end values beyond: extend='hold' or --extend hold" if held else ""
+            raise InputError(f"{asked} {path} is known over {low:g}-{high:g} nm alone; give bands within{extend}")
+
+
+def warn_of_own_colours(scene: Scene, wavelength_nm: Floats, width_nm: Floats) -> None:
+    """Tell by a `UserWarning` where data of a light with colours of its own end within the bands."""
+    for path in (path for group in scene.groups.values() if group.own_colour for path in group.emitters):
+        for part in _parts(scene.geometry, path.split("/")):
+            within_cie = Spectrum(np.array(CIE_NM), np.ones(2)) if part.get("type") in _EMISSION_WITHIN_CIE else None
+            if table := within_cie or table_of(part):
+                warn_of_dark_ends(f"scene {scene.name}: light {path!r}", table, wavelength_nm, width_nm)
+
+
+def warn_of_dark_ends(light: str, spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) -> None:
+    """Tell by a `UserWarning` where a light's spectrum ends within the bands at a value other than 0."""
+    shortest, longest = (wavelength_nm - width_nm / 2).min(), (wavelength_nm + width_nm / 2).max()
+    low, high = spectrum.wavelength_nm[[0, -1]]
+    below = shortest < low - _ROUNDING_NM and spectrum.values[0] > 0
+    if below or (longest > high + _ROUNDING_NM and spectrum.values[-1] > 0):
+        warnings.warn(
+            f"{light} is known over {low:g}-{high:g} nm, and bands reach {shortest:g}-{longest:g} nm: "
+            "it gives no light beyond what is known",
+            UserWarning,
+            stacklevel=4,
+        )
+
+
+def _surfaces(scene: Node, emitters: Container[str]) -> Iterator[tuple[str, tuple[float, float], bool]]:
+    """Path of each table outside of lights, the wavelengths that it covers, and whether its ends can be held."""
+    # A spectrum that stands in the scene itself counts where a surface refers to it.
+    pending = [(key, part) for key, part in scene.items() if isinstance(part, dict) and not _range_nm(part)]
+    for path, node in pending:
+        if path in emitters:
+            continue
+        table = _named(scene, str(node.get("id"))) if node.get("type") == "ref" else node
+        if found := _range_nm(table):
+            yield path, found, table["type"] not in _WITHIN_CIE
+        pending += [(f"{path}/{key}", part) for key, part in node.items() if isinstance(part, dict)]
+
+
+def _range_nm(node: Node) -> tuple[float, float] | None:
+    """Wavelengths that a spectrum or a metal's index is known over; None for what isn't a table."""
+    if node.get("type") in _WITHIN_CIE:
+        return CIE_NM
+    table = table_of(node)
+    if table is None and isinstance(node.get("material"), str):
+        table = optical_constant(node["material"], "eta")
+    return (float(table.wavelength_nm[0]), float(table.wavelength_nm[-1])) if table else None
+
+
+def _named(scene: Node, name: str) -> Node:
+    """Part that stands in the scene under an id; empty where there is none."""
+    return next((x for key, x in scene.items() if isinstance(x, dict) and name in (key, x.get("id"))), {})
+
+
+def _parts(node: Node, path: list[str]) -> list[Node]:
+    """Node at a path, and all those within it."""
+    for key in path:
+        node = node[key]
+    found = [node]
+    for part in found:
+        found += [value for value in part.values() if isinstance(value, dict)]
+    return found

@@ -1,0 +1,95 @@
+"""Levels belong to the scene: no seed, size or variant moves them by more than their stated errors allow.
+
+The renders of a scene have one expectation. Sum of squares of their levels about the mean, over the variances that they
+state, is compared with the same sum of normal draws, whose variances are estimated from as many passes: two-sided.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from render.engine import render
+from render.jit import backend
+from scenes.catalog import load
+
+FALSE_ALARM, DRAWS = 1e-4, 400_000
+PASSES, SPP, MOST_ERROR = 8, 32, 0.03
+SEEDS = tuple(range(10))
+# Three sizes of one aspect ratio each.
+SIZES = {
+    "cornell_box": ((24, 24), (32, 32), (40, 40)),
+    "night_street": ((30, 40), (36, 48), (48, 64)),
+    "still_life_outdoor": ((20, 20), (30, 30), (40, 40)),
+}
+BANDS = {"wavelength_nm": np.arange(410.0, 720.0, 60.0), "width_nm": 60.0}  # few: a level is one number
+
+IN_SCALAR = """
+import json, sys
+sys.path[:0] = {path!r}
+from test_render_levels import levels
+print(json.dumps(levels({name!r}, {sizes!r}, {seeds!r})))
+"""
+
+
+def levels(name, sizes, seeds):
+    """Level and relative error of each size and seed, shape (size, seed, 2)."""
+    scene = replace(load(name), reference_plane=None)
+    made = [[render(scene, tuple(size), spp=SPP, seed=seed, **BANDS) for seed in seeds] for size in sizes]
+    return [[(x.level().value, x.level().relative_error) for x in row] for row in made]
+
+
+def scalar_levels(name, sizes, seeds):
+    """The same without LLVM, in a process of its own."""
+    code = IN_SCALAR.format(
+        path=[os.path.dirname(__file__), *filter(None, sys.path)], name=name, sizes=sizes, seeds=seeds
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"DRJIT_LIBLLVM_PATH": "/nonexistent/libLLVM.so"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def chi_square(values, variances):
+    """Sum of squares about the weighted mean; the last two axes are (set, seed), variances are pooled over seeds."""
+    weights = 1 / variances.mean(axis=-1, keepdims=True)
+    mean = (weights * values).sum(axis=(-2, -1)) / (weights * np.ones_like(values)).sum(axis=(-2, -1))
+    return (weights * (values - mean[..., None, None]) ** 2).sum(axis=(-2, -1))
+
+
+def check(found):
+    """Levels (set, seed, 2) agree within their stated errors, and these are small."""
+    values, errors = np.moveaxis(np.array(found), -1, 0)
+    assert errors.max() <= MOST_ERROR
+    sigma = np.sqrt(((values * errors) ** 2).mean(axis=1, keepdims=True))
+    rng, drawn = np.random.default_rng(11), []
+    for _ in range(DRAWS // 10_000):
+        normal = sigma * rng.standard_normal((10_000, *values.shape))
+        variances = sigma**2 * rng.chisquare(PASSES - 1, normal.shape) / (PASSES - 1)
+        drawn.append(chi_square(normal, variances))
+    low, high = np.quantile(np.concatenate(drawn), [FALSE_ALARM / 2, 1 - FALSE_ALARM / 2])
+    assert low < chi_square(values, (values * errors) ** 2) < high
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_three_seeds_give_one_level(name):
+    """The two seeds of a frame with lamps at the rims of pixels once had levels of 1 to 2."""
+    check(levels(name, SIZES[name][-1:], (0, 1, 2)))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("name", SIZES)
+def test_ten_seeds_three_sizes_and_both_variants_give_one_level(name):
+    if backend() == "numpy":
+        pytest.skip("needs LLVM or CUDA beside the scalar variant")
+    check([*levels(name, SIZES[name], SEEDS), *scalar_levels(name, SIZES[name], SEEDS)])
