@@ -7,7 +7,7 @@ import errno
 import json
 import os
 import sqlite3
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields
 from functools import partial
@@ -178,13 +178,12 @@ def add(base: sqlite3.Connection, row: Row) -> None:
     _put(base, "cells", values)
 
 
-def done(base: sqlite3.Connection, pictures: Path, keys: Collection[str]) -> set[str]:
+def done(base: sqlite3.Connection, pictures: Path, keys: Iterable[str]) -> set[str]:
     """Which of these cells have a whole row, and whole pictures: a power cut may have taken these."""
-    return {
-        row.key
-        for row in map(_row, base.execute(f"SELECT {_COLUMNS} FROM cells"))
-        if row is not None and row.key in keys and is_whole(pictures / row.picture) and is_whole(pictures / row.truth)
-    }
+    asked = set(keys)
+    found = [_row(values) for values in base.execute(f"SELECT {_COLUMNS} FROM cells") if values[0] in asked]
+    pairs = [(row.key, pictures / row.picture, pictures / row.truth) for row in found if row is not None]
+    return {key for key, picture, truth in pairs if is_whole(picture) and is_whole(truth)}
 
 
 def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
