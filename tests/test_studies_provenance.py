@@ -27,7 +27,9 @@ from studies.opponents import cases_of
 from studies.provenance import Provenance, versions
 from studies.report_ledger import ledger_results
 from studies.row import Row
+from studies.study import RenderLimits, SceneChoice, Study
 from studies.sweep import sweep
+from studies.workers import cores, run_in_processes
 
 
 def inexact(plan: Plan) -> Plan:
@@ -117,6 +119,21 @@ def test_threads_told_are_those_that_the_working_process_has(count: int, tmp_pat
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout.splitlines()[-1]) == [count, count, "llvm"]
+
+
+def test_rows_of_two_processes_tell_their_own_threads_not_the_parents(tmp_path: Path) -> None:
+    SAMPLE.swept(SAMPLE.small_study(tmp_path), tmp_path / "out", partial(run_in_processes, workers=2))
+    found = read_rows(tmp_path / "out")
+    assert [row.threads for row in found] == 4 * [max(1, cores() // 2) if backend() == "llvm" else 1]
+    assert os.getpid() not in {row.worker for row in found}
+
+
+def test_a_rows_variant_is_the_one_that_mitsuba_has_set(tmp_path: Path) -> None:
+    limits = RenderLimits(size=16, spp=16, band_nm=100.0)
+    study = Study((SceneChoice("flat_field"),), ("1cd/m2",), processors=("bayer",), render=limits)
+    SAMPLE.swept(study, tmp_path)
+    (row,) = read_rows(tmp_path)
+    assert row.variant == import_module("mitsuba").variant()
 
 
 def versions_of_numpy(monkeypatch: pytest.MonkeyPatch, version: str) -> None:

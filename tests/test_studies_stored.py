@@ -149,7 +149,7 @@ def flipped(seed: int) -> Callable[[bytes], bytes]:
     return damage
 
 
-DAMAGES |= {f"bits flipped, seed {seed}": flipped(seed) for seed in range(60)}
+DAMAGES |= {f"bits flipped, seed {seed}": flipped(seed) for seed in (*range(24), 58)}  # 58: a key in its table alone
 
 
 def told_in_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> int:
