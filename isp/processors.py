@@ -44,6 +44,8 @@ class Processor:
         Letters whose balanced planes `matrix` takes to linear sRGB.
     unit : str
         Letter whose electrons a neutral reads in the developed picture.
+    on_backend : bool
+        Whether it runs in Dr.Jit where there is a backend; NumPy else.
     """
 
     mosaic: str
@@ -52,6 +54,7 @@ class Processor:
     extra: str | None = None
     colours: tuple[str, ...] = ("R", "G", "B")
     unit: str = "G"
+    on_backend: bool = False
 
 
 def _mended(develop: Develop) -> Develop:
@@ -68,11 +71,13 @@ def _processors() -> dict[str, Processor]:
     """Every processor; the first two are the paper's."""
     early = "W as luminance by early fusion"
     processors = {
-        "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)"),
+        "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)", on_backend=True),
         "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
         "bayer_malvar": Processor("bayer", picture_malvar, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
         "bayer_menon": Processor("bayer", picture_menon, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
-        "bayer_nlm": Processor("bayer", picture_bayer_nlm, "the interleaved camera's non-local means on Bayer"),
+        "bayer_nlm": Processor(
+            "bayer", picture_bayer_nlm, "the interleaved camera's non-local means on Bayer", on_backend=True
+        ),
         "bayer_bm3d": Processor("bayer", picture_bayer_bm3d, "BM3D, Dabov et al. 2007, then Menon", extra=BM3D),
         "rgbw_sato": Processor("rgbw", picture_sato, f"{early}: Sato 1983"),
         "rgbw_kijima": Processor("rgbw", picture_kijima, f"{early}: Kijima 2007"),
@@ -88,12 +93,17 @@ def _processors() -> dict[str, Processor]:
 PROCESSORS: Mapping[str, Processor] = MappingProxyType(_processors())
 
 
+def libraries(name: str) -> tuple[str, ...]:
+    """Libraries that a processor of `PROCESSORS` needs beside rodcone's own."""
+    extra = PROCESSORS[name].extra
+    return () if extra is None else _LIBRARIES[extra]
+
+
 def require_libraries(name: str) -> None:
     """Raise `InputError` where the extra of a processor of `PROCESSORS` is not installed."""
-    extra = PROCESSORS[name].extra
-    for library in _LIBRARIES[extra] if extra is not None else ():
+    for library in libraries(name):
         if find_spec(library) is None:
             raise InputError(
                 f"processors: {name!r} needs {library}, which is not installed; allowed without it: other processors; "
-                f"leave {name} out, or pip install 'rodcone[{extra}]'"
+                f"leave {name} out, or pip install 'rodcone[{PROCESSORS[name].extra}]'"
             )

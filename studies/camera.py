@@ -1,6 +1,6 @@
 """A camera under study: its sensor, its chip, its colour matrix, and one photograph developed and measured."""
 
-import time
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.readout import read_out
 from sensor.variations import vary
+from studies.clock import timed
 from studies.metrics import Quality, measure
 from studies.truth import Light, neutral_electrons
 
@@ -49,7 +50,10 @@ class Camera:
 
 @dataclass(frozen=True)
 class Shot:
-    """A photograph: raw image, developed picture (linear sRGB, then encoded), its quality, decisions, and seconds."""
+    """A photograph: raw image, developed picture (linear sRGB, then encoded), its quality, decisions, and seconds.
+
+    `first_s` are those of first calls, as `studies.clock.timed` tells them apart from the others.
+    """
 
     raw: RawImage
     linear: NDArray[np.float64]
@@ -59,6 +63,7 @@ class Shot:
     capture_s: float
     develop_s: float
     measure_s: float
+    first_s: float
 
 
 def build_camera(name: str, sensor_name: str, light: Light, shape: tuple[int, int], rng: np.random.Generator) -> Camera:
@@ -94,20 +99,24 @@ def photograph(
         Expected electrons of the mosaic.
     truth : (h, w, 3) float64
         Encoded sRGB of the noise-free scene, in which `white_cd_m2` is white.
+    rng : numpy.random.Generator
+        Of the exposure's noise; it is left as it is.
     """
-    start = time.perf_counter()
-    raw = read_out(expected_e, camera.sensor, camera.device, exposure_s, rng)
-    exposed = time.perf_counter()
-    neutral = neutral_electrons(camera.sensor, light, exposure_s)
+    raw, capture_s, first_capture_s = timed(
+        lambda: read_out(expected_e, camera.sensor, camera.device, exposure_s, deepcopy(rng)), "exact capture"
+    )
+    neutral, saturated = neutral_electrons(camera.sensor, light, exposure_s), raw.saturated
     processor = PROCESSORS[camera.name]
-    picture = processor.develop(raw, camera.colours, neutral=neutral)
-    developed = time.perf_counter()
+    picture, develop_s, first_develop_s = timed(
+        lambda: processor.develop(raw, camera.colours, neutral=neutral),
+        *("develop", camera.name, raw.shape, bool(saturated.any()), bool(saturated.all())),
+    )
     unit_e = neutral[channels(camera.sensor.cfa).index(processor.unit)]  # of 1 cd/m^2
     linear = picture.rgb / (unit_e * white_cd_m2)
     encoded = encode_srgb(linear)
-    quality = measure(encoded, truth)
-    done = time.perf_counter()
-    return Shot(raw, linear, encoded, quality, picture, exposed - start, developed - exposed, done - developed)
+    quality, measure_s, first_measure_s = timed(lambda: measure(encoded, truth), "quality")
+    first_s = first_capture_s + first_develop_s + first_measure_s
+    return Shot(raw, linear, encoded, quality, picture, capture_s, develop_s, measure_s, first_s)
 
 
 def mean_electrons(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> dict[str, float]:

@@ -2,8 +2,7 @@
 
 import json
 import platform
-import time
-from dataclasses import dataclass
+import threading
 from datetime import UTC, datetime
 from functools import cache, lru_cache
 from pathlib import Path
@@ -13,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour import encode_srgb
+from isp.picture import Picture
 from isp.processors import PROCESSORS
 from render.errors import InputError
-from render.files import replacing
 from render.jit import backend, dr
 from sensor.cfa import channels
 from sensor.device import Device, draw_device
@@ -28,144 +27,49 @@ from sensor.readout import as_raw, read_out
 from studies.appearance import TruePicture, appearance, true_picture
 from studies.camera import mean_electrons
 from studies.cells import Cell, device_stream, exposure_stream
-from studies.digests import code_version, digest_bytes
+from studies.clock import timed
 from studies.metrics import measure
 from studies.png import to_png
+from studies.provenance import machine, provenance, threads, told
+from studies.row import Row
+from studies.stored import is_whole, keep
 from studies.target_figures import target_figures
 from studies.truth import neutral_electrons
 
 Image = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Row:
-    """What the ledger holds of a cell. Times and host alone differ from run to run.
-
-    Attributes
-    ----------
-    key, code : str
-        Of `Cell`.
-    scene ... seed
-        Of `studies.cells.Coordinates`.
-    luminance_cd_m2, illuminance_lux, exposure_s : float
-        The level in both units (lux where the scene states a plane), and the time.
-    spp, bands : int
-        Of the render.
-    lens : str
-        Terms of the modelled lens, as JSON.
-    budget_share : float or None
-        Share of the noise variance that a plan predicts for its approximations.
-    psnr_db, ssim, delta_e_median, delta_e_p95 : float
-        Of `studies.metrics.Quality`.
-    s_cielab_median, s_cielab_p95, flip_mean, pu21_psnr_db : float
-        Of `studies.appearance.Appearance`.
-    mtf50_cy_per_px, chart_delta_e_mean, patch_snr_db : float or None
-        Of `studies.target_figures.TargetFigures`.
-    mc_share : float
-        Monte Carlo variance over the sensor's own, means over the pixels below saturation.
-    snr_db : float or None
-        Green's, where the processor measures it.
-    substitution : int or None
-        Whether W stood for luminance.
-    saturated : float
-        Share of the pixels.
-    balance, mean_electrons : str
-        By channel, as JSON.
-    engine : str
-        What developed it.
-    picture, truth : str
-        Files of the developed and the noise-free picture below the folder of pictures.
-    render_s, capture_s, develop_s, measure_s : float
-        Of the render that the cell shares with others, and of its own steps.
-    finished : str
-        UTC.
-    host : str
-    """
-
-    key: str
-    code: str
-    scene: str
-    spectrum: str
-    level: str
-    exposure: str
-    sensor: str
-    processor: str
-    seed: int
-    luminance_cd_m2: float
-    illuminance_lux: float | None
-    exposure_s: float
-    spp: int
-    bands: int
-    lens: str
-    budget_share: float | None
-    psnr_db: float
-    ssim: float
-    delta_e_median: float
-    delta_e_p95: float
-    s_cielab_median: float
-    s_cielab_p95: float
-    flip_mean: float
-    pu21_psnr_db: float
-    mtf50_cy_per_px: float | None
-    chart_delta_e_mean: float | None
-    patch_snr_db: float | None
-    mc_share: float
-    snr_db: float | None
-    substitution: int | None
-    saturated: float
-    balance: str
-    mean_electrons: str
-    engine: str
-    picture: str
-    truth: str
-    render_s: float
-    capture_s: float
-    develop_s: float
-    measure_s: float
-    finished: str
-    host: str
-
-
-TIME_AND_HOST = ("render_s", "capture_s", "develop_s", "measure_s", "finished", "host")
-
-
-def run_cell(cell: Cell, threads: int | None = None) -> Row:
+def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     """Make the picture of a cell and measure it against the truth.
 
     Parameters
     ----------
     cell : Cell
-    threads : int, optional
+    most_threads : int, optional
         For Dr.Jit in this process; left out, as many as it has.
 
     Raises
     ------
     InputError
-        Where this process has other code than the one that asks, or can't read the arrays by their paths.
+        Where this process has other code, versions or engines than the one that asks, or can't read the arrays by
+        their paths.
     OSError
         Where the picture can't be written.
     """
-    _check_code(cell)
-    if threads is not None:
-        limit_threads(threads)
+    _check_provenance(cell)
+    if most_threads is not None:
+        limit_threads(most_threads)
     truth = _truth(cell.truth)
     expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * (cell.luminance_cd_m2 * cell.exposure_s)
-    processor, mosaic = PROCESSORS[cell.at.processor], PROCESSORS[cell.at.processor].mosaic
-    shape = (truth.linear.shape[0], truth.linear.shape[1])
-    device = draw_device(cell.sensor, shape, device_stream(cell.at, mosaic))
-    start = time.perf_counter()
-    raw = _expose(cell, expected_e, device, exposure_stream(cell.at, mosaic))
-    exposed = time.perf_counter()
-    neutral = neutral_electrons(cell.sensor, cell.light, cell.exposure_s)
-    picture = processor.develop(raw, cell.colours, neutral=neutral)
-    developed = time.perf_counter()
-    linear = _linear(cell, picture.rgb, float(neutral[channels(cell.sensor.cfa).index(processor.unit)]))
+    raw, picture, seconds = _photograph(cell, expected_e)
+    linear = _linear(cell, picture.rgb)
     encoded = encode_srgb(linear)
-    figures = _figures(cell, linear, encoded, truth)
-    measured = time.perf_counter()
+    figures, measure_s, first_s = timed(
+        lambda: _figures(cell, linear, encoded, truth), "measure", cell.at.scene, raw.shape
+    )
+    seconds["first_s"] += first_s
     return Row(
         key=cell.key,
-        code=cell.code,
         **vars(cell.at),
         luminance_cd_m2=cell.luminance_cd_m2,
         illuminance_lux=cell.illuminance_lux,
@@ -181,16 +85,39 @@ def run_cell(cell: Cell, threads: int | None = None) -> Row:
         saturated=float(raw.saturated.mean()),
         balance=json.dumps(dict(picture.balance)),
         mean_electrons=json.dumps(mean_electrons(cell.sensor, expected_e)),
-        engine=picture.engine,
-        picture=_keep(cell.pictures, to_png(encoded)),
-        truth=_keep(cell.pictures, _true_png(cell.truth, cell.truth.stat().st_mtime_ns)),
+        variant=cell.made_by.variant,
+        readout_engine=raw.engine,
+        development_engine=picture.engine,
+        versions=cell.made_by.versions,
+        picture=keep(cell.pictures, to_png(encoded), ".png"),
+        truth=keep(cell.pictures, _true_png(cell.truth, cell.truth.stat().st_mtime_ns), ".png"),
         render_s=cell.render_s,
-        capture_s=exposed - start,
-        develop_s=developed - exposed,
-        measure_s=measured - developed,
+        measure_s=measure_s,
+        **seconds,
+        threads=threads(),
         finished=datetime.now(UTC).isoformat(timespec="milliseconds"),
         host=platform.node(),
+        machine=machine(),
+        worker=threading.get_native_id(),
     )
+
+
+def _photograph(cell: Cell, expected_e: Image) -> tuple[RawImage, Picture, dict[str, Any]]:
+    """Raw image, developed picture, and the seconds of both."""
+    at, shape = cell.at, (expected_e.shape[0], expected_e.shape[1])
+    processor, engine = PROCESSORS[at.processor], cell.made_by.readout_engine
+    device = draw_device(cell.sensor, shape, device_stream(at, processor.mosaic))
+    raw, capture_s, first_capture_s = timed(
+        lambda: _expose(cell, expected_e, device, exposure_stream(at, processor.mosaic)),
+        *("capture", engine, at.sensor, shape),
+    )
+    neutral, saturated = neutral_electrons(cell.sensor, cell.light, cell.exposure_s), raw.saturated
+    picture, develop_s, first_develop_s = timed(
+        lambda: processor.develop(raw, cell.colours, neutral=neutral),
+        *("develop", at.processor, shape, bool(saturated.any()), bool(saturated.all())),
+    )
+    first_s = first_capture_s + first_develop_s
+    return raw, picture, {"capture_s": capture_s, "develop_s": develop_s, "first_s": first_s}
 
 
 def _figures(cell: Cell, linear: Image, encoded: Image, truth: TruePicture) -> dict[str, Any]:
@@ -202,22 +129,26 @@ def _figures(cell: Cell, linear: Image, encoded: Image, truth: TruePicture) -> d
 
 
 @cache
-def limit_threads(threads: int) -> None:
+def limit_threads(most: int) -> None:
     """Give Dr.Jit in this process so many threads; on the LLVM backend alone does it matter."""
     if backend() == "llvm":
-        dr.set_thread_count(threads)
+        dr.set_thread_count(most)
 
 
-def _check_code(cell: Cell) -> None:
-    if cell.code != code_version():
-        raise InputError(
-            f"worker on {platform.node()}: its code is {code_version()}, the sweep's is {cell.code}; "
-            "allowed: the same; install the same rodcone and start the worker again"
-        )
+def _check_provenance(cell: Cell) -> None:
+    own = told(provenance(cell.made_by.variant, cell.at.processor, exact=cell.made_by.readout_engine == "numpy"))
+    for name, asked in told(cell.made_by).items():
+        if own.get(name) != asked:
+            raise InputError(
+                f"worker on {platform.node()}: its {name} is {own.get(name)}, the sweep's is {asked}; allowed: the "
+                "same; install the same rodcone with the same packages and start the worker again"
+            )
 
 
-def _linear(cell: Cell, rgb: Image, unit_e: float) -> Image:
-    """Linear sRGB, in which white is 1, of a developed picture, in which a neutral of 1 cd/m^2 reads `unit_e`."""
+def _linear(cell: Cell, rgb: Image) -> Image:
+    """Linear sRGB, in which white is 1, of a developed picture in the unit of its processor."""
+    neutral = neutral_electrons(cell.sensor, cell.light, cell.exposure_s)  # of 1 cd/m^2
+    unit_e = float(neutral[channels(cell.sensor.cfa).index(PROCESSORS[cell.at.processor].unit)])
     linear = rgb / (unit_e * cell.white_cd_m2)
     if cell.sensor.lens.horizontal_view_deg:  # a camera corrects the falloff that it knows of its lens
         linear = linear / falloff(cell.sensor.lens, linear.shape[:2])[..., None]
@@ -240,17 +171,16 @@ def _true_png(path: Path, changed_ns: int) -> bytes:
 
 
 def _array(path: Path) -> Image:
-    try:
-        return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
-    except (OSError, ValueError) as error:
+    if not is_whole(path):
         raise InputError(
-            f"{path}: can't be read on {platform.node()} ({error}); allowed: a folder that all workers see under the "
-            "same path; give one with --out, or run the sweep again where the file is damaged"
-        ) from error
+            f"{path}: can't be read on {platform.node()}, or isn't what was written; allowed: a folder that all "
+            "workers see under the same path; give one with --out, or run the sweep again where the file is damaged"
+        )
+    return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
 
 
 def _expose(cell: Cell, expected_e: Image, device: Device, rng: np.random.Generator) -> RawImage:
-    if cell.exact or backend() == "numpy":
+    if cell.made_by.readout_engine == "numpy":
         return read_out(expected_e, cell.sensor, device, cell.exposure_s, rng)
     single = expected_e.astype(np.float32)
     dn = read_frame(single, cell.sensor, device, cell.exposure_s, draw_key(rng))
@@ -265,13 +195,3 @@ def _monte_carlo_share(cell: Cell, expected_e: Image) -> float:
     error_e = _array(cell.half_difference) * (cell.luminance_cd_m2 * cell.exposure_s)
     own = noise_variance(expected_e, cell.sensor, cell.exposure_s)[inside].mean()
     return float((error_e[inside] ** 2).mean() / own)
-
-
-def _keep(folder: Path, content: bytes) -> str:
-    """Write a picture under the hash of its content; gives its name below the folder."""
-    name = digest_bytes(content)
-    place = folder / name[:2] / f"{name}.png"
-    place.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(place) as (part,):
-        part.write_bytes(content)
-    return f"{name[:2]}/{name}.png"

@@ -9,6 +9,7 @@ from isp.colour_fit import ColourFit
 from sensor.config import SensorConfig
 from studies.digests import digest
 from studies.levels import parse_level
+from studies.provenance import Provenance
 from studies.study import Condition, label, parse_exposure
 from studies.truth import Light
 
@@ -33,7 +34,7 @@ class Cell:
     Attributes
     ----------
     key : str
-        Hash of all below and of the code that made it.
+        Hash of all that decides the picture.
     at : Coordinates
     luminance_cd_m2 : float
         Mean scene luminance.
@@ -42,8 +43,8 @@ class Cell:
     exposure_s : float
     sensor : SensorConfig
         With the processor's mosaic and the lens that is modelled.
-    exact : bool
-        As `studies.model.ImageModel`.
+    made_by : Provenance
+        Of the process that asks; one that can't make it so refuses.
     colours : ColourFit
         Of the processor's balanced planes, under the scene's light.
     light : Light
@@ -53,8 +54,6 @@ class Cell:
         As `studies.frames.Frame` and `LitScene` hold them.
     pictures : Path
         Folder that the picture goes to, under the hash of its content.
-    code : str
-        `studies.digests.code_version` of the process that asks.
     spp, bands, render_s : int, int, float
         Of the render, for the ledger.
     budget_share : float or None
@@ -67,7 +66,7 @@ class Cell:
     illuminance_lux: float | None
     exposure_s: float
     sensor: SensorConfig
-    exact: bool
+    made_by: Provenance
     colours: ColourFit
     light: Light
     white_cd_m2: float
@@ -75,7 +74,6 @@ class Cell:
     half_difference: Path
     truth: Path
     pictures: Path
-    code: str
     spp: int
     bands: int
     render_s: float
@@ -95,10 +93,15 @@ def coordinates(condition: Condition, processor: str, seed: int) -> Coordinates:
 
 
 def cell_key(
-    at: Coordinates, frame: str, luminance_cd_m2: float, exposure_s: float, exact: bool, colours: ColourFit, code: str
+    at: Coordinates,
+    frame: str,
+    luminance_cd_m2: float,
+    exposure_s: float,
+    colours: ColourFit,
+    made_by: Provenance,
 ) -> str:
     """Key of a cell: its coordinates, which seed its noise, and all that its picture is made from."""
-    return digest([astuple(at), frame, luminance_cd_m2, exposure_s, exact, colours, code])
+    return digest([astuple(at), frame, luminance_cd_m2, exposure_s, colours, made_by])
 
 
 def device_stream(at: Coordinates, mosaic: str) -> np.random.Generator:

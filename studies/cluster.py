@@ -16,9 +16,10 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from render.errors import InputError, one_line
-from studies.cell_run import Row
+from render.jit import backend
 from studies.cells import Cell
-from studies.digests import code_version
+from studies.provenance import versions
+from studies.row import Row
 from studies.workers import cores, run
 
 TRIM = (
@@ -171,13 +172,15 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
         if count != 1:
             raise InputError(f"cluster: {worker} has {count} threads; allowed: 1; start dask worker with --nthreads 1")
     try:
-        versions, found, trim = (client.run(ask) for ask in (code_version, cores, _trim_threshold))
+        theirs, found, trim = (client.run(ask) for ask in (_what_computes, cores, _trim_threshold))
     except ImportError as error:
         raise InputError(f"cluster: a worker lacks rodcone ({one_line(error)}); install it there") from error
-    for worker, version in versions.items():
-        if version != code_version():
+    for worker, its in theirs.items():
+        other = [name for name, version in _what_computes().items() if its.get(name) != version]
+        if other:
             raise InputError(
-                f"cluster: {worker} runs rodcone {version}, this is {code_version()}; install the same, start it again"
+                f"cluster: {worker} runs {other[0]} {its.get(other[0])}, this is {_what_computes()[other[0]]}; "
+                "install the same, start it again"
             )
     if any(trim.values()):
         warnings.warn(
@@ -187,6 +190,10 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
         )
     on_host = Counter(urlsplit(worker).hostname for worker in found)
     return len(found), max(1, min(count // on_host[urlsplit(worker).hostname] for worker, count in found.items()))
+
+
+def _what_computes() -> dict[str, str]:
+    return {**versions(), "engine": backend()}
 
 
 def _trim_threshold() -> str | None:

@@ -1,7 +1,6 @@
 """The main job: one scene, one render, light levels in; two cameras' pictures and a report out."""
 
 import json
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from importlib import metadata
@@ -27,12 +26,13 @@ from sensor.response import expected_electrons
 from studies.appearance import TruePicture, appearance, true_picture
 from studies.budget import monte_carlo_share, pixel_share
 from studies.camera import CAMERAS, Camera, Shot, build_camera, mean_electrons, photograph
+from studies.clock import FIRST, Clock, timed
 from studies.levels import parse_level, resolve_level
 from studies.pictures import contact_sheet, to_bytes
 from studies.quiet_render import render_quietly
 from studies.radiance_file import check_radiance_file, open_radiance_file
 from studies.report import render_report
-from studies.results import DISPLAY_WHITE, environment, level_facts, notes, render_facts, sensor_facts
+from studies.results import DISPLAY_WHITE, engines_told, environment, level_facts, notes, render_facts, sensor_facts
 from studies.target_figures import target_figures
 from studies.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 
@@ -70,16 +70,6 @@ class Outcome:
     overview: bytes
 
 
-class _Clock:
-    """Seconds of each stage, added up."""
-
-    def __init__(self) -> None:
-        self.stages: dict[str, float] = {}
-
-    def add(self, stage: str, seconds: float) -> None:
-        self.stages[stage] = self.stages.get(stage, 0.0) + seconds
-
-
 def check(demo: Demo) -> None:
     """Raise `InputError` for anything in `demo` that can be told before the render."""
     if demo.light is not None:
@@ -111,13 +101,13 @@ def run(demo: Demo, step: Step = lambda what, share: None) -> Outcome:
         For an unknown scene, sensor or unit, or a value out of range; before anything is rendered.
     """
     check(demo)
-    clock = _Clock()
+    clock = Clock()
     step("render", 0.0)
-    if is_radiance_file(demo.scene):
-        transport, spectrum, assumed = open_radiance_file(demo.scene, demo.light)
-    else:
-        (transport, spectrum), assumed = _rendered(demo, step), []
-    clock.add("render", transport.seconds)
+    with clock.stage("render"):
+        if is_radiance_file(demo.scene):
+            transport, spectrum, assumed = open_radiance_file(demo.scene, demo.light)
+        else:
+            (transport, spectrum), assumed = _rendered(demo, step), []
     levels = _levels(demo, transport)
     light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
     truth = _truth(transport, light)
@@ -130,12 +120,13 @@ def run(demo: Demo, step: Step = lambda what, share: None) -> Outcome:
             cells.append(cell)
             encoded[cell["picture"]] = picture
     step("report", 0.95)
-    pictures = {name: to_bytes(picture) for name, picture in {**encoded, "truth": truth.encoded}.items()}
-    results = _results(demo, transport, levels, cells, clock, assumed)
     sheet = [
         [encoded[_name(i, sensor, camera)] for i in range(len(levels))] for sensor in demo.sensors for camera in CAMERAS
     ]
-    return Outcome(results, pictures, to_bytes(contact_sheet(sheet), "PNG"))
+    with clock.stage("pictures' files"):
+        pictures = {name: to_bytes(picture) for name, picture in {**encoded, "truth": truth.encoded}.items()}
+        overview = to_bytes(contact_sheet(sheet), "PNG")
+    return Outcome(_results(demo, transport, levels, cells, clock, assumed), pictures, overview)
 
 
 def write(outcome: Outcome, folder: Path) -> Path:
@@ -211,35 +202,38 @@ def _photograph_level(
     cameras: Sequence[Camera],
     index: int,
     level: LightLevel,
-    clock: _Clock,
+    clock: Clock,
 ) -> list[tuple[dict[str, Any], NDArray[np.float64]]]:
     """Cell and encoded picture of each camera at one level; all look at the same radiance."""
-    started = time.perf_counter()
-    radiance = transport.relight(luminance_cd_m2=level.luminance_cd_m2)
-    halves = transport.relight_halves(luminance_cd_m2=level.luminance_cd_m2)
-    white = shown_white_cd_m2(transport, level.luminance_cd_m2)
-    clock.add("relight", time.perf_counter() - started)
+    with clock.stage("relight"):
+        radiance = transport.relight(luminance_cd_m2=level.luminance_cd_m2)
+        halves = transport.relight_halves(luminance_cd_m2=level.luminance_cd_m2)
+        white = shown_white_cd_m2(transport, level.luminance_cd_m2)
     made = []
     for place, camera in enumerate(cameras):
-        started = time.perf_counter()
-        irradiance = form_image(radiance, camera.sensor)
-        exposure_s = auto_exposure_s(irradiance, camera.sensor, demo.longest_s)
-        expected_e = expected_electrons(irradiance, camera.sensor, exposure_s)
-        clock.add("form image", time.perf_counter() - started)
+        with clock.stage("form image"):
+            irradiance = form_image(radiance, camera.sensor)
+            exposure_s = auto_exposure_s(irradiance, camera.sensor, demo.longest_s)
+            expected_e = expected_electrons(irradiance, camera.sensor, exposure_s)
         rng = np.random.default_rng([demo.seed, *divmod(place, len(CAMERAS)), 1, index])
         shot = photograph(camera, expected_e, truth.encoded, light, white, exposure_s, rng)
+        seen, appearance_s, first_s = timed(
+            lambda shot=shot: (  # type: ignore[misc]
+                appearance(shot.linear, truth, white),
+                target_figures(demo.scene, shot.linear, truth.linear),
+            ),
+            "appearance",
+        )
+        measure_s = shot.measure_s + appearance_s
         for stage, seconds in (
             ("capture", shot.capture_s),
             (f"develop {camera.name}", shot.develop_s),
+            ("metrics", measure_s),
+            (FIRST, shot.first_s + first_s),
         ):
             clock.add(stage, seconds)
-        started = time.perf_counter()
-        seen = appearance(shot.linear, truth, white)
-        target = target_figures(demo.scene, shot.linear, truth.linear)
-        measure_s = shot.measure_s + time.perf_counter() - started
-        clock.add("metrics", measure_s)
         share = monte_carlo_share(expected_e, halves, camera.sensor, exposure_s)
-        figures = {**asdict(shot.quality), **asdict(seen), **asdict(target), "mc_share": share}
+        figures = {**asdict(shot.quality), **asdict(seen[0]), **asdict(seen[1]), "mc_share": share}
         made.append((_cell(camera, shot, expected_e, index, figures, measure_s), shot.encoded))
     return made
 
@@ -263,6 +257,7 @@ def _cell(
         "balance": dict(shot.picture.balance),
         "saturated": float(shot.raw.saturated.mean()),
         "mean_electrons": mean_electrons(camera.sensor, expected_e),
+        "engines": {"capture": shot.raw.engine, "develop": shot.picture.engine},
         "seconds": {"capture": shot.capture_s, "develop": shot.develop_s, "measure": measure_s},
         "picture": _name(level, camera.sensor_name, camera.name),
     }
@@ -273,7 +268,7 @@ def _results(
     transport: Transport,
     levels: Sequence[LightLevel],
     cells: list[dict[str, Any]],
-    clock: _Clock,
+    clock: Clock,
     assumed: Sequence[str],
 ) -> dict[str, Any]:
     return {
@@ -281,7 +276,7 @@ def _results(
         "seed": demo.seed,
         "scene": Path(demo.scene).name,
         "size": list(transport.coverage.shape),
-        "environment": environment(),
+        "environment": environment() | engines_told(cells),
         "render": render_facts(transport) | {"brightest_share": brightest_share(demo, transport)},
         "exposure_rule": RULE.format(longest=demo.longest_s * 1e3),
         "display_white": DISPLAY_WHITE,
@@ -289,7 +284,7 @@ def _results(
         "sensors": [sensor_facts(name) for name in demo.sensors],
         "cameras": list(CAMERAS),
         "cells": cells,
-        "stages": [{"name": name, "seconds": seconds} for name, seconds in clock.stages.items()],
         "left_out": list(dict.fromkeys(line for name in demo.sensors for line in left_out(preset(name)))),
         "notes": [*notes(), *assumed],
+        "stages": [{"name": name, "seconds": seconds} for name, seconds in clock.stages().items()],
     }

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from render.errors import InputError, unknown
 from render.files import replacing
-from studies.cell_run import Row
 from studies.ledger import COLUMNS, FILE, read_ledger, rows
+from studies.row import Row
 
 if TYPE_CHECKING:
     import pandas as pd

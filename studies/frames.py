@@ -6,10 +6,12 @@ cell reads one (h, w) array from its path, whatever the number of bands, and no 
 
 import json
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from isp.colour_fit import ColourFit
 from isp.processors import Processor
@@ -22,9 +24,11 @@ from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.response import expected_electrons
 from studies.camera import colour_fit
-from studies.digests import code_version, digest
+from studies.digests import digest
 from studies.lit_scene import OpenedScene, white_spectrum
 from studies.model import ImageModel, modelled
+from studies.provenance import versions
+from studies.stored import is_whole, keep
 from studies.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 
 _PLAIN = ImageModel(diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0)
@@ -81,8 +85,8 @@ class Frame:
 
 
 def lit_key(render: str, opened: OpenedScene, spectrum: str) -> str:
-    """Key of a lit scene: the render's content, the scene's own lights, the spectrum, the code."""
-    return digest([render, opened.identity, spectrum, code_version()])
+    """Key of a lit scene: the render's content, the scene's own lights, the spectrum, and what computes it."""
+    return digest([render, opened.identity, spectrum, versions()])
 
 
 def frame_key(lit: str, preset: SensorConfig, sensor: SensorConfig) -> str:
@@ -92,16 +96,11 @@ def frame_key(lit: str, preset: SensorConfig, sensor: SensorConfig) -> str:
 
 def read_lit(folder: Path, key: str) -> LitScene | None:
     """Lit scene made earlier, None where there is none that is whole."""
-    facts = _read(folder / f"{key}.json")
-    truth = folder / f"{key}.truth.npy"
-    if facts is None or not truth.is_file():
+    facts = _read(folder, key, "truth")
+    if facts is None:
         return None
-    try:
-        light = Light(*(np.array(facts["light"][name], float) for name in ("wavelength_nm", "width_nm", "spectrum")))
-        white, lux = float(facts["white_cd_m2"]), facts["lux_per_cd_m2"]
-        return LitScene(key, light, white, None if lux is None else float(lux), truth)
-    except (KeyError, TypeError, ValueError):  # damaged: made again
-        return None
+    light = Light(*(np.array(facts["light"][name], float) for name in ("wavelength_nm", "width_nm", "spectrum")))
+    return LitScene(key, light, facts["white_cd_m2"], facts["lux_per_cd_m2"], folder / facts["truth"])
 
 
 def make_lit(folder: Path, key: str, opened: OpenedScene, transport: Transport, spectrum: str) -> LitScene:
@@ -110,28 +109,22 @@ def make_lit(folder: Path, key: str, opened: OpenedScene, transport: Transport, 
     light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
     white = shown_white_cd_m2(transport, 1.0)
     lux = transport.illuminance_lux(1.0)
-    facts = {
+    facts: dict[str, Any] = {
         "light": {name: value.tolist() for name, value in vars(light).items()},
         "white_cd_m2": white,
         "lux_per_cd_m2": lux,
+        "truth": keep(folder, _npy(true_srgb(radiance, light, white)), ".npy"),
     }
-    truth = true_srgb(radiance, light, white)
-    with replacing(folder / f"{key}.truth.npy", folder / f"{key}.json") as (picture, text):
-        np.save(picture, truth)
-        text.write_text(json.dumps(facts), "utf-8")
-    return LitScene(key, light, white, lux, folder / f"{key}.truth.npy")
+    _write(folder, key, facts)
+    return LitScene(key, light, white, lux, folder / facts["truth"])
 
 
 def read_frame(folder: Path, key: str, sensor: SensorConfig) -> Frame | None:
     """Frame made earlier, None where there is none that is whole."""
-    electrons, difference = (folder / f"{key}.{name}.npy" for name in ("electrons", "difference"))
-    facts = _read(folder / f"{key}.json")
-    if facts is None or not (electrons.is_file() and difference.is_file()):
+    facts = _read(folder, key, "electrons", "half_difference")
+    if facts is None:
         return None
-    try:
-        return Frame(key, sensor, float(facts["auto_s"]), electrons, difference)
-    except (KeyError, TypeError, ValueError):  # damaged: made again
-        return None
+    return Frame(key, sensor, facts["auto_s"], folder / facts["electrons"], folder / facts["half_difference"])
 
 
 def make_frame(
@@ -151,11 +144,12 @@ def make_frame(
         Whose auto exposure it is, whatever mosaic and lens `sensor` has.
     """
     whole, even, odd = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in views)
-    names = [folder / f"{key}.{name}" for name in ("electrons.npy", "difference.npy", "json")]
-    with replacing(*names) as (electrons, difference, text):
-        np.save(electrons, whole)
-        np.save(difference, ((even - odd) / 2).astype(np.float32))
-        text.write_text(json.dumps({"auto_s": _auto_s(views[0], preset)}), "utf-8")
+    facts = {
+        "auto_s": _auto_s(views[0], preset),
+        "electrons": keep(folder, _npy(whole), ".npy"),
+        "half_difference": keep(folder, _npy(((even - odd) / 2).astype(np.float32)), ".npy"),
+    }
+    _write(folder, key, facts)
 
 
 def _auto_s(radiance: SpectralRadiance, preset: SensorConfig) -> float:
@@ -177,9 +171,24 @@ def colours_under(sensor: SensorConfig, processor: Processor, spectrum: Spectrum
     return colour_fit(sensor, processor, light_in_bands(spectrum, nm, band_widths(nm)))
 
 
-def _read(path: Path) -> dict[str, Any] | None:
+def _npy(array: NDArray[np.floating]) -> memoryview:
+    file = BytesIO()
+    np.save(file, array)
+    return file.getbuffer()
+
+
+def _write(folder: Path, key: str, facts: dict[str, Any]) -> None:
+    with replacing(folder / f"{key}.json") as (text,):
+        text.write_text(json.dumps({"facts": facts, "digest": digest(facts)}), "utf-8")
+
+
+def _read(folder: Path, key: str, *files: str) -> dict[str, Any] | None:
+    """Facts kept under a key, None where they or the files that they name aren't whole: these are made again."""
     try:
-        facts: dict[str, Any] = json.loads(path.read_text("utf-8"))
+        stored = json.loads((folder / f"{key}.json").read_text("utf-8"))
     except (OSError, ValueError):
         return None
-    return facts if isinstance(facts, dict) else None
+    if not isinstance(stored, dict) or digest(stored.get("facts")) != stored.get("digest"):
+        return None
+    facts: dict[str, Any] = stored["facts"]
+    return facts if all(is_whole(folder / facts[name]) for name in files) else None

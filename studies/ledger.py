@@ -1,20 +1,26 @@
-"""The ledger of a sweep: an SQLite file with a row a cell. A row stands whole or not at all, whatever ends the run."""
+"""The ledger of a sweep: an SQLite file with a row a cell. A row stands whole or not at all, whatever ends the run.
+
+What is read back for its values ends in its digest: SQLite itself doesn't notice a number that has changed.
+"""
 
 import errno
 import json
 import os
 import sqlite3
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields
-from functools import cache, partial
-from pathlib import Path, PurePath
-from typing import Any, get_type_hints
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
 
-from render.errors import InputError
-from studies.cell_run import Row
+from render.errors import InputError, one_line
+from studies.cells import Coordinates
+from studies.digests import digest
+from studies.row import Row
+from studies.stored import is_whole
 
-VERSION = 2  # of the tables; raise it with any change to them
+VERSION = 3  # of the tables; raise it with any change to them
 APPLICATION_ID = 0x726F6463  # "rodc": tells this file from other SQLite files
 FILE = "ledger.sqlite"
 _DAMAGED = (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_TOOBIG)
@@ -23,26 +29,31 @@ _TYPES: dict[Any, str] = {str: "TEXT NOT NULL", int: "INTEGER NOT NULL", float: 
 _OPTIONAL: dict[Any, str] = {float | None: "REAL", int | None: "INTEGER"}
 _HINTS = get_type_hints(Row)
 COLUMNS = tuple(field.name for field in fields(Row))
+_COLUMNS = ", ".join(f"cells.{name}" for name in (*COLUMNS, "digest"))
+_REAL = {name for name in COLUMNS if _HINTS[name] in (float, float | None)}
+Found = TypeVar("Found")
 _CREATE = (
     "CREATE TABLE cells ("
     + ", ".join(
         f"{name} {(_TYPES | _OPTIONAL)[_HINTS[name]]}" + (" PRIMARY KEY" if name == "key" else "") for name in COLUMNS
     )
-    + ") STRICT",
-    # What the last run asked for, in the study's order; the cells of earlier ones stay in `cells`.
-    "CREATE TABLE wanted (place INTEGER PRIMARY KEY, key TEXT NOT NULL) STRICT",
-    "CREATE TABLE renders (request TEXT PRIMARY KEY, content TEXT NOT NULL, spp INTEGER NOT NULL, "
-    "bands INTEGER NOT NULL, seconds REAL NOT NULL) STRICT",
-    "CREATE TABLE runs (started TEXT NOT NULL, host TEXT NOT NULL, study TEXT NOT NULL, environment TEXT NOT NULL) "
-    "STRICT",
+    + ", digest TEXT NOT NULL) STRICT",
+    # What the last run asks for, in the study's order; of a scene that isn't rendered yet the keys aren't known. The
+    # cells of earlier runs stay in `cells`.
+    "CREATE TABLE wanted (place INTEGER PRIMARY KEY, key TEXT) STRICT",
+    "CREATE TABLE renders (request TEXT PRIMARY KEY, content TEXT NOT NULL, variant TEXT NOT NULL, "
+    "spp INTEGER NOT NULL, bands INTEGER NOT NULL, seconds REAL NOT NULL, digest TEXT NOT NULL) STRICT",
+    "CREATE TABLE runs (started TEXT NOT NULL, host TEXT NOT NULL, study TEXT NOT NULL, stages TEXT NOT NULL, "
+    "digest TEXT NOT NULL) STRICT",
 )
 
 
 @dataclass(frozen=True)
 class RenderRecord:
-    """A render as the ledger knows it: hash of its content, samples a pixel, bands, and the seconds that it took."""
+    """A render as the ledger knows it: hash of its content, variant, samples a pixel, bands, seconds that it took."""
 
     content: str
+    variant: str
     spp: int
     bands: int
     seconds: float
@@ -65,6 +76,7 @@ def open_ledger(folder: Path) -> Iterator[sqlite3.Connection]:
         try:
             _distrust(base)
             _prepare(base, path)
+            _check_whole(base, path)
             yield base
         finally:
             base.close()
@@ -89,12 +101,18 @@ def read_ledger(folder: Path) -> Iterator[sqlite3.Connection]:
         base = sqlite3.connect(address, timeout=_WAIT_S, isolation_level=None, uri=True)
         try:
             _distrust(base)
-            found = base.execute("PRAGMA quick_check(1)").fetchone()[0] if _has_tables(base, path) else "it is empty"
-            if found != "ok":
-                raise InputError(f"{path}: it is no whole ledger ({found}); run the sweep again in another folder")
+            if not _has_tables(base, path):
+                raise InputError(f"{path}: it is no ledger (it is empty); run the sweep again in another folder")
+            _check_whole(base, path)
             yield base
         finally:
             base.close()
+
+
+def _check_whole(base: sqlite3.Connection, path: Path) -> None:
+    found = base.execute("PRAGMA integrity_check(1)").fetchone()[0]
+    if found != "ok":
+        raise InputError(f"{path}: it is no whole ledger ({one_line(found)}); run the sweep again in another folder")
 
 
 def _distrust(base: sqlite3.Connection) -> None:
@@ -156,65 +174,110 @@ def _told(path: Path) -> Iterator[None]:
 
 def add(base: sqlite3.Connection, row: Row) -> None:
     """Add a row, at once and whole; one of the same key is replaced."""
-    marks = ", ".join("?" * len(COLUMNS))
-    base.execute(f"INSERT OR REPLACE INTO cells ({', '.join(COLUMNS)}) VALUES ({marks})", astuple(row))
+    values = [float(value) if column in _REAL and value is not None else value for column, value in vars(row).items()]
+    _put(base, "cells", values)
 
 
-def done(base: sqlite3.Connection, pictures: Path) -> set[str]:
-    """Keys of the cells that have a row, and pictures that aren't empty: a power cut may have taken these."""
-    rows = base.execute("SELECT key, picture, truth FROM cells")
-    standing = cache(lambda name: _stands(pictures / name))  # many cells share a truth
-    return {key for key, picture, truth in rows if standing(picture) and standing(truth)}
+def done(base: sqlite3.Connection, pictures: Path, keys: Iterable[str]) -> set[str]:
+    """Which of these cells have a whole row, and whole pictures: a power cut may have taken these."""
+    asked = set(keys)
+    found = [_row(values) for values in base.execute(f"SELECT {_COLUMNS} FROM cells") if values[0] in asked]
+    pairs = [(row.key, pictures / row.picture, pictures / row.truth) for row in found if row is not None]
+    return {key for key, picture, truth in pairs if is_whole(picture) and is_whole(truth)}
 
 
 def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
-    """Rows of the cells that the last run asked for, in the study's order; with `everything` all that there are."""
-    columns = ", ".join(f"cells.{name}" for name in COLUMNS)
+    """Rows of the cells that the last run asked for, in the study's order; with `everything` all that there are.
+
+    Raises
+    ------
+    InputError
+        Where a row isn't what was written.
+    """
     chosen = (
-        f"SELECT {columns} FROM cells ORDER BY key"
+        f"SELECT {_COLUMNS} FROM cells ORDER BY key"
         if everything
-        else f"SELECT {columns} FROM wanted JOIN cells USING (key) ORDER BY place"
+        else f"SELECT {_COLUMNS} FROM wanted JOIN cells USING (key) ORDER BY place"
     )
-    found = [Row(*values) for values in base.execute(chosen)]
-    for picture in (PurePath(name) for row in found for name in (row.picture, row.truth)):
-        if picture.is_absolute() or ".." in picture.parts:
-            raise InputError(f"ledger: picture {str(picture)!r} lies outside the folder of pictures; remove that row")
-    return found
+    return [_whole(_row(values), f"row {values[0]!r}") for values in base.execute(chosen)]
 
 
-def last_run(base: sqlite3.Connection) -> tuple[dict[str, Any], dict[str, Any]] | None:
-    """Study and environment of the last run, as `note_run` had them; None before there is one."""
-    found = base.execute("SELECT study, environment FROM runs ORDER BY rowid DESC LIMIT 1").fetchone()
-    return None if found is None else (json.loads(found[0]), json.loads(found[1]))
+def last_study(base: sqlite3.Connection) -> tuple[dict[str, Any], dict[str, float]] | None:
+    """Study of the last run, and the seconds by stage of all runs of it; None before there is one."""
+    found = [_whole(_sealed(values), "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
+    if not found:
+        return None
+    study, seconds = found[-1][2], dict[str, float]()
+    for stages in (json.loads(run[3]) for run in found if run[2] == study):
+        for name, value in stages.items():
+            seconds[name] = seconds.get(name, 0.0) + value
+    return json.loads(study), seconds
 
 
-def want(base: sqlite3.Connection, keys: Iterable[str]) -> None:
-    """Note which cells the run under way asks for, in place of what the last one did."""
+def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:
+    """Note which cells the run under way asks for, in place of what was noted before; None where not known yet."""
     base.execute("BEGIN IMMEDIATE")
     base.execute("DELETE FROM wanted")
     base.executemany("INSERT INTO wanted (key) VALUES (?)", ((key,) for key in keys))
     base.execute("COMMIT")
 
 
-def note_run(base: sqlite3.Connection, started: str, host: str, study: str, environment: dict[str, Any]) -> None:
-    """Note a run: when, where, of what, with which versions."""
-    base.execute("INSERT INTO runs VALUES (?, ?, ?, ?)", (started, host, study, json.dumps(environment)))
+def forget_old(base: sqlite3.Connection) -> None:
+    """Remove the rows of what the run under way has made anew with other versions, or from another variant's render.
+
+    The backend counts among the versions; engines that differ alone are another plan's.
+    """
+    new = {_place(row): (row.variant, row.versions) for row in rows(base)}
+    found = [row for row in map(_row, base.execute(f"SELECT {_COLUMNS} FROM cells")) if row is not None]
+    old = [(row.key,) for row in found if new.get(_place(row), made := (row.variant, row.versions)) != made]
+    base.executemany("DELETE FROM cells WHERE key = ?", old)
+
+
+def note_run(base: sqlite3.Connection, started: str, host: str, study: str) -> int:
+    """Note a run: when, where, of what; gives its number."""
+    return _put(base, "runs", [started, host, study, "{}"])
+
+
+def note_stages(base: sqlite3.Connection, run: int, stages: Mapping[str, float]) -> None:
+    """Note the seconds that a run has taken so far, by stage."""
+    values = base.execute("SELECT started, host, study FROM runs WHERE rowid = ?", (run,)).fetchone()
+    text = json.dumps(dict(stages))
+    base.execute("UPDATE runs SET stages = ?, digest = ? WHERE rowid = ?", (text, digest([*values, text]), run))
 
 
 def render_record(base: sqlite3.Connection, request: str) -> RenderRecord | None:
-    """What was found about a render that was asked for before."""
-    found = base.execute("SELECT content, spp, bands, seconds FROM renders WHERE request = ?", (request,))
-    values = found.fetchone()
-    return None if values is None else RenderRecord(*values)
+    """What was found about a render that was asked for before; None too where it isn't what was written."""
+    found = base.execute("SELECT * FROM renders WHERE request = ?", (request,)).fetchone()
+    values = None if found is None else _sealed(found)
+    return None if values is None else RenderRecord(*values[1:])
 
 
 def note_render(base: sqlite3.Connection, request: str, record: RenderRecord) -> None:
     """Keep what was found about a render."""
-    base.execute("INSERT OR REPLACE INTO renders VALUES (?, ?, ?, ?, ?)", (request, *astuple(record)))
+    _put(base, "renders", [request, *astuple(record)])
 
 
-def _stands(path: Path) -> bool:
-    try:
-        return path.stat().st_size > 0
-    except OSError:
-        return False
+def _put(base: sqlite3.Connection, table: str, values: list[Any]) -> int:
+    marks = ", ".join("?" * (len(values) + 1))
+    done = base.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", [*values, digest(values)])
+    return int(done.lastrowid or 0)
+
+
+def _sealed(values: tuple[Any, ...]) -> tuple[Any, ...] | None:
+    """Values without the digest at their end; None where it isn't theirs."""
+    return values[:-1] if digest(values[:-1]) == values[-1] else None
+
+
+def _row(values: tuple[Any, ...]) -> Row | None:
+    whole = _sealed(values)
+    return None if whole is None else Row(*whole)
+
+
+def _whole(found: Found | None, what: str) -> Found:
+    if found is None:
+        raise InputError(f"ledger: {what} isn't what was written (damaged); run rodcone sweep again, which makes it")
+    return found
+
+
+def _place(row: Row) -> Coordinates:
+    return Coordinates(*(getattr(row, field.name) for field in fields(Coordinates)))

@@ -12,9 +12,10 @@ from render.errors import InputError, unknown
 from sensor.presets import names, preset
 from sensor.readout import as_raw
 from sensor.variations import vary
-from studies.cell_run import Row
 from studies.confidence import Estimate, mean_with_confidence
+from studies.provenance import require_alike
 from studies.report_text import DELTA_E, PSNR, Metric
+from studies.row import Row
 
 FLIP = Metric("flip_mean", "FLIP, mean", 3, "", higher=False)
 METRICS = (PSNR, DELTA_E, FLIP)
@@ -83,8 +84,10 @@ def cases_of(rows: Sequence[Row]) -> list[Case]:
     Raises
     ------
     InputError
-        Where a processor lacks a picture that another has, or there are fewer than two seeds.
+        Where a processor lacks a picture that another has, there are fewer than two seeds, or rows were made by
+        different versions, variants or engines.
     """
+    require_alike(rows)
     found: dict[tuple[Group, str], dict[str, dict[int, Row]]] = {}
     for row in rows:
         place = Group(row.scene, row.spectrum, row.exposure, row.sensor), row.level
@@ -154,6 +157,6 @@ def snr_db(case: Case, camera: str, letter: str) -> float:
         return nan
     sensor = vary(preset(row.sensor), PROCESSORS[camera].mosaic)
     dark_e = as_raw(
-        np.zeros((len(sensor.cfa), len(sensor.cfa[0])), np.uint16), sensor, row.exposure_s, row.engine
+        np.zeros((len(sensor.cfa), len(sensor.cfa[0])), np.uint16), sensor, row.exposure_s, row.readout_engine
     ).dark_noise_e
     return 20 * log10(electrons / sqrt(electrons + dark_e**2))

@@ -29,7 +29,7 @@ def opponents(
     from render.errors import InputError
     from render.files import check_place
     from studies.export import read_rows
-    from studies.ledger import last_run, read_ledger
+    from studies.ledger import last_study, read_ledger
     from studies.opponents_page import write_page
 
     if out.suffix != ".md":
@@ -37,6 +37,6 @@ def opponents(
     check_place(out)
     rows = read_rows(folder)
     with read_ledger(folder) as base:
-        study, _ = last_run(base) or ({}, {})
+        study, _ = last_study(base) or ({}, {})
     write_page(rows, study, folder, out, camera)
     print(out)

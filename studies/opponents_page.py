@@ -1,16 +1,17 @@
 """The page of a camera beside its opponents: Markdown, with the figure as SVG in a file of its own."""
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from render.files import replacing
 from studies import opponents_text as text
-from studies.cell_run import Row
 from studies.opponents import Case, cases_of, is_ranked, opponents_of
 from studies.opponents_figure import description, figure_of
 from studies.paper_drawing import to_svg
 from studies.report_text import percent
+from studies.row import Row
 
 
 def write_page(rows: Sequence[Row], study: Mapping[str, Any], folder: Path, out: Path, camera: str) -> None:
@@ -99,9 +100,10 @@ def facts_sentence(cases: Sequence[Case], study: Mapping[str, Any]) -> str:
         if values
     ]
     seeds = ", ".join(str(row.seed) for row in rows)
+    code = text.code(json.loads(rows[0].versions)["rodcone"])
     return (
         f"Study {text.code(str(study.get('name', 'study')))}: {'; '.join(parts)}; seeds {seeds}{of_size}; rodcone "
-        f"{text.code(rows[0].code)}. Pictures are measured against the noise-free truth at the known exposure scale."
+        f"{code}. Pictures are measured against the noise-free truth at the known exposure scale."
     )
 
 

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from studies.cell_run import Row
 from studies.paper_checks import Check, Claim, at_least, near
 from studies.paper_flat import channel_e, decibels, light_of, shot_noise_alone, snr
 from studies.paper_layout import Figure, sheet
 from studies.paper_setup import READINGS, SWEEP, Setup, sensor_of, swept
 from studies.prepare import PICTURES
+from studies.row import Row
 
 LUMINANCE_CD_M2, EXPOSURE_S = 100.0, 0.010
 LARGE_UM, SMALL_UM = 6, 2

@@ -11,13 +11,13 @@ from isp.processors import PROCESSORS
 from isp.substitution import SUBSTITUTION_SNR
 from sensor.raw import RawImage
 from studies.camera import colour_fit
-from studies.cell_run import Row
 from studies.cells import Coordinates
 from studies.paper_camera import Image, View, decode_srgb, develop, exposures, noise, quality_db
 from studies.paper_checks import Claim, at_least, at_most, near
 from studies.paper_figure1b import shown
 from studies.paper_layout import Figure, sheet
 from studies.paper_setup import READINGS, Setup, sensor_of, swept, view
+from studies.row import Row
 from studies.study import parse_exposure
 
 LUMINANCE_CD_M2 = 25.0

@@ -11,12 +11,12 @@ from render.errors import require_whole
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
-from studies.cell_run import Row
 from studies.export import read_rows
 from studies.lit_scene import make_transport, open_choice
 from studies.model import as_stated
 from studies.paper_camera import View, view_of
 from studies.prepare import RENDERS
+from studies.row import Row
 from studies.study import RenderLimits, SceneChoice, Study
 from studies.study_file import read_study
 from studies.sweep import sweep

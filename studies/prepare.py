@@ -2,7 +2,7 @@
 
 import sqlite3
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,12 +10,14 @@ import numpy as np
 
 from isp.colour_fit import ColourFit
 from isp.processors import PROCESSORS
+from render.jit import backend
 from render.transport import Transport
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.cells import Cell, cell_key, coordinates
-from studies.digests import code_version, digest, digest_bytes
+from studies.clock import Clock
+from studies.digests import digest, digest_bytes
 from studies.frames import (
     Frame,
     LitScene,
@@ -30,6 +32,7 @@ from studies.frames import (
 from studies.ledger import RenderRecord, note_render, render_record
 from studies.lit_scene import OpenedScene, level_luminance, make_transport, under, white_spectrum
 from studies.model import ImageModel, Plan, modelled
+from studies.provenance import provenance, versions
 from studies.study import Condition, Study, conditions, parse_exposure
 
 Progress = Callable[[float, float], None]
@@ -38,12 +41,13 @@ RENDERS, FRAMES, PICTURES = "renders", "frames", "pictures"  # folders beside th
 
 @dataclass(frozen=True)
 class Job:
-    """A study being swept: with which plan, into which folder, noted in which ledger."""
+    """A study being swept: with which plan, into which folder, noted in which ledger, its time taken by which clock."""
 
     study: Study
     plan: Plan
     out: Path
     base: sqlite3.Connection
+    clock: Clock = field(default_factory=Clock)
 
 
 class Variant(NamedTuple):
@@ -63,6 +67,12 @@ class Shared(NamedTuple):
     colours: ColourFit
 
 
+def known_cells(job: Job, opened: OpenedScene) -> list[Cell] | None:
+    """Cells of one scene in the study's order; None where it isn't rendered yet, or what they share isn't whole."""
+    record = render_record(job.base, _request(job, opened))
+    return None if record is None else _cells(job, opened, record)
+
+
 def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]:
     """Cells of one scene in the study's order; renders only where something that they share is missing.
 
@@ -73,25 +83,31 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
     OSError
         Where a file can't be written.
     """
-    request = digest([opened.identity, job.plan.renders.get(opened.choice), job.study.render, code_version()])
-    record = render_record(job.base, request)
-    cells = None if record is None else _cells(job, opened, record)
+    cells = known_cells(job, opened)
     if cells is not None:
         return cells
-    model = job.plan.renders.get(opened.choice)
-    transport = make_transport(opened, job.study, model, job.out / RENDERS, progress)
-    record = RenderRecord(
-        digest_bytes(np.ascontiguousarray(transport.radiance).data),
-        transport.spp,
-        transport.wavelength_nm.size,
-        transport.seconds,
-    )
-    _make_files(job, opened, record, transport)
-    note_render(job.base, request, record)
-    cells = _cells(job, opened, record)
+    with job.clock.stage("renders"):
+        model = job.plan.renders.get(opened.choice)
+        transport = make_transport(opened, job.study, model, job.out / RENDERS, progress)
+    with job.clock.stage("what cells share"):
+        record = RenderRecord(
+            digest_bytes(np.ascontiguousarray(transport.radiance).data),
+            transport.variant,
+            transport.spp,
+            transport.wavelength_nm.size,
+            transport.seconds,
+        )
+        _make_files(job, opened, record, transport)
+        note_render(job.base, _request(job, opened), record)
+        cells = _cells(job, opened, record)
     if cells is None:
         raise OSError(None, "files just written are gone", str(job.out / FRAMES))
     return cells
+
+
+def _request(job: Job, opened: OpenedScene) -> str:
+    asked = [opened.identity, job.plan.renders.get(opened.choice), job.study.render]
+    return digest([*asked, backend(), versions()])
 
 
 def _variants(job: Job, opened: OpenedScene) -> list[Variant]:
@@ -164,15 +180,15 @@ def _cell(
     luminance = level_luminance(condition.level, scene.lux_per_cd_m2)
     asked_s = parse_exposure(condition.exposure)
     exposure_s = min(job.study.longest_exposure_s, frame.auto_s / luminance) if asked_s is None else asked_s
-    exact = job.plan.images[condition].exact
+    made_by = provenance(record.variant, processor, exact=job.plan.images[condition].exact)
     return Cell(
-        key=cell_key(at, frame.key, luminance, exposure_s, exact, shared.colours, code_version()),
+        key=cell_key(at, frame.key, luminance, exposure_s, shared.colours, made_by),
         at=at,
         luminance_cd_m2=luminance,
         illuminance_lux=None if scene.lux_per_cd_m2 is None else luminance * scene.lux_per_cd_m2,
         exposure_s=exposure_s,
         sensor=frame.sensor,
-        exact=exact,
+        made_by=made_by,
         colours=shared.colours,
         light=scene.light,
         white_cd_m2=scene.white_cd_m2 * luminance,
@@ -180,7 +196,6 @@ def _cell(
         half_difference=frame.half_difference.resolve(),
         truth=scene.truth.resolve(),
         pictures=(job.out / PICTURES).resolve(),
-        code=code_version(),
         spp=record.spp,
         bands=record.bands,
         render_s=record.seconds,

@@ -70,6 +70,7 @@ def page_view(results: Mapping[str, Any], pictures: Mapping[str, bytes]) -> dict
     share = text.Metric("mc_share", "Monte Carlo share", 1, "", higher=False)
     aim = (MOST_SHARE, f"aim {text.percent(MOST_SHARE)}")
     speed = speed_rows(results, cells)
+    none_known = [()] * len(groups(results))  # of a sweep in which no cell has all of its seeds yet
     per_view, per_cells = len(groups(results)) // len(views(results)), len(cells) // len(views(results))
     return {
         "results": results,
@@ -96,10 +97,10 @@ def page_view(results: Mapping[str, Any], pictures: Mapping[str, bytes]) -> dict
             for place, name in enumerate(view_names(results))
         ],
         # One row of charts for each group.
-        "charts": list(zip(*(group_charts(results, cells, metric) for metric in metrics), strict=True)),
+        "charts": list(zip(*(group_charts(results, cells, metric) for metric in metrics), strict=True)) or none_known,
         "share_charts": group_charts(results, cells, share, log_y=True, percent=True, rule=aim),
         "speed": speed,
-        "speed_charts": speed_charts(results, speed),
+        "speed_charts": speed_charts(speed),
         "renders": render_rows(results, cells),
         # Effect and cost, as `sensor.left_out.left_out` parts them.
         "left_out": [line.partition(": ")[::2] for line in results["left_out"]],

@@ -63,34 +63,45 @@ def speed_rows(results: Mapping[str, Any], cells: Cells) -> list[dict[str, Any]]
     """Return for each sensor and camera the mean seconds of a picture's steps and its mean PSNR, as numbers.
 
     PSNR is a mean over the conditions in which it is known for every camera of the sensor, so that all are judged on
-    the same ones; ``gain_db`` is its lead over the camera that develops fastest.
+    the same ones; ``gain_db`` is its lead over the camera that develops fastest. Conditions that other variants or
+    engines rendered or captured have rows of their own, whose sensor's name says so.
     """
     rows = []
     for sensor in results["sensors"]:
-        own = {c: [x for x in cells if (x["sensor"], x["camera"]) == (sensor["name"], c)] for c in results["cameras"]}
-        judged = [
-            place
-            for place, same in enumerate(zip(*own.values(), strict=True))
-            if all(cell["psnr_db"] is not None and isfinite(cell["psnr_db"]) for cell in same)
-        ]
-        made = []
-        for camera, of_camera in own.items():
-            steps = {
-                step: _mean([(x["seconds"] or {}).get(step) for x in of_camera]) for step in ("capture", "develop")
-            }
-            psnr = _mean([of_camera[place]["psnr_db"] for place in judged])
-            made.append({"sensor": sensor["name"], "camera": camera, "psnr_db": psnr, "judged": len(judged), **steps})
-        fastest = min(made, key=lambda row: row["develop"] if row["develop"] is not None else float("inf"))
-        known = fastest["psnr_db"]
-        rows += [{**row, "gain_db": None if known is None else row["psnr_db"] - known} for row in made]
+        own = [[x for x in cells if (x["sensor"], x["camera"]) == (sensor["name"], c)] for c in results["cameras"]]
+        parts: dict[str, list[Cells]] = {}
+        for same in zip(*own, strict=True):
+            parts.setdefault(_made_with(same), []).append(same)
+        for way, conditions in parts.items():
+            rows += _speed_of(sensor["name"] + (f", {way}" if len(parts) > 1 else ""), conditions)
     return rows
 
 
-def speed_charts(results: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[Chart]:
+def _made_with(condition: Cells) -> str:
+    """Engines of a condition's cells before development, in words."""
+    known: dict[str, str] = next((cell["engines"] for cell in condition if cell.get("engines")), {})
+    return ", ".join(f"{step} {known[step]}" for step in ("render", "capture") if step in known) or "not made yet"
+
+
+def _speed_of(sensor: str, conditions: Sequence[Cells]) -> list[dict[str, Any]]:
+    """Rows of `speed_rows` for conditions with one cell of each camera."""
+    judged = [c for c in conditions if all(x["psnr_db"] is not None and isfinite(x["psnr_db"]) for x in c)]
+    made = []
+    for slot, first in enumerate(conditions[0]):
+        seconds = [condition[slot]["seconds"] or {} for condition in conditions]
+        steps = {step: _mean([one.get(step) for one in seconds]) for step in ("capture", "develop")}
+        psnr = _mean([condition[slot]["psnr_db"] for condition in judged])
+        made.append({"sensor": sensor, "camera": first["camera"], "psnr_db": psnr, "judged": len(judged), **steps})
+    fastest = min(made, key=lambda row: row["develop"] if row["develop"] is not None else float("inf"))
+    known = fastest["psnr_db"]
+    return [{**row, "gain_db": None if known is None else row["psnr_db"] - known} for row in made]
+
+
+def speed_charts(rows: Sequence[Mapping[str, Any]]) -> list[Chart]:
     """Return mean PSNR over the seconds of development, a chart a sensor, a mark a camera; none where unknown."""
     charts = []
-    for sensor in results["sensors"]:
-        own = [row for row in rows if row["sensor"] == sensor["name"] and None not in (row["develop"], row["psnr_db"])]
+    for sensor in dict.fromkeys(row["sensor"] for row in rows):
+        own = [row for row in rows if row["sensor"] == sensor and None not in (row["develop"], row["psnr_db"])]
         if not own:
             continue
         lines = [
@@ -103,7 +114,7 @@ def speed_charts(results: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) 
         ]
         charts.append(
             line_chart(
-                f"PSNR over development time, {sensor['name']}",
+                f"PSNR over development time, {sensor}",
                 f"Mean PSNR over the seconds that a picture's development takes: {'; '.join(map(_speed_words, own))}.",
                 [max(row["develop"], LEAST_S) for row in own],
                 lines,

@@ -1,7 +1,7 @@
 """What a ledger's rows and its study tell of renders, levels, sensors and time: parts of a report's results."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,10 +9,11 @@ from render.errors import InputError
 from sensor.config import LensConfig
 from sensor.left_out import left_out
 from sensor.presets import preset
-from studies.cell_run import Row
 from studies.levels import parse_level
+from studies.provenance import made_by, told
 from studies.report_text import significant
 from studies.results import sensor_facts
+from studies.row import Row
 from studies.study import label
 
 
@@ -47,13 +48,13 @@ def sensor_of(name: str) -> dict[str, Any]:
         return {"name": label(name), **dict.fromkeys(keys)}
 
 
-def stages_of(rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
-    """Return the seconds of work, added up over all workers; each render once."""
-    yield {"name": "renders", "seconds": sum({row.scene: row.render_s for row in rows}.values())}
-    yield {"name": "captures", "seconds": sum(row.capture_s for row in rows)}
-    for name in dict.fromkeys(row.processor for row in rows):
-        yield {"name": f"develop {name}", "seconds": sum(row.develop_s for row in rows if row.processor == name)}
-    yield {"name": "metrics", "seconds": sum(row.measure_s for row in rows)}
+def environment_of(rows: Sequence[Row]) -> dict[str, str]:
+    """Return what made the rows, whichever run did: versions, variants and engines, threads, machines."""
+    found: dict[str, dict[str, None]] = {}
+    for row in rows:
+        for name, value in {**told(made_by(row)), "threads": str(row.threads), "machine": row.machine}.items():
+            found.setdefault(name, {})[value] = None
+    return {name: "; ".join(values) for name, values in found.items()}
 
 
 def lenses_left_out(rows: Sequence[Row], sensors: Sequence[str]) -> list[str]:

@@ -11,26 +11,27 @@ from typing import Any, NamedTuple
 from PIL import Image
 
 from render.errors import InputError
-from render.files import inside
 from sensor.exposure import RULE
-from studies.cell_run import Row
-from studies.ledger import FILE, last_run, read_ledger, rows
+from studies.ledger import FILE, last_study, read_ledger, rows
 from studies.prepare import PICTURES
+from studies.provenance import require_alike
 from studies.report_cells import SCATTERED
 from studies.report_choice import chosen_conditions
-from studies.report_facts import configuration, lenses_left_out, level_of, render_of, sensor_of, stages_of
+from studies.report_facts import configuration, environment_of, lenses_left_out, level_of, render_of, sensor_of
 from studies.results import DISPLAY_WHITE
+from studies.row import Row
+from studies.stored import read_whole
 from studies.study import label
 
 SHOWN_BYTES = 8e6  # of pictures in a page, where their number isn't given: some 11 MB of HTML, which any browser takes
-_UNKNOWN = ("exposure_s", "balance", "mean_electrons", "seconds", "substitution", "budget_share", *SCATTERED)
+_UNKNOWN = ("engines", "exposure_s", "balance", "mean_electrons", "seconds", "substitution", "budget_share", *SCATTERED)
 
 
 class Ledger(NamedTuple):
-    """What the last run of a sweep asked for and what there is of it."""
+    """What the last run of a sweep asked for, what there is of it, and the seconds by stage of all its runs."""
 
     study: dict[str, Any]
-    environment: dict[str, Any]
+    stages: dict[str, float]
     wanted: int
     rows: list[Row]
 
@@ -41,17 +42,18 @@ def read_run(folder: Path) -> Ledger:
     Raises
     ------
     InputError
-        Where there is no ledger, one of another version, or none of its cells is made yet.
+        Where there is no ledger, one of another version, or none of its cells is made yet, or they were made by
+        different versions, variants or engines.
     """
     if not (folder / FILE).is_file():
         raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
     with read_ledger(folder) as base:
         found, wanted = rows(base), base.execute("SELECT count(*) FROM wanted").fetchone()[0]
-        run = last_run(base)
+        run = last_study(base)
     if not found or run is None:
         raise InputError(f"{folder}: its last run has made no cell yet; run rodcone sweep, which goes on")
-    study, environment = run
-    return Ledger(study, environment, wanted, found)
+    require_alike(found)
+    return Ledger(*run, wanted, found)
 
 
 def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[dict[str, Any], dict[str, bytes]]:
@@ -73,11 +75,11 @@ def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[dict
     study, cells = ledger.study, list(_cells(ledger))
     names = [label(choice["source"]) for choice in study["scenes"]]
     truths = _truths(ledger, names)
-    pictures = {name: _bytes(folder, name) for name in truths if name is not None}
+    pictures = {name: read_whole(folder / PICTURES, name) for name in truths if name is not None}
     sizes = {name: _size(pictures, truths[place * len(study["spectra"])]) for place, name in enumerate(names)}
     missing = ledger.wanted - len(ledger.rows)
     left = _choose(folder, cells, study, most_pictures)
-    pictures |= {cell["picture"]: _bytes(folder, cell["picture"]) for cell in cells if cell["picture"]}
+    pictures |= {cell["picture"]: read_whole(folder / PICTURES, cell["picture"]) for cell in cells if cell["picture"]}
     results = {
         "rodcone": metadata.version("rodcone"),
         "name": study["name"],
@@ -88,7 +90,7 @@ def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[dict
         "spectra": study["spectra"],
         "exposures": study["exposures"],
         "truths": truths,
-        "environment": ledger.environment,
+        "environment": environment_of(ledger.rows),
         "render": None,
         "renders": [render_of(ledger.rows, name) for name in names],
         "exposure_rule": RULE.format(longest=study["longest_exposure_s"] * 1e3),
@@ -97,7 +99,7 @@ def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[dict
         "sensors": [sensor_of(name) for name in study["sensors"]],
         "cameras": study["processors"],
         "cells": cells,
-        "stages": list(stages_of(ledger.rows)),
+        "stages": [{"name": name, "seconds": seconds} for name, seconds in ledger.stages.items()],
         "left_out": lenses_left_out(ledger.rows, study["sensors"]),
         "notes": []
         if missing == 0
@@ -140,6 +142,7 @@ def _figures(row: Row) -> dict[str, Any]:
         "substitution": None if row.substitution is None else bool(row.substitution),
         "balance": json.loads(row.balance),
         "mean_electrons": json.loads(row.mean_electrons),
+        "engines": {"render": row.variant, "capture": row.readout_engine, "develop": row.development_engine},
         "seconds": {"capture": row.capture_s, "develop": row.develop_s, "measure": row.measure_s},
         "file": f"{PICTURES}/{row.picture}",
     }
@@ -149,16 +152,6 @@ def _truths(ledger: Ledger, names: Sequence[str]) -> list[str | None]:
     """File of each scene's truth under each spectrum; None where no cell of it is made yet."""
     found = {(row.scene, row.spectrum): row.truth for row in ledger.rows}
     return [found.get(view) for view in product(names, ledger.study["spectra"])]
-
-
-def _bytes(folder: Path, name: str) -> bytes:
-    path = inside(folder / PICTURES, name)
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path}: can't be read ({error.strerror}); run rodcone sweep again, which makes it"
-        ) from error
 
 
 def _size(pictures: Mapping[str, bytes], name: str | None) -> list[int]:

@@ -1,16 +1,15 @@
 """What a study found, as plain data: the content of `results.json`, and what the report shows."""
 
-import platform
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
-from importlib import metadata
 from typing import Any
 
-from render.jit import LIBLLVM, backend, dr
+from render.jit import backend
 from render.loader import variant
 from render.transport import Transport
 from scenes.levels import LightLevel
 from sensor.presets import preset
+from studies.provenance import machine, threads, versions
 
 DISPLAY_WHITE = "the scene's 99th percentile of luminance, visible lamps excluded, is shown at 90 % of white"
 
@@ -54,18 +53,22 @@ def sensor_facts(name: str) -> dict[str, Any]:
 
 
 def environment() -> dict[str, Any]:
-    """Versions and engines that made the numbers."""
-    names = ("mitsuba", "drjit", "numpy", "scipy", "scikit-image", "flip-evaluator")
-    packages = {name: metadata.version(name) for name in names}
+    """What makes numbers in this process."""
     return {
-        "python": platform.python_version(),
-        **packages,
-        "llvm": LIBLLVM.name if LIBLLVM else "none",
+        **versions(),
         "variant": variant(),
         "engine": backend(),
-        "engine of captures": "numpy",  # `studies.camera.photograph` reads out in the exact form
-        "threads": dr.thread_count() if backend() == "llvm" else 1,
-        "platform": platform.platform(),
+        "threads": threads(),
+        "machine": machine(),
+    }
+
+
+def engines_told(cells: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+    """Which engines drew and developed a report's cells, in words."""
+    known = [cell["engines"] for cell in cells if cell["engines"]]
+    return {
+        f"engine of {name}": ", ".join(dict.fromkeys(engines[step] for engines in known))
+        for name, step in (("captures", "capture"), ("development", "develop"))
     }
 
 

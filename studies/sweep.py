@@ -5,22 +5,22 @@ import platform
 import shutil
 import sqlite3
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from itertools import chain
 from pathlib import Path
 
 from isp.processors import require_libraries
-from studies.cell_run import Row
 from studies.cells import Cell
-from studies.digests import code_version
-from studies.ledger import add, done, note_run, open_ledger, want
+from studies.clock import FIRST, Clock
+from studies.ledger import add, done, forget_old, note_run, note_stages, open_ledger, want
 from studies.lit_scene import open_all
 from studies.model import Plan
-from studies.prepare import PICTURES, Job, scene_cells
-from studies.results import environment
-from studies.study import Study, check
+from studies.prepare import PICTURES, Job, known_cells, scene_cells
+from studies.row import Row
+from studies.study import Study, check, conditions
 
 Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 Runner = Callable[
@@ -53,10 +53,20 @@ class Swept:
     notes: tuple[str, ...]
 
 
-def sweep(study: Study, out: Path, plan: Plan, runner: Runner, step: Step = lambda what, share: None) -> Swept:
+def sweep(
+    study: Study,
+    out: Path,
+    plan: Plan,
+    runner: Runner,
+    step: Step = lambda what, share: None,
+    *,
+    keep_old: bool = False,
+    clock: Clock | None = None,
+) -> Swept:
     """Make the missing cells of a study and note each in the ledger of a folder.
 
-    Whatever ends it (Ctrl-C, a kill, a full disk), the next call goes on with the cells that are missing then.
+    Whatever ends it (Ctrl-C, a kill, a full disk), the next call goes on with the cells that are missing then. Cells
+    that other versions, another variant or other engines made are made anew.
 
     Parameters
     ----------
@@ -68,6 +78,10 @@ def sweep(study: Study, out: Path, plan: Plan, runner: Runner, step: Step = lamb
     runner : callable
         Takes cells, gives rows as they come.
     step : callable
+    keep_old : bool
+        Keep what is made anew as rows of their own, instead of removing them.
+    clock : Clock, optional
+        That began when the work did, where something was done before.
 
     Raises
     ------
@@ -76,27 +90,37 @@ def sweep(study: Study, out: Path, plan: Plan, runner: Runner, step: Step = lamb
     OSError
         Where the folder can't be written, or the disk is full.
     """
-    started = time.perf_counter()
+    clock = clock or Clock()
     check(study)
     for name in study.processors:
         require_libraries(name)
     scenes = open_all(study)
     out.mkdir(parents=True, exist_ok=True)
     _clear(out)
-    cells, made = [], 0
     with open_ledger(out) as base:
-        _note(base, study)
-        job = Job(study, plan, out, base)
+        job = Job(study, plan, out, base, clock)
+        run = _note(base, study)
+        found = [known_cells(job, opened) for opened in scenes.values()]
+        count = len(conditions(study)) * len(study.processors) * len(study.seeds) // len(scenes)
+        keys: list[Sequence[str | None]] = [
+            [cell.key for cell in cells] if cells else [None] * count for cells in found
+        ]
+        want(base, chain.from_iterable(keys))
+        made = 0
         for index, opened in enumerate(scenes.values()):
             part = _part(step, index, len(scenes))
-            of_scene = scene_cells(job, opened, _rendering(part))
-            cells += of_scene
-            want(base, (cell.key for cell in cells))
-            kept = done(base, out / PICTURES)
-            missing = [cell for cell in of_scene if cell.key not in kept]
-            made += _run(base, missing, runner, part)
+            cells = found[index] or scene_cells(job, opened, _rendering(part))
+            asked = [cell.key for cell in cells]
+            keys[index] = asked
+            want(base, chain.from_iterable(keys))
+            kept = done(base, out / PICTURES, asked)
+            made += _run(job, run, [cell for cell in cells if cell.key not in kept], runner, part)
+        if not keep_old:
+            forget_old(base)
+        stages = clock.stages()
+        note_stages(base, run, stages)
     notes = tuple(dict.fromkeys(note for opened in scenes.values() for note in opened.notes))
-    return Swept(out, len(cells), made, time.perf_counter() - started, notes)
+    return Swept(out, count * len(scenes), made, sum(stages.values()), notes)
 
 
 def _clear(out: Path) -> None:
@@ -108,24 +132,42 @@ def _clear(out: Path) -> None:
                     shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
-def _run(base: sqlite3.Connection, missing: Sequence[Cell], runner: Runner, part: Step) -> int:
-    """Make cells and note each as it comes; gives their number."""
-    began, count = time.perf_counter(), 0
+def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step) -> int:
+    """Make cells, note each as it comes and the time taken so far; gives their number."""
+    began, made = time.perf_counter(), 0
+    seconds, workers = dict[str, float](), set[tuple[str, int]]()
     with closing(runner(missing)) as rows:
         for row in rows:
-            add(base, row)
-            count += 1
-            part(_told(count, len(missing), time.perf_counter() - began), _after_render(count / len(missing)))
-    return count
+            add(job.base, row)
+            made += 1
+            workers.add((row.host, row.worker))
+            for name, value in _steps(row).items():
+                seconds[name] = seconds.get(name, 0.0) + value
+            note_stages(job.base, run, job.clock.stages(_on_the_clock(seconds, len(workers))))
+            left_s = (time.perf_counter() - began) / made * (len(missing) - made)
+            part(f"cell {made} of {len(missing)}, {duration(left_s)} left", _after_render(made / len(missing)))
+    for name, value in _on_the_clock(seconds, len(workers)).items():
+        job.clock.add(name, value)
+    return made
+
+
+def _steps(row: Row) -> dict[str, float]:
+    developed = f"develop {row.processor}"
+    return {"captures": row.capture_s, developed: row.develop_s, "metrics": row.measure_s, FIRST: row.first_s}
+
+
+def _on_the_clock(seconds: Mapping[str, float], workers: int) -> dict[str, float]:
+    """Seconds of work as they pass on the clock: workers, of whom each takes its own time, work at once."""
+    return {name: value / workers for name, value in seconds.items()}
 
 
 def _rendering(part: Step) -> Callable[[float, float], None]:
     return lambda share, error: part(f"render, relative error {error:.3f}", RENDER_SHARE * share)
 
 
-def _note(base: sqlite3.Connection, study: Study) -> None:
+def _note(base: sqlite3.Connection, study: Study) -> int:
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    note_run(base, now, platform.node(), json.dumps(asdict(study)), environment() | {"code": code_version()})
+    return note_run(base, now, platform.node(), json.dumps(asdict(study)))
 
 
 def _part(step: Step, index: int, count: int) -> Step:
@@ -136,10 +178,6 @@ def _part(step: Step, index: int, count: int) -> Step:
 
 def _after_render(share: float) -> float:
     return RENDER_SHARE + (1 - RENDER_SHARE) * share
-
-
-def _told(count: int, wanted: int, seconds: float) -> str:
-    return f"cell {count} of {wanted}, {duration(seconds / count * (wanted - count))} left"
 
 
 def duration(seconds: float) -> str:

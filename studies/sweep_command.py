@@ -15,6 +15,7 @@ from cyclopts import Parameter
 from isp.processors import require_libraries
 from render.errors import InputError, require_whole
 from sensor.presets import preset
+from studies.clock import Clock
 from studies.cluster import on_cluster
 from studies.estimate import Estimate, as_facts, estimate
 from studies.export import read_rows, write_table
@@ -49,6 +50,7 @@ def sweep(
     cluster: str | None = None,
     reference: Annotated[bool, Parameter(negative="")] = False,
     as_stated: Annotated[bool, Parameter(negative="")] = False,
+    keep_old: Annotated[bool, Parameter(negative="")] = False,
     dry_run: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
@@ -72,11 +74,15 @@ def sweep(
         Model everything, instead of what the sensor's noise doesn't hide.
     as_stated
         Render and image as study and sensors state, without a plan.
+    keep_old
+        Keep cells that other versions, another variant or other engines made as rows of their own, which rodcone export
+        --all writes; they are removed once they are made anew otherwise.
     dry_run
         Print cells, renders, and an estimate of time and memory; compute nothing.
     json
         Print one JSON object instead of the path.
     """
+    clock = Clock()
     task = read_study(study, set or ())
     if reference and as_stated:
         raise InputError("reference: it can't go with --as-stated; leave one of them out")
@@ -94,7 +100,9 @@ def sweep(
     with _kept_told(out), ExitStack() as held:
         runner: Runner = _local(workers) if cluster is None else held.enter_context(on_cluster(cluster))
         step = held.enter_context(_steps())
-        swept = run_sweep(task, out, _plan(task, out, reference, as_stated, step), runner, step)
+        with clock.stage("plan"):
+            plan = _plan(task, out, reference, as_stated, step)
+        swept = run_sweep(task, out, plan, runner, step, keep_old=keep_old, clock=clock)
     for note in swept.notes:
         print(f"rodcone: {note}", file=sys.stderr)
     report = write_report(out, out / REPORT)

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +11,15 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from render.errors import InputError, unknown
-from render.files import inside
 from scenes.catalog import load, names
 from scenes.metamers import TWINS_UNDER
-from studies.cell_run import Row
 from studies.chart_colours import daylight_delta_e, decode_srgb, pair_delta_e, true_pair_delta_e
 from studies.confidence import mean_with_confidence
 from studies.patches import patch_masks
 from studies.prepare import PICTURES
+from studies.provenance import require_alike
+from studies.row import Row
+from studies.stored import read_whole
 from studies.study import OWN
 
 AXES = ("scene", "spectrum", "level", "exposure", "sensor", "processor")
@@ -64,7 +66,7 @@ def lines(
     ------
     InputError
         For an unknown axis or figure, a figure that the scene doesn't have, or lines whose cells differ in more than
-        their seeds: a mean over lights or cameras says nothing.
+        their seeds: a mean over lights, cameras or versions says nothing.
     """
     for axis in (*by, *where):
         if axis not in AXES:
@@ -76,6 +78,7 @@ def lines(
     for row in rows:
         if all(getattr(row, axis) == value for axis, value in where.items()):
             groups.setdefault(tuple(getattr(row, axis) for axis in by), []).append(row)
+    require_alike([row for group in groups.values() for row in group])
     if not groups:
         raise InputError(f"where: no cell has {dict(where)}; allowed: values of the study's axes; see rodcone export")
     for at, group in groups.items():
@@ -127,16 +130,13 @@ def _figure(row: Row, name: str, folder: Path) -> float | None:
         raise InputError(f"show: {name} is known of scene {scene}, not of {row.scene}; leave it out, or give --where")
     if name == TRUE_PAIRS:
         return float(true_pair_delta_e(TWINS_UNDER if row.spectrum == OWN else row.spectrum).mean())
-    picture = _linear(inside(folder / PICTURES, row.picture))
+    picture = _linear(read_whole(folder / PICTURES, row.picture))
     return float(measure(picture, patch_masks(load(scene), (picture.shape[0], picture.shape[1]))).mean())
 
 
-def _linear(path: Path) -> NDArray[np.float64]:
-    try:
-        with Image.open(path) as picture:
-            return decode_srgb(np.asarray(picture.convert("RGB"), dtype=np.float64) / 255)
-    except OSError as error:
-        raise InputError(f"{path}: the picture can't be read ({error}); run the sweep again") from error
+def _linear(content: bytes) -> NDArray[np.float64]:
+    with Image.open(BytesIO(content)) as picture:
+        return decode_srgb(np.asarray(picture.convert("RGB"), dtype=np.float64) / 255)
 
 
 def _told(mean: float | None, half: float | None) -> str:

@@ -16,8 +16,9 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from render.errors import InputError
-from studies.cell_run import Row, run_cell
+from studies.cell_run import run_cell
 from studies.cells import Cell
+from studies.row import Row
 
 LEAVE_S = 10.0  # that a worker without work may take to end; libraries let go of threads and memory
 MOST_DEATHS = 3  # of workers with the same cell in their hands, before it is given up: the last two times alone
@@ -75,7 +76,7 @@ def run(
     WorkerLostError
         Where the executor broke; rows that were ready have been given.
     """
-    call, waiting = partial(run_cell, threads=threads), iter(cells)
+    call, waiting = partial(run_cell, most_threads=threads), iter(cells)
     running: dict[Future[Row], Cell] = {}
     try:
         while True:

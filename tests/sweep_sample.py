@@ -13,10 +13,10 @@ import numpy as np
 from render.exr import write_exr
 from render.radiance import SpectralRadiance
 from sensor.presets import preset
-from studies.cell_run import TIME_AND_HOST, Row
 from studies.cells import Cell
 from studies.ledger import COLUMNS, FILE
 from studies.model import Plan, as_stated
+from studies.row import TIME_AND_HOST, Row
 from studies.study import SceneChoice, Study
 from studies.sweep import Runner, Swept, sweep
 from studies.workers import InThisProcess, run

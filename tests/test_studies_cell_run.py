@@ -35,6 +35,7 @@ from studies.lit_scene import open_all
 from studies.metrics import measure
 from studies.model import ImageModel, Plan
 from studies.prepare import Job, scene_cells
+from studies.stored import keep
 from studies.study import RenderLimits, SceneChoice, conditions
 from studies.truth import light_in_bands, neutral_electrons, true_srgb
 
@@ -66,7 +67,7 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     device = draw_device(sensor, radiance.shape, device_stream(cell.at, "bayer"))
     raw = read_out(expected_e, sensor, device, exposure_s, exposure_stream(cell.at, "bayer"))
     neutral = neutral_electrons(sensor, light, exposure_s)
-    white = float(np.percentile(radiance.luminance(), 99.0)) / 0.9
+    white = float(np.percentile(radiance.luminance(), 99.0, method="inverted_cdf")) / 0.9
     linear = picture_bayer(raw, colours, neutral=neutral).rgb / (neutral[1] * white)
     truth = true_srgb(radiance, light, white)
     encoded = encode_srgb(linear)
@@ -88,6 +89,25 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     assert hashlib.sha256(content).hexdigest().startswith(Path(row.picture).stem)
     assert json.loads(row.mean_electrons)["G"] == pytest.approx(expected_e[::2, 1::2].mean(), rel=0.2)
     assert (row.luminance_cd_m2, row.illuminance_lux, row.mc_share) == (25.0, None, 0.0)
+
+
+def test_the_monte_carlo_share_is_of_the_pixels_below_saturation(tmp_path: Path) -> None:
+    """Half of the pixels at 400 e- with an error of 3 e- each, half beyond the well with 5000 e-, in numbers."""
+    cell = made(tmp_path, levels=("1cd/m2",), exposures=("10ms",), seeds=(0,))[0]
+    saturated = np.arange(SAMPLE.SIZE[1]) >= SAMPLE.SIZE[1] // 2
+    expected_e = np.broadcast_to(np.where(saturated, 2.0 * cell.sensor.pixel.full_well_e, 400.0), SAMPLE.SIZE)
+    error_e = np.broadcast_to(np.where(saturated, 5000.0, 3.0), SAMPLE.SIZE)
+    given = {}
+    for name, array in (("electrons", expected_e), ("half_difference", error_e)):
+        file = BytesIO()
+        np.save(file, array / 0.01)  # at 1 cd/m^2 and 1 s
+        given[name] = tmp_path / keep(tmp_path, file.getvalue(), ".npy")
+    row = run_cell(replace(cell, **given))
+    pixel, sensor = cell.sensor.pixel, cell.sensor
+    dark_e = pixel.dark_current_e_per_s * 0.01
+    dark = pixel.read_noise_e**2 + pixel.dsnu_e**2 + sensor.gain_e_per_dn**2 / 12
+    own = 400.0 + dark_e + (pixel.prnu * 400.0) ** 2 + dark
+    assert row.mc_share == pytest.approx(9.0 / own, rel=1e-6)
 
 
 def test_a_cell_gives_the_same_row_and_picture_each_time(tmp_path: Path) -> None:
@@ -139,7 +159,7 @@ def test_a_cell_weighs_the_same_whatever_the_pictures_size_and_travels_as_it_is(
 def test_other_code_and_arrays_out_of_reach_are_told_in_one_line(tmp_path: Path) -> None:
     cell = made(tmp_path)[0]
     with pytest.raises(InputError, match="install the same rodcone"):
-        run_cell(replace(cell, code="0.0.0+other"))
+        run_cell(replace(cell, made_by=replace(cell.made_by, versions='{"rodcone": "0.0.0+other"}')))
     with pytest.raises(InputError, match="a folder that all workers see") as told:
         run_cell(replace(cell, electrons=tmp_path / "absent.npy"))
     assert "\n" not in str(told.value)

@@ -7,6 +7,7 @@ import pytest
 
 from isp.colour_fit import ColourFit
 from studies.cells import Coordinates, cell_key, coordinates, device_stream, exposure_stream
+from studies.provenance import Provenance
 from studies.study import Condition, SceneChoice
 
 AT = Coordinates("still_life", "own", "25cd/m2", "10ms", "low_noise", "interleaved", 0)
@@ -56,14 +57,17 @@ def test_fixed_patterns_belong_to_sensor_mosaic_and_seed_alone() -> None:
 def test_a_key_changes_with_each_thing_that_decides_a_picture() -> None:
     fit = ColourFit(("R", "G", "B"), np.ones(3), np.eye(3), np.eye(3))
     other_fit = replace(fit, mean=np.array([1.0, 1.0, np.nextafter(1.0, 2.0)]))
-    given = (AT, "frame", 25.0, 0.01, True, fit, "code")
-    others = (replace(AT, seed=1), "other", 25.1, 0.011, False, other_fit, "new")
+    made_by = Provenance("llvm_ad_spectral", "llvm", "numpy", "{}")
+    given = (AT, "frame", 25.0, 0.01, fit, made_by)
+    others = (replace(AT, seed=1), "other", 25.1, 0.011, other_fit)
     keys = [cell_key(*given)]
     for place, other in enumerate(others):
         changed = list(given)
         changed[place] = other
         keys.append(cell_key(*changed))  # type: ignore[arg-type]
-    assert len(set(keys)) == 8
+    for field in ("variant", "readout_engine", "development_engine", "versions"):
+        keys.append(cell_key(*given[:-1], replace(made_by, **{field: "another"})))  # type: ignore[arg-type]
+    assert len(set(keys)) == 1 + 5 + 4
     assert cell_key(*given) == keys[0]
 
 

@@ -17,9 +17,9 @@ import sweep_sample as SAMPLE
 
 from render.errors import InputError
 from studies import cluster as module
-from studies.cell_run import Row
 from studies.cells import Cell
 from studies.cluster import TRIM, check_address, on_cluster
+from studies.row import Row
 
 SETTINGS = Path(module.__file__).parent / "data" / "dask.yaml"
 

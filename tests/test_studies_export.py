@@ -10,13 +10,12 @@ import pyarrow.parquet
 import pytest
 
 from render.errors import InputError
-from studies.cell_run import Row
 from studies.export import read_rows, to_csv, to_pandas, write_table
 from studies.ledger import COLUMNS, add, open_ledger, want
+from studies.row import Row
 
 ROW = Row(
     key="00ff",
-    code="0.1.0+abc",
     scene="desk, lit.exr",
     spectrum="own",
     level="25cd/m2",
@@ -48,15 +47,22 @@ ROW = Row(
     saturated=0.0,
     balance="{}",
     mean_electrons="{}",
-    engine="llvm",
+    variant="llvm_ad_spectral",
+    readout_engine="numpy",
+    development_engine="llvm",
+    versions='{"numpy": "2.4.6", "rodcone": "0.1.0+abc"}',
     picture="ab/abcd.png",
     truth="cd/cdef.png",
     render_s=1.5,
     capture_s=0.1,
     develop_s=0.2,
     measure_s=0.3,
+    first_s=0.4,
+    threads=2,
     finished="2026-01-01T00:00:00+00:00",
     host="here",
+    machine="Linux, Python 3.12.0",
+    worker=1234,
 )
 
 

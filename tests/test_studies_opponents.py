@@ -9,7 +9,6 @@ import pytest
 
 from render.errors import InputError
 from sensor.presets import preset
-from studies.cell_run import Row
 from studies.opponents import (
     AHEAD,
     BEHIND,
@@ -23,6 +22,7 @@ from studies.opponents import (
     snr_db,
 )
 from studies.report_text import DELTA_E, PSNR
+from studies.row import Row
 
 EMPTY: dict[Any, Any] = {str: "", int: 0, float: 0.0}
 T_2 = 4.302653  # Student's t, two-sided 95 %, 2 degrees of freedom
@@ -32,7 +32,13 @@ def row(processor: str, seed: int, **values: Any) -> Row:
     hints = get_type_hints(Row)
     plain = {field.name: EMPTY.get(hints[field.name]) for field in fields(Row)}
     place = {"scene": "desk", "spectrum": "own", "level": "1cd/m2", "exposure": "auto", "sensor": "mine.toml"}
-    return Row(**plain | place | {"mean_electrons": "{}"} | {"processor": processor, "seed": seed} | values)
+    return Row(
+        **plain
+        | place
+        | {"mean_electrons": "{}", "versions": '{"rodcone": "0.1.0"}'}
+        | {"processor": processor, "seed": seed}
+        | values
+    )
 
 
 def rows_of(figures: dict[str, list[float]], metric: str = "psnr_db", **values: Any) -> list[Row]:

@@ -12,7 +12,6 @@ from isp import processors
 from isp.processors import PROCESSORS, require_libraries
 from render.errors import InputError
 from studies import opponents_page
-from studies.cell_run import Row
 from studies.cli import main
 from studies.opponents import cases_of
 from studies.opponents_figure import figure_of, hardest
@@ -29,6 +28,7 @@ from studies.opponents_text import (
 )
 from studies.paper_drawing import Line, Text
 from studies.report_text import PSNR
+from studies.row import Row
 from studies.study_file import read_study
 
 LEVELS = {"0.1cd/m2": 0.1, "1cd/m2": 1.0, "10cd/m2": 10.0}

@@ -38,9 +38,28 @@ def test_a_condition_unknown_for_one_camera_counts_for_none() -> None:
     assert [(row["psnr_db"], row["judged"]) for row in rows] == [(23.0, 6), (20.0, 6)]
 
 
+def test_no_mean_is_over_conditions_that_other_engines_captured_or_other_variants_rendered() -> None:
+    """The two darkest levels in NumPy, ten times as slow and 5 dB worse; each way has rows and a chart of its own."""
+    of = made()
+    for cell in of["cells"]:
+        slow = cell["level"] < 2
+        cell["engines"] = {"render": "llvm_ad_spectral", "capture": "numpy" if slow else "llvm", "develop": "llvm"}
+        cell["psnr_db"] -= 5.0 * slow
+        cell["seconds"] = {**cell["seconds"], "capture": 0.2 if slow else 0.02}
+    rows = [row for row in speed_rows(of, ordered_cells(of)) if row["camera"] == "bayer"]
+    for row in rows:
+        slow = row["sensor"].endswith(", render llvm_ad_spectral, capture numpy")
+        assert slow or row["sensor"].endswith(", capture llvm")
+        assert (row["capture"], row["psnr_db"], row["judged"]) == pytest.approx(
+            (0.2, 15.0, 2) if slow else (0.02, 20.0, 5)
+        )
+    assert len(rows) == 2 * len(of["sensors"])
+    assert len(speed_charts(speed_rows(of, ordered_cells(of)))) == 2 * len(of["sensors"])
+
+
 def test_the_chart_has_a_mark_a_camera_slower_ones_to_the_right_and_better_ones_above() -> None:
     of = made()
-    chart = speed_charts(of, speed_rows(of, ordered_cells(of)))[0]
+    chart = speed_charts(speed_rows(of, ordered_cells(of)))[0]
     assert [len(line.points) for line in chart.series] == [1, 1]
     slow, fast = (line.points[0] for line in chart.series)
     assert slow.x > fast.x
@@ -56,10 +75,10 @@ def test_an_unknown_time_or_psnr_has_no_mark() -> None:
             cell["seconds"] = None
     rows = speed_rows(of, ordered_cells(of))
     assert [row["develop"] for row in rows] == [pytest.approx(0.11), None] * 2
-    assert [len(chart.series) for chart in speed_charts(of, rows)] == [1, 1]
+    assert [len(chart.series) for chart in speed_charts(rows)] == [1, 1]
     for cell in of["cells"]:
         cell["psnr_db"] = None
-    assert speed_charts(of, speed_rows(of, ordered_cells(of))) == []
+    assert speed_charts(speed_rows(of, ordered_cells(of))) == []
 
 
 def test_ticks_of_less_than_two_decades_are_1_2_and_5() -> None:

@@ -56,8 +56,8 @@ def test_sweep_prints_the_ledger_alone_and_the_table_follows(
     assert facts["report"] == str(out / "report.html")
     assert call(["export", str(out), "-o", str(tmp_path / "t.csv")], capsys) == (0, f"{tmp_path / 't.csv'}\n", "")
     header, *table = (tmp_path / "t.csv").read_text("utf-8").splitlines()
-    assert header.startswith("key,code,scene,spectrum,level,exposure,sensor,processor,seed,luminance_cd_m2,illuminance")
-    assert [line.split(",")[4] for line in table] == ["1cd/m2", "25cd/m2"]
+    assert header.startswith("key,scene,spectrum,level,exposure,sensor,processor,seed,luminance_cd_m2,illuminance")
+    assert [line.split(",")[3] for line in table] == ["1cd/m2", "25cd/m2"]
 
 
 def test_a_sweep_follows_the_plan_and_reference_models_everything(
@@ -143,7 +143,7 @@ def test_a_full_disk_is_one_line_that_says_what_is_kept(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device", str(tmp_path / "out" / "pictures"))
 
-    monkeypatch.setattr("studies.cell_run._keep", full)
+    monkeypatch.setattr("studies.cell_run.keep", full)
     code, out, err = call(["sweep", str(study), "-o", str(tmp_path / "out"), "--workers", "1", "--as-stated"], capsys)
     assert (code, out, err.count("\n")) == (1, "", 1)
     assert "pictures: No space left on device; make room: " in err

@@ -11,15 +11,16 @@ import pytest
 from isp.colour import encode_srgb
 from render.errors import InputError
 from scenes.catalog import load
-from studies.cell_run import Row
 from studies.chart_colours import daylight_srgb
 from studies.patches import patch_masks
 from studies.png import to_png
 from studies.prepare import PICTURES
+from studies.row import Row
+from studies.stored import keep
 from studies.table import FIGURES, lines, markdown
 
 HINTS = get_type_hints(Row)
-BLANK = Row(**{field.name: "" if HINTS[field.name] is str else 0 for field in fields(Row)})
+BLANK = Row(**{field.name: "" if HINTS[field.name] is str else 0 for field in fields(Row)} | {"versions": "{}"})
 HERE = Path()
 
 
@@ -79,15 +80,27 @@ def test_chart_colours_are_read_from_the_pictures(tmp_path: Path) -> None:
     linear = np.full((128, 128, 3), 0.2)
     for mask, colour in zip(masks, daylight_srgb(), strict=True):
         linear[mask] = colour
-    (tmp_path / PICTURES).mkdir()
-    (tmp_path / PICTURES / "a.png").write_bytes(to_png(encode_srgb(linear)))
-    row = replace(ROWS[0], scene="color_checker", picture="a.png")
+    picture = keep(tmp_path / PICTURES, to_png(encode_srgb(linear)), ".png")
+    row = replace(ROWS[0], scene="color_checker", picture=picture)
     (line,) = lines([row], tmp_path, [], ["daylight_delta_e"], {})
     # 8 bits, and cyan's and a few others' share beyond sRGB clipped: well under one, far from none
     assert line.means[0] is not None
     assert 0.0 < line.means[0] < 0.5
-    with pytest.raises(InputError, match="run the sweep again"):
+    with pytest.raises(InputError, match="run rodcone sweep again"):
         lines([replace(row, picture="b.png")], tmp_path, [], ["daylight_delta_e"], {})
+    (tmp_path / PICTURES / picture).write_bytes(b"\x89")
+    with pytest.raises(InputError, match="isn't what was written"):
+        lines([row], tmp_path, [], ["daylight_delta_e"], {})
+
+
+def test_a_mean_over_cells_that_other_versions_variants_or_engines_made_is_refused() -> None:
+    for change in ({"versions": '{"numpy": "1"}'}, {"variant": "scalar"}, {"readout_engine": "llvm"}):
+        mixed = [replace(ROWS[0], **{**change, "versions": change.get("versions", '{"numpy": "2"}')}), ROWS[1]]
+        mixed[1] = replace(mixed[1], versions='{"numpy": "2"}')
+        with pytest.raises(InputError, match="would be in one mean or comparison"):
+            lines(mixed, HERE, ["processor"], ["psnr_db"], {})
+    apart = [replace(row, development_engine=f"of {row.processor}") for row in ROWS]
+    assert len(lines(apart, HERE, ["processor"], ["psnr_db"], {})) == 2, "each processor has its engine"
 
 
 def test_what_the_observer_sees_of_pairs_depends_on_the_light_alone() -> None:

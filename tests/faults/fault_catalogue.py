@@ -681,4 +681,91 @@ SCENES_FROM_OUTSIDE = (
     ),
 )
 
-FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *KERNEL, *STUDIES, *RENDERS, *SCENES_FROM_OUTSIDE)
+_ACCOUNTS = ("studies_clock", "studies_cell_run", "studies_provenance")
+ACCOUNTING = (
+    _fault(
+        "a cell's Monte Carlo share over saturated pixels too",
+        "studies/cell_run.py",
+        "inside = expected_e < cell.sensor.pixel.full_well_e",
+        "inside = expected_e < np.inf",
+        "studies_cell_run",
+    ),
+    _fault(
+        "render seconds counted once a cell",
+        "studies/sweep.py",
+        'return {"captures": row.capture_s,',
+        'return {"renders": row.render_s, "captures": row.capture_s,',
+        "studies_clock",
+    ),
+    _fault("threads told as 1", "studies/cell_run.py", "threads=threads(),", "threads=1,", "studies_provenance"),
+    _fault(
+        "engine of captures 'cuda'",
+        "studies/cell_run.py",
+        "readout_engine=raw.engine,",
+        'readout_engine="cuda",',
+        "studies_provenance",
+    ),
+    _fault(
+        "engine of the demo's captures 'cuda'",
+        "studies/demo.py",
+        '"engines": {"capture": shot.raw.engine,',
+        '"engines": {"capture": "cuda",',
+        "studies_clock",
+    ),
+    _fault(
+        "capture and develop seconds swapped",
+        "studies/cell_run.py",
+        '{"capture_s": capture_s, "develop_s": develop_s,',
+        '{"capture_s": develop_s, "develop_s": capture_s,',
+        *_ACCOUNTS,
+    ),
+    _fault(
+        "capture and develop seconds of a photograph swapped",
+        "studies/camera.py",
+        "picture, capture_s, develop_s, measure_s",
+        "picture, develop_s, capture_s, measure_s",
+        "studies_clock",
+    ),
+    _fault(
+        "first calls within the seconds",
+        "studies/clock.py",
+        "    _CALLED.add(kind)\n    start = time.perf_counter()\n",
+        "    _CALLED.add(kind)\n",
+        "studies_clock",
+    ),
+    _fault(
+        "another kernel's first call within the seconds",
+        "studies/cell_run.py",
+        "bool(saturated.any()), bool(saturated.all())",
+        "True, True",
+        "studies_clock",
+    ),
+    _fault("stages without the rest", "studies/clock.py", " - sum(seconds.values())}", " * 0}", "studies_clock"),
+    _fault("seconds of all workers as one's", "studies/sweep.py", "value / workers for", "value for", "studies_clock"),
+    _fault(
+        "the first scene's cells alone as wanted",
+        "studies/sweep.py",
+        "if cells else [None] * count for cells in found",
+        "if cells else [] for cells in found",
+        "studies_stored",
+    ),
+    _fault(
+        "versions of the process that asks for the report",
+        "studies/report_facts.py",
+        "{**told(made_by(row)), ",
+        '{**told(made_by(row)), "numpy": "2", ',
+        "studies_provenance",
+    ),
+    _fault(
+        "keys without versions",
+        "studies/cells.py",
+        "exposure_s, colours, made_by])",
+        "exposure_s, colours])",
+        "studies_cells",
+        "studies_provenance",
+    ),
+    _fault("no digest of arrays", "studies/stored.py", "digest_file(path) == path.stem", "size > 0", "studies_stored"),
+    _fault("no digest of rows", "studies/ledger.py", "digest(values[:-1]) == values[-1]", "True", "studies_stored"),
+)
+
+FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *KERNEL, *STUDIES, *RENDERS, *SCENES_FROM_OUTSIDE, *ACCOUNTING)

@@ -29,9 +29,9 @@ from sensor.raw import RawImage
 from sensor.raw_files import write_raw
 from sensor.raw_tiff import read_tiff
 from sensor.tiff import CFA, text, write_mosaic
-from studies.cell_run import Row
 from studies.export import read_rows
 from studies.ledger import add, open_ledger, want
+from studies.row import Row
 from studies.study_file import read_study
 
 Sample = Mapping[str, bytes]  # files by name; the first is the one that is read

@@ -1,0 +1,66 @@
+"""Seconds of a run by stages that add up to its wall clock, and of calls without what a process does once."""
+
+import time
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TypeVar
+
+Result = TypeVar("Result")
+FIRST, OTHER = "first calls", "other"
+
+
+class Clock:
+    """Seconds of each stage, and of what no stage holds."""
+
+    def __init__(self) -> None:
+        self._start = time.perf_counter()
+        self._seconds: dict[str, float] = {}
+
+    def add(self, stage: str, seconds: float) -> None:
+        """Add seconds to a stage."""
+        self._seconds[stage] = self._seconds.get(stage, 0.0) + seconds
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Add what is done within to a stage, also where it ends in an error."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.add(name, time.perf_counter() - start)
+
+    def stages(self, more: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Seconds by stage, some more added; with `OTHER` they are those since the clock was made."""
+        seconds = dict(self._seconds)
+        for name, value in (more or {}).items():
+            seconds[name] = seconds.get(name, 0.0) + value
+        return {**seconds, OTHER: time.perf_counter() - self._start - sum(seconds.values())}
+
+
+_CALLED = set[Hashable]()  # kinds of calls that this process has made
+
+
+def timed(call: Callable[[], Result], *kind: Hashable) -> tuple[Result, float, float]:
+    """Make a call; the first of its kind in a process compiles kernels and loads libraries, so it is made again.
+
+    Parameters
+    ----------
+    call : callable
+        Gives the same each time.
+    *kind
+        All that a kernel is compiled for.
+
+    Returns
+    -------
+    result, seconds, first_s
+        Seconds of the call, and of the first one before it, 0 where there was none.
+    """
+    start = time.perf_counter()
+    result = call()
+    seconds = time.perf_counter() - start
+    if kind in _CALLED:
+        return result, seconds, 0.0
+    _CALLED.add(kind)
+    start = time.perf_counter()
+    result = call()
+    return result, time.perf_counter() - start, seconds
