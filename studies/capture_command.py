@@ -22,6 +22,7 @@ def capture(
     spp: int = 64,
     seed: int = 0,
     trust_scene: Annotated[bool, Parameter(negative="")] = False,
+    force: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Photograph a scene and write raw files that raw converters open; prints their paths.
@@ -55,13 +56,15 @@ def capture(
         Seed of the render, the chip and the exposure.
     trust_scene
         Let a .xml scene load plug-ins of its own, which are native code, and files from anywhere.
+    force
+        Go on where more memory is needed than is free.
     json
         Print one JSON object with the paths and facts of the exposure instead of the paths.
     """
     from studies.progress import progress
     from studies.shot import Order, take
 
-    order = Order(source, out, sensor, cfa, exposure_s, level, white_balance, size, spp, seed, trust_scene)
+    order = Order(source, out, sensor, cfa, exposure_s, level, white_balance, size, spp, seed, trust_scene, force)
     with progress(sys.stderr) as step:
         taken = take(order, step)
     for note in taken.notes:

@@ -16,7 +16,7 @@ from render.radiance import SpectralRadiance
 from render.radiance_source import is_radiance_file
 from render.scene import Scene
 from render.scene_parts import SceneFile
-from render.spectrum import Spectrum
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.transport import Transport
 from sensor.calibration import ColourCalibration
 from sensor.capture import capture
@@ -31,7 +31,9 @@ from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files import check_ending, write_raw
 from studies.calibrate import calibrate, iso_speed
+from studies.estimate import memory
 from studies.levels import parse_level
+from studies.memory import require_memory
 from studies.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.scene_source import asked_level, open_scene
 
@@ -55,6 +57,7 @@ class Order:
     spp: int = 64
     seed: int = 0
     trust: bool = False
+    force: bool = False
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,9 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
         return sensor, None
     opened = open_scene(order.source, order.trust)
     asked_level(opened.scene, order.level)
-    check_covers(sensor.cfa, _size(order, opened))
+    height, width = _size(order, opened)
+    check_covers(sensor.cfa, (height, width))
+    require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
     return sensor, opened
 
 
