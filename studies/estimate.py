@@ -19,9 +19,9 @@ RENDER_S = 1e-7  # a pixel, sample, band and light group
 CELL_S = 6e-6  # a pixel: capture, development, metrics and file together, mean of the interleaved and Bayer cameras
 CELL_LEAST_S = 0.05  # a cell of any size
 START_S = 4.0  # a worker's imports
-# Bytes a pixel, counted from the arrays held at once, and checked against measured peaks (docs/studies.md).
+# Bytes a pixel, counted from the arrays held at once, and checked against measured peaks (`tests/test_studies_memory.py`).
 _TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
-_VIEW_ARRAYS = 6  # one pass's planes and their copies; later relit radiance, its halves, and an image forming
+_VIEW_ARRAYS = 7  # one pass's planes and their copies; later relit radiance, its halves, and an image forming
 _RENDER_BYTES = 120  # whatever the bands: the render's marks, a preview
 _CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
 _PICTURE_BYTES = 50  # of each picture kept until the report: floats, its place on the overview, its file
