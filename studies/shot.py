@@ -31,7 +31,7 @@ from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files import check_ending, write_raw
 from studies.calibrate import calibrate, iso_speed
-from studies.estimate import memory
+from studies.estimate import file_extent, memory
 from studies.levels import parse_level
 from studies.memory import require_memory
 from studies.radiance_file import LIGHT, check_radiance_file, open_radiance_file
@@ -121,6 +121,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
         if order.trust:
             raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")
         check_radiance_file(order.source, () if order.level is None else (order.level,))
+        require_memory(memory(*file_extent(order.source)), order.force)
         return sensor, None
     opened = open_scene(order.source, order.trust)
     asked_level(opened.scene, order.level)

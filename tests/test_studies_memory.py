@@ -12,7 +12,7 @@ import pytest
 
 from studies.cli import main
 from studies.demo import Demo
-from studies.estimate import demo_memory, memory
+from studies.estimate import demo_memory, file_extent, memory
 from studies.memory import Limit, memory_limits
 
 COMMANDS = {
@@ -130,6 +130,14 @@ def test_workers_add_up_and_the_largest_process_counts_for_limits_that_each_has(
     assert many.largest < alone.largest
     assert memory(10**6, 20, 3).total - memory(10**6, 20, 2).total == 3 * 4 * 20 * 10**6  # three arrays of float32
     assert demo_memory(Demo(size=4000)).total > demo_memory(Demo(size=4000, levels=("1cd/m2",))).total > 20e9
+
+
+def test_a_picture_file_counts_by_its_bytes_and_needs_no_render(tmp_path: Path) -> None:
+    (tmp_path / "a.exr").write_bytes(bytes(160_000_000))  # a megapixel of 40 bands, were it not packed
+    needed = memory(*file_extent(tmp_path / "a.exr")).total
+    assert needed < memory(1_500_000, 40, 1).total
+    assert needed > memory(10**6, 40, 0).total
+    assert demo_memory(Demo(str(tmp_path / "a.exr"))).total > needed
 
 
 MEASURED = {
