@@ -23,6 +23,7 @@ def capture(
     seed: int = 0,
     trust_scene: Annotated[bool, Parameter(negative="")] = False,
     extend: str | None = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Photograph a scene and write raw files that raw converters open; prints their paths.
@@ -58,13 +59,17 @@ def capture(
         Let a .xml scene load plug-ins of its own, which are native code, and files from anywhere.
     extend
         Give hold to let surfaces go on at their end values outside their tables; bands beyond are refused by default.
+    force
+        Go on where more memory is needed than is free.
     json
         Print one JSON object with the paths and facts of the exposure instead of the paths.
     """
     from studies.progress import progress
     from studies.shot import Order, take
 
-    order = Order(source, out, sensor, cfa, exposure_s, level, white_balance, size, spp, seed, trust_scene, extend)
+    order = Order(
+        source, out, sensor, cfa, exposure_s, level, white_balance, size, spp, seed, trust_scene, extend, force
+    )
     with progress(sys.stderr) as step:
         taken = take(order, step)
     for note in taken.notes:

@@ -38,6 +38,7 @@ def demo(
     max_seconds: float = 65.0,
     seed: int = 0,
     light: str | None = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
 ) -> None:
     """Photograph one scene from moonlight to daylight with both cameras and write a report.
 
@@ -65,8 +66,12 @@ def demo(
         Seed of the render, the chips and the exposures.
     light
         Light of the scene by name, such as A; for a file the light that its colours are judged under (D65 by default).
+    force
+        Go on where more memory is needed than is free.
     """
     from studies import demo as job
+    from studies.estimate import demo_memory
+    from studies.memory import require_memory
     from studies.progress import progress
 
     defaults = job.Demo()
@@ -82,6 +87,7 @@ def demo(
         light=light,
     )
     job.check(task)
+    require_memory(demo_memory(task), force)
     out.mkdir(parents=True, exist_ok=True)  # a place that can't be written is told before the render, not after
     with progress(sys.stderr) as step:
         outcome = job.run(task, step)

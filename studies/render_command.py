@@ -18,8 +18,10 @@ from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup, Scene
 from render.scene_parts import SceneFile
-from render.spectrum import VISIBLE_NM, Floats, Spectrum
+from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum
 from render.transport import Transport
+from studies.estimate import memory
+from studies.memory import require_memory
 from studies.progress import progress
 from studies.results import render_facts
 from studies.scene_source import asked_level, open_scene
@@ -42,6 +44,7 @@ class Order:
     limits: dict[str, Any] = field(default_factory=dict)  # spp, noise, max_seconds, max_depth, seed, cache
     trust: bool = False
     extend: str | None = None
+    force: bool = False
 
 
 def render(
@@ -61,6 +64,7 @@ def render(
     cache: Path | None = None,
     trust_scene: Annotated[bool, Parameter(negative="")] = False,
     extend: str | None = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Render a scene into a spectral OpenEXR file; prints its path.
@@ -104,18 +108,15 @@ def render(
         Let the scene file load plug-ins of its own, which are native code, and files from anywhere.
     extend
         Give hold to let surfaces go on at their end values outside their tables; bands beyond are refused by default.
+    force
+        Go on where more memory is needed than is free.
     json
         Print one JSON object with the path and facts of the render instead of the path.
     """
-    limits: dict[str, Any] = {
-        "spp": spp,
-        "noise": noise,
-        "max_seconds": max_seconds,
-        "max_depth": max_depth,
-        "seed": seed,
-    }
-    limits["cache"] = cache
-    order = Order(source, out, height, width, bands, tuple(light or ()), level, limits, trust_scene, extend)
+    limits = {"spp": spp, "noise": noise, "max_seconds": max_seconds, "max_depth": max_depth, "seed": seed}
+    lights = tuple(light or ())
+    limited = {**limits, "cache": cache}
+    order = Order(source, out, height, width, bands, lights, level, limited, trust_scene, extend, force)
     facts = run(order)
     for note in facts["notes"]:
         print(f"rodcone: {note}", file=sys.stderr)
@@ -142,6 +143,8 @@ def run(order: Order) -> dict[str, Any]:
     scene, size = opened.scene, _size(opened.size, order.height, order.width)
     spectra = _spectra(scene, order.light)
     luminance_cd_m2, illuminance_lux = asked_level(scene, order.level)
+    count = DEFAULT_WAVELENGTH_NM.size if nm is None else nm.size
+    require_memory(memory(size[0] * size[1], count, len(scene.groups)), order.force)
     check_place(order.out)
     with progress(sys.stderr) as step:
         step("render", 0.0)

@@ -16,7 +16,7 @@ from render.radiance import SpectralRadiance
 from render.radiance_source import is_radiance_file
 from render.scene import Scene
 from render.scene_parts import SceneFile
-from render.spectrum import Spectrum
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.transport import Transport
 from sensor.calibration import ColourCalibration
 from sensor.capture import capture
@@ -31,7 +31,9 @@ from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files import check_ending, write_raw
 from studies.calibrate import calibrate, iso_speed
+from studies.estimate import file_extent, memory
 from studies.levels import parse_level
+from studies.memory import require_memory
 from studies.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.scene_source import asked_level, open_scene
 
@@ -56,6 +58,7 @@ class Order:
     seed: int = 0
     trust: bool = False
     extend: str | None = None
+    force: bool = False
 
 
 @dataclass(frozen=True)
@@ -121,10 +124,13 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
         if order.extend:
             raise InputError(f"extend: {order.source!r} is a picture, which has no surfaces; leave --extend out")
         check_radiance_file(order.source, () if order.level is None else (order.level,))
+        require_memory(memory(*file_extent(order.source)), order.force)
         return sensor, None
     opened = open_scene(order.source, order.trust, order.extend)
     asked_level(opened.scene, order.level)
-    check_covers(sensor.cfa, _size(order, opened))
+    height, width = _size(order, opened)
+    check_covers(sensor.cfa, (height, width))
+    require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
     return sensor, opened
 
 

@@ -21,6 +21,7 @@ from studies.estimate import Estimate, as_facts, estimate
 from studies.export import read_rows, write_table
 from studies.ledger import FILE
 from studies.lit_scene import open_all
+from studies.memory import Memory, require_memory
 from studies.model import Plan
 from studies.model import as_stated as plan_as_stated
 from studies.plan import plan as plan_study
@@ -52,6 +53,7 @@ def sweep(
     as_stated: Annotated[bool, Parameter(negative="")] = False,
     keep_old: Annotated[bool, Parameter(negative="")] = False,
     dry_run: Annotated[bool, Parameter(negative="")] = False,
+    force: Annotated[bool, Parameter(negative="")] = False,
     json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Make every picture of a study, note each in a ledger and write a report; prints the ledger's path.
@@ -79,6 +81,8 @@ def sweep(
         --all writes; they are removed once they are made anew otherwise.
     dry_run
         Print cells, renders, and an estimate of time and memory; compute nothing.
+    force
+        Go on where the estimate needs more memory than is free.
     json
         Print one JSON object instead of the path.
     """
@@ -96,6 +100,8 @@ def sweep(
         return 0
     for name in task.processors:
         require_libraries(name)
+    found = _estimated(task, out, reference, 0 if cluster else workers or cores())
+    require_memory(Memory(found.bytes, found.largest_bytes), force)
     out.mkdir(parents=True, exist_ok=True)  # a place that can't be written is told before anything is rendered
     with _kept_told(out), ExitStack() as held:
         runner: Runner = _local(workers) if cluster is None else held.enter_context(on_cluster(cluster))

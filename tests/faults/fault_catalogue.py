@@ -257,7 +257,7 @@ LENS = (
         "sensor_exposure",
         *_LENS,
     ),
-    _fault("band width left out", "sensor/response.py", " * inside_nm * area_m2", " * area_m2", "sensor_response"),
+    _fault("band width left out", "sensor/response.py", " * seen_nm * area_m2", " * area_m2", "sensor_response"),
 )
 
 LIGHT = (
@@ -768,4 +768,83 @@ ACCOUNTING = (
     _fault("no digest of rows", "studies/ledger.py", "digest(values[:-1]) == values[-1]", "True", "studies_stored"),
 )
 
-FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *KERNEL, *STUDIES, *RENDERS, *SCENES_FROM_OUTSIDE, *ACCOUNTING)
+# What must be refused or told, taken as it comes.
+NONSENSE = (
+    _fault(
+        "saturated = (dn >= white)",
+        "sensor/raw.py",
+        "return self.electrons >= self.saturation_e",
+        "return self.dn >= self.white_dn",
+        "sensor_raw",
+    ),
+    _fault(
+        "black level rounded down",
+        "sensor/config.py",
+        "ceil(least - 1e-9)",
+        "int(least)",
+        "sensor_config",
+    ),
+    _fault(
+        "raw image of NaN",
+        "sensor/raw.py",
+        'kind == "f" and not np.isfinite(samples).all()',
+        'kind == "f" and np.isinf(samples).any()',
+        "sensor_raw",
+    ),
+    _fault("raw image of complex numbers", "sensor/raw.py", 'not in "uif"', 'not in "uifc"', "sensor_raw"),
+    _fault(
+        "PSNR of a picture that isn't finite",
+        "studies/metrics.py",
+        "    require_finite(picture=picture, truth=truth)\n    mean_square",
+        "    mean_square",
+        "studies_metrics",
+    ),
+    _fault(
+        "micrometres taken for nanometres",
+        "render/spectrum.py",
+        "SHORTEST_NM, LONGEST_NM = 100.0",
+        "SHORTEST_NM, LONGEST_NM = 0.1",
+        "render_spectrum",
+    ),
+    _fault("bands that overlap", "render/spectrum.py", "MOST_OVERLAP = 0.01", "MOST_OVERLAP = 1.01", "render_spectrum"),
+    _fault(
+        "lost share of energy instead of photons",
+        "sensor/window.py",
+        " * photons_per_joule(nm) * step",
+        " * step",
+        "sensor_window",
+    ),
+    _fault("window left open, untold", "sensor/window.py", "LEAST_TOLD = 5e-3", "LEAST_TOLD = 0.5", "sensor_window"),
+    _fault("channel without light", "sensor/window.py", "MOST_LOST = 0.5", "MOST_LOST = 1.0", "sensor_window"),
+    _fault(
+        "white frame untold",
+        "studies/shot.py",
+        "MOST_SATURATED = 0.5",
+        "MOST_SATURATED = 0.99",
+        "studies_capture_develop",
+    ),
+    _fault("seeds = 3 is the seed 3", "studies/study_file.py", "list(range(seeds))", "[seeds]", "studies_study_file"),
+    _fault(
+        "address-space limit taken as all free",
+        "studies/memory.py",
+        "most - _pages(0), True)",
+        "most, True)",
+        "studies_memory",
+    ),
+    _fault(
+        "control group's use taken as free",
+        "studies/memory.py",
+        "most - used + float(cached)",
+        "float(most)",
+        "studies_memory",
+    ),
+    _fault(
+        "need of one light group whatever there are",
+        "studies/estimate.py",
+        "_TRANSPORT_ARRAYS * groups",
+        "_TRANSPORT_ARRAYS",
+        "studies_memory",
+    ),
+)
+
+FAULTS = (*SENSOR, *LENS, *LIGHT, *ISP, *KERNEL, *STUDIES, *RENDERS, *SCENES_FROM_OUTSIDE, *ACCOUNTING, *NONSENSE)
