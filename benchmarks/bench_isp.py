@@ -27,7 +27,7 @@ import numpy as np
 from environment import beside, in_turn, print_environment, seconds_of
 from skimage.restoration import denoise_nl_means
 
-from isp.interleaved import reconstruct
+from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.reference import reconstruct_reference
 from isp.settings import PATCH, SIGMA_S
 from render.jit import backend
@@ -107,6 +107,7 @@ def ways(yardstick: Call) -> None:
     }
     for name, (raw, settings) in frames.items():
         compare(name, partial(reconstruct, raw, **{**PATCHES, **settings}), yardstick)
+    compare("nothing saturated, with the noise", partial(reconstruct_with_noise, frame(300.0), **PATCHES), yardstick)
 
 
 def trades() -> None:

@@ -53,7 +53,9 @@ def main() -> None:
     bare_s = sum(float(row["capture_s"]) + float(row["develop_s"]) for row in rows)
     cells = len(rows) - 1
     print(f"{cells + 1} cells, {given.size}x{given.size}, {given.spp} samples, {given.workers} workers")
-    print(f"render and one cell         {first[0]:8.1f} s, processor {first[1]:8.1f} s")
+    samples = given.size**2 * given.spp * 20  # bands
+    each = f"{1e9 * first[0] / samples:.0f} ns a sample and band, processor {1e9 * first[1] / samples:.0f} ns"
+    print(f"render and one cell         {first[0]:8.1f} s, processor {first[1]:8.1f} s: {each}")
     print(f"the other cells             {rest[0]:8.1f} s, processor {rest[1]:8.1f} s")
     print(f"a cell, start-up included   {1e3 * rest[0] / cells:8.0f} ms, processor {1e3 * rest[1] / cells:8.0f} ms")
     print(f"its capture and development {1e3 * bare_s / (cells + 1):8.0f} ms, as its row states")

@@ -108,15 +108,17 @@ def machine() -> dict[str, Any]:
 
 def lines(stage: dict[str, Any]) -> list[str]:
     """A stage as a table; * marks the Pareto front."""
+    took = f"{stage['reference_s']:.3g} s, processor {stage['reference_processor_s']:.3g} s"
     made = [
         f"\n{stage['name']}: {stage['question']}",
-        f"  reference: {stage['reference']}, {stage['reference_s']:.3g} s; sensor noise {stage['noise_e']:.3g} e-",
-        f"  {'choice':30}{'seconds':>10}{'ratio':>9}{'first':>9}{'error, e-':>12}{'share':>10}",
+        f"  reference: {stage['reference']}, {took}; sensor noise {stage['noise_e']:.3g} e-",
+        f"  {'choice':30}{'seconds':>9}{'ratio':>7}{'processor':>10}{'ratio':>7}{'first':>7}"
+        f"{'error, e-':>11}{'share':>9}",
     ]
     for point in stage["points"]:
         made.append(
-            f"{'*' if point['on_front'] else ' ':>2}{point['choice']:30}{point['seconds']:10.4g}"
-            f"{point['time_over_reference']:9.3g}{point['first_s']:9.3g}{point['error_e']:12.3g}"
-            f"{100 * point['share_of_noise_variance']:9.2g}%"
+            f"{'*' if point['on_front'] else ' ':>2}{point['choice']:30}{point['seconds']:9.3g}"
+            f"{point['time_over_reference']:7.3g}{point['processor_s']:10.3g}{point['processor_over_reference']:7.3g}"
+            f"{point['first_s']:7.3g}{point['error_e']:11.3g}{100 * point['share_of_noise_variance']:8.2g}%"
         )
     return made

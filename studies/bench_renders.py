@@ -1,77 +1,69 @@
 """The render's choices measured: numbers of bands, and samples a pixel."""
 
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
 
 from render.engine import render
 from render.scene import Scene
+from render.spectrum import Floats
 from render.transport import Transport
 from sensor.config import SensorConfig
-from studies.bench_points import Point, Stage, timed
+from studies.bench_points import Point, Stage, Times, timed
 from studies.bench_setup import MOST_BANDS, Bench, exposure_s_of, mosaic_e, noise_e_of, rms_e
 from studies.plan_bands import fine_bands, groups_of
 
 
 def by_bands(bench: Bench, scene: Scene, sensor: SensorConfig) -> tuple[Transport, Stage]:
-    """Renders of the same paths in ever more bands; the finest first, for the others are measured against it."""
+    """Renders of the same paths in ever more bands, against the finest."""
     nm, width_nm = fine_bands(group.spectrum for group in scene.groups.values())
-    made: dict[int, tuple[Transport, float, float]] = {}
-    for count in sorted({*bench.bands, MOST_BANDS}, reverse=True):
+
+    def call(count: int) -> Callable[[], Transport]:
         groups = groups_of(width_nm, count)
         first = np.array([nm[group[0]] - width_nm[group[0]] / 2 for group in groups])
         widths = np.array([width_nm[group].sum() for group in groups])
+        return _render(bench, scene, first + widths / 2, widths, bench.samples[0], bench.seed)
 
-        one = partial(
-            render,
-            scene,
-            (bench.size, bench.size),
-            wavelength_nm=first + widths / 2,
-            width_nm=widths,
-            max_spp=bench.samples[0],
-            seed=bench.seed,
-        )
-        made[count] = timed(one, bench.repeats)
-    finest, _, finest_s = made[MOST_BANDS]
-    exposure_s = exposure_s_of(bench, sensor, finest)
-    truth = mosaic_e(bench, sensor, finest, exposure_s)
-    points = [
-        Point(f"{count} bands", first_s, seconds, rms_e(mosaic_e(bench, sensor, transport, exposure_s), truth, sensor))
-        for count, (transport, first_s, seconds) in sorted(made.items())
-    ]
+    made = timed({f"{count} bands": call(count) for count in sorted({*bench.bands, MOST_BANDS})}, bench.repeats)
+    finest, finest_times = made[f"{MOST_BANDS} bands"]
     question = f"How many bands? {bench.scene}, {bench.size}x{bench.size}, {bench.samples[0]} samples a pixel"
-    noise_e = noise_e_of(truth, sensor, exposure_s)
     words = f"{MOST_BANDS} bands of the same paths"
-    return finest, Stage("bands", question, words, noise_e, tuple(points), finest_s)
+    return finest, _stage("bands", question, words, bench, sensor, finest, finest_times, made)
 
 
 def by_samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
-    """One render that goes on and on, against another one of four times its samples."""
+    """Ever more samples, against another render of four times the most."""
     edges = np.linspace(380.0, 780.0, 9)
-    centres, widths = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    call = partial(_render, bench, scene, (edges[1:] + edges[:-1]) / 2, np.diff(edges))
+    made = timed({f"{spp} samples": call(spp, bench.seed) for spp in bench.samples}, bench.repeats)
+    most = 4 * bench.samples[-1]
+    truth, truth_times = timed({"": call(most, bench.seed + 1)}, 0)[""]
+    question = f"How many samples a pixel? {bench.scene}, {bench.size}x{bench.size}, 8 bands"
+    words = f"{most} samples of another seed, whose own noise is in the errors"
+    return _stage("samples", question, words, bench, sensor, truth, truth_times, made)
 
-    def made(spp: int, seed: int, resume: Transport | None) -> Transport:
-        size = (bench.size, bench.size)
-        # 1 ms: two passes of 16 samples are made in any case, and later calls go on with passes of 16
-        limit = {"max_spp": spp} if resume is not None else {"max_seconds": 1e-3}
-        return render(scene, size, wavelength_nm=centres, width_nm=widths, seed=seed, resume=resume, **limit)
 
-    reference: Transport | None = None
-    for spp in (1, 4 * bench.samples[-1]):
-        reference = made(spp, bench.seed + 1, reference)
-    assert reference is not None
+def _render(bench: Bench, scene: Scene, nm: Floats, width_nm: Floats, spp: int, seed: int) -> Callable[[], Transport]:
+    size = (bench.size, bench.size)
+    return partial(render, scene, size, wavelength_nm=nm, width_nm=width_nm, spp=spp, seed=seed)
+
+
+def _stage(
+    name: str,
+    question: str,
+    words: str,
+    bench: Bench,
+    sensor: SensorConfig,
+    reference: Transport,
+    reference_times: Times,
+    made: Mapping[str, tuple[Transport, Times]],
+) -> Stage:
+    """Errors of renders against the reference's mosaic."""
     exposure_s = exposure_s_of(bench, sensor, reference)
     truth = mosaic_e(bench, sensor, reference, exposure_s)
-    points, transport = [], made(1, bench.seed, None)
-    for spp in bench.samples:
-        transport = made(spp, bench.seed, transport)
-        error_e = rms_e(mosaic_e(bench, sensor, transport, exposure_s), truth, sensor)
-        points.append(Point(f"{transport.spp} samples", transport.seconds, transport.seconds, error_e))
-    return Stage(
-        "samples",
-        f"How many samples a pixel? {bench.scene}, {bench.size}x{bench.size}, 8 bands",
-        f"{reference.spp} samples of another seed, whose own noise is in the errors",
-        noise_e_of(truth, sensor, exposure_s),
-        tuple(points),
-        reference.seconds,
+    points = tuple(
+        Point(choice, times, rms_e(mosaic_e(bench, sensor, transport, exposure_s), truth, sensor))
+        for choice, (transport, times) in made.items()
     )
+    return Stage(name, question, words, noise_e_of(truth, sensor, exposure_s), points, reference_times)

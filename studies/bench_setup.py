@@ -34,7 +34,7 @@ class Bench:
         Numbers of bands; samples a pixel, increasing; a render of four times the last is the reference.
     neighbourhoods, patches : tuple of int
     repeats : int
-        Calls beside the first; the best counts.
+        Turns beside the first; their median counts.
     seed : int
     """
 

@@ -9,7 +9,7 @@ from studies.bench_points import Stage
 from studies.bench_renders import by_bands, by_samples
 from studies.bench_setup import Bench
 
-STAGES = 7
+STAGES = 6
 
 
 def stages(bench: Bench) -> Iterator[Stage]:
@@ -20,5 +20,5 @@ def stages(bench: Bench) -> Iterator[Stage]:
     yield by_samples(bench, scene, sensor)
     camera = camera_of(bench, scene, sensor, finest)
     yield by_lens(bench, camera)
-    yield from by_readout(bench, camera)
+    yield by_readout(bench, camera)
     yield from by_reconstruction(bench, camera)
