@@ -151,33 +151,6 @@ def _share(
     return dr.select(previous_delta, 1.0, _power_heuristic(previous_pdf, light_pdf))
 
 
-def _bounce_by_light(
-    mi: Any,
-    scene: Any,
-    sampler: Any,
-    bsdf: Any,
-    si: Any,
-    go_on: Any,
-    wavelengths: list[Any],
-    step: Any,
-    table: TableReader | None,
-    own_colour: bool,
-) -> tuple[list[Any], Any, list[Any], Any]:
-    """Light received from a sampled position on a lamp; then a sampled direction, its weights, and the mark."""
-    lit = go_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-    si.wavelengths = wavelengths[0]
-    ds, sampled = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
-    lit &= (ds.pdf != 0) & dr.any(sampled != 0)
-    context, lobe, angle = mi.BSDFContext(), sampler.next_1d(), sampler.next_2d()
-    values, pdf, sample, weights, by_wavelength = dr.dispatch(
-        bsdf, partial(scatter, table), context, si, si.to_local(ds.d), lobe, angle, wavelengths, step
-    )
-    factor = dr.select(lit, dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, pdf)), 0.0)
-    arriving = _arriving(ds, sampled, si, wavelengths, own_colour)
-    received = [value * (light * factor) for value, light in zip(values, arriving, strict=True)]
-    return received, sample, weights, by_wavelength
-
-
 def _bounce(
     mi: Any,
     scene: Any,
@@ -189,14 +162,28 @@ def _bounce(
     step: Any,
     table: TableReader | None,
     own_colour: bool,
+    sample_lights: bool,
 ) -> tuple[list[Any], Any, list[Any], Any]:
-    """The same where no lamp is looked for."""
-    del scene, go_on, own_colour
-    context, lobe, angle = mi.BSDFContext(), sampler.next_1d(), sampler.next_2d()
-    sample, weights, by_wavelength = dr.dispatch(
-        bsdf, partial(draw, table), context, si, lobe, angle, wavelengths, step
+    """Light received from a sampled position on a lamp; then a sampled direction, its weights, and the mark."""
+    context = mi.BSDFContext()
+    if not sample_lights:
+        lobe, angle = sampler.next_1d(), sampler.next_2d()
+        sample, weights, by_wavelength = dr.dispatch(
+            bsdf, partial(draw, table), context, si, lobe, angle, wavelengths, step
+        )
+        return [mi.Spectrum(0.0) for _ in wavelengths], sample, weights, by_wavelength
+    lit = go_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+    si.wavelengths = wavelengths[0]
+    ds, sampled = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
+    lit &= (ds.pdf != 0) & dr.any(sampled != 0)
+    lobe, angle = sampler.next_1d(), sampler.next_2d()
+    values, pdf, sample, weights, by_wavelength = dr.dispatch(
+        bsdf, partial(scatter, table), context, si, si.to_local(ds.d), lobe, angle, wavelengths, step
     )
-    return [mi.Spectrum(0.0) for _ in wavelengths], sample, weights, by_wavelength
+    factor = dr.select(lit, dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, pdf)), 0.0)
+    arriving = _arriving(ds, sampled, si, wavelengths, own_colour)
+    received = [value * (light * factor) for value, light in zip(values, arriving, strict=True)]
+    return received, sample, weights, by_wavelength
 
 
 def _times(first: list[Any], second: list[Any]) -> list[Any]:
@@ -274,7 +261,6 @@ def _trace(
     A path that escapes meets the even sky, and then carries what the sky would give it: its throughput. A light that
     the camera's ray meets first counts for `_seen` alone.
     """
-    bounce = _bounce_by_light if sample_lights else _bounce
     ray, previous, previous_pdf, previous_delta, result = start
     ray.wavelengths = wavelengths[0]
     throughput = [mi.Spectrum(1.0) for _ in wavelengths]
@@ -288,8 +274,8 @@ def _trace(
         result = _plus(result, throughput, emitted, dr.select(indirect, share, 0.0))
 
         go_on, escaped = (depth + 1 < max_depth) & si.is_valid(), indirect & ~si.is_valid()
-        received, sample, weights, by_wavelength = bounce(
-            mi, scene, sampler, si.bsdf(ray), si, go_on, wavelengths, step, table, own_colour
+        received, sample, weights, by_wavelength = _bounce(
+            mi, scene, sampler, si.bsdf(ray), si, go_on, wavelengths, step, table, own_colour, sample_lights
         )
         result = _plus(result, throughput, received, 1.0)
         chosen |= go_on & by_wavelength
