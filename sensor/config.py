@@ -1,11 +1,11 @@
 """What a camera is: pixel, lens, mosaic, responses, converter. Zero switches a term off; there are no mode flags."""
 
 from dataclasses import dataclass, field
-from math import ceil, hypot, inf
+from math import ceil, hypot
 from numbers import Real
 
 from render.errors import InputError, require_range, require_whole
-from render.spectrum import VISIBLE_NM
+from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from sensor.cfa import RGBW, Tile, channels, check_tile
 from sensor.curves import Responses, rgbw
 
@@ -136,7 +136,8 @@ class LensConfig:
 
 
 def _increasing(window_nm: tuple[float, float]) -> bool:
-    return all(isinstance(nm, Real) for nm in window_nm) and 0 < window_nm[0] < window_nm[1] < inf
+    real = all(isinstance(nm, Real) for nm in window_nm)
+    return real and SHORTEST_NM <= window_nm[0] < window_nm[1] <= LONGEST_NM
 
 
 @dataclass(frozen=True)
@@ -173,7 +174,7 @@ class SensorConfig:
         if self.black_level_dn is not None:
             require_whole("black_level_dn", self.black_level_dn, 0, self.white_dn - 1, "give DN under the white level")
         if not (isinstance(self.window_nm, tuple | list) and len(self.window_nm) == 2 and _increasing(self.window_nm)):
-            raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give (shortest, longest) in nm")
+            raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give (shortest, longest) in 100-20000 nm")
         self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every letter has a curve
 
     @property

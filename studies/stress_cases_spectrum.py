@@ -12,7 +12,7 @@ from sensor.cfa import channels, letter_map
 from sensor.optics import camera_equation
 from studies.stress_case import Case, Margin, Situation, worse, worst_of
 from studies.stress_chain import expected
-from studies.stress_light import BANDS_NM, at_level, even_lines, in_bands, of_lines
+from studies.stress_light import BANDS_NM, at_level, even_lines, in_bands, of_lines, times
 
 SODIUM = "sodium_low"
 
@@ -55,6 +55,12 @@ def _some_bands(*kept_nm: float) -> SpectralRadiance:
     return _bands(at_level(100.0), np.isin(BANDS_NM, kept_nm))
 
 
+def _one_narrow() -> SpectralRadiance:
+    """10 cd/m^2 in 1 nm at 555 nm, and dark bands on both sides: a camera refuses a window left open."""
+    alone = _bands(in_bands((467.25, 555.0, 667.75), (174.5, 1.0, 224.5)), np.array([False, True, False]))
+    return times(alone, np.full(alone.shape, 10.0 / alone.luminance().mean()))
+
+
 def _fine() -> SpectralRadiance:
     edges_nm = np.linspace(*VISIBLE_NM, 402)
     return in_bands(tuple((edges_nm[1:] + edges_nm[:-1]) / 2), tuple(np.diff(edges_nm)), 32, 4)
@@ -74,7 +80,7 @@ SPECTRUM_CASES = (
     Case("violet_alone", "light in one band at 390 nm alone", lambda: Situation(_some_bands(390.0))),
     Case("red_alone", "light in one band at 770 nm alone", lambda: Situation(_some_bands(770.0))),
     Case("one_band", "one band of 400 nm", lambda: Situation(in_bands((580.0,), (400.0,)))),
-    Case("one_narrow_band", "one band of 1 nm at 555 nm", lambda: Situation(in_bands((555.0,), (1.0,)))),
+    Case("one_narrow_band", "one band of 1 nm at 555 nm", lambda: Situation(_one_narrow())),
     Case(
         "bands_401",
         "401 bands, 1 nm each: a render of its own",

@@ -164,6 +164,7 @@ def test_a_lens_out_of_range_is_refused_by_name_and_value(field, value):
         ({"black_level_dn": 9.84}, ("black_level_dn: 9.84 is not a whole number", "round it")),
         ({"window_nm": (780.0, 380.0)}, ("window_nm: (780.0, 380.0)", "shortest")),
         ({"window_nm": (np.nan, 780.0)}, ("window_nm", "shortest")),
+        ({"window_nm": (0.38, 0.78)}, ("window_nm: (0.38, 0.78)", "in 100-20000 nm")),
         ({"cfa": ("RG", "B")}, ("cfa", "rectangle")),
         ({"cfa": "RGBW"}, ("cfa: 'RGBW'", "tuple of rows")),
         ({"cfa": ("RG", "XW")}, ("responses: letter: 'X'", "allowed: B, G, R, W")),
