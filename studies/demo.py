@@ -277,7 +277,11 @@ def _results(
         "scene": Path(demo.scene).name,
         "size": list(transport.coverage.shape),
         "environment": environment() | engines_told(cells),
-        "render": render_facts(transport) | {"brightest_share": brightest_share(demo, transport)},
+        "render": {
+            **render_facts(transport),
+            "relative_level_error": transport.level().relative_error,
+            "brightest_share": brightest_share(demo, transport),
+        },
         "exposure_rule": RULE.format(longest=demo.longest_s * 1e3),
         "display_white": DISPLAY_WHITE,
         "levels": level_facts(levels, transport),

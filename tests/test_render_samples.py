@@ -1,14 +1,13 @@
 """Samples that a render tells of are those that it drew: counted by the paths that its integrator was handed."""
 
-from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from path_counter import count_paths
 
-from render import passes
 from render.engine import render
-from render.jit import backend, dr
+from render.jit import backend
 from render.limits import MOST_ROUNDING, PASSES
 from scenes.catalog import load, names
 
@@ -20,25 +19,7 @@ BANDS = {"wavelength_nm": [450.0, 550.0, 650.0], "width_nm": 100.0}
 
 @pytest.fixture
 def paths(monkeypatch):
-    """Counts the camera's paths and the meter's, of all light groups together, as they are traced."""
-    counts, make = Counter(), passes.integrators
-
-    def counted(film, part_bands, unit, seed, meter=False):
-        made = make(film, part_bands, unit, seed, meter)
-        for integrator in made:
-            own = type(integrator).sample
-
-            def sample(self, scene, sampler, ray, medium=None, active=True, own=own):
-                counts["meter" if self.meter else "camera"] += dr.width(ray.o)
-                return own(self, scene, sampler, ray, medium, active)
-
-            if not hasattr(own, "counts"):
-                sample.counts = True
-                monkeypatch.setattr(type(integrator), "sample", sample)
-        return made
-
-    monkeypatch.setattr(passes, "integrators", counted)
-    return counts
+    return count_paths(monkeypatch)
 
 
 def drawn(paths, groups):

@@ -1,13 +1,18 @@
-"""What a row states of how its picture was made, counted another way: from stored arrays, wells and clocks."""
+"""What a row and the demo's results state of how pictures were made, counted another way: paths, arrays, wells."""
 
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from path_counter import count_paths
 from sweep_sample import swept
 
+from render.engine import render
+from render.jit import backend
 from sensor.presets import low_noise
+from studies import demo, quiet_render
+from studies.demo import Demo
 from studies.ledger import open_ledger, rows
 from studies.study import RenderLimits, SceneChoice, Study
 
@@ -42,3 +47,35 @@ def test_an_automatic_exposure_fills_the_well_or_ends_at_the_longest(tmp_path: P
     assert bright.exposure_s < 0.05
     assert dark.exposure_s == 0.05
     assert max(json.loads(dark.mean_electrons).values()) < 0.01 * well
+
+
+@pytest.mark.skipif(backend() == "numpy", reason="counts the wavefronts of Dr.Jit")
+def test_the_demos_results_state_the_render_and_the_exposures_that_were_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    paths, made = count_paths(monkeypatch), []
+    monkeypatch.setattr(quiet_render, "render", lambda *a, **k: made.append(render(*a, **k)) or made[-1])
+    size, longest_s = 16, 0.05
+    asked = Demo(
+        scene="slanted_edge", size=size, spp=33, sensors=("low_noise",), levels=("0.001cd/m2", "1000cd/m2"),
+        longest_s=longest_s,
+    )  # fmt: skip
+    results = demo.run(asked).results
+    (transport,), told = made, results["render"]
+    assert told["spp"] == paths["camera"] / size**2 / len(transport.groups)
+    assert told["passes"] == len(transport.pass_means.radiance)
+    assert told["stopped_by"] == "samples"
+    assert told["bands"] == transport.radiance.shape[1]
+    low, high = told["first_nm"] - told["width_nm"] / 2, told["last_nm"] + told["width_nm"] / 2
+    assert (low, high) == pytest.approx((380, 780))
+    assert told["bands"] * told["width_nm"] == pytest.approx(high - low)
+    scattered = transport.pass_means.radiance.sum(axis=(1, 2))  # one light of one power in every band
+    assert told["relative_level_error"] == pytest.approx(scattered.std(ddof=1) / 8**0.5 / scattered.mean(), rel=0.3)
+    well = low_noise().pixel.full_well_e
+    for cell in results["cells"]:
+        fullest = max(cell["mean_electrons"].values())
+        if cell["level"] == 0:
+            assert cell["exposure_s"] == longest_s
+            assert fullest < 0.01 * well
+        else:
+            assert cell["exposure_s"] < longest_s
+            assert 0.2 * well < cell["mean_electrons"]["G"] < 0.8 * well  # the brightest greens have 80 %
+        assert cell["saturated"] <= 0.3

@@ -1,0 +1,58 @@
+"""The table of stated numbers fits the tests, the planted faults and the page; no number of a row is without a line."""
+
+import ast
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from render.transport import Transport
+from studies.bench_points import Times
+from studies.row import Row
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT / "tests" / name) for name in ("faults", "verification")]
+
+from fault_catalogue import FAULTS  # noqa: E402
+from stated_numbers import PAGE, STATED, Stated, page  # noqa: E402
+
+TOLD = {name for one in STATED for name in one.told_by}
+# Light and its errors: physics, which other tests compare with closed forms and other programs.
+LIGHT = {"radiance", "coverage", "seen", "pass_means", "groups", "wavelength_nm", "width_nm", "shared", "integrator"}
+# What a cell is, what it is made from, and the figures of its picture.
+ASKED = {"key", "scene", "spectrum", "level", "exposure", "sensor", "processor", "seed", "lens", "budget_share"}
+FIGURES = {
+    "psnr_db", "ssim", "delta_e_median", "delta_e_p95", "s_cielab_median", "s_cielab_p95", "flip_mean", "pu21_psnr_db",
+    "mtf50_cy_per_px", "chart_delta_e_mean", "patch_snr_db", "snr_db", "substitution", "balance", "mean_electrons",
+    "illuminance_lux",
+}  # fmt: skip
+# Names of files and places; the picture's is its digest, which is checked where it is read.
+NAMES = {"picture", "truth", "finished", "host", "machine", "worker"}
+
+
+@pytest.mark.parametrize(
+    ("prefix", "names"),
+    [
+        ("Transport", {field.name for field in fields(Transport)} - LIGHT),
+        ("row", {field.name for field in fields(Row)} - ASKED - FIGURES - NAMES),
+        ("bench ", {field.name for field in fields(Times)}),
+    ],
+)
+def test_no_number_about_the_work_is_left_out(prefix: str, names: set[str]) -> None:
+    separator = "" if prefix.endswith(" ") else "."
+    assert {f"{prefix}{separator}{name}" for name in names} - TOLD == set()
+
+
+@pytest.mark.parametrize("stated", STATED, ids=lambda one: one.number)
+def test_a_number_has_its_test_and_a_fault_that_this_test_is_asked_to_notice(stated: Stated) -> None:
+    file, function = stated.test.split("::")
+    tree = ast.parse((ROOT / "tests" / file).read_text("utf-8"))
+    assert function in {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+    (fault,) = [fault for fault in FAULTS if fault.name == stated.fault]
+    assert f"tests/{file}" in fault.tests
+
+
+def test_the_page_shows_the_table() -> None:
+    text = PAGE.read_text("utf-8")
+    assert text == page(text)

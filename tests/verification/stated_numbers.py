@@ -1,0 +1,268 @@
+"""The numbers that the program states of its own work, and what counts each of them another way.
+
+python tests/verification/stated_numbers.py     writes the table of docs/verification.md anew
+"""
+
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "verification.md"
+BEGIN, END = (
+    "<!-- stated numbers: made by python tests/verification/stated_numbers.py -->",
+    "<!-- end of stated numbers -->",
+)
+
+
+@dataclass(frozen=True)
+class Stated:
+    """A number that the program states.
+
+    Attributes
+    ----------
+    number : str
+    told_by : tuple of str
+        Of `Transport`, `results.json`, `row` (of a sweep), `report`, `bench`, each with the name it has there.
+    counted : str
+        The other way of counting.
+    test : str
+        File and function below `tests`.
+    fault : str
+        Name in `tests/faults/fault_catalogue.py` of the planted fault that this test must notice.
+    """
+
+    number: str
+    told_by: tuple[str, ...]
+    counted: str
+    test: str
+    fault: str
+
+
+STATED = (
+    Stated(
+        "samples a pixel",
+        ("Transport.spp", "results.json render.spp", "row.spp"),
+        "paths that the integrator was handed, over pixels and light groups; each scene, with and without a plane",
+        "test_render_samples.py::test_at_most_a_fifth_more_is_drawn_than_asked_for",
+        "samples told as asked",
+    ),
+    Stated(
+        "passes",
+        ("Transport.passes", "results.json render.passes"),
+        "values a pass that levels are computed from",
+        "test_studies_stated_numbers.py::test_the_demos_results_state_the_render_and_the_exposures_that_were_made",
+        "samples of the demo's render as passes",
+    ),
+    Stated(
+        "what stopped the render",
+        ("Transport.stopped_by", "results.json render.stopped_by"),
+        "the error reached, recomputed from the relit light",
+        "test_render_engine.py::test_an_error_asked_for_is_reached",
+        "the end told of another limit",
+    ),
+    Stated(
+        "noise rule",
+        ("Transport.stopped_by",),
+        "passes made where any error is good enough",
+        "test_render_engine.py::test_an_error_is_not_believed_before_eight_passes",
+        "an error believed after two passes",
+    ),
+    Stated(
+        "seconds of a render",
+        ("Transport.seconds", "results.json render.seconds", "row.render_s"),
+        "a clock around the call, added to those of the earlier result",
+        "test_render_engine.py::test_seconds_are_those_of_all_the_calls_that_a_render_took",
+        "seconds of the earlier render forgotten",
+    ),
+    Stated(
+        "variance of a render",
+        ("Transport.variance", "Transport.half_difference"),
+        "scatter over the pixels of a wall that is even",
+        "test_render_engine.py::test_the_stated_variance_is_the_scatter_of_pixels_about_the_closed_form",
+        "variance of the passes by their number",
+    ),
+    Stated(
+        "relative Monte Carlo error",
+        ("Transport.relative_mc_error", "results.json render.relative_mc_error"),
+        "a variance written by hand, pooled over nine pixels on paper",
+        "test_render_error_estimates.py::test_the_relative_error_of_uniform_planes_is_standard_error_over_mean",
+        "pooled over three pixels",
+    ),
+    Stated(
+        "error of a level",
+        ("Transport.level", "results.json render.relative_level_error"),
+        "the jackknife over passes; the scatter of levels over ten seeds, three sizes and both variants",
+        "test_render_transport.py::test_a_level_and_its_error_are_those_of_a_ratio_of_sums_over_passes",
+        "a level's error without the passes' scatter",
+    ),
+    Stated(
+        "level in cd/m2",
+        ("row.luminance_cd_m2", "results.json levels"),
+        "luminance of the picture less that of lamps, over the area that shows none",
+        "test_render_transport.py::test_the_mean_luminance_asked_for_is_that_of_what_is_no_light",
+        "level counts the lamps seen",
+    ),
+    Stated(
+        "bands",
+        ("results.json render.bands", "row.bands"),
+        "planes of the stored render",
+        "test_studies_stated_numbers.py::test_bands_and_samples_are_those_of_the_stored_render",
+        "another band than rendered",
+    ),
+    Stated(
+        "exposure",
+        ("results.json cells.exposure_s", "row.exposure_s"),
+        "electrons over the well",
+        "test_studies_stated_numbers.py::test_an_automatic_exposure_fills_the_well_or_ends_at_the_longest",
+        "the longest exposure as the shortest",
+    ),
+    Stated(
+        "saturated share",
+        ("results.json cells.saturated", "row.saturated"),
+        "a frame of light far over the well",
+        "test_sensor_raw.py::test_all_of_a_saturated_frame_is_flagged_and_nothing_of_a_dark_one",
+        "saturated = (dn >= white)",
+    ),
+    Stated(
+        "Monte Carlo share of a cell",
+        ("row.mc_share",),
+        "pixels below saturation alone, from light written by hand",
+        "test_studies_cell_run.py::test_the_monte_carlo_share_is_of_the_pixels_below_saturation",
+        "a cell's Monte Carlo share over saturated pixels too",
+    ),
+    Stated(
+        "Monte Carlo share of the demo",
+        ("results.json cells.mc_share",),
+        "halves drawn with a known error",
+        "test_studies_truth_metrics.py::test_monte_carlo_share_is_the_ratio_of_variances",
+        "the whole difference of the halves as error",
+    ),
+    Stated(
+        "white of the pictures",
+        ("results.json display_white",),
+        "a hundred greys in order",
+        "test_studies_truth_metrics.py::test_white_is_the_percentile_of_the_area_that_shows_no_light",
+        "white at another percentile",
+    ),
+    Stated(
+        "engines of a row",
+        ("row.readout_engine", "row.development_engine"),
+        "the kernels that were called",
+        "test_studies_provenance.py::test_a_row_names_the_engines_that_kernels_ran_on",
+        "engine of captures 'cuda'",
+    ),
+    Stated(
+        "engines of the demo",
+        ("results.json cells.engines", "results.json environment"),
+        "the readout that was called",
+        "test_studies_clock.py::test_the_demos_stages_add_up_and_its_cells_name_their_engines",
+        "engine of the demo's captures 'cuda'",
+    ),
+    Stated(
+        "variant",
+        ("Transport.variant", "row.variant"),
+        "Mitsuba, asked in another process",
+        "test_studies_provenance.py::test_a_rows_variant_is_the_one_that_mitsuba_has_set",
+        "variant told as the scalar one",
+    ),
+    Stated(
+        "threads",
+        ("row.threads", "report"),
+        "threads of the working process, as the system counts them",
+        "test_studies_provenance.py::test_threads_told_are_those_that_the_working_process_has",
+        "threads told as 1",
+    ),
+    Stated(
+        "versions",
+        ("row.versions", "report"),
+        "what each module says of itself",
+        "test_studies_provenance.py::test_versions_are_those_that_the_modules_tell_themselves",
+        "a version left out",
+    ),
+    Stated(
+        "versions in a report",
+        ("report",),
+        "rows of two versions in one folder",
+        "test_studies_provenance.py::test_a_report_or_ranking_over_mixed_cells_is_refused_in_one_line",
+        "versions of the process that asks for the report",
+    ),
+    Stated(
+        "seconds of a cell's steps",
+        ("row.capture_s", "row.develop_s", "row.measure_s"),
+        "a clock that each step alone moves on by its own amount",
+        "test_studies_clock.py::test_a_rows_seconds_are_each_of_its_own_step",
+        "capture and develop seconds swapped",
+    ),
+    Stated(
+        "first calls",
+        ("row.first_s", "report"),
+        "kernels that Dr.Jit compiled or loaded within the seconds told",
+        "test_studies_clock.py::test_no_kernel_is_compiled_or_loaded_within_the_seconds_told",
+        "another kernel's first call within the seconds",
+    ),
+    Stated(
+        "time of each stage",
+        ("results.json stages", "report"),
+        "the wall clock of the run",
+        "test_studies_clock.py::test_the_reports_stages_add_up_to_the_runs_wall_clock",
+        "seconds of all workers as one's",
+    ),
+    Stated(
+        "seconds of renders in a report",
+        ("report",),
+        "renders made, however many cells share them",
+        "test_studies_clock.py::test_a_render_counts_once_however_many_cells_share_it",
+        "render seconds counted once a cell",
+    ),
+    Stated(
+        "N of M cells",
+        ("report",),
+        "cells of the study, of a sweep ended in its first scene",
+        "test_studies_stored.py::test_a_sweep_of_two_scenes_ended_in_its_first_gives_a_report_that_counts_all_cells",
+        "the first scene's cells alone as wanted",
+    ),
+    Stated(
+        "interval of a mean",
+        ("report", "table"),
+        "how many of many intervals hold the true mean; a printed table",
+        "test_studies_confidence.py::test_five_figures_have_the_interval_of_the_printed_table",
+        "an interval of one side",
+    ),
+    Stated(
+        "seconds of a choice",
+        ("bench first_s", "bench seconds", "bench processor_s"),
+        "two clocks that calls move on at different rates",
+        "test_studies_bench.py::test_calls_take_turns_the_first_does_not_count_and_the_median_does",
+        "processor's seconds from the wall clock",
+    ),
+    Stated(
+        "ratios of choices",
+        ("bench time_over_reference", "bench share_of_noise_variance"),
+        "numbers worked out on paper",
+        "test_studies_bench.py::test_ratios_stand_beside_seconds",
+        "a share of noise from amplitudes",
+    ),
+)
+
+
+def table() -> str:
+    """The table as Markdown."""
+    lines = ["| number | told by | counted another way | test | planted fault |", "|---|---|---|---|---|"]
+    for one in STATED:
+        told = ", ".join(f"`{name}`" for name in one.told_by)
+        test = one.test.split("::")[1].removeprefix("test_").replace("_", " ")
+        lines.append(f"| {one.number} | {told} | {one.counted} | {test} (`{one.test.split('::')[0]}`) | {one.fault} |")
+    return "\n".join(lines)
+
+
+def page(text: str) -> str:
+    """The page with the table in its place."""
+    whole = f"{BEGIN}\n\n{table()}\n\n{END}"
+    return re.sub(re.escape(BEGIN) + ".*?" + re.escape(END), lambda _: whole, text, flags=re.DOTALL)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(PAGE.read_text("utf-8")), "utf-8")
+    sys.stdout.write(f"{PAGE.relative_to(ROOT)}: {len(STATED)} numbers\n")
