@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from render.radiance_source import is_radiance_file
@@ -11,7 +10,7 @@ from scenes.levels import DEMO_LEVELS
 from studies.camera import CAMERAS
 from studies.demo import WAVELENGTH_NM, Demo
 from studies.lit_scene import OpenedScene
-from studies.memory import Memory
+from studies.memory import Memory, file_extent, memory
 from studies.model import Plan
 from studies.study import SceneChoice, Study, conditions
 
@@ -20,15 +19,6 @@ RENDER_S = 1e-7  # a pixel, sample, band and light group
 CELL_S = 6e-6  # a pixel: capture, development, metrics and file together, mean of the interleaved and Bayer cameras
 CELL_LEAST_S = 0.05  # a cell of any size
 START_S = 4.0  # a worker's imports
-# Bytes a pixel, counted from the arrays held at once; `tests/test_studies_memory.py` compares them with measured peaks.
-_TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
-_VIEW_ARRAYS = 7  # one pass's planes and their copies; later relit radiance, its halves, and an image forming
-_RENDER_BYTES = 120  # whatever the bands: the render's marks, a preview
-_CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
-_PICTURE_BYTES = 50  # of each picture kept until the report: floats, its place on the overview, its file
-PROCESS_BYTES = 350e6  # libraries and compiled kernels
-_FILE_BANDS = 40  # of a picture file
-_FILE_PACKING = 1.5  # its bytes of float32 over those on disk: 1.2 with the noise of a render, more without
 
 
 @dataclass(frozen=True)
@@ -54,33 +44,6 @@ class Estimate:
     seconds: float
     bytes: float
     largest_bytes: float
-
-
-def memory(pixels: int, bands: int, groups: int, workers: int = 0, pictures: int = 0) -> Memory:
-    """Memory that a render of so many light groups needs, and what comes after it.
-
-    Parameters
-    ----------
-    pixels, bands, groups : int
-        No groups for a picture file, which needs no render.
-    workers : int
-        Processes that develop cells; 1: the process that renders does, 0: no cells are made here.
-    pictures : int
-        Kept until all are made.
-    """
-    arrays = _TRANSPORT_ARRAYS * groups + _VIEW_ARRAYS
-    rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + _RENDER_BYTES + _PICTURE_BYTES * pictures)
-    if workers <= 1:
-        own = rendering + workers * _CELL_BYTES * pixels
-        return Memory(own, own)
-    worker = PROCESS_BYTES + _CELL_BYTES * pixels
-    return Memory(rendering + workers * worker, max(rendering, worker))
-
-
-def file_extent(path: str | Path) -> tuple[int, int, int]:
-    """Pixels, bands and light groups that a picture file counts as, by its bytes: its header isn't read yet."""
-    values = Path(path).stat().st_size * _FILE_PACKING / 4
-    return round(values / _FILE_BANDS), _FILE_BANDS, 0
 
 
 def demo_memory(demo: Demo) -> Memory:

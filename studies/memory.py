@@ -1,4 +1,4 @@
-"""Memory that is free, and the refusal of a run that needs more: the system would end it without a word."""
+"""Memory that a run needs and that is free, and the refusal where it isn't: the system would end it without a word."""
 
 import resource
 from collections.abc import Iterator
@@ -9,6 +9,15 @@ from pathlib import Path
 from render.errors import InputError
 
 GB = 1e9
+# Bytes a pixel, counted from the arrays held at once; `tests/test_studies_memory.py` compares them with measured peaks.
+_TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
+_VIEW_ARRAYS = 7  # one pass's planes and their copies; later relit radiance, its halves, and an image forming
+_RENDER_BYTES = 120  # whatever the bands: the render's marks, a preview
+_CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
+_PICTURE_BYTES = 50  # of each picture kept until the report: floats, its place on the overview, its file
+PROCESS_BYTES = 350e6  # libraries and compiled kernels
+_FILE_BANDS = 40  # of a picture file
+_FILE_PACKING = 1.5  # its bytes of float32 over those on disk: 1.2 with the noise of a render, more without
 
 
 @dataclass(frozen=True)
@@ -35,6 +44,33 @@ class Limit:
     name: str
     free: float
     each: bool = False
+
+
+def memory(pixels: int, bands: int, groups: int, workers: int = 0, pictures: int = 0) -> Memory:
+    """Memory that a render of so many light groups needs, and what comes after it.
+
+    Parameters
+    ----------
+    pixels, bands, groups : int
+        No groups for a picture file, which needs no render.
+    workers : int
+        Processes that develop cells; 1: the process that renders does, 0: no cells are made here.
+    pictures : int
+        Kept until all are made.
+    """
+    arrays = _TRANSPORT_ARRAYS * groups + _VIEW_ARRAYS
+    rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + _RENDER_BYTES + _PICTURE_BYTES * pictures)
+    if workers <= 1:
+        own = rendering + workers * _CELL_BYTES * pixels
+        return Memory(own, own)
+    worker = PROCESS_BYTES + _CELL_BYTES * pixels
+    return Memory(rendering + workers * worker, max(rendering, worker))
+
+
+def file_extent(path: str | Path) -> tuple[int, int, int]:
+    """Pixels, bands and light groups that a picture file counts as, by its bytes: its header isn't read yet."""
+    values = Path(path).stat().st_size * _FILE_PACKING / 4
+    return round(values / _FILE_BANDS), _FILE_BANDS, 0
 
 
 def require_memory(need: Memory, force: bool = False) -> None:

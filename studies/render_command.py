@@ -20,8 +20,7 @@ from render.scene import LightGroup, Scene
 from render.scene_parts import SceneFile
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum
 from render.transport import Transport
-from studies.estimate import memory
-from studies.memory import require_memory
+from studies.memory import memory, require_memory
 from studies.progress import progress
 from studies.results import render_facts
 from studies.scene_source import asked_level, open_scene

@@ -31,9 +31,8 @@ from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files import check_ending, write_raw
 from studies.calibrate import calibrate, iso_speed
-from studies.estimate import file_extent, memory
 from studies.levels import parse_level
-from studies.memory import require_memory
+from studies.memory import file_extent, memory, require_memory
 from studies.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.scene_source import asked_level, open_scene
 

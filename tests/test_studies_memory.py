@@ -12,8 +12,8 @@ import pytest
 
 from studies.cli import main
 from studies.demo import Demo
-from studies.estimate import demo_memory, file_extent, memory
-from studies.memory import Limit, memory_limits
+from studies.estimate import demo_memory
+from studies.memory import Limit, file_extent, memory, memory_limits
 
 COMMANDS = {
     "render": ["render", "still_life", "--height", "4000", "--width", "4000", "-o", "out/picture.exr"],

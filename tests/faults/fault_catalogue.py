@@ -904,7 +904,7 @@ NONSENSE = (
     ),
     _fault(
         "need of one light group whatever there are",
-        "studies/estimate.py",
+        "studies/memory.py",
         "_TRANSPORT_ARRAYS * groups",
         "_TRANSPORT_ARRAYS",
         "studies_memory",
