@@ -9,12 +9,14 @@ import os
 import re
 import tempfile
 from dataclasses import asdict, fields
+from importlib import metadata
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from render.error_estimates import SharedPaths, relative_error
+from render.jit import compiler_version
 from render.level import PassMeans
 from render.loader import Film, integrator_name, variant
 from render.scene import Node, Scene
@@ -95,7 +97,8 @@ def _digest(file: BinaryIO, size: int) -> bytes:
 
 def _path(folder: Path, scene: Scene, film: Film, seed: int) -> Path:
     key = {
-        "engine": [ENGINE_VERSION, integrator_name(), variant()],
+        "engine": [ENGINE_VERSION, integrator_name(), variant(), *map(metadata.version, ("mitsuba", "drjit"))],
+        "compiler": compiler_version(),
         "scene": [scene.name, scene.geometry, scene.reference_plane, _file_digests(scene.geometry)],
         "groups": [[name, group.emitters, group.own_colour] for name, group in scene.groups.items()],
         "film": asdict(film),

@@ -82,7 +82,7 @@ os.environ["DRJIT_LIBLLVM_PATH"] = str(LIBLLVM) if LIBLLVM else "/nonexistent/li
 import drjit as dr  # noqa: E402  (the environment variable above must come first)
 import drjit.scalar  # noqa: E402
 
-__all__ = ["LIBLLVM", "Matrix4", "arrays", "backend", "dr", "find_llvm", "llvm_version"]
+__all__ = ["LIBLLVM", "Matrix4", "arrays", "backend", "compiler_version", "dr", "find_llvm", "llvm_version"]
 
 Matrix4 = dr.scalar.Matrix4f64  # a 4x4 transform as `mitsuba.load_dict` takes it in every variant
 
@@ -93,6 +93,12 @@ def backend() -> Backend:
     if dr.has_backend(dr.JitBackend.CUDA):
         return "cuda"
     return "llvm" if LIBLLVM and dr.has_backend(dr.JitBackend.LLVM) else "numpy"
+
+
+def compiler_version() -> str:
+    """Version of the LLVM or CUDA that kernels are compiled by, ``none`` on ``numpy``."""
+    found = {"llvm": dr.detail.llvm_version, "cuda": dr.detail.cuda_version}.get(backend())
+    return ".".join(map(str, found())) if found else "none"
 
 
 def arrays() -> Any:

@@ -9,7 +9,7 @@ from importlib import metadata
 
 from isp.processors import PROCESSORS, libraries
 from render.errors import InputError
-from render.jit import backend, dr
+from render.jit import backend, compiler_version, dr
 from studies.digests import code_version
 from studies.row import Row
 
@@ -51,10 +51,8 @@ def versions(processor: str | None = None) -> dict[str, str]:
     """Versions of all that makes numbers, of the backend in use and of a processor's own libraries too."""
     names = (*_PACKAGES, *(libraries(processor) if processor else ()))
     made = {"rodcone": code_version(), **{name: metadata.version(name) for name in names}, "llvm": "none"}
-    if backend() == "llvm":
-        made["llvm"] = ".".join(map(str, dr.detail.llvm_version()))
-    elif backend() == "cuda":
-        made["cuda"] = ".".join(map(str, dr.detail.cuda_version()))
+    if backend() != "numpy":
+        made[backend()] = compiler_version()
     return made
 
 

@@ -1,6 +1,7 @@
 """Finished renders on disk: found again to the bit, made again where anything differs or the file is damaged."""
 
 from dataclasses import replace
+from importlib import metadata
 
 import numpy as np
 import pytest
@@ -167,6 +168,22 @@ def test_the_same_lights_in_other_groups_or_another_order_are_another_entry(tmp_
 def test_another_engine_version_is_another_entry(tmp_path, renders, monkeypatch):
     small(tmp_path)
     monkeypatch.setattr("render.cache.ENGINE_VERSION", 10**6)
+    small(tmp_path)
+    assert len(renders) == 2
+
+
+@pytest.mark.parametrize("library", ["mitsuba", "drjit"])
+def test_a_render_of_another_version_is_another_entry(library, tmp_path, renders, monkeypatch):
+    small(tmp_path)
+    told = metadata.version
+    monkeypatch.setattr(metadata, "version", lambda name: "0.1" if name == library else told(name))
+    small(tmp_path)
+    assert len(renders) == 2
+
+
+def test_a_render_of_another_compiler_is_another_entry(tmp_path, renders, monkeypatch):
+    small(tmp_path)
+    monkeypatch.setattr("render.cache.compiler_version", lambda: "0.1")
     small(tmp_path)
     assert len(renders) == 2
 
