@@ -112,13 +112,12 @@ def lines(stage: dict[str, Any]) -> list[str]:
     made = [
         f"\n{stage['name']}: {stage['question']}",
         f"  reference: {stage['reference']}, {took}; sensor noise {stage['noise_e']:.3g} e-",
-        f"  {'choice':30}{'seconds':>9}{'ratio':>7}{'processor':>10}{'ratio':>7}{'first':>7}"
-        f"{'error, e-':>11}{'share':>9}",
+        f"  {'choice':27}{'seconds':>8}{'ratio':>8}{'processor':>10}{'ratio':>8}{'error, e-':>10}{'share':>9}",
     ]
     for point in stage["points"]:
         made.append(
-            f"{'*' if point['on_front'] else ' ':>2}{point['choice']:30}{point['seconds']:9.3g}"
-            f"{point['time_over_reference']:7.3g}{point['processor_s']:10.3g}{point['processor_over_reference']:7.3g}"
-            f"{point['first_s']:7.3g}{point['error_e']:11.3g}{100 * point['share_of_noise_variance']:8.2g}%"
+            f"{'*' if point['on_front'] else ' ':>2}{point['choice']:27}{point['seconds']:8.3g}"
+            f"{point['time_over_reference']:8.3g}{point['processor_s']:10.3g}{point['processor_over_reference']:8.3g}"
+            f"{point['error_e']:10.3g}{100 * point['share_of_noise_variance']:8.2g}%"
         )
     return made
