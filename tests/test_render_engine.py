@@ -10,12 +10,14 @@ import signal
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 from scipy.stats import t as student
 
+from render import engine
 from render.engine import render
 from render.errors import InputError
 from render.geometry import look_at, to_world, translate
@@ -351,16 +353,21 @@ def test_an_error_is_not_believed_before_eight_passes():
     assert small(noise=10.0, spp=None, max_spp=4096).passes == PASSES
 
 
-def test_seconds_are_those_of_all_the_calls_that_a_render_took():
-    part = replace(small(spp=8), seconds=1000.0)
-    start = time.perf_counter()
+def test_seconds_are_those_of_all_the_calls_that_a_render_took(monkeypatch):
+    """By a clock that passes alone move on, 3 s each."""
+    clock, add = SimpleNamespace(now=1000.0), engine.add_pass
+
+    def add_slowly(*given):
+        add(*given)
+        clock.now += 3.0
+
+    monkeypatch.setattr(engine, "time", SimpleNamespace(perf_counter=lambda: clock.now))
+    monkeypatch.setattr(engine, "add_pass", add_slowly)
+    part = small(spp=8)
+    assert (part.passes, part.seconds) == (8, 24.0)
+    clock.now += 500.0  # between the calls
     on = small(spp=16, resume=part)
-    took = time.perf_counter() - start
-    assert 1000.0 < on.seconds <= 1000.0 + took
-    start = time.perf_counter()
-    one = small(spp=512)
-    took = time.perf_counter() - start
-    assert 0.3 * took < one.seconds <= took  # what is left out is checks and the start of Mitsuba
+    assert (on.passes, on.seconds) == (16, 48.0)
 
 
 def test_samples_end_a_render_before_an_error_out_of_reach():

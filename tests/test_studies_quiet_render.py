@@ -16,7 +16,7 @@ from studies import quiet_render
 from studies.budget import MOST_SHARE, OF_PIXELS, pixel_share
 from studies.quiet_render import render_quietly
 
-NM, WIDTH_NM = np.arange(400.0, 701.0, 50.0), np.full(7, 50.0)
+NM, WIDTH_NM = np.arange(405.0, 780.0, 50.0), np.full(8, 50.0)
 LONGEST_S = 0.066
 
 

@@ -1,5 +1,6 @@
 """Every reader of outside files, with small valid files of the project's own writers to begin from."""
 
+import sys
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
@@ -9,7 +10,6 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 import numpy as np
-from builders import transport_of
 from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_elements, pages, tiff_tags
 
 from render.cache import load_transport, save_transport
@@ -33,6 +33,10 @@ from studies.export import read_rows
 from studies.ledger import add, open_ledger, want
 from studies.row import Row
 from studies.study_file import read_study
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from builders import transport_of
 
 Sample = Mapping[str, bytes]  # files by name; the first is the one that is read
 

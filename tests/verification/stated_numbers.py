@@ -72,7 +72,7 @@ STATED = (
     Stated(
         "seconds of a render",
         ("Transport.seconds", "results.json render.seconds", "row.render_s"),
-        "a clock around the call, added to those of the earlier result",
+        "a clock that passes alone move on, over two calls of one render",
         "test_render_engine.py::test_seconds_are_those_of_all_the_calls_that_a_render_took",
         "seconds of the earlier render forgotten",
     ),
