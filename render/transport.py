@@ -190,10 +190,13 @@ class Transport:
         """
         emitted = self._emission(self._lights(None, None))
         weights = self._luminance_weights(self._at_level(emitted, luminance_cd_m2, None)[0])
-        total = np.einsum("gb,gbyx->yx", weights, self.radiance, optimize=True)
-        for of_group, seen in zip(weights, self.seen, strict=True):
-            total -= np.tensordot(of_group if len(seen) > 1 else of_group.sum(keepdims=True), seen, axes=1)
-        return np.asarray(np.maximum(total, 0.0), dtype=np.float64)
+        total = np.zeros(self.coverage.shape)
+        for of_group, radiance, seen in zip(weights, self.radiance, self.seen, strict=True):
+            for weight, plane in zip(of_group, radiance, strict=True):  # no copy of all planes in double precision
+                total += weight * plane
+            for weight, plane in zip(of_group if len(seen) > 1 else [of_group.sum()], seen, strict=True):
+                total -= weight * plane
+        return np.maximum(total, 0.0)
 
     def _repr_png_(self) -> bytes:
         return self.relight()._repr_png_()
