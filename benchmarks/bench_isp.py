@@ -30,7 +30,7 @@ from skimage.restoration import denoise_nl_means
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.reference import reconstruct_reference
 from isp.settings import PATCH, SIGMA_S
-from render.jit import backend
+from rodcone.jit import backend
 from sensor.cfa import RGBW, letter_map
 from sensor.raw import RawImage
 

@@ -25,23 +25,23 @@ from environment import print_environment
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from isp.colour import encode_srgb
+from isp.colour.camera_colour import encode_srgb
 from isp.pipeline import picture_interleaved
-from isp.processors import PROCESSORS
+from isp.processors.catalogue import PROCESSORS
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL, substitution_weight
 from render.engine import render
-from render.errors import InputError
+from rodcone.errors import InputError
 from scenes.catalog import load
 from sensor.cfa import channels, mask
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.readout import read_out
 from sensor.response import expected_electrons
-from studies.camera import Camera, build_camera, photograph
-from studies.confidence import Estimate, mean_with_confidence
-from studies.demo import WAVELENGTH_NM
-from studies.metrics import Quality, measure
-from studies.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
+from studies.commands.demo import WAVELENGTH_NM
+from studies.metrics.confidence import Estimate, mean_with_confidence
+from studies.metrics.quality import Quality, measure
+from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
+from studies.photograph.camera import Camera, build_camera, photograph
 
 SIZE = 160
 FIXED_S, LONGEST_S = 0.020, 0.066

@@ -21,8 +21,8 @@ from dataclasses import replace
 import numpy as np
 from environment import beside, in_turn, print_environment, seconds_of
 
-from render.jit import backend
 from render.radiance import SpectralRadiance
+from rodcone.jit import backend
 from sensor.capture import capture, capture_strips
 from sensor.device import draw_device
 from sensor.optics import form_image

@@ -66,7 +66,7 @@ def main() -> None:
 def seconds_of_command(*words: str) -> tuple[float, float]:
     """Seconds of a rodcone command: on the clock, and of the processor in all of its processes."""
     wall, cpu = time.perf_counter(), _children_s()
-    command = "from studies.cli import main; raise SystemExit(main())"
+    command = "from studies.commands.cli import main; raise SystemExit(main())"
     subprocess.run([sys.executable, "-c", command, *words], check=True, stdout=subprocess.DEVNULL)
     return time.perf_counter() - wall, _children_s() - cpu
 

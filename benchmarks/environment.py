@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from render.jit import LIBLLVM, backend, dr
+from rodcone.jit import LIBLLVM, backend, dr
 
 
 def print_environment() -> None:

@@ -14,10 +14,10 @@ from mkdocs.structure.pages import Page
 from mkdocs.utils import get_relative_url
 from run_page import FENCE
 
-from studies.cli import app
+from studies.commands.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("render", "scenes", "sensor", "isp", "studies")
+PACKAGES = ("rodcone", "render", "scenes", "sensor", "isp", "studies")
 FIGURES = ("*", "demo/*", "paper/*", "tutorial/*/*", "how_to/*/*")  # what docs/figures.mk makes
 SHOWN = (".html", ".png", ".svg")
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
@@ -78,8 +78,9 @@ def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
 
 
 def modules(package: str) -> list[str]:
-    """Modules of a package by name."""
-    return sorted(path.stem for path in (ROOT / package).glob("*.py") if path.stem != "__init__")
+    """Modules of a package by their names within it, such as ``capture`` and ``kernel.poisson``."""
+    paths = (path.relative_to(ROOT / package).with_suffix("") for path in (ROOT / package).rglob("*.py"))
+    return sorted(".".join(path.parts) for path in paths if path.stem != "__init__")
 
 
 def summary(path: Path) -> str:
@@ -98,13 +99,13 @@ def decisions_page() -> str:
 def api_page() -> str:
     """List of the packages, in the order in which light goes through them."""
     rows = [f"| [`{name}`]({name}/index.md) | {summary(ROOT / name / '__init__.py')} |" for name in PACKAGES]
-    told = "Imports point one way: `studies > isp > (scenes | sensor) > render`. The commands: [Commands](commands.md)."
+    told = "Imports point one way: `studies > isp > (scenes | sensor) > render > rodcone`. The commands: [Commands](commands.md)."
     return f"# API\n\n{told}\n\n| package | what |\n|---|---|\n" + "\n".join(rows)
 
 
 def package_page(package: str) -> str:
     """List of a package's modules, a line each."""
-    rows = [f"| [`{name}`]({name}.md) | {summary(ROOT / package / f'{name}.py')} |" for name in modules(package)]
+    rows = [f"| [`{name}`]({name}.md) | {summary(ROOT.joinpath(package, *name.split('.')).with_suffix('.py'))} |" for name in modules(package)]
     text = summary(ROOT / package / "__init__.py")
     return f"# {package}\n\n{text}\n\n| module | what |\n|---|---|\n" + "\n".join(rows)
 
@@ -124,8 +125,10 @@ def mathml(latex: str, block: bool) -> str:
 
 def linked(name: str, code: str, url: str) -> str:
     """`code` as a link to the page of the module that `name` begins with; as it is where there is none."""
-    package, module, *rest = name.split(".")
-    if module not in modules(package):
+    package, _, inner = name.partition(".")
+    found = [module for module in modules(package) if f"{inner}.".startswith(f"{module}.")]
+    if not found:
         return code
-    anchor = f"#{name}" if rest else ""
+    module = max(found, key=len)
+    anchor = f"#{name}" if inner != module else ""
     return f'<a href="{get_relative_url(f"api/{package}/{module}.html", url)}{anchor}">{code}</a>'

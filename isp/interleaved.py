@@ -19,7 +19,7 @@ from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Distance, Recon
 from isp.strip_sums import Started, end_rows, start_rows
 from isp.strips import strip_rows
 from isp.tiles import number_tile
-from render.jit import arrays, backend, dr
+from rodcone.jit import arrays, backend, dr
 from sensor.cfa import channels
 from sensor.raw import RawImage
 

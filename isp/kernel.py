@@ -19,7 +19,7 @@ from typing import Any
 from isp.lane_shape import PACKET, Pixel, Shape, entry_length, packet_rows, whole_packets
 from isp.weighted_sums import HEADROOM, add_exactly, add_quickly, at_least, start_sums
 from isp.window_sums import window_sums
-from render.jit import arrays, dr
+from rodcone.jit import arrays, dr
 
 ROOT_SCALE = 2.0**-32  # the product of two scaled distances is finite, whatever they are, and under 1e-19 no number
 

@@ -11,7 +11,7 @@ from isp.lane_shape import PACKET, Shape
 from isp.strips import upload
 from isp.tiles import Pattern, lane_size, tile_grid
 from isp.weighted_sums import HEADROOM
-from render.jit import arrays, dr
+from rodcone.jit import arrays, dr
 from sensor.cfa import channels
 from sensor.raw import RawImage
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.balance import clip_highlights, white_balance
-from isp.colour import BalanceSource
-from isp.colour_fit import ColourFit, relative_noise
+from isp.colour.camera_colour import BalanceSource
+from isp.colour.colour_fit import ColourFit, relative_noise
+from isp.colour.white_balance import clip_highlights, white_balance
 from isp.substitution import matrix_without_white
-from render.errors import InputError
-from render.jit import Backend
-from render.notebook import html_of, preview_png
+from rodcone.errors import InputError
+from rodcone.jit import Backend
+from rodcone.notebook import html_of, preview_png
 from sensor.cfa import channels
 from sensor.raw import RawImage
 

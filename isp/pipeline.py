@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.balance import clip_highlights, white_balance
-from isp.bayer import bilinear
-from isp.colour_fit import ColourFit, relative_noise
+from isp.colour.colour_fit import ColourFit, relative_noise
+from isp.colour.white_balance import clip_highlights, white_balance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, checked_matrix, finish, require_letters
+from isp.processors.bayer import bilinear
 from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S
 from isp.similarity import saturated_fraction
 from isp.substitution import (
@@ -43,8 +43,9 @@ def develop_interleaved(
     raw : RawImage
         Mosaic with R, G, B and W.
     matrix : (3, 3) array_like or ColourFit
-        From balanced R, G, B to linear sRGB (`isp.colour.fit_matrix`). A fit of all channels
-        (`isp.colour_fit.fit_colours`) lets W into the colours where it isn't saturated, as far as the noise asks.
+        From balanced R, G, B to linear sRGB (`isp.colour.camera_colour.fit_matrix`). A fit of all channels
+        (`isp.colour.colour_fit.fit_colours`) lets W into the colours where it isn't saturated, as far as the noise
+        asks.
     neutral : (channel,) array_like, optional
         Calibrated response to a neutral, in the order of `sensor.cfa.channels`: the white balance of pictures that are
         too dark for Gray World. The project's own curves under D65 by default.

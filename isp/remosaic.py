@@ -6,10 +6,10 @@ import numpy as np
 
 from isp.defects import mend
 from isp.interleaved import reconstruct
-from render.errors import InputError
+from rodcone.errors import InputError
 from sensor.cfa import Tile, channels, mask
-from sensor.dng import is_rgbw
 from sensor.raw import RawImage
+from sensor.raw_files.dng import is_rgbw
 
 
 def bayer_tile(tile: Tile) -> Tile:

@@ -6,8 +6,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError, unknown
-from render.jit import Backend
+from rodcone.errors import InputError, unknown
+from rodcone.jit import Backend
 from sensor.cfa import Tile
 
 Distance = Literal["noise", "raw"]

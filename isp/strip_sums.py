@@ -19,7 +19,7 @@ from isp.settings import Settings
 from isp.strips import Strip, centre_groups, crop, decay, make_strip, part_of, plane_groups, upload
 from isp.tiles import Pattern, Work, first_offset, lane_size, list_offsets, sort_tiles
 from isp.weighted_sums import LEAST_WEIGHT
-from render.jit import arrays, dr
+from rodcone.jit import arrays, dr
 from sensor.raw import RawImage
 
 

@@ -16,7 +16,7 @@ from isp.planes import fill, judged_mosaic
 from isp.settings import WINDOW, Settings
 from isp.similarity import reliability, saturated_fraction
 from isp.tiles import Pattern, lane_size
-from render.jit import arrays
+from rodcone.jit import arrays
 from sensor.raw import RawImage
 
 STRIP_BYTES = 600_000_000  # of all that a strip takes: one and a half megapixels of RGBW

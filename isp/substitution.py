@@ -2,15 +2,15 @@
 
 The paper switches. Here the weight falls smoothly with the frame's SNR, so that a sweep over light shows no step; over
 a half counts as on, which is the switch's decision. W is not luminance: what it sees besides is taken out by the matrix
-fitted on surfaces (`isp.colour_fit`), as far as the noise of the colours allows.
+fitted on surfaces (`isp.colour.colour_fit`), as far as the noise of the colours allows.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.colour import luminance_of_srgb
-from isp.colour_fit import ColourFit
-from render.errors import InputError
+from isp.colour.camera_colour import luminance_of_srgb
+from isp.colour.colour_fit import ColourFit
+from rodcone.errors import InputError
 from sensor.cfa import channels
 from sensor.raw import RawImage
 
@@ -84,7 +84,7 @@ def matrix_with_white(matrix: ArrayLike | ColourFit, noise: ArrayLike, weight: f
         With a fit W joins the colours, by weights that minimise the expected error at the noise; a plain matrix leaves
         it out of them, and W as it is gives the luminance.
     noise : (4,) array_like
-        Variance of the balanced channels, as `isp.colour_fit.relative_noise`.
+        Variance of the balanced channels, as `isp.colour.colour_fit.relative_noise`.
     weight : float
         Of `substitution_weight`.
 

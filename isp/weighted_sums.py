@@ -7,7 +7,7 @@ weight met so far.
 
 from typing import Any
 
-from render.jit import arrays, dr
+from rodcone.jit import arrays, dr
 
 HEADROOM = 55.0  # log2: squares of weights, and 16-bit samples times weights, 10^5 of each, stay under 2^127
 LOWEST_EXPONENT = -62.0  # weights end here: their squares are still normal numbers, which all processors treat alike

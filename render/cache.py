@@ -16,11 +16,11 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from render.error_estimates import SharedPaths, relative_error
-from render.jit import compiler_version
 from render.level import PassMeans
 from render.loader import Film, integrator_name, variant
 from render.scene import Node, Scene
 from render.transport import Transport, emission
+from rodcone.jit import compiler_version
 
 ENGINE_VERSION = 4  # raise it with any change that moves a rendered value: older entries are then not used
 _DIGEST_BYTES = hashlib.sha256().digest_size

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from render.cache import load_transport, save_transport
 from render.error_estimates import relative_error
-from render.errors import InputError, require_whole
 from render.limits import Limits
 from render.loader import Film, integrator_name, load_units, samples_drawn, variant
 from render.passes import Sums, add_pass, let_go, no_passes, sums_of
@@ -21,6 +20,7 @@ from render.scene import Scene
 from render.scene_range import check_range, warn_of_own_colours
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from render.transport import Stop, Transport, emission
+from rodcone.errors import InputError, require_whole
 
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError
 from render.spectrum import Floats
+from rodcone.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from render.errors import InputError, require_range, require_whole
 from render.transport import Stop, Transport
+from rodcone.errors import InputError, require_range, require_whole
 
 DEFAULT_SPP = 64
 PASSES = 8  # scatter of fewer passes says little about the error

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.dense import LANES, dense_path
-from render.errors import InputError, one_line
-from render.jit import backend
-from render.matte import matte_surface, with_matte_surfaces
-from render.reflectance_table import band_offsets, reflectance_table, with_rows
-from render.scattered_path import scattered_path
+from render.integrator.dense import LANES, dense_path
+from render.integrator.matte import matte_surface, with_matte_surfaces
+from render.integrator.reflectance_table import band_offsets, reflectance_table, with_rows
+from render.integrator.scattered_path import scattered_path
 from render.scene import EMISSION_PARAMETER, OWN_COLOUR_EMITTERS, Node, Scene, uniform_node
-from render.scene_paths import search_path
 from render.spectrum import Floats, Spectrum
+from render.user_scene.scene_paths import search_path
+from rodcone.errors import InputError, one_line
+from rodcone.jit import backend
 
 METER_PIXELS = 64  # film of the irradiance meter, each side
 
@@ -37,7 +37,7 @@ def variant() -> str:
 @cache
 def mitsuba_module() -> Any:
     """Mitsuba with its variant set and the dense integrator registered."""
-    import mitsuba  # only now: its import loads Dr.Jit, which must find the LLVM that `render.jit` has chosen
+    import mitsuba  # only now: its import loads Dr.Jit, which must find the LLVM that `rodcone.jit` has chosen
 
     mi: Any = mitsuba
     mi.set_variant(variant())

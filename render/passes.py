@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.dense import LANES
 from render.error_estimates import SharedPaths
-from render.errors import InputError, one_line
+from render.integrator.dense import LANES
 from render.level import PassMeans
 from render.loader import PART_BANDS, Film, Loaded, integrators, mitsuba_module, parts, seen_directly, variant
 from render.scene import Scene
 from render.spectrum import Floats
 from render.transport import Transport
+from rodcone.errors import InputError, one_line
 
 Planes = NDArray[np.float32]  # (band, h, w)
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError, require_range
-from render.notebook import XYZ_TO_SRGB, html_of, preview_png
 from render.photometry import luminance, tristimulus
 from render.spectrum import Floats, band_widths
+from rodcone.errors import InputError, require_range
+from rodcone.notebook import XYZ_TO_SRGB, html_of, preview_png
 
 
 @dataclass(frozen=True)

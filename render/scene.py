@@ -6,9 +6,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from render.errors import InputError, one_line, unknown
 from render.optical_constants import optical_constant
 from render.spectrum import Floats, Spectrum
+from rodcone.errors import InputError, one_line, unknown
 
 Node: TypeAlias = dict[str, Any]
 

@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from render.errors import InputError
+from rodcone.errors import InputError
 
 Floats: TypeAlias = NDArray[np.float64]
 

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.error_estimates import SharedPaths, relative_error, within_band_error
-from render.errors import InputError, require_keys, require_range
 from render.illuminants import illuminant
-from render.jit import arrays, backend, dr
 from render.level import Level, PassMeans
-from render.notebook import html_of
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.scene_range import warn_of_dark_ends
 from render.spectrum import Floats, Spectrum
+from rodcone.errors import InputError, require_keys, require_range
+from rodcone.jit import arrays, backend, dr
+from rodcone.notebook import html_of
 
 Stop = Literal["samples", "noise", "seconds", "interrupt"]
 

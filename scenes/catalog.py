@@ -4,8 +4,8 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from render.errors import require_keys, unknown
 from render.scene import Scene
+from rodcone.errors import require_keys, unknown
 from scenes.color_checker import color_checker
 from scenes.cornell_box import cornell_box
 from scenes.flat_field import flat_field

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from render.errors import require_range
 from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Floats, Spectrum
+from rodcone.errors import require_range
 from scenes.materials import matte, panel
 from scenes.reflectances import color_checker as patches
 from scenes.reflectances import grey, held

@@ -1,9 +1,9 @@
 """A grey wall under an even sky: every pixel has the same, known radiance."""
 
-from render.errors import require_range
 from render.geometry import look_at, to_world
 from render.illuminants import illuminant
 from render.scene import LightGroup, Scene
+from rodcone.errors import require_range
 from scenes.materials import matte, panel
 from scenes.reflectances import grey
 

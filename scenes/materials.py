@@ -1,10 +1,10 @@
 """Mitsuba nodes for surfaces and flat shapes, so that each scene reads as a list of things."""
 
-from render.errors import InputError
 from render.geometry import rotate, scale, to_world, translate
 from render.optical_constants import optical_constant
 from render.scene import Node, spectrum_node
 from render.spectrum import Floats, Spectrum
+from rodcone.errors import InputError
 from scenes.reflectances import resampled
 
 

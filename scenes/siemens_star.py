@@ -1,9 +1,9 @@
 """Siemens star: spokes that narrow towards the middle, every spatial frequency in every direction."""
 
-from render.errors import require_whole
 from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Scene
+from rodcone.errors import require_whole
 from scenes.materials import matte, panel, star
 from scenes.reflectances import grey
 

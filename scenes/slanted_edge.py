@@ -1,9 +1,9 @@
 """Slanted edge: the target from which ISO 12233 measures how sharp a camera is."""
 
-from render.errors import require_range
 from render.geometry import look_at, rotate, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Scene
+from rodcone.errors import require_range
 from scenes.materials import matte, panel
 from scenes.reflectances import grey
 

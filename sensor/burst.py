@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError, require_range
 from render.radiance import SpectralRadiance
+from rodcone.errors import InputError, require_range
 from sensor.capture import capture
 from sensor.config import SensorConfig
 from sensor.device import Device

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from render.errors import InputError
 from render.spectrum import Floats
+from rodcone.errors import InputError
 
 
 @dataclass(frozen=True)

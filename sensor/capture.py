@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError
-from render.jit import backend
 from render.radiance import SpectralRadiance
+from rodcone.errors import InputError
+from rodcone.jit import backend
 from sensor.cfa import check_covers
 from sensor.config import SensorConfig
 from sensor.device import Device
-from sensor.lanes import expected_electrons_single, read_frame
+from sensor.kernel.run import expected_electrons_single, read_frame
 from sensor.optics import camera_equation, falloff, form_image, spreads
 from sensor.random import draw_key
 from sensor.raw import RawImage
@@ -32,10 +32,10 @@ def capture(
 ) -> RawImage:
     """Take one exposure: optics, expected electrons, readout.
 
-    With Dr.Jit on LLVM or CUDA all of it runs there: signal in single precision, shot noise as `sensor.poisson` says
-    (exact under 30 e-, distribution function within 5e-6 above). Otherwise, and with `exact`, it is `read_out` of
-    `expected_electrons` of `form_image`, NumPy's exact sampler. The raw image's `engine` names what ran; the forms draw
-    different frames of the same statistics, each always the same one for a seed.
+    With Dr.Jit on LLVM or CUDA all of it runs there: signal in single precision, shot noise as
+    `sensor.kernel.poisson` says (exact under 30 e-, distribution function within 5e-6 above). Otherwise, and with
+    `exact`, it is `read_out` of `expected_electrons` of `form_image`, NumPy's exact sampler. The raw image's `engine`
+    names what ran; the forms draw different frames of the same statistics, each always the same one for a seed.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError, unknown
+from rodcone.errors import InputError, unknown
 
 Tile: TypeAlias = tuple[str, ...]
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from math import ceil, hypot
 from numbers import Real
 
-from render.errors import InputError, require_range, require_whole
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
+from rodcone.errors import InputError, require_range, require_whole
 from sensor.cfa import RGBW, Tile, channels, check_tile
 from sensor.curves import Responses, rgbw
 

@@ -5,9 +5,9 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
-from render.errors import InputError, one_line, require_keys
 from render.spectrum import Spectrum
-from render.toml_file import read_toml
+from rodcone.errors import InputError, one_line, require_keys
+from rodcone.toml_file import read_toml
 from sensor.cfa import Tile, channels, tile_of
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.curves import Responses, built_in, read_csv, read_curve, rgbw

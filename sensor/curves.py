@@ -12,8 +12,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from render.errors import InputError, require_range, unknown
 from render.spectrum import Floats, Spectrum
+from rodcone.errors import InputError, require_range, unknown
 
 # Smooth curves of the project's own: peak * exp(-|(nm - centre) / width|^power), another width and power on each side.
 # Peaks and centres are those of ISETCam's interleaved RGBW sensor; widths and powers were fitted so that electrons per

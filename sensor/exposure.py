@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from render.errors import InputError, require_range, unknown
+from rodcone.errors import InputError, require_range, unknown
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance

@@ -15,10 +15,10 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import expit
 
-from render.errors import InputError, require_range
 from render.illuminants import illuminant
 from render.photometry import colour_matching_functions, photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
+from rodcone.errors import InputError, require_range
 from sensor.curves import Responses
 
 DYES_OPEN_NM, DYES_WIDTH_NM = 760.0, 12.0  # half open, and the logistic's width: 10 to 90 % within 53 nm

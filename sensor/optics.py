@@ -6,10 +6,10 @@ from math import pi, radians, tan
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError, require_whole
 from render.photometry import luminance, photons_per_joule
 from render.radiance import SpectralRadiance, check_values
 from render.spectrum import Floats, band_widths
+from rodcone.errors import InputError, require_whole
 from sensor.config import LensConfig, SensorConfig
 from sensor.diffraction import spread_light
 

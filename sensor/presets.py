@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from render.errors import unknown
+from rodcone.errors import unknown
 from sensor.config import SensorConfig
 from sensor.config_file import read_sensor
 

@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError
+from rodcone.errors import InputError
 
 _U32 = np.uint64(0xFFFFFFFF)
 MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
@@ -27,7 +27,7 @@ class Term(IntEnum):
     COLUMN_GAIN = 5
     COLUMN_OFFSET = 6
     HOT = 7
-    EXPOSURE = 8  # shot and read noise of one pixel together, in `sensor.kernel`
+    EXPOSURE = 8  # shot and read noise of one pixel together, in `sensor.kernel.kernel`
 
 
 def draw_key(rng: np.random.Generator) -> int:

@@ -6,8 +6,8 @@ from math import hypot
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from render.errors import InputError, require_range
-from render.notebook import html_of, preview_png
+from rodcone.errors import InputError, require_range
+from rodcone.notebook import html_of, preview_png
 from sensor.calibration import ColourCalibration
 from sensor.cfa import Tile, channels, check_covers, check_tile
 
@@ -42,8 +42,8 @@ class RawImage:
     colour : ColourCalibration or None
         Of the channels of `cfa`; None for a camera without colours, or one not calibrated.
     engine : str
-        What drew a simulated frame's noise: ``numpy`` (exact), or ``llvm`` or ``cuda`` (`sensor.poisson` states the
-        error); empty where unknown, as for a file of another program.
+        What drew a simulated frame's noise: ``numpy`` (exact), or ``llvm`` or ``cuda``
+        (`sensor.kernel.poisson` states the error); empty where unknown, as for a file of another program.
     column_gain_spread : float
         Standard deviation of the columns' relative gain, in `prnu` too: full pixels of weak columns read less.
     defects : (n, 2) intp, optional

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import InputError, require_range
+from rodcone.errors import InputError, require_range
 from sensor.config import SensorConfig
 from sensor.crosstalk import spread_charge
 from sensor.device import Device

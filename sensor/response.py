@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from render.errors import require_range
 from render.photometry import photons_per_joule
 from render.spectrum import Floats
+from rodcone.errors import require_range
 from sensor.cfa import channels, check_covers, mask
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance

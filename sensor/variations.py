@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from render.errors import unknown
+from rodcone.errors import unknown
 from sensor.cfa import MOSAICS, RGBW, Tile
 from sensor.config import SensorConfig
 from sensor.curves import Responses, built_in

@@ -4,9 +4,9 @@ import warnings
 
 import numpy as np
 
-from render.errors import InputError
 from render.photometry import photons_per_joule
 from render.spectrum import VISIBLE_NM, Floats
+from rodcone.errors import InputError
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from render.errors import unknown
+from rodcone.errors import unknown
 from studies.stress_case import Case, Margin, Measure
 from studies.stress_cases_camera import EXPOSURE_CASES, FRAME_CASES, PIXEL_CASES
 from studies.stress_cases_light import LIGHT_CASES

@@ -8,31 +8,31 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour import fit_matrix, neutral_response
-from isp.colour_fit import ColourFit
+from isp.colour.camera_colour import fit_matrix, neutral_response
+from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
-from isp.processors import PROCESSORS
+from isp.processors.catalogue import PROCESSORS
 from isp.substitution import matrix_with_white
 from render.illuminants import illuminant
-from render.jit import backend
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from rodcone.jit import backend
 from scenes.reflectances import color_checker
 from sensor.capture import capture
 from sensor.cfa import Tile, channels
 from sensor.curves import rgbw
 from sensor.device import draw_device
-from sensor.lanes import expected_electrons_single
+from sensor.kernel.run import expected_electrons_single
 from sensor.optics import camera_equation, falloff, form_image, spreads
 from sensor.presets import low_noise
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance, expected_electrons
-from studies.camera import colour_fit
+from studies.metrics.truth import light_in_bands
+from studies.photograph.camera import colour_fit
 from studies.stress_case import Situation
-from studies.truth import light_in_bands
 
 Image = NDArray[np.float64]
 CAMERAS = ("interleaved", "bayer")
-MOST_E = 1e30  # where the readout holds a mean (sensor.kernel): over any well
+MOST_E = 1e30  # where the readout holds a mean (sensor.kernel.kernel): over any well
 # The fixed settings take W into every picture: what it did wrong would show. Automatic ones decide by the frame.
 FIXED: Mapping[str, float] = MappingProxyType({"substitution_snr": np.inf})
 

@@ -28,9 +28,9 @@ def stress(
     json
         Print every margin as one JSON object instead of the table.
     """
-    from render.files import replacing
-    from render.jit import backend
-    from studies.progress import progress
+    from rodcone.files import replacing
+    from rodcone.jit import backend
+    from rodcone.progress import progress
     from studies.stress import choose, run_cases, unexpected
     from studies.stress_page import as_json, catalogue, page, summary
     from studies.stress_precision import run_stages

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t
 
-from isp.colour import encode_srgb, neutral_response
+from isp.colour.camera_colour import encode_srgb, neutral_response
 from render.radiance import SpectralRadiance
 from sensor.cfa import channels, letter_map
 from sensor.config import BLACK_SIGMAS, SensorConfig

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import poisson
 
-from isp.colour import encode_srgb
+from isp.colour.camera_colour import encode_srgb
 from isp.interleaved import reconstruct
 from isp.planes import LEAST_PRNU, fill, stabilise
 from isp.reference import sum_weights
@@ -22,7 +22,7 @@ from render.transport import emission
 from sensor.cfa import RGBW, channels, letter_map
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device
-from sensor.lanes import expected_electrons_single, read_frame
+from sensor.kernel.run import expected_electrons_single, read_frame
 from sensor.optics import camera_equation, form_image
 from sensor.presets import low_noise
 from sensor.random import Term, philox
@@ -148,7 +148,7 @@ def _read(at: Parameters) -> Found:
 
 
 def _drawn(mean: Image, key: int, read_noise_e: float) -> Image:
-    """`sensor.kernel.read_lanes` in double precision: Box-Muller, and Giles's quantile Q_N2."""
+    """`sensor.kernel.kernel.read_lanes` in double precision: Box-Muller, and Giles's quantile Q_N2."""
     rows, columns = (np.asarray(index, dtype=np.uint64) for index in np.indices(mean.shape))
     words = philox((columns, rows, np.full_like(rows, int(Term.EXPOSURE)), np.zeros_like(rows)), key)
     radius = np.sqrt(-2.0 * np.log((words[0] >> np.uint64(1)).astype(np.float64) * 2.0**-31 + 2.0**-32))

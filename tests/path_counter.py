@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from render import passes
-from render.jit import dr
+from rodcone.jit import dr
 
 
 def count_paths(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:

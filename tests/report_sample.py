@@ -188,7 +188,7 @@ def sample_pictures(results: dict[str, Any]) -> dict[str, bytes]:
 
 
 if __name__ == "__main__":
-    from studies.report import render_report
+    from studies.pages.report import render_report
 
     sample = sample_results()
     Path(sys.argv[1]).write_text(render_report(sample, sample_pictures(sample)), encoding="utf-8")

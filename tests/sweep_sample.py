@@ -4,22 +4,75 @@ import hashlib
 import os
 import sqlite3
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
-from render.exr import write_exr
 from render.radiance import SpectralRadiance
+from render.radiance_files.exr import write_exr
 from sensor.presets import preset
-from studies.cells import Cell
-from studies.ledger import COLUMNS, FILE
-from studies.model import Plan, as_stated
-from studies.row import TIME_AND_HOST, Row
-from studies.study import SceneChoice, Study
-from studies.sweep import Runner, Swept, sweep
-from studies.workers import InThisProcess, run
+from studies.budget.model_plan import Plan, as_stated
+from studies.study.study import SceneChoice, Study
+from studies.sweep.cells import Cell
+from studies.sweep.database import COLUMNS, FILE
+from studies.sweep.row import TIME_AND_HOST, Row
+from studies.sweep.run_sweep import Runner, Swept, sweep
+from studies.sweep.workers import InThisProcess, run
+
+ROW = Row(
+    key="00ff",
+    scene="desk, lit.exr",
+    spectrum="own",
+    level="25cd/m2",
+    exposure="auto",
+    sensor="low_noise",
+    processor="bayer",
+    seed=2**40,
+    luminance_cd_m2=25.0,
+    illuminance_lux=None,
+    exposure_s=0.1 + 0.2,
+    spp=0,
+    bands=10,
+    lens='{"f_number": 2.8}',
+    budget_share=None,
+    psnr_db=float("inf"),
+    ssim=-0.25,
+    delta_e_median=0.0,
+    delta_e_p95=1.5,
+    s_cielab_median=0.5,
+    s_cielab_p95=2.5,
+    flip_mean=0.125,
+    pu21_psnr_db=float("inf"),
+    mtf50_cy_per_px=None,
+    chart_delta_e_mean=None,
+    patch_snr_db=None,
+    mc_share=0.0,
+    snr_db=-3.5,
+    substitution=1,
+    saturated=0.0,
+    balance="{}",
+    mean_electrons="{}",
+    variant="llvm_ad_spectral",
+    readout_engine="numpy",
+    development_engine="llvm",
+    versions='{"numpy": "2.4.6", "rodcone": "0.1.0+abc"}',
+    picture="ab/abcd.png",
+    truth="cd/cdef.png",
+    render_s=1.5,
+    capture_s=0.1,
+    develop_s=0.2,
+    measure_s=0.3,
+    first_s=0.4,
+    threads=2,
+    finished="2026-01-01T00:00:00+00:00",
+    host="here",
+    machine="Linux, Python 3.12.0",
+    worker=1234,
+)
+
+EMPTY: dict[Any, Any] = {str: "", int: 0, float: 0.0}
 
 NM = np.linspace(405.0, 765.0, 10)  # bands of 40 nm
 SIZE = (16, 20)
@@ -75,3 +128,17 @@ def half_pictures(out: Path) -> list[Path]:
 def parts_left(out: Path) -> list[str]:
     """Temporary files that an end left behind among the pictures and frames."""
     return [name for folder, folders, files in os.walk(out) for name in (*folders, *files) if name.startswith(".part")]
+
+
+def row(processor: str, seed: int, **values: Any) -> Row:
+    """A row in which all that is not given is empty."""
+    hints = get_type_hints(Row)
+    plain = {field.name: EMPTY.get(hints[field.name]) for field in fields(Row)}
+    place = {"scene": "desk", "spectrum": "own", "level": "1cd/m2", "exposure": "auto", "sensor": "mine.toml"}
+    return Row(
+        **plain
+        | place
+        | {"mean_electrons": "{}", "versions": '{"rodcone": "0.1.0"}'}
+        | {"processor": processor, "seed": seed}
+        | values
+    )

@@ -11,8 +11,8 @@ from isp.reference import reconstruct_reference, reference_with_noise, sum_weigh
 from isp.settings import SIGMA_D, WINDOW, Settings
 from isp.similarity import noise_distance, saturated_fraction
 from isp.tiles import number_tile, sort_tiles
-from render.errors import InputError
-from render.jit import backend, dr
+from rodcone.errors import InputError
+from rodcone.jit import backend, dr
 from sensor.cfa import BAYER, RGBW, channels, letter_map
 from sensor.raw import RawImage
 

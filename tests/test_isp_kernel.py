@@ -10,8 +10,8 @@ from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.reference import reconstruct_reference, sum_weights
 from isp.settings import Settings
 from isp.similarity import reliability, reliability_of_mean
-from render.errors import InputError
-from render.jit import backend
+from rodcone.errors import InputError
+from rodcone.jit import backend
 from sensor.cfa import BAYER, RGBW, channels, letter_map
 from sensor.raw import RawImage
 

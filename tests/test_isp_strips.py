@@ -14,7 +14,7 @@ from isp.similarity import saturated_fraction, share_of_saturated
 from isp.strip_sums import _around
 from isp.strips import make_strip, strip_rows
 from isp.tiles import lane_size, number_tile
-from render.jit import backend
+from rodcone.jit import backend
 from sensor.cfa import BAYER, RGBW
 from sensor.raw import RawImage
 

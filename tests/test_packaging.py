@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("render", "scenes", "sensor", "isp", "studies")
+PACKAGES = ("rodcone", "render", "scenes", "sensor", "isp", "studies")
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
@@ -58,7 +58,7 @@ def test_the_wheel_says_what_it_needs_and_brings_the_command(archives: tuple[Pat
     assert metadata["Name"] == "rodcone"
     assert metadata["License-Expression"] == "MIT"
     assert metadata["Requires-Python"] == ">=3.11"
-    assert "rodcone = studies.cli:main" in commands
+    assert "rodcone = studies.commands.cli:main" in commands
     (llvm,) = [need for need in metadata.get_all("Requires-Dist", []) if need.startswith("karellen-llvm-core")]
     assert "linux" in llvm, "its wheels are for Linux x86-64: elsewhere the installation must not ask for it"
     assert "x86_64" in llvm

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from render.transport import Transport
-from studies.bench_points import Times
-from studies.row import Row
+from studies.speed.points import Times
+from studies.sweep.row import Row
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / "tests" / name) for name in ("faults", "verification")]

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sensor.characterise import measure, plan_for
 from sensor.config import LensConfig, PixelConfig, SensorConfig
-from sensor.photon_transfer import bench
+from sensor.emva1288.characterise import measure, plan_for
+from sensor.emva1288.photon_transfer import bench
 from sensor.presets import preset
 
 SHAPE = (240, 320)

@@ -15,8 +15,8 @@ import pytest
 import tifffile
 from numpy.typing import NDArray
 
-from isp.bayer import bilinear
-from isp.colour import adapt_to_d65, xyz_to_srgb
+from isp.colour.camera_colour import adapt_to_d65, xyz_to_srgb
+from isp.processors.bayer import bilinear
 from isp.remosaic import remosaic
 from render.illuminants import illuminant
 from render.photometry import tristimulus
@@ -26,10 +26,10 @@ from sensor.cfa import channels, mask
 from sensor.device import draw_device
 from sensor.presets import low_noise, preset
 from sensor.raw import RawImage
-from sensor.raw_files import write_raw
+from sensor.raw_files.raw_file import write_raw
 from sensor.readout import read_out
 from sensor.response import electrons_per_irradiance
-from studies.calibrate import calibrate
+from studies.photograph.calibrate import calibrate
 
 rawpy = pytest.importorskip("rawpy", reason="rawpy (LibRaw) is not installed")
 

@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from fault_catalogue import FAULTS, Fault
 
 ROOT = Path(__file__).resolve().parents[2]
-PARTS = ("render", "scenes", "sensor", "isp", "studies", "tests", "benchmarks", "pyproject.toml")
+PARTS = ("rodcone", "render", "scenes", "sensor", "isp", "studies", "tests", "benchmarks", "pyproject.toml")
 MINUTES = 8  # for one fault's tests
 
 

@@ -13,26 +13,26 @@ import numpy as np
 from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_elements, pages, tiff_tags
 
 from render.cache import load_transport, save_transport
-from render.exr import read_exr, write_exr
-from render.iset import read_iset_scene
 from render.loader import Film, integrator_name, variant
 from render.radiance import SpectralRadiance
-from render.scene_file import load_scene_file
+from render.radiance_files.exr import read_exr, write_exr
+from render.radiance_files.iset import read_iset_scene
+from render.user_scene.scene_file import load_scene_file
 from scenes.catalog import load
 from sensor.calibration import ColourCalibration
 from sensor.config_file import read_sensor
 from sensor.curves import read_csv, read_curve
-from sensor.dng import read_dng
-from sensor.noise_profile import read_noise_profile
-from sensor.photograph import read_photograph
 from sensor.raw import RawImage
-from sensor.raw_files import write_raw
-from sensor.raw_tiff import read_tiff
-from sensor.tiff import CFA, text, write_mosaic
-from studies.export import read_rows
-from studies.ledger import add, open_ledger, want
-from studies.row import Row
-from studies.study_file import read_study
+from sensor.raw_files.dng import read_dng
+from sensor.raw_files.noise_profile import read_noise_profile
+from sensor.raw_files.photograph import read_photograph
+from sensor.raw_files.raw_file import write_raw
+from sensor.raw_files.raw_tiff import read_tiff
+from sensor.raw_files.tiff import CFA, text, write_mosaic
+from studies.study.study_file import read_study
+from studies.sweep.database import add, open_ledger, want
+from studies.sweep.export import read_rows
+from studies.sweep.row import Row
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 

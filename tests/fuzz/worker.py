@@ -15,7 +15,7 @@ from typing import Any
 
 from targets import TARGETS, InputErrorlessRefusal, Sample, Target
 
-from render.errors import MOST_TOLD, InputError
+from rodcone.errors import MOST_TOLD, InputError
 
 MOST_MIB = 256  # of memory over what the process held before
 MOST_CPU_S = 5.0  # of processor time

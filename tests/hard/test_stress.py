@@ -2,7 +2,7 @@
 
 import pytest
 
-from render.jit import backend
+from rodcone.jit import backend
 from studies.stress import CASES, INVARIANTS, LIMITS, OWN, choose, run_case, run_cases, unexpected
 
 needs_kernel = pytest.mark.skipif(backend() == "numpy", reason="without Dr.Jit a case takes minutes")

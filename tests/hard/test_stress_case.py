@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isp.bayer import bilinear
-from render.errors import InputError
-from render.jit import backend
+from isp.processors.bayer import bilinear
+from rodcone.errors import InputError
+from rodcone.jit import backend
 from sensor.cfa import letter_map
 from sensor.raw import RawImage
-from studies.cli import main
+from studies.commands.cli import main
 from studies.stress import CASES, LIMITS, Result, choose, unexpected
 from studies.stress_case import Margin, worse, worst_of
 from studies.stress_page import as_json, catalogue, limits, page, summary

@@ -5,7 +5,7 @@ from math import log10
 import numpy as np
 import pytest
 
-from render.jit import backend
+from rodcone.jit import backend
 from studies.stress_case import Margin
 from studies.stress_precision import Found, Stage, beside_noise, search
 from studies.stress_stages import STAGES

@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 from sweep_sample import content, half_pictures, picture
 
-from studies.ledger import FILE
+from studies.sweep.database import FILE
 
 HERE = Path(__file__).resolve().parent
 CHILD = HERE / "sweep_child.py"

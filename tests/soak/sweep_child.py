@@ -9,8 +9,8 @@ from functools import partial
 
 from sweep_sample import small_study, swept
 
-from render.errors import InputError
-from studies.workers import run_in_processes
+from rodcone.errors import InputError
+from studies.sweep.workers import run_in_processes
 
 PER_SEED = 4  # two levels of two processors
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from render.engine import render
-from render.jit import backend
+from rodcone.jit import backend
 from scenes.catalog import load
 
 FALSE_ALARM, DRAWS = 1e-4, 400_000

@@ -13,9 +13,9 @@ from scipy.stats import t as student
 from render.engine import render
 from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant, lines_nm
-from render.jit import backend
 from render.scene import LightGroup, Scene, spectrum_node
 from render.spectrum import flat, line_bands
+from rodcone.jit import backend
 from scenes.materials import floor, matte, panel
 from scenes.reflectances import band, edge
 

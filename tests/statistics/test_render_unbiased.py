@@ -16,10 +16,10 @@ from scipy.stats import t as student
 from render.engine import render
 from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant, lines_nm
-from render.jit import backend
 from render.loader import mitsuba_module
 from render.scene import LightGroup, Scene
 from render.spectrum import Spectrum, line_bands
+from rodcone.jit import backend
 from scenes.catalog import load
 from scenes.materials import ball, disk, floor, glass, matte, panel
 from scenes.reflectances import band, edge, grey

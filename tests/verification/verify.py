@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-CODE = ("render", "scenes", "sensor", "isp", "studies", "tests", "benchmarks")
+CODE = ("rodcone", "render", "scenes", "sensor", "isp", "studies", "tests", "benchmarks")
 RESULTS = ROOT / "out" / "verify.json"
 FUZZED = ROOT / "out" / "fuzz" / "counts.json"
 FUZZ_INPUTS, FUZZ_AT_ONCE_S = 1_000_000, 300  # to be tried in total; between two looks at the count
@@ -46,7 +46,9 @@ def slow_tests(file: str) -> Found:
 
 
 def hard_cases() -> Found:
-    code, said = command("-c", "from studies.cli import main; raise SystemExit(main())", "stress", "-o", "out/stress")
+    code, said = command(
+        "-c", "from studies.commands.cli import main; raise SystemExit(main())", "stress", "-o", "out/stress"
+    )
     counted = re.search(r"\d+ cases, \d+ invariants measured:[^\n]*", said)
     return code == 0, counted[0] if counted else said[-300:]
 

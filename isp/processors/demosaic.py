@@ -1,0 +1,83 @@
+"""Bayer opponents that carry detail between colours: Malvar's linear filters and Menon's directional ones.
+
+Both from the library `colour-demosaicing`:
+H. S. Malvar, L.-W. He, R. Cutler, "High-quality linear interpolation for demosaicing of Bayer-patterned color images",
+ICASSP 2004; D. Menon, S. Andriani, G. Calvagno, "Demosaicing with directional filtering and a posteriori decision",
+IEEE Trans. Image Process. 16(1), 2007.
+
+Ours is what stands around: the mosaic is balanced first (`isp.processors.mosaic`), and reflected about its outermost
+pixels, which keeps the phase of the tile. The library's own border repeats the outermost pixel and so puts a colour
+where another belongs.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from isp.picture import Picture
+from isp.planes import Plane
+from isp.processors.mosaic import Image, as_picture, balance_mosaic, to_rgb
+from rodcone.errors import InputError
+from rodcone.optional import optional_library
+from sensor.cfa import Tile
+from sensor.raw import RawImage
+from sensor.raw_files.dng import is_bayer
+
+EXTRA = "opponents"
+# Pixels that a value depends on along one axis. Malvar's filters are 5 wide. Menon's take 2 for a green, 2 more for
+# its difference and 2 for the decision, 2 for R and B, and 4 in the refinement that follows.
+MALVAR_REACH, MENON_REACH = 2, 12
+
+
+def malvar(mosaic: Plane, cfa: Tile) -> Image:
+    """Planes of R, G and B by Malvar's 5x5 filters, shape (h, w, 3).
+
+    Parameters
+    ----------
+    mosaic : (h, w) float64
+        Balanced.
+
+    Raises
+    ------
+    InputError
+        For a tile that isn't Bayer's, or without `colour-demosaicing`.
+    """
+    return _demosaic("demosaicing_CFA_Bayer_Malvar2004", mosaic, cfa, MALVAR_REACH)
+
+
+def menon(mosaic: Plane, cfa: Tile) -> Image:
+    """Planes of R, G and B by Menon's directional filters with refinement, shape (h, w, 3); as `malvar`."""
+    return _demosaic("demosaicing_CFA_Bayer_Menon2007", mosaic, cfa, MENON_REACH)
+
+
+def picture_malvar(
+    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
+) -> Picture:
+    """Develop a Bayer raw image with Malvar's demosaicking; parameters as `isp.pipeline.develop_bayer`."""
+    require_bayer(raw.cfa)
+    mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
+    rgb = to_rgb(raw, malvar(mosaic.values, raw.cfa), matrix, MALVAR_REACH)
+    return as_picture(raw, rgb, mosaic.balance)
+
+
+def picture_menon(
+    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
+) -> Picture:
+    """Develop a Bayer raw image with Menon's demosaicking; parameters as `isp.pipeline.develop_bayer`."""
+    require_bayer(raw.cfa)
+    mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
+    rgb = to_rgb(raw, menon(mosaic.values, raw.cfa), matrix, MALVAR_REACH)
+    return as_picture(raw, rgb, mosaic.balance)
+
+
+def require_bayer(cfa: Tile) -> None:
+    """Raise `InputError` unless the tile is one of Bayer's four phases."""
+    if not is_bayer(cfa):
+        raise InputError(f"raw: mosaic {cfa} is not Bayer; allowed here: {('RG', 'GB')} in any phase; use another isp")
+
+
+def _demosaic(function: str, mosaic: Plane, cfa: Tile, reach: int) -> Image:
+    require_bayer(cfa)
+    pad = reach + reach % 2  # whole tiles: the pattern stays what it is
+    library = optional_library("colour_demosaicing", EXTRA)
+    planes = getattr(library, function)(np.pad(mosaic, pad, mode="reflect"), "".join(cfa))
+    return np.asarray(planes, dtype=np.float64)[pad:-pad, pad:-pad]

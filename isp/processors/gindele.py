@@ -1,0 +1,87 @@
+"""RGBW prior art that recovers colours where W is full: Gindele & Gallagher 2002, on Adams' demosaicking.
+
+E. B. Gindele, A. C. Gallagher, "Sparsely sampled image sensing device with color and luminance photosites", US patent
+6 476 865, 2002. Taken, from its claims: R, G, B and luminance sites in equal numbers; missing colours come by a first
+interpolation that uses the neighbouring luminance values where these aren't clipped, and by a second that doesn't where
+they are.
+
+The first interpolation follows J. E. Adams and J. F. Hamilton (US patent 5 629 734, 1997): along the direction of the
+smaller gradient, with a Laplacian of the site's own colour; then differences of each colour from luminance. Ours: the
+balance before, the two steps in which W's quarter of the sites is filled (diagonals first), ties averaged, and bilinear
+interpolation by normalised convolution as the second.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from isp.colour.white_balance import saturated_nearby
+from isp.picture import Picture, require_letters
+from isp.planes import Plane, fill
+from isp.processors.fusion import LETTERS
+from isp.processors.mosaic import Image, as_picture, balance_mosaic, to_rgb
+from rodcone.errors import InputError
+from sensor.cfa import Tile, mask
+from sensor.raw import RawImage
+from sensor.raw_files.dng import is_rgbw
+
+_PAD = 4  # two steps of two pixels each, in whole tiles
+REACH = 3  # pixels: two for W at a colour's site, one more for the difference
+_DIAGONALS = ((1, 1), (1, -1))
+_AXES = ((0, 1), (1, 0))
+
+
+def picture_gindele(
+    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
+) -> Picture:
+    """Develop a 2x2 RGBW raw image; parameters as `isp.pipeline.develop_interleaved`."""
+    require_letters(raw, LETTERS)
+    mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
+    clipped = saturated_nearby(raw, "W", REACH)[..., None]
+    planes = np.where(clipped, _alone(mosaic.values, raw.cfa), adams_planes(mosaic.values, raw.cfa))
+    return as_picture(raw, to_rgb(raw, planes, matrix, REACH), mosaic.balance)
+
+
+def adams_planes(mosaic: Plane, cfa: Tile) -> Image:
+    """First interpolation: R, G and B through W, shape (h, w, 3) [as `mosaic`, which is balanced].
+
+    Raises
+    ------
+    InputError
+        Where the tile isn't 2x2 with R, G, B and W once each.
+    """
+    white = luminance_plane(mosaic, cfa)
+    return np.stack([white + fill(mosaic - white, cfa, letter) for letter in "RGB"], axis=-1)
+
+
+def luminance_plane(mosaic: Plane, cfa: Tile) -> Plane:
+    """W everywhere, along the smaller gradient: first at the sites diagonal to W's, then at those beside them."""
+    if not is_rgbw(cfa):
+        raise InputError(f"cfa: {cfa} is not 2x2 RGBW; allowed here: R, G, B and W once each; use another isp")
+    padded = np.pad(mosaic, _PAD, mode="reflect")
+    row, column = divmod("".join(cfa).index("W"), 2)
+    opposite = mask(cfa, cfa[1 - row][1 - column], (padded.shape[0], padded.shape[1]))
+    sampled = mask(cfa, "W", (padded.shape[0], padded.shape[1]))
+    white = np.where(opposite, _along_smaller_gradient(padded, padded, _DIAGONALS), padded)
+    white = np.where(sampled | opposite, white, _along_smaller_gradient(white, padded, _AXES))
+    return white[_PAD:-_PAD, _PAD:-_PAD]
+
+
+def _along_smaller_gradient(white: Plane, own: Plane, directions: tuple[tuple[int, int], ...]) -> Plane:
+    """Mean of the two neighbours in `white`, corrected by a quarter of the own colour's Laplacian.
+
+    Adams & Hamilton's classifier: difference of the neighbours plus the Laplacian's size.
+    """
+    estimates, classifiers = [], []
+    for down, right in directions:
+        before, after = (np.roll(white, (sign * down, sign * right), (0, 1)) for sign in (1, -1))
+        laplacian = 2 * own - sum(np.roll(own, (2 * sign * down, 2 * sign * right), (0, 1)) for sign in (1, -1))
+        estimates.append((before + after) / 2 + laplacian / 4)
+        classifiers.append(np.abs(before - after) + np.abs(laplacian))
+    first, second = estimates
+    smaller = np.where(classifiers[0] < classifiers[1], first, second)
+    return np.where(classifiers[0] == classifiers[1], (first + second) / 2, smaller)
+
+
+def _alone(mosaic: Plane, cfa: Tile) -> Image:
+    """Second interpolation: each colour from its own samples."""
+    return np.stack([fill(mosaic, cfa, letter) for letter in "RGB"], axis=-1)

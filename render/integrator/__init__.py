@@ -1,0 +1,1 @@
+"""All wavelength bands along one light path."""

@@ -1,0 +1,107 @@
+"""A Lambertian surface for the dense path: its reflectance is looked up once for value, density and sample.
+
+Looking up reflectance is most of what a band costs. Mitsuba's ``twosided`` evaluates front and back, and each of them
+reflectance twice, once for the light's direction and once for the sampled one: eight table look-ups a wavelength, where
+two do, and none where the reflectance of all bands is read from a table (`render.integrator.reflectance_table`).
+"""
+
+from typing import Any
+
+from render.integrator.reflectance_table import TableReader
+from render.scene import Node
+from rodcone.jit import dr
+
+
+def matte_surface(mi: Any) -> Any:
+    """Build the BSDF class for the variant that is set; register it as ``matte``.
+
+    Properties of the plug-in: ``reflectance`` (a texture), ``twosided``; where its reflectance stands in the table also
+    ``row``, and for a checkerboard ``other_row`` and ``which``, a texture that is 1 where the other row holds.
+    """
+
+    class Matte(mi.BSDF):  # type: ignore[misc]
+        def __init__(self, props: Any) -> None:
+            super().__init__(props)
+            self.reflectance = props.get_texture("reflectance")
+            self.twosided = bool(props.get("twosided", False))
+            # As data of the surface: written into the code, each would be compiled apart.
+            self.row = dr.opaque(mi.UInt32, int(props["row"])) if "row" in props else None
+            self.other_row, self.which = None, None
+            if "which" in props:
+                self.other_row, self.which = dr.opaque(mi.UInt32, int(props["other_row"])), props["which"]
+            sides = mi.BSDFFlags.FrontSide | (mi.BSDFFlags.BackSide if self.twosided else mi.BSDFFlags.Empty)
+            self.m_components = [mi.BSDFFlags.DiffuseReflection | sides]
+            self.m_flags = self.m_components[0]
+
+        def scatter_bands(
+            self, si: Any, towards_light: Any, angle: Any, wavelengths: list[Any], table: TableReader | None, step: Any
+        ) -> tuple[list[Any], Any, Any, list[Any]]:
+            """Value and density towards a light; a sampled direction and its weights; at all wavelengths."""
+            density = _density(si.wi, towards_light, self.twosided)
+            sample, weights = self.sample_bands(si, angle, wavelengths, table, step)
+            return [weight * density for weight in weights], density, sample, weights
+
+        def sample_bands(
+            self, si: Any, angle: Any, wavelengths: list[Any], table: TableReader | None, step: Any
+        ) -> tuple[Any, list[Any]]:
+            """Give a sampled direction and its weights, which are the reflectance."""
+            sample = _sampled(mi, si.wi, angle, self.twosided)
+            if self.row is not None and table is not None:
+                return sample, table.read(_row_at(self, si), step, sample.pdf > 0)
+            weights = []
+            for group in wavelengths:
+                si.wavelengths = group
+                weights.append(self.reflectance.eval(si) & (sample.pdf > 0))
+            return sample, weights
+
+        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
+            sample = _sampled(mi, si.wi, sample2, self.twosided)
+            return sample, self.reflectance.eval(si, active) & (active & (sample.pdf > 0))
+
+        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.reflectance.eval(si, active) * _density(si.wi, wo, self.twosided)
+
+        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return _density(si.wi, wo, self.twosided)
+
+    return Matte
+
+
+def _row_at(surface: Any, si: Any) -> Any:
+    if surface.which is None:
+        return surface.row
+    return dr.select(surface.which.eval(si)[0] > 0.5, surface.other_row, surface.row)
+
+
+def _density(wi: Any, wo: Any, twosided: bool) -> Any:
+    """Cosine over pi where both directions are on the same, open side: BRDF times cosine for a reflectance of 1."""
+    lit = wi.z * wo.z > 0 if twosided else (wi.z > 0) & (wo.z > 0)
+    return dr.select(lit, dr.abs(wo.z) * dr.inv_pi, 0.0)
+
+
+def _sampled(mi: Any, wi: Any, angle: Any, twosided: bool) -> Any:
+    sample = dr.zeros(mi.BSDFSample3f)
+    sample.wo = mi.warp.square_to_cosine_hemisphere(angle)
+    if twosided:
+        sample.wo.z = dr.select(wi.z < 0, -sample.wo.z, sample.wo.z)
+    sample.pdf = _density(wi, sample.wo, twosided)
+    sample.eta = 1.0
+    sample.sampled_type = mi.UInt32(+mi.BSDFFlags.DiffuseReflection)
+    return sample
+
+
+def with_matte_surfaces(node: Node) -> Node:
+    """Copy of a scene's dict in which Lambertian surfaces, one- or two-sided, are ``matte``."""
+    return {key: _as_matte(value) if isinstance(value, dict) else value for key, value in node.items()}
+
+
+def _as_matte(node: Node) -> Node:
+    if node.get("type") == "diffuse" and isinstance(node.get("reflectance"), dict):
+        return {**node, "type": "matte"}
+    inner = [key for key, value in node.items() if isinstance(value, dict)]
+    if node.get("type") == "twosided" and len(inner) == 1:
+        surface = _as_matte(node[inner[0]])
+        if surface["type"] == "matte":
+            kept = {key: value for key, value in node.items() if key not in ("type", inner[0])}
+            return {**surface, **kept, "twosided": True}
+    return with_matte_surfaces(node)

@@ -1,0 +1,1 @@
+"""Spectral radiance as files: OpenEXR and ISETCam's ``.mat``."""

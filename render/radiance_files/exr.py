@@ -1,0 +1,200 @@
+"""Spectral OpenEXR files: absolute radiance in float32, with a preview that any viewer shows. Layout: `exr_layout`."""
+
+import contextlib
+import errno
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from render.photometry import tristimulus
+from render.radiance import SpectralRadiance
+from render.radiance_files.exr_layout import (
+    BANDS,
+    LAYOUT_UNITS,
+    OWN_UNITS,
+    TRUE_UNITS,
+    UNITS,
+    VERSION,
+    channel_name,
+    check_units,
+    radiance_channels,
+    read_bands,
+    write_bands,
+)
+from render.radiance_files.file_checks import MOST_EXPANSION, require_extent, require_file
+from rodcone.errors import InputError, one_line
+from rodcone.files import replacing
+
+ERROR, SCENE, PREVIEW = "rodconeRelativeMcError", "rodconeScene", "rodconePreview"
+PREVIEW_PERCENTILE, PREVIEW_AT = 99.0, 0.9
+PREVIEW_TEXT = (
+    "R, G, B: linear sRGB (Rec. 709, D65) of CIE 1931 XYZ, cut at 0 and 65504, not adapted to the light; "
+    "1 is whiteLuminance cd/m^2, of which the 99th percentile of luminance reaches 0.9"
+)
+_MAGIC = b"\x76\x2f\x31\x01"
+_XYZ_TO_SRGB = np.array(  # IEC 61966-2-1
+    [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
+)
+_HALF_MAX, _FLOAT = 65504.0, np.finfo(np.float32)
+MOST_TILE_BYTES = 64 << 20  # of one tile, however small the file: 1024 x 1024 pixels in 16 channels
+
+
+def write_exr(path: str | Path, radiance: SpectralRadiance, *, scene: str = "") -> None:
+    """Write radiance as a spectral OpenEXR file; it appears whole or not at all.
+
+    Channels are float32 with lossless PIZ compression; there are no half floats, since absolute radiance at night is
+    under their least number. float32 radiance, band centres and widths read back bit by bit.
+
+    Parameters
+    ----------
+    path : path
+    radiance : SpectralRadiance
+        Values of float64 are rounded to float32: those under 1e-45 become 0.
+    scene : str
+        Name to keep with the picture.
+
+    Raises
+    ------
+    InputError
+        For a value over float32's 3.4e38, a wavelength outside 1-9999 nm, or centres less than 1e-6 nm apart.
+    OSError
+        Where the file can't be written.
+    """
+    path = Path(path)
+    if radiance.values.max() > _FLOAT.max:
+        raise InputError(f"{path}: radiance {radiance.values.max():g} is over float32's {_FLOAT.max:g}; scale it down")
+    names = [channel_name(nm) for nm in radiance.wavelength_nm]
+    if len(set(names)) < len(names):
+        raise InputError(f"{path}: band centres less than 1e-6 nm apart have no names of their own; merge those bands")
+    preview, white_cd_m2 = _preview(radiance)
+    channels = {
+        name: np.ascontiguousarray(radiance.values[:, :, band], dtype=np.float32) for band, name in enumerate(names)
+    }
+    channels |= {name: np.ascontiguousarray(preview[:, :, k]) for k, name in enumerate("RGB")}
+    header = {
+        "compression": OpenEXR.PIZ_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "spectralLayoutVersion": VERSION,
+        UNITS: LAYOUT_UNITS,
+        OWN_UNITS: TRUE_UNITS,
+        BANDS: write_bands(radiance.wavelength_nm, radiance.widths_nm),
+        ERROR: repr(float(radiance.relative_mc_error)),
+        "whiteLuminance": white_cd_m2,
+        PREVIEW: PREVIEW_TEXT,
+        **({SCENE: scene} if scene else {}),
+    }
+    _write_whole(path, header, channels)
+
+
+def _write_whole(path: Path, header: dict[str, Any], channels: dict[str, NDArray[np.float32]]) -> None:
+    """Write beside the place and move there."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as (place,):
+        try:
+            OpenEXR.File(header, channels).write(str(place))
+        except RuntimeError as error:
+            raise OSError(errno.EIO, one_line(error), str(path)) from error
+
+
+def _preview(radiance: SpectralRadiance) -> tuple[NDArray[np.float32], float]:
+    """Linear sRGB (h, w, 3), and the luminance [cd m^-2] that reads 1 in it."""
+    xyz = tristimulus(radiance.values, radiance.wavelength_nm, radiance.widths_nm)
+    white = float(np.percentile(xyz[:, :, 1], PREVIEW_PERCENTILE)) / PREVIEW_AT or 1.0
+    white = float(np.clip(white, _FLOAT.tiny, _FLOAT.max))
+    return np.clip(xyz / white @ _XYZ_TO_SRGB.T, 0.0, _HALF_MAX).astype(np.float32), white
+
+
+def read_exr(path: str | Path) -> SpectralRadiance:
+    """Read radiance from a spectral OpenEXR file, rodcone's own or another program's.
+
+    Any S0 channels in any order, in wavelengths or frequencies, in half or float, with or without a preview. What has
+    to be assumed is told by a `UserWarning`. Polarisation (S1 to S3) is left out: S0 is the radiance. Of a picture
+    that is smaller than its frame the part that is there is read.
+
+    Parameters
+    ----------
+    path : path
+        File of at most 32768 pixels a side, 4096 channels and 8 GiB of pixels.
+
+    Returns
+    -------
+    SpectralRadiance
+        float32, (h, w, band) over band-planar memory.
+
+    Raises
+    ------
+    InputError
+        Where there is no file, no spectral OpenEXR in it, it holds reflectances, deep data, several parts or subsampled
+        channels, its size is over the limits, it is damaged, or a value is negative or not finite.
+    """
+    path = Path(path)
+    size = require_file(path)
+    try:
+        header = _part(path, header_only=True).header
+        bands = radiance_channels(channel.name for channel in header["channels"])
+        check_units(header, bands)
+        centres, widths = read_bands(bands, header)
+        error = float(header.get(ERROR, 0.0))
+        height, width = _extent(header, size)
+        planes = _planes(path, list(bands), (height, width))
+        return SpectralRadiance(np.moveaxis(planes, 0, -1), centres, error, widths)
+    except InputError as refused:
+        raise InputError(f"{path}: {refused}") from None
+    except (KeyError, TypeError, ValueError, OverflowError) as wrong:
+        raise InputError(f"{path}: its header is damaged: {wrong}; save it again") from wrong
+
+
+def _extent(header: dict[str, Any], file_bytes: int) -> tuple[int, int]:
+    """Height and width, once memory for all channels may be taken."""
+    kind, channels = header["type"], header["channels"]
+    if kind not in (OpenEXR.scanlineimage, OpenEXR.tiledimage):
+        raise InputError(f"it holds deep data ({kind}); allowed: one value a pixel; flatten it")
+    if any((channel.xSampling, channel.ySampling) != (1, 1) for channel in channels):
+        raise InputError("it has subsampled channels; allowed: a value for every pixel; save it at full resolution")
+    (left, top), (right, bottom) = ([int(n) for n in corner] for corner in header["dataWindow"])
+    height, width = bottom - top + 1, right - left + 1
+    needed = require_extent(height, width, len(channels))
+    if needed > MOST_EXPANSION * file_bytes:
+        raise InputError(f"{file_bytes} bytes can't hold the {needed} bytes of pixels that it declares; save it again")
+    if kind == OpenEXR.tiledimage:  # the library takes a whole tile's memory, however small the picture
+        across, down = int(header["tiles"].xSize), int(header["tiles"].ySize)
+        if across * down * len(channels) * _FLOAT.dtype.itemsize > max(MOST_TILE_BYTES, MOST_EXPANSION * file_bytes):
+            raise InputError(f"its tiles have {across} x {down} pixels, far more than it holds; save it again")
+    return height, width
+
+
+def _planes(path: Path, names: list[str], shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Pixels of the named channels, shape (band, h, w)."""
+    channels = _part(path, header_only=False).channels
+    planes = np.empty((len(names), *shape), dtype=np.float32)
+    for plane, name in zip(planes, names, strict=True):
+        pixels = channels.pop(name).pixels  # let go of one by one
+        if pixels.dtype not in (np.float16, np.float32) or pixels.shape != shape:
+            raise InputError(
+                f"channel {name!r} is {pixels.dtype} of {pixels.shape}; allowed: half or float; convert it"
+            )
+        plane[:] = pixels
+    return planes
+
+
+def _part(path: Path, *, header_only: bool) -> Any:
+    """Read the file's one part through the library, which raises many kinds, or prints why and gives no part."""
+    with path.open("rb") as file:
+        if file.read(4) != _MAGIC:
+            raise InputError("it is no OpenEXR file; allowed: spectral OpenEXR; convert it")
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said):
+            parts = OpenEXR.File(str(path), separate_channels=True, header_only=header_only).parts
+    except Exception as error:
+        raise InputError(f"OpenEXR can't read it: {one_line(error)}; save it again") from error
+    if not parts:  # printed as "Warning: ... for part 0 - reason"
+        reason = " ".join(said.getvalue().rpartition(" - ")[2].split())
+        raise InputError(f"OpenEXR can't read it: {reason}; save it again")
+    if len(parts) > 1:
+        raise InputError(f"it has {len(parts)} parts; allowed: one; save the spectral one by itself")
+    return parts[0]

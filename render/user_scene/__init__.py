@@ -1,0 +1,1 @@
+"""Scenes from outside: Mitsuba files, checked before anything in them is instantiated."""

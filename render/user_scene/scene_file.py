@@ -1,0 +1,146 @@
+"""A user's own scene as Mitsuba XML, checked before anything in it is instantiated."""
+
+import os
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from render.geometry import to_world
+from render.loader import mitsuba_module
+from render.scene import Node
+from render.user_scene.allowed_plugins import require_allowed
+from render.user_scene.scene_dict import RESERVED, inline_spectrum
+from render.user_scene.scene_lights import reason
+from render.user_scene.scene_parts import SceneFile, assemble
+from render.user_scene.scene_paths import find_file, screen, search_path
+from rodcone.errors import InputError, unknown
+
+
+def load_scene_file(path: str | Path, *, trust: bool = False, extend: str | None = None) -> SceneFile:
+    """Read a Mitsuba XML scene.
+
+    A Mitsuba scene can load native code. So it is read without Mitsuba first, then by Mitsuba's parser, which
+    instantiates nothing; every plug-in has to be one of Mitsuba's own, every file has to lie in the scene's folder.
+    RGB colours are upsampled to spectra by Mitsuba. Films, samplers and integrators are left out: the engine brings
+    its own, and the film gives the size.
+
+    Parameters
+    ----------
+    path : path
+    trust : bool
+        Lets the scene name folders, plug-ins of its own and files anywhere. Its native code then runs.
+    extend : "hold", optional
+        As of `Scene`: surfaces go on at their end values outside their tables.
+
+    Returns
+    -------
+    SceneFile
+        Scene, size of its film, and what was left out.
+
+    Raises
+    ------
+    InputError
+        For a missing or malformed file (with its line), a refused plug-in or file, a scene without light or camera.
+    """
+    file = Path(os.path.realpath(path))
+    if not file.is_file():
+        raise InputError(f"scene file: {str(path)!r} is missing or no file; give the path of a Mitsuba .xml scene")
+    folder = None if trust else file.parent
+    screen(file, folder)
+    mi = mitsuba_module()
+    state = _parse(mi, file, trust)
+    # A trusted scene's <path> folders are on Mitsuba's search path by now.
+    searched = [Path(str(place)) for place in mi.file_resolver()] if trust else [file.parent]
+    return assemble(mi, file.stem, _from_xml(mi, state, searched, folder), extend)
+
+
+def _parse(mi: Any, file: Path, trust: bool) -> Any:
+    """Mitsuba's parser state. The scene's folder is on the search path only while no plug-in is loaded."""
+    kept, config = search_path(mi), mi.parser.ParserConfig(mi.variant())
+    mi.set_file_resolver(search_path(mi, file.parent))
+    try:
+        state = mi.parser.parse_file(config, str(file))
+        mi.parser.transform_upgrade(config, state)
+    except RuntimeError as error:
+        raise InputError(f"{reason(error)}; correct the file") from None
+    except UnicodeDecodeError:  # of an error that quotes a half of a letter, or a file of spectra
+        raise InputError(f"{file}: Mitsuba can't read it, nor say why in UTF-8; correct the file") from None
+    finally:
+        if not trust:
+            mi.set_file_resolver(kept)
+    return state
+
+
+def _from_xml(mi: Any, state: Any, searched: list[Path], folder: Path | None) -> Node:
+    """Nested dict of a parsed scene: every part is checked before they are put together."""
+    nodes, index_of = list(state.nodes), state.id_to_index
+    if nodes[0].props.plugin_name() != "scene":
+        raise InputError(f"{state.files[0]}: its root is {nodes[0].props.plugin_name()!r}; allowed: <scene>")
+    parts = []
+    for node in nodes:
+        try:
+            parts.append(_xml_part(node, nodes, index_of, searched, folder))
+        except InputError as error:
+            raise InputError(f"{mi.parser.file_location(state, node)}: {error}") from None
+    numbers: Counter[str] = Counter()
+    for part, node in zip(parts, nodes, strict=True):
+        for key, value in node.props.items():
+            if node.props.type(key).name == "ResolvedReference":
+                child, tag = parts[value.index()], nodes[value.index()].type.name.lower()
+                own = child.get("id", "" if key.startswith("_arg_") else key)
+                part[_key(part, index_of, numbers, own if part is parts[0] else key, tag)] = child
+    return parts[0]
+
+
+def _xml_part(
+    node: Any, nodes: list[Any], index_of: Mapping[str, int], searched: list[Path], folder: Path | None
+) -> Node:
+    """One node of a parsed scene without its children."""
+    properties = node.props
+    if folder is not None:
+        require_allowed(properties.plugin_name(), node.type.name.lower())
+    result: Node = {"type": properties.plugin_name()}
+    if properties.id():
+        result["id"] = properties.id()
+    for name, value in properties.items():
+        key, kind = RESERVED.sub("_", name), properties.type(name).name
+        if key in ("type", "id") or key in result:
+            raise InputError(f"property name {name!r} is not allowed here; rename it")
+        if kind == "Reference":
+            if value.id() not in index_of:
+                raise unknown("ref", value.id(), index_of)
+            target = nodes[index_of[value.id()]]  # an <alias> has no node of its own
+            result[key] = {"type": "ref", "id": target.props.id()}
+        elif kind == "String" and key == "filename":
+            result[key] = str(find_file(value, searched, folder))
+        elif kind != "ResolvedReference":
+            result[key] = _xml_value(kind, value)
+    return result
+
+
+def _key(taken: Node, ids: Mapping[str, int], numbers: Counter[str], wanted: str, tag: str) -> str:
+    """Key of a part: the name wanted, else its kind; without separators of paths, numbered where a part has it."""
+    own = RESERVED.sub("_", wanted) or tag
+    name = own if wanted else ""
+    while not name or name in taken or (name != wanted and name in ids):
+        name = f"{own}_{numbers[own]}"
+        numbers[own] += 1
+    return name
+
+
+def _xml_value(kind: str, value: Any) -> Any:
+    if kind == "Transform":
+        matrix = np.array(value.matrix, dtype=np.float64)
+        if not np.all(np.isfinite(matrix)):
+            raise InputError("a transform is not finite; allowed: finite numbers, a scale other than 0; correct it")
+        return to_world(matrix)
+    if kind == "Color":
+        return {"type": "rgb", "value": [float(x) for x in value]}
+    if kind == "Vector":
+        return [float(x) for x in value]
+    if kind == "Spectrum":
+        return inline_spectrum(value.wavelengths, value.values)
+    return value

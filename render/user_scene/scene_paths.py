@@ -1,0 +1,184 @@
+"""Reading a scene's XML before Mitsuba does, and the files that a scene may name.
+
+Mitsuba's parser acts while it reads: ``<path>`` adds a folder from which plug-ins are loaded, ``<include>`` and
+``<spectrum filename>`` open files, ``$parameters`` multiply text, and deep nesting ends the process. So expat, which
+only reads, goes first.
+"""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NoReturn
+from xml.parsers import expat
+
+from rodcone.errors import InputError
+
+# Far above any scene written by hand or by an exporter, far under what ends the process: Mitsuba 3.9 dies at 100 000
+# nested elements.
+MOST_NESTED = 64
+MOST_FILES = 200
+MOST_BYTES = 64 << 20
+MOST_SUBSTITUTED = 10_000_000  # characters that $parameters may add
+TRUST = "if you trust the scene, trust=True or --trust-scene"
+
+
+def find_file(name: str, searched: list[Path], folder: Path | None) -> Path:
+    """Path of a file that a scene names, links not followed: what is named in it is looked for beside the link.
+
+    Parameters
+    ----------
+    name : str
+    searched : list of Path
+        Folders in which a relative name is looked for, in this order.
+    folder : Path or None
+        The file has to lie inside it, links followed; None allows any place.
+
+    Raises
+    ------
+    InputError
+        For a file outside the folder, a missing one, or what isn't a plain file.
+    """
+    if not name or "\0" in name:
+        raise InputError(f"file {name!r} is not allowed; name a file in the scene's folder")
+    candidates = [str(base / name) for base in searched]
+    chosen = next(filter(os.path.exists, candidates), candidates[0])
+    if folder is not None and not Path(os.path.realpath(chosen)).is_relative_to(os.path.realpath(folder)):
+        raise InputError(f"file {name!r} lies outside the scene's folder; move it there, or, {TRUST}")
+    if not os.path.exists(chosen):
+        places = ", ".join(map(str, searched))
+        raise InputError(f"file {name!r} is missing in {places}; put it there or correct the name")
+    if not os.path.isfile(chosen):
+        raise InputError(f"file {name!r} is a folder or a device; allowed: a plain file; correct the name")
+    return Path(chosen)
+
+
+def search_path(mi: Any, *folders: Path) -> Any:
+    """Mitsuba's search path of the given folders and its own.
+
+    Not the working directory, which Mitsuba puts first: a ``plugins/diffuse.so`` in it would be loaded as native code.
+    """
+    resolver = mi.FileResolver()
+    resolver.clear()
+    for folder in (*folders, Path(mi.__file__).parent):
+        resolver.append(str(folder))
+    return resolver
+
+
+@dataclass
+class _Spent:
+    """What the files read so far have cost, all includes together."""
+
+    files: int = 0
+    bytes: int = 0
+    substituted: int = 0
+    parameters: dict[str, str] = field(default_factory=dict)
+
+
+def screen(path: Path, folder: Path | None) -> None:
+    """Read a scene file and what it includes, and raise `InputError` for what Mitsuba's parser shouldn't see.
+
+    Parameters
+    ----------
+    path : Path
+        Scene file, absolute.
+    folder : Path or None
+        Where included files and spectra have to lie; None lets files anywhere and ``<path>`` through, in whose folders
+        they are then looked for.
+    """
+    _screen(path, [path.parent], folder, 0, _Spent())
+
+
+def _screen(path: Path, searched: list[Path], folder: Path | None, level: int, spent: _Spent) -> None:
+    parser = expat.ParserCreate("utf-8")
+    depth = level
+
+    def refuse(reason: object) -> NoReturn:
+        raise InputError(
+            f"{path} (line {parser.CurrentLineNumber}, col {parser.CurrentColumnNumber + 1}): {reason}"
+        ) from None
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        try:
+            # As Mitsuba: a file's own folder counts for its includes alone, its includer's for both.
+            places = [path.parent, *searched] if tag == "include" else searched
+            named = _checked_element(tag, attributes, depth, places, folder, spent)
+            if tag == "path":  # the latest comes first; one of an included file counts in that file alone
+                searched.insert(0, _named_folder(attributes.get("value", ""), [path.parent, *searched], spent))
+        except InputError as error:
+            refuse(error)
+        if named and tag == "include":
+            _screen(named, [path.parent, *searched], folder, depth, spent)
+
+    def end(_: str) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser.StartDoctypeDeclHandler = lambda *_: refuse("a DOCTYPE is not allowed; remove it")
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    try:
+        parser.Parse(_content(path, spent), True)
+    except expat.ExpatError as error:
+        raise InputError(
+            f"{path} (line {error.lineno}, col {error.offset + 1}): "
+            f"not well-formed XML, {expat.ErrorString(error.code)}; correct the file"
+        ) from None
+
+
+def _content(path: Path, spent: _Spent) -> bytes:
+    spent.files += 1
+    spent.bytes += path.stat().st_size
+    if spent.files > MOST_FILES or spent.bytes > MOST_BYTES:
+        raise InputError(
+            f"{path}: the scene's XML is over {MOST_BYTES >> 20} MiB or {MOST_FILES} files, each include counted; "
+            "put meshes into .ply files, and let no file include itself"
+        )
+    content = path.read_bytes()
+    try:
+        content.decode("utf-8")  # of other encodings expat and Mitsuba could read different elements
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: byte {error.start} is no UTF-8; allowed: XML in UTF-8; save it so") from None
+    return content
+
+
+def _checked_element(
+    tag: str, attributes: dict[str, str], depth: int, searched: list[Path], folder: Path | None, spent: _Spent
+) -> Path | None:
+    """Check one element; gives the file that Mitsuba's parser would open for it."""
+    if depth > MOST_NESTED:
+        raise InputError(f"elements are nested over {MOST_NESTED} deep; flatten the scene")
+    if tag == "path" and folder is not None:
+        raise InputError(f"<path> lets a scene load native code and is refused; remove it, or, {TRUST}")
+    longest = max(map(len, spent.parameters.values()), default=0)
+    # Each parameter may hold earlier ones, so that ten lines of <default> could fill the memory.
+    spent.substituted += sum(value.count("$") for value in attributes.values()) * longest
+    if spent.substituted > MOST_SUBSTITUTED:
+        raise InputError(f"$parameters grow past {MOST_SUBSTITUTED} characters; write the values out")
+    if tag == "default":
+        given = {name: _substitute(value, spent.parameters) for name, value in attributes.items()}
+        spent.parameters.setdefault(given.get("name", ""), given.get("value", ""))
+    if tag not in ("include", "spectrum") or "filename" not in attributes:
+        return None
+    return find_file(_substitute(attributes["filename"], spent.parameters), searched, folder)
+
+
+def _named_folder(value: str, searched: list[Path], spent: _Spent) -> Path:
+    """Folder that a ``<path>`` adds to the search path."""
+    name = _substitute(value, spent.parameters)
+    for base in searched:
+        if (base / name).is_dir():
+            return base / name
+    raise InputError(f"<path> folder {name!r} is missing in {searched[0]}; put it there or correct the name")
+
+
+def _substitute(text: str, parameters: Mapping[str, str]) -> str:
+    """Put in ``$parameters`` as Mitsuba does, longest names first."""
+    if "\\$" in text:
+        raise InputError(f"{text!r} holds an escaped $, which is not allowed here; name files without it")
+    for name in sorted(parameters, key=len, reverse=True):
+        text = text.replace(f"${name}", parameters[name])
+    if "$" in text:
+        raise InputError(f"{text!r} holds an undefined $parameter; state it by <default> before")
+    return text

@@ -1,0 +1,143 @@
+"""Memory that a run needs and that is free, and the refusal where it isn't: the system would end it without a word."""
+
+import resource
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from rodcone.errors import InputError
+
+GB = 1e9
+# Bytes a pixel, counted from the arrays held at once; `tests/rodcone/test_memory.py` compares them with measured peaks.
+_TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
+_VIEW_ARRAYS = 7  # one pass's planes and their copies; later relit radiance, its halves, and an image forming
+_RENDER_BYTES = 120  # whatever the bands: the render's marks, a preview
+_CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
+_PICTURE_BYTES = 50  # of each picture kept until the report: floats, its place on the overview, its file
+PROCESS_BYTES = 350e6  # libraries and compiled kernels
+_FILE_BANDS = 40  # of a picture file
+_FILE_PACKING = 1.5  # its bytes of float32 over those on disk: 1.2 with the noise of a render, more without
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a run needs at its peak [bytes]: all its processes together, and the largest of them."""
+
+    total: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One bound on memory.
+
+    Attributes
+    ----------
+    name : str
+    free : float
+        Bytes that are not in use.
+    each : bool
+        Whether every process has it for itself.
+    """
+
+    name: str
+    free: float
+    each: bool = False
+
+
+def memory(pixels: int, bands: int, groups: int, workers: int = 0, pictures: int = 0) -> Memory:
+    """Memory that a render of so many light groups needs, and what comes after it.
+
+    Parameters
+    ----------
+    pixels, bands, groups : int
+        No groups for a picture file, which needs no render.
+    workers : int
+        Processes that develop cells; 1: the process that renders does, 0: no cells are made here.
+    pictures : int
+        Kept until all are made.
+    """
+    arrays = _TRANSPORT_ARRAYS * groups + _VIEW_ARRAYS
+    rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + _RENDER_BYTES + _PICTURE_BYTES * pictures)
+    if workers <= 1:
+        own = rendering + workers * _CELL_BYTES * pixels
+        return Memory(own, own)
+    worker = PROCESS_BYTES + _CELL_BYTES * pixels
+    return Memory(rendering + workers * worker, max(rendering, worker))
+
+
+def file_extent(path: str | Path) -> tuple[int, int, int]:
+    """Pixels, bands and light groups that a picture file counts as, by its bytes: its header isn't read yet."""
+    values = Path(path).stat().st_size * _FILE_PACKING / 4
+    return round(values / _FILE_BANDS), _FILE_BANDS, 0
+
+
+def require_memory(need: Memory, force: bool = False) -> None:
+    """Raise `InputError` where a run needs more memory than is free, unless `force`.
+
+    What this process holds already is part of what the run needs. The message names the need and the least limit.
+    """
+    held = _pages(1)
+    for limit in sorted([] if force else memory_limits(), key=lambda each: each.free):
+        needed, whose = (need.largest, "a process of the run") if limit.each else (need.total, "the run")
+        if needed > held + limit.free:
+            raise InputError(
+                f"memory: {whose} needs about {needed / GB:.1f} GB; allowed: {(held + limit.free) / GB:.1f} GB, which "
+                f"is {limit.name}; take a smaller picture, fewer bands or workers, or go on with --force"
+            )
+
+
+def memory_limits(root: Path = Path("/")) -> Iterator[Limit]:
+    """Bounds on this process's memory that the system tells; none where it tells none.
+
+    Parameters
+    ----------
+    root : Path
+        Under which ``proc`` and ``sys`` lie.
+    """
+    with suppress(OSError, LookupError, ValueError):
+        lines = (root / "proc/meminfo").read_text().splitlines()
+        facts = dict(line.split(":", 1) for line in lines)
+        yield Limit("what is available on this machine", 1024.0 * int(facts["MemAvailable"].split()[0]))
+    yield from _groups(root)
+    most = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if most != resource.RLIM_INFINITY:
+        yield Limit(f"what the address-space limit of {most / GB:.1f} GB leaves (ulimit -v)", most - _pages(0), True)
+
+
+def _groups(root: Path) -> Iterator[Limit]:
+    """Limits of the control groups that this process is in, of both versions; parents bind too."""
+    mount = root / "sys/fs/cgroup"
+    try:
+        places = [line.split(":", 2) for line in (root / "proc/self/cgroup").read_text().splitlines()]
+    except OSError:
+        return
+    for _, controllers, place in places:
+        if not controllers:
+            top, names = mount, ("memory.max", "memory.current", "inactive_file")
+        elif "memory" in controllers.split(","):
+            top, names = mount / "memory", ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+        else:
+            continue
+        own = top / place.lstrip("/")
+        for folder in (own, *own.parents):
+            with suppress(OSError, LookupError, ValueError):
+                yield _group_limit(folder, *names)
+            if folder == top:
+                break
+
+
+def _group_limit(folder: Path, most_file: str, used_file: str, cache_key: str) -> Limit:
+    """Limit of one group; `ValueError` where it has none. Files that it merely holds in its cache are no use."""
+    most = int((folder / most_file).read_text())  # the word "max" without a limit
+    used = int((folder / used_file).read_text())
+    cached = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())[cache_key]
+    return Limit(f"what the control group's limit of {most / GB:.1f} GB leaves", most - used + float(cached))
+
+
+def _pages(field: int) -> float:
+    """Memory of this process [bytes] by a field of ``/proc/self/statm``: 0 all addresses, 1 what is resident."""
+    with suppress(OSError, LookupError, ValueError):
+        return float(Path("/proc/self/statm").read_text().split()[field]) * resource.getpagesize()
+    return 0.0

@@ -1,0 +1,1 @@
+"""A chip on the bench: EMVA Standard 1288."""

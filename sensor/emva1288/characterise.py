@@ -1,0 +1,213 @@
+"""What an EMVA 1288 laboratory reports of a chip, beside what was configured."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import hypot, log10, sqrt
+
+import numpy as np
+
+from render.spectrum import Floats
+from rodcone.errors import require_range, require_whole
+from sensor.config import SensorConfig
+from sensor.emva1288 import estimators as emva
+from sensor.emva1288.photon_transfer import Expose, Transfer, bench, dark_slopes, engine, take_stack, take_transfer
+
+# Under this variance [DN^2] rounding is no longer an added 1/12, and the standard gives an upper limit alone.
+LEAST_VARIANCE_DN2 = 0.24
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to expose: levels of light [e-], their exposure time, frames of a stack, times of the dark series [s]."""
+
+    light_e: Floats
+    exposure_s: float
+    frames: int
+    dark_times_s: Sequence[float]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One result: its name and unit, what was configured, what was measured, and the measurement's standard error.
+
+    An error of 0 marks what is no estimate of a configured number, but derived from others.
+    """
+
+    name: str
+    unit: str
+    configured: float
+    measured: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Characterisation:
+    """Results of one chip.
+
+    Attributes
+    ----------
+    figures : tuple of Figure
+    transfer : Transfer
+    dark_mean_dn, dark_variance_dn2, gain_dn_per_e, saturation_e : float
+        What the photon-transfer line rests on.
+    linearity_share : (level,) float64
+        Relative deviation of the mean from the fitted line; NaN beyond 5-95 % of saturation.
+    notes : tuple of str
+        What a reader has to know about the figures.
+    """
+
+    figures: tuple[Figure, ...]
+    transfer: Transfer
+    dark_mean_dn: float
+    dark_variance_dn2: float
+    gain_dn_per_e: float
+    saturation_e: float
+    linearity_share: Floats
+    notes: tuple[str, ...]
+
+    @property
+    def snr(self) -> Floats:
+        """Mean above the dark over the temporal noise, at each level; NaN where nothing varies."""
+        noise = np.sqrt(np.where(self.transfer.variance_dn2 > 0, self.transfer.variance_dn2, np.nan))
+        return np.asarray((self.transfer.mean_dn - self.dark_mean_dn) / noise)
+
+    def figure(self, name: str) -> Figure:
+        """Result by name."""
+        return next(figure for figure in self.figures if figure.name == name)
+
+
+def characterise(
+    sensor: SensorConfig,
+    shape: tuple[int, int] = (256, 320),
+    seed: int = 0,
+    exposure_s: float = 0.01,
+    exact: bool = False,
+) -> Characterisation:
+    """Draw one chip, take its frames (`exact` as in `sensor.emva1288.photon_transfer.bench`) and report.
+
+    Raises
+    ------
+    InputError
+        For a frame under 16 x 16 pixels, a seed or an exposure time out of range, or a camera that shows no shot noise.
+    """
+    for name, side in zip(("height", "width"), shape, strict=True):
+        require_whole(name, side, 16, 1 << 14, "give the frame's side in pixels")
+    require_whole("seed", seed, 0, 2**31, "give a whole number")
+    require_range("exposure_s", exposure_s, 0.0, 1e6, "give seconds, 0 or more")
+    result = measure(bench(sensor, shape, seed, exact), plan_for(sensor, exposure_s), sensor)
+    return replace(result, notes=(*result.notes, f"frames were drawn by {engine(exact)}"))
+
+
+def plan_for(sensor: SensorConfig, exposure_s: float = 0.01, levels: int = 55, frames: int = 32) -> Plan:
+    """Even levels up to 1.1 times the well and a few dim ones; dark times that fill the quickest pixels to a third."""
+    pixel = sensor.pixel
+    current = pixel.dark_current_e_per_s + pixel.hot_pixel_dark_current_e_per_s
+    longest_s = min(0.3 * pixel.full_well_e / current, 1e6) if current else 1.0
+    even = np.linspace(0, 1.1 * pixel.full_well_e, levels + 1)[1:]
+    dim = np.geomspace(1e-4 * pixel.full_well_e, even[0], 8)[:-1]  # too dim to weigh in a fit: the plot's foot
+    light_e = np.concatenate([dim, even])
+    return Plan(light_e, exposure_s, frames, tuple(np.linspace(0, longest_s, 6)))
+
+
+def measure(expose: Expose, plan: Plan, sensor: SensorConfig) -> Characterisation:
+    """Run the procedure on any chip; `sensor` gives the well to aim at and the values to compare with."""
+    dark = take_stack(expose, 0.0, plan.exposure_s, plan.frames)
+    bright = take_stack(expose, 0.5 * sensor.pixel.full_well_e, plan.exposure_s, plan.frames)
+    full = take_stack(expose, 2 * sensor.pixel.full_well_e, plan.exposure_s, 2)
+    transfer = take_transfer(expose, plan.light_e, plan.exposure_s)
+    slopes = dark_slopes(expose, plan.dark_times_s)
+
+    saturation_e = float(transfer.light_e[np.argmax(transfer.variance_dn2)])
+    dark_mean_dn = float(dark.mean_dn.mean())
+    gain = emva.gain(transfer, dark, saturation_e)
+    linear, linear_error = emva.linearity(transfer, dark_mean_dn, saturation_e)
+    current, hot_share, hot_current = emva.dark_current(slopes, gain)
+    column_gain = emva.column_gain(dark, bright)
+    dark_e = plan.exposure_s * (current[0] + hot_share[0] * hot_current[0])
+    threshold_e = (
+        sqrt(max(dark.variance_dn2, 0.0)) / gain[0] + 0.5
+    )  # light that equals the noise, in the standard's form
+    measured = {
+        "gain": gain,
+        "dark noise": emva.dark_noise(dark, gain),
+        "DSNU": emva.dsnu(dark, gain),
+        "PRNU": emva.prnu(dark, bright),
+        "column offsets": emva.column_offset(dark, gain),
+        "column gains": column_gain,
+        "dark current": current,
+        "hot pixels": hot_share,
+        "their dark current": hot_current,
+        "full well": emva.well(full, dark, gain, column_gain[0], dark_e),
+        "saturation": (saturation_e, 0.0),
+        "threshold": (threshold_e, 0.0),
+        "dynamic range": (_decibels(saturation_e / threshold_e), 0.0),
+        "greatest SNR": (_decibels(sqrt(saturation_e)), 0.0),
+        "linearity error": (linear_error, 0.0),
+    }
+    truth = configured(sensor, plan.exposure_s)
+    figures = tuple(Figure(name, UNITS[name], truth[name], *measured[name]) for name in UNITS)
+    notes = _notes(dark.variance_dn2, gain[0])
+    return Characterisation(figures, transfer, dark_mean_dn, dark.variance_dn2, gain[0], saturation_e, linear, notes)
+
+
+UNITS = {
+    "gain": "DN/e-",
+    "dark noise": "e-",
+    "DSNU": "e-",
+    "PRNU": "1",
+    "column offsets": "e-",
+    "column gains": "1",
+    "dark current": "e-/s",
+    "hot pixels": "1",
+    "their dark current": "e-/s",
+    "full well": "e-",
+    "saturation": "e-",
+    "threshold": "e-",
+    "dynamic range": "dB",
+    "greatest SNR": "dB",
+    "linearity error": "1",
+}
+
+
+def configured(sensor: SensorConfig, exposure_s: float) -> dict[str, float]:
+    """What each figure would be without a measurement's error; saturation is the well's, where pixels clip at once."""
+    pixel, share = sensor.pixel, sensor.pixel.hot_pixel_share
+    hot_e = pixel.hot_pixel_dark_current_e_per_s * exposure_s
+    dark_e = pixel.dark_current_e_per_s * exposure_s + share * hot_e
+    dark_noise_e = sqrt(pixel.read_noise_e**2 + dark_e)
+    threshold_e = hypot(dark_noise_e, sensor.gain_e_per_dn / sqrt(12)) + 0.5
+    return {
+        "gain": 1 / sensor.gain_e_per_dn,
+        "dark noise": dark_noise_e,
+        "DSNU": hypot(pixel.fixed_dark_e, sqrt(share * (1 - share)) * hot_e, pixel.column_gain_spread * dark_e),
+        "PRNU": pixel.fixed_gain,
+        "column offsets": hypot(pixel.column_offset_e, pixel.column_gain_spread * dark_e),
+        "column gains": pixel.column_gain_spread,
+        "dark current": pixel.dark_current_e_per_s,
+        "hot pixels": share if pixel.hot_pixel_dark_current_e_per_s else 0.0,
+        "their dark current": pixel.hot_pixel_dark_current_e_per_s if share else 0.0,
+        "full well": pixel.full_well_e,
+        "saturation": pixel.full_well_e,
+        "threshold": threshold_e,
+        "dynamic range": _decibels(pixel.full_well_e / threshold_e),
+        "greatest SNR": _decibels(sqrt(pixel.full_well_e)),
+        "linearity error": 0.0,
+    }
+
+
+def _decibels(ratio: float) -> float:
+    return 20 * log10(ratio)
+
+
+def _notes(dark_variance_dn2: float, gain_dn_per_e: float) -> tuple[str, ...]:
+    notes = [
+        "light is set in electrons: quantum efficiency is 1",
+        "saturation is where the temporal variance peaks, under the well where PRNU spreads the clipping; the dynamic "
+        "range and the greatest SNR follow from it, configured ones from the well",
+    ]
+    if dark_variance_dn2 < LEAST_VARIANCE_DN2:
+        notes.append(
+            f"the dark's variance, {dark_variance_dn2:.3f} DN^2, is under {LEAST_VARIANCE_DN2}: rounding hides the "
+            f"dark noise, which is less than {0.4 / gain_dn_per_e:.3g} e-, and moves DSNU"
+        )
+    return tuple(notes)

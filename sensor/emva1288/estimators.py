@@ -1,0 +1,145 @@
+"""Estimators of EMVA Standard 1288 (release 4.0 Linear), each with its standard error.
+
+All take statistics in DN and give a value and the standard error of that value, which an exact count of draws predicts:
+nothing in them knows what was configured.
+"""
+
+from math import hypot, inf, pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.spectrum import Floats
+from rodcone.errors import InputError
+from sensor.emva1288.photon_transfer import Stack, Transfer, column_variance, hot_pixels
+
+QUANTISATION_DN2 = 1 / 12  # variance that rounding adds, where the noise is wide enough
+FIT_SHARE = 0.7  # of saturation: the standard's range for the gain
+LINEAR_RANGE = (0.05, 0.95)  # of saturation: the standard's range for linearity
+
+Estimate = tuple[float, float]
+
+
+def gain(transfer: Transfer, dark: Stack, saturation_e: float) -> Estimate:
+    """Overall system gain K [DN/e-]: slope of temporal variance over mean, above the dark's, up to 70 % of saturation.
+
+    The line goes through the dark point, whose variance all others share, so its error counts once for all.
+
+    Raises
+    ------
+    InputError
+        Where the variance doesn't grow with the light: the converter or the well is too coarse to show shot noise.
+    """
+    used = transfer.light_e <= FIT_SHARE * saturation_e
+    signal = transfer.mean_dn[used] - dark.mean_dn.mean()
+    excess = transfer.variance_dn2[used] - dark.variance_dn2
+    power = float(np.sum(signal**2))
+    slope = float(np.sum(signal * excess)) / power if power > 0 else 0.0
+    pixels = dark.mean_dn.size
+    own = np.sum((signal * transfer.variance_dn2[used]) ** 2) * 2 / pixels
+    common = (signal.sum() * dark.variance_dn2) ** 2 * 2 / (pixels * (dark.frames - 1))
+    error = sqrt(float(own + common)) / power if power > 0 else inf
+    if not slope > 4 * error:  # 4 standard errors: no slope at all would be taken for one once in 3e4 chips
+        raise InputError(
+            f"gain: {slope:.3g} +- {error:.3g} DN/e- can't be told from 0, the light shows no shot noise; allowed: "
+            "a camera whose noise exceeds its rounding; give more bits, a smaller well or a larger frame"
+        )
+    return slope, error
+
+
+def linearity(transfer: Transfer, dark_mean_dn: float, saturation_e: float) -> tuple[Floats, float]:
+    """Relative deviation of each mean from the fitted line (NaN beyond 5-95 % of saturation), and its mean size.
+
+    The line is fitted with weights 1/light^2, so that relative deviations count alike at all levels.
+    """
+    low, high = (share * saturation_e for share in LINEAR_RANGE)
+    used = (transfer.light_e >= low) & (transfer.light_e <= high)
+    share = np.full(transfer.light_e.shape, np.nan)
+    if np.count_nonzero(used) < 3:
+        return share, float("nan")
+    light, signal = transfer.light_e[used], transfer.mean_dn[used] - dark_mean_dn
+    slope, start = np.polyfit(light, signal, 1, w=1 / light)
+    line = start + slope * light
+    share[used] = signal / np.where(line > 0, line, np.nan) - 1
+    return share, float(np.mean(np.abs(share[used])))
+
+
+def dark_noise(dark: Stack, gain_dn_per_e: Estimate) -> Estimate:
+    """Temporal dark noise [e-], less quantisation."""
+    error = dark.variance_dn2 * sqrt(2 / (dark.mean_dn.size * (dark.frames - 1)))
+    return _electrons(dark.variance_dn2 - QUANTISATION_DN2, error, gain_dn_per_e)
+
+
+def dsnu(dark: Stack, gain_dn_per_e: Estimate) -> Estimate:
+    """Spread of the pixels' dark readings [e-], columns and hot pixels included."""
+    return _electrons(dark.spatial_dn2, _spread_error(_squares(dark.mean_dn)), gain_dn_per_e)
+
+
+def prnu(dark: Stack, bright: Stack) -> Estimate:
+    """Spread of the pixels' response above the dark's, over its mean; column gains included."""
+    signal = float(bright.mean_dn.mean() - dark.mean_dn.mean())
+    error = _spread_error(_squares(bright.mean_dn) - _squares(dark.mean_dn))
+    return _root((bright.spatial_dn2 - dark.spatial_dn2) / signal**2, error / signal**2)
+
+
+def column_offset(dark: Stack, gain_dn_per_e: Estimate) -> Estimate:
+    """Spread of the columns' dark offsets [e-]."""
+    return _electrons(*column_variance(dark.mean_dn), gain_dn_per_e)
+
+
+def column_gain(dark: Stack, bright: Stack) -> Estimate:
+    """Spread of the columns' gains: of what light adds to each column's mean."""
+    added = bright.mean_dn - dark.mean_dn
+    variance, error = column_variance(added)
+    return _root(variance / added.mean() ** 2, error / added.mean() ** 2)
+
+
+def well(full: Stack, dark: Stack, gain_dn_per_e: Estimate, column_spread: float, dark_e: float) -> Estimate:
+    """Full well [e-] from the mean of frames in which every pixel is clipped.
+
+    The well reads at the converter's top, which cuts the upper half of the noise behind the well off: the mean of
+    min(0, x) of a normal x is -sigma / sqrt(2 pi). `dark_e` are the electrons that a dark frame collects.
+    """
+    slope, error = gain_dn_per_e
+    full_e = float(full.mean_dn.mean() - dark.mean_dn.mean()) / slope + dark_e
+    noise_e = sqrt(max(dark.variance_dn2 + dark.spatial_dn2, 0.0)) / slope
+    full_e += hypot(noise_e, column_spread * full_e) / sqrt(2 * pi)
+    return full_e, full_e * error / slope
+
+
+def dark_current(slopes: NDArray[np.float64], gain_dn_per_e: Estimate) -> tuple[Estimate, Estimate, Estimate]:
+    """Dark current of ordinary pixels [e-/s], share of hot pixels, and what these have on top [e-/s]."""
+    hot = hot_pixels(slopes)
+    share = float(hot.mean())
+    rest, relative = slopes[~hot] / gain_dn_per_e[0], gain_dn_per_e[1] / gain_dn_per_e[0]
+    current, spread = float(rest.mean()), float(rest.std() / sqrt(rest.size))
+    above = slopes[hot] / gain_dn_per_e[0] - current
+    on_top = (float(above.mean()), float(above.std() / sqrt(above.size))) if hot.any() else (0.0, 0.0)
+    return (
+        (current, hypot(spread, current * relative)),
+        (share, sqrt(share * (1 - share) / hot.size)),
+        (on_top[0], hypot(on_top[1], on_top[0] * relative)),
+    )
+
+
+def _electrons(variance_dn2: float, error_dn2: float, gain_dn_per_e: Estimate) -> Estimate:
+    """Standard deviation in electrons from a variance in DN^2; the gain's error comes on top."""
+    slope, error = gain_dn_per_e
+    value, own = _root(variance_dn2 / slope**2, error_dn2 / slope**2)
+    return value, hypot(own, value * error / slope)
+
+
+def _root(variance: float, error: float) -> Estimate:
+    """Root of an estimated variance; one that isn't above its error gives the root of the error as the error."""
+    value = sqrt(max(variance, 0.0))
+    return value, error / (2 * value) if variance > error else sqrt(error)
+
+
+def _squares(image: NDArray[np.float64]) -> Floats:
+    """Mean square of each column's deviations from the image's mean, shape (w,)."""
+    return np.asarray(np.mean((image - image.mean()) ** 2, axis=0))
+
+
+def _spread_error(of_columns: Floats) -> float:
+    """Standard error of the mean over columns: they are independent even where a column's pixels are not."""
+    return float(of_columns.std(ddof=1) / sqrt(of_columns.size))

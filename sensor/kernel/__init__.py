@@ -1,0 +1,1 @@
+"""Expected electrons and the readout in Dr.Jit."""

@@ -1,0 +1,200 @@
+"""A Bayer or 2x2 RGBW mosaic as a digital negative: DNG 1.4, uncompressed, one 16-bit CFA image.
+
+Tags and their meaning: Adobe, "Digital Negative (DNG) Specification", version 1.4.0.0, 2012. What they can't hold
+exactly (most have rationals of 32 bits) stands once more in DNGPrivateData, as JSON behind ``rodcone`` and a zero byte;
+reading takes the calibration from there, and refuses a file whose public levels and mosaic say something else.
+"""
+
+import struct
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rodcone.errors import InputError
+from rodcone.files import replacing
+from sensor.calibration import ColourCalibration
+from sensor.cfa import Tile, channels
+from sensor.raw import RawImage
+from sensor.raw_files.raw_json import parse_json, raw_image, to_json
+from sensor.raw_files.tiff import CFA, EXIF, MAKER, Tags, Values, read_make, read_mosaic, text, write_mosaic
+
+PRIVATE = b"rodcone\0"
+PRIVATE_DATA = 50740
+MAKE = "rodcone"
+CFA_REPEAT, CFA_PATTERN, BLACK_LEVEL, WHITE_LEVEL = 33421, 33422, 50714, 50717
+OPCODES = 51008  # OpcodeList1: what is done to the samples as read
+EXPOSURE_TIME, F_NUMBER, ISO = 33434, 33437, 34855
+_COMPARED = {
+    CFA_REPEAT: "CFARepeatPatternDim",
+    CFA_PATTERN: "CFAPattern",
+    BLACK_LEVEL: "BlackLevel",
+    WHITE_LEVEL: "WhiteLevel",
+    OPCODES: "OpcodeList1",
+    EXPOSURE_TIME: "ExposureTime",
+    F_NUMBER: "FNumber",
+    ISO: "PhotographicSensitivity",
+}
+_COLOURS = {"R": 0, "G": 1, "B": 2, "W": 6}  # numbers of CFAPattern and CFAPlaneColor; 6 is white
+_ILLUMINANT_A, _ILLUMINANT_D65 = 17, 21  # EXIF LightSource
+_LARGEST = 2**31 - 1  # of a rational's numerator and denominator
+
+
+def is_bayer(tile: Tile) -> bool:
+    """Whether a tile is one of Bayer's four phases: 2x2, green on a diagonal, red and blue once."""
+    if len(tile) != 2 or len(tile[0]) != 2 or sorted("".join(tile)) != list("BGGR"):
+        return False
+    return tile[0][0] == tile[1][1] or tile[0][1] == tile[1][0]
+
+
+def is_rgbw(tile: Tile) -> bool:
+    """Whether a tile is 2x2 with R, G, B and W once each."""
+    return len(tile) == 2 and len(tile[0]) == 2 and sorted("".join(tile)) == list("BGRW")
+
+
+def write_dng(raw: RawImage, path: Path) -> Path:
+    """Write a digital negative; gives its path. LibRaw and what is built on it open frames from 22 pixels a side.
+
+    Raises
+    ------
+    InputError
+        For another mosaic, a camera without colour calibration, or levels that DNG can't hold.
+    OSError
+        Where the folder is missing or can't be written.
+    """
+    if raw.black_dn != int(raw.black_dn):
+        raise InputError(
+            f"black_dn: {raw.black_dn!r} is no whole number, and raw converters cut its fraction off; allowed: whole "
+            "DN; write a .tif instead"
+        )
+    tags = dng_tags(raw)
+    with replacing(path) as (place,):
+        write_mosaic(place, raw.dn, CFA, tags, exif_tags(raw))
+    return path
+
+
+def read_dng(path: Path) -> RawImage:
+    """Read a digital negative that `write_dng` wrote.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing, damaged, of another camera, or was changed since.
+    """
+    dn, tags = read_mosaic(path, CFA, (PRIVATE_DATA, EXIF, *_COMPARED))
+    kind, private = tags.get(PRIVATE_DATA, ("", ()))
+    content = bytes(int(value) for value in private) if kind == "B" else b""
+    if not content.startswith(PRIVATE):
+        raise InputError(
+            f"{path}: its DNGPrivateData holds no calibration in electrons; allowed: files that `rodcone capture` wrote"
+        )
+    raw = raw_image(parse_json(content[len(PRIVATE) :], str(path)), dn, str(path))
+    expected = {**dng_tags(raw), **exif_tags(raw)}
+    for code, name in _COMPARED.items():
+        (_, held), (_, meant) = (found.get(code, ("", "missing")) for found in (tags, expected))
+        if held != meant:
+            raise InputError(
+                f"{path}: {name} is {held[:8]}, the calibration says {meant}; allowed: an unchanged file; write it anew"
+            )
+    return raw
+
+
+def is_own(path: Path) -> bool:
+    """Whether a file says that `write_dng` wrote it; what doesn't is some camera's or program's."""
+    return read_make(path) == MAKE
+
+
+def dng_tags(raw: RawImage) -> Tags:
+    """Tags of the first directory, without those that describe the TIFF itself.
+
+    NoiseProfile is N(x)^2 = S x + O for x from black (0) to white (1), the same for all channels: S is the shot noise,
+    1 / full scale in electrons, O the dark noise; PRNU grows with x^2 and has no place there. LinearResponseLimit is
+    where the well begins to clip (`RawImage.saturation_e`).
+    """
+    colour = _require(raw)
+    letters = channels(raw.cfa)
+    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
+    height, width = raw.shape
+    tags: dict[int, tuple[str, Values]] = {
+        254: ("I", (0,)),  # NewSubfileType: the full picture
+        MAKER: text(MAKE),
+        272: text(raw.camera),
+        274: ("H", (1,)),  # Orientation: upright
+        CFA_REPEAT: ("H", (2, 2)),
+        CFA_PATTERN: ("B", tuple(_COLOURS[letter] for row in raw.cfa for letter in row)),
+        50706: ("B", (1, 4, 0, 0)),  # DNGVersion
+        50707: ("B", (1, 1, 0, 0)),  # DNGBackwardVersion: all that is newer may be skipped
+        50708: text(f"rodcone {raw.camera}"),  # UniqueCameraModel
+        50710: ("B", tuple(_COLOURS[letter] for letter in letters)),  # CFAPlaneColor
+        50711: ("H", (1,)),  # CFALayout: a rectangle
+        BLACK_LEVEL: ("2I", rational(raw.black_dn)),
+        WHITE_LEVEL: ("I", (int(raw.white_dn),)),
+        50728: ("2I", rational(colour.neutral / colour.neutral.max())),  # AsShotNeutral
+        50734: ("2I", rational(min(max(raw.saturation_e / full_e, 0.0), 1.0))),  # LinearResponseLimit
+        50829: ("I", (0, 0, height, width)),  # ActiveArea
+        51041: ("d", (1 / full_e, (raw.dark_noise_e / full_e) ** 2)),  # NoiseProfile
+    }
+    tags |= _colour_tags(colour)
+    if raw.defects is not None and is_bayer(raw.cfa):
+        tags[OPCODES] = ("U", tuple(_bad_pixels(raw.cfa, raw.defects)))
+    tags[PRIVATE_DATA] = ("B", tuple(PRIVATE + to_json(raw).encode("ascii")))
+    return dict(sorted(tags.items()))
+
+
+def _bad_pixels(tile: Tile, defects: NDArray[np.intp]) -> bytes:
+    """Opcode FixBadPixelsList of DNG 1.3, chapter 6: big-endian, to be skipped by who doesn't know it; Bayer alone."""
+    phase = ("RG", "GR", "GB", "BG").index(tile[0])
+    parameters = struct.pack(">3I", phase, len(defects), 0) + defects.astype(">u4").tobytes()
+    return struct.pack(">IIIII", 1, 5, 0x01030000, 1, len(parameters)) + parameters
+
+
+def exif_tags(raw: RawImage) -> Tags:
+    """Tags of the exposure (Exif 2.3, CIPA DC-008)."""
+    tags: dict[int, tuple[str, Values]] = {
+        EXPOSURE_TIME: ("2I", rational(raw.exposure_s)),
+        36864: ("B", tuple(b"0230")),  # ExifVersion
+    }
+    if raw.f_number is not None:
+        tags[F_NUMBER] = ("2I", rational(raw.f_number))
+    if raw.iso is not None:
+        tags[ISO] = ("H", (min(max(round(raw.iso), 1), 65_535),))
+    return tags
+
+
+def _colour_tags(colour: ColourCalibration) -> dict[int, tuple[str, Values]]:
+    """Matrices for illuminants A and D65."""
+    tags: dict[int, tuple[str, Values]] = {
+        50721: ("2i", rational(colour.xyz_to_camera_a)),  # ColorMatrix1, 2
+        50722: ("2i", rational(colour.xyz_to_camera_d65)),
+        50778: ("H", (_ILLUMINANT_A,)),  # CalibrationIlluminant1, 2
+        50779: ("H", (_ILLUMINANT_D65,)),
+        50964: ("2i", rational(colour.camera_to_xyz_a)),  # ForwardMatrix1, 2
+        50965: ("2i", rational(colour.camera_to_xyz_d65)),
+    }
+    if colour.neutral.size == 4:  # a fourth plane asks for a way back to three: W carries no colour here
+        tags |= dict.fromkeys((50725, 50726), ("2i", rational(np.eye(3, 4))))  # ReductionMatrix1, 2
+    return tags
+
+
+def _require(raw: RawImage) -> ColourCalibration:
+    """Colour calibration of a raw image that a DNG can hold, or `InputError`."""
+    if not (is_bayer(raw.cfa) or is_rgbw(raw.cfa)):
+        raise InputError(f"cfa: {raw.cfa} is not written as DNG; allowed: Bayer or 2x2 RGBW; write a .tif instead")
+    if raw.colour is None:
+        raise InputError("colour: the raw image holds no colour calibration, which a DNG needs; write a .tif instead")
+    if raw.black_dn < 0 or raw.white_dn != int(raw.white_dn):
+        raise InputError(
+            f"levels: black {raw.black_dn!r} and white {raw.white_dn!r} don't fit a DNG; "
+            "allowed: black of 0 or more, a whole white; write a .tif instead"
+        )
+    return raw.colour
+
+
+def rational(values: ArrayLike) -> Values:
+    """Numerators and denominators of the nearest fractions that fit 32 bits, row by row."""
+    pairs: list[int] = []
+    for value in np.ravel(np.asarray(values, dtype=np.float64)):
+        nearest = Fraction(float(value)).limit_denominator(max(int(_LARGEST / max(abs(value), 1.0)), 1))
+        pairs += [nearest.numerator, nearest.denominator]
+    return tuple(pairs)

@@ -1,0 +1,182 @@
+"""Photographs of real cameras as raw images: whatever Bayer raw LibRaw reads (extra `photographs`, library `rawpy`).
+
+A raw image has one black level, one white level and a noise model in electrons; a camera's file has a black level a
+channel and, but for some digital negatives, no word on noise. What is made of that stands in the facts.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.radiance_files.file_checks import require_file
+from render.spectrum import Floats
+from rodcone.errors import InputError, one_line
+from rodcone.optional import optional_library
+from sensor.calibration import ColourCalibration
+from sensor.cfa import Tile
+from sensor.raw import RawImage
+from sensor.raw_files.dng import is_bayer
+from sensor.raw_files.noise_estimate import NoiseEstimate, estimate_noise
+from sensor.raw_files.noise_profile import read_noise_profile
+
+EXTRA = "photographs"
+# What is assumed where neither the file nor the frame tells: a pixel of a present-day camera.
+ASSUMED_FULL_WELL_E, ASSUMED_DARK_NOISE_E = 30_000.0, 3.0
+# Of a file's bytes, at 2 a pixel. Lossless JPEG spends a bit or more on a pixel: it swells 16 times at most.
+MOST_EXPANSION = 200
+# Linear sRGB to XYZ under D65 (IEC 61966-2-1), and adapted to D50 (the sRGB profile of ICC), rounded to four digits.
+_XYZ_OF_SRGB = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+_D50_OF_SRGB = np.array([[0.4361, 0.3851, 0.1431], [0.2225, 0.7169, 0.0606], [0.0139, 0.0971, 0.7142]])
+
+
+def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
+    """Read a camera's raw file, turned upright, and what had to be estimated or assumed.
+
+    Returns
+    -------
+    RawImage
+        Its black level is the largest of the channels', the others' samples shifted up to it. Its matrix is the one
+        that LibRaw holds for the camera, for daylight, under both of a calibration's illuminants.
+    dict
+        ``reader``; ``noise``: where gain and dark noise come from (``profile of the file``, ``estimated from the
+        frame`` or ``assumed``); ``gain_e_per_dn``, ``dark_noise_e``; ``as_shot``: ``file``, ``daylight`` where the file
+        has no balance, or ``none``; ``colour_matrix``: ``LibRaw``, or ``none`` where the camera's own colours pass for
+        sRGB.
+
+    Raises
+    ------
+    InputError
+        Without `rawpy`, for a file that LibRaw can't read, or a mosaic that isn't Bayer.
+    """
+    rawpy = optional_library("rawpy", EXTRA)
+    size = require_file(path)
+    try:
+        with rawpy.imread(str(path)) as opened:
+            _check_extent(opened.sizes, size, path)
+            return _raw_image(opened, path, f"LibRaw {'.'.join(map(str, rawpy.libraw_version))}")
+    except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
+        first = error.args[0] if error.args else ""
+        reason = " ".join((first.decode("utf-8", "replace") if isinstance(first, bytes) else str(first)).split())
+        raise InputError(
+            f"{path}: LibRaw can't read it ({reason}); allowed: raw files of cameras that LibRaw knows, or of rodcone"
+        ) from None
+    except (ValueError, TypeError, IndexError, OverflowError, NotImplementedError, np.linalg.LinAlgError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"{path}: what LibRaw reads of it is no photograph ({one_line(error)}); it is damaged, copy it again"
+        ) from error
+
+
+def _check_extent(sizes: Any, file_bytes: int, path: Path) -> None:
+    """Raise `InputError` where a header claims more pixels than its file can hold: LibRaw takes memory for them all."""
+    height, width = int(sizes.raw_height), int(sizes.raw_width)
+    if 2 * height * width > MOST_EXPANSION * file_bytes:
+        raise InputError(f"{path}: {file_bytes} bytes can't hold the {height} x {width} pixels that it declares")
+
+
+def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str, Any]]:
+    letters = _letters(opened, path)
+    black, white = _black(opened), int(opened.white_level)
+    if not black.max() < white:
+        raise InputError(f"{path}: black {black.max():g} is not under white {white:g}; it is damaged or no photograph")
+    dn = np.minimum(opened.raw_image_visible + (black.max() - black), white)
+    upright = _turned(dn.astype(np.uint16), opened.sizes.flip)
+    tile = _tile(_turned(letters, opened.sizes.flip), path)
+    noise, source = _noise(path, upright.astype(np.float64) - black.max(), float(white - black.max()))
+    colour, facts = _colour(opened)
+    raw = RawImage(
+        dn=upright,
+        cfa=tile,
+        black_dn=float(black.max()),
+        white_dn=float(white),
+        gain_e_per_dn=noise.gain_e_per_dn,
+        read_noise_e=noise.dark_noise_e,
+        dsnu_e=0.0,
+        prnu=0.0,
+        exposure_s=float(opened.other.shutter_speed),
+        camera="photograph",
+        f_number=_positive(opened.other.aperture, 0.1),
+        iso=_positive(opened.other.iso_speed, 1.0),
+        colour=colour,
+    )
+    told = {"noise": source, "gain_e_per_dn": noise.gain_e_per_dn, "dark_noise_e": raw.dark_noise_e}
+    return raw, {"reader": reader, **told, **facts}
+
+
+def _letters(opened: Any, path: Path) -> NDArray[np.str_]:
+    """Letter of each pixel of the picture, (h, w)."""
+    if opened.raw_image is None or opened.raw_image_visible.ndim != 2:
+        raise InputError(f"{path}: it holds no mosaic, but whole pixels; allowed: Bayer raw files; take another file")
+    names = opened.color_desc.decode("ascii", "replace")
+    indices = np.asarray(opened.raw_colors_visible)
+    if names != "RGBG" or indices.max() > 3:
+        raise InputError(f"{path}: its colours are {names!r}; allowed: Bayer's R, G and B; take another file")
+    return np.asarray(np.array(list(names))[indices])
+
+
+def _tile(letters: NDArray[np.str_], path: Path) -> Tile:
+    tile = tuple("".join(row[:2]) for row in letters[:2])
+    if not is_bayer(tile) or any(
+        np.any(letters[row::2, column::2] != tile[row][column]) for row in (0, 1) for column in (0, 1)
+    ):
+        raise InputError(
+            f"{path}: its mosaic begins with {tuple(''.join(row[:6]) for row in letters[:2])} and is not Bayer's; "
+            "allowed: Bayer raw files, no X-Trans; take another file"
+        )
+    return tile
+
+
+def _black(opened: Any) -> NDArray[np.intp]:
+    """Black level of each pixel [DN]."""
+    levels = np.array(opened.black_level_per_channel, dtype=np.intp)
+    return np.asarray(levels[np.asarray(opened.raw_colors_visible)])
+
+
+def _turned(frame: NDArray[Any], flip: int) -> NDArray[Any]:
+    """Frame upright. LibRaw's `flip`: 1 mirrors the columns, 2 the rows, 4 then swaps the two."""
+    rows, columns = (slice(None, None, -1 if flip & bit else 1) for bit in (2, 1))
+    turned = frame[rows, columns]
+    return np.ascontiguousarray(turned.T if flip & 4 else turned)
+
+
+def _noise(path: Path, above_black_dn: NDArray[np.float64], full_dn: float) -> tuple[NoiseEstimate, str]:
+    profile = read_noise_profile(path, full_dn)
+    if profile is not None:
+        return profile, "profile of the file"
+    estimate = estimate_noise(above_black_dn, full_dn)
+    if estimate is not None:
+        return estimate, "estimated from the frame"
+    return NoiseEstimate(ASSUMED_FULL_WELL_E / full_dn, ASSUMED_DARK_NOISE_E), "assumed"
+
+
+def _colour(opened: Any) -> tuple[ColourCalibration, dict[str, str]]:
+    """Calibration from LibRaw's matrix, camera to sRGB for daylight, and the as-shot balance."""
+    matrix = np.array(opened.color_matrix, dtype=np.float64)[:, :3]
+    sums = matrix.sum(axis=1, keepdims=True)
+    known = bool(np.all(np.isfinite(matrix)) and np.all(sums > 0) and np.linalg.cond(matrix) < 1e6)
+    to_srgb = matrix / sums if known and not np.array_equal(matrix, np.eye(3)) else np.eye(3)
+    daylight = _neutral(opened.daylight_whitebalance)
+    shot = _neutral(opened.camera_whitebalance)
+    neutral = shot if shot is not None else daylight if daylight is not None else np.ones(3)
+    from_xyz = np.linalg.inv(_XYZ_OF_SRGB @ to_srgb) * (neutral if daylight is None else daylight)[:, None]
+    back = _D50_OF_SRGB @ to_srgb
+    facts = {
+        "as_shot": "file" if shot is not None else "daylight" if daylight is not None else "none",
+        "colour_matrix": "none" if np.array_equal(to_srgb, np.eye(3)) else "LibRaw",
+    }
+    return ColourCalibration(neutral, to_srgb, from_xyz, from_xyz, back, back), facts
+
+
+def _neutral(gains: Any) -> Floats | None:
+    """Response of R, G and B to a neutral, green 1, from white balance factors; None where they aren't known."""
+    factors = np.array(gains[:3], dtype=np.float64)
+    if factors.shape != (3,) or not np.all(np.isfinite(factors) & (factors > 0)):
+        return None
+    return np.asarray(factors[1] / factors)
+
+
+def _positive(value: float, least: float) -> float | None:
+    return float(value) if np.isfinite(value) and value >= least else None

@@ -1,0 +1,68 @@
+"""Raw files: our digital negatives and 16-bit TIFF with a sidecar, by the ending of their name, and real cameras'."""
+
+from pathlib import Path
+from typing import Any
+
+from rodcone.errors import InputError
+from sensor.cfa import Tile
+from sensor.raw import RawImage
+from sensor.raw_files.dng import is_bayer, is_own, is_rgbw, read_dng, write_dng
+from sensor.raw_files.photograph import read_photograph
+from sensor.raw_files.raw_tiff import read_tiff, write_tiff
+
+ENDINGS = (".dng", ".tif", ".tiff")
+
+
+def check_ending(path: Path, tile: Tile) -> None:
+    """Raise `InputError` where a mosaic can't be written under this name."""
+    if path.suffix.lower() not in ENDINGS:
+        raise InputError(f"raw file: {str(path)!r} has another ending; allowed: {', '.join(ENDINGS)}; rename it")
+    if path.suffix.lower() == ".dng" and not (is_bayer(tile) or is_rgbw(tile)):
+        raise InputError(
+            f"raw file: {str(path)!r} can't hold the mosaic {tile}; allowed as DNG: Bayer, 2x2 RGBW; "
+            f"write {path.with_suffix('.tif').name}"
+        )
+
+
+def write_raw(raw: RawImage, path: str | Path) -> tuple[Path, ...]:
+    """Write a raw file; gives the paths of what was written, the picture first.
+
+    Raises
+    ------
+    InputError
+        For another ending than ``.dng``, ``.tif`` or ``.tiff``, or a raw image that the format can't hold.
+    OSError
+        Where the folder is missing or can't be written.
+    """
+    place = Path(path)
+    check_ending(place, raw.cfa)
+    return (write_dng(raw, place),) if place.suffix.lower() == ".dng" else write_tiff(raw, place)
+
+
+def read_raw(path: str | Path) -> RawImage:
+    """Read a raw file: one that `write_raw` wrote bit for bit, a camera's as `photograph.read_photograph` does.
+
+    Raises
+    ------
+    InputError
+        As `open_raw`.
+    """
+    return open_raw(path)[0]
+
+
+def open_raw(path: str | Path) -> tuple[RawImage, dict[str, Any]]:
+    """Read a raw file, and for a camera's, what had to be estimated or assumed; nothing for our own.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing, damaged, changed, or that LibRaw doesn't read as a Bayer mosaic.
+    """
+    place = Path(path)
+    if not place.is_file():
+        raise InputError(f"{place}: there is no such file; give the path of a raw file")
+    if place.suffix.lower() in ENDINGS[1:]:
+        return read_tiff(place), {}
+    if place.suffix.lower() == ENDINGS[0] and is_own(place):
+        return read_dng(place), {}
+    return read_photograph(place)

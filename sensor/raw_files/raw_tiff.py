@@ -1,0 +1,63 @@
+"""Any mosaic as a 16-bit TIFF, with a JSON sidecar that holds its tile and calibration exactly."""
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodcone.errors import InputError
+from rodcone.files import replacing
+from sensor.raw import RawImage
+from sensor.raw_files.raw_json import MOST_BYTES, parse_json, raw_image, to_json
+from sensor.raw_files.tiff import MIN_IS_BLACK, read_mosaic, write_mosaic
+
+DIGEST = "pixels_sha256"
+
+
+def write_tiff(raw: RawImage, path: Path) -> tuple[Path, Path]:
+    """Write the mosaic, and its sidecar beside it under the same name with ``.json``; gives both paths.
+
+    Raises
+    ------
+    InputError
+        Where the pixels are not uint16.
+    OSError
+        Where the folder is missing or can't be written.
+    """
+    sidecar = path.with_suffix(".json")
+    with replacing(sidecar, path) as (note, picture):
+        write_mosaic(picture, raw.dn, MIN_IS_BLACK, {})
+        note.write_text(to_json(raw, **{DIGEST: _digest(raw.dn)}) + "\n", encoding="utf-8")
+    return path, sidecar
+
+
+def read_tiff(path: Path) -> RawImage:
+    """Read a mosaic and its sidecar.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing or damaged, or a sidecar that belongs to other pixels.
+    """
+    dn, _ = read_mosaic(path, MIN_IS_BLACK)
+    sidecar = path.with_suffix(".json")
+    try:
+        if sidecar.exists() and not sidecar.is_file():  # a pipe or a device may never end
+            raise InputError(f"{sidecar}: a folder or a device; allowed: the sidecar that rodcone wrote")
+        with sidecar.open("rb") as file:
+            text = file.read(MOST_BYTES + 1)
+        if len(text) > MOST_BYTES:
+            raise InputError(f"{sidecar}: over {MOST_BYTES} bytes; allowed: the sidecar that rodcone wrote")
+    except OSError as error:
+        raise InputError(
+            f"{sidecar}: can't be read ({error.strerror or error}); keep the sidecar beside {path.name}"
+        ) from error
+    held = parse_json(text, str(sidecar), (DIGEST,))
+    if held[DIGEST] != _digest(dn):
+        raise InputError(f"{sidecar}: it describes other pixels than {path.name}; keep the two files of one exposure")
+    return raw_image(held, dn, str(sidecar))
+
+
+def _digest(dn: NDArray[np.uint16]) -> str:
+    return hashlib.sha256(np.ascontiguousarray(dn, dtype="<u2").data).hexdigest()

@@ -1,0 +1,1 @@
+"""The error budget: what each approximation costs, in electrons."""

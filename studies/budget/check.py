@@ -1,0 +1,131 @@
+"""The error budget held to its word: the planned model's expected electrons against the reference's."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.transport import Transport
+from sensor.kernel.run import expected_electrons_single
+from sensor.optics import form_image
+from sensor.presets import preset
+from sensor.response import electrons_per_irradiance, expected_electrons
+from sensor.variations import vary
+from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger
+from studies.budget.model_plan import Plan
+from studies.study.lit_scene import level_luminance, make_transport, open_all, under
+from studies.study.model import ImageModel, modelled
+from studies.study.study import Condition, SceneChoice, Study
+
+REFERENCE_SEED = 1 << 33  # added to the study's: the reference's render is independent of plan and pilot
+
+Step = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Checked:
+    """Prediction and measurement of one condition and mosaic: RMS of the difference over pixels below saturation [e-].
+
+    The prediction holds the reference's own Monte Carlo noise, which no model of it leaves out.
+    """
+
+    ledger: Ledger
+    predicted_e: float
+    measured_e: float
+
+
+@dataclass(frozen=True)
+class Check:
+    """All of a study's conditions, and the seconds that the renders of each model took."""
+
+    rows: tuple[Checked, ...]
+    planned_s: float
+    reference_s: float
+
+    @property
+    def covered(self) -> float:
+        """Share of the conditions in which the prediction is at least what was measured."""
+        return float(np.mean([row.predicted_e >= row.measured_e for row in self.rows]))
+
+    @property
+    def median_ratio(self) -> float:
+        """Median of predicted over measured, where anything was measured."""
+        return float(np.median([row.predicted_e / row.measured_e for row in self.rows if row.measured_e > 0]))
+
+
+def check_json(check: Check) -> dict[str, Any]:
+    """Totals, and prediction and measurement of each condition."""
+    rows = [
+        asdict(row.ledger.condition)
+        | {"mosaic": row.ledger.mosaic, "predicted_e": row.predicted_e, "measured_e": row.measured_e}
+        for row in check.rows
+    ]
+    return {
+        "conditions": len(rows),
+        "covered": check.covered,
+        "median_ratio": check.median_ratio,
+        "planned_s": check.planned_s,
+        "reference_s": check.reference_s,
+        "rows": rows,
+    }
+
+
+def check_plan(
+    study: Study, planned: Plan, reference: Plan, *, cache: Path, step: Step = lambda what, share: None
+) -> Check:
+    """Render both models with independent seeds and compare expected electrons; no sensor noise.
+
+    Parameters
+    ----------
+    planned, reference : Plan
+        Of this study: `studies.budget.plan.plan` and `reference_plan`.
+    cache : Path
+        Folder of renders.
+    """
+    rows: list[Checked] = []
+    seconds = np.zeros(2)
+    other = replace(study, render=replace(study.render, seed=study.render.seed + REFERENCE_SEED))
+    for choice, opened in open_all(study).items():
+        made = []
+        for which, (model, of) in enumerate(((planned, study), (reference, other))):
+            step(f"{choice.source}, {('planned', 'reference')[which]}", len(rows) / len(planned.ledgers))
+            transport = make_transport(opened, of, model.renders.get(choice), cache, lambda share, error: None)
+            seconds[which] += transport.seconds
+            made.append(transport)
+        rows += _compare(choice, planned, reference, made[0], made[1])
+    return Check(tuple(rows), float(seconds[0]), float(seconds[1]))
+
+
+def _compare(
+    choice: SceneChoice, planned: Plan, reference: Plan, ours: Transport, theirs: Transport
+) -> Iterator[Checked]:
+    for row in planned.ledgers:
+        if row.condition.scene == choice:
+            expected = model_electrons(ours, row, planned.images[row.condition])
+            true = model_electrons(theirs, row, reference.images[row.condition])
+            below = true < preset(row.condition.sensor).pixel.full_well_e
+            measured = float(np.sqrt(np.mean((expected - true)[below] ** 2))) if below.any() else 0.0
+            more = planned.renders[choice].spp / reference.renders[choice].spp if choice in planned.renders else 0.0
+            yield Checked(row, predicted_difference_e(row, more), measured)
+
+
+def predicted_difference_e(row: Ledger, spp_over_reference: float) -> float:
+    """RMS of the difference to a reference that has noise of its own [e-], of its samples and of its level."""
+    rms_e = {term.name: term.rms_e for term in row.terms}
+    return float(np.sqrt(row.rms_e**2 + rms_e[MONTE_CARLO] ** 2 * spp_over_reference + rms_e[LEVEL] ** 2))
+
+
+def model_electrons(transport: Transport, row: Ledger, model: ImageModel) -> NDArray[np.float64]:
+    """Expected electrons (h, w) of a condition and mosaic under a model of render, lens and readout."""
+    condition: Condition = row.condition
+    lit = under(transport, condition.spectrum)
+    level = level_luminance(condition.level, lit.illuminance_lux(1.0))
+    sensor = modelled(vary(preset(condition.sensor), row.mosaic), model)
+    image = form_image(lit.relight(luminance_cd_m2=level), sensor)
+    if model.exact:
+        return expected_electrons(image, sensor, row.exposure_s)
+    weights = electrons_per_irradiance(sensor, image.wavelength_nm, image.widths_nm, row.exposure_s)
+    return expected_electrons_single(image.values, weights, sensor).astype(np.float64)

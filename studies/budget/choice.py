@@ -1,0 +1,107 @@
+"""The cheapest model within the stated share of the sensor's noise variance."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import ceil
+
+from studies.budget.ledger import KERNEL, Weighed
+from studies.study.study import BudgetShares, Condition
+
+FIRST_SPP = 128  # fewer samples make passes of under 16, which are noisier than the pilot's
+
+# What a model costs in nanoseconds of one core; ratios are what counts. `still_life` at 256x256 takes 1690, 2370 and
+# 4410 ns a pixel and sample in 8, 16 and 40 bands: 85 ns a band, and as much as 12 bands for tracing a path.
+TRACING_BANDS = 12
+SAMPLE_BAND_NS = 85.0
+LENS_BAND_NS = {"diffraction": 55.0, "veiling glare": 4.5, "cos^4": 0.7}  # a pixel, on the same picture
+EXACT_NS = 40.0  # a pixel
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a scene's render and its conditions' images hold: bands, samples, samples wanted, terms left out."""
+
+    count: int
+    spp: int
+    wanted_spp: int
+    left_out: dict[Condition, frozenset[str]]
+
+
+def choose(rows: Sequence[Weighed], sizes: dict[int, int], shares: BudgetShares, most_spp: int) -> Choice:
+    """Choose one render and a lens for each condition of one scene.
+
+    Monte Carlo noise has a share of its own; the rest is for all other terms together. A condition's choice holds for
+    all of its mosaics. The finest bands with everything modelled are within any share.
+
+    Parameters
+    ----------
+    rows : sequence of Weighed
+    sizes : dict of int to int
+        Real number of bands by the count asked for; lines add some.
+    shares : BudgetShares
+    most_spp : int
+        What the study allows; 0 for a picture file.
+    """
+    by_condition: dict[Condition, list[Weighed]] = {}
+    for row in rows:
+        by_condition.setdefault(row.condition, []).append(row)
+    best: tuple[float, Choice] | None = None
+    for count, bands in sizes.items():
+        cost, left_out = 0.0, {}
+        for condition, some in by_condition.items():
+            found = _cheapest_lens(some, count, bands, shares)
+            if found is None:
+                break
+            cost, left_out[condition] = cost + found[0], found[1]
+        if len(left_out) < len(by_condition):
+            continue
+        wanted = wanted_spp(rows, count, left_out, shares)
+        spp = min(max(wanted, FIRST_SPP), most_spp)
+        cost += render_ns(bands, spp)
+        if best is None or cost < best[0]:
+            best = cost, Choice(count, spp, wanted, left_out)
+    if best is None:
+        raise AssertionError("the finest bands with everything modelled have no error")
+    return best[1]
+
+
+def wanted_spp(
+    rows: Iterable[Weighed], count: int, left_out: Mapping[Condition, frozenset[str]], shares: BudgetShares
+) -> int:
+    """Samples a pixel that bring Monte Carlo noise under its share in every condition."""
+    return ceil(
+        max(
+            row.monte_carlo(count, 1, left_out[row.condition]) / (shares.monte_carlo * row.noise_variance)
+            for row in rows
+        )
+    )
+
+
+def render_ns(bands: int, spp: int) -> float:
+    """Time of a render [ns a pixel]; bands are worked on in fours."""
+    return (-(-bands // 4) * 4 + TRACING_BANDS) * spp * SAMPLE_BAND_NS
+
+
+def image_ns(bands: int, modelled: Iterable[str]) -> float:
+    """Time of a picture's lens and readout [ns a pixel]."""
+    return sum(EXACT_NS if name == KERNEL else LENS_BAND_NS[name] * bands for name in modelled)
+
+
+def _cheapest_lens(
+    rows: Sequence[Weighed], count: int, bands: int, shares: BudgetShares
+) -> tuple[float, frozenset[str]] | None:
+    """Cost, and the terms of lens and kernel left out; None where the bands alone are too much."""
+    names = [*rows[0].lens, KERNEL]
+    found = [
+        (image_ns(bands, set(names) - set(out)), frozenset(out))
+        for some in range(len(names) + 1)
+        for out in combinations(names, some)
+        if all(_fits(row, count, out, shares) for row in rows)
+    ]
+    return min(found, key=lambda each: (each[0], sorted(each[1])), default=None)
+
+
+def _fits(row: Weighed, count: int, left_out: Iterable[str], shares: BudgetShares) -> bool:
+    total_e = sum(row.bands[count]) + sum({**row.lens, KERNEL: row.kernel}[name] for name in left_out)
+    return total_e**2 <= (shares.total - shares.monte_carlo) * row.noise_variance

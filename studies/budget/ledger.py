@@ -1,0 +1,193 @@
+"""The error budget's ledger: each approximation in electrons, and as a share of the sensor's own noise variance."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensor.config import SensorConfig
+from sensor.noise import noise_variance
+from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
+from studies.study.study import Condition
+
+# Standard errors added to a mean over the pilot's pixels. Of noise a few pixels may hold most, here and in what is
+# predicted: whatever its distribution, at most 5 % exceed the mean by root 19 standard deviations (Cantelli).
+EFFECT_MARGIN, NOISE_MARGIN = 2.0, 19.0**0.5
+MONTE_CARLO, LEVEL = "Monte Carlo", "level"
+RESPONSE, LIGHT = "bands", "light within bands"
+KERNEL = "kernel"
+
+
+@dataclass(frozen=True)
+class Term:
+    """One approximation's error: RMS over pixels below saturation [e-], and its square over the noise variance.
+
+    `modelled` terms cost what they would if they were left out, and count nothing.
+    """
+
+    name: str
+    rms_e: float
+    share: float
+    modelled: bool = False
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """What the planned model of one condition and mosaic is predicted to be off.
+
+    Attributes
+    ----------
+    condition : Condition
+    mosaic : str
+    exposure_s, noise_e : float
+        Time, and the sensor's own noise: root of its mean variance [e-].
+    terms : tuple of Term
+    rms_e, share : float
+        All together. Noise of the render and of its level is independent of the others and adds in square; these can
+        act alike, and the RMS of a sum is at most the sum of the RMS (Minkowski's inequality).
+    """
+
+    condition: Condition
+    mosaic: str
+    exposure_s: float
+    noise_e: float
+    terms: tuple[Term, ...]
+    rms_e: float
+    share: float
+
+
+@dataclass(frozen=True)
+class PilotNoise:
+    """Noise of a pilot.
+
+    Attributes
+    ----------
+    spp, pass_spp : int
+        Samples of the pilot, and of one of its passes.
+    level : float
+        Variance of the level over its square, of one sample a pixel and for as many pixels as the render has.
+    """
+
+    spp: int
+    pass_spp: int
+    level: float
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Errors of every choice that a plan has, for one condition and mosaic [e-].
+
+    Attributes
+    ----------
+    noise_variance : float
+        The sensor's own, mean over pixels below saturation [e-^2].
+    blurred, sharp : float
+        Monte Carlo variance of one sample a pixel, with diffraction and without.
+    jitter : mapping of int to float
+        The same of the wavelengths within bands, by number of bands.
+    level : float
+        Variance from the mean luminance that a level scales the picture by, of one sample a pixel [e-^2].
+    bands : mapping of int to (float, float)
+        By number of bands: response and light within them.
+    lens : mapping of str to float
+        Of leaving a term of the lens out.
+    kernel : float
+        Of the fast readout.
+    """
+
+    condition: Condition
+    mosaic: str
+    exposure_s: float
+    noise_variance: float
+    blurred: float
+    sharp: float
+    jitter: Mapping[int, float]
+    level: float
+    bands: Mapping[int, tuple[float, float]]
+    lens: Mapping[str, float]
+    kernel: float
+
+    def monte_carlo(self, count: int, spp: int, left_out: frozenset[str]) -> float:
+        """Monte Carlo variance of a model [e-^2]."""
+        return ((self.sharp if DIFFRACTION in left_out else self.blurred) + self.jitter[count]) / spp
+
+
+def weigh(
+    condition: Condition,
+    mosaic: str,
+    sensor: SensorConfig,
+    found: Effects,
+    level_cd_m2: float,
+    exposure_s: float,
+    pilot: PilotNoise,
+) -> Weighed:
+    """Scale a sensor's effects to a level and a time.
+
+    Parameters
+    ----------
+    found : Effects
+        At 1 cd/m^2 and 1 s.
+    pilot : PilotNoise
+    """
+    scale = level_cd_m2 * exposure_s
+    expected_e = scale * found.full.mean(axis=0)
+    below = expected_e < sensor.pixel.full_well_e
+    if not below.any():  # all saturated: no error reaches the raw image
+        counts = dict.fromkeys(found.bands, 0.0)
+        bands = dict.fromkeys(found.bands, (0.0, 0.0))
+        none = Weighed(condition, mosaic, exposure_s, 1.0, 0.0, 0.0, counts, 0.0, bands, {}, 0.0)
+        return replace(none, lens=dict.fromkeys(found.lens, 0.0))
+    own = noise_variance(expected_e, sensor, exposure_s)[below].mean()
+    blurred, sharp = found.blurred**2 * pilot.spp, found.sharp**2 * pilot.spp
+    signal = np.maximum(found.full.mean(axis=0), np.finfo(np.float64).tiny)
+    # Wavelengths are stratified within a pass; what light a path carries is independent of its wavelength.
+    spread = sharp.mean(axis=0) / signal**2 + 1 / pilot.pass_spp
+    square = float((expected_e[below] ** 2).mean())
+    return Weighed(
+        condition,
+        mosaic,
+        exposure_s,
+        float(own),
+        blurred=scale**2 * _upper(blurred[:, below], NOISE_MARGIN),
+        sharp=scale**2 * _upper(sharp[:, below], NOISE_MARGIN),
+        jitter={n: scale**2 * _upper((some.jitter * spread)[below], NOISE_MARGIN) for n, some in found.bands.items()},
+        level=square * pilot.level,
+        bands={n: (scale * _rms(b.response, below), scale * _rms(b.light, below)) for n, b in found.bands.items()},
+        lens={name: scale * _rms(pair, below) for name, pair in found.lens.items()},
+        kernel=float(np.sqrt(np.mean(kernel_rms_e(expected_e, max(found.bands))[below] ** 2))),
+    )
+
+
+def ledger(weighed: Weighed, count: int, spp: int, left_out: frozenset[str]) -> Ledger:
+    """Ledger of one model: its number of bands, samples (0 for a picture file), terms of lens and kernel left out."""
+    own = weighed.noise_variance
+    monte_carlo = weighed.monte_carlo(count, spp, left_out) if spp else 0.0
+    level = weighed.level / spp if spp else 0.0
+    response, light = weighed.bands[count]
+    systematic = {RESPONSE: response, LIGHT: light, **weighed.lens, KERNEL: weighed.kernel}
+    random = [Term(MONTE_CARLO, monte_carlo**0.5, monte_carlo / own), Term(LEVEL, level**0.5, level / own)]
+    terms = []
+    for name, rms_e in systematic.items():
+        optional = name in weighed.lens or name == KERNEL
+        terms.append(Term(name, rms_e, rms_e**2 / own, modelled=optional and name not in left_out))
+    square = monte_carlo + level + sum(term.rms_e for term in terms if not term.modelled) ** 2
+    return Ledger(
+        weighed.condition,
+        weighed.mosaic,
+        weighed.exposure_s,
+        own**0.5,
+        (*random, *terms),
+        square**0.5,
+        square / own,
+    )
+
+
+def _rms(pair: Pair, below: NDArray[np.bool_]) -> float:
+    """Root of the mean product of an effect's two estimates, with a margin for how few pixels there are."""
+    return float(np.sqrt(max(_upper((pair[0] * pair[1])[below], EFFECT_MARGIN), 0.0)))
+
+
+def _upper(values: NDArray[np.float64], margin: float) -> float:
+    """Mean over pixels (last axis) and so many standard errors of it."""
+    return float(values.mean() + margin * values.std() / np.sqrt(values.shape[-1]))

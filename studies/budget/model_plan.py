@@ -1,0 +1,43 @@
+"""A plan: how each scene is rendered, and which terms of the lens each condition's image holds."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sensor.config import LensConfig
+from studies.budget.ledger import Ledger
+from studies.study.model import ImageModel, RenderModel
+from studies.study.study import Condition, SceneChoice, Study, conditions
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Models of a study's scenes and conditions, and the share of the noise variance that each is predicted to add.
+
+    `ledgers` holds what that is made of, a row a condition and mosaic.
+    """
+
+    renders: Mapping[SceneChoice, RenderModel]
+    images: Mapping[Condition, ImageModel]
+    shares: Mapping[Condition, float] = field(default_factory=dict)
+    ledgers: tuple[Ledger, ...] = ()
+
+    def _repr_html_(self) -> str:
+        from studies.budget.plan_text import plan_html  # late: it reads this type
+
+        return plan_html(self)
+
+
+def as_stated(study: Study, lenses: Mapping[str, LensConfig]) -> Plan:
+    """Plan without a budget: bands and samples as the study states, lenses as the sensors state."""
+    low, high = study.render.range_nm
+    edges = np.linspace(low, high, max(1, round((high - low) / study.render.band_nm)) + 1)
+    render = RenderModel(
+        tuple(((edges[1:] + edges[:-1]) / 2).tolist()), tuple(np.diff(edges).tolist()), study.render.spp
+    )
+    images = {}
+    for condition in conditions(study):
+        lens = lenses[condition.sensor]
+        images[condition] = ImageModel(lens.diffraction, lens.veiling_glare, lens.horizontal_view_deg)
+    return Plan(dict.fromkeys(study.scenes, render), images)

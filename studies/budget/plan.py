@@ -1,0 +1,200 @@
+"""The error budget of a study: what its pictures have to hold, and what the sensor's noise hides."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.engine import render
+from render.spectrum import Spectrum
+from render.transport import Transport
+from sensor.config import LensConfig, SensorConfig
+from sensor.exposure import auto_exposure_s
+from sensor.optics import form_image
+from sensor.presets import preset
+from sensor.variations import vary
+from studies.budget.bands import counts, fine_bands, groups_of, wide_bands
+from studies.budget.choice import Choice, choose
+from studies.budget.ledger import KERNEL, Ledger, PilotNoise, Weighed, ledger, weigh
+from studies.budget.model_plan import Plan
+from studies.budget.terms import LENS_TERMS, effects, horizontal_view_deg
+from studies.study.lit_scene import OpenedScene, level_luminance, open_all, under, white_spectrum
+from studies.study.model import ImageModel, RenderModel
+from studies.study.radiance_file import open_radiance_file
+from studies.study.study import OWN, Condition, Study, conditions, mosaics, parse_exposure
+
+PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels a picture is no smoother, so no effect is smaller
+PILOT_SEED = 1 << 32  # added to the study's seed: the pilot is no part of a render, and the cache keeps them apart
+FULL_PASSES_SPP = 128  # from which on a render's passes have 16 samples
+REFERENCE_SAMPLES = 4  # times what the study allows: the reference's noise is then at most half of the plan's
+_FOREVER_S = 1e7
+
+Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
+Groups = Mapping[int, Sequence[NDArray[np.intp]]]
+
+
+@dataclass(frozen=True)
+class Pilot:
+    """A scene rendered small with few samples, in fine bands, and the choices of wider ones."""
+
+    opened: OpenedScene
+    transport: Transport
+    groups: Groups
+    rendered: bool
+    view_deg: float
+
+
+def plan(study: Study, *, cache: Path | None = None, step: Step = lambda what, share: None) -> Plan:
+    """Compute a study's error budget on pilot renders and choose the cheapest model within it.
+
+    Parameters
+    ----------
+    study : Study
+        `budget` holds the shares, `lens` what the lens does in full, `render.spp` the most samples.
+    cache : Path, optional
+        Folder of renders.
+
+    Returns
+    -------
+    Plan
+        The same for the same study, whatever the machine's speed. Picture files have no entry in `renders`.
+
+    Raises
+    ------
+    InputError
+        For a scene that can't be opened or rendered.
+    """
+    renders, images, ledgers = {}, {}, []
+    opened_scenes = open_all(study)
+    for index, opened in enumerate(opened_scenes.values()):
+        step(f"pilot of {opened.choice.source}", index / len(opened_scenes))
+        pilot = make_pilot(opened, study, cache)
+        rows = list(_weigh_all(pilot, study))
+        sizes = {count: len(groups) for count, groups in pilot.groups.items()}
+        choice = choose(rows, sizes, study.budget, study.render.spp if pilot.rendered else 0)
+        if pilot.rendered:
+            nm, width_nm = wide_bands(pilot.transport, pilot.groups[choice.count])
+            renders[opened.choice] = RenderModel(tuple(nm.tolist()), tuple(width_nm.tolist()), choice.spp)
+        for row in rows:
+            images[row.condition] = _image(full_lens(study, pilot, preset(row.condition.sensor)), choice, row.condition)
+            ledgers.append(ledger(row, choice.count, choice.spp, choice.left_out[row.condition]))
+    return Plan(renders, images, _worst(ledgers), tuple(ledgers))
+
+
+def reference_plan(study: Study) -> Plan:
+    """Model everything: fine bands, four times the samples that the study allows, the whole lens, the exact readout."""
+    renders, images = {}, {}
+    for opened in open_all(study).values():
+        if opened.scene is not None:
+            nm, width_nm = fine_bands(_spectra(opened, study), study.render.range_nm)
+            spp = min(REFERENCE_SAMPLES * study.render.spp, 1 << 16)
+            renders[opened.choice] = RenderModel(tuple(nm.tolist()), tuple(width_nm.tolist()), spp)
+        for condition in conditions(study):
+            if condition.scene == opened.choice:
+                lens = _full_lens(study, preset(condition.sensor).lens, _view_deg(opened))
+                images[condition] = ImageModel(lens.diffraction, lens.veiling_glare, lens.horizontal_view_deg, True)
+    return Plan(renders, images)
+
+
+def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> Pilot:
+    """Render a scene's pilot: eight passes, of as many samples as the passes of its render will have.
+
+    A picture file is its own pilot, and keeps its bands.
+    """
+    if opened.scene is None:
+        transport = open_radiance_file(opened.choice.source, opened.choice.light)[0]
+        single = [np.array([band]) for band in range(transport.wavelength_nm.size)]
+        return Pilot(opened, transport, {len(single): single}, False, 0.0)
+    nm, width_nm = fine_bands(_spectra(opened, study), study.render.range_nm)
+    scale = min(1.0, PILOT_SIDE / max(opened.size))
+    size = max(1, round(opened.size[0] * scale)), max(1, round(opened.size[1] * scale))
+    transport = render(
+        opened.scene,
+        size,
+        wavelength_nm=nm,
+        width_nm=width_nm,
+        seed=study.render.seed + PILOT_SEED,
+        max_spp=min(study.render.spp, FULL_PASSES_SPP),
+        cache=cache,
+    )
+    groups = {count: groups_of(width_nm, count) for count in counts(width_nm)}
+    return Pilot(opened, transport, groups, True, _view_deg(opened))
+
+
+def full_lens(study: Study, pilot: Pilot, sensor: SensorConfig) -> LensConfig:
+    """Lens of the reference: what the sensor's own states, and what it leaves out as the study states it."""
+    return _full_lens(study, sensor.lens, pilot.view_deg)
+
+
+def _full_lens(study: Study, lens: LensConfig, view_deg: float) -> LensConfig:
+    asked = study.lens
+    view = view_deg if asked.horizontal_view_deg is None else asked.horizontal_view_deg
+    return replace(
+        lens,
+        diffraction=lens.diffraction or asked.diffraction,
+        veiling_glare=lens.veiling_glare or asked.veiling_glare,
+        horizontal_view_deg=lens.horizontal_view_deg or view,
+    )
+
+
+def _view_deg(opened: OpenedScene) -> float:
+    return 0.0 if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
+
+
+def _spectra(opened: OpenedScene, study: Study) -> list[Spectrum]:
+    """Every spectrum that the scene is lit by."""
+    own = [group.spectrum for group in opened.scene.groups.values()] if opened.scene else []
+    return own + [white_spectrum(opened, name) for name in study.spectra if name != OWN]
+
+
+def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
+    """Weigh each condition and mosaic of one scene."""
+    rng = np.random.default_rng([study.render.seed, PILOT_SEED])
+    for spectrum in study.spectra:
+        lit = under(pilot.transport, spectrum)
+        lux = lit.illuminance_lux(1.0)
+        noise = _pilot_noise(pilot, lit)
+        for name in study.sensors:
+            auto_s = _auto_s(lit, preset(name))
+            for mosaic in mosaics(study):
+                sensor = vary(preset(name), mosaic)
+                found = effects(lit, sensor, full_lens(study, pilot, sensor), pilot.groups, rng)
+                for condition in conditions(study):
+                    if (condition.scene, condition.spectrum, condition.sensor) == (pilot.opened.choice, spectrum, name):
+                        level = level_luminance(condition.level, lux)
+                        exposure_s = parse_exposure(condition.exposure)
+                        if exposure_s is None:
+                            exposure_s = min(study.longest_exposure_s, auto_s / level)
+                        yield weigh(condition, mosaic, sensor, found, level, exposure_s, noise)
+
+
+def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:
+    """What Monte Carlo noise the pilot has; a picture file tells none."""
+    if not pilot.rendered:
+        return PilotNoise(spp=0, pass_spp=1, level=0.0)
+    fewer = lit.coverage.size / (pilot.opened.size[0] * pilot.opened.size[1])
+    error = lit.level().relative_error or 0.0
+    return PilotNoise(spp=lit.spp, pass_spp=lit.spp // lit.passes, level=error**2 * lit.spp * fewer)
+
+
+def _auto_s(transport: Transport, sensor: SensorConfig) -> float:
+    """Time that auto exposure chooses at 1 cd/m^2, behind a plain lens, as a sweep does."""
+    bare = replace(sensor.lens, diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0, defocus_um=0.0)
+    plain = replace(sensor, lens=bare)
+    return auto_exposure_s(form_image(transport.relight(luminance_cd_m2=1.0), plain), plain, _FOREVER_S)
+
+
+def _image(lens: LensConfig, choice: Choice, condition: Condition) -> ImageModel:
+    left_out = choice.left_out[condition]
+    kept = {field: 0.0 if name in left_out else getattr(lens, field) for name, field in LENS_TERMS.items()}
+    return ImageModel(**kept, exact=KERNEL not in left_out)
+
+
+def _worst(ledgers: Sequence[Ledger]) -> dict[Condition, float]:
+    """Largest share over the mosaics of each condition."""
+    shares: dict[Condition, float] = {}
+    for row in ledgers:
+        shares[row.condition] = max(row.share, shares.get(row.condition, 0.0))
+    return shares

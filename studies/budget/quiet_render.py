@@ -1,0 +1,44 @@
+"""Rendering until the render's own noise is small beside the sensor's, or a cap stops it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from render.engine import render
+from render.scene import Scene
+from render.transport import Transport
+from studies.budget.budget import MOST_SHARE
+
+FIRST_SPP = 128  # in eight passes: enough to tell how many more it takes
+MARGIN = 1.05  # on samples that the share so far asks for: it is an estimate
+MOST_GROWTH = 4.0  # of samples from one look to the next
+
+
+def render_quietly(
+    scene: Scene,
+    size: tuple[int, int],
+    share: Callable[[Transport], float],
+    *,
+    max_spp: int,
+    max_seconds: float,
+    **options: Any,
+) -> Transport:
+    """Render until `share` is `MOST_SHARE` or less, or samples or time are used up; the passes made are kept.
+
+    Parameters
+    ----------
+    share : callable
+        The render's noise variance over the sensor's own, such as `pixel_share`.
+    max_spp, max_seconds : int, float
+        The cap.
+    **options
+        Of `render.engine.render`: bands, seed, cache, progress.
+    """
+    made, wanted = None, min(FIRST_SPP, max_spp)
+    while True:
+        made = render(scene, size, max_spp=wanted, max_seconds=max_seconds, resume=made, **options)
+        now = share(made)
+        if now <= MOST_SHARE or made.stopped_by != "samples" or made.spp >= max_spp:
+            return made
+        wanted = min(max_spp, int(np.ceil(made.spp * min(MARGIN * now / MOST_SHARE, MOST_GROWTH))))

@@ -1,0 +1,187 @@
+"""What each approximation does to a picture, in electrons, found on a small pilot render.
+
+Everything is linear in light and time, so it is found once for 1 cd/m^2 and 1 s and scaled. Each effect is computed
+from the pilot's even and from its odd passes: the product of the two has the effect's square as its mean, free of Monte
+Carlo noise. That noise is drawn anew from the scatter of the passes, and goes through the lens as the light does.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import radians, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.radiance import SpectralRadiance
+from render.transport import Transport
+from sensor.config import LensConfig, SensorConfig
+from sensor.kernel.poisson import LARGEST_ERROR
+from sensor.optics import form_image
+from sensor.response import expected_electrons
+from studies.budget.bands import merge_radiance, merge_transport
+
+Pair = NDArray[np.float64]  # (2, h, w): from even and from odd passes [e- per cd/m^2 and s]
+
+DIFFRACTION = "diffraction"
+LENS_TERMS = {DIFFRACTION: "diffraction", "veiling glare": "veiling_glare", "cos^4": "horizontal_view_deg"}
+DRAWS = 2  # of Monte Carlo noise
+SINGLE_EPSILON = 2.0**-24  # largest relative rounding error of one operation in single precision
+NORMAL_REACH = 6.7  # standard deviations at which `sensor.kernel.kernel.normal_pair` ends
+
+
+@dataclass(frozen=True)
+class BandErrors:
+    """What one choice of wide bands does.
+
+    Attributes
+    ----------
+    response : (2, h, w) float64
+        Light and response vary together within a band: exact radiance averaged over wide bands, less the fine bands'.
+    light : (2, h, w) float64
+        The light and what the scene does with it vary together within a band: product of averages, less their average.
+    jitter : (h, w) float64
+        Variance of one path's electrons by the wavelength within the bands that it draws.
+    """
+
+    response: Pair
+    light: Pair
+    jitter: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Effects:
+    """Expected electrons of one sensor under one spectrum at 1 cd/m^2 and 1 s, and what approximations do to them.
+
+    Attributes
+    ----------
+    full : (2, h, w) float64
+        Everything modelled, fine bands.
+    blurred, sharp : (draw, h, w) float64
+        Draws of the pilot's Monte Carlo noise, with diffraction and without. Diffraction evens noise out, and brings
+        that of a lamp's rim to pixels below saturation.
+    lens : mapping of str to (2, h, w) float64
+        What leaving one term of the lens out changes.
+    bands : mapping of int to BandErrors
+        By the count of `studies.budget.bands.COUNTS`.
+    """
+
+    full: Pair
+    blurred: NDArray[np.float64]
+    sharp: NDArray[np.float64]
+    lens: Mapping[str, Pair]
+    bands: Mapping[int, BandErrors]
+
+
+def effects(
+    transport: Transport,
+    sensor: SensorConfig,
+    lens: LensConfig,
+    groups: Mapping[int, Sequence[NDArray[np.intp]]],
+    rng: np.random.Generator,
+) -> Effects:
+    """Find all effects for a sensor under the transport's own spectra.
+
+    Parameters
+    ----------
+    transport : Transport
+        The pilot, in fine bands.
+    sensor : SensorConfig
+    lens : LensConfig
+        With everything that the reference models.
+    groups : mapping of int to sequence of index arrays
+        Choices of wide bands, as `studies.budget.bands.groups_of` makes them.
+    rng : numpy.random.Generator
+        For the draws of Monte Carlo noise.
+    """
+    halves = transport.relight_halves(luminance_cd_m2=1.0)
+    bare = replace(sensor, lens=replace(lens, **dict.fromkeys(LENS_TERMS.values(), 0.0)))
+    full, plain = _electrons(halves, replace(sensor, lens=lens)), _electrons(halves, bare)
+    without = {
+        name: _electrons(halves, replace(sensor, lens=replace(lens, **{field: 0.0}))) - full
+        for name, field in LENS_TERMS.items()
+        if getattr(lens, field)
+    }
+    return Effects(
+        full=full,
+        blurred=_noise(transport, replace(sensor, lens=lens), rng),
+        sharp=_noise(transport, replace(sensor, lens=replace(lens, diffraction=0.0)), rng),
+        lens=without,
+        bands={factor: _band_errors(transport, halves, plain, bare, some) for factor, some in groups.items()},
+    )
+
+
+def kernel_rms_e(expected_e: NDArray[np.float64], bands: int) -> NDArray[np.float64]:
+    """Most that the fast readout's expected electrons are off, (h, w): a bound, since no machine need have Dr.Jit.
+
+    A sum over bands in single precision rounds bands + 2 times. A draw's distribution function is off by at most
+    `LARGEST_ERROR`, and so is its mean by that times the width of the distribution.
+    """
+    rounding = (bands + 2) * SINGLE_EPSILON * expected_e
+    return np.asarray(rounding + LARGEST_ERROR * 2 * NORMAL_REACH * np.sqrt(expected_e))
+
+
+def horizontal_view_deg(camera: Mapping[str, object], size: tuple[int, int]) -> float:
+    """Angle of view across a picture of a Mitsuba ``perspective`` camera, 0 where it states none as ``fov``."""
+    field, axis = camera.get("fov"), camera.get("fov_axis", "x")
+    if not isinstance(field, int | float):
+        return 0.0
+    height, width = size
+    spans = {
+        "x": width,
+        "y": height,
+        "smaller": min(size),
+        "larger": max(size),
+        "diagonal": float(np.hypot(height, width)),
+    }
+    half = tan(radians(float(field) / 2)) * width / spans[str(axis)]
+    return float(2 * np.degrees(np.arctan(half)))
+
+
+def _noise(transport: Transport, sensor: SensorConfig, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Draws of the transport's Monte Carlo noise in electrons: each pixel's bands rise and fall together."""
+    deviation = np.moveaxis(np.sqrt(np.maximum(transport.relight_variance(luminance_cd_m2=1.0), 0.0)), 0, -1)
+    signs = rng.choice(np.array([-1, 1], np.float32), (DRAWS, *deviation.shape[:2], 1))
+    lights = [deviation, *((1 + sign) * deviation for sign in signs)]  # a lens takes no negative light
+    level, *drawn = _electrons(
+        [SpectralRadiance(light, transport.wavelength_nm, 0.0, transport.width_nm) for light in lights], sensor
+    )
+    return np.asarray(np.stack(drawn) - level)
+
+
+def _electrons(halves: Sequence[SpectralRadiance], sensor: SensorConfig) -> Pair:
+    return np.stack([expected_electrons(form_image(half, sensor), sensor, 1.0) for half in halves])
+
+
+def _band_errors(
+    transport: Transport,
+    halves: Sequence[SpectralRadiance],
+    plain: Pair,
+    sensor: SensorConfig,
+    groups: Sequence[NDArray[np.intp]],
+) -> BandErrors:
+    averaged = [merge_radiance(half, groups) for half in halves]
+    # A level is reached by the luminance that the wide bands tell, so their share in that error is counted here.
+    mean = SpectralRadiance(
+        transport.mean_radiance(luminance_cd_m2=1.0)[None, None], transport.wavelength_nm, width_nm=transport.width_nm
+    )
+    followed = _electrons(averaged, sensor) / merge_radiance(mean, groups).luminance().item()
+    wide = _electrons(merge_transport(transport, groups).relight_halves(luminance_cd_m2=1.0), sensor)
+    return BandErrors(followed - plain, wide - followed, _jitter(halves, sensor, groups))
+
+
+def _jitter(
+    halves: Sequence[SpectralRadiance], sensor: SensorConfig, groups: Sequence[NDArray[np.intp]]
+) -> NDArray[np.float64]:
+    """Variance over the places within all wide bands at once: a path draws one offset for all of them."""
+    places = max(len(group) for group in groups)
+    if places == 1:
+        return np.zeros(halves[0].shape)
+    values = np.maximum(halves[0].values + halves[1].values, 0) / 2
+    drawn = []
+    for place in range(places):
+        chosen = np.zeros_like(values)
+        for group in groups:
+            index = group[place * len(group) // places]
+            chosen[..., group] = values[..., [index]]
+        drawn.append(SpectralRadiance(chosen, halves[0].wavelength_nm, 0.0, halves[0].width_nm))
+    return np.asarray(_electrons(drawn, sensor).var(axis=0))

@@ -1,0 +1,77 @@
+"""The command `rodcone capture`."""
+
+import json as notation
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+
+def capture(
+    source: str,
+    /,
+    *,
+    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("shot.dng"),
+    sensor: str = "low_noise",
+    cfa: str | None = None,
+    exposure_s: float | None = None,
+    level: str | None = None,
+    white_balance: str | None = None,
+    size: int | None = None,
+    spp: int = 64,
+    seed: int = 0,
+    trust_scene: Annotated[bool, Parameter(negative="")] = False,
+    extend: str | None = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Photograph a scene and write raw files that raw converters open; prints their paths.
+
+    Parameters
+    ----------
+    source
+        Scene by name such as color_checker, a Mitsuba scene (.xml), or a file of spectral radiance: .exr, or .mat of
+        ISETCam.
+    out
+        Raw file to write: .dng for Bayer and 2x2 RGBW (with a re-mosaiced Bayer one beside it, NAME_bayer.dng), .tif
+        with a .json beside it for any mosaic.
+    sensor
+        Sensor preset by name, or a preset file.
+    cfa
+        Mosaic, such as rgbw or bayer; the preset's own by default.
+    exposure_s
+        Exposure time in seconds; chosen for the brightest green by default.
+    level
+        Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
+        by default.
+    white_balance
+        Illuminant, such as D65, that the camera's as-shot white balance and colour matrix are set to; the scene's
+        first light by default, D65 for a file of radiance.
+    size
+        Longer side of the rendered picture in pixels; 256 by default, a .xml scene's film has its own, a file of
+        radiance keeps its own.
+    spp
+        Samples a pixel of the render.
+    seed
+        Seed of the render, the chip and the exposure.
+    trust_scene
+        Let a .xml scene load plug-ins of its own, which are native code, and files from anywhere.
+    extend
+        Give hold to let surfaces go on at their end values outside their tables; bands beyond are refused by default.
+    force
+        Go on where more memory is needed than is free.
+    json
+        Print one JSON object with the paths and facts of the exposure instead of the paths.
+    """
+    from rodcone.progress import progress
+    from studies.photograph.shot import Order, take
+
+    order = Order(
+        source, out, sensor, cfa, exposure_s, level, white_balance, size, spp, seed, trust_scene, extend, force
+    )
+    with progress(sys.stderr) as step:
+        taken = take(order, step)
+    for note in taken.notes:
+        print(f"rodcone: {note}", file=sys.stderr)
+    print(notation.dumps(taken.facts) if json else "\n".join(str(path) for path in taken.paths))

@@ -1,0 +1,58 @@
+"""The command `rodcone develop`."""
+
+import json as notation
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+
+def develop(
+    raw: Path,
+    /,
+    *,
+    out: Annotated[Path | None, Parameter(name=["--out", "-o"])] = None,
+    isp: str | None = None,
+    bits: int = 8,
+    ev: float | None = None,
+    white_balance: str = "gray-world",
+    encoding: str = "srgb",
+    json: Annotated[bool, Parameter(negative="")] = False,
+) -> None:
+    """Develop a raw file of `rodcone capture`, or any camera's with a Bayer mosaic, into a picture; prints its path.
+
+    Parameters
+    ----------
+    raw
+        Raw file: .dng, or .tif with its .json beside it; or a camera's, such as .nef, .cr2 or .dng, which takes
+        pip install 'rodcone[photographs]'.
+    out
+        Picture to write, .png or .tif; the raw file's name with .png by default.
+    isp
+        Pipeline: interleaved (RGBW) or bayer, by the mosaic in the file where left out. For Bayer also bayer_malvar,
+        bayer_menon, bayer_nlm and bayer_bm3d; for RGBW rgbw_sato, rgbw_kijima, rgbw_yamagami and rgbw_gindele.
+    bits
+        Of each channel: 8 or 16.
+    ev
+        Brightness in stops, at 0 a full well is white; by default the 99th percentile of the picture's luminance is
+        shown at 90 % of white.
+    white_balance
+        gray-world, as in the paper, or as-shot: what capture's --white-balance or the camera set, as raw converters do.
+    encoding
+        Colours of the picture: srgb, or display-p3 for screens with a wider gamut.
+    json
+        Print one JSON object with the path and what was decided instead of the path.
+    """
+    from rodcone.errors import InputError
+    from rodcone.files import check_place
+    from studies.photograph.develop import develop_file
+    from studies.photograph.picture_file import check_picture_file, write_picture
+
+    if not raw.name:
+        raise InputError(f"raw: {str(raw)!r} is a folder; give the path of a raw file")
+    picture = raw.with_suffix(".png") if out is None else out
+    check_picture_file(picture, bits, encoding)
+    check_place(picture)
+    developed = develop_file(raw, isp, ev, white_balance, encoding)
+    write_picture(developed.encoded, picture, bits, encoding)
+    print(notation.dumps({"path": str(picture), **developed.facts}) if json else picture)

@@ -1,0 +1,81 @@
+"""What a run will take, before anything is computed: cells, renders, time and memory, as orders of magnitude."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from render.radiance_files.radiance_source import is_radiance_file
+from rodcone.memory import Memory, file_extent, memory
+from scenes.catalog import load
+from scenes.levels import DEMO_LEVELS
+from studies.budget.model_plan import Plan
+from studies.commands.demo import WAVELENGTH_NM, Demo
+from studies.photograph.camera import CAMERAS
+from studies.study.lit_scene import OpenedScene
+from studies.study.study import SceneChoice, Study, conditions
+
+# Measured on two shared cores of a server (AVX-512): `benchmarks/bench_sweep.py` prints them for another machine.
+RENDER_S = 1e-7  # a pixel, sample, band and light group
+CELL_S = 6e-6  # a pixel: capture, development, metrics and file together, mean of the interleaved and Bayer cameras
+CELL_LEAST_S = 0.05  # a cell of any size
+START_S = 4.0  # a worker's imports
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Sizes of a sweep.
+
+    Attributes
+    ----------
+    cells, kept, renders, workers : int
+        `kept` cells stand in the ledger from an earlier run; `renders` counts scenes, files of radiance left out.
+    seconds : float
+        With so many workers, renders done before or `kept` cells not taken off.
+    bytes : float
+        Memory of all processes together, at most.
+    largest_bytes : float
+        Memory of the process that needs most.
+    """
+
+    cells: int
+    kept: int
+    renders: int
+    workers: int
+    seconds: float
+    bytes: float
+    largest_bytes: float
+
+
+def demo_memory(demo: Demo) -> Memory:
+    """Memory that a demo needs."""
+    if is_radiance_file(demo.scene):
+        pixels, bands, groups = file_extent(demo.scene)
+    else:
+        pixels, bands, groups = demo.size**2, len(WAVELENGTH_NM), len(load(demo.scene).groups)
+    levels = len(DEMO_LEVELS if demo.levels is None else demo.levels)
+    return memory(pixels, bands, groups, workers=1, pictures=levels * len(demo.sensors) * len(CAMERAS))
+
+
+def estimate(study: Study, plan: Plan, scenes: Mapping[SceneChoice, OpenedScene], workers: int, kept: int) -> Estimate:
+    """Estimate a sweep."""
+    cells = len(conditions(study)) * len(study.processors) * len(study.seeds)
+    per_scene = cells / len(scenes)
+    seconds = START_S if workers > 1 else 0.0
+    needs = []
+    for choice, opened in scenes.items():
+        if opened.scene is None:
+            pixels, bands, groups = file_extent(choice.source)
+        else:
+            model, pixels, groups = plan.renders[choice], opened.size[0] * opened.size[1], len(opened.scene.groups)
+            bands = len(model.wavelength_nm)
+            seconds += RENDER_S * pixels * bands * groups * model.spp
+        seconds += per_scene * max(CELL_LEAST_S, CELL_S * pixels) / max(workers, 1)
+        needs.append(memory(pixels, bands, groups, workers))
+    renders = sum(opened.scene is not None for opened in scenes.values())
+    total, largest = max(need.total for need in needs), max(need.largest for need in needs)
+    return Estimate(cells, kept, renders, workers, seconds, total, largest)
+
+
+def as_facts(found: Estimate) -> dict[str, Any]:
+    """Estimate as JSON holds it."""
+    return dict(vars(found))

@@ -1,0 +1,42 @@
+"""The command `rodcone opponents`."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+
+def opponents(
+    folder: Path,
+    /,
+    *,
+    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("opponents.md"),
+    camera: str = "interleaved",
+) -> None:
+    """Write a page on one camera beside the other processors of a sweep, its losses included; prints its path.
+
+    Every number and sentence is computed from the ledger; the figure is an SVG file of the page's name.
+
+    Parameters
+    ----------
+    folder
+        Folder of a sweep of two seeds or more; rodcone new study opponents writes a study to start from.
+    out
+        Page to write, ending in .md.
+    camera
+        Processor whose leads and losses the page tells.
+    """
+    from rodcone.errors import InputError
+    from rodcone.files import check_place
+    from studies.pages.duels_page import write_page
+    from studies.sweep.database import last_study, read_ledger
+    from studies.sweep.export import read_rows
+
+    if out.suffix != ".md":
+        raise InputError(f"out: {str(out)!r} doesn't end in .md; allowed: that ending; write {out.stem}.md")
+    check_place(out)
+    rows = read_rows(folder)
+    with read_ledger(folder) as base:
+        study, _ = last_study(base) or ({}, {})
+    write_page(rows, study, folder, out, camera)
+    print(out)

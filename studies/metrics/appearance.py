@@ -1,0 +1,91 @@
+"""How far a picture is from the truth to the eye: S-CIELAB, FLIP, and PSNR of absolute luminance on PU21's scale."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from skimage.color import deltaE_cie76, rgb2lab
+
+from isp.colour.camera_colour import encode_srgb, luminance_of_srgb
+from studies.metrics.flip import flip
+from studies.metrics.pu21 import pu21_psnr_db
+from studies.metrics.quality import require_finite
+from studies.metrics.s_cielab import seen_lab
+
+Image = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TruePicture:
+    """The noise-free picture, and what comparisons need of it, worked out once for all that are compared with it.
+
+    Attributes
+    ----------
+    linear : (h, w, 3) float64
+        sRGB, not clipped; white is 1.
+    encoded, lab : (h, w, 3) float64
+        As a display shows it, and its CIELAB.
+    seen : (h, w, 3) float64
+        CIELAB after the eye's blur.
+    """
+
+    linear: Image
+    encoded: Image
+    lab: Image
+    seen: Image
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """Differences that an eye sees.
+
+    Attributes
+    ----------
+    s_cielab_median, s_cielab_p95 : float
+        Median and 95th percentile over pixels; 1 is about what can just be seen.
+    flip_mean : float
+        0 (no difference) to 1.
+    pu21_psnr_db : float
+        Of luminance in cd/m^2.
+    """
+
+    s_cielab_median: float
+    s_cielab_p95: float
+    flip_mean: float
+    pu21_psnr_db: float
+
+
+def true_picture(linear: Image) -> TruePicture:
+    """Work out what comparisons need of linear sRGB (h, w, 3); `InputError` for a value that is NaN or infinite."""
+    require_finite(truth=linear)
+    encoded = encode_srgb(linear)
+    return TruePicture(linear, encoded, rgb2lab(encoded), seen_lab(encoded))
+
+
+def appearance(linear: Image, truth: TruePicture, white_cd_m2: float) -> Appearance:
+    """Compare a picture with the truth, both of one scale: nothing is fitted to the picture.
+
+    Parameters
+    ----------
+    linear : (h, w, 3) float64
+        sRGB, not clipped; 1 stands for `white_cd_m2`.
+    truth : TruePicture
+    white_cd_m2 : float
+        Luminance of white. FLIP and S-CIELAB see the pictures as a display shows them, whatever this is; PU21 sees the
+        scene's own luminance, adapted to D65.
+
+    Raises
+    ------
+    InputError
+        For a value that is NaN or infinite.
+    """
+    require_finite(picture=linear)
+    encoded = encode_srgb(linear)
+    difference = deltaE_cie76(seen_lab(encoded), truth.seen)
+    luminances = (luminance_of_srgb(picture) * white_cd_m2 for picture in (linear, truth.linear))
+    return Appearance(
+        float(np.median(difference)),
+        float(np.percentile(difference, 95)),
+        float(flip(encoded, truth.encoded).mean()),
+        pu21_psnr_db(*luminances),
+    )

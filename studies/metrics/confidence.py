@@ -1,0 +1,56 @@
+"""Mean over seeds, and the interval that holds the true mean with a stated confidence."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from rodcone.errors import InputError, require_range
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Mean of a figure over seeds.
+
+    Attributes
+    ----------
+    mean, low, high : float
+        In the figure's own unit; the interval is `low` to `high`.
+    count : int
+        Seeds that it comes from.
+    """
+
+    mean: float
+    low: float
+    high: float
+    count: int
+
+
+def mean_with_confidence(values: Sequence[float] | NDArray[np.floating], confidence: float = 0.95) -> Estimate:
+    """Mean with Student's interval: mean -+ t s / sqrt(n), t of n - 1 degrees of freedom, s the sample's deviation.
+
+    It is exact for figures that scatter by a normal law, and close for means of many pixels, which nearly do.
+
+    Parameters
+    ----------
+    values : (seed,) array_like
+        One figure a seed, independent of each other.
+    confidence : float
+        Share of such intervals that hold the true mean: 0.95 is what papers mostly state.
+
+    Raises
+    ------
+    InputError
+        For fewer than two values: one says nothing of its scatter; or for one that isn't finite.
+    """
+    require_range("confidence", confidence, 0.01, 0.999999, "give a share: 95 % is 0.95")
+    sample = np.asarray(values, dtype=np.float64)
+    if sample.ndim != 1 or sample.size < 2:
+        raise InputError(f"values: shape {sample.shape} is not allowed; give two seeds or more, one figure each")
+    if not np.isfinite(sample).all():
+        raise InputError(f"values: {sample[~np.isfinite(sample)][0]} is not allowed; give finite figures")
+    half = float(student.isf((1 - confidence) / 2, sample.size - 1)) * float(sample.std(ddof=1)) / sample.size**0.5
+    mean = float(sample.mean())
+    return Estimate(mean, mean - half, mean + half, sample.size)

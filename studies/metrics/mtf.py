@@ -1,0 +1,147 @@
+"""Sharpness from a slanted edge: the spatial frequency response of ISO 12233 (e-SFR), and where it falls to half.
+
+Source: ISO 12233:2017, clause 6 and annex D: edge found row by row, a line through it, all pixels sorted by distance
+into quarter-pixel bins (4x oversampled edge), its derivative under a Hamming window, Fourier transform. Four places
+are worked out from first principles. Distances are across the edge, not along the row. A bin's mean stands at its
+samples' mean distance, which is not quite its middle. The derivative's own response is divided out; the standard prints
+it with a slip. So is the bin's own, which the standard leaves in: 1 % at 0.3 cycles per pixel.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from render.spectrum import Floats
+from rodcone.errors import InputError
+
+OVERSAMPLING = 4  # bins a pixel, as the standard has it
+LEAST_REACH_PX = 8.0  # the window takes 0.46 pi^2 / (2 reach^2) off the variance of a 1-pixel blur: 3.5 % here
+HIGHEST_CYCLES_PER_PX = 1.0  # twice Nyquist: beyond, the derivative has little response left to divide by
+_PASSES = 4  # each centres the rows' window on the line found before; the standard makes two
+
+
+@dataclass(frozen=True)
+class EdgeResponse:
+    """What an edge tells.
+
+    Attributes
+    ----------
+    angle_deg : float
+        Lean from the vertical, anticlockwise; of an edge nearer the horizontal that of the transposed picture.
+    frequency_cycles_per_px : (n,) float64
+        From 0 to 1; Nyquist is 0.5.
+    mtf : (n,) float64
+        1 at frequency 0.
+    mtf50_cycles_per_px : float
+        First frequency at which `mtf` is 0.5.
+    """
+
+    angle_deg: float
+    frequency_cycles_per_px: Floats
+    mtf: Floats
+    mtf50_cycles_per_px: float
+
+
+def edge_response(luminance: ArrayLike) -> EdgeResponse:
+    """Measure the sharpness of one straight edge between two even fields.
+
+    Noise scatters the result: 2.4 % for 80 x 80 pixels, a step of 30 dB over the noise and MTF50 at 0.19. From 20 dB
+    down half is met too early: -2 % there, -13 % at 10 dB, over 160 x 160 pixels. Average pictures over seeds first.
+
+    Parameters
+    ----------
+    luminance : (h, w) array_like
+        Linear, any scale. The edge runs through the whole picture, some 3 to 10 degrees off its rows or columns, and
+        keeps 8 pixels from the other two sides.
+
+    Raises
+    ------
+    InputError
+        Where there is no such edge, it leans too little to be oversampled, or comes too near the side.
+    """
+    picture = _upright(np.asarray(luminance, dtype=np.float64))
+    slope, start = _fit_line(picture)
+    turns = np.floor(picture.shape[0] * abs(slope))
+    if turns < 1:
+        raise InputError(
+            f"luminance: the edge moves {picture.shape[0] * abs(slope):.2f} pixels over the picture; allowed: 1 or "
+            "more; tilt it by 5 degrees, or give more of it"
+        )
+    picture = picture[: round(turns / abs(slope))]  # whole turns: each bin's samples lie evenly in it
+    spread = _line_spread(picture, slope, start)
+    frequency, mtf = _spectrum(spread)
+    return EdgeResponse(float(np.degrees(np.arctan(slope))), frequency, mtf, _first_half(frequency, mtf))
+
+
+def _upright(picture: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Picture with its edge nearer the vertical, transposed if need be."""
+    if picture.ndim != 2 or min(picture.shape) < 2 * LEAST_REACH_PX or not np.isfinite(picture).all():
+        raise InputError(f"luminance: shape {picture.shape} is not allowed; give (h, w), 16 or more each, all finite")
+    h, w = picture.shape[0] // 2, picture.shape[1] // 2
+    across = abs(picture[:, :w].mean() - picture[:, -w:].mean())
+    return picture if across >= abs(picture[:h].mean() - picture[-h:].mean()) else picture.T
+
+
+def _fit_line(picture: NDArray[np.float64]) -> tuple[float, float]:
+    """Line through the edge, column = start + slope row: centroids of the rows' derivatives under a Hamming window."""
+    height, width = picture.shape
+    derivative, column = np.diff(picture, axis=1), np.arange(width - 1) + 0.5
+    rows = np.arange(height)
+    centre = np.full(height, (width - 1) / 2)
+    line = np.zeros(2)
+    for _ in range(_PASSES):
+        offset = np.clip((column - centre[:, None]) / (width / 2), -1, 1)
+        weighted = derivative * (0.54 + 0.46 * np.cos(np.pi * offset))
+        steps = weighted.sum(axis=1)
+        if not (np.all(steps > 0) or np.all(steps < 0)):
+            raise InputError("luminance: no edge crosses all its rows; allowed: one; crop to it, or expose for longer")
+        line = np.polyfit(rows, weighted @ column / steps, 1)
+        centre = np.polyval(line, rows)
+    return float(line[0]), float(line[1])
+
+
+def _line_spread(picture: NDArray[np.float64], slope: float, start: float) -> NDArray[np.float64]:
+    """Windowed line spread, a sample each quarter pixel."""
+    height, width = picture.shape
+    centre = start + slope * np.arange(height)
+    cosine = 1 / np.hypot(1, slope)
+    reach = min(centre.min(), width - 1 - centre.max()) * cosine
+    if reach < LEAST_REACH_PX:
+        raise InputError(
+            f"luminance: the edge comes to {reach:.1f} pixels from a side; allowed: {LEAST_REACH_PX:g} or more; "
+            "centre it, or give a wider picture"
+        )
+    half = int(reach * OVERSAMPLING)
+    distance = (
+        np.arange(width) - centre[:, None]
+    ) * cosine * OVERSAMPLING + half  # in bins, from the first one's start
+    used = (distance >= 0) & (distance < 2 * half)
+    bins, middles = distance[used].astype(int), np.arange(2 * half) + 0.5
+    counts = np.bincount(bins, minlength=2 * half)
+    if not counts.all():
+        raise InputError("luminance: some quarter pixels of the edge hold no sample; tilt it by 5 degrees")
+    place, value = (np.bincount(bins, of[used], minlength=2 * half) / counts for of in (distance, picture))
+    edge = np.interp(middles, place, value)
+    window = 0.54 + 0.46 * np.cos(np.pi * (middles[1:-1] / half - 1))
+    return np.asarray((edge[2:] - edge[:-2]) / 2 * window)
+
+
+def _spectrum(spread: NDArray[np.float64]) -> tuple[Floats, Floats]:
+    """Frequencies [cycles/px] and response, less that of the derivative (2 bins wide) and of the bin."""
+    fine = 8 * spread.size  # zeros beside it: a finer grid of frequencies
+    frequency = np.fft.rfftfreq(fine, 1 / OVERSAMPLING)
+    kept = frequency <= HIGHEST_CYCLES_PER_PX
+    size = np.abs(np.fft.rfft(spread, fine))[kept]
+    frequency = frequency[kept]
+    own = np.sinc(2 * frequency / OVERSAMPLING) * np.sinc(frequency / OVERSAMPLING)
+    return np.asarray(frequency), np.asarray(size / size[0] / own)
+
+
+def _first_half(frequency: Floats, mtf: Floats) -> float:
+    """First frequency where the response is 0.5, between samples by a straight line."""
+    below = np.flatnonzero(mtf < 0.5)
+    if below.size == 0:
+        raise InputError(f"luminance: its response stays above half up to {HIGHEST_CYCLES_PER_PX:g} cycles a pixel")
+    after = int(below[0])
+    return float(np.interp(0.5, mtf[[after, after - 1]], frequency[[after, after - 1]]))

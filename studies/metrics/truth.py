@@ -1,0 +1,69 @@
+"""The noise-free picture that others are measured against, and the known scale between the two."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.colour.camera_colour import adapt_to_d65, xyz_to_srgb
+from render.photometry import tristimulus
+from render.radiance import SpectralRadiance
+from render.spectrum import Floats, Spectrum
+from render.transport import Transport
+from sensor.cfa import channels
+from sensor.config import SensorConfig
+from sensor.optics import camera_equation
+from sensor.response import electrons_per_irradiance
+
+WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # the scene's 99th percentile of luminance is shown at 90 % of white
+
+
+@dataclass(frozen=True)
+class Light:
+    """The light of a study: its spectrum of 1 cd/m^2, in bands.
+
+    Attributes
+    ----------
+    wavelength_nm, width_nm, spectrum : (band,) float64
+    """
+
+    wavelength_nm: Floats
+    width_nm: Floats
+    spectrum: Floats
+
+
+def light_in_bands(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) -> Light:
+    """Average a spectrum over bands and scale it to 1 cd/m^2."""
+    values = spectrum.band_average(wavelength_nm, width_nm)
+    return Light(wavelength_nm, width_nm, values / tristimulus(values, wavelength_nm, width_nm)[1])
+
+
+def shown_white_cd_m2(transport: Transport, luminance_cd_m2: float | None) -> float:
+    """Luminance that is shown as white at a level of the transport's lights; None: at their own powers.
+
+    Light that is seen directly doesn't count, nor the part of a pixel that it covers.
+    """
+    luminance = transport.scattered_luminance(luminance_cd_m2=luminance_cd_m2)
+    weights = 1.0 - transport.coverage.astype(np.float64)
+    return float(np.percentile(luminance, WHITE_PERCENTILE, weights=weights, method="inverted_cdf")) / WHITE_AT
+
+
+def true_srgb(radiance: SpectralRadiance, light: Light, white_cd_m2: float) -> NDArray[np.float64]:
+    """Linear sRGB of the scene, Bradford-adapted from its light to D65; `white_cd_m2` reads 1. Shape (h, w, 3)."""
+    white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm)
+    xyz = tristimulus(radiance.values, radiance.wavelength_nm, radiance.widths_nm)
+    return xyz_to_srgb(adapt_to_d65(xyz, white) / white_cd_m2)
+
+
+def neutral_electrons(sensor: SensorConfig, light: Light, exposure_s: float) -> Floats:
+    """Expected electrons of each channel from a neutral of 1 cd/m^2 under the light, shape (channel,).
+
+    Green's is the known scale: a developed picture over it is in cd/m^2, with nothing taken from the noisy picture.
+    """
+    weights = electrons_per_irradiance(sensor, light.wavelength_nm, light.width_nm, exposure_s)
+    return np.asarray(weights @ light.spectrum * camera_equation(sensor.lens))
+
+
+def green_scale(sensor: SensorConfig, light: Light, exposure_s: float) -> float:
+    """Electrons of a green pixel per cd/m^2 of a neutral."""
+    return float(neutral_electrons(sensor, light, exposure_s)[channels(sensor.cfa).index("G")])

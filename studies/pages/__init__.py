@@ -1,0 +1,1 @@
+"""Results as HTML, SVG and Markdown. No physics."""

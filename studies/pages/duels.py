@@ -1,0 +1,162 @@
+"""One camera against every other processor of a sweep: its lead in each condition, with an interval over seeds."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isnan, log10, nan, sqrt
+
+import numpy as np
+
+from isp.processors.catalogue import PROCESSORS
+from rodcone.errors import InputError, unknown
+from sensor.presets import names, preset
+from sensor.readout import as_raw
+from sensor.variations import vary
+from studies.metrics.confidence import Estimate, mean_with_confidence
+from studies.pages.report_text import DELTA_E, PSNR, Metric
+from studies.sweep.provenance import require_alike
+from studies.sweep.row import Row
+
+FLIP = Metric("flip_mean", "FLIP, mean", 3, "", higher=False)
+METRICS = (PSNR, DELTA_E, FLIP)
+AHEAD, LEVEL, BEHIND = "ahead", "level", "behind"
+FEWEST_SEEDS = 2  # that an interval takes
+
+
+@dataclass(frozen=True)
+class Group:
+    """Scene, spectrum, exposure and sensor: all that a row of a study's levels has in common."""
+
+    scene: str
+    spectrum: str
+    exposure: str
+    sensor: str
+
+
+@dataclass(frozen=True)
+class Case:
+    """One condition of a sweep: rows by processor, each in the order of the seeds, the same for all.
+
+    Attributes
+    ----------
+    group : Group
+    level : str
+        As the study writes it.
+    luminance_cd_m2 : float
+    rows : mapping of str to tuple of Row
+    """
+
+    group: Group
+    level: str
+    luminance_cd_m2: float
+    rows: Mapping[str, tuple[Row, ...]]
+
+    def mean(self, processor: str, metric: Metric) -> float:
+        """Mean of a metric over the seeds."""
+        return float(np.mean([getattr(row, metric.key) for row in self.rows[processor]]))
+
+
+@dataclass(frozen=True)
+class Duel:
+    """A camera's lead over one opponent in one condition, in the metric's unit; positive is better than the opponent.
+
+    Attributes
+    ----------
+    case : Case
+    opponent : str
+    lead : Estimate
+        Over pairs of pictures of the same seed.
+    """
+
+    case: Case
+    opponent: str
+    lead: Estimate
+
+    @property
+    def outcome(self) -> str:
+        """`AHEAD` or `BEHIND` where the whole 95 % interval is on one side of 0, else `LEVEL`."""
+        return AHEAD if self.lead.low > 0 else BEHIND if self.lead.high < 0 else LEVEL
+
+
+def cases_of(rows: Sequence[Row]) -> list[Case]:
+    """Sort a ledger's rows by condition; within a group by luminance.
+
+    Raises
+    ------
+    InputError
+        Where a processor lacks a picture that another has, there are fewer than two seeds, or rows were made by
+        different versions, variants or engines.
+    """
+    require_alike(rows)
+    found: dict[tuple[Group, str], dict[str, dict[int, Row]]] = {}
+    for row in rows:
+        place = Group(row.scene, row.spectrum, row.exposure, row.sensor), row.level
+        found.setdefault(place, {}).setdefault(row.processor, {})[row.seed] = row
+    processors, seeds = dict.fromkeys(row.processor for row in rows), sorted({row.seed for row in rows})
+    if len(seeds) < FEWEST_SEEDS:
+        raise InputError(f"seeds: {seeds} is not allowed; give two or more, which an interval takes, and sweep again")
+    for (group, level), by_processor in found.items():
+        for name in processors:
+            if sorted(by_processor.get(name, {})) != seeds:
+                raise InputError(
+                    f"cells: {name} on {group.scene} at {level} lacks seeds that others have; allowed: a whole sweep; "
+                    "run the same rodcone sweep again, which makes what is missing"
+                )
+    cases = []
+    for (group, level), by_processor in found.items():
+        in_order = {name: tuple(by_processor[name][seed] for seed in seeds) for name in processors}
+        cases.append(Case(group, level, next(iter(in_order.values()))[0].luminance_cd_m2, in_order))
+    groups = list(dict.fromkeys(case.group for case in cases))
+    return sorted(cases, key=lambda case: (groups.index(case.group), case.luminance_cd_m2))
+
+
+def opponents_of(cases: Sequence[Case], camera: str) -> list[str]:
+    """Every other processor of the sweep.
+
+    Raises
+    ------
+    InputError
+        Where the camera isn't in the sweep, or is alone in it.
+    """
+    there = list(cases[0].rows) if cases else []
+    if camera not in there:
+        raise unknown("camera", camera, there)
+    if len(there) == 1:
+        raise InputError(f"processors: {there} is not allowed; give the camera and an opponent or more")
+    return [name for name in there if name != camera]
+
+
+def duels(cases: Sequence[Case], camera: str, opponent: str, metric: Metric) -> list[Duel]:
+    """Lead of a camera over one opponent in each condition that is ranked."""
+    return [
+        Duel(case, opponent, lead_over(case, camera, opponent, metric)) for case in cases if is_ranked(case, camera)
+    ]
+
+
+def lead_over(case: Case, camera: str, opponent: str, metric: Metric) -> Estimate:
+    """How much better a camera is than another: mean over the seeds' pairs, with its 95 % interval."""
+    sign = 1 if metric.higher else -1
+    pairs = zip(case.rows[camera], case.rows[opponent], strict=True)
+    return mean_with_confidence([sign * (getattr(a, metric.key) - getattr(b, metric.key)) for a, b in pairs])
+
+
+def is_ranked(case: Case, camera: str) -> bool:
+    """Whether the camera has a signal to rank: W's SNR is 1 or more, or it has no W, or its noise isn't known here."""
+    snr = snr_db(case, camera, "W")
+    return isnan(snr) or snr >= 0
+
+
+def snr_db(case: Case, camera: str, letter: str) -> float:
+    """SNR of a letter's mean expected electrons [dB], shot and dark noise; NaN where letter or noise isn't known.
+
+    A sensor of the user's own file is known to the ledger by its name alone.
+    """
+    row = case.rows[camera][0]
+    electrons = json.loads(row.mean_electrons).get(letter)
+    if electrons is None or electrons <= 0 or row.sensor not in names():
+        return nan
+    sensor = vary(preset(row.sensor), PROCESSORS[camera].mosaic)
+    dark_e = as_raw(
+        np.zeros((len(sensor.cfa), len(sensor.cfa[0])), np.uint16), sensor, row.exposure_s, row.readout_engine
+    ).dark_noise_e
+    return 20 * log10(electrons / sqrt(electrons + dark_e**2))

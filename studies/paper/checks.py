@@ -1,0 +1,98 @@
+"""Claims of the paper as checks with numbers; a verdict follows from them and is never written by hand."""
+
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import Literal
+
+from rodcone.errors import InputError
+
+Verdict = Literal["reproduced", "reproduced under a condition", "not reproduced"]
+VERDICTS: tuple[Verdict, ...] = ("reproduced", "reproduced under a condition", "not reproduced")
+
+# What "about" may mean: a number given to one digit stands for a fifth more or less.
+ABOUT = 0.2
+
+
+@dataclass(frozen=True)
+class Check:
+    """One number of a claim under one condition, and the range in which the claim holds.
+
+    Attributes
+    ----------
+    condition : str
+        Where or how: a reading of Table 1, a light, an exposure.
+    value : float
+    low, high : float
+        Range in which the claim holds, ends included; infinite where it has no end.
+    unit : str
+        In the words of the page, such as ``dB``.
+    """
+
+    condition: str
+    value: float
+    low: float
+    high: float
+    unit: str = ""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the value lies in the range; NaN and infinities don't."""
+        return isfinite(self.value) and self.low <= self.value <= self.high
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper, and what was computed for it.
+
+    Attributes
+    ----------
+    where : str
+        Figure, table or section.
+    text : str
+        The statement.
+    checks : tuple of Check
+        One or more.
+    note : str
+        How the numbers were got, and what was ours to choose.
+
+    Raises
+    ------
+    InputError
+        Without a check, or for two of one condition.
+    """
+
+    where: str
+    text: str
+    checks: tuple[Check, ...]
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        conditions = [check.condition for check in self.checks]
+        if not conditions or len(set(conditions)) != len(conditions):
+            raise InputError(f"claim {self.text!r}: checks {conditions!r} are not allowed; give some, each once")
+
+    @property
+    def verdict(self) -> Verdict:
+        """Reproduced where every check holds, under a condition where some do."""
+        held = sum(check.holds for check in self.checks)
+        return VERDICTS[0] if held == len(self.checks) else VERDICTS[1] if held else VERDICTS[2]
+
+
+def about(condition: str, value: float, claimed: float, unit: str = "") -> Check:
+    """Check against a number that the paper gives as "about": a fifth more or less, `ABOUT`."""
+    return Check(condition, value, claimed * (1 - ABOUT), claimed * (1 + ABOUT), unit)
+
+
+def near(condition: str, value: float, claimed: float, margin: float, unit: str = "") -> Check:
+    """Check against a number within a margin on either side."""
+    return Check(condition, value, claimed - margin, claimed + margin, unit)
+
+
+def at_least(condition: str, value: float, low: float, unit: str = "") -> Check:
+    """Check that a value is no less."""
+    return Check(condition, value, low, inf, unit)
+
+
+def at_most(condition: str, value: float, high: float, unit: str = "") -> Check:
+    """Check that a value is no more."""
+    return Check(condition, value, -inf, high, unit)

@@ -1,0 +1,173 @@
+"""Figure 2: the four curves and the tile, and what W gathers and gains over R, G and B."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from render.spectrum import Floats
+from sensor.curves import rgbw
+from sensor.noise import noise_variance
+from studies.pages.drawing import Box, Drawing, Mark, Text
+from studies.pages.layout import HEIGHT, WIDTH, Figure, curves
+from studies.paper.checks import Claim, about, at_least
+from studies.paper.flat import channel_e, light_of, snr, without_prnu
+from studies.paper.numbers import MOONLIGHT_CD_M2
+from studies.paper.setup import READINGS, TODAY, sensor_of
+
+NM: Floats = np.arange(400.0, 701.0, 2.0)  # the paper's range
+LETTERS = "RGBW"
+CLAIMED = {"R": 10.0, "G": 6.0, "B": 10.0}
+SNR_EXPOSURE_S = 0.020  # Figure 6's longest
+BRIGHT = 0.9  # share of the well that W holds in "bright light": beyond it, W saturates
+LEVELS = np.geomspace(1e-3, 1e2, 51)  # [cd/m^2]; W is full beyond
+FILLS = {"R": "#c8504b", "G": "#5a9e58", "B": "#4d72c0", "W": "#f4f4f0"}
+SENSORS = (*READINGS, TODAY)
+
+Ratios = Mapping[str, float]  # W over each colour
+
+
+@dataclass(frozen=True)
+class Gain:
+    """W's SNR over a colour's, dark noise's share of the variance of W's pixel, and shot noise's of the colour's."""
+
+    ratio: float
+    dark: float
+    shot: float
+
+
+Gains = Mapping[str, Mapping[str, Gain]]  # by sensor and colour
+
+
+def signal_ratios(light: str) -> Ratios:
+    """Electrons of W over those of R, G and B in a light, 380-780 nm."""
+    electrons = channel_e(sensor_of("table1_output"), light_of(light), 1.0, 1.0)
+    return dict(zip("RGB", (electrons[3] / electrons[:3]).tolist(), strict=True))
+
+
+def snr_gains(name: str, luminance_cd_m2: float, *, fixed_pattern: bool = True) -> Mapping[str, Gain]:
+    """W's gain over R, G and B: one pixel of each on a uniform neutral field under D65."""
+    sensor = sensor_of(name) if fixed_pattern else without_prnu(sensor_of(name))
+    electrons = channel_e(sensor, light_of("D65"), luminance_cd_m2, SNR_EXPOSURE_S)
+    values, variance = snr(electrons, sensor, SNR_EXPOSURE_S), noise_variance(electrons, sensor, SNR_EXPOSURE_S)
+    dark = float(noise_variance(np.zeros(1), sensor, SNR_EXPOSURE_S)[0] / variance[3])
+    return {
+        letter: Gain(float(values[3] / values[i]), dark, float(electrons[i] / variance[i]))
+        for i, letter in enumerate("RGB")
+    }
+
+
+def bright_cd_m2(name: str) -> float:
+    """Luminance at which W is nearly full."""
+    sensor = sensor_of(name)
+    return float(BRIGHT * sensor.pixel.full_well_e / channel_e(sensor, light_of("D65"), 1.0, SNR_EXPOSURE_S)[3])
+
+
+def coverage() -> float:
+    """Least of W's response over the largest of R, G and B, over the range."""
+    values = rgbw().band_average(tuple(LETTERS), NM, np.full(NM.size, 2.0))
+    return float((values[3] / values[:3].max(axis=0)).min())
+
+
+def signal_claims(ratios: Mapping[str, Ratios], least: float) -> tuple[Claim, ...]:
+    """W is wideband, and gathers 6 and 10 times as much.
+
+    Parameters
+    ----------
+    ratios : mapping
+        `signal_ratios` by light.
+    least : float
+        Of `coverage`.
+    """
+    return (
+        Claim(
+            "Figure 2",
+            "W passes what R, G and B pass, all of 400-700 nm",
+            (at_least("W over the largest of the three, at its least", least, 1.0, "×"),),
+            "Curves of the project's own, fitted to ISETCam's interleaved RGBW sensor.",
+        ),
+        Claim(
+            "Section 2",
+            "W gathers about 6 times the signal of G and 10 times that of R and of B",
+            tuple(
+                about(f"{letter}, {light}, 380-780 nm", value, CLAIMED[letter], "×")
+                for light, of_light in ratios.items()
+                for letter, value in of_light.items()
+            ),
+        ),
+    )
+
+
+def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
+    """W's gain in SNR: the ratio of signals where read noise rules, its root where shot noise does.
+
+    Parameters
+    ----------
+    moon, bright : mapping
+        `snr_gains` in moonlight, and with W nearly full.
+    pure : mapping
+        As `bright`, without fixed pattern.
+    """
+    roots = {letter: sqrt(value) for letter, value in signal_ratios("D65").items()}
+    conditions = f"One pixel of each, {SNR_EXPOSURE_S * 1e3:g} ms, f/2.8, D65;"
+    return (
+        Claim(
+            "Section 2",
+            "W's SNR is about 6 times that of G and 10 times that of R and of B",
+            tuple(
+                about(f"{letter}, {name}, {where}: {gain.dark:.0%} dark noise", gain.ratio, CLAIMED[letter], "×")
+                for where, by_sensor in (("moonlight", moon), ("W full", bright))
+                for name, of_sensor in by_sensor.items()
+                for letter, gain in of_sensor.items()
+            ),
+            f"{conditions} in moonlight, and where W is nearly full. The per cent are dark noise's part of W's "
+            "variance: where it is nearly all of it, the SNR goes as the signal.",
+        ),
+        Claim(
+            "Section 2",
+            "Where shot noise dominates, W's gain in SNR is the root of its gain in signal",
+            tuple(
+                about(f"{letter}, {name}: {gain.shot:.0%} shot noise", gain.ratio, roots[letter], "×")
+                for name, of_sensor in pure.items()
+                for letter, gain in of_sensor.items()
+            ),
+            f"{conditions} where W is nearly full, fixed pattern (PRNU) left out. The per cent are shot noise's part "
+            "of the colour's variance. low_noise is a pixel of today, with 1.5 e⁻ of read noise.",
+        ),
+    )
+
+
+def figure_2() -> tuple[Figure, tuple[Claim, ...]]:
+    """Curves, tile and W's gain over light, with the claims about them."""
+    moon = {name: snr_gains(name, MOONLIGHT_CD_M2) for name in READINGS}
+    bright = {name: snr_gains(name, bright_cd_m2(name)) for name in READINGS}
+    pure = {name: snr_gains(name, bright_cd_m2(name), fixed_pattern=False) for name in SENSORS}
+    claims = signal_claims({light: signal_ratios(light) for light in ("E", "D65")}, coverage())
+    caption = (
+        "Electrons per photon of R, G, B and W, and the 2×2 tile. On the right W's gain in SNR over G, one pixel at "
+        f"{SNR_EXPOSURE_S * 1e3:g} ms and f/2.8 under D65: the signal's ratio in the dark, less in light."
+    )
+    return Figure("2", caption, _drawing()), (*claims, *snr_claims(moon, bright, pure))
+
+
+def _drawing() -> Drawing:
+    responses = rgbw().band_average(tuple(LETTERS), NM, np.full(NM.size, 2.0))
+    colours = {"R": "1", "G": "2", "B": "0", "W": "ink"}
+    lines = [(x, line.tolist(), colours[x], x == "W") for x, line in zip(LETTERS, responses, strict=True)]
+    marks: list[Mark] = list(curves("Responses, electrons per photon", "wavelength, nm", NM.tolist(), lines))
+    for index, letter in enumerate(LETTERS):
+        x, y = WIDTH - 40 + 34 * (index % 2), HEIGHT - 112 + 34 * (index // 2)
+        marks += [Box(x, y, 34, 34, "soft", FILLS[letter]), Text(x + 17, y + 21, letter, "middle", "tile")]
+    gains = [
+        (name, [snr_gains(name, float(level))["G"].ratio for level in LEVELS], str(slot), slot == 1)
+        for slot, name in enumerate(SENSORS)
+    ]
+    root = [sqrt(signal_ratios("D65")["G"])] * LEVELS.size
+    gains.append(("√ of signals' ratio", root, "soft", True))
+    corner = (WIDTH + 60, 0.0)
+    marks += curves(
+        "W's SNR over G's, one pixel", "luminance, cd/m²", LEVELS.tolist(), gains, log=(True, False), at=corner
+    )
+    described = "response over wavelength, the tile R G over B W, and W's gain in SNR over luminance"
+    return Drawing(2 * WIDTH + 70, HEIGHT, "Figure 2", described, tuple(marks))

@@ -1,0 +1,144 @@
+"""Figure 4: beside an edge, the patch around a pixel x is nearer to that of y on its own side than to that of z."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.colour.camera_colour import encode_srgb
+from isp.planes import planes
+from sensor.cfa import channels
+from sensor.raw import RawImage
+from studies.pages.drawing import Box, Drawing, Mark, Picture, Text
+from studies.pages.layout import GAP, HEAD, SIDE, Figure
+from studies.paper.camera import Image, exposures
+from studies.paper.checks import Claim, at_least
+from studies.paper.numbers import MOONLIGHT_CD_M2
+from studies.paper.setup import READINGS, Setup, sensor_of, view
+from studies.sweep.cells import Coordinates
+
+PATCH = 5  # ours: the paper doesn't say
+ASIDE, AWAY = 4, 8  # pixels from the edge to x, and from x to y and to z: even, so that all lie alike in the tile
+CROP = 40  # pixels of the picture that are shown
+SHARE = 0.95  # of the pixels beside the edge, for the statement to hold "in general"
+EXPOSURE_S = 0.020
+LEVELS = {"25 cd/m²": 25.0, "moonlight": MOONLIGHT_CD_M2}
+
+
+@dataclass(frozen=True)
+class Triplets:
+    """Pixels x beside the edge with their y and z, and the distances of their patches.
+
+    Attributes
+    ----------
+    places : (n, 2) intp
+        Row and column of each x; y is `AWAY` rows below, z as many columns to the left, across the edge.
+    to_y, to_z : (n,) float64
+        Euclidean distance of W's patches [standard deviations of a pixel's noise].
+    """
+
+    places: NDArray[np.intp]
+    to_y: Image
+    to_z: Image
+
+    @property
+    def share(self) -> float:
+        """Share of the x that are nearer to their y."""
+        return float((self.to_y < self.to_z).mean())
+
+
+def edge_columns(truth: Image) -> NDArray[np.intp]:
+    """Column of each row (h,) at which luminance (h, w) crosses the midst of dark and bright."""
+    middle = (truth.min() + truth.max()) / 2
+    return np.asarray((truth < middle).sum(axis=1), dtype=np.intp)  # the dark half is on the left
+
+
+def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
+    """Compare the patches of h_W around x, y and z beside the edge, in every row that holds all three.
+
+    Parameters
+    ----------
+    columns : (h,) intp
+        Of `edge_columns`.
+    """
+    plane = planes(raw)[channels(raw.cfa).index("W")]
+    half = PATCH // 2
+    rows = np.arange(half, plane.shape[0] - AWAY - half)
+    places = np.stack([rows, columns[rows] + ASIDE], axis=-1)
+    inside = (places[:, 1] - AWAY >= half) & (places[:, 1] < plane.shape[1] - half)
+    places = places[inside]
+
+    def patches(down: int, across: int) -> Image:
+        windows = np.lib.stride_tricks.sliding_window_view(plane, (PATCH, PATCH))
+        return np.asarray(windows[places[:, 0] + down - half, places[:, 1] + across - half])
+
+    here, along, beyond = patches(0, 0), patches(AWAY, 0), patches(0, -AWAY)
+    distances = (np.sqrt(((here - other) ** 2).sum(axis=(1, 2))) for other in (along, beyond))
+    return Triplets(places, *distances)
+
+
+def claims_4(shares: Mapping[str, float]) -> tuple[Claim, ...]:
+    """The statement of Figure 4; `shares` of the pixels beside the edge by condition."""
+    return (
+        Claim(
+            "Figure 4",
+            "The patch around x is nearer to that of y, on its side of an edge, than to that of z beyond it",
+            tuple(at_least(name, share, SHARE, "of the x") for name, share in shares.items()),
+            f"slanted_edge, contrast 4, W's patches of {PATCH} × {PATCH} in units of noise, "
+            f"{EXPOSURE_S * 1e3:g} ms; x {ASIDE} pixels from the edge, y and z {AWAY} from x. Chance gives one half.",
+        ),
+    )
+
+
+def figure_4(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
+    """The edge with three patches, under both readings and at two levels."""
+    shares, parts = {}, []
+    for name, level in LEVELS.items():
+        seen = view(setup, "slanted_edge", level)
+        columns = edge_columns(seen.radiance.luminance())
+        for reading in READINGS:
+            at = Coordinates("slanted_edge", "own", f"{level:g}cd/m2", "20ms", reading, "interleaved", 0)
+            sensor = sensor_of(reading)
+            raw = exposures(seen, sensor, EXPOSURE_S, at, 1)[0]
+            found = triplets(raw, columns)
+            shares[f"{reading}, {name}"] = found.share
+            if name == next(iter(LEVELS)):
+                parts.append((reading, planes(raw)[channels(raw.cfa).index("W")], found))
+    caption = (
+        f"W beside an edge at {next(iter(LEVELS))}, in units of noise, and the patches around x, y and z enlarged. "
+        "The numbers are their distances."
+    )
+    return Figure("4", caption, _drawing(parts)), claims_4(shares)
+
+
+def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Drawing:
+    """For each reading the plane around one x with three boxes, and beside it their patches large."""
+    marks: list[Mark] = []
+    small, wide, half = (SIDE - 2 * GAP) / 3, SIDE + 150.0, PATCH // 2
+    for index, (reading, plane, found) in enumerate(parts):
+        middle, corner = len(found.places) // 2, index * wide
+        row, column = found.places[middle].tolist()
+        side = min(CROP, *plane.shape)
+        top, left = (
+            min(max(at - side // 2, 0), size - side) for at, size in zip((row, column), plane.shape, strict=True)
+        )
+        low, high = np.percentile(plane, [1, 99])
+        shown = encode_srgb(np.repeat(np.clip((plane - low) / (high - low), 0.0, 1.0)[..., None] ** 2.2, 3, axis=-1))
+        scale = SIDE / side
+        marks += [Text(corner, 13, reading), Picture(corner, HEAD, SIDE, SIDE, shown[top:, left:][:side, :side])]
+        words = {"x": "x", "y": f"y, {found.to_y[middle]:.1f} away", "z": f"z, {found.to_z[middle]:.1f} away"}
+        for place, (letter, down, across) in enumerate((("x", 0, 0), ("y", AWAY, 0), ("z", 0, -AWAY))):
+            i, j = row + down - half, column + across - half
+            x, y = corner + (j - left) * scale, HEAD + (i - top) * scale
+            marks += [
+                Box(x, y, PATCH * scale, PATCH * scale, "1"),
+                Text(x + 3, y + 12, letter, "start", "1", bold=True),
+            ]
+            at = corner + SIDE + GAP, HEAD + place * (small + GAP)
+            marks += [
+                Picture(*at, small, small, shown[i : i + PATCH, j : j + PATCH]),
+                Text(at[0] + small + 6, at[1] + small / 2 + 4, words[letter]),
+            ]
+    title, described = "Figure 4", "an edge, and the patches around x, y and z"
+    return Drawing(len(parts) * wide, HEAD + SIDE, title, described, tuple(marks))

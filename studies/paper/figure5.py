@@ -1,0 +1,144 @@
+"""Figure 5: at 200 cd/m^2, 66 ms and 3 um W is partly full, and the result is whole; early fusion loses there."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.colour.camera_colour import encode_srgb, luminance_of_srgb
+from isp.colour.white_balance import saturated_nearby
+from isp.processors.bayer import bilinear
+from isp.processors.catalogue import PROCESSORS
+from sensor.cfa import channels, mask
+from sensor.raw import RawImage
+from studies.pages.layout import Figure, grey, sheet
+from studies.paper.camera import Image, View, develop, exposures, quality_db
+from studies.paper.checks import Check, Claim, at_least
+from studies.paper.setup import READINGS, Setup, sensor_of, view
+from studies.sweep.cells import Coordinates
+
+LUMINANCE_CD_M2, EXPOSURE_S, PITCH_UM = 200.0, 0.066, 3
+PARTLY = (0.02, 0.98)  # share of W's pixels that may be full for "partly"
+WHOLE = 0.95  # correlation with the truth where W is full, for "whole": nine tenths of the variance
+# Early fusion: W enters before anything else (Sato 1983, Kijima 2007), or behind a neutral density (Yamagami 1994).
+EARLY = ("rgbw_sato", "rgbw_kijima", "rgbw_yamagami")
+GAIN_DB = 1.0  # a decibel is easily seen
+
+
+@dataclass(frozen=True)
+class Bright:
+    """What Figure 5 measures under one reading.
+
+    Attributes
+    ----------
+    white_full, colours_full : float
+        Share of W's pixels that are full, and of the colours'.
+    result_likeness, white_likeness : float
+        Correlation of luminance with the truth where W is full and no colour is: of the result, and of W itself.
+    full_likeness : float
+        Of the result where a colour is full as well.
+    """
+
+    white_full: float
+    colours_full: float
+    result_likeness: float
+    white_likeness: float
+    full_likeness: float
+
+
+def likeness(plane: Image, truth: Image, where: NDArray[np.bool_]) -> float:
+    """Correlation of two planes (h, w) over some pixels; 0 where either is even or there are none."""
+    if where.sum() < 2 or np.ptp(plane[where]) == 0 or np.ptp(truth[where]) == 0:
+        return 0.0
+    return float(np.corrcoef(plane[where], truth[where])[0, 1])
+
+
+def measure_bright(raw: RawImage, result: Image, seen: View) -> Bright:
+    """Judge one exposure and its result (h, w, 3), linear sRGB."""
+    truth = luminance_of_srgb(seen.truth)
+    white, colours = saturated_nearby(raw, "W"), saturated_nearby(raw, "RGB")
+    alone = white & ~colours
+    luminance = luminance_of_srgb(result)
+    own = bilinear(raw)[..., channels(raw.cfa).index("W")]
+    is_white = mask(raw.cfa, "W", raw.shape)
+    return Bright(
+        float(raw.saturated[is_white].mean()),
+        float(raw.saturated[~is_white].mean()),
+        likeness(luminance, truth, alone),
+        likeness(own, truth, alone),
+        likeness(luminance, truth, white & colours),
+    )
+
+
+def claims_5(found: Mapping[str, Bright], gains_db: Mapping[str, float]) -> tuple[Claim, ...]:
+    """W partly full, the result whole, early fusion worse.
+
+    Parameters
+    ----------
+    found : mapping
+        By reading.
+    gains_db : mapping
+        PSNR of the interleaved camera over each opponent's, by opponent and reading.
+    """
+    return (
+        Claim(
+            "Figure 5",
+            "At 200 cd/m², 66 ms and 3 µm W is partly saturated",
+            tuple(Check(name, one.white_full, *PARTLY, "of its pixels") for name, one in found.items()),
+            "still_life, f/2.8; the well in proportion to area.",
+        ),
+        Claim(
+            "Figure 5",
+            "The result is whole where W is saturated",
+            (
+                *(at_least(f"{name}, colours not full", one.result_likeness, WHOLE) for name, one in found.items()),
+                *(at_least(f"{name}, a colour full too", one.full_likeness, WHOLE) for name, one in found.items()),
+            ),
+            "Correlation of the result's luminance with the truth's over those pixels. W's own is "
+            + " and ".join(f"{one.white_likeness:.2f} ({name})" for name, one in found.items())
+            + ". Of the colours' pixels "
+            + " and ".join(f"{one.colours_full:.0%}" for one in found.values())
+            + " are full too.",
+        ),
+        Claim(
+            "Section 2",
+            "Early fusion gives away the dynamic range between the two mosaics",
+            tuple(at_least(name, gain, GAIN_DB, "dB") for name, gain in gains_db.items()),
+            "PSNR of the interleaved camera over the opponent's, Figure 5's conditions.",
+        ),
+    )
+
+
+def figure_5(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
+    """R image, W image and result under both readings, with the opponents' PSNR."""
+    seen = view(setup, "still_life", LUMINANCE_CD_M2)
+    found, gains_db, rows = {}, {}, []
+    for reading, threshold in READINGS.items():
+        raws, made = _shoot(setup, seen, reading, "interleaved", substitution_snr=threshold)
+        found[reading] = measure_bright(raws[0], made[0], seen)
+        own_db = quality_db(made, seen.truth)
+        for name in EARLY:
+            gains_db[f"{name}, {reading}"] = own_db - quality_db(_shoot(setup, seen, reading, name)[1], seen.truth)
+        full_e = sensor_of(reading, pitch_um=PITCH_UM).pixel.full_well_e
+        planes = bilinear(raws[0])
+        rows.append(
+            [
+                (f"{reading}: R, white is full", grey(planes[..., 0], full_e)),
+                ("W, white is full", grey(planes[..., 3], full_e)),
+                ("result", encode_srgb(made[0])),
+            ]
+        )
+    drawing = sheet("Figure 5", "R image, W image that is partly saturated, and the result", rows)
+    caption = "R as recorded, W as recorded with much of it full, and the result, at 200 cd/m², 66 ms and 3 µm."
+    return Figure("5", caption, drawing), claims_5(found, gains_db)
+
+
+def _shoot(
+    setup: Setup, seen: View, reading: str, processor: str, **options: float
+) -> tuple[list[RawImage], list[Image]]:
+    """Exposures and pictures of one processor."""
+    sensor = sensor_of(reading, PROCESSORS[processor].mosaic, PITCH_UM)
+    at = Coordinates("still_life", "own", "200cd/m2", "66ms", f"{reading}_3um", processor, 0)
+    raws = exposures(seen, sensor, EXPOSURE_S, at, setup.seeds)
+    return raws, [develop(raw, seen, sensor, processor, **options)[0] for raw in raws]

@@ -1,0 +1,130 @@
+"""The paper's numbers outside its figures: moonlight in photons, 30 dB, eight decades of light, and Table 1."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import sqrt
+
+import numpy as np
+
+from render.spectrum import VISIBLE_NM
+from scenes.levels import DEMO_LEVELS
+from sensor.config import LensConfig
+from sensor.device import Device
+from sensor.readout import read_out
+from studies.paper.camera import View
+from studies.paper.checks import Check, Claim, about, near
+from studies.paper.flat import decibels, light_of, photons, shot_noise_alone
+from studies.paper.setup import READINGS, sensor_of
+
+MOONLIGHT_CD_M2 = DEMO_LEVELS[0].luminance_cd_m2
+FULL_SUN_LUX = 1e5  # as `DEMO_LEVELS`
+# A clear night without moon, airglow included: 0.002 lux (Schlyter, "Radiometry and photometry in astronomy", 2009).
+NIGHT_SKY_LUX = 2e-3
+FLAT_SIDE = 256  # of the uniform field that is read out [pixels]
+
+
+@dataclass(frozen=True)
+class Table:
+    """What Table 1 says of the well, twice [e-]."""
+
+    swing_e: float
+    full_well_e: float
+
+
+def moonlight_photons(first_nm: float, last_nm: float) -> float:
+    """Photons of a range of wavelengths from moonlight on the sensor, through f/5.6 [um^-2 s^-1]."""
+    sensor, light = replace(sensor_of("table1_output"), lens=LensConfig(5.6)), light_of("D65")
+    inside = (light.wavelength_nm > first_nm) & (light.wavelength_nm < last_nm)
+    return photons(replace(light, spectrum=np.where(inside, light.spectrum, 0.0)), MOONLIGHT_CD_M2, sensor)
+
+
+def measured_snr_db(mean_e: float = 1000.0, seed: int = 0) -> float:
+    """SNR of a uniform field that is read out twice with no noise but that of light [dB]."""
+    sensor = shot_noise_alone(sensor_of("table1_output"))
+    shape, rng = (FLAT_SIDE, FLAT_SIDE), np.random.default_rng(seed)
+    chip, field = Device(np.ones(shape), np.zeros(shape)), np.full((FLAT_SIDE, FLAT_SIDE), mean_e)
+    first, second = (read_out(field, sensor, chip, 0.01, rng).electrons for _ in range(2))
+    return decibels((first.mean() + second.mean()) / 2 / (np.std(first - second) / sqrt(2)))
+
+
+def photon_claims(per_um2_s: Mapping[str, float], measured_db: float) -> tuple[Claim, ...]:
+    """Moonlight in photons, and 30 dB.
+
+    Parameters
+    ----------
+    per_um2_s : mapping
+        `moonlight_photons` by the range of wavelengths.
+    measured_db : float
+        SNR of 1000 electrons as read out.
+    """
+    # The spread of n differences has the relative error 1/sqrt(2 n): 5 of them, a false alarm in 2 million.
+    margin = decibels(1 + 5 / sqrt(2 * FLAT_SIDE**2)) + 0.01
+    return (
+        Claim(
+            "Section 1",
+            "Moonlight through f/5.6 brings about 10 photons per µm² and second",
+            tuple(about(f"D65, {name}", value, 10.0, "µm⁻² s⁻¹") for name, value in per_um2_s.items()),
+            f"The paper gives no luminance: {MOONLIGHT_CD_M2:g} cd/m² is the one at which its number is right, twice "
+            "what 0.3 lux of a full moon make of a reflectance of 0.18.",
+        ),
+        Claim(
+            "Section 1",
+            "One photon for a pixel of 2 µm in 25 ms of moonlight",
+            tuple(about(f"D65, {name}", value * 2.0**2 * 0.025, 1.0, "photons") for name, value in per_um2_s.items()),
+            "Fill factor 1.",
+        ),
+        Claim(
+            "Section 1",
+            "1000 photons have an SNR of 30 dB",
+            (
+                near("closed form, √1000", decibels(sqrt(1000.0)), 30.0, 0.01, "dB"),
+                near("1000 e⁻ read out, shot noise alone", measured_db, 30.0, margin, "dB"),
+            ),
+            "That noise on a uniform field is visible under 30 dB is a finding about observers, and isn't judged here.",
+        ),
+    )
+
+
+def range_spans(view: View) -> dict[str, float]:
+    """Bright over dark luminance, day over night, in three senses; `view` is a scene at any level."""
+    levels = [level.luminance_cd_m2 for level in DEMO_LEVELS]
+    low, high = np.percentile(view.radiance.luminance(), [0.1, 99.9])
+    of_scene = float(high / low) if low > 0 else float("inf")
+    return {
+        "mean of a scene, moonlight to full sun": levels[-1] / levels[0],
+        "mean of a scene, moonless sky to full sun": FULL_SUN_LUX / NIGHT_SKY_LUX,
+        "pixels of still_life, dark by moonlight to bright in the sun": levels[-1] / levels[0] * of_scene,
+    }
+
+
+def range_claim(spans: Mapping[str, float]) -> Claim:
+    """Eight decades from day to night, to the order of magnitude; `spans` as of `range_spans`."""
+    return Claim(
+        "Section 1",
+        "Scene intensities span about 10⁸ from day to night",
+        tuple(Check(name, float(np.log10(span)), 7.5, 8.5, "decades") for name, span in spans.items()),
+        "Moonlight 0.036 cd/m², full sun 100 000 lux on a reflectance of 0.18, moonless clear sky 0.002 lux; of pixels "
+        "0.1 and 99.9 %.",
+    )
+
+
+def table_claim(found: Mapping[str, Table]) -> Claim:
+    """Whether Table 1 agrees with itself; `found` by reading."""
+    return Claim(
+        "Table 1",
+        "The voltage swing is what a full well gives",
+        tuple(about(name, table.swing_e / table.full_well_e, 1.0, "× the well") for name, table in found.items()),
+        "1.08 V over 30 µV/e⁻ is 36 000 e⁻, the well 15 000 e⁻. Here the well clips; the swing is only reported.",
+    )
+
+
+def tables() -> dict[str, Table]:
+    """Table 1 under each reading."""
+    pixels = {name: sensor_of(name).pixel for name in READINGS}
+    return {name: Table(pixel.swing_e, pixel.full_well_e) for name, pixel in pixels.items()}
+
+
+def number_claims(view: View) -> tuple[Claim, ...]:
+    """All claims of this module; `view` is the scene whose range counts."""
+    per_um2_s = {f"{low:g}-{high:g} nm": moonlight_photons(low, high) for low, high in ((400.0, 700.0), VISIBLE_NM)}
+    return *photon_claims(per_um2_s, measured_snr_db()), range_claim(range_spans(view)), table_claim(tables())

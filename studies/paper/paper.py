@@ -1,0 +1,114 @@
+"""The paper's figures and claims, all of them: computed, written as files, and as one page."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from rodcone.files import replacing
+from studies.pages.drawing import to_picture, to_svg
+from studies.pages.layout import Figure
+from studies.pages.results import environment
+from studies.paper.bilateral import bilateral_claims
+from studies.paper.checks import VERDICTS, Claim
+from studies.paper.figure1a import figure_1a
+from studies.paper.figure1b import figure_1b
+from studies.paper.figure2 import figure_2
+from studies.paper.figure3 import figure_3
+from studies.paper.figure4 import figure_4
+from studies.paper.figure5 import figure_5
+from studies.paper.figure6 import figure_6
+from studies.paper.numbers import number_claims
+from studies.paper.page import paper_page
+from studies.paper.setup import READINGS, Setup, Step, view
+
+Made = tuple[Figure, tuple[Claim, ...]]
+
+
+@dataclass(frozen=True)
+class Paper:
+    """The figures in the paper's order, the claims, and what made them."""
+
+    figures: tuple[Figure, ...]
+    claims: tuple[Claim, ...]
+    facts: dict[str, Any]
+
+
+def make(setup: Setup) -> Paper:
+    """Compute every figure and every claim; scenes are rendered once and kept in the folder.
+
+    Raises
+    ------
+    OSError
+        Where the folder can't be written.
+    """
+    setup.out.mkdir(parents=True, exist_ok=True)
+    makers: dict[str, Callable[[Setup], Made]] = {
+        "Figure 1a": figure_1a,
+        "Figure 1b": figure_1b,
+        "Figure 2": lambda _: figure_2(),
+        "Figure 3": figure_3,
+        "Figure 4": figure_4,
+        "Figure 5": figure_5,
+        "Figure 6": figure_6,
+    }
+    made = []
+    for index, (name, maker) in enumerate(makers.items()):
+        part = partial(_part, setup.step, name, index, len(makers))
+        part("begins", 0.0)
+        made.append(maker(replace(setup, step=part)))
+    numbers = number_claims(view(setup, "still_life", 1.0))
+    claims = (*numbers, *(claim for _, own in made for claim in own), *bilateral_claims(tuple(READINGS)))
+    facts = {"size": setup.size, "spp": setup.spp, "seeds": setup.seeds, "rodcone": metadata.version("rodcone")}
+    return Paper(tuple(figure for figure, _ in made), claims, facts | {"environment": environment()})
+
+
+def _part(step: Step, name: str, index: int, count: int, what: str, share: float) -> None:
+    """Progress of one figure as part of the whole."""
+    step(f"{name}: {what}", (index + share) / count)
+
+
+def write(paper: Paper, folder: Path) -> Path:
+    """Write ``paper.html``, ``paper.json`` and each figure as SVG and PNG; all appear or none."""
+    files = {f"figure_{figure.name}.svg": to_svg(figure.drawing).encode() for figure in paper.figures}
+    files |= {f"figure_{figure.name}.png": to_picture(figure.drawing) for figure in paper.figures}
+    files["paper.json"] = (json.dumps(as_json(paper), indent=1, allow_nan=False) + "\n").encode()
+    files["paper.html"] = paper_page(paper.figures, paper.claims, paper.facts).encode()
+    with replacing(*(folder / name for name in files)) as places:
+        for place, content in zip(places, files.values(), strict=True):
+            place.write_bytes(content)
+    return folder / "paper.html"
+
+
+def as_json(paper: Paper) -> dict[str, Any]:
+    """Claims with their checks and verdicts, how many of each verdict, and the facts."""
+    claims = [
+        {
+            "where": claim.where,
+            "claim": claim.text,
+            "verdict": claim.verdict,
+            "checks": [
+                {
+                    "condition": check.condition,
+                    "value": _finite(check.value),
+                    "low": _finite(check.low),
+                    "high": _finite(check.high),
+                    "unit": check.unit,
+                    "holds": check.holds,
+                }
+                for check in claim.checks
+            ],
+            "note": claim.note,
+        }
+        for claim in paper.claims
+    ]
+    count = {verdict: sum(claim.verdict == verdict for claim in paper.claims) for verdict in VERDICTS}
+    return {**paper.facts, "verdicts": count, "claims": claims}
+
+
+def _finite(value: float) -> float | None:
+    """Number as JSON has it: none for what isn't finite."""
+    return value if abs(value) < float("inf") else None

@@ -1,0 +1,1 @@
+"""One photograph: exposed, developed, written."""

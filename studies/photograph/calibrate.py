@@ -1,0 +1,109 @@
+"""Colour calibration of a camera on the ColorChecker, as a laboratory fills in a digital negative's tags."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.colour.camera_colour import adapt_to_d65, fit_matrix, xyz_to_srgb
+from render.illuminants import illuminant
+from render.photometry import photons_per_joule, tristimulus
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
+from rodcone.errors import InputError
+from scenes.reflectances import color_checker
+from sensor.calibration import ColourCalibration
+from sensor.cfa import channels
+from sensor.config import SensorConfig
+from sensor.optics import camera_equation
+from sensor.response import electrons_per_irradiance
+from studies.metrics.truth import Light, green_scale, light_in_bands
+
+ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is 78 / exposure that saturates [lux s]
+
+
+def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
+    """Fit a camera's colours under the light of an exposure, illuminant A and D65.
+
+    Parameters
+    ----------
+    sensor : SensorConfig
+        With R, G and B in its mosaic. Channels beyond these get a fitted column from XYZ, and carry no colour back.
+    light : Spectrum
+        What the camera's white balance is set to.
+
+    Raises
+    ------
+    InputError
+        Where a channel is missing, collects nothing, or the three can't tell colours apart.
+    """
+    if not set("RGB") <= set(channels(sensor.cfa)):
+        raise InputError(f"cfa: {sensor.cfa} holds no colours to calibrate; allowed: R, G and B; write its raw as .tif")
+    neutral, to_srgb, _, _ = _under(sensor, light)
+    _, _, to_camera_a, to_xyz_a = _under(sensor, illuminant("A"))
+    _, _, to_camera_d65, to_xyz_d65 = _under(sensor, illuminant("D65"))
+    return ColourCalibration(neutral, to_srgb, to_camera_a, to_camera_d65, to_xyz_a, to_xyz_d65)
+
+
+def iso_speed(sensor: SensorConfig) -> float | None:
+    """Saturation-based speed of green under D65; None where the mosaic has no G or it collects nothing.
+
+    The exposure that fills the well with green's mean; no half stop of headroom is taken off.
+    """
+    if "G" not in channels(sensor.cfa):
+        return None
+    light = _in_bands(illuminant("D65"))
+    electrons_per_cd_m2 = green_scale(sensor, light, 1.0)
+    if electrons_per_cd_m2 <= 0:
+        return None
+    per_lux_s = electrons_per_cd_m2 / camera_equation(sensor.lens)
+    return ISO_SATURATION_LUX_S * per_lux_s / sensor.pixel.full_well_e
+
+
+def _in_bands(spectrum: Spectrum) -> Light:
+    return light_in_bands(spectrum, DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM))
+
+
+def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Floats, Floats]:
+    """Neutral, matrix to sRGB, matrix from XYZ and matrix to XYZ (D50) under one light."""
+    light = _in_bands(spectrum)
+    nm, width = light.wavelength_nm, light.width_nm
+    electrons = electrons_per_irradiance(sensor, nm, width, 1.0)
+    response = electrons / (photons_per_joule(nm) * width)  # inside the camera's window
+    letters = channels(sensor.cfa)
+    rgb = [letters.index(letter) for letter in "RGB"]
+    collected = electrons @ light.spectrum
+    if not np.all(collected > 0):
+        raise InputError(
+            f"responses: {letters[int(np.argmin(collected))]} collects nothing under the light, 380-780 nm; "
+            "allowed: a channel that sees light; give another curve"
+        )
+    surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
+    to_srgb = fit_matrix(response[rgb], nm, light.spectrum, surfaces)
+    if np.linalg.cond(to_srgb) > 1e6:
+        raise InputError("responses: R, G and B can't tell colours apart; allowed: three different curves; correct one")
+    white = tristimulus(light.spectrum, nm, width)  # Y = 1
+    from_xyz = _srgb_of_xyz(white)
+    target = xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light.spectrum, nm, width), white))
+    balanced = (surfaces * light.spectrum) @ electrons.T / collected
+    from_srgb = _through_neutral(target, balanced)
+    from_srgb[rgb] = np.linalg.inv(to_srgb)
+    neutral = collected / collected[letters.index("G")]
+    to_xyz = np.zeros((3, len(letters)))
+    to_xyz[:, rgb] = _d50_of_srgb() @ to_srgb
+    return neutral, to_srgb, neutral[:, None] * from_srgb @ from_xyz, to_xyz
+
+
+def _through_neutral(source: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Least-squares matrix (target channel, 3) whose rows sum to 1, so that white stays white."""
+    last = source[:, -1:]
+    free, *_ = np.linalg.lstsq(source[:, :-1] - last, target - last, rcond=None)
+    return np.concatenate([free, 1.0 - free.sum(axis=0, keepdims=True)]).T
+
+
+def _srgb_of_xyz(white: Floats) -> NDArray[np.float64]:
+    """Matrix from XYZ under a light to linear sRGB, adapted to D65."""
+    return np.asarray(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)
+
+
+def _d50_of_srgb() -> NDArray[np.float64]:
+    """Matrix from linear sRGB to XYZ adapted to D50, the connection space of DNG's ForwardMatrix (ICC.1:2010)."""
+    d50 = np.array([0.9642, 1.0, 0.8249])
+    return np.asarray(np.linalg.inv(_srgb_of_xyz(d50)))

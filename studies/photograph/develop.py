@@ -1,0 +1,100 @@
+"""A raw file developed into a picture for the screen."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.colour.calibrated_colours import fit_of_calibration
+from isp.colour.camera_colour import luminance_of_srgb
+from isp.colour.encoding import ENCODINGS, encode
+from isp.processors.catalogue import PROCESSORS
+from rodcone.errors import InputError, require_range, unknown
+from sensor.cfa import channels
+from sensor.raw_files.dng import is_bayer
+from sensor.raw_files.raw_file import open_raw
+from studies.metrics.truth import WHITE_AT, WHITE_PERCENTILE  # the demo's rule, here on the picture's own luminance
+
+WHITE_BALANCES = ("gray-world", "as-shot")
+
+
+@dataclass(frozen=True)
+class Developed:
+    """Encoded picture (h, w, 3) in [0, 1], and what was decided on the way, as JSON holds it."""
+
+    encoded: NDArray[np.float64]
+    facts: dict[str, Any]
+
+
+def develop_file(
+    path: Path,
+    isp: str | None = None,
+    ev: float | None = None,
+    white_balance: str = WHITE_BALANCES[0],
+    encoding: str = "srgb",
+) -> Developed:
+    """Read a raw file and develop it with its own colour calibration.
+
+    The colour matrix is the file's, fitted under the light that its as-shot neutral stands for; of a camera's file,
+    LibRaw's for daylight.
+
+    Parameters
+    ----------
+    isp : str, optional
+        Of `isp.processors.catalogue.PROCESSORS`; ``bayer`` or ``interleaved``, by the mosaic, where left out.
+    ev : float, optional
+        Brightness in stops: at 0 green's full well is white. Left out, the 99th percentile of the picture's luminance
+        comes to 90 % of white, which noise raises in the deepest dark; for looking, not for measuring.
+    white_balance : str
+        ``gray-world`` as in the paper, with the file's as-shot neutral where the picture is too dark for that; or
+        ``as-shot``, that neutral in any case.
+    encoding : str
+        Of `isp.colour.encoding.ENCODINGS`.
+
+    Raises
+    ------
+    InputError
+        For a file that can't be read, holds no colours, or whose mosaic the pipeline doesn't know.
+    """
+    for what, value, allowed in (
+        ("isp", isp or "bayer", PROCESSORS),
+        ("white_balance", white_balance, WHITE_BALANCES),
+        ("encoding", encoding, ENCODINGS),
+    ):
+        if value not in allowed:
+            raise unknown(what, value, allowed)
+    if ev is not None:
+        require_range("ev", ev, -40.0, 40.0, "give stops")
+    raw, told = open_raw(path)
+    if raw.colour is None:
+        raise InputError(f"{path}: it holds no colour calibration; allowed: a camera with R, G and B; capture with one")
+    name = isp or ("bayer" if is_bayer(raw.cfa) else "interleaved")
+    neutral = raw.colour.neutral
+    fixed = neutral if white_balance == "as-shot" else None
+    colours = fit_of_calibration(raw.colour, channels(raw.cfa))
+    picture = PROCESSORS[name].develop(raw, colours, neutral=neutral, balance=fixed)
+    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
+    linear = picture.rgb / full_e
+    stops = _stops(linear) if ev is None else ev
+    facts = {
+        "raw": str(path),
+        "isp": name,
+        "engine": picture.engine,
+        "ev": stops,
+        "balance": dict(picture.balance),
+        "snr": picture.snr,
+        "substitution": picture.substituted,
+        "saturated": float(raw.saturated.mean()),
+        "defects": 0 if raw.defects is None else len(raw.defects),
+        "encoding": encoding,
+        **told,
+    }
+    return Developed(encode(linear * 2.0**stops, encoding), facts)
+
+
+def _stops(linear: NDArray[np.float64]) -> float:
+    """Stops that bring the 99th percentile of luminance to 90 % of white; 0 for a picture without light."""
+    bright = float(np.percentile(luminance_of_srgb(linear), WHITE_PERCENTILE))
+    return float(np.log2(WHITE_AT / bright)) if bright > 0 else 0.0

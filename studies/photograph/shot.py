@@ -1,0 +1,201 @@
+"""One photograph as raw files: a scene or a stored radiance in, digital negatives out."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from isp.remosaic import remosaic
+from render.engine import render
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from render.radiance_files.radiance_source import is_radiance_file
+from render.scene import Scene
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
+from render.transport import Transport
+from render.user_scene.scene_parts import SceneFile
+from rodcone.errors import InputError, require_range, require_whole
+from rodcone.files import check_place
+from rodcone.memory import file_extent, memory, require_memory
+from sensor.calibration import ColourCalibration
+from sensor.capture import capture
+from sensor.cfa import channels, check_covers
+from sensor.config import SensorConfig
+from sensor.device import draw_device
+from sensor.exposure import auto_exposure_s
+from sensor.left_out import left_out
+from sensor.optics import form_image
+from sensor.presets import preset
+from sensor.raw import RawImage
+from sensor.raw_files.dng import is_rgbw
+from sensor.raw_files.raw_file import check_ending, write_raw
+from studies.photograph.calibrate import calibrate, iso_speed
+from studies.study.levels import parse_level
+from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
+from studies.study.scene_source import asked_level, open_scene
+
+Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
+MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
+_DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to photograph and how; None: the preset's mosaic, auto exposure, the scene's level, light and size."""
+
+    source: str
+    out: Path
+    sensor: str = "low_noise"
+    cfa: str | None = None
+    exposure_s: float | None = None
+    level: str | None = None
+    white_balance: str | None = None
+    size: int | None = None
+    spp: int = 64
+    seed: int = 0
+    trust: bool = False
+    extend: str | None = None
+    force: bool = False
+
+
+@dataclass(frozen=True)
+class Taken:
+    """Paths of the files written, facts of the exposure as JSON holds them, and what had to be assumed."""
+
+    paths: tuple[Path, ...]
+    facts: dict[str, Any]
+    notes: tuple[str, ...]
+
+
+def take(order: Order, step: Step = lambda what, share: None) -> Taken:
+    """Photograph and write; a 2x2 RGBW negative gets a re-mosaiced Bayer one beside it, ``NAME_bayer.dng``.
+
+    Raises
+    ------
+    InputError
+        For an unknown name or a value out of range, before anything is rendered.
+    OSError
+        Where the folder can't be written.
+    """
+    sensor, opened = _check(order)
+    if opened is None:
+        transport, light, notes = open_radiance_file(order.source, order.white_balance)
+    else:
+        light, notes = _light(order, opened.scene)
+        notes += opened.notes
+    colour = calibrate(sensor, light) if set("RGB") <= set(channels(sensor.cfa)) else None
+    check_place(order.out)  # told before the render, not after
+    if opened is not None:
+        transport = _render(order, opened, step)
+    step("exposure", 0.9)
+    radiance = _lit(order, opened, transport)
+    raw = _expose(order, sensor, radiance, colour)
+    share = float(raw.saturated.mean())
+    if share > MOST_SATURATED:
+        notes += [
+            f"{share:.0%} of the pixels are saturated at {raw.exposure_s:g} s; give a shorter --exposure-s (seconds: "
+            "20 ms is 0.02), or leave it out"
+        ]
+    bayer = remosaic(raw) if order.out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) else None
+    paths = write_raw(raw, order.out)
+    if bayer is not None:
+        paths += write_raw(bayer, order.out.with_stem(order.out.stem + "_bayer"))
+    return Taken(paths, _facts(order, sensor, raw, radiance, paths), tuple(notes))
+
+
+def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
+    """Sensor and scene (None: a stored radiance), or `InputError`."""
+    sensor = preset(order.sensor, order.cfa)
+    check_ending(order.out, sensor.cfa)
+    require_whole("spp", order.spp, 1, 1 << 16, "give samples per pixel")
+    require_whole("seed", order.seed, 0, 2**31, "give a whole number")
+    if order.size is not None:
+        require_whole("size", order.size, 1, 8192, "give the picture's longer side in pixels")
+    if order.exposure_s is not None:
+        require_range("exposure_s", order.exposure_s, 0.0, 1e7, "give seconds, 0 or more")
+    elif "G" not in channels(sensor.cfa):
+        raise InputError(f"cfa: {sensor.cfa} has no G for the auto exposure; allowed: a mosaic with G; give exposure_s")
+    if is_radiance_file(order.source):
+        if order.trust:
+            raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")
+        if order.extend:
+            raise InputError(f"extend: {order.source!r} is a picture, which has no surfaces; leave --extend out")
+        check_radiance_file(order.source, () if order.level is None else (order.level,))
+        require_memory(memory(*file_extent(order.source)), order.force)
+        return sensor, None
+    opened = open_scene(order.source, order.trust, order.extend)
+    asked_level(opened.scene, order.level)
+    height, width = _size(order, opened)
+    check_covers(sensor.cfa, (height, width))
+    require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
+    return sensor, opened
+
+
+def _size(order: Order, opened: SceneFile) -> tuple[int, int]:
+    """Height and width: the film's own, or its proportions with the longer side that was asked for."""
+    height, width = opened.size
+    scale = 1.0 if order.size is None else order.size / max(height, width)
+    return max(1, round(height * scale)), max(1, round(width * scale))
+
+
+def _light(order: Order, scene: Scene) -> tuple[Spectrum, list[str]]:
+    """Light that the camera's colours are set to, and what had to be assumed."""
+    if order.white_balance is not None:
+        return illuminant(order.white_balance), []
+    name, first = next(iter(scene.groups.items()))
+    if not first.own_colour:
+        return first.spectrum, []
+    assumed = f"scene {scene.name}: light group {name!r} has colours of its own; white balance is set to {LIGHT}"
+    return illuminant(LIGHT), [f"{assumed}, --white-balance sets it otherwise"]
+
+
+def _render(order: Order, opened: SceneFile, step: Step) -> Transport:
+    return render(
+        opened.scene,
+        _size(order, opened),
+        spp=order.spp,
+        seed=order.seed,
+        progress=lambda share, error: step(f"render, relative error {error:.3f}", 0.9 * share),
+    )
+
+
+def _lit(order: Order, opened: SceneFile | None, transport: Transport) -> SpectralRadiance:
+    if opened is None:
+        return transport.relight(luminance_cd_m2=None if order.level is None else parse_level(order.level)[0])
+    luminance_cd_m2, illuminance_lux = asked_level(opened.scene, order.level)
+    return transport.relight(luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
+
+
+def _expose(
+    order: Order, sensor: SensorConfig, radiance: SpectralRadiance, colour: ColourCalibration | None
+) -> RawImage:
+    exposure_s = order.exposure_s
+    if exposure_s is None:
+        exposure_s = auto_exposure_s(form_image(radiance, sensor), sensor)
+    device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
+    raw = capture(radiance, sensor, exposure_s, device, np.random.default_rng([order.seed, _FRAME]))
+    name = Path(order.sensor).stem.encode("ascii", "replace").decode()
+    return replace(raw, camera=name, f_number=sensor.lens.f_number, iso=iso_speed(sensor), colour=colour)
+
+
+def _facts(
+    order: Order, sensor: SensorConfig, raw: RawImage, radiance: SpectralRadiance, paths: tuple[Path, ...]
+) -> dict[str, Any]:
+    return {
+        "paths": [str(path) for path in paths],
+        "source": order.source,
+        "sensor": order.sensor,
+        "cfa": list(raw.cfa),
+        "size": list(raw.shape),
+        "seed": order.seed,
+        "exposure_s": raw.exposure_s,
+        "iso": raw.iso,
+        "engine": raw.engine,
+        "luminance_cd_m2": float(radiance.luminance().mean()),
+        "relative_mc_error": radiance.relative_mc_error,
+        "relative_level_error": radiance.relative_level_error,
+        "saturated": float(raw.saturated.mean()),
+        "left_out": list(left_out(sensor)),
+    }

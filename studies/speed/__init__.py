@@ -1,0 +1,1 @@
+"""Speed against error: what ``rodcone bench`` measures."""

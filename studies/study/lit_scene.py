@@ -1,0 +1,191 @@
+"""A study's scene: opened, rendered once, and lit by the spectra that the study asks for."""
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from render.engine import render
+from render.illuminants import illuminant
+from render.photometry import luminance
+from render.radiance_files.radiance_source import is_radiance_file
+from render.scene import Scene
+from render.scene_range import check_range
+from render.spectrum import Floats, Spectrum
+from render.transport import Transport
+from rodcone.digests import digest, digest_file
+from rodcone.errors import InputError
+from scenes.catalog import load
+from studies.study.levels import parse_level
+from studies.study.model import RenderModel
+from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
+from studies.study.scene_source import CATALOGUE_SIDE, asked_level, open_scene
+from studies.study.study import OWN, SceneChoice, Study
+
+Progress = Callable[[float, float], None]
+
+
+@dataclass(frozen=True)
+class OpenedScene:
+    """A scene ready to be rendered.
+
+    Attributes
+    ----------
+    choice : SceneChoice
+    scene : Scene or None
+        None for a picture file, which needs no render.
+    size : (int, int)
+        Height and width; (0, 0) for a picture file, which is read only when it is needed.
+    identity : str
+        Hash of all that the scene is.
+    notes : tuple of str
+    """
+
+    choice: SceneChoice
+    scene: Scene | None
+    size: tuple[int, int]
+    identity: str
+    notes: tuple[str, ...] = ()
+
+
+def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
+    """Open a scene and check the study's levels and spectra against it; nothing is rendered.
+
+    Raises
+    ------
+    InputError
+        For a scene that is unknown or can't be read, a level in lux without a reference plane, or another spectrum for
+        lights that have colours of their own.
+    """
+    if is_radiance_file(choice.source):
+        if choice.extend:
+            raise InputError(f"scenes: extend for {choice.source}, a picture without surfaces; leave it out")
+        check_radiance_file(choice.source, study.levels)
+        return OpenedScene(choice, None, (0, 0), digest([digest_file(choice.source), choice.light]))
+    if choice.source.endswith(".xml"):
+        if choice.light is not None:
+            raise InputError(f"scenes: light {choice.light!r} for {choice.source}; allowed: none, a file has its own")
+        opened = open_scene(choice.source, extend=choice.extend)
+        scene, own_size, notes = opened.scene, opened.size, opened.notes
+    else:
+        scene = load(choice.source, **({} if choice.light is None else {"light": choice.light}))
+        scene = replace(scene, extend=choice.extend)
+        own_size, notes = (CATALOGUE_SIDE, CATALOGUE_SIDE), ()
+    for level in study.levels:
+        asked_level(scene, level)
+    for spectrum in study.spectra:
+        _check_relit(scene, spectrum)
+    check_range(scene, *study.render.range_nm)
+    size = _size(own_size, study.render.size)
+    return OpenedScene(choice, scene, size, digest([digest_scene(scene), size]), tuple(notes))
+
+
+def _size(own: tuple[int, int], longest: int | None) -> tuple[int, int]:
+    """Height and width of the film, or its proportions with the longer side that was asked for."""
+    scale = 1.0 if longest is None else longest / max(own)
+    return max(1, round(own[0] * scale)), max(1, round(own[1] * scale))
+
+
+def _check_relit(scene: Scene, spectrum: str) -> None:
+    for name, group in scene.groups.items():
+        if spectrum != OWN and group.own_colour:
+            raise InputError(
+                f"spectra: {spectrum!r} can't relight group {name!r} of scene {scene.name}, whose lights have colours "
+                f"of their own; allowed: {OWN}; put the scene into a study of its own"
+            )
+
+
+def make_transport(
+    opened: OpenedScene, study: Study, model: RenderModel | None, cache: Path, progress: Progress
+) -> Transport:
+    """Render a scene, or read a picture file; a coarser render in `cache` is gone on from, a finer one is taken.
+
+    Raises
+    ------
+    InputError
+        As `render.engine.render` and `open_radiance_file`.
+    KeyboardInterrupt
+        Where Ctrl-C ended the render; what was rendered is in `cache`.
+    """
+    if opened.scene is None or model is None:
+        transport, _, assumed = open_radiance_file(opened.choice.source, opened.choice.light)
+        for note in assumed:
+            warnings.warn(note, stacklevel=2)
+        return transport
+    limits = study.render
+    transport = render(
+        opened.scene,
+        opened.size,
+        wavelength_nm=model.wavelength_nm,
+        width_nm=model.width_nm,
+        max_spp=model.spp,  # in passes of 16 samples, so that a finer request goes on from a coarser one's
+        max_seconds=limits.max_seconds,
+        seed=limits.seed,
+        cache=cache,
+        progress=progress,
+    )
+    if transport.stopped_by == "interrupt":
+        raise KeyboardInterrupt
+    return transport
+
+
+def under(transport: Transport, spectrum: str) -> Transport:
+    """Transport whose lights all have another spectrum, each at the luminance of its own; ``own`` changes nothing."""
+    if spectrum == OWN:
+        return transport
+    groups = {
+        name: replace(group, spectrum=illuminant(spectrum) * spectral_luminance(group.spectrum))
+        for name, group in transport.groups.items()
+    }
+    return replace(transport, groups=groups)
+
+
+def spectral_luminance(spectrum: Spectrum) -> float:
+    """Luminance of a spectrum at power 1, in bands of 1 nm as `render.illuminants.unit_luminance` sums it."""
+    nm: Floats = np.arange(360.5, 830.0)
+    width = np.ones_like(nm)
+    return float(luminance(spectrum.band_average(nm, width), nm, width))
+
+
+def white_spectrum(opened: OpenedScene, spectrum: str) -> Spectrum:
+    """Light that the cameras' colours are set to: the scene's first, or D65 where that has colours of its own."""
+    if spectrum != OWN:
+        return illuminant(spectrum)
+    if opened.scene is None:
+        return illuminant(opened.choice.light or LIGHT)
+    first = next(iter(opened.scene.groups.values()))
+    return illuminant(LIGHT) if first.own_colour else first.spectrum
+
+
+def level_luminance(level: str, lux_per_cd_m2: float | None) -> float:
+    """Mean scene luminance of a level [cd m^-2]."""
+    value, unit = parse_level(level)
+    if unit == "cd/m2":
+        return value
+    if not lux_per_cd_m2:
+        raise InputError(f"level: {level!r} needs light on a reference plane, which the scene hasn't; give it in cd/m2")
+    return value / lux_per_cd_m2
+
+
+def open_all(study: Study) -> dict[SceneChoice, OpenedScene]:
+    """Open every scene of a study; done before the first render, a fault in the last one is told at once."""
+    return {choice: open_choice(choice, study) for choice in study.scenes}
+
+
+def digest_scene(scene: Scene) -> str:
+    """Hash of a scene, the meshes and bitmaps that it names by their content."""
+    return digest([scene, _contents(scene.geometry)])
+
+
+def _contents(node: Mapping[str, Any]) -> list[str]:
+    """Hashes of the files that a scene's dict names, in its order."""
+    found = []
+    for key, value in node.items():
+        if isinstance(value, Mapping):
+            found += _contents(value)
+        elif key == "filename" and Path(str(value)).is_file():
+            found.append(digest_file(str(value)))
+    return found

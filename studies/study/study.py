@@ -1,0 +1,277 @@
+"""A study: scenes, spectra, levels, exposures, sensors, processors and seeds, of which every combination is a cell."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from isp.processors.catalogue import PROCESSORS
+from render.illuminants import illuminant, lines_nm
+from render.radiance_files.radiance_source import is_radiance_file
+from render.spectrum import VISIBLE_NM
+from rodcone.errors import InputError, require_range, require_whole, unknown
+from sensor.cfa import channels
+from sensor.exposure import LONGEST_S
+from sensor.presets import preset
+from sensor.variations import vary
+from studies.study.levels import parse_level
+
+OWN = "own"  # the spectrum that the scene's lights have
+LOWEST_NM, HIGHEST_NM = 300.0, 1100.0  # of `render.spectrum.flat`, black bodies and the sun's table
+LEAST_RANGE_NM = 100.0  # the widest band that `RenderLimits.band_nm` takes
+AUTO = "auto"  # the exposure by `sensor.exposure.auto_exposure_s`
+# A light whose table ends short of the bands, at no more than this share of its peak, is taken as dark from there on;
+# white LEDs of the CIE end at 780 nm with 0.6 to 5 %.
+_RUN_OUT = 0.01
+_FILES = (".xml", ".exr", ".mat", ".toml")
+_TIME = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+)\s*(us|ms|s)\s*$")
+_SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
+
+
+@dataclass(frozen=True)
+class SceneChoice:
+    """A scene of the catalogue by name, a Mitsuba scene (``.xml``) or a spectral picture (``.exr``, ``.mat``).
+
+    Attributes
+    ----------
+    source : str
+    light : str, optional
+        Option ``light`` of a catalogue scene's builder; for a picture file the light that its colours are judged under.
+    extend : str, optional
+        ``hold``: surfaces go on at their end values outside their tables.
+    """
+
+    source: str
+    light: str | None = None
+    extend: str | None = None
+
+
+@dataclass(frozen=True)
+class RenderLimits:
+    """How the scenes are rendered: the most that a plan may ask for, and what is done without one.
+
+    Attributes
+    ----------
+    size : int, optional
+        Longer side in pixels; left out, 256, or what a Mitsuba scene's film has. A picture file keeps its own size.
+    band_nm : float
+        Width of the bands without a plan; 20 nm do for smooth spectra.
+    spp : int
+        Samples a pixel.
+    max_seconds : float, optional
+        Time for each render; with it results depend on the machine's speed.
+    seed : int
+    range_nm : (float, float)
+        Wavelengths that are rendered; a sensor whose window reaches beyond 380-780 nm needs them.
+    """
+
+    size: int | None = None
+    band_nm: float = 20.0
+    spp: int = 512
+    max_seconds: float | None = None
+    seed: int = 0
+    range_nm: tuple[float, float] = VISIBLE_NM
+
+
+@dataclass(frozen=True)
+class LensTerms:
+    """What a full model of the lens holds where the preset leaves it out; a plan skips what the noise hides.
+
+    Attributes
+    ----------
+    diffraction : float
+        1 for an ideal aperture, as `sensor.config.LensConfig`.
+    veiling_glare : float
+        Share of the light; 1 % is a good photographic lens by the index of ISO 9358.
+    horizontal_view_deg : float, optional
+        Angle of view for cos^4; left out, the scene's camera's own.
+    """
+
+    diffraction: float = 1.0
+    veiling_glare: float = 0.01
+    horizontal_view_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class BudgetShares:
+    """Shares of the sensor's own noise variance that a plan's approximations may add: together, and Monte Carlo's."""
+
+    total: float = 0.10
+    monte_carlo: float = 0.03
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What light meets which chip for how long: all that decides the expected electrons but for the mosaic.
+
+    Attributes
+    ----------
+    scene : SceneChoice
+    spectrum : str
+        An illuminant's name, or ``own``.
+    level : str
+        ``25cd/m2`` (mean scene luminance) or ``500lux`` (on the reference plane).
+    exposure : str
+        ``auto``, or a time such as ``10ms``.
+    sensor : str
+        Preset by name, or a ``.toml`` file.
+    """
+
+    scene: SceneChoice
+    spectrum: str
+    level: str
+    exposure: str
+    sensor: str
+
+
+@dataclass(frozen=True)
+class Study:
+    """Axes of a sweep, and how its pictures are made. Every combination of the seven axes is a cell."""
+
+    scenes: tuple[SceneChoice, ...]
+    levels: tuple[str, ...]
+    spectra: tuple[str, ...] = (OWN,)
+    exposures: tuple[str, ...] = (AUTO,)
+    sensors: tuple[str, ...] = ("low_noise",)
+    processors: tuple[str, ...] = ("interleaved", "bayer")
+    seeds: tuple[int, ...] = (0,)
+    name: str = "study"
+    longest_exposure_s: float = LONGEST_S
+    render: RenderLimits = field(default_factory=RenderLimits)
+    lens: LensTerms = field(default_factory=LensTerms)
+    budget: BudgetShares = field(default_factory=BudgetShares)
+
+
+def conditions(study: Study) -> list[Condition]:
+    """All combinations of scenes, spectra, levels, exposures and sensors, the last running fastest."""
+    axes = (study.scenes, study.spectra, study.levels, study.exposures, study.sensors)
+    return [Condition(*place) for place in product(*axes)]
+
+
+def mosaics(study: Study) -> tuple[str, ...]:
+    """Mosaics that the study's processors take, each once."""
+    return tuple(dict.fromkeys(PROCESSORS[name].mosaic for name in study.processors))
+
+
+def label(value: Any) -> str:
+    """Name of a value of an axis in ledger and seeds: a file's own name without its folder, else the value as it is."""
+    text = str(value)
+    return Path(text).name if Path(text).suffix.lower() in _FILES else text
+
+
+def parse_exposure(text: str) -> float | None:
+    """Exposure time [s] of ``10ms``, ``0.5s`` or ``200us``; None for ``auto``.
+
+    Raises
+    ------
+    InputError
+        For anything else, or a time of 0.
+    """
+    if text == AUTO:
+        return None
+    match = _TIME.match(text)
+    if match is None:
+        raise InputError(f"exposures: {text!r} is not a time; allowed: auto, or a number and us, ms or s; write 10ms")
+    seconds = float(match[1]) * _SECONDS[match[2]]
+    require_range("exposures", seconds, 1e-9, 1e6, "give a time above 0 in seconds")
+    return seconds
+
+
+def check(study: Study) -> None:
+    """Raise `InputError` for whatever in a study can be told without opening its scenes."""
+    axes: dict[str, Sequence[Any]] = {
+        name: getattr(study, name)
+        for name in ("scenes", "spectra", "levels", "exposures", "sensors", "processors", "seeds")
+    }
+    for name, values in axes.items():
+        labels = [label(value.source if isinstance(value, SceneChoice) else value) for value in values]
+        if not labels or len(set(labels)) != len(labels):
+            raise InputError(
+                f"{name}: {labels!r} is not allowed; give one or more, each once, files under names of their own"
+            )
+    for spectrum in study.spectra:
+        if spectrum != OWN:
+            illuminant(spectrum)
+            _check_relit(study, spectrum)
+            _check_known(spectrum, study.render.range_nm)
+    for level in study.levels:
+        parse_level(level)
+    for exposure in study.exposures:
+        parse_exposure(exposure)
+    _check_names(study)
+    for seed in study.seeds:
+        require_whole("seeds", seed, 0, 2**63 - 1, "give whole numbers")
+    _check_numbers(study)
+
+
+def _check_names(study: Study) -> None:
+    """Lights of scenes, processors, and sensors with the mosaics that these take."""
+    for scene in study.scenes:
+        if scene.light is not None:
+            illuminant(scene.light)
+    for name in study.processors:
+        if name not in PROCESSORS:
+            raise unknown("processors", name, PROCESSORS)
+    for name in study.sensors:
+        own = preset(name)
+        if AUTO in study.exposures and "G" not in channels(own.cfa):
+            raise InputError(
+                f"exposures: {AUTO!r} looks at G, which {label(name)}'s mosaic lacks; give times such as 5ms"
+            )
+        for mosaic in mosaics(study):
+            vary(own, mosaic)
+
+
+def _check_relit(study: Study, spectrum: str) -> None:
+    for scene in study.scenes:
+        if is_radiance_file(scene.source):
+            raise InputError(
+                f"spectra: {spectrum!r} can't relight {scene.source}, a picture whose light is in it; "
+                f"allowed: {OWN}; put the scene into a study of its own"
+            )
+
+
+def _check_known(spectrum: str, range_nm: tuple[float, float]) -> None:
+    """Raise `InputError` where a light is not known as far as a study renders beyond 380-780 nm."""
+    if range_nm[0] >= VISIBLE_NM[0] and range_nm[1] <= VISIBLE_NM[1]:
+        return
+    light = illuminant(spectrum)
+    ends = zip(light.wavelength_nm[[0, -1]], light.values[[0, -1]], (range_nm[0], -range_nm[1]), (1, -1), strict=True)
+    short = [nm for nm, value, asked, sign in ends if sign * nm > asked and value > _RUN_OUT * light.values.max()]
+    if short or lines_nm(spectrum):
+        raise InputError(
+            f"spectra: {spectrum!r} is known over {light.wavelength_nm[0]:g}-{light.wavelength_nm[-1]:g} nm, and "
+            f"render.range_nm asks for {range_nm[0]:g}-{range_nm[1]:g} nm; allowed: sunlight, moonlight, temperatures "
+            "such as 2856K, LEDs that have run out there such as LED-B5; take one of them"
+        )
+
+
+def _check_range(range_nm: tuple[float, ...]) -> None:
+    if len(range_nm) != 2 or not LOWEST_NM <= range_nm[0] < range_nm[1] <= HIGHEST_NM:
+        raise InputError(
+            f"render.range_nm: {list(range_nm)!r} is not allowed; give [shortest, longest] within "
+            f"{LOWEST_NM:g} to {HIGHEST_NM:g} nm, where lights are known"
+        )
+    if range_nm[1] - range_nm[0] < LEAST_RANGE_NM:
+        raise InputError(f"render.range_nm: {list(range_nm)!r} is less than {LEAST_RANGE_NM:g} nm; widen it")
+
+
+def _check_numbers(study: Study) -> None:
+    require_range("longest_exposure_s", study.longest_exposure_s, 1e-9, 1e6, "give seconds above 0")
+    limits, lens, budget = study.render, study.lens, study.budget
+    if limits.size is not None:
+        require_whole("render.size", limits.size, 16, 8192, "give the picture's longer side in pixels")
+    _check_range(limits.range_nm)
+    require_range("render.band_nm", limits.band_nm, 1.0, 100.0, "give nanometres")
+    require_whole("render.spp", limits.spp, 1, 1 << 16, "give samples per pixel")
+    require_whole("render.seed", limits.seed, 0, 2**31, "give a whole number")
+    if limits.max_seconds is not None:
+        require_range("render.max_seconds", limits.max_seconds, 1e-3, 1e7, "give seconds")
+    require_range("lens.diffraction", lens.diffraction, 0.0, 100.0, "give 1 for an ideal lens, 0 for none")
+    require_range("lens.veiling_glare", lens.veiling_glare, 0.0, 1.0, "give a fraction, 0 for none")
+    if lens.horizontal_view_deg is not None:
+        require_range("lens.horizontal_view_deg", lens.horizontal_view_deg, 0.0, 175.0, "give degrees, 0 for none")
+    require_range("budget.total", budget.total, 1e-6, 1e3, "give a share of the noise variance: 10 % is 0.1")
+    require_range("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total")

@@ -1,0 +1,200 @@
+"""Cells on a cluster of `dask.distributed` (extra ``cluster``): the same cells, the same ledger."""
+
+import logging
+import os
+import socket
+import time
+import warnings
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import CancelledError
+from contextlib import closing, contextmanager
+from functools import partial
+from importlib.util import find_spec
+from ipaddress import ip_address
+from typing import Any
+from urllib.parse import urlsplit
+
+from rodcone.errors import InputError, one_line
+from rodcone.jit import backend
+from studies.sweep.cells import Cell
+from studies.sweep.provenance import versions
+from studies.sweep.row import Row
+from studies.sweep.workers import cores, run
+
+TRIM = (
+    "MALLOC_TRIM_THRESHOLD_"  # as `distributed` sets it, NumPy takes twice the processor time: pages go back and forth
+)
+PATIENCE_S = 30.0  # for scheduler and workers to answer
+RETRY_S = 0.2
+Rows = Generator[Row, None, None]
+
+
+@contextmanager
+def on_cluster(address: str, patience_s: float = PATIENCE_S) -> Iterator[Callable[[Sequence[Cell]], Rows]]:
+    """Connect to a scheduler and give what runs cells on its workers; a worker that dies is dask's to replace.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler: ``tcp://127.0.0.1:8786``, or ``tls://...`` with dask's own settings for TLS.
+    patience_s : float
+        How long to wait for it.
+
+    Raises
+    ------
+    InputError
+        For a cluster that doesn't answer, has no workers, workers of other code or with several threads each; later
+        for one that goes away, or a cell that ended its worker too often.
+    """
+    if find_spec("distributed") is None:
+        raise InputError("cluster: dask.distributed is not installed; install it: pip install 'rodcone[cluster]'")
+    check_address(address)
+    with _quiet(), closing(_client(address, patience_s)) as client:
+        slots, threads = _survey(client, address, patience_s)
+        yield partial(_run, client, address, slots, threads)
+
+
+def _run(client: Any, address: str, slots: int, threads: int, cells: Sequence[Cell]) -> Rows:
+    """Run cells, two in each worker's hands."""
+    from distributed import KilledWorker
+
+    executor = client.get_executor(pure=False)
+    try:
+        yield from run(cells, executor, at_once=2 * slots, threads=threads)
+    except KilledWorker as error:
+        raise InputError(f"cluster: {one_line(error)}; what is done is kept; give workers more memory") from error
+    except CancelledError as error:
+        raise InputError(f"cluster: {address} went away; what is done is kept; start it and run again") from error
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep dask's tracebacks off stderr: what they mean is told in one line."""
+    import distributed  # noqa: F401 - now: its import sets the levels
+
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
+
+
+def check_address(address: str) -> None:
+    """Raise `InputError` for what is no scheduler's address; warn where cells would travel an open network in clear."""
+    parts = urlsplit(address)
+    if parts.scheme not in ("tcp", "tls") or not parts.hostname or not _port(parts):
+        raise InputError(
+            f"cluster: {address!r} is not an address; allowed: tcp://HOST:PORT or tls://HOST:PORT of a dask scheduler"
+        )
+    if parts.scheme == "tcp" and not _is_loopback(parts.hostname):
+        warnings.warn(
+            f"{address} is no loopback address: whoever reaches it can run code as you; see docs/studies.md for tls://",
+            stacklevel=2,
+        )
+
+
+def _port(parts: Any) -> int | None:
+    try:
+        port: int | None = parts.port
+    except ValueError:  # not a number, or beyond 65535
+        return None
+    return port
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _client(address: str, patience_s: float) -> Any:
+    from distributed import Client
+
+    _check_encryption(address)
+    try:
+        _wait_for_port(address, patience_s)
+        return Client(address, timeout=patience_s, set_as_default=False)
+    except OSError as error:
+        raise InputError(
+            f"cluster: {address} doesn't answer within {patience_s:g} s ({one_line(error)}); start it: "
+            "dask scheduler --host 127.0.0.1"
+        ) from error
+
+
+def _check_encryption(address: str) -> None:
+    """Raise `InputError` where dask's settings for TLS don't fit the address: it would say so in a traceback."""
+    from distributed.security import Security
+
+    try:
+        security = Security()
+        certified = security.get_connection_args("client").get("ssl_context") is not None
+    except OSError as error:  # a certificate that can't be read, or isn't one
+        raise InputError(
+            f"cluster: dask's settings for TLS: {one_line(error)}; correct distributed.comm.tls"
+        ) from error
+    if address.startswith("tls:") and not certified:
+        raise InputError(
+            f"cluster: {address} needs certificates; allowed: ca-file and client under distributed.comm.tls in the "
+            "file that DASK_CONFIG names; start from: rodcone new cluster -o dask.yaml"
+        )
+    if address.startswith("tcp:") and security.require_encryption:
+        raise InputError(f"cluster: {address} is in clear and dask's settings require encryption; write tls://")
+
+
+def _wait_for_port(address: str, patience_s: float) -> None:
+    """Wait until something listens: a batch job starts its scheduler a moment before its sweep."""
+    parts, until = urlsplit(address), time.monotonic() + patience_s
+    while True:
+        try:
+            socket.create_connection((str(parts.hostname), int(parts.port or 0)), timeout=patience_s).close()
+            return
+        except OSError:
+            if time.monotonic() > until:
+                raise
+        time.sleep(RETRY_S)
+
+
+def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
+    """Number of workers, and threads for Dr.Jit in each: its machine's cores over the workers there."""
+    try:
+        client.wait_for_workers(1, timeout=patience_s)
+    except TimeoutError as error:
+        raise InputError(
+            f"cluster: {address} has no worker after {patience_s:g} s; start some: dask worker {address} --nthreads 1"
+        ) from error
+    for worker, count in client.nthreads().items():
+        if count != 1:
+            raise InputError(f"cluster: {worker} has {count} threads; allowed: 1; start dask worker with --nthreads 1")
+    try:
+        theirs, found, trim = (client.run(ask) for ask in (_what_computes, cores, _trim_threshold))
+    except ImportError as error:
+        raise InputError(f"cluster: a worker lacks rodcone ({one_line(error)}); install it there") from error
+    for worker, its in theirs.items():
+        other = [name for name, version in _what_computes().items() if its.get(name) != version]
+        if other:
+            raise InputError(
+                f"cluster: {worker} runs {other[0]} {its.get(other[0])}, this is {_what_computes()[other[0]]}; "
+                "install the same, start it again"
+            )
+    if any(trim.values()):
+        warnings.warn(
+            f"cluster: workers run with {TRIM}={max(filter(None, trim.values()))}, which costs NumPy up to twice the "
+            "time; start them with the settings of: rodcone new cluster -o dask.yaml",
+            stacklevel=2,
+        )
+    on_host = Counter(urlsplit(worker).hostname for worker in found)
+    return len(found), max(1, min(count // on_host[urlsplit(worker).hostname] for worker, count in found.items()))
+
+
+def _what_computes() -> dict[str, str]:
+    return {**versions(), "engine": backend()}
+
+
+def _trim_threshold() -> str | None:
+    return os.environ.get(TRIM)

@@ -1,0 +1,283 @@
+"""The ledger of a sweep: an SQLite file with a row a cell. A row stands whole or not at all, whatever ends the run.
+
+What is read back for its values ends in its digest: SQLite itself doesn't notice a number that has changed.
+"""
+
+import errno
+import json
+import os
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import astuple, dataclass, fields
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from rodcone.digests import digest
+from rodcone.errors import InputError, one_line
+from studies.sweep.cells import Coordinates
+from studies.sweep.row import Row
+from studies.sweep.stored import is_whole
+
+VERSION = 3  # of the tables; raise it with any change to them
+APPLICATION_ID = 0x726F6463  # "rodc": tells this file from other SQLite files
+FILE = "ledger.sqlite"
+_DAMAGED = (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_TOOBIG)
+_WAIT_S = 30.0  # for another process that writes: a row takes milliseconds
+_TYPES: dict[Any, str] = {str: "TEXT NOT NULL", int: "INTEGER NOT NULL", float: "REAL NOT NULL"}
+_OPTIONAL: dict[Any, str] = {float | None: "REAL", int | None: "INTEGER"}
+_HINTS = get_type_hints(Row)
+COLUMNS = tuple(field.name for field in fields(Row))
+_COLUMNS = ", ".join(f"cells.{name}" for name in (*COLUMNS, "digest"))
+_REAL = {name for name in COLUMNS if _HINTS[name] in (float, float | None)}
+Found = TypeVar("Found")
+_CREATE = (
+    "CREATE TABLE cells ("
+    + ", ".join(
+        f"{name} {(_TYPES | _OPTIONAL)[_HINTS[name]]}" + (" PRIMARY KEY" if name == "key" else "") for name in COLUMNS
+    )
+    + ", digest TEXT NOT NULL) STRICT",
+    # What the last run asks for, in the study's order; of a scene that isn't rendered yet the keys aren't known. The
+    # cells of earlier runs stay in `cells`.
+    "CREATE TABLE wanted (place INTEGER PRIMARY KEY, key TEXT) STRICT",
+    "CREATE TABLE renders (request TEXT PRIMARY KEY, content TEXT NOT NULL, variant TEXT NOT NULL, "
+    "spp INTEGER NOT NULL, bands INTEGER NOT NULL, seconds REAL NOT NULL, digest TEXT NOT NULL) STRICT",
+    "CREATE TABLE runs (started TEXT NOT NULL, host TEXT NOT NULL, study TEXT NOT NULL, stages TEXT NOT NULL, "
+    "digest TEXT NOT NULL) STRICT",
+)
+
+
+@dataclass(frozen=True)
+class RenderRecord:
+    """A render as the ledger knows it: hash of its content, variant, samples a pixel, bands, seconds that it took."""
+
+    content: str
+    variant: str
+    spp: int
+    bands: int
+    seconds: float
+
+
+@contextmanager
+def open_ledger(folder: Path) -> Iterator[sqlite3.Connection]:
+    """Open the ledger of a folder, or make it.
+
+    Raises
+    ------
+    InputError
+        For a file that is no ledger, or one of another version.
+    OSError
+        Where the file or the disk can't be written; it names the path.
+    """
+    path = folder / FILE
+    with _told(path):
+        base = sqlite3.connect(path, timeout=_WAIT_S, isolation_level=None)
+        try:
+            _distrust(base)
+            _prepare(base, path)
+            _check_whole(base, path)
+            yield base
+        finally:
+            base.close()
+
+
+@contextmanager
+def read_ledger(folder: Path) -> Iterator[sqlite3.Connection]:
+    """Open the ledger of a folder to read from it alone; a sweep may go on writing to it.
+
+    Raises
+    ------
+    InputError
+        For a file that is no ledger, one of another version, or a damaged one.
+    OSError
+        Where it can't be read.
+    """
+    path = folder / FILE
+    # Beside what can't be written no log can be, which a reader otherwise looks into; and no other process writes.
+    still = not os.access(folder, os.W_OK) and not path.with_name(f"{FILE}-wal").exists()
+    with _told(path):
+        address = f"{path.resolve().as_uri()}?mode=ro{'&immutable=1' if still else ''}"
+        base = sqlite3.connect(address, timeout=_WAIT_S, isolation_level=None, uri=True)
+        try:
+            _distrust(base)
+            if not _has_tables(base, path):
+                raise InputError(f"{path}: it is no ledger (it is empty); run the sweep again in another folder")
+            _check_whole(base, path)
+            yield base
+        finally:
+            base.close()
+
+
+def _check_whole(base: sqlite3.Connection, path: Path) -> None:
+    found = base.execute("PRAGMA integrity_check(1)").fetchone()[0]
+    if found != "ok":
+        raise InputError(f"{path}: it is no whole ledger ({one_line(found)}); run the sweep again in another folder")
+
+
+def _distrust(base: sqlite3.Connection) -> None:
+    """Read a file as SQLite advises for one from elsewhere (sqlite.org/security.html), and any bytes as text."""
+    base.execute("PRAGMA trusted_schema = OFF")
+    base.execute("PRAGMA cell_size_check = ON")
+    base.execute("PRAGMA mmap_size = 0")
+    base.text_factory = partial(str, encoding="utf-8", errors="replace")
+
+
+def _prepare(base: sqlite3.Connection, path: Path) -> None:
+    """Check the version, or make the tables, write ahead: readers don't wait, a killed writer leaves no half."""
+    if not _has_tables(base, path):
+        base.execute("BEGIN IMMEDIATE")  # of two sweeps that start at once one makes the tables
+        if not _has_tables(base, path):
+            for statement in _CREATE:
+                base.execute(statement)
+            base.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+            base.execute(f"PRAGMA user_version = {VERSION}")
+        base.execute("COMMIT")
+    base.execute("PRAGMA journal_mode = WAL")
+    base.execute("PRAGMA synchronous = NORMAL")
+
+
+def _has_tables(base: sqlite3.Connection, path: Path) -> bool:
+    """Whether a ledger of this version is there; `InputError` for anything else that is."""
+    tables = base.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+    version, owner = (base.execute(f"PRAGMA {name}").fetchone()[0] for name in ("user_version", "application_id"))
+    if tables and owner != APPLICATION_ID:
+        raise InputError(f"{path}: it is no ledger of rodcone; allowed: one, or none; choose another folder with --out")
+    if tables and version != VERSION:
+        raise InputError(
+            f"{path}: it has version {version}, this rodcone reads {VERSION}; allowed: that version; sweep again into "
+            "another folder with --out, or export this one with the rodcone that wrote it"
+        )
+    if tables and {sql for (sql,) in base.execute("SELECT sql FROM sqlite_master WHERE sql NOT NULL")} != {*_CREATE}:
+        raise InputError(
+            f"{path}: its tables are not a ledger's; allowed: no other tables, views or triggers; remove it"
+        )
+    return bool(tables)
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Turn SQLite's errors into those that the command line tells in one line."""
+    try:
+        yield
+    except UnicodeDecodeError as error:  # of an error that quotes the file
+        raise InputError(f"{path}: it is no ledger (its names are no text); move it away") from error
+    except sqlite3.DatabaseError as error:
+        code = getattr(error, "sqlite_errorcode", None)
+        if code is None:  # a fault of ours, not of the file's
+            raise
+        if code & 0xFF in _DAMAGED:
+            raise InputError(f"{path}: it is no ledger ({error}); move it away, or choose another folder") from error
+        number = errno.ENOSPC if code == sqlite3.SQLITE_FULL else errno.EIO
+        raise OSError(number, str(error), str(path)) from error
+
+
+def add(base: sqlite3.Connection, row: Row) -> None:
+    """Add a row, at once and whole; one of the same key is replaced."""
+    values = [float(value) if column in _REAL and value is not None else value for column, value in vars(row).items()]
+    _put(base, "cells", values)
+
+
+def done(base: sqlite3.Connection, pictures: Path, keys: Iterable[str]) -> set[str]:
+    """Which of these cells have a whole row, and whole pictures: a power cut may have taken these."""
+    asked = set(keys)
+    found = [_row(values) for values in base.execute(f"SELECT {_COLUMNS} FROM cells") if values[0] in asked]
+    pairs = [(row.key, pictures / row.picture, pictures / row.truth) for row in found if row is not None]
+    return {key for key, picture, truth in pairs if is_whole(picture) and is_whole(truth)}
+
+
+def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
+    """Rows of the cells that the last run asked for, in the study's order; with `everything` all that there are.
+
+    Raises
+    ------
+    InputError
+        Where a row isn't what was written.
+    """
+    chosen = (
+        f"SELECT {_COLUMNS} FROM cells ORDER BY key"
+        if everything
+        else f"SELECT {_COLUMNS} FROM wanted JOIN cells USING (key) ORDER BY place"
+    )
+    return [_whole(_row(values), f"row {values[0]!r}") for values in base.execute(chosen)]
+
+
+def last_study(base: sqlite3.Connection) -> tuple[dict[str, Any], dict[str, float]] | None:
+    """Study of the last run, and the seconds by stage of all runs of it; None before there is one."""
+    found = [_whole(_sealed(values), "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
+    if not found:
+        return None
+    study, seconds = found[-1][2], dict[str, float]()
+    for stages in (json.loads(run[3]) for run in found if run[2] == study):
+        for name, value in stages.items():
+            seconds[name] = seconds.get(name, 0.0) + value
+    return json.loads(study), seconds
+
+
+def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:
+    """Note which cells the run under way asks for, in place of what was noted before; None where not known yet."""
+    base.execute("BEGIN IMMEDIATE")
+    base.execute("DELETE FROM wanted")
+    base.executemany("INSERT INTO wanted (key) VALUES (?)", ((key,) for key in keys))
+    base.execute("COMMIT")
+
+
+def forget_old(base: sqlite3.Connection) -> None:
+    """Remove the rows of what the run under way has made anew with other versions, or from another variant's render.
+
+    The backend counts among the versions; engines that differ alone are another plan's.
+    """
+    new = {_place(row): (row.variant, row.versions) for row in rows(base)}
+    found = [row for row in map(_row, base.execute(f"SELECT {_COLUMNS} FROM cells")) if row is not None]
+    old = [(row.key,) for row in found if new.get(_place(row), made := (row.variant, row.versions)) != made]
+    base.executemany("DELETE FROM cells WHERE key = ?", old)
+
+
+def note_run(base: sqlite3.Connection, started: str, host: str, study: str) -> int:
+    """Note a run: when, where, of what; gives its number."""
+    return _put(base, "runs", [started, host, study, "{}"])
+
+
+def note_stages(base: sqlite3.Connection, run: int, stages: Mapping[str, float]) -> None:
+    """Note the seconds that a run has taken so far, by stage."""
+    values = base.execute("SELECT started, host, study FROM runs WHERE rowid = ?", (run,)).fetchone()
+    text = json.dumps(dict(stages))
+    base.execute("UPDATE runs SET stages = ?, digest = ? WHERE rowid = ?", (text, digest([*values, text]), run))
+
+
+def render_record(base: sqlite3.Connection, request: str) -> RenderRecord | None:
+    """What was found about a render that was asked for before; None too where it isn't what was written."""
+    found = base.execute("SELECT * FROM renders WHERE request = ?", (request,)).fetchone()
+    values = None if found is None else _sealed(found)
+    return None if values is None else RenderRecord(*values[1:])
+
+
+def note_render(base: sqlite3.Connection, request: str, record: RenderRecord) -> None:
+    """Keep what was found about a render."""
+    _put(base, "renders", [request, *astuple(record)])
+
+
+def _put(base: sqlite3.Connection, table: str, values: list[Any]) -> int:
+    marks = ", ".join("?" * (len(values) + 1))
+    done = base.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", [*values, digest(values)])
+    return int(done.lastrowid or 0)
+
+
+def _sealed(values: tuple[Any, ...]) -> tuple[Any, ...] | None:
+    """Values without the digest at their end; None where it isn't theirs."""
+    return values[:-1] if digest(values[:-1]) == values[-1] else None
+
+
+def _row(values: tuple[Any, ...]) -> Row | None:
+    whole = _sealed(values)
+    return None if whole is None else Row(*whole)
+
+
+def _whole(found: Found | None, what: str) -> Found:
+    if found is None:
+        raise InputError(f"ledger: {what} isn't what was written (damaged); run rodcone sweep again, which makes it")
+    return found
+
+
+def _place(row: Row) -> Coordinates:
+    return Coordinates(*(getattr(row, field.name) for field in fields(Coordinates)))

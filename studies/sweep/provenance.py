@@ -1,0 +1,103 @@
+"""What makes a cell's numbers: the render's variant, engines and versions. Cells that differ in it don't mix."""
+
+import json
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cache
+from importlib import metadata
+
+from isp.processors.catalogue import PROCESSORS, libraries
+from rodcone.errors import InputError
+from rodcone.jit import backend, compiler_version, dr
+from studies.sweep.code_version import code_version
+from studies.sweep.row import Row
+
+_PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "scikit-image", "colour-science", "flip-evaluator")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What makes a cell.
+
+    Attributes
+    ----------
+    variant : str
+        Of Mitsuba, that rendered the scene; ``none`` for a picture file.
+    readout_engine, development_engine : str
+        ``cuda``, ``llvm`` or ``numpy``.
+    versions : str
+        Of rodcone with its sources, of the packages that it computes with and of LLVM, as JSON.
+    """
+
+    variant: str
+    readout_engine: str
+    development_engine: str
+    versions: str
+
+
+def provenance(variant: str, processor: str, exact: bool) -> Provenance:
+    """What makes a cell in this process; `exact` as `studies.study.model.ImageModel`."""
+    return Provenance(
+        variant,
+        "numpy" if exact else backend(),
+        backend() if PROCESSORS[processor].on_backend else "numpy",
+        json.dumps(versions(processor), sort_keys=True),
+    )
+
+
+@cache
+def versions(processor: str | None = None) -> dict[str, str]:
+    """Versions of all that makes numbers, of the backend in use and of a processor's own libraries too."""
+    names = (*_PACKAGES, *(libraries(processor) if processor else ()))
+    made = {"rodcone": code_version(), **{name: metadata.version(name) for name in names}, "llvm": "none"}
+    if backend() != "numpy":
+        made[backend()] = compiler_version()
+    return made
+
+
+def machine() -> str:
+    """Operating system and Python, in words."""
+    return f"{platform.platform()}, Python {platform.python_version()}"
+
+
+def threads() -> int:
+    """Threads that Dr.Jit's kernels use in this process."""
+    return int(dr.thread_count()) if backend() == "llvm" else 1
+
+
+def told(made_by: Provenance) -> dict[str, str]:
+    """Each fact of it by its name in words."""
+    return {
+        "Mitsuba variant": made_by.variant,
+        "engine of captures": made_by.readout_engine,
+        "engine of development": made_by.development_engine,
+        **json.loads(made_by.versions),
+    }
+
+
+def made_by(row: Row) -> Provenance:
+    """What made a ledger's row."""
+    return Provenance(*(getattr(row, field.name) for field in fields(Provenance)))
+
+
+def require_alike(rows: Sequence[Row]) -> None:
+    """Raise `InputError` where a mean or a comparison would be over different versions, variants or engines.
+
+    A scene has one variant, a condition one engine of captures, a processor one of development, and a package one
+    version.
+    """
+    found: dict[tuple[object, ...], str] = {}
+    for row in rows:
+        of = {
+            "Mitsuba variant": (row.scene,),
+            "engine of captures": (row.scene, row.spectrum, row.level, row.exposure, row.sensor),
+            "engine of development": (row.processor,),
+        }
+        for name, value in told(made_by(row)).items():
+            first = found.setdefault((name, *of.get(name, ())), value)
+            if first != value:
+                raise InputError(
+                    f"cells: {name} {first} and {value} would be in one mean or comparison; allowed: one; run rodcone "
+                    "sweep again, which makes them anew"
+                )

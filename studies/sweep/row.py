@@ -1,0 +1,111 @@
+"""One row of a sweep's ledger: a cell, its figures, and what made them."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Row:
+    """What the ledger holds of a cell. Times and what made it alone differ from run to run.
+
+    Attributes
+    ----------
+    key : str
+        Of `Cell`.
+    scene ... seed
+        Of `studies.sweep.cells.Coordinates`.
+    luminance_cd_m2, illuminance_lux, exposure_s : float
+        The level in both units (lux where the scene states a plane), and the time.
+    spp, bands : int
+        Of the render.
+    lens : str
+        Terms of the modelled lens, as JSON.
+    budget_share : float or None
+        Share of the noise variance that a plan predicts for its approximations.
+    psnr_db, ssim, delta_e_median, delta_e_p95 : float
+        Of `studies.metrics.quality.Quality`.
+    s_cielab_median, s_cielab_p95, flip_mean, pu21_psnr_db : float
+        Of `studies.metrics.appearance.Appearance`.
+    mtf50_cy_per_px, chart_delta_e_mean, patch_snr_db : float or None
+        Of `studies.metrics.target_figures.TargetFigures`.
+    mc_share : float
+        Monte Carlo variance over the sensor's own, means over the pixels below saturation.
+    snr_db : float or None
+        Green's, where the processor measures it.
+    substitution : int or None
+        Whether W stood for luminance.
+    saturated : float
+        Share of the pixels.
+    balance, mean_electrons : str
+        By channel, as JSON.
+    variant, readout_engine, development_engine, versions : str
+        Of `studies.sweep.provenance.Provenance`; the engines as raw image and picture tell them.
+    picture, truth : str
+        Files of the developed and the noise-free picture below the folder of pictures.
+    render_s, capture_s, develop_s, measure_s : float
+        Of the render that the cell shares with others, and of its own steps.
+    first_s : float
+        Of the steps' first calls of their kind in the process, which compile and load: made again, and not in the three
+        above.
+    threads : int
+        Of Dr.Jit's kernels in the process.
+    finished : str
+        UTC.
+    host, machine : str
+        Name, and operating system with Python.
+    worker : int
+        Number of the thread that ran the cell, as the host counts them.
+    """
+
+    key: str
+    scene: str
+    spectrum: str
+    level: str
+    exposure: str
+    sensor: str
+    processor: str
+    seed: int
+    luminance_cd_m2: float
+    illuminance_lux: float | None
+    exposure_s: float
+    spp: int
+    bands: int
+    lens: str
+    budget_share: float | None
+    psnr_db: float
+    ssim: float
+    delta_e_median: float
+    delta_e_p95: float
+    s_cielab_median: float
+    s_cielab_p95: float
+    flip_mean: float
+    pu21_psnr_db: float
+    mtf50_cy_per_px: float | None
+    chart_delta_e_mean: float | None
+    patch_snr_db: float | None
+    mc_share: float
+    snr_db: float | None
+    substitution: int | None
+    saturated: float
+    balance: str
+    mean_electrons: str
+    variant: str
+    readout_engine: str
+    development_engine: str
+    versions: str
+    picture: str
+    truth: str
+    render_s: float
+    capture_s: float
+    develop_s: float
+    measure_s: float
+    first_s: float
+    threads: int
+    finished: str
+    host: str
+    machine: str
+    worker: int
+
+
+TIME_AND_HOST = (
+    "render_s", "capture_s", "develop_s", "measure_s", "first_s", "threads", "finished", "host", "machine", "worker",
+)  # fmt: skip

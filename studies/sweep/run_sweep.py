@@ -1,0 +1,187 @@
+"""A sweep: every cell of a study that the ledger doesn't hold yet, made and noted."""
+
+import json
+import platform
+import shutil
+import sqlite3
+import time
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing, suppress
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from itertools import chain
+from pathlib import Path
+
+from isp.processors.catalogue import require_libraries
+from studies.budget.model_plan import Plan
+from studies.photograph.clock import FIRST, Clock
+from studies.study.lit_scene import open_all
+from studies.study.study import Study, check, conditions
+from studies.sweep.cells import Cell
+from studies.sweep.database import add, done, forget_old, note_run, note_stages, open_ledger, want
+from studies.sweep.prepare import PICTURES, Job, known_cells, scene_cells
+from studies.sweep.row import Row
+
+Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
+Runner = Callable[
+    [Sequence[Cell]], Generator[Row, None, None]
+]  # such as `partial(studies.sweep.workers.run_in_processes, workers=4)`
+LEFT_S = 3600.0  # after which a temporary file has no writer any more: writing one takes seconds
+RENDER_SHARE = 0.5  # of the progress bar that a scene's render takes; how long it takes isn't known before
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What a sweep did.
+
+    Attributes
+    ----------
+    out : Path
+        Folder of the ledger.
+    cells, made : int
+        Cells of the study, and how many of them this run made; the others stood in the ledger.
+    seconds : float
+        Of the whole run.
+    notes : tuple of str
+        What had to be assumed.
+    """
+
+    out: Path
+    cells: int
+    made: int
+    seconds: float
+    notes: tuple[str, ...]
+
+
+def sweep(
+    study: Study,
+    out: Path,
+    plan: Plan,
+    runner: Runner,
+    step: Step = lambda what, share: None,
+    *,
+    keep_old: bool = False,
+    clock: Clock | None = None,
+) -> Swept:
+    """Make the missing cells of a study and note each in the ledger of a folder.
+
+    Whatever ends it (Ctrl-C, a kill, a full disk), the next call goes on with the cells that are missing then. Cells
+    that other versions, another variant or other engines made are made anew.
+
+    Parameters
+    ----------
+    study : Study
+    out : Path
+        Folder; made where it isn't there.
+    plan : Plan
+        Of `studies.study.model.as_stated`, `studies.budget.plan.plan` or `reference_plan`.
+    runner : callable
+        Takes cells, gives rows as they come.
+    step : callable
+    keep_old : bool
+        Keep what is made anew as rows of their own, instead of removing them.
+    clock : Clock, optional
+        That began when the work did, where something was done before.
+
+    Raises
+    ------
+    InputError
+        For whatever in the study isn't allowed, before anything is rendered.
+    OSError
+        Where the folder can't be written, or the disk is full.
+    """
+    clock = clock or Clock()
+    check(study)
+    for name in study.processors:
+        require_libraries(name)
+    scenes = open_all(study)
+    out.mkdir(parents=True, exist_ok=True)
+    _clear(out)
+    with open_ledger(out) as base:
+        job = Job(study, plan, out, base, clock)
+        run = _note(base, study)
+        found = [known_cells(job, opened) for opened in scenes.values()]
+        count = len(conditions(study)) * len(study.processors) * len(study.seeds) // len(scenes)
+        keys: list[Sequence[str | None]] = [
+            [cell.key for cell in cells] if cells else [None] * count for cells in found
+        ]
+        want(base, chain.from_iterable(keys))
+        made = 0
+        for index, opened in enumerate(scenes.values()):
+            part = _part(step, index, len(scenes))
+            cells = found[index] or scene_cells(job, opened, _rendering(part))
+            asked = [cell.key for cell in cells]
+            keys[index] = asked
+            want(base, chain.from_iterable(keys))
+            kept = done(base, out / PICTURES, asked)
+            made += _run(job, run, [cell for cell in cells if cell.key not in kept], runner, part)
+        if not keep_old:
+            forget_old(base)
+        stages = clock.stages()
+        note_stages(base, run, stages)
+    notes = tuple(dict.fromkeys(note for opened in scenes.values() for note in opened.notes))
+    return Swept(out, count * len(scenes), made, sum(stages.values()), notes)
+
+
+def _clear(out: Path) -> None:
+    """Remove what a killed run had begun to write; another that is at work now has begun less than that ago."""
+    for pattern in (".part-*", "*.part"):  # of `rodcone.files.replacing` and `render.cache.save_transport`
+        for path in list(out.rglob(pattern)):
+            with suppress(OSError):  # another sweep may clear it too
+                if time.time() - path.stat().st_mtime > LEFT_S:
+                    shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step) -> int:
+    """Make cells, note each as it comes and the time taken so far; gives their number."""
+    began, made = time.perf_counter(), 0
+    seconds, workers = dict[str, float](), set[tuple[str, int]]()
+    with closing(runner(missing)) as rows:
+        for row in rows:
+            add(job.base, row)
+            made += 1
+            workers.add((row.host, row.worker))
+            for name, value in _steps(row).items():
+                seconds[name] = seconds.get(name, 0.0) + value
+            note_stages(job.base, run, job.clock.stages(_on_the_clock(seconds, len(workers))))
+            left_s = (time.perf_counter() - began) / made * (len(missing) - made)
+            part(f"cell {made} of {len(missing)}, {duration(left_s)} left", _after_render(made / len(missing)))
+    for name, value in _on_the_clock(seconds, len(workers)).items():
+        job.clock.add(name, value)
+    return made
+
+
+def _steps(row: Row) -> dict[str, float]:
+    developed = f"develop {row.processor}"
+    return {"captures": row.capture_s, developed: row.develop_s, "metrics": row.measure_s, FIRST: row.first_s}
+
+
+def _on_the_clock(seconds: Mapping[str, float], workers: int) -> dict[str, float]:
+    """Seconds of work as they pass on the clock: workers, of whom each takes its own time, work at once."""
+    return {name: value / workers for name, value in seconds.items()}
+
+
+def _rendering(part: Step) -> Callable[[float, float], None]:
+    return lambda share, error: part(f"render, relative error {error:.3f}", RENDER_SHARE * share)
+
+
+def _note(base: sqlite3.Connection, study: Study) -> int:
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return note_run(base, now, platform.node(), json.dumps(asdict(study)))
+
+
+def _part(step: Step, index: int, count: int) -> Step:
+    """Progress of one scene as part of the whole."""
+    words = f"scene {index + 1} of {count}: " if count > 1 else ""
+    return lambda what, share: step(words + what, (index + share) / count)
+
+
+def _after_render(share: float) -> float:
+    return RENDER_SHARE + (1 - RENDER_SHARE) * share
+
+
+def duration(seconds: float) -> str:
+    """Time in words, to the precision that an estimate has: ``40 s``, ``3 min``, ``2.5 h``."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"

@@ -1,0 +1,148 @@
+"""A sweep's figures as a table: means over the seeds, a line for each combination of the axes that are asked for."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from rodcone.errors import InputError, unknown
+from scenes.catalog import load, names
+from scenes.metamers import TWINS_UNDER
+from studies.metrics.chart_colours import daylight_delta_e, decode_srgb, pair_delta_e, true_pair_delta_e
+from studies.metrics.confidence import mean_with_confidence
+from studies.metrics.patches import patch_masks
+from studies.study.study import OWN
+from studies.sweep.prepare import PICTURES
+from studies.sweep.provenance import require_alike
+from studies.sweep.row import Row
+from studies.sweep.stored import read_whole
+
+AXES = ("scene", "spectrum", "level", "exposure", "sensor", "processor")
+SAME = 1e-6  # below it a mean is none, and a half width, as a share of its mean, only sums in another order
+ELECTRONS = "electrons_"  # and a letter: mean electrons of its pixels
+CHARTS = {"pair_delta_e": ("metamers", pair_delta_e), "daylight_delta_e": ("color_checker", daylight_delta_e)}
+TRUE_PAIRS = "true_pair_delta_e"  # of the light alone, whatever the camera
+FIGURES = tuple(one.name for one in fields(Row) if "float" in str(one.type) or one.name == "substitution")
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of a table: its place on the axes, and each figure's mean and 95 % interval's half width over the seeds.
+
+    None stands for a figure that a cell lacks, and for the interval of one seed.
+    """
+
+    at: tuple[str, ...]
+    means: tuple[float | None, ...]
+    halves: tuple[float | None, ...]
+
+
+def lines(
+    rows: Sequence[Row], folder: Path, by: Sequence[str], show: Sequence[str], where: Mapping[str, str]
+) -> list[Line]:
+    """Lines of a table, in the study's order.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+    folder : Path
+        Of the sweep, for figures that are measured in pictures.
+    by : sequence of str
+        Axes, some of `AXES`.
+    show : sequence of str
+        Columns of the ledger that are numbers; ``electrons_W`` and the other letters; ``pair_delta_e``, the mean
+        CIEDE2000 within the pairs of scene metamers; ``daylight_delta_e``, the mean between the ColorChecker's patches
+        and their colours under D65; both are measured in the 8-bit pictures. ``true_pair_delta_e`` is what the CIE
+        observer sees of the pairs.
+    where : mapping of str to str
+        Axes and the one value that counts.
+
+    Raises
+    ------
+    InputError
+        For an unknown axis or figure, a figure that the scene doesn't have, or lines whose cells differ in more than
+        their seeds: a mean over lights, cameras or versions says nothing.
+    """
+    for axis in (*by, *where):
+        if axis not in AXES:
+            raise unknown("axis", axis, AXES)
+    for name in show:
+        if name not in (*FIGURES, *CHARTS, TRUE_PAIRS) and not name.startswith(ELECTRONS):
+            raise unknown("show", name, (*FIGURES, *CHARTS, TRUE_PAIRS, f"{ELECTRONS}W"))
+    groups: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        if all(getattr(row, axis) == value for axis, value in where.items()):
+            groups.setdefault(tuple(getattr(row, axis) for axis in by), []).append(row)
+    require_alike([row for group in groups.values() for row in group])
+    if not groups:
+        raise InputError(f"where: no cell has {dict(where)}; allowed: values of the study's axes; see rodcone export")
+    for at, group in groups.items():
+        _check_alike(at, group)
+    return [_line(at, group, folder, show) for at, group in groups.items()]
+
+
+def markdown(table: Sequence[Line], by: Sequence[str], show: Sequence[str]) -> str:
+    """Table in Markdown; ``mean ± half width``, to three digits; no half width where the seeds don't differ."""
+    cells = [[*by, *show], ["---"] * len(by) + ["---:"] * len(show)]
+    for line in table:
+        figures = [_told(mean, half) for mean, half in zip(line.means, line.halves, strict=True)]
+        cells.append([*(text.replace("|", "\\|") for text in line.at), *figures])
+    return "\n".join(f"| {' | '.join(row)} |" for row in cells)
+
+
+def _check_alike(at: tuple[str, ...], group: Sequence[Row]) -> None:
+    for axis in AXES:
+        values = list(dict.fromkeys(getattr(row, axis) for row in group))
+        if len(values) > 1:
+            raise InputError(
+                f"by: a line of {'/'.join(at) or 'all'} would be a mean over {axis} {', '.join(values)}; allowed: over "
+                f"seeds alone; add {axis} to --by, or give --where {axis}={values[0]}"
+            )
+
+
+def _line(at: tuple[str, ...], group: Sequence[Row], folder: Path, show: Sequence[str]) -> Line:
+    means: list[float | None] = []
+    halves: list[float | None] = []
+    for name in show:
+        found = [_figure(row, name, folder) for row in group]
+        values = [value for value in found if value is not None]
+        whole = len(values) == len(found)  # a mean over the seeds that happen to have the figure would be biased
+        means.append(float(np.mean(values)) if whole else None)
+        interval = mean_with_confidence(values) if whole and len(values) > 1 else None
+        halves.append(None if interval is None else interval.high - interval.mean)
+    return Line(at, tuple(means), tuple(halves))
+
+
+def _figure(row: Row, name: str, folder: Path) -> float | None:
+    if name.startswith(ELECTRONS):
+        electrons: dict[str, float] = json.loads(row.mean_electrons)
+        return electrons.get(name.removeprefix(ELECTRONS))
+    if name in FIGURES:
+        value = getattr(row, name)
+        return None if value is None else float(value)
+    scene, measure = CHARTS.get(name, ("metamers", pair_delta_e))
+    if row.scene != scene or row.scene not in names():
+        raise InputError(f"show: {name} is known of scene {scene}, not of {row.scene}; leave it out, or give --where")
+    if name == TRUE_PAIRS:
+        return float(true_pair_delta_e(TWINS_UNDER if row.spectrum == OWN else row.spectrum).mean())
+    picture = _linear(read_whole(folder / PICTURES, row.picture))
+    return float(measure(picture, patch_masks(load(scene), (picture.shape[0], picture.shape[1]))).mean())
+
+
+def _linear(content: bytes) -> NDArray[np.float64]:
+    with Image.open(BytesIO(content)) as picture:
+        return decode_srgb(np.asarray(picture.convert("RGB"), dtype=np.float64) / 255)
+
+
+def _told(mean: float | None, half: float | None) -> str:
+    if mean is None:
+        return "-"
+    if abs(mean) < SAME:
+        return "0"
+    places = max(0, 2 - int(np.floor(np.log10(max(abs(mean), 1e-3)))))
+    return f"{mean:.{places}f}" if half is None or half < SAME * abs(mean) else f"{mean:.{places}f} ± {half:.{places}f}"

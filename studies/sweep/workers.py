@@ -1,0 +1,201 @@
+"""Cells on any executor, and on a pool of processes that outlives the death of any of them."""
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections import Counter
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager, suppress
+from functools import partial
+from itertools import islice
+from multiprocessing import active_children
+from multiprocessing.connection import wait as wait_for
+from multiprocessing.process import BaseProcess
+from typing import Any
+
+from rodcone.errors import InputError
+from studies.sweep.cells import Cell
+from studies.sweep.row import Row
+from studies.sweep.run_cell import run_cell
+
+LEAVE_S = 10.0  # that a worker without work may take to end; libraries let go of threads and memory
+MOST_DEATHS = 3  # of workers with the same cell in their hands, before it is given up: the last two times alone
+# What BLAS libraries and OpenMP read at their import: set before a worker starts.
+_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
+
+
+class WorkerLostError(RuntimeError):
+    """A worker died; `cells` were in the executor's hands."""
+
+    def __init__(self, cells: Sequence[Cell]) -> None:
+        super().__init__("a worker died")
+        self.cells = tuple(cells)
+
+
+class InThisProcess(Executor):
+    """Executor that runs each call as it is submitted."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Run the call; its exception, if any, is the future's."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def run(
+    cells: Iterable[Cell], executor: Executor, *, at_once: int = 1, threads: int | None = None
+) -> Generator[Row, None, None]:
+    """Run cells on an executor and give their rows as they come, in no order.
+
+    Ctrl-C takes no further cells, waits for those that run and gives their rows, then raises.
+
+    Parameters
+    ----------
+    cells : iterable of Cell
+    executor : concurrent.futures.Executor
+        Any whose calls may travel as pickles: a pool, `InThisProcess`, `dask.distributed.Client.get_executor()`.
+    at_once : int
+        Cells in the executor's hands; twice its workers keep these busy.
+    threads : int, optional
+        For Dr.Jit in each worker.
+
+    Raises
+    ------
+    InputError, OSError
+        As `studies.sweep.run_cell.run_cell`.
+    WorkerLostError
+        Where the executor broke; rows that were ready have been given.
+    """
+    call, waiting = partial(run_cell, most_threads=threads), iter(cells)
+    running: dict[Future[Row], Cell] = {}
+    try:
+        while True:
+            for cell in islice(waiting, at_once - len(running)):
+                running[_submitted(executor, call, cell, running)] = cell
+            if not running:
+                return
+            yield from _finished(running)
+    except KeyboardInterrupt:
+        for future in [future for future in running if future.cancel()]:
+            del running[future]
+        while running:
+            yield from _finished(running)
+        raise
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _submitted(executor: Executor, call: Any, cell: Cell, running: dict[Future[Row], Cell]) -> Future[Row]:
+    try:
+        return executor.submit(call, cell)
+    except BrokenExecutor as error:
+        raise WorkerLostError([*running.values(), cell]) from error
+
+
+def _finished(running: dict[Future[Row], Cell]) -> Iterator[Row]:
+    """Rows of the next cells that are done; a fault among these comes after them."""
+    ready, _ = wait(running, return_when=FIRST_COMPLETED)
+    for future in [future for future in ready if future.exception() is None]:
+        del running[future]
+        yield future.result()
+    for future in [future for future in ready if future in running]:
+        if isinstance(future.exception(), BrokenExecutor):
+            raise WorkerLostError(tuple(running.values())) from future.exception()
+        del running[future]
+        future.result()
+
+
+def run_in_processes(cells: Sequence[Cell], workers: int) -> Generator[Row, None, None]:
+    """Run cells on spawned processes; a pool in which one died is made anew.
+
+    The cells that it had in its hands are run again, after all others and one by one: where the memory was short they
+    now have all of it, and a cell that ends its worker by itself is told from its neighbours. Dr.Jit, BLAS and OpenMP
+    get cores / workers threads in each process.
+
+    Raises
+    ------
+    InputError
+        At the end, where a cell ended its worker `MOST_DEATHS` times; all others are done by then.
+    """
+    threads = max(1, cores() // workers)
+    waiting, deaths = {cell.key: cell for cell in cells}, Counter[str]()
+    given_up: list[Cell] = []
+    while waiting:
+        untried = [cell for cell in waiting.values() if not deaths[cell.key]]
+        batch, at_once = (untried, 2 * workers) if untried else (list(waiting.values()), 1)
+        with _pool(workers, threads) as pool:
+            try:
+                for row in run(batch, pool, at_once=at_once, threads=threads):
+                    del waiting[row.key]
+                    yield row
+            except WorkerLostError as lost:
+                deaths.update(cell.key for cell in lost.cells)
+                given_up += [waiting.pop(cell.key) for cell in lost.cells if deaths[cell.key] >= MOST_DEATHS]
+    if given_up:
+        raise InputError(
+            f"cells: {len(given_up)} ended their worker {MOST_DEATHS} times, the first at {given_up[0].at}; the others "
+            "are done; the memory may be short: give fewer --workers, or run again"
+        )
+
+
+@contextmanager
+def _pool(workers: int, threads: int) -> Iterator[ProcessPoolExecutor]:
+    """Pool of spawned processes, all of them started: forked ones would share locks of Dr.Jit's and BLAS's threads."""
+    pool, others = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin), active_children()
+    with _inherited(threads):
+        for _ in range(workers):  # each submission starts one, as none is idle yet
+            pool.submit(cores)
+    impatience = threading.Timer(LEAVE_S, _end, ([process for process in active_children() if process not in others],))
+    try:
+        yield pool
+    finally:
+        impatience.start()
+        pool.shutdown(cancel_futures=True)
+        impatience.cancel()
+
+
+def _end(processes: Sequence[BaseProcess]) -> None:
+    """End workers that can't leave: one killed while it held the queue's lock leaves it locked for the others."""
+    for process in processes:
+        with suppress(ProcessLookupError):  # gone just now
+            process.kill()
+
+
+@contextmanager
+def _inherited(threads: int) -> Iterator[None]:
+    """Environment and signal mask for processes started within: threads, and Ctrl-C for this process to handle."""
+    before = {name: os.environ.get(name) for name in _THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, str(threads)))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _begin() -> None:
+    """In a new worker: where the parent is killed it ends too."""
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
+
+
+def _leave_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait_for([parent.sentinel])
+        os._exit(1)

@@ -1,0 +1,67 @@
+"""Colours from a calibration's matrices: R, G, B as the file says, W as its curve would, to what three numbers tell."""
+
+import numpy as np
+import pytest
+
+from isp.colour.calibrated_colours import MEAN_SRGB, MOMENTS_SRGB, UNTOLD, fit_of_calibration
+from isp.colour.camera_colour import training
+from isp.colour.colour_fit import fit_colours
+from render.illuminants import illuminant
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from scenes.reflectances import color_checker
+from sensor.presets import preset
+from studies.photograph.calibrate import calibrate
+
+NM = DEFAULT_WAVELENGTH_NM
+WIDTH = band_widths(NM)
+SURFACES = np.array([reflectance.band_average(NM, WIDTH) for _, reflectance in color_checker()])
+LETTERS = ("R", "G", "B", "W")
+
+
+def test_the_training_moments_are_the_color_checkers() -> None:
+    responses = preset("low_noise", "rgbw").responses.band_average(LETTERS, NM, WIDTH)
+    _, srgb = training(responses, NM, illuminant("D65").band_average(NM, WIDTH), SURFACES)
+    assert srgb.mean(axis=0) == pytest.approx(MEAN_SRGB, abs=6e-5)
+    assert srgb.T @ srgb / 24 == pytest.approx(MOMENTS_SRGB, abs=6e-5)
+
+
+@pytest.mark.parametrize("light", ["D65", "A", "D50", "F11"])
+def test_without_noise_r_g_b_become_colour_as_the_file_says(light: str) -> None:
+    colour = calibrate(preset("low_noise", "rgbw"), illuminant(light))
+    assert np.asarray(fit_of_calibration(colour, LETTERS)) == pytest.approx(colour.to_srgb, abs=1e-9)
+
+
+@pytest.mark.parametrize("light", ["D65", "A"])
+def test_with_noise_it_is_nearly_the_fit_of_the_curves(light: str) -> None:
+    sensor = preset("low_noise", "rgbw")
+    colour = calibrate(sensor, illuminant(light))
+    responses = sensor.responses.band_average(LETTERS, NM, WIDTH)
+    spectrum = illuminant(light).band_average(NM, WIDTH)
+    known, signals = (
+        fit_colours(LETTERS, responses, NM, spectrum, SURFACES),
+        training(responses, NM, spectrum, SURFACES),
+    )
+    noise = np.array([1e-2, 4e-3, 1.2e-2, 3e-4])
+
+    def error(matrix: np.ndarray) -> float:
+        return float(((signals[0] @ matrix.T - signals[1]) ** 2).mean() * 3 + (matrix**2 @ noise).sum())
+
+    best, ours = error(known.matrix(LETTERS, noise)), error(fit_of_calibration(colour, LETTERS).matrix(LETTERS, noise))
+    assert best <= ours < 1.1 * best
+    # what a matrix that doesn't know the noise costs here
+    assert error(np.hstack([known.matrix(), np.zeros((3, 1))])) > 2 * ours
+
+
+def test_without_noise_w_stays_out_of_the_colours() -> None:
+    fit = fit_of_calibration(calibrate(preset("low_noise", "rgbw"), illuminant("D65")), LETTERS)
+    assert fit.matrix(LETTERS)[:, 3] == pytest.approx(0.0, abs=1e-9)  # R, G, B tell all that the matrices know
+    responses = preset("low_noise", "rgbw").responses.band_average(LETTERS, NM, WIDTH)
+    signals, srgb = training(responses, NM, illuminant("D65").band_average(NM, WIDTH), SURFACES)
+    row = np.linalg.solve(MOMENTS_SRGB, fit.cross[3])
+    assert np.sqrt(((signals[:, 3] - srgb @ row) ** 2).mean()) == pytest.approx(UNTOLD, rel=0.2)
+
+
+def test_three_channels_need_no_more_than_their_matrix() -> None:
+    colour = calibrate(preset("low_noise", "bayer"), illuminant("D65"))
+    fit = fit_of_calibration(colour, LETTERS[:3])
+    assert fit.matrix() == pytest.approx(colour.to_srgb, abs=1e-9)

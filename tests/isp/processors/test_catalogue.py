@@ -1,0 +1,163 @@
+"""Every processor alike: flat fields in every phase, highlights, balance, defects, and what is refused."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pytest
+
+from isp.colour.camera_colour import luminance_of_srgb
+from isp.processors.catalogue import PROCESSORS
+from rodcone.errors import InputError
+from rodcone.optional import optional_library
+from sensor.cfa import MOSAICS, RGBW, Tile, channels, letter_map
+from sensor.raw import RawImage
+from sensor.variations import VARIATIONS
+
+IDENTITY = np.eye(3)
+FULL_E = 15_000.0
+# A neutral's relative electrons; behind its density W collects what G does.
+NEUTRAL = {"R": 0.5, "G": 1.0, "B": 0.4, "W": 5.0, "C": 0.9, "M": 0.7, "Y": 1.0}
+QUICK = [name for name in PROCESSORS if name != "bayer_bm3d"]  # whose library takes seconds: its own file
+
+
+def neutral_of(name: str) -> Mapping[str, float]:
+    return NEUTRAL | {"W": 1.0} if PROCESSORS[name].mosaic == "rgbw_nd" else NEUTRAL
+
+
+def tile_of(name: str) -> Tile:
+    mosaic = PROCESSORS[name].mosaic
+    return VARIATIONS[mosaic][0] if mosaic in VARIATIONS else MOSAICS[mosaic]
+
+
+def phases(tile: Tile) -> Iterator[Tile]:
+    """Tile turned by each row and column."""
+    for row in range(len(tile)):
+        turned = tile[row:] + tile[:row]
+        for column in range(len(tile[0])):
+            yield tuple(line[column:] + line[:column] for line in turned)
+
+
+def grey(name: str, tile: Tile, level_e: np.ndarray) -> RawImage:
+    """Noise-free exposure of a neutral scene whose green collects `level_e` (h, w), one electron a DN, black 100."""
+    letters = letter_map(tile, level_e.shape)
+    share = np.vectorize(neutral_of(name).get)(letters)
+    dn = np.clip(np.rint(level_e * share) + 100, 0, FULL_E + 100).astype(np.uint16)
+    return RawImage(dn, tile, 100.0, FULL_E + 100, 1.0, 1.0, 1.0, 0.0, 0.01)
+
+
+def require_library(name: str) -> None:
+    extra = PROCESSORS[name].extra
+    if extra is not None:
+        library = "bm3d" if extra == "bm3d" else "colour_demosaicing"
+        pytest.importorskip("colour_demosaicing", reason=f"rodcone[{extra}] is not installed")
+        pytest.importorskip(library, reason=f"rodcone[{extra}] is not installed")
+
+
+@pytest.mark.parametrize("shape", [(30, 33), (17, 16)])
+@pytest.mark.parametrize("name", QUICK)
+def test_a_flat_grey_field_stays_flat_and_grey_to_the_border_in_every_phase(name: str, shape: tuple[int, int]) -> None:
+    require_library(name)
+    for tile in phases(tile_of(name)):
+        picture = PROCESSORS[name].develop(grey(name, tile, np.full(shape, 1000.0)), IDENTITY)
+        assert picture.rgb == pytest.approx(np.full((*shape, 3), 1000.0), rel=1e-5)
+        assert picture.balance == dict.fromkeys(channels(tile), "gray world")
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_grey_ramp_into_saturation_takes_no_colour(name: str) -> None:
+    # Colours clip one after the other: G at its full well, R and B (balanced) at twice and 2.5 times it. What doesn't
+    # hold highlights shows G 15 000 e- beside R and B of up to 37 500. Interpolating across the kink where the ramp
+    # ends, or at the frame's border, may miss by one step of the ramp: 500 e-.
+    require_library(name)
+    ramp = 5000.0 + 500.0 * np.indices((24, 80))[1]
+    tile = tile_of(name)
+    balance = [neutral_of(name)[letter] for letter in channels(tile)]
+    rgb = PROCESSORS[name].develop(grey(name, tile, ramp), IDENTITY, balance=balance).rgb
+    assert np.abs(rgb - rgb[..., 1:2]).max() <= 500.0 * (1 + 1e-6)
+    bright = rgb[:, -20:]
+    assert bright == pytest.approx(np.full(bright.shape, bright[0, 0, 0]), rel=1e-5)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_bright_ends_at_greens_full_well_or_where_w_alone_is_the_luminance_at_w_s(name: str) -> None:
+    require_library(name)
+    tile = tile_of(name)
+    balance = [neutral_of(name)[letter] for letter in channels(tile)]
+    rgb = PROCESSORS[name].develop(grey(name, tile, np.full((24, 24), 1e5)), IDENTITY, balance=balance).rgb
+    ends_with_w = name in ("rgbw_sato", "cmyw_yamagami")
+    assert rgb == pytest.approx(np.full((24, 24, 3), FULL_E / 5 if ends_with_w else FULL_E), rel=1e-5)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_nothing_beside_a_highlight_is_brighter_than_it(name: str) -> None:
+    # filters with negative weights overshoot at the edge of a square of saturated grey
+    require_library(name)
+    rows, columns = np.indices((32, 34))
+    square = np.where((abs(rows - 16) < 7) & (abs(columns - 16) < 7), 1e5, 2000.0)
+    tile = tile_of(name)
+    balance = [neutral_of(name)[letter] for letter in channels(tile)]
+    rgb = PROCESSORS[name].develop(grey(name, tile, square), IDENTITY, balance=balance).rgb
+    if name in ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami"):  # differences of colours from a luminance of their own
+        assert luminance_of_srgb(rgb).max() <= FULL_E * (1 + 1e-6)
+    else:
+        assert rgb.max() <= FULL_E * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_given_balance_takes_the_place_of_gray_world(name: str) -> None:
+    require_library(name)
+    tile, unit = tile_of(name), PROCESSORS[name].unit
+    letters = channels(tile)
+    other = [neutral_of(name)[letter] * (2.0 if letter == "W" else 1.0) for letter in letters]
+    level = PROCESSORS[name].develop(grey(name, tile, np.full((20, 20), 800.0)), IDENTITY, balance=other)
+    assert level.balance == dict.fromkeys(letters, "given")
+    assert unit in letters
+    # W given as twice as sensitive as it is: half the luminance where W is that, none of a change where it isn't
+    expected = 400.0 if name in ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami") else 800.0
+    assert level.rgb == pytest.approx(np.full((20, 20, 3), expected), rel=1e-5)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_listed_defects_are_mended_before_any_processor_sees_them(name: str) -> None:
+    require_library(name)
+    raw = grey(name, tile_of(name), np.full((20, 20), 800.0))
+    places = np.array([(0, 0), (7, 8), (7, 9), (19, 19)])
+    raw.dn[tuple(places.T)] = 15_100
+    listed = RawImage(raw.dn, raw.cfa, 100.0, FULL_E + 100, 1.0, 1.0, 1.0, 0.0, 0.01, defects=places)
+    rgb = PROCESSORS[name].develop(listed, IDENTITY).rgb
+    assert rgb == pytest.approx(np.full((20, 20, 3), 800.0), rel=1e-5)
+    assert np.abs(PROCESSORS[name].develop(raw, IDENTITY).rgb - 800.0).max() > 200.0
+
+
+@pytest.mark.parametrize("name", PROCESSORS)
+def test_another_mosaic_is_refused_in_one_line(name: str) -> None:
+    other = ("RC", "CC") if name.startswith("bayer") else ("RG", "GB")
+    raw = RawImage(np.full((16, 16), 500, np.uint16), other, 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
+    with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: ") as error:
+        PROCESSORS[name].develop(raw, IDENTITY)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["rgbw_sato", "rgbw_gindele", "cmyw_yamagami", "bayer_malvar"])
+def test_a_wrong_matrix_neutral_or_balance_is_refused(name: str) -> None:
+    require_library(name)
+    raw = grey(name, tile_of(name), np.full((16, 16), 500.0))
+    with pytest.raises(InputError, match=r"^matrix: shape \(2, 3\)"):
+        PROCESSORS[name].develop(raw, np.ones((2, 3)))
+    with pytest.raises(InputError, match=r"^neutral: \[1.0, 2.0\]"):
+        PROCESSORS[name].develop(raw, IDENTITY, neutral=[1, 2])
+    with pytest.raises(InputError, match=r"^balance: \[1.0, 2.0\]"):
+        PROCESSORS[name].develop(raw, IDENTITY, balance=[1, 2])
+
+
+def test_a_missing_library_names_its_extra() -> None:
+    with pytest.raises(InputError, match=r"^nowhere_to_be_found: not installed .*pip install 'rodcone\[opponents\]'"):
+        optional_library("nowhere_to_be_found", "opponents")
+
+
+def test_every_processor_says_what_it_is() -> None:
+    assert list(PROCESSORS)[:2] == ["interleaved", "bayer"]
+    assert tile_of("interleaved") == RGBW
+    for name, processor in PROCESSORS.items():
+        assert processor.source
+        assert {*processor.colours, processor.unit} <= set(channels(tile_of(name)))

@@ -1,0 +1,80 @@
+"""Malvar and Menon: the library's own result inside, no border effect, and what carries detail between colours."""
+
+import numpy as np
+import pytest
+
+from isp.processors.demosaic import malvar, menon
+from isp.processors.mosaic import balance_mosaic
+from rodcone.errors import InputError
+from rodcone.optional import optional_library
+from sensor.raw import RawImage
+
+pytest.importorskip("colour_demosaicing", reason="rodcone[opponents] is not installed")
+
+PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
+NAMES = {malvar: "demosaicing_CFA_Bayer_Malvar2004", menon: "demosaicing_CFA_Bayer_Menon2007"}
+
+
+@pytest.mark.parametrize("cfa", PHASES)
+@pytest.mark.parametrize("demosaic", NAMES)
+def test_the_interior_is_the_librarys(demosaic, cfa: tuple[str, str]) -> None:
+    mosaic = np.random.default_rng(3).uniform(0, 1000, (41, 44))
+    theirs = getattr(optional_library("colour_demosaicing", ""), NAMES[demosaic])(mosaic, "".join(cfa))
+    ours = demosaic(mosaic, cfa)
+    np.testing.assert_allclose(ours[12:-12, 12:-12], theirs[12:-12, 12:-12], rtol=0, atol=1e-9)
+    assert np.abs(ours - theirs).max() > 1.0  # the border is not
+
+
+@pytest.mark.parametrize("demosaic", NAMES)
+def test_more_reflection_changes_nothing(demosaic) -> None:
+    # so the padding reaches as far as the filters do, in every phase of the frame's corners
+    mosaic = np.random.default_rng(4).uniform(0, 1000, (37, 34))
+    more = demosaic(np.pad(mosaic, 24, mode="reflect"), ("GB", "RG"))[24:-24, 24:-24]
+    np.testing.assert_allclose(demosaic(mosaic, ("GB", "RG")), more, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("cfa", PHASES)
+def test_malvars_filters_on_an_impulse(cfa: tuple[str, str]) -> None:
+    # Malvar, He & Cutler 2004, Figure 2: green at the impulse's own red site is 4/8 of it, at the next red or blue
+    # site of its row -1/8; green at the green sites beside it is their own sample.
+    rows, columns = np.array([list(row) for row in cfa]), np.indices((16, 16))
+    letters = np.tile(rows, (8, 8))
+    y, x = next(
+        (y, x) for y, x in zip(*map(np.ravel, columns), strict=True) if letters[y, x] == "R" and y > 5 and x > 5
+    )
+    mosaic = np.zeros((16, 16))
+    mosaic[y, x] = 8.0
+    green, blue = (malvar(mosaic, cfa)[..., index] for index in (1, 2))
+    assert green[y, x - 2 : x + 3] == pytest.approx([-1.0, 0.0, 4.0, 0.0, -1.0])
+    assert blue[y - 2 : y + 3, x] == pytest.approx([-1.5, 0.0, 6.0, 0.0, -1.5])  # blue at red sites, down and up
+
+
+@pytest.mark.parametrize("demosaic", NAMES)
+@pytest.mark.parametrize("cfa", PHASES)
+def test_a_grey_ramp_is_reproduced(demosaic, cfa: tuple[str, str]) -> None:
+    rows, columns = np.indices((40, 42))
+    ramp = 10.0 * rows + 4.0 * columns
+    planes = demosaic(ramp, cfa)[14:-14, 14:-14]
+    assert planes == pytest.approx(np.repeat(ramp[14:-14, 14:-14, None], 3, axis=2), abs=1e-9)
+
+
+def test_a_mosaic_is_balanced_to_greens_unit_and_held_beside_a_full_colour() -> None:
+    dn = np.tile(np.array([[600, 1100], [1100, 500]], np.uint16), (4, 4))
+    dn[4, 5] = 15_100  # a green; beside it a red that reads 1.5 full wells when balanced
+    dn[4, 4] = 100 + 11_250
+    raw = RawImage(dn, ("RG", "GB"), 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
+    mosaic = balance_mosaic(raw, raw.electrons, balance=[0.5, 1.0, 0.4])
+    expected = np.full((8, 8), 1000.0)
+    expected[4, 4:6] = 15_000.0
+    assert mosaic.values == pytest.approx(expected)
+    far = raw.dn.copy()
+    far[4, 4], far[0, 0] = 600, 11_350  # as bright a red, with no full sample beside it, is a red lamp and stays one
+    lamp = RawImage(far, ("RG", "GB"), 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
+    assert balance_mosaic(lamp, lamp.electrons, balance=[0.5, 1.0, 0.4]).values[0, 0] == pytest.approx(22_500.0)
+
+
+def test_other_tiles_are_refused() -> None:
+    with pytest.raises(
+        InputError, match=r"^raw: mosaic \('RG', 'BW'\) is not Bayer; allowed here: .*; use another isp"
+    ):
+        malvar(np.zeros((8, 8)), ("RG", "BW"))

@@ -1,0 +1,141 @@
+"""RGBW prior art: what W's luminance is, how colours are combined, and the density and complementary colours."""
+
+import numpy as np
+import pytest
+
+from isp.colour.camera_colour import luminance_of_srgb, neutral_response
+from isp.planes import fill
+from isp.processors.complementary import picture_complementary
+from isp.processors.fusion import (
+    MATCHED_RADIUS,
+    combine,
+    picture_kijima,
+    picture_sato,
+    picture_yamagami,
+    with_luminance,
+)
+from sensor.cfa import RGBW, Tile, channels, letter_map
+from sensor.curves import rgbw
+from sensor.filters import complementary, matched_transmittance
+from sensor.raw import RawImage
+
+MATRIX = np.array([[1.6, -0.5, -0.1], [-0.2, 1.4, -0.2], [0.0, -0.5, 1.5]])
+BALANCE = [0.5, 1.0, 0.4, 5.0]
+
+
+def exposure(planes_e: dict[str, np.ndarray], cfa: Tile = RGBW, dark_e: float = 1.0) -> RawImage:
+    """Noise-free raw image in which each letter's sites read that letter's plane."""
+    shape = next(iter(planes_e.values())).shape
+    electrons = np.select([letter_map(cfa, shape) == letter for letter in planes_e], list(planes_e.values()))
+    dn = np.clip(np.rint(4 * electrons) + 100, 0, 60_100).astype(np.uint16)
+    return RawImage(dn, cfa, 100.0, 60_100.0, 0.25, dark_e, 0.0, 0.0, 0.01)
+
+
+def grey(level_e: np.ndarray, cfa: Tile = RGBW, white: float = 5.0) -> RawImage:
+    return exposure({"R": 0.5 * level_e, "G": level_e, "B": 0.4 * level_e, "W": white * level_e}, cfa)
+
+
+def test_another_luminance_keeps_the_colour_differences() -> None:
+    rgb = np.random.default_rng(0).uniform(0, 100, (5, 6, 3))
+    luminance = np.random.default_rng(1).uniform(0, 100, (5, 6))
+    changed = with_luminance(rgb, luminance)
+    assert luminance_of_srgb(changed) == pytest.approx(luminance)
+    assert changed[..., 0] - changed[..., 2] == pytest.approx(rgb[..., 0] - rgb[..., 2])
+
+
+@pytest.mark.parametrize(("develop", "white"), [(picture_sato, 5.0), (picture_yamagami, 1.0)])
+def test_the_luminance_is_ws_in_full_bandwidth(develop, white: float) -> None:
+    level = np.random.default_rng(2).uniform(100, 900, (20, 22))
+    raw = grey(level, white=white)
+    balance = [*BALANCE[:3], white]
+    picture = develop(raw, MATRIX, balance=balance)
+    plane = fill(raw.electrons, raw.cfa, "W") / white
+    assert luminance_of_srgb(picture.rgb) == pytest.approx(plane, rel=1e-12)
+
+
+def test_yamagamis_colour_differences_have_less_noise_than_satos() -> None:
+    # Bilinear leaves a colour's own samples as they are: standard deviation 1 there. The tent averages 7.1 samples.
+    rng = np.random.default_rng(3)
+    noisy = exposure({letter: 500 + 20 * rng.standard_normal((96, 96)) for letter in "RGBW"})
+    sato, yamagami = (
+        develop(noisy, np.eye(3), balance=[1, 1, 1, 1]).rgb for develop in (picture_sato, picture_yamagami)
+    )
+    blue_sites = letter_map(noisy.cfa, noisy.shape) == "B"
+    spread = [np.std((rgb[..., 2] - rgb[..., 0])[blue_sites]) for rgb in (sato, yamagami)]
+    # at a B site Sato's B is a sample (1) and R the mean of two (1/2): sqrt(1.5) * 20; Yamagami's: sqrt(2 / 7.1) * 20
+    assert spread[0] == pytest.approx(20 * np.sqrt(1.5), rel=0.1)
+    assert spread[1] == pytest.approx(20 * np.sqrt(2 / (64 / 24) ** 2), rel=0.15)
+
+
+def test_combining_weighs_samples_by_a_tent() -> None:
+    mosaic = np.zeros((24, 24))
+    mosaic[12, 12] = 1.0  # a red site
+    spread = combine(mosaic, RGBW, "R")
+    # samples at distances 0 and 2 of a red site: (4 and twice 2) along each axis, 64 in all; next to it twice (3, 1)
+    assert spread[12, 12] == pytest.approx(16 / 64)
+    assert spread[12, 14] == pytest.approx(8 / 64)
+    assert spread[12, 13] == pytest.approx(12 / 64)
+    assert spread[12, 12 + MATCHED_RADIUS + 1] == 0.0
+
+
+def test_kijima_gives_a_grey_scene_all_of_ws_detail() -> None:
+    # W's detail at W's sites, and no colour where the differences of the colours from W are nothing
+    level = np.random.default_rng(4).uniform(200, 800, (24, 24))
+    flat = np.full((24, 24), 500.0)
+    white = exposure({"R": 0.5 * flat, "G": flat, "B": 0.4 * flat, "W": 5 * level})
+    rgb = picture_kijima(white, np.eye(3), balance=BALANCE).rgb
+    plane = fill(white.electrons / 5, RGBW, "W")
+    for index, letter in enumerate("RGB"):
+        expected = plane + combine(np.where(letter_map(RGBW, (24, 24)) == letter, 500.0 - plane, 0.0), RGBW, letter)
+        assert rgb[..., index] == pytest.approx(expected, rel=1e-9)
+
+
+def test_early_fusion_gives_away_what_is_over_ws_full_well() -> None:
+    # Green at 0.4 of its well, W at twice its own: luminance stays at W's full well for Sato, colours stay for Kijima
+    raw = grey(np.full((16, 16), 6000.0))
+    assert picture_sato(raw, MATRIX, balance=BALANCE).rgb == pytest.approx(np.full((16, 16, 3), 3000.0), rel=1e-4)
+    assert picture_kijima(raw, MATRIX, balance=BALANCE).rgb == pytest.approx(np.full((16, 16, 3), 6000.0), rel=1e-4)
+
+
+def test_a_density_of_its_own_is_what_the_default_neutral_of_yamagami_holds() -> None:
+    # too dark for Gray World: the calibrated response decides, and knows that W is behind its density
+    shares = neutral_response(("R", "G", "B", "W")) / neutral_response(("G",))
+    shares[3] *= matched_transmittance(rgbw())
+    assert shares[3] == pytest.approx(1.0, rel=1e-12)
+    level = {letter: np.full((16, 16), 80.0 * share) for letter, share in zip("RGBW", shares, strict=True)}
+    picture = picture_yamagami(exposure(level, dark_e=1000.0), MATRIX)
+    assert picture.balance == dict.fromkeys("RGBW", "calibrated")
+    # half a DN is 0.125 e-, in B 0.4 when balanced, and 1.5 times that in the matrix
+    assert picture.rgb == pytest.approx(np.full((16, 16, 3), 80.0), abs=0.8)
+
+
+def test_complementary_colours_come_in_the_matrix_order_c_y_m() -> None:
+    # Yellow is the unit, W (balanced to 1000) the luminance; with the identity each output shows its own column.
+    level = {"C": np.full((16, 16), 900.0), "M": np.full((16, 16), 350.0), "Y": np.full((16, 16), 1000.0)}
+    raw = exposure({**level, "W": np.full((16, 16), 5000.0)}, ("CM", "YW"))
+    letters = channels(raw.cfa)
+    assert letters == ("W", "C", "M", "Y")
+    picture = picture_complementary(raw, np.eye(3), balance=[5.0, 0.9, 0.7, 1.0])
+    balanced = np.array([1000.0, 1000.0, 500.0])  # C, Y, M
+    expected = balanced + (1000.0 - luminance_of_srgb(balanced))
+    assert picture.rgb == pytest.approx(np.broadcast_to(expected, (16, 16, 3)), rel=1e-9)
+    assert set(picture.balance) == set("CMYW")
+
+
+def test_complementary_colours_in_the_dark_take_their_own_neutral() -> None:
+    response = neutral_response(("W", "C", "M", "Y"), complementary(rgbw()))
+    level = {letter: np.full((16, 16), 80.0 * one / response[3]) for letter, one in zip("WCMY", response, strict=True)}
+    picture = picture_complementary(exposure(level, ("CM", "YW"), dark_e=1000.0), np.eye(3))
+    assert picture.balance == dict.fromkeys("CMYW", "calibrated")
+    assert picture.rgb == pytest.approx(np.full((16, 16, 3), 80.0), abs=0.3)
+
+
+def test_where_w_is_full_the_colours_keep_their_ratios_at_its_luminance() -> None:
+    # W reads 15 000 e- at most: 3000 balanced. An orange of that and more luminance keeps its chromaticity.
+    level = {"R": 5000.0, "G": 6000.0, "B": 800.0, "W": 40_000.0}
+    raw = exposure({letter: np.full((16, 16), one) for letter, one in level.items()})
+    orange = np.array([10_000.0, 6000.0, 2000.0])
+    for develop in (picture_sato, picture_yamagami):
+        rgb = develop(raw, np.eye(3), balance=BALANCE).rgb
+        expected = orange * 3000.0 / luminance_of_srgb(orange)
+        assert rgb == pytest.approx(np.broadcast_to(expected, (16, 16, 3)), rel=1e-4)

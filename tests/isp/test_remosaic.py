@@ -1,0 +1,90 @@
+"""RGBW turned into Bayer: which sites keep their sample, and what stands at the others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from isp.remosaic import bayer_tile, remosaic
+from rodcone.errors import InputError
+from sensor.calibration import ColourCalibration
+from sensor.cfa import Tile, channels, letter_map, mask
+from sensor.raw import RawImage
+from sensor.raw_files.dng import is_bayer
+
+PHASES = [("RG", "BW"), ("GR", "WB"), ("BW", "RG"), ("WB", "GR"), ("RW", "GB"), ("RB", "GW"), ("WG", "BR")]
+LEVELS_E = {"R": 500.0, "G": 1000.0, "B": 400.0, "W": 5000.0}
+
+
+def raw(cfa: Tile, scene: dict[str, np.ndarray]) -> RawImage:
+    """Noise-free mosaic of a scene's channels at one electron a DN, black 100."""
+    shape = scene["R"].shape
+    electrons = np.zeros(shape)
+    for letter in channels(cfa):
+        electrons[mask(cfa, letter, shape)] = scene[letter][mask(cfa, letter, shape)]
+    dn = np.rint(electrons + 100).astype(np.uint16)
+    return RawImage(dn, cfa, 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
+
+
+def flat(shape: tuple[int, int] = (33, 40)) -> dict[str, np.ndarray]:
+    return {letter: np.full(shape, level) for letter, level in LEVELS_E.items()}
+
+
+@pytest.mark.parametrize("cfa", PHASES)
+def test_the_tile_is_bayer_with_red_where_it_was(cfa: Tile) -> None:
+    tile = bayer_tile(cfa)
+    assert is_bayer(tile)
+    assert "".join(tile).index("R") == "".join(cfa).index("R")
+
+
+@pytest.mark.parametrize("cfa", PHASES)
+def test_a_flat_field_stays_flat_to_the_border(cfa: Tile) -> None:
+    made = remosaic(raw(cfa, flat()))
+    for letter in "RGB":
+        assert set(made.dn[mask(made.cfa, letter, made.shape)].tolist()) == {LEVELS_E[letter] + 100}
+
+
+@pytest.mark.parametrize("cfa", PHASES)
+def test_sites_on_which_both_mosaics_agree_keep_their_sample(cfa: Tile) -> None:
+    clean = raw(cfa, flat())
+    noise = np.rint(20 * np.random.default_rng(3).standard_normal(clean.shape))  # the reconstruction averages over it
+    noisy = replace(clean, dn=(clean.dn + noise).astype(np.uint16), read_noise_e=20.0)
+    made = remosaic(noisy)
+    agree = letter_map(made.cfa, made.shape) == letter_map(cfa, noisy.shape)
+    assert agree.any()
+    np.testing.assert_array_equal(made.dn[agree], noisy.dn[agree])
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("cfa", PHASES)
+def test_a_ramp_is_sampled_where_the_new_pixel_lies(cfa: Tile, axis: int) -> None:
+    place = np.indices((48, 48))[axis]
+    scene = {letter: level * (1 + 0.01 * (place - 24)) for letter, level in LEVELS_E.items()}
+    made = remosaic(raw(cfa, scene))
+    inner = np.zeros(made.shape, dtype=bool)
+    inner[12:-12, 12:-12] = True  # Omega whole: samples lie evenly around each pixel
+    for letter in "RGB":
+        here = inner & mask(made.cfa, letter, made.shape)
+        # one pixel beside its place would be 1 %; noise-like weights of a ramp move the mean by a fifth of that
+        assert made.dn[here] - 100.0 == pytest.approx(scene[letter][here], rel=2.5e-3, abs=0.51), letter
+
+
+def test_saturated_frames_stay_within_the_converter() -> None:
+    made = remosaic(raw(("RG", "BW"), {letter: np.full((16, 16), 15_000.0) for letter in "RGBW"}))
+    assert set(made.dn.ravel().tolist()) == {15_100}
+    assert made.saturated.all()
+
+
+def test_calibration_goes_along_without_white() -> None:
+    eye = np.eye(4, 3)
+    colour = ColourCalibration(np.array([0.5, 1.0, 0.4, 4.9]), np.eye(3), eye, eye, eye.T, eye.T)
+    made = remosaic(replace(raw(("RG", "BW"), flat()), colour=colour, iso=50.0))
+    assert made.colour is not None
+    np.testing.assert_array_equal(made.colour.neutral, [0.5, 1.0, 0.4])
+    assert (made.colour.camera_to_xyz_a.shape, made.iso, made.black_dn) == ((3, 3), 50.0, 100.0)
+
+
+@pytest.mark.parametrize("cfa", [("RG", "GB"), ("WGWR", "GWRW", "WBWG", "BWGW")])
+def test_other_mosaics_are_refused(cfa: Tile) -> None:
+    with pytest.raises(InputError, match=r"cfa: .* can't become Bayer; allowed: 2x2 with R, G, B and W"):
+        remosaic(raw(cfa, flat()))

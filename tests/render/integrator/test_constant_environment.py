@@ -1,0 +1,152 @@
+"""An even sky along the paths of another light: the same light as by itself, and an error that knows of both."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from render.engine import render
+from render.error_estimates import relative_error
+from render.geometry import look_at, to_world, translate
+from render.limits import PASSES
+from render.scene import LightGroup, Scene
+from render.spectrum import flat
+from rodcone.jit import backend
+from scenes.materials import ball, checks, floor, glass, matte, panel
+from scenes.reflectances import edge, grey
+from studies.budget.bands import merge_transport
+
+pytestmark = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: each light is rendered by itself")
+
+BANDS_NM, WIDTH_NM, SIZE, BLOCK = np.array([430.0, 500.0, 570.0, 640.0]), 30.0, (32, 40), 8
+FALSE_ALARM = 1e-5
+ARRAYS = ("radiance", "variance", "half_difference", "irradiance")
+
+
+def courtyard():
+    """A corner of two coloured walls and a chequered floor with a glass ball, under a lamp and an even sky."""
+    camera = {"type": "perspective", "fov": 40.0, "to_world": to_world(look_at((0.9, 0.9, 2.0), (0.2, 0.25, 0)))}
+    lamp = panel(look_at((1.2, 1.6, 0.9), (0.3, 0.0, 0.2)), 0.04, 0.04, matte(grey(0.02)), emitter={"type": "area"})
+    geometry = {
+        "type": "scene",
+        "sensor": camera,
+        "floor": panel(floor(0.5, 0, 0.5), 2.0, 2.0, checks(grey(0.8), edge(600, 12, 0.1, 0.7), 5, 5)),
+        "wall": panel(translate(0.5, 0.3, -0.4), 2.0, 0.6, matte(edge(560, 40, 0.3, 0.8))),
+        "side": panel(look_at((-0.3, 0.3, 0.5), (1, 0.3, 0.5)), 2.0, 0.6, matte(edge(480, 30, 0.7, 0.2))),
+        "glass": ball(0.35, 0.12, 0.4, 0.12, glass()),
+        "card": panel(floor(0.5, 0.001, 0.1), 0.1, 0.1, matte(grey(0.5))),
+        "lamp": lamp,
+        "sky": {"type": "constant"},
+    }
+    groups = {"sky": LightGroup(("sky",), flat(), 1.0), "lamp": LightGroup(("lamp/emitter",), flat(), 2000.0)}
+    return Scene("courtyard", geometry, groups, reference_plane="card")
+
+
+def sky_by_itself(scene):
+    geometry = {key: value for key, value in scene.geometry.items() if key != "lamp"}
+    black = panel(look_at((1.2, 1.6, 0.9), (0.3, 0.0, 0.2)), 0.04, 0.04, matte(grey(0.02)))
+    return replace(scene, geometry=geometry | {"lamp": black}, groups={"sky": scene.groups["sky"]})
+
+
+def made(scene, **options):
+    return render(scene, SIZE, **({"wavelength_nm": BANDS_NM, "width_nm": WIDTH_NM, "spp": 128, "seed": 3} | options))
+
+
+@pytest.fixture(scope="module")
+def both():
+    return made(courtyard())
+
+
+@pytest.fixture(scope="module")
+def several():
+    scene = replace(courtyard(), reference_plane=None)
+    return [made(scene, spp=16, seed=seed) for seed in range(20, 44)]
+
+
+def blocks(planes):
+    """Means over blocks of pixels of (..., h, w)."""
+    h, w = planes.shape[-2] // BLOCK, planes.shape[-1] // BLOCK
+    return planes.reshape(*planes.shape[:-2], h, BLOCK, w, BLOCK).mean(axis=(-3, -1), dtype=np.float64)
+
+
+def test_the_sky_along_another_lights_paths_is_the_sky_by_itself(both):
+    alone = made(sky_by_itself(courtyard()), spp=256, seed=8)
+    variance = blocks(both.variance[0]) + blocks(alone.variance[0])
+    z = (blocks(both.radiance[0]) - blocks(alone.radiance[0])) / np.sqrt(variance / BLOCK**2)
+    # Block means of 64 pixels with 7 degrees of freedom each are close to normal.
+    assert np.abs(z).max() < norm.isf(FALSE_ALARM / 2 / z.size)
+    assert 0.5 < np.mean(z**2) < 1.7  # 20 blocks whose bands go together: standard error 0.32 at most
+    # Two meters of 64x64 pixels and at least 128 samples; a sample scatters by less than the mean.
+    assert both.irradiance[0] == pytest.approx(alone.irradiance[0], rel=5 * np.sqrt(2 / 64**2 / 128))
+
+
+def test_only_the_sky_shares_paths_and_it_is_told_with_which(both):
+    assert both.shared.groups == (1, 0)
+    assert both.shared.correlation.shape == both.variance.shape[1:]
+    assert -1 <= both.shared.correlation.min() < -0.5
+    assert 0.5 < both.shared.correlation.max() <= 1
+    assert made(sky_by_itself(courtyard()), spp=8).shared is None
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_stated_variance_of_both_lights_is_the_scatter_of_renders(several, sign):
+    """Where errors rise together, and where one falls as the other rises; half of the renders tell where that is."""
+    chosen, judged = several[::2], several[1::2]
+    where = sign * np.mean([one.shared.correlation for one in chosen], axis=0) > 0.35
+    emitted = np.ones((2, 4))
+    sky, lamp = np.mean([one.variance for one in chosen], axis=0)[:, where]
+    emitted[0] = np.median(np.sqrt(lamp / sky))
+    lit = [np.einsum("gb,gbhw->bhw", emitted, one.radiance, dtype=np.float64)[where] for one in judged]
+    apart = np.mean([np.einsum("gb,gbhw->bhw", emitted**2, one.variance)[where] for one in judged], axis=0)
+    joint = np.mean([one.shared.term(emitted, one.variance)[where] for one in judged], axis=0)
+    ratio = np.var(lit, axis=0, ddof=1) / (apart + joint)
+    assert np.count_nonzero(where.any(axis=0)) > 60
+    # A ratio has 11 over 84 degrees of freedom: 60 pixels' mean scatters by 6 %, and lies 84 / 82 high.
+    assert ratio.mean() == pytest.approx(1.0, rel=0.3)
+    assert sign * np.median(joint / apart) > 0.3  # without it the ratio would be off by that much
+
+
+def test_the_error_told_knows_of_the_correlation(both):
+    lights = np.array([g.spectrum.band_average(BANDS_NM, np.full(4, WIDTH_NM)) * g.power for g in both.groups.values()])
+    expected = relative_error(lights, both.radiance, both.variance, shared=both.shared)
+    assert both.relative_mc_error == both.relight().relative_mc_error == expected
+    assert abs(expected / relative_error(lights, both.radiance, both.variance) - 1) > 0.01
+    told = []
+    small = made(courtyard(), spp=16, progress=lambda share, error: told.append(error))
+    assert told[-1] == pytest.approx(small.relative_mc_error, rel=1e-4)
+
+
+def test_a_render_gone_on_from_and_a_cached_one_keep_the_correlation(tmp_path):
+    small = {"spp": None, "noise": 1e-6}
+    whole = made(courtyard(), max_spp=32, **small)
+    part = made(courtyard(), max_spp=32, max_seconds=1e-3, cache=tmp_path, **small)
+    assert (part.passes, whole.passes) == (2, PASSES)
+    on = made(courtyard(), max_spp=32, cache=tmp_path, **small)
+    again = made(courtyard(), max_spp=32, cache=tmp_path, **small)
+    assert np.array_equal(on.radiance, whole.radiance)
+    noisy = (whole.variance > 1e-6 * whole.radiance**2).all(axis=0)
+    assert np.count_nonzero(noisy) > 1000
+    assert on.shared.correlation[noisy] == pytest.approx(whole.shared.correlation[noisy], abs=1e-3)
+    assert all(np.array_equal(getattr(on, name), getattr(again, name)) for name in ARRAYS)
+    assert again.shared.groups == on.shared.groups
+    assert np.array_equal(again.shared.correlation, on.shared.correlation)
+    assert again.relative_mc_error == on.relative_mc_error
+
+
+def test_wider_bands_keep_the_correlation(both):
+    merged = merge_transport(both, [np.array([0, 1]), np.array([2, 3])])
+    assert merged.shared.correlation == pytest.approx(
+        both.shared.correlation.reshape(2, 2, *SIZE).mean(axis=1), abs=1e-6
+    )
+    assert 0 < merged.relight().relative_mc_error < 1.2 * both.relative_mc_error
+
+
+def test_a_sky_of_its_own_colour_or_with_another_light_is_rendered_by_itself():
+    scene = courtyard()
+    assert scene.is_even_sky("sky")
+    assert not scene.is_even_sky("lamp")
+    own = replace(scene.groups["sky"], own_colour=True)
+    assert not replace(scene, groups=scene.groups | {"sky": own}).is_even_sky("sky")
+    together = LightGroup(("sky", "lamp/emitter"), flat())
+    assert not replace(scene, groups={"all": together}).is_even_sky("all")

@@ -1,0 +1,176 @@
+"""Every kind of reflectance that Mitsuba has, in small XML scenes, against Mitsuba's own `path` and `specfilm`.
+
+Two walls of one paint under two lamps, four segments deep. Welch's t-test of the picture's mean in each band, over
+renders of different seeds on both sides. All comparisons of this file together fail by chance with probability
+`FALSE_ALARM` at most (Bonferroni); seeds are fixed. A bias of `CAUGHT` would be noticed nine times out of ten.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from render.engine import render
+from render.loader import Film, load_units, mitsuba_module
+from render.user_scene.scene_file import load_scene_file
+from render.user_scene.scene_paths import search_path
+from rodcone.jit import backend
+
+pytestmark = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba is all there is")
+
+FALSE_ALARM, CAUGHT = 1e-4, 0.04
+BANDS_NM, WIDTH_NM, DEPTH = np.array([420.0, 500.0, 600.0, 720.0]), 60.0, 4
+DRAWS, SPP = 8, 256
+
+PICTURE = '<string name="filename" value="p.png"/>'
+BITMAP = f'<texture name="reflectance" type="bitmap">{PICTURE}</texture>'
+COLOUR = '<rgb name="{}" value="0.6 0.3 0.1"/>'
+RGB = COLOUR.format("reflectance")
+POINTS = '<spectrum name="{}" value="370:0.2, 500:0.7, 790:0.3"/>'
+CHECKS = '<texture name="reflectance" type="checkerboard">{}{}</texture>'
+EVEN = '<spectrum name="{}" value="370:{}, 790:{}"/>'
+
+
+def plugin(kind: str, parts: str) -> str:
+    return f'<spectrum name="reflectance" type="{kind}">{parts}</spectrum>'
+
+
+REFLECTANCES = {
+    "rgb": RGB,
+    "srgb": plugin("srgb", COLOUR.format("color")),
+    "uniform": '<spectrum name="reflectance" value="0.6"/>',
+    "float": '<float name="reflectance" value="0.6"/>',
+    "rawconstant": '<texture name="reflectance" type="rawconstant"><float name="value" value="0.6"/></texture>',
+    "regular": plugin(
+        "regular",
+        '<float name="wavelength_min" value="370"/><float name="wavelength_max" value="790"/>'
+        '<string name="values" value="0.2, 0.8, 0.4"/>',
+    ),
+    "irregular": plugin(
+        "irregular",
+        '<string name="wavelengths" value="370, 500, 790"/><string name="values" value="0.2, 0.7, 0.3"/>',
+    ),
+    "points": POINTS.format("reflectance"),
+    "file": '<spectrum name="reflectance" filename="r.spd"/>',
+    "d65": plugin("d65", '<float name="scale" value="0.5"/>'),
+    "tinted d65": plugin("d65", COLOUR.format("color")),
+    "blackbody": plugin("blackbody", '<float name="temperature" value="1200"/>'),
+    "bitmap": BITMAP,
+    "mesh attribute": '<texture name="reflectance" type="mesh_attribute"><string name="name" value="vertex_color"/>'
+    "</texture>",
+    "reference": '<ref id="cloth" name="reflectance"/>',
+    "checkerboard": CHECKS.format(COLOUR.format("color0"), POINTS.format("color1")),
+    "checkerboard of tables": CHECKS.format(EVEN.format("color0", 0.7, 0.1), EVEN.format("color1", 0.2, 0.7)),
+}
+IN_ROWS = (
+    "regular",
+    "irregular",
+    "points",
+    "file",
+    "checkerboard of tables",
+)  # read from the engine's own table of reflectances
+
+PAINTS = {name: f'<bsdf type="diffuse" id="paint">{node}</bsdf>' for name, node in REFLECTANCES.items()} | {
+    "two-sided rgb": f'<bsdf type="twosided" id="paint"><bsdf type="diffuse">{RGB}</bsdf></bsdf>',
+    "textured rough plastic": '<bsdf type="roughplastic" id="paint">'
+    f'<texture name="diffuse_reflectance" type="bitmap">{PICTURE}</texture></bsdf>',
+    "blend": f'<bsdf type="blendbsdf" id="paint"><float name="weight" value="0.4"/><bsdf type="diffuse">{RGB}</bsdf>'
+    f'<bsdf type="diffuse">{BITMAP}</bsdf></bsdf>',
+}
+# The second lamp as the first: one light group of one spectrum. Another: a group of its own colour, without rows.
+LAMPS = {"one spectrum": (3, 3), "own colour": (3, 1)}
+COMPARISONS = len(PAINTS) * len(LAMPS) * BANDS_NM.size
+
+
+def bands() -> str:
+    ends = '<float name="wavelength_min" value="{}"/><float name="wavelength_max" value="{}"/>'
+    return "".join(
+        f'<spectrum name="band{index}" type="regular">{ends.format(nm - WIDTH_NM / 2, nm + WIDTH_NM / 2)}'
+        '<string name="values" value="1, 1"/></spectrum>'
+        for index, nm in enumerate(BANDS_NM)
+    )
+
+
+def wall(place: str) -> str:
+    """Quad of 4 m with texture coordinates and a colour at each corner."""
+    return (
+        f'<shape type="ply"><string name="filename" value="q.ply"/><ref id="paint"/>'
+        f'<transform name="to_world"><scale value="2"/>{place}</transform></shape>'
+    )
+
+
+def lamp(index: int, value: float) -> str:
+    return (
+        f'<emitter type="point" id="lamp:{index}"><point name="position" x="{1.6 * index - 0.8}" y="1" z="1.5"/>'
+        f'<spectrum name="intensity" value="{value}"/></emitter>'
+    )
+
+
+def write_scene(folder: Path, paint: str, lamps: tuple[float, float]) -> Path:
+    pixels = np.random.default_rng(5).integers(30, 230, (4, 4, 3), dtype=np.uint8)
+    Image.fromarray(pixels).save(folder / "p.png")
+    (folder / "r.spd").write_text("370 0.2\n500 0.7\n790 0.3\n")
+    (folder / "q.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 4\n"
+        + "".join(f"property float {name}\n" for name in "xyzstrgb")
+        + "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+        "-1 -1 0 0 0 .8 .2 .1\n1 -1 0 1 0 .2 .7 .3\n1 1 0 1 1 .2 .2 .6\n-1 1 0 0 1 .5 .5 .5\n3 0 1 2\n3 0 2 3\n"
+    )
+    path = folder / "scene.xml"
+    path.write_text(
+        f'<scene version="3.0.0"><integrator type="path"><integer name="max_depth" value="{DEPTH}"/></integrator>'
+        '<sensor type="perspective"><float name="fov" value="40"/><transform name="to_world">'
+        '<lookat origin="0, 1.2, 3" target="0, -0.3, 0" up="0, 1, 0"/></transform><sampler type="multijitter"/>'
+        '<film type="specfilm"><integer name="width" value="8"/><integer name="height" value="6"/>'
+        f'<string name="component_format" value="float32"/><rfilter type="box"/>{bands()}</film></sensor>'
+        f'<texture type="bitmap" id="cloth">{PICTURE}</texture>{paint}'
+        f'{wall("")}{wall("""<rotate x="1" angle="-90"/><translate y="-1"/>""")}'
+        f"{''.join(lamp(index, value) for index, value in enumerate(lamps))}</scene>"
+    )
+    return path
+
+
+def stock(path: Path) -> np.ndarray:
+    """Means over the picture of Mitsuba's own renders of the file, (draw, band)."""
+    mi, kept = mitsuba_module(), mitsuba_module().file_resolver()
+    mi.set_file_resolver(search_path(mi, path.parent))
+    try:
+        loaded = mi.load_file(str(path))
+    finally:
+        mi.set_file_resolver(kept)
+    made = [np.asarray(mi.render(loaded, spp=SPP, seed=10_000 + k), np.float64) for k in range(DRAWS)]
+    return np.stack([picture.mean(axis=(0, 1)) for picture in made]) / WIDTH_NM
+
+
+@pytest.mark.parametrize("lamps", LAMPS)
+@pytest.mark.parametrize("paint", PAINTS)
+def test_each_kind_of_reflectance_renders_as_in_stock_mitsuba(paint: str, lamps: str, tmp_path: Path) -> None:
+    path = write_scene(tmp_path, PAINTS[paint], LAMPS[lamps])
+    opened = load_scene_file(path)
+    film = Film(opened.size, BANDS_NM, np.full(4, WIDTH_NM), DEPTH)
+    rows = lamps == "one spectrum" and paint in IN_ROWS
+    assert [bool(unit.curves) for unit in load_units(opened.scene, film)] == [rows]
+    made = [
+        render(
+            opened.scene,
+            opened.size,
+            wavelength_nm=BANDS_NM,
+            width_nm=WIDTH_NM,
+            max_depth=DEPTH,
+            spp=SPP,
+            seed=seed,
+        )
+        for seed in range(DRAWS)
+    ]
+    drawn = [transport.relight().values.mean(axis=(0, 1), dtype=np.float64) for transport in made]
+    ours, theirs = np.stack(drawn), stock(path)
+    parts = [draws.var(axis=0, ddof=1) / len(draws) for draws in (ours, theirs)]
+    error = np.sqrt(parts[0] + parts[1])
+    freedom = (DRAWS - 1) * error**4 / (parts[0] ** 2 + parts[1] ** 2)
+    level = FALSE_ALARM / COMPARISONS / 2
+    assert np.all(np.abs(ours.mean(axis=0) - theirs.mean(axis=0)) < student.isf(level, freedom) * error)
+    caught = (student.isf(level, freedom) + norm.ppf(0.9)) * error / theirs.mean(axis=0)
+    assert np.median(caught) < CAUGHT

@@ -1,0 +1,215 @@
+"""ISETCam scenes in every form, with known photons; what doesn't fit is refused."""
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from render.radiance_files.iset import read_iset_scene
+from rodcone.errors import InputError
+
+NM = np.arange(400.0, 701.0, 10.0)
+PHOTONS = 1e15 * np.random.default_rng(7).random((5, 6, NM.size))
+# A photon of 500 nm has h c / lambda = 6.62607015e-34 * 299792458 / 500e-9 J.
+JOULE = 6.62607015e-34 * 299792458.0 / (NM * 1e-9)
+
+
+def save(tmp_path: Path, **variables: Any) -> Path:
+    path = tmp_path / "scene.mat"
+    scipy.io.savemat(path, variables, do_compression=True)
+    return path
+
+
+def basis_file(tmp_path: Path, **changes: Any) -> tuple[Path, np.ndarray]:
+    """Scene of three basis functions, and its photons by the definition: coefficient times function, summed."""
+    rng = np.random.default_rng(8)
+    functions, coefficients = rng.random((NM.size, 3)), 1e15 * rng.random((5, 6, 3))
+    parts: dict[str, Any] = {"mcCOEF": coefficients, "basis": {"basis": functions, "wave": NM}, "comment": "a"}
+    illuminant = {"data": np.ones(NM.size), "wavelength": NM}
+    return save(tmp_path, **{**parts, "illuminant": illuminant, **changes}), np.einsum(
+        "hwk,nk->hwn", coefficients, functions
+    )
+
+
+def test_photons_become_watts_by_planck_constant_and_frequency(tmp_path: Path) -> None:
+    read = read_iset_scene(save(tmp_path, photons=PHOTONS, wave=NM, comment="x", fov=10.0, name="scene"))
+    assert read.values == pytest.approx(PHOTONS * JOULE, rel=6e-8)  # float32: 2^-24
+    assert read.wavelength_nm.tolist() == NM.tolist()
+    assert read.widths_nm == pytest.approx(np.full(NM.size, 10.0))
+    assert read.relative_mc_error == 0
+
+
+def test_older_names_of_photons_and_wavelengths_are_known(tmp_path: Path) -> None:
+    read = read_iset_scene(save(tmp_path, data=PHOTONS, wavelength=NM[:, None]))
+    assert read.values == pytest.approx(PHOTONS * JOULE, rel=6e-8)
+
+
+def test_saved_scene_struct_is_read(tmp_path: Path) -> None:
+    scene = {
+        "type": "scene",
+        "name": "a",
+        "data": {"photons": PHOTONS.astype(np.float32), "luminance": []},
+        "spectrum": {"wave": NM[:, None]},
+        "illuminant": {"type": "illuminant", "data": {"photons": np.ones(NM.size)}, "spectrum": {"wave": NM}},
+        "depthMap": np.full((5, 6), 1.2),
+    }
+    read = read_iset_scene(save(tmp_path, scene=scene))
+    assert read.values == pytest.approx(PHOTONS * JOULE, rel=2e-7)  # rounded twice
+
+
+@pytest.mark.parametrize("names", [("dmin", "dmax"), ("min", "max")])
+@pytest.mark.parametrize("dtype", [np.uint16, np.uint32])
+def test_photons_of_old_files_are_stretched_from_integers(tmp_path: Path, dtype: Any, names: tuple[str, str]) -> None:
+    """The formula of ieCompressData: round(top * (photons - least) / (most - least))."""
+    top, least, most = float(np.iinfo(dtype).max), PHOTONS.min(), PHOTONS.max()
+    stored = np.round(top * (PHOTONS - least) / (most - least)).astype(dtype)
+    data = {"photons": stored, names[0]: least, names[1]: most}
+    read = read_iset_scene(save(tmp_path, scene={"data": data, "spectrum": {"wave": NM}}))
+    half_step = (most - least) / top / 2
+    assert np.all(np.abs(read.values / JOULE - PHOTONS) <= half_step + 1e-7 * PHOTONS)
+
+
+def test_basis_coefficients_give_photons(tmp_path: Path) -> None:
+    path, photons = basis_file(tmp_path)
+    assert read_iset_scene(path).values == pytest.approx(photons * JOULE, rel=1e-6)
+
+
+def test_the_mean_that_was_taken_out_is_added(tmp_path: Path) -> None:
+    mean = 1e14 * np.arange(NM.size)
+    path, photons = basis_file(tmp_path, imgMean=mean)
+    assert read_iset_scene(path).values == pytest.approx((photons + mean) * JOULE, rel=1e-6)
+
+
+def test_one_basis_function_whose_axis_matlab_dropped_is_read(tmp_path: Path) -> None:
+    shape = NM / 500
+    path = save(tmp_path, mcCOEF=PHOTONS[:, :, 0], basis={"basis": shape[:, None], "wave": NM})
+    assert read_iset_scene(path).values == pytest.approx(PHOTONS[:, :, :1] * shape * JOULE, rel=1e-6)
+
+
+def test_photons_that_a_basis_makes_negative_become_zero_and_are_told(tmp_path: Path) -> None:
+    """One band of 31 has its mean under zero: 1/31 is 3.23 %."""
+    mean = np.full(NM.size, 1e14)
+    mean[4] = -1e18
+    path, photons = basis_file(tmp_path, imgMean=mean)
+    with pytest.warns(UserWarning, match=r"3\.23% of its photons"):
+        read = read_iset_scene(path)
+    assert not read.values[:, :, 4].any()
+    assert read.values == pytest.approx(np.maximum(photons + mean, 0) * JOULE, rel=1e-6)
+
+
+def in_form(form: str, photons: np.ndarray, tmp_path: Path) -> Path:
+    """The same photons in one of the three forms that ISETCam writes."""
+    if form == "basis":  # one function a wavelength: coefficients are photons
+        return save(tmp_path, mcCOEF=photons, basis={"basis": np.eye(NM.size), "wave": NM})
+    if form == "struct":
+        return save(tmp_path, scene={"data": {"photons": photons}, "spectrum": {"wave": NM}})
+    return save(tmp_path, photons=photons, wave=NM)
+
+
+@pytest.mark.parametrize("form", ["basis", "struct", "photons"])
+@pytest.mark.parametrize(("count", "share"), [(1, "0.108"), (9, "0.968")])  # of 5 x 6 x 31 = 930 samples
+def test_a_few_photons_below_zero_become_zero_and_are_told_in_every_form(
+    form: str, count: int, share: str, tmp_path: Path
+) -> None:
+    photons = PHOTONS.copy()
+    photons.flat[100 : 100 + count] = -1e9  # a hair below 0 beside 1e15
+    with pytest.warns(UserWarning, match=rf"^{share}% of its photons were negative and became 0") as told:
+        read = read_iset_scene(in_form(form, photons, tmp_path))
+    assert len(told) == 1
+    assert np.count_nonzero(read.values == 0) == count
+    assert read.values == pytest.approx(np.maximum(photons, 0) * JOULE, rel=6e-7)
+
+
+@pytest.mark.parametrize("form", ["struct", "photons"])
+def test_stored_photons_of_which_over_a_hundredth_is_below_zero_are_refused(form: str, tmp_path: Path) -> None:
+    photons = PHOTONS.copy()
+    photons.flat[100:110] = -1e9  # 10 of 930 are 1.08 %
+    with pytest.raises(InputError, match="at row 0, column 3, band 7"):  # 100 = 3 x 31 + 7
+        read_iset_scene(in_form(form, photons, tmp_path))
+
+
+def test_uneven_wavelengths_are_told(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="half-way"):
+        read = read_iset_scene(save(tmp_path, photons=PHOTONS[:, :, :3], wave=np.array([400.0, 410.0, 430.0])))
+    assert read.widths_nm.tolist() == [10, 15, 20]
+    assert read.wavelength_nm.tolist() == [400, 412.5, 430]  # bands meet at 405 and 420 nm
+
+
+@pytest.mark.parametrize(
+    ("variables", "told"),
+    [
+        ({"photons": PHOTONS}, "wavelength"),
+        ({"wave": NM}, "'data'"),
+        ({"rgb": PHOTONS}, "sceneToFile"),
+        ({"photons": PHOTONS, "wave": NM[:-1]}, r"\(5, 6, 31\) is not \(h, w, 30\)"),
+        ({"photons": -PHOTONS, "wave": NM}, "at row 0, column 0, band 0"),
+        ({"photons": PHOTONS * np.nan, "wave": NM}, "nan"),
+        ({"photons": PHOTONS * 1e60, "wave": NM}, "inf"),
+        ({"photons": np.where(np.arange(PHOTONS.size).reshape(PHOTONS.shape), PHOTONS, -np.inf), "wave": NM}, "-inf"),
+        ({"photons": np.ones(PHOTONS.shape, np.int32), "wave": NM}, "int32"),
+        ({"photons": np.ones(PHOTONS.shape, np.uint16), "wave": NM}, "dmin"),
+        ({"photons": PHOTONS[:, :, 0], "wave": 550.0}, "width"),
+        ({"photons": PHOTONS, "wave": NM[::-1]}, "increasing"),
+        ({"photons": PHOTONS, "wave": NM - 400}, "increasing"),
+        ({"photons": "none", "wave": NM}, "no numbers 'photons'"),
+        ({"scene": 1.0}, "no struct 'scene'"),
+        ({"scene": {"data": {"photons": PHOTONS}}}, "no struct 'spectrum'"),
+        ({"mcCOEF": PHOTONS}, "no struct 'basis'"),
+        ({"mcCOEF": PHOTONS, "basis": {"basis": np.ones((30, 31)), "wave": NM}}, "one row"),
+        ({"mcCOEF": PHOTONS, "basis": {"basis": np.ones((31, 3)), "wave": NM}}, r"not \(h, w, 3\)"),
+        ({"mcCOEF": PHOTONS, "basis": {"basis": np.ones((31, 31)), "wave": NM}, "imgMean": np.ones(3)}, "imgMean"),
+        ({"photons": np.ones((1 << 16, 1, 2)), "wave": NM[:2]}, "65536 x 1 pixels"),
+    ],
+)
+def test_what_is_no_scene_is_refused_in_one_line(tmp_path: Path, variables: dict[str, Any], told: str) -> None:
+    path = save(tmp_path, **variables)
+    with pytest.raises(InputError, match=told) as refused:
+        read_iset_scene(path)
+    assert str(refused.value).startswith(f"{path}: ")
+    assert str(refused.value).count(str(path)) == 1
+    assert "\n" not in str(refused.value)
+
+
+def test_a_basis_that_would_swell_beyond_the_limit_is_refused(tmp_path: Path) -> None:
+    """1 Mpx of one coefficient and 3000 wavelengths: 12.6 GB from a file of some kilobytes."""
+    nm = 300.0 + 0.1 * np.arange(3000)
+    path = save(tmp_path, mcCOEF=np.zeros((1024, 1024), np.uint8), basis={"basis": np.ones((3000, 1)), "wave": nm})
+    assert path.stat().st_size < 100_000
+    with pytest.raises(InputError, match="12582912000 bytes"):
+        read_iset_scene(path)
+
+
+def test_a_basis_that_would_swell_beyond_its_file_is_refused(tmp_path: Path) -> None:
+    """64 kpx of one coefficient and 3000 wavelengths: 786 MB from 24 kB, where 2000 times that is allowed."""
+    nm = 300.0 + 0.1 * np.arange(3000)
+    path = save(tmp_path, mcCOEF=np.zeros((256, 256), np.uint8), basis={"basis": np.ones((3000, 1)), "wave": nm})
+    assert path.stat().st_size < 30_000
+    with pytest.raises(InputError, match="can't hold the 786432000 bytes"):
+        read_iset_scene(path)
+
+
+@settings(max_examples=100, deadline=2000, derandomize=True)
+@given(st.lists(st.tuples(st.integers(0, 1 << 16), st.integers(0, 255)), min_size=1, max_size=4))
+def test_changed_bytes_give_an_error_of_one_line_or_radiance(
+    tmp_path_factory: pytest.TempPathFactory, changes: list[tuple[int, int]]
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "changed.mat"
+    basis = {"basis": np.ones((3, 2)), "wave": NM[:3]}
+    scipy.io.savemat(path, {"mcCOEF": PHOTONS[:, :, :2], "basis": basis, "imgMean": np.ones(3)})
+    changed = bytearray(path.read_bytes())
+    for place, value in changes:
+        changed[place % len(changed)] = value
+    path.write_bytes(changed)
+    told = ""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            read_iset_scene(path)  # whose type holds finite values alone
+        except InputError as refused:
+            told = str(refused)
+    assert "\n" not in told

@@ -1,0 +1,595 @@
+"""Rendering against closed forms and against stock Mitsuba; stop rules, seeds, sizes and what is refused.
+
+Monte Carlo values are compared in units of their own stated standard error. By chance each such test may fail at most
+`FALSE_ALARM` of the time, over all the comparisons that it makes (Bonferroni); its seed is fixed.
+"""
+
+import gc
+import os
+import signal
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, norm
+from scipy.stats import t as student
+
+from render import engine
+from render.engine import render
+from render.geometry import look_at, to_world, translate
+from render.illuminants import illuminant
+from render.limits import PASSES
+from render.loader import mitsuba_module
+from render.scene import LightGroup, Scene, spectrum_node
+from render.spectrum import Spectrum, flat
+from rodcone.errors import InputError
+from rodcone.jit import backend
+from scenes.catalog import load
+from scenes.materials import floor, glossy, matte, panel
+from scenes.reflectances import color_checker as patches
+from scenes.reflectances import edge, grey
+from sensor.optics import form_image
+from sensor.presets import table1_output
+from sensor.response import expected_electrons
+
+BANDS_NM = np.arange(405.0, 780.0, 50.0)  # eight bands fill 380-780 nm
+NARROWER_NM = np.linspace(410.0, 750.0, 8)
+WIDTH_NM = np.full(8, 50.0)
+SIZE = (24, 32)
+BLOCK = 8  # pixels each side: the mean of 64 pixels is close to normal
+FALSE_ALARM = 1e-5
+RAMP = spectrum_node(Spectrum(np.array([380.0, 780.0]), np.array([0.0, 1.0])))
+
+only_dense = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba renders")
+
+
+def bound(comparisons):
+    """Standard errors that normal errors exceed, on either side, `FALSE_ALARM` of the time in all comparisons."""
+    return norm.isf(FALSE_ALARM / 2 / comparisons)
+
+
+def block_means(planes):
+    """Means over blocks of pixels of (..., h, w)."""
+    h, w = planes.shape[-2] // BLOCK, planes.shape[-1] // BLOCK
+    return planes.reshape(*planes.shape[:-2], h, BLOCK, w, BLOCK).mean(axis=(-3, -1), dtype=np.float64)
+
+
+def planes_of(radiance):
+    return np.moveaxis(radiance.values.astype(np.float64), -1, 0)
+
+
+def emissions(groups):
+    """Spectral emission of each group and band, written out."""
+    return np.stack([g.spectrum.band_average(BANDS_NM, WIDTH_NM) * g.power for g in groups.values()])
+
+
+def lit_variance(transport, groups):
+    """Variance of the radiance that the groups give together, (band, h, w)."""
+    given, variance = emissions(groups), transport.variance.astype(np.float64)
+    independent = np.einsum("gb,gbhw->bhw", given**2, variance)
+    if transport.shared is None:
+        return independent
+    one, other = transport.shared.groups
+    covariance = transport.shared.correlation * np.sqrt(variance[one] * variance[other])
+    return independent + 2 * (given[one] * given[other])[:, None, None] * covariance
+
+
+def noisy_wall():
+    """The flat field with a point light behind the wall: no light more, but paths go to look for lights now.
+
+    Under the sky alone they don't, and every path brings the same: the flat field is exact.
+    """
+    scene = load("flat_field")
+    geometry = scene.geometry | {"behind": {"type": "point", "position": [0, 0, -1]}}
+    groups = {"sky": replace(scene.groups["sky"], emitters=("sky", "behind"))}
+    return replace(scene, geometry=geometry, groups=groups)
+
+
+@pytest.fixture(scope="module")
+def wall():
+    return render(noisy_wall(), SIZE, wavelength_nm=BANDS_NM, spp=128, seed=1)
+
+
+def test_a_wall_under_an_even_sky_is_exact():
+    made = render(load("flat_field"), SIZE, wavelength_nm=BANDS_NM, spp=8, seed=1)
+    assert made.radiance == pytest.approx(np.full((1, 8, *SIZE), 0.5), rel=1e-6)
+    assert made.irradiance == pytest.approx(np.full((1, 8), np.pi), rel=1e-5)
+    assert made.relative_mc_error < 1e-6
+    assert not made.coverage.any()
+
+
+def two_lights():
+    """A card that sees a round black-backed lamp and the sky around it; under it a coloured ball. All are in view.
+
+    The lamp fills a cone of 30 degrees' half angle above the card: a quarter of the projected hemisphere.
+    """
+    camera = {"type": "perspective", "fov": 62.0, "to_world": to_world(look_at((0, 0.5, 2.2), (0, 0.15, 0)))}
+    height = np.sqrt(3.0) * 0.5
+    geometry = {
+        "type": "scene",
+        "sensor": camera,
+        "card": panel(floor(0, 0, 0), 0.03, 0.03, matte(grey(0.4))),
+        "tray": panel(translate(0, -0.35, -0.9), 2.4, 0.6, matte(edge(600, 15, 0.1, 0.7))),
+        "ball": {
+            "type": "sphere",
+            "center": [0, -0.55, 0],
+            "radius": 0.5,
+            "bsdf": glossy(edge(520, 20, 0.7, 0.1), 0.3),
+        },
+        "lamp": {
+            "type": "disk",
+            "to_world": to_world(look_at((0, height, 0), (0, 0, 0), (0, 0, 1)), np.diag([0.5, 0.5, 1.0, 1.0])),
+            "bsdf": matte(grey(1e-6)),
+            "emitter": {"type": "area"},
+        },
+        "sky": {"type": "constant"},
+    }
+    groups = {
+        "sky": LightGroup(("sky",), illuminant("D65"), 20.0),
+        "lamp": LightGroup(("lamp/emitter",), illuminant("A"), 200.0),
+    }
+    return Scene("two_lights", geometry, groups, reference_plane="card")
+
+
+@pytest.fixture(scope="module")
+def two():
+    return render(two_lights(), SIZE, wavelength_nm=BANDS_NM, spp=256, seed=2)
+
+
+def test_a_rendered_wall_is_reflectance_times_sky_within_the_stated_error(wall):
+    truth = 0.5 * 100.0 * illuminant("D65").band_average(BANDS_NM, WIDTH_NM)
+    sky = 100.0 * illuminant("D65").band_average(BANDS_NM, WIDTH_NM)
+    deviation = planes_of(wall.relight()) - truth[:, None, None]
+    error = sky * np.sqrt(wall.variance[0].mean(axis=(1, 2), dtype=np.float64))  # every pixel has the same one
+    mean_z = deviation.mean(axis=(1, 2)) / error * np.sqrt(deviation[0].size)
+    assert np.abs(mean_z).max() < bound(BANDS_NM.size)
+
+
+def test_the_stated_variance_is_the_scatter_of_pixels_about_the_closed_form(wall):
+    # All bands of a path rise and fall together on a grey wall: one band tells. The scatter over n pixels and the
+    # stated variance, n (passes - 1) degrees of freedom, both follow chi-squared laws.
+    count, passes = wall.radiance[0, 0].size, wall.passes
+    scatter = ((wall.radiance[0, 0].astype(np.float64) - 0.5) ** 2).sum()
+    stated = wall.variance[0, 0].mean(dtype=np.float64)
+    rate = FALSE_ALARM / 4
+    low, high = chi2.ppf(rate, count) / count, chi2.isf(rate, count) / count
+    freedom = count * (passes - 1)
+    slack_low, slack_high = chi2.ppf(rate, freedom) / freedom, chi2.isf(rate, freedom) / freedom
+    assert low / slack_high < scatter / count / stated < high / slack_low
+
+
+def test_the_half_difference_has_the_stated_variance(wall):
+    count = wall.radiance[0, 0].size
+    half = (wall.half_difference[0, 0].astype(np.float64) ** 2).sum() / wall.variance[0, 0].mean(dtype=np.float64)
+    # Stated variance: 7 n degrees of freedom against n, hence a bound for F of (n, 7 n) from its normal limit.
+    assert abs(half / count - 1) < bound(1) * np.sqrt(2 / count * (1 + 1 / (wall.passes - 1)))
+
+
+def test_the_stated_relative_error_is_the_standard_error_over_the_mean(wall):
+    truth = np.sqrt(wall.variance.mean(dtype=np.float64)) / 0.5
+    # A median of pooled values: 9 pixels x 7 degrees of freedom scatter by 9 %, the median's bias is under 2 %.
+    assert wall.relight().relative_mc_error == pytest.approx(truth, rel=0.03)
+
+
+def test_a_rendered_wall_gives_the_analytic_electrons_within_the_stated_error(wall):
+    sensor, exposure_s = table1_output("rgbw"), 0.010
+    sky = 100.0 * illuminant("D65").band_average(BANDS_NM, WIDTH_NM)
+    electrons = expected_electrons(form_image(wall.relight(), sensor), sensor, exposure_s)
+    per_irradiance = BANDS_NM * 1e-9 / (6.62607015e-34 * 299792458.0) * 50.0 * (2.2e-6) ** 2 * 0.9 * exposure_s
+    deviation_share = np.sqrt(wall.variance[0, 0].mean(dtype=np.float64)) / 0.5
+    for row, column, letter in ((0, 0, "R"), (0, 1, "G"), (1, 0, "B"), (1, 1, "W")):
+        efficiency = sensor.responses.band_average(letter, BANDS_NM, WIDTH_NM)
+        truth = (np.pi / (1 + 4 * 2.8**2) * 0.5 * sky * efficiency[0] * per_irradiance).sum()
+        seen = electrons[row::2, column::2]
+        z = (seen.mean() / truth - 1) / deviation_share * np.sqrt(seen.size)
+        assert abs(z) < bound(4), letter
+        assert seen.std() / truth == pytest.approx(deviation_share, rel=bound(4) / np.sqrt(2 * seen.size))
+
+
+def test_the_reference_plane_under_an_even_sky_gets_pi_times_its_radiance(wall):
+    # A mixture of directions sampled for the surface and for the sky: a sample scatters by less than its mean, and
+    # 64x64 pixels have 8 passes of 16.
+    assert wall.irradiance == pytest.approx(np.full((1, 8), np.pi), rel=bound(8) / np.sqrt(64 * 64 * 8 * 16))
+    assert wall.relight(illuminance_lux=50.0 * np.pi).luminance().mean() == pytest.approx(25.0, rel=5e-3)
+    assert wall.illuminance_lux(25.0) == pytest.approx(50.0 * np.pi, rel=5e-3)
+
+
+def test_a_lamp_of_half_angle_30_degrees_gives_a_quarter_of_pi_and_hides_that_much_sky(two):
+    sky, lamp = two.irradiance / np.pi
+    # The card is 3 cm wide, the lamp 87 cm away: the form factor at its middle holds within 1e-3.
+    assert lamp == pytest.approx(np.full(8, 0.25), rel=5e-3)
+    assert sky == pytest.approx(np.full(8, 0.75), rel=5e-3)
+
+
+def test_color_checker_patches_are_reflectance_times_sky_in_every_band():
+    h, w, pixels_of_patch = 24, 36, 2
+    made = render(load("color_checker", light="E"), (h, w), wavelength_nm=BANDS_NM, spp=128, seed=3)
+    pixel_m = 2 * 0.72 * np.tan(np.radians(10.0)) / h
+    z = []
+    for index, (_, reflectance) in enumerate(patches()):
+        row, column = divmod(index, 6)
+        x, y = (column - 2.5) * 0.045, (1.5 - row) * 0.045
+        left, top = round(w / 2 + x / pixel_m) - 1, round(h / 2 - y / pixel_m) - 1
+        here = np.s_[:, top : top + pixels_of_patch, left : left + pixels_of_patch]
+        seen, variance = made.radiance[0][here].astype(np.float64), made.variance[0][here].astype(np.float64)
+        truth = reflectance.band_average(BANDS_NM, WIDTH_NM)
+        # Under an even sky the jitter within a band is all that scatters; where a patch is grey, float32's rounding.
+        error = np.hypot(np.sqrt(variance.sum(axis=(1, 2))) / pixels_of_patch**2, 2e-6 * truth)
+        z.append((seen.mean(axis=(1, 2)) - truth) / error)
+    freedom = pixels_of_patch**2 * (PASSES - 1)
+    assert np.abs(z).max() < student.isf(FALSE_ALARM / 2 / (24 * 8), freedom)
+    # Mean 28/26 for Student's law; bands share their paths, so 24 patches count: 0.33 is its standard error.
+    assert 0.25 < np.mean(np.square(z)) < 2.75
+
+
+@pytest.mark.parametrize("max_depth", [2, 3, 16])
+def test_a_glowing_cavity_is_the_geometric_series_of_its_reflectance(max_depth):
+    camera = {"type": "perspective", "fov": 60.0, "to_world": to_world(look_at((0.3, 0, 0), (0, 0, 1)))}
+    # A cube: Mitsuba samples a sphere from inside with a bias of 5e-4, in its own integrator too.
+    cavity = {"type": "cube", "flip_normals": True, "bsdf": matte(grey(0.8)), "emitter": {"type": "area"}}
+    groups = {"glow": LightGroup(("cavity/emitter",), flat())}
+    scene = Scene("furnace", {"type": "scene", "sensor": camera, "cavity": cavity}, groups)
+    made = render(scene, (8, 8), wavelength_nm=BANDS_NM, spp=512, max_depth=max_depth)
+    truth = (1 - 0.8**max_depth) / (1 - 0.8)
+    error = np.sqrt(made.variance[0, 0].sum(dtype=np.float64)) / 64
+    assert error < 0.01 * truth
+    assert np.abs(made.radiance[0].mean(axis=(1, 2), dtype=np.float64) - truth).max() < bound(1) * error
+    assert (made.coverage == 1).all()
+
+
+def stock(scene, spp, seed):
+    """Band averages of Mitsuba's own `path` and `specfilm`, and their variance, from passes of other seeds."""
+    mi, description = mitsuba_module(), scene.description
+    film = {"type": "specfilm", "width": SIZE[1], "height": SIZE[0], "component_format": "float32"}
+    for index, centre in enumerate(BANDS_NM):
+        ends = {"wavelength_min": centre - 25.0, "wavelength_max": centre + 25.0}
+        film[f"band{index}"] = {"type": "regular", **ends, "values": "1,1"}
+    film["rfilter"] = {"type": "box"}
+    description["sensor"] = {**description["sensor"], "film": film, "sampler": {"type": "independent"}}
+    description["integrator"] = {"type": "path", "max_depth": 8}
+    loaded = mi.load_dict(description)
+    passes = np.stack([np.asarray(mi.render(loaded, spp=spp // 16, seed=seed + k), np.float64) for k in range(16)])
+    passes = np.moveaxis(passes, -1, 1) / 50.0
+    return passes.mean(axis=0), passes.var(axis=0, ddof=1) / 16
+
+
+@pytest.mark.parametrize("lamp", [{}, {"power": 600.0}, {"power": 600.0, "spectrum": illuminant("D50")}])
+def test_relit_groups_sum_to_what_stock_mitsuba_renders_directly(two, lamp):
+    scene = two_lights()
+    groups = dict(scene.groups) | {"lamp": replace(scene.groups["lamp"], **lamp)}
+    direct, variance = stock(replace(scene, groups=groups), 512, 4)
+    relit = planes_of(
+        two.relight({"lamp": groups["lamp"].spectrum}, powers={name: group.power for name, group in groups.items()})
+    )
+    both = (block_means(variance) + block_means(lit_variance(two, groups))) / BLOCK**2
+    noisy = both > 1e-10 * block_means(direct) ** 2  # the others see the sky alone
+    assert block_means(relit)[~noisy] == pytest.approx(block_means(direct)[~noisy], rel=1e-4)
+    z = ((block_means(relit) - block_means(direct)) / np.sqrt(both))[noisy]
+    assert z.size > 40
+    assert np.abs(z).max() < bound(z.size)
+    # A dozen blocks count, whose bands are partly correlated: 0.41 is the standard error of the mean square.
+    assert 0.25 < np.mean(z**2) < 2.75
+
+
+def test_a_lamp_in_view_is_taken_out_of_the_light_and_what_it_covers_out_of_the_area(two):
+    """The lamp has 200 cd/m^2, a little less in these bands, and nothing that it lights more than 40."""
+    dark = two.relight(powers={"sky": 0.0}).luminance()
+    sky, lamp = (seen[0] for seen in two.seen)
+    assert two.coverage == pytest.approx(sky + lamp, abs=1e-6)
+    assert 5 < (lamp == 1).sum() < 200
+    assert 5 < ((lamp > 0) & (lamp < 1)).sum() < 100
+    assert (dark[lamp == 1] > 150).all()
+    assert (dark[lamp == 0] < 40).all()
+    left = dark - lamp * dark[lamp == 1].min()
+    assert (left > -1e-3).all()
+    level = two.level(powers={"sky": 0.0})
+    assert level.value == pytest.approx(left.sum() / (1 - two.coverage).sum(), rel=1e-4)
+    assert level.relative_error < 0.01
+    lit = two.relight(powers={"sky": 0.0}, luminance_cd_m2=10.0)
+    assert lit.luminance() == pytest.approx(dark * 10.0 / level.value, rel=1e-5)
+
+
+def test_a_black_wall_is_black():
+    made = render(load("flat_field", reflectance=0.0), (2, 2), wavelength_nm=BANDS_NM, spp=8)
+    assert not made.radiance.any()
+    assert made.relight().relative_mc_error == 0.0
+    assert made.irradiance == pytest.approx(np.full((1, 8), np.pi), rel=1e-5)
+
+
+def test_a_wall_in_front_of_the_sky_hides_it(wall):
+    assert not wall.coverage.any()
+
+
+def small(seed=0, **options):
+    return render(noisy_wall(), (3, 4), **({"wavelength_nm": BANDS_NM, "spp": 8, "seed": seed} | options))
+
+
+def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
+    one, again, other = small(7), small(7), small(8)
+    for name in ("radiance", "variance", "half_difference", "irradiance", "coverage"):
+        assert np.array_equal(getattr(one, name), getattr(again, name)), name
+    assert not (one.radiance == other.radiance).any()
+
+
+def apart(scene):
+    """The scene with a light of no power in the sky's group, which then is rendered by itself."""
+    geometry = scene.geometry | {"off": {"type": "point", "position": [0, -9, 0]}}
+    return replace(
+        scene, geometry=geometry, groups=scene.groups | {"sky": replace(scene.groups["sky"], emitters=("sky", "off"))}
+    )
+
+
+def test_groups_and_passes_draw_from_seeds_of_their_own():
+    made = render(apart(two_lights()), SIZE, wavelength_nm=BANDS_NM[:4], width_nm=50.0, spp=64, seed=2)
+    assert made.shared is None
+    sky, lamp = (made.half_difference[g, 0] / np.sqrt(np.maximum(made.variance[g, 0], 1e-20)) for g in (0, 1))
+    noisy = (made.variance[:, 0] > 1e-8).all(axis=0)
+    assert noisy.sum() > 60
+    assert abs(np.corrcoef(sky[noisy], lamp[noisy])[0, 1]) < bound(1) / np.sqrt(noisy.sum())
+
+
+def test_samples_asked_for_are_drawn_in_eight_passes():
+    made = small(spp=64)
+    assert (made.spp, made.passes, made.stopped_by) == (64, PASSES, "samples")
+    assert made.seconds > 0
+    assert (small(spp=1).spp, small(spp=1).passes) == (2, 2)  # two passes at least, for the error
+    assert 9 <= small(spp=9).spp <= 16
+    assert small(spp=None).spp == 64
+
+
+def test_an_error_asked_for_is_reached():
+    made = small(noise=0.006, spp=None)
+    assert made.stopped_by == "noise"
+    assert made.relight().relative_mc_error <= 0.006 * (1 + 1e-5)
+    assert made.passes > PASSES
+    assert made.passes % 2 == 0
+    assert made.relight().relative_mc_error > 0.006 / 1.5  # and not by far more work than it needs
+
+
+def test_an_error_is_not_believed_before_eight_passes():
+    assert small(noise=10.0, spp=None, max_spp=4096).passes == PASSES
+
+
+def test_seconds_are_those_of_all_the_calls_that_a_render_took(monkeypatch):
+    """By a clock that passes alone move on, 3 s each."""
+    clock, add = SimpleNamespace(now=1000.0), engine.add_pass
+
+    def add_slowly(*given):
+        add(*given)
+        clock.now += 3.0
+
+    monkeypatch.setattr(engine, "time", SimpleNamespace(perf_counter=lambda: clock.now))
+    monkeypatch.setattr(engine, "add_pass", add_slowly)
+    part = small(spp=8)
+    assert (part.passes, part.seconds) == (8, 24.0)
+    clock.now += 500.0  # between the calls
+    on = small(spp=16, resume=part)
+    assert (on.passes, on.seconds) == (16, 48.0)
+
+
+def test_samples_end_a_render_before_an_error_out_of_reach():
+    made = small(noise=1e-6, spp=16)
+    assert (made.spp, made.stopped_by) == (16, "samples")
+
+
+def test_time_asked_for_ends_a_render_after_two_passes_at_least():
+    made = small(max_seconds=0.001, spp=None)
+    assert (made.passes, made.stopped_by) == (2, "seconds")
+    small(spp=None, noise=0.5)  # compiled by now
+    longer = small(max_seconds=3.0, spp=None)  # a pair takes 0.15 s where nothing else runs
+    assert longer.stopped_by == "seconds"
+    assert longer.passes > 2
+    assert longer.seconds < 5.0  # all the samples allowed would take minutes
+
+
+def test_a_ceiling_of_samples_ends_a_render_in_passes_of_sixteen_or_fewer():
+    assert (small(spp=None, max_spp=24).spp, small(spp=None, max_spp=24).passes) == (24, PASSES)
+    made = small(spp=None, max_spp=200, noise=1e-6)
+    assert (made.stopped_by, made.spp // made.passes) == ("samples", 16)
+    assert 200 <= made.spp < 200 + 2 * 16
+    text = complaint(small, spp=8, max_spp=16)
+    assert text == "spp and max_spp: 8 and 16 are both given; allowed: one; leave spp out"
+
+
+def test_a_render_that_is_gone_on_from_has_the_bits_of_one_that_was_not_interrupted():
+    whole = small(5, spp=None, max_spp=64, noise=1e-6)
+    part = small(5, spp=None, max_seconds=1e-3, max_spp=64)  # two passes
+    assert part.passes == 2
+    on = small(5, spp=None, max_spp=64, resume=part)
+    assert (on.spp, on.passes) == (whole.spp, whole.passes)
+    assert on.seconds > part.seconds
+    assert np.array_equal(on.radiance, whole.radiance)
+    # The sums behind these two are taken back from rounded values.
+    assert on.variance == pytest.approx(whole.variance, rel=1e-5, abs=1e-12)
+    assert on.half_difference == pytest.approx(whole.half_difference, abs=1e-6)
+    assert on.irradiance == pytest.approx(whole.irradiance, rel=1e-12)
+    assert part.passes == 2  # untouched
+
+
+def test_a_result_of_another_render_is_not_gone_on_from():
+    part = small(spp=4)
+    for options in ({"width_nm": 40.0}, {"wavelength_nm": NARROWER_NM}):
+        assert complaint(small, spp=16, resume=part, **options).startswith("resume: (group, band, h, w) (1, 8, 3, 4)")
+    assert complaint(render, load("flat_field"), (4, 4), wavelength_nm=BANDS_NM, resume=part).startswith("resume: ")
+
+
+def test_control_c_keeps_the_passes_made_so_far(tmp_path):
+    def press(share, error):
+        os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    made = small(spp=None, max_spp=4096, cache=tmp_path, progress=press)
+    assert made.stopped_by == "interrupt"
+    assert 2 <= made.passes <= 4
+    assert signal.getsignal(signal.SIGINT) is before
+    on = small(spp=None, max_spp=128, cache=tmp_path)
+    assert (on.passes, on.stopped_by) == (8, "samples")
+    assert np.array_equal(on.radiance, small(spp=None, max_spp=128).radiance)
+
+
+def test_a_second_control_c_gives_up(tmp_path):
+    def press(share, error):
+        for _ in range(2):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.01)
+
+    with pytest.raises(KeyboardInterrupt):
+        small(spp=None, max_spp=4096, cache=tmp_path, progress=press)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_render_in_another_thread_leaves_control_c_alone():
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(small).result().stopped_by == "samples"
+
+
+def test_the_error_reached_is_told():
+    made = small(spp=64)
+    assert made.relative_mc_error == pytest.approx(made.relight().relative_mc_error, rel=1e-5)
+    assert 0 < made.relative_mc_error < 0.05
+
+
+def test_progress_rises_to_one_with_the_error_so_far():
+    calls = []
+    made = small(spp=64, progress=lambda share, error: calls.append((share, error)))
+    shares, errors = zip(*calls, strict=True)
+    assert shares == (0.25, 0.5, 0.75, 1.0)
+    assert errors[-1] == pytest.approx(made.relight().relative_mc_error, rel=1e-4)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 7), (7, 1)])
+def test_images_of_one_pixel_or_one_row_are_rendered(size):
+    made = render(noisy_wall(), size, wavelength_nm=BANDS_NM, spp=64, seed=9)
+    assert made.radiance.shape == (1, 8, *size)
+    assert made.relight().shape == size
+    error = np.sqrt(made.variance[0, 0].sum(dtype=np.float64)) / made.radiance[0, 0].size
+    # Student's bound: 7 degrees of freedom for one pixel.
+    freedom = 7 * made.radiance[0, 0].size
+    assert abs(made.radiance[0, 0].mean() - 0.5) < student.isf(FALSE_ALARM / 2, freedom) * error
+
+
+def test_bands_of_any_number_and_width_are_rendered():
+    reflectance = Spectrum(np.array([380.0, 780.0]), np.array([0.2, 0.6]))
+    scene = load("flat_field")
+    scene = replace(scene, geometry=scene.geometry | {"wall": scene.geometry["wall"] | {"bsdf": matte(reflectance)}})
+    nm, width_nm = np.array([400.0, 450.0, 546.1, 600.0, 700.0]), np.array([10.0, 40.0, 1.0, 20.0, 100.0])
+    made = render(scene, (8, 8), wavelength_nm=nm, width_nm=width_nm, spp=256)
+    ratio = made.radiance[0].mean(axis=(1, 2)) / made.radiance[0, 0].mean()
+    expected = reflectance.band_average(nm, width_nm) / reflectance.band_average(nm[0], width_nm[0])
+    # All bands share their paths: only the jitter inside the bands scatters, (100 nm / sqrt 12) / sqrt(64 x 256).
+    assert ratio == pytest.approx(expected, rel=5e-3)
+
+
+def complaint(call, *args, **options):
+    with pytest.raises(InputError) as caught:
+        call(*args, **options)
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+@pytest.mark.parametrize("size", [(0, 5), (5, -1), (5,), (5, 5, 3), (2.0, 3.0), (40_000, 2), 5])
+def test_a_bad_size_is_refused_with_its_value(size):
+    text = complaint(render, load("flat_field"), size)
+    assert text == f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "allowed"),
+    [
+        ("spp", 0, "1 to 65536"),
+        ("spp", -4, "1 to 65536"),
+        ("spp", 1 << 17, "1 to 65536"),
+        ("noise", 0.0, "1e-06 to 10"),
+        ("noise", np.nan, "1e-06 to 10"),
+        ("noise", -0.1, "1e-06 to 10"),
+        ("max_seconds", 0.0, "0.001 to 1e+07"),
+        ("max_seconds", np.inf, "0.001 to 1e+07"),
+        ("max_depth", 1, "2 to 65536"),
+        ("seed", -1, "0 to 9"),
+    ],
+)
+def test_a_bad_limit_is_refused_with_its_value_and_what_is_allowed(name, value, allowed):
+    assert complaint(small, **{name: value}).startswith(f"{name}: {value!r} is outside {allowed}")
+
+
+@pytest.mark.parametrize(("name", "value"), [("spp", 2.5), ("seed", 1.5), ("max_depth", 2.5)])
+def test_a_count_that_is_not_whole_is_refused_with_its_value(name, value):
+    assert complaint(small, **{name: value}).startswith(f"{name}: {value!r} ")
+
+
+@pytest.mark.parametrize("bands", [{"wavelength_nm": [500.0, 400.0]}, {"wavelength_nm": [550.0]}, {"width_nm": -1.0}])
+def test_bad_bands_are_refused(bands):
+    assert "_nm" in complaint(small, **bands)
+
+
+def test_a_scene_without_light_is_refused():
+    geometry = {name: node for name, node in load("flat_field").geometry.items() if name != "sky"}
+    text = complaint(render, Scene("cave", geometry, {}), (2, 2))
+    assert text == "scene cave: it has no light; allowed: one light group or more; add one"
+
+
+@pytest.fixture
+def freed():
+    """Lets go of refused scenes at the end: Dr.Jit compiles every live material into the next render, theirs too."""
+    yield
+    gc.collect()
+
+
+def ball_under_the_sky(bsdf):
+    camera = {"type": "perspective", "fov": 40.0, "to_world": to_world(look_at((0, 0, 3), (0, 0, 0)))}
+    ball = {"type": "sphere", "radius": 0.8, "bsdf": bsdf}
+    geometry = {"type": "scene", "sensor": camera, "ball": ball, "sky": {"type": "constant"}}
+    return Scene("ball", geometry, {"sky": LightGroup(("sky",), flat())})
+
+
+def test_a_node_that_mitsuba_does_not_know_is_refused():
+    text = complaint(render, ball_under_the_sky({"type": "velvet"}), (2, 2))
+    assert text.startswith("scene ball: Mitsuba can't load it: ")
+    assert "velvet" in text
+
+
+def test_a_blend_whose_weight_is_a_spectrum_is_refused(freed):
+    blend = {"type": "blendbsdf", "weight": RAMP, "matte": {"type": "diffuse"}, "mirror": {"type": "conductor"}}
+    text = complaint(render, ball_under_the_sky(blend), (2, 2), wavelength_nm=BANDS_NM, spp=8)
+    assert "not implemented" in text  # Mitsuba's reason
+
+
+def test_a_refused_scene_does_not_spoil_the_next_render_while_its_error_is_kept():
+    blend = {"type": "blendbsdf", "weight": RAMP, "matte": {"type": "diffuse"}, "mirror": {"type": "conductor"}}
+    with pytest.raises(InputError) as kept:
+        render(ball_under_the_sky(blend), (2, 2), wavelength_nm=BANDS_NM, spp=8)
+    assert render(ball_under_the_sky({"type": "diffuse"}), (2, 2), wavelength_nm=BANDS_NM, spp=8).radiance.any()
+    assert "not implemented" in str(kept.value)
+
+
+@only_dense
+def test_a_material_that_chooses_by_wavelength_is_refused(freed):
+    hair = {"type": "hair", "eumelanin": 1.0}  # picks lobes by the attenuation of the path's first wavelengths
+    text = complaint(render, ball_under_the_sky(hair), (6, 6), wavelength_nm=BANDS_NM, spp=16)
+    assert text.startswith("scene: a material chooses where light goes by wavelength")
+    assert "allowed: materials whose sampling doesn't depend on wavelength; replace it" in text
+
+
+@pytest.mark.parametrize("bsdf", [{"type": "dielectric", "int_ior": 1.5}, {"type": "dielectric", "int_ior": "bk7"}])
+def test_clear_glass_under_an_even_sky_is_as_bright_as_the_sky(bsdf):
+    made = render(ball_under_the_sky(bsdf), (6, 6), wavelength_nm=BANDS_NM, spp=64, max_depth=32)
+    assert made.radiance == pytest.approx(np.ones((1, 8, 6, 6)), abs=0.02)  # paths end after 32 segments
+    assert made.radiance.mean() == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    "bsdf",
+    [
+        {"type": "roughplastic", "diffuse_reflectance": RAMP, "alpha": 0.2},
+        {"type": "plastic", "diffuse_reflectance": RAMP, "nonlinear": True},
+        {"type": "principled", "base_color": RAMP, "metallic": 0.5},
+    ],
+)
+def test_coloured_materials_of_one_sampling_are_rendered(bsdf):
+    made = render(ball_under_the_sky(bsdf), (6, 6), wavelength_nm=BANDS_NM, spp=16)
+    middle = made.radiance[0, :, 2:4, 2:4].mean(axis=(1, 2))
+    assert (np.diff(middle) > 0).all()  # redder is brighter, as the reflectance says

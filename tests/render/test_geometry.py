@@ -1,0 +1,78 @@
+"""Transforms: closed forms, and Mitsuba's own transforms as the independent reference."""
+
+import numpy as np
+import pytest
+
+from render.geometry import look_at, rotate, scale, to_world, translate
+from render.loader import mitsuba_module
+from rodcone.jit import Matrix4
+
+POINT = np.array([0.3, -1.2, 2.5, 1.0])
+
+
+def mitsubas():
+    mitsuba_module()
+    import mitsuba.scalar_rgb as mi
+
+    return mi.ScalarTransform4f
+
+
+def test_translate_moves_points_and_leaves_directions():
+    assert np.array_equal(translate(1, -2, 3) @ [0, 0, 0, 1], [1, -2, 3, 1])
+    assert np.array_equal(translate(1, -2, 3) @ [5, 6, 7, 0], [5, 6, 7, 0])
+
+
+def test_scale_stretches_each_axis():
+    assert np.array_equal(scale(2, 3, 4) @ [1, 1, 1, 1], [2, 3, 4, 1])
+
+
+@pytest.mark.parametrize(
+    ("axis", "start", "end"),
+    [((0, 0, 5), (1, 0, 0), (0, 1, 0)), ((1, 0, 0), (0, 1, 0), (0, 0, 1)), ((0, 2, 0), (0, 0, 1), (1, 0, 0))],
+)
+def test_a_quarter_turn_is_right_handed_whatever_the_axis_length(axis, start, end):
+    assert (rotate(axis, 90.0) @ [*start, 0])[:3] == pytest.approx(end, abs=1e-15)
+
+
+def test_a_third_of_a_turn_about_the_diagonal_permutes_the_axes():
+    assert (rotate((1, 1, 1), 120.0) @ [1, 2, 3, 0])[:3] == pytest.approx([3, 1, 2], abs=1e-14)
+
+
+def test_a_rotation_keeps_lengths_and_undoes_itself():
+    turn = rotate((0.3, -2.0, 0.7), 33.0)
+    assert turn @ turn.T == pytest.approx(np.eye(4), abs=1e-15)
+    assert turn @ rotate((0.3, -2.0, 0.7), -33.0) == pytest.approx(np.eye(4), abs=1e-15)
+
+
+def test_look_at_puts_the_origin_in_place_and_faces_the_target():
+    place = look_at((1, 2, 3), (1, 2, -5))
+    assert (place @ [0, 0, 0, 1])[:3] == pytest.approx([1, 2, 3], abs=1e-15)
+    assert (place @ [0, 0, 1, 0])[:3] == pytest.approx([0, 0, -1], abs=1e-15)
+    assert (place @ [0, 1, 0, 0])[:3] == pytest.approx([0, 1, 0], abs=1e-15)
+    assert np.linalg.det(place) == pytest.approx(1.0, rel=1e-14)
+
+
+def test_to_world_applies_the_last_transform_first():
+    matrix = np.array(to_world(translate(1, 0, 0), scale(2, 2, 2)))
+    assert matrix @ [1, 1, 1, 1] == pytest.approx([3, 2, 2, 1])
+    assert np.array(to_world(translate(1, 2, 3))) == pytest.approx(translate(1, 2, 3))
+
+
+def test_to_world_gives_the_type_that_every_variant_loads():
+    assert isinstance(to_world(np.eye(4)), Matrix4)
+
+
+def test_transforms_equal_mitsubas():
+    theirs = mitsubas()
+    pairs = [
+        (translate(1, -2, 0.5), theirs().translate([1, -2, 0.5])),
+        (scale(1, 2, 3), theirs().scale([1, 2, 3])),
+        (rotate((0.4, 2, -6), 71.0), theirs().rotate((np.array([0.2, 1, -3]) / np.sqrt(10.04)).tolist(), 71.0)),
+        (look_at((1, 2, 3), (-0.5, 0.1, 0.2)), theirs().look_at([1, 2, 3], [-0.5, 0.1, 0.2], [0, 1, 0])),
+        (
+            look_at((1, 2, 3), (0, 9, 0), up=(0, 0, 1)),
+            theirs().look_at(origin=[1, 2, 3], target=[0, 9, 0], up=[0, 0, 1]),
+        ),
+    ]
+    for ours, transform in pairs:
+        assert ours @ POINT == pytest.approx(np.array(transform.matrix) @ POINT, rel=1e-5, abs=1e-5)  # theirs: float32

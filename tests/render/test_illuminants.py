@@ -1,0 +1,169 @@
+"""Named lights: each of luminance 1, and of the shape that its name promises."""
+
+import numpy as np
+import pytest
+from outside_truth import LIGHT_NM, LIGHTS
+
+from render.illuminants import MOON_SLOPE_PER_NM, daylight, illuminant, lines_nm, names, unit_luminance
+from render.photometry import colour_matching_functions, luminance, tristimulus
+from render.spectrum import Spectrum, black_body, line_bands
+from rodcone.errors import InputError
+
+NM, WIDTH_NM = np.arange(360.5, 830.0), np.ones(470)
+
+
+@pytest.mark.parametrize("name", [*names(), "2700K", "D12000K"])
+def test_every_light_has_a_luminance_of_one(name):
+    light, v = illuminant(name), colour_matching_functions()[1]
+    fine = np.arange(360.0, 830.0, 0.05) + 0.025  # another quadrature: a point every 0.05 nm
+    sampled = np.interp(fine, light.wavelength_nm, light.values, left=0.0, right=0.0)
+    luminance_cd_m2 = 683.0 * 0.05 * (sampled * np.interp(fine, v.wavelength_nm, v.values)).sum()
+    assert luminance_cd_m2 == pytest.approx(1.0, rel=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "x", "y"),
+    [  # CIE 15, 1931 observer
+        ("A", 0.44758, 0.40745),
+        ("D50", 0.34567, 0.35851),
+        ("D55", 0.33243, 0.34744),
+        ("D65", 0.31272, 0.32903),
+        ("D75", 0.29903, 0.31488),
+        ("E", 1 / 3, 1 / 3),
+        ("F2", 0.3721, 0.3751),
+        ("F11", 0.3805, 0.3769),
+        ("sodium_high", 0.5330, 0.4150),
+        ("LED-B1", 0.4560, 0.4078),
+        ("LED-B2", 0.4357, 0.4012),
+        ("LED-B3", 0.3756, 0.3723),
+        ("LED-B4", 0.3422, 0.3502),
+        ("LED-B5", 0.3118, 0.3236),
+        ("LED-BH1", 0.4474, 0.4066),
+        ("LED-RGB1", 0.4557, 0.4211),
+        ("LED-V1", 0.4548, 0.4044),
+        ("LED-V2", 0.3781, 0.3775),
+        ("D4000K", 0.38234, 0.38377),  # CIE 15, table of daylight loci
+        ("D10000K", 0.27879, 0.29207),
+        ("2856K", 0.44758, 0.40745),  # illuminant A, but for the second radiation constant
+    ],
+)
+def test_every_light_has_its_published_chromaticity(name, x, y):
+    xyz = tristimulus(illuminant(name).band_average(NM, WIDTH_NM), NM, WIDTH_NM)
+    assert xyz[:2] / xyz.sum() == pytest.approx([x, y], abs=5e-4)
+
+
+# Kieffer and Stone 2005, table 4, visible bands: nm, a0 to a3, d1 to d3.
+ROLO = np.array(
+    [
+        (405.0, -2.35754, -1.72134, 0.40337, -0.21105, 0.35235, -0.03818, -0.00006),
+        (412.3, -2.34185, -1.74337, 0.42156, -0.21512, 0.36591, -0.05902, 0.00080),
+        (414.4, -2.43367, -1.72184, 0.43600, -0.22675, 0.35558, -0.03247, -0.00503),
+        (441.6, -2.31964, -1.72114, 0.37286, -0.19304, 0.37935, -0.09562, 0.00970),
+        (465.8, -2.35085, -1.66538, 0.41802, -0.22541, 0.33450, -0.02546, -0.00484),
+        (475.0, -2.28999, -1.63180, 0.36193, -0.20381, 0.33024, -0.03131, 0.00222),
+        (486.9, -2.23351, -1.68573, 0.37632, -0.19877, 0.36590, -0.08945, 0.00678),
+        (544.0, -2.13864, -1.60613, 0.27886, -0.16426, 0.37190, -0.10629, 0.01428),
+        (549.1, -2.10782, -1.66736, 0.41697, -0.22026, 0.36814, -0.09815, -0.00000),
+        (553.8, -2.12504, -1.65970, 0.38409, -0.20655, 0.37206, -0.10745, 0.00347),
+        (665.1, -1.88914, -1.58096, 0.30477, -0.17908, 0.37141, -0.13514, 0.01248),
+        (693.1, -1.89410, -1.58509, 0.28080, -0.16427, 0.39109, -0.17048, 0.01754),
+        (703.6, -1.92103, -1.60151, 0.36924, -0.20567, 0.37155, -0.13989, 0.00412),
+        (745.3, -1.86896, -1.57522, 0.33712, -0.19415, 0.36888, -0.14828, 0.00958),
+        (763.7, -1.85258, -1.47181, 0.14377, -0.11589, 0.39126, -0.16957, 0.03053),
+        (774.8, -1.80271, -1.59357, 0.36351, -0.20326, 0.36908, -0.16182, 0.00830),
+    ]
+)
+
+
+def test_moonlight_is_sunlight_times_the_rolo_model_of_the_full_moon():
+    nm, phase_deg = ROLO[:, 0], 7.0
+    terms = [np.radians(phase_deg) ** power for power in range(4)]
+    terms += [np.exp(-phase_deg / 4.06054), np.exp(-phase_deg / 12.8802), np.cos((phase_deg + 30.5858) / 16.7498)]
+    albedo = np.exp(ROLO[:, 1:] @ terms)
+    slope, at_550_nm = np.polyfit(nm - 550, albedo, 1)
+    assert pytest.approx(slope / at_550_nm, rel=5e-3) == MOON_SLOPE_PER_NM
+    ratio = illuminant("moonlight").band_average(nm, 10.0) / illuminant("sunlight").band_average(nm, 10.0)
+    share = (ratio / albedo) / (ratio / albedo).mean()
+    assert share == pytest.approx(np.ones(nm.size), abs=0.1)  # the model's own bands scatter by 9 % about a line
+    assert share.std() < 0.05
+
+
+def mccamy_k(name):
+    """Correlated colour temperature by McCamy's formula (1992)."""
+    xyz = tristimulus(illuminant(name).band_average(NM, WIDTH_NM), NM, WIDTH_NM)
+    x, y = xyz[:2] / xyz.sum()
+    n = (x - 0.3320) / (0.1858 - y)
+    return 449 * n**3 + 3525 * n**2 + 6823.3 * n + 5520.33
+
+
+def test_the_low_sun_and_the_moon_under_it_are_warm():
+    assert 5000 < mccamy_k("sunlight") < 5500  # air mass 1.5: between D50 and D55
+    assert 4300 < mccamy_k("moonlight") < 4700  # Kieffer & Stone's reddening takes 600 to 800 K off
+
+
+@pytest.mark.parametrize("kelvin", [2000.0, 3000.0, 6500.0])
+def test_a_temperature_is_a_black_body(kelvin):
+    made, planck = illuminant(f"{kelvin:g}K"), black_body(kelvin)
+    assert made.values / made.values.max() == pytest.approx(planck.values / planck.values.max(), rel=1e-14)
+
+
+@pytest.mark.parametrize(("name", "kelvin"), [("D50", 5003.0), ("D55", 5503.0), ("D65", 6504.0), ("D75", 7504.0)])
+def test_the_daylight_formula_gives_the_tabulated_illuminants(name, kelvin):
+    nm = np.arange(400.0, 751.0, 10.0)
+    ratio = daylight(kelvin).band_average(nm, 1e-3) / illuminant(name).band_average(nm, 1e-3)
+    assert ratio == pytest.approx(np.ones(nm.size), abs=3e-3)  # the tables round M1 and M2 to three decimals
+    assert illuminant(f"D{kelvin:g}K").values == pytest.approx(daylight(kelvin).values)
+
+
+@pytest.mark.parametrize("name", ["100K", "D3000K", "D30000K", "2000000K"])
+def test_a_temperature_out_of_range_is_refused_with_its_value(name):
+    with pytest.raises(InputError, match=rf"^illuminant: .* \[K\]: {float(name.strip('DK')):.1f} is outside "):
+        illuminant(name)
+
+
+def test_sodiums_lines_are_the_doublet_and_share_a_band_that_holds_all_their_light():
+    assert lines_nm("sodium_low") == (588.995, 589.592)
+    nm, width_nm = line_bands(lines_nm("sodium_low"))
+    light = illuminant("sodium_low").band_average(nm, width_nm) * width_nm
+    assert np.count_nonzero(light) == 1
+    assert width_nm[light > 0] < 2.0
+    y = colour_matching_functions()[1]
+    v = np.interp(lines_nm("sodium_low"), y.wavelength_nm, y.values)
+    assert light.sum() == pytest.approx(1 / (683.0 * (2 * v[0] + v[1]) / 3), rel=1e-9)
+
+
+def test_smooth_lights_have_no_lines_and_an_unknown_one_is_refused():
+    assert all(lines_nm(name) == () for name in (*names(), "3000K") if name != "sodium_low")
+    with pytest.raises(InputError, match="did you mean 'sodium_low'"):
+        lines_nm("sodium_lo")
+
+
+def test_equal_energy_is_flat():
+    assert np.ptp(illuminant("E").values) == 0.0
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+def test_a_light_has_the_shape_of_isetcams_table(name):
+    ratio = illuminant(name).band_average(LIGHT_NM, 1e-3) / LIGHTS[name]
+    assert ratio / np.median(ratio) == pytest.approx(np.ones(ratio.size), rel=2e-3)  # both tables: 3 or 4 digits
+
+
+def test_scaling_to_unit_luminance_takes_out_any_factor():
+    spectrum = Spectrum(np.array([500.0, 600.0]), np.array([1.0, 2.0]))
+    assert unit_luminance(spectrum * 1e-7).values == pytest.approx(unit_luminance(spectrum).values, rel=1e-13)
+    assert luminance(unit_luminance(spectrum).band_average(NM, WIDTH_NM), NM, WIDTH_NM) == pytest.approx(1.0, rel=1e-13)
+
+
+@pytest.mark.parametrize(("name", "nearest"), [("d65", "D65"), ("D66", "D6|D65"), ("moonligt", "moonlight")])
+def test_an_unknown_light_is_refused_and_the_nearest_named(name, nearest):
+    with pytest.raises(InputError) as caught:
+        illuminant(name)
+    text = str(caught.value)
+    assert text.startswith(f"illuminant: {name!r} is unknown; allowed: A, D50")
+    assert any(f"did you mean {choice!r}?" in text for choice in nearest.split("|"))
+    assert "\n" not in text
+
+
+def test_names_lists_every_light_once():
+    assert len(set(names())) == len(names())
+    assert {"A", "D65", "E", "moonlight", "F11"} <= set(names())

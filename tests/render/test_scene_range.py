@@ -1,0 +1,289 @@
+"""Bands beyond what a scene's surfaces and lights are known over: refused, held or told; closed forms beside them."""
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from render.engine import render
+from render.geometry import look_at, to_world
+from render.illuminants import illuminant
+from render.illuminants import names as illuminants
+from render.scene import LightGroup, Node, Scene, spectrum_node, uniform_node
+from render.scene_range import check_range, warn_of_dark_ends, warn_of_own_colours
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, flat
+from render.user_scene.scene_file import load_scene_file
+from rodcone.errors import InputError
+from rodcone.jit import backend
+from scenes.catalog import load
+from scenes.catalog import names as scenes
+
+SHORT = Spectrum(np.array([400.0, 550.0, 700.0]), np.array([0.2, 0.8, 0.4]))
+EVEN, UNEVEN = spectrum_node(SHORT), spectrum_node(Spectrum(np.array([400.0, 500.0, 700.0]), SHORT.values))
+EXACT = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba draws wavelengths too")
+WALL_NM = np.array([385.0, 475.0, 625.0, 775.0])  # of bands 10 nm wide: outside, inside twice, outside
+
+
+def wall(bsdf: Node, light: Spectrum | None = None, **parts: Any) -> Scene:
+    """Quad that fills the picture under a sun at normal incidence of 1 W m^-2 nm^-1, or another light."""
+    geometry = {
+        "type": "scene",
+        "sensor": {"type": "perspective", "fov": 20.0, "to_world": to_world(look_at((0, 0, 4), (0, 0, 0)))},
+        "wall": {"type": "rectangle", "bsdf": bsdf},
+        "sun": {"type": "directional", "direction": [0.0, 0.0, -1.0]},
+        **parts,
+    }
+    return Scene("wall", geometry, {"sun": LightGroup(("sun",), light or flat())})
+
+
+def matte(reflectance: Any) -> Node:
+    return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": reflectance}}
+
+
+def radiance(scene: Scene) -> np.ndarray:
+    """Mean over the picture in the four bands."""
+    made = render(scene, (4, 4), wavelength_nm=WALL_NM, width_nm=10.0, spp=16, max_depth=2)
+    return np.asarray(made.relight().values.mean(axis=(0, 1), dtype=np.float64))
+
+
+# --- surfaces
+
+
+CHECKS = {"type": "checkerboard", "color0": uniform_node(0.5), "color1": UNEVEN}
+FILTER = {"type": "thindielectric", "specular_transmittance": EVEN}
+D65 = {"type": "d65"}
+ENDING = {
+    "even table": (matte(EVEN), "wall/bsdf/bsdf/reflectance", 400, 700),
+    "uneven table": (matte(UNEVEN), "wall/bsdf/bsdf/reflectance", 400, 700),
+    "blanks between": (
+        matte({"type": "irregular", "wavelengths": "390 700", "values": "0.1 0.2"}),
+        "wall/bsdf/bsdf/reflectance",
+        *(390, 700),
+    ),
+    "part of a texture": (matte(CHECKS), "wall/bsdf/bsdf/reflectance/color1", 400, 700),
+    "transmittance": (FILTER, "wall/bsdf/specular_transmittance", 400, 700),
+    "reference": (matte({"type": "ref", "id": "paint"}), "wall/bsdf/bsdf/reflectance", 400, 700),
+    "metal by name": ({"type": "roughconductor", "material": "Li"}, "wall/bsdf", 306.123, 751.394),
+    "index of a metal": ({"type": "conductor", "eta": EVEN, "k": uniform_node(1.0)}, "wall/bsdf/eta", 400, 700),
+}
+
+
+@pytest.mark.parametrize(("bsdf", "path", "low", "high"), ENDING.values(), ids=ENDING)
+def test_bands_beyond_a_surfaces_data_are_refused_and_it_is_named(
+    bsdf: Node, path: str, low: float, high: float
+) -> None:
+    scene = wall(bsdf, paint=EVEN)
+    check_range(scene, np.ceil(low), np.floor(high))
+    for ends in ((low - 0.5, high - 1.0), (low + 1.0, high + 0.5), (380.0, 780.0)):
+        with pytest.raises(InputError) as refused:
+            check_range(scene, *ends)
+        assert str(refused.value) == (
+            f"scene wall: bands reach {ends[0]:g}-{ends[1]:g} nm, and {path} is known over {low:g}-{high:g} nm alone; "
+            "give bands within, or hold its end values beyond: extend='hold' or --extend hold"
+        )
+    check_range(replace(scene, extend="hold"), 100.0, 20_000.0)
+
+
+def test_render_refuses_before_it_renders() -> None:
+    with pytest.raises(InputError, match="bands reach 380-780 nm, and wall/bsdf/bsdf/reflectance is known over 400-7"):
+        radiance(wall(matte(EVEN)))
+
+
+def test_mitsubas_own_lights_as_reflectance_are_known_over_the_cie_range() -> None:
+    """Outside 360-830 nm Mitsuba gives 0, and there is no table whose ends could be held."""
+    check_range(wall(matte(D65)), 360.0, 830.0)
+    with pytest.raises(InputError, match=r"known over 360-830 nm alone; give bands within$"):
+        check_range(wall(matte(D65)), 380.0, 831.0)
+
+
+@pytest.mark.parametrize(
+    "bsdf",
+    [
+        matte(uniform_node(0.5)),
+        matte({"type": "rgb", "value": [0.6, 0.3, 0.1]}),
+        matte({"type": "bitmap", "filename": "p.png"}),
+        {"type": "roughconductor", "material": "none"},
+        {"type": "diffuse"},
+    ],
+)
+def test_what_mitsuba_knows_at_every_wavelength_is_never_refused(bsdf: Node) -> None:
+    check_range(wall(bsdf), 300.0, 1100.0)
+
+
+def test_a_table_that_only_a_light_refers_to_is_no_surface() -> None:
+    lit = wall(matte(uniform_node(0.5)), tint=EVEN)
+    panel = {"type": "rectangle", "emitter": {"type": "area", "radiance": {"type": "ref", "id": "tint"}}}
+    group = LightGroup(("panel/emitter",), flat(), own_colour=True)
+    groups = {**lit.groups, "panel": group}
+    check_range(Scene("wall", lit.geometry | {"panel": panel}, groups), 380.0, 780.0)
+
+
+@EXACT
+@pytest.mark.parametrize("reflectance", [EVEN, UNEVEN], ids=["even", "uneven"])
+@pytest.mark.parametrize("rows", [True, False])
+def test_held_ends_go_on_in_the_picture(reflectance: Node, rows: bool) -> None:
+    """Diffuse under collimated irradiance E at normal incidence: L = rho E / pi, rho averaged over each band."""
+    scene = wall(matte(reflectance))
+    if not rows:  # a light of its own colour is evaluated wavelength by wavelength
+        sun = scene.geometry["sun"] | {"irradiance": uniform_node(1.0)}
+        groups = {"sun": LightGroup(("sun",), flat(), own_colour=True)}
+        scene = Scene("wall", scene.geometry | {"sun": sun}, groups)
+    inside = {id(EVEN): (0.5, 0.6), id(UNEVEN): (0.65, 0.55)}[id(reflectance)]
+    found = radiance(replace(scene, extend="hold"))
+    assert found * np.pi == pytest.approx([0.2, *inside, 0.4], rel=2e-3)  # wavelengths jittered within 10 nm
+
+
+def test_a_held_metal_goes_on_at_its_last_index() -> None:
+    held = replace(wall({"type": "conductor", "material": "Li"}), extend="hold").geometry["wall"]["bsdf"]
+    assert set(held) == {"type", "eta", "k"}
+    for part in ("eta", "k"):
+        first, *_, before, last = held[part]["values"].split(",")
+        assert last == before
+        assert held[part]["wavelengths"].startswith("100.0,306.12")
+        assert first == held[part]["values"].split(",")[1]
+
+
+def test_holding_leaves_the_scene_and_its_lights_as_they_were() -> None:
+    lamp = {"type": "rectangle", "emitter": {"type": "area", "radiance": EVEN}}
+    geometry = wall(matte(EVEN)).geometry | {"lamp": lamp}
+    groups = {
+        "sun": LightGroup(("sun",), flat()),
+        "lamp": LightGroup(("lamp/emitter",), flat(), own_colour=True),
+    }
+    held = Scene("wall", geometry, groups, extend="hold")
+    assert held.geometry["lamp"] == lamp
+    assert geometry["wall"]["bsdf"]["bsdf"]["reflectance"] == EVEN
+    again = replace(held, name="again")
+    assert again.geometry["wall"] == held.geometry["wall"]
+
+
+def test_another_word_for_extend_is_refused_and_the_one_meant_is_named() -> None:
+    with pytest.raises(InputError, match="extend: 'hol' is unknown; allowed: hold; did you mean 'hold'"):
+        replace(wall(matte(EVEN)), extend="hol")
+
+
+XML = """<scene version="3.0.0">
+<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="4"/>
+<integer name="height" value="4"/></film>
+<transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
+<float name="fov" value="20"/></sensor>
+<emitter type="directional" id="sun"><vector name="direction" x="0" y="0" z="-1"/>
+<spectrum name="irradiance" value="1"/></emitter>
+<shape type="rectangle" id="wall"><bsdf type="diffuse">
+<spectrum name="reflectance" value="400:0.2, 550:0.8, 700:0.4"/></bsdf></shape></scene>"""
+
+
+@EXACT
+def test_a_scene_file_is_refused_or_held(tmp_path: Path) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text(XML)
+    with pytest.raises(InputError, match=r"wall/_arg_0/reflectance is known over 400-700 nm alone; .*--extend hold"):
+        radiance(load_scene_file(path).scene)
+    found = radiance(load_scene_file(path, extend="hold").scene)
+    assert found * np.pi == pytest.approx([0.2, 0.5, 0.6, 0.4], rel=2e-3)
+    with pytest.raises(InputError, match="extend: 'zero' is unknown"):
+        load_scene_file(path, extend="zero")
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"type": "irregular", "wavelengths": "400, blue", "values": "1, 2"}, "'blue'"),
+        ({"type": "irregular", "wavelengths": "400, 300", "values": "1, 2"}, "strictly increasing"),
+        ({"type": "regular", "wavelength_min": "far", "wavelength_max": 700.0, "values": "1, 2"}, "'far'"),
+        ({"type": "regular", "wavelength_min": 400.0, "wavelength_max": 700.0, "values": "1"}, "two or more"),
+    ],
+)
+def test_a_table_that_is_none_is_refused_in_one_line(table: Node, words: str) -> None:
+    with pytest.raises(InputError, match=words) as refused:
+        check_range(wall(matte(table)), 400.0, 700.0)
+    assert "give numbers, separated by commas" in str(refused.value)
+
+
+# --- lights
+
+
+def told(lights: Scene | Spectrum, low: float, high: float) -> list[str]:
+    """Warnings about a spectrum, or about a scene's lights of their own colour, for one band."""
+    band = np.array([(low + high) / 2]), np.array([high - low])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        if isinstance(lights, Scene):
+            warn_of_own_colours(lights, *band)
+        else:
+            warn_of_dark_ends("lamp", lights, *band)
+    assert all(warning.category is UserWarning for warning in caught)
+    return [str(warning.message) for warning in caught]
+
+
+@EXACT
+def test_a_light_is_dark_outside_its_table_and_a_warning_tells() -> None:
+    scene = wall(matte(uniform_node(0.5)), SHORT)
+    with pytest.warns(
+        UserWarning,
+        match=r"^light group 'sun' is known over 400-700 nm, and bands reach 380-780 nm: it gives no light "
+        "beyond what is known$",
+    ):
+        found = radiance(scene)
+    assert found[[0, 3]].tolist() == [0.0, 0.0]
+    assert found[1:3] * np.pi == pytest.approx([0.25, 0.3], rel=1e-6)
+    assert told(SHORT, 400.0, 700.0) == []
+    assert len(told(SHORT, 399.0, 700.0)) == len(told(SHORT, 400.0, 701.0)) == 1
+
+
+def test_a_table_that_ends_at_zero_is_dark_beyond_by_itself() -> None:
+    line = Spectrum(np.array([588.0, 589.0, 590.0]), np.array([0.0, 2.0, 0.0]))
+    assert told(line, 380.0, 780.0) == []
+    rising = Spectrum(np.array([400.0, 700.0]), np.array([0.0, 2.0]))
+    assert told(rising, 380.0, 700.0) == []
+    assert len(told(rising, 380.0, 780.0)) == 1
+
+
+def test_a_light_of_its_own_colour_tells_of_the_tables_in_it(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2), (200, 120, 40)).save(tmp_path / "p.png")
+    bare = wall(matte(uniform_node(0.5))).geometry
+    for radiance_of, beyond_nm, known in (
+        (EVEN, 701.0, "400-700"),
+        ({"type": "rgb", "value": [1.0, 2.0, 3.0]}, 831.0, "360-830"),
+        ({"type": "checkerboard", "color0": uniform_node(1.0), "color1": UNEVEN}, 701.0, "400-700"),
+        ({"type": "bitmap", "filename": str(tmp_path / "p.png")}, 1000.0, None),
+    ):
+        panel = {"type": "rectangle", "emitter": {"type": "area", "radiance": radiance_of}}
+        geometry = {key: part for key, part in bare.items() if key != "sun"} | {"panel": panel}
+        scene = Scene("wall", geometry, {"panel": LightGroup(("panel/emitter",), flat(), own_colour=True)})
+        assert told(scene, 400.0, 700.0) == []
+        expected = f"scene wall: light 'panel/emitter' is known over {known} nm, and bands reach 400-{beyond_nm:g} nm"
+        assert [text[: len(expected)] for text in told(scene, 400.0, beyond_nm)] == ([expected] if known else [])
+
+
+def test_a_light_exchanged_after_the_render_tells_too() -> None:
+    made = render(wall(matte(uniform_node(0.5))), (2, 2), wavelength_nm=WALL_NM, width_nm=10.0, spp=2, max_depth=2)
+    made.relight({"sun": "D65"})
+    with pytest.warns(UserWarning, match="light group 'sun' is known over 400-700 nm, and bands reach 380-780 nm"):
+        made.relight({"sun": SHORT})
+
+
+# --- what the project ships
+
+
+@pytest.mark.parametrize("name", scenes())
+def test_every_scene_of_the_catalogue_covers_the_default_bands_exactly(name: str) -> None:
+    """Its tables reach from 380 nm to 780 nm, or further; so do its lights, as far as they shine."""
+    scene = load(name)
+    ends = DEFAULT_WAVELENGTH_NM[0] - 5, DEFAULT_WAVELENGTH_NM[-1] + 5
+    check_range(scene, *ends)
+    assert told(scene, *ends) == []
+    assert [text for group in scene.groups.values() for text in told(group.spectrum, *ends)] == []
+    if name != "color_checker":
+        with pytest.raises(InputError, match="known over 380-780 nm alone"):
+            check_range(scene, 380.0, 785.0)
+        check_range(replace(scene, extend="hold"), 300.0, 1100.0)
+
+
+def test_every_illuminant_covers_the_default_bands() -> None:
+    for name in (*illuminants(), "2856K", "D7000K"):
+        assert told(illuminant(name), 380.0, 780.0) == [], name

@@ -1,0 +1,257 @@
+"""Spectra: exact averages of linear pieces, and one-line complaints about bad points and bands."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from render.photometry import LIGHT_M_S, PLANCK_J_S
+from render.radiance import SpectralRadiance
+from render.spectrum import (
+    DEFAULT_WAVELENGTH_NM,
+    Spectrum,
+    band_widths,
+    black_body,
+    flat,
+    line_bands,
+    line_spectrum,
+)
+from rodcone.errors import InputError
+from sensor.optics import SpectralIrradiance
+
+BOLTZMANN_J_K = 1.380649e-23  # exact, SI 2019
+WIEN_NM_K = 2.897771955e6  # CODATA 2018
+TENT = Spectrum(np.array([400.0, 500.0, 700.0]), np.array([0.0, 1.0, 0.0]))
+
+
+def complaint(call, *args):
+    with pytest.raises(InputError) as caught:
+        call(*args)
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+@pytest.mark.parametrize(
+    ("centre", "width", "mean"),
+    [
+        (450.0, 100.0, 0.5),  # the rising side alone
+        (450.0, 20.0, 0.5),
+        (425.0, 1e-6, 0.25),  # a point
+        (600.0, 200.0, 0.5),  # the falling side alone
+        (650.0, 50.0, 0.25),
+        (500.0, 20.0, (0.95 + 0.975) / 2),  # over the top: a mean of two trapezoids
+        (550.0, 300.0, 0.5),  # all of it: area 150
+        (400.0, 100.0, 0.125),  # half outside: area 12.5 over 100
+        (400.0, 400.0, (50 + 75) / 400),
+        (1000.0, 1400.0, (75.0 + 25.0 + 12.5 + 37.5 - 50.0 + 50.0) / 1400),  # wider than the spectrum: area 150
+        (350.0, 100.0, 0.0),  # ends where it starts
+        (200.0, 50.0, 0.0),
+        (900.0, 50.0, 0.0),
+    ],
+)
+def test_a_band_average_of_linear_pieces_is_exact(centre, width, mean):
+    assert TENT.band_average(centre, width) == pytest.approx(mean, rel=1e-8, abs=1e-13)
+
+
+def test_a_band_across_a_point_of_uneven_spacing_weighs_its_pieces_by_width():
+    spectrum = Spectrum(np.array([400.0, 403.0, 410.0, 500.0]), np.array([2.0, 8.0, 1.0, 1.0]))
+    area = 5.0 * 3 + 4.5 * 7 + 1.0 * 10  # trapezoids up to 420 nm
+    assert spectrum.band_average(410.0, 20.0) == pytest.approx(area / 20, rel=1e-14)
+
+
+@given(
+    start=st.floats(200, 500),
+    steps=st.lists(st.floats(0.01, 200), min_size=1, max_size=12),
+    seed=st.integers(0, 2**32 - 1),
+    cuts=st.integers(1, 40),
+)
+@settings(deadline=None, derandomize=True, max_examples=200)
+def test_bands_that_fill_the_spectrum_sum_to_its_integral(start, steps, seed, cuts):
+    nm = start + np.concatenate([[0.0], np.cumsum(steps)])
+    values = np.random.default_rng(seed).uniform(0, 3, nm.size)
+    edges = np.linspace(nm[0] - 7.0, nm[-1] + 11.0, cuts + 1)
+    averages = Spectrum(nm, values).band_average((edges[1:] + edges[:-1]) / 2, np.diff(edges))
+    assert (averages * np.diff(edges)).sum() == pytest.approx(np.trapezoid(values, nm), rel=1e-10, abs=1e-9)
+
+
+def test_a_band_average_has_the_shape_of_the_bands_and_one_width_serves_all():
+    assert flat(3.0).band_average(DEFAULT_WAVELENGTH_NM, 10.0) == pytest.approx(np.full(40, 3.0), rel=1e-13)
+    assert TENT.band_average([], []).shape == (0,)
+
+
+def test_default_bands_fill_the_visible_range():
+    assert (DEFAULT_WAVELENGTH_NM[0] - 5, DEFAULT_WAVELENGTH_NM[-1] + 5) == (380.0, 780.0)
+    assert DEFAULT_WAVELENGTH_NM.size == 40
+
+
+def test_a_spectrum_times_a_number_keeps_its_points():
+    assert np.array_equal((TENT * 2.5).values, [0.0, 2.5, 0.0])
+    assert np.array_equal((TENT * 2.5).wavelength_nm, TENT.wavelength_nm)
+
+
+def test_a_spectrum_holds_its_own_copy_of_the_points():
+    nm, values = np.array([400.0, 500.0]), np.array([1.0, 1.0])
+    spectrum = Spectrum(nm, values)
+    values[:], nm[:] = 7.0, [1.0, 2.0]
+    assert spectrum.band_average(450.0, 10.0) == 1.0
+
+
+@pytest.mark.parametrize("nm", [[500.0], [500.0, 500.0], [500.0, 400.0], [[400.0, 500.0]], [400.0, np.nan], []])
+def test_wavelengths_that_do_not_increase_are_refused_with_their_values(nm):
+    text = complaint(Spectrum, np.array(nm), np.ones_like(np.array(nm)))
+    assert text.startswith(f"wavelength_nm: {nm!r} is not allowed; give two or more strictly increasing")
+
+
+@pytest.mark.parametrize("values", [[1.0], [1.0, -0.1], [1.0, np.nan], [np.inf, 1.0], [1.0, 1.0, 1.0]])
+def test_values_that_are_not_finite_positive_or_one_a_wavelength_are_refused(values):
+    text = complaint(Spectrum, np.array([400.0, 500.0]), np.array(values))
+    assert "spectrum values" in text
+    assert "2 finite numbers >= 0, one a wavelength; correct them" in text
+
+
+def test_band_widths_are_the_spacing_of_even_centres():
+    assert np.array_equal(band_widths(np.arange(400.0, 701.0, 10.0), None), np.full(31, 10.0))
+    assert np.array_equal(band_widths([500.0, 540.0], None), [40.0, 40.0])
+
+
+def test_band_widths_given_are_kept_and_one_width_serves_all():
+    assert np.array_equal(band_widths([400.0, 500.0, 650.0], [1.0, 2.0, 3.0]), [1.0, 2.0, 3.0])
+    assert np.array_equal(band_widths([400.0, 500.0, 650.0], 5.0), [5.0, 5.0, 5.0])
+
+
+@pytest.mark.parametrize("nm", [[500.0], [400.0, 410.0, 425.0]])
+def test_bands_without_even_spacing_need_a_width(nm):
+    text = complaint(band_widths, nm, None)
+    assert f"{len(nm)} bands" in text
+    assert "give width_nm as well" in text
+
+
+@pytest.mark.parametrize("nm", [[], [500.0, 400.0], [500.0, 500.0], [-10.0, 10.0], [0.0, 10.0], [400.0, np.inf]])
+def test_centres_that_do_not_increase_from_above_zero_are_refused_with_their_values(nm):
+    assert complaint(band_widths, nm, 10.0).startswith(f"wavelength_nm: {nm!r} is not allowed; give increasing")
+
+
+@pytest.mark.parametrize("width", [0.0, -1.0, np.nan, np.inf])
+def test_widths_that_are_not_positive_are_refused_with_their_values(width):
+    assert complaint(band_widths, [400.0, 500.0], [10.0, width]).startswith(f"width_nm: {[10.0, width]!r} is not")
+
+
+NOT_NM = [
+    (np.array([0.38, 0.58, 0.78]), "0.38 to 0.78 is outside 100 to 20000 nm; they seem to be micrometres: multiply"),
+    (np.array([3.8e-7, 5.8e-7, 7.8e-7]), "they seem to be metres: multiply them by 1e+09"),
+    (np.array([0.0, 400.0, 800.0]), "0 to 800 is outside 100 to 20000 nm; give nanometres"),
+    (np.array([400.0, 10_400.0, 20_400.0]), "is outside 100 to 20000 nm; give nanometres"),
+]
+
+
+@pytest.mark.parametrize(("nm", "words"), NOT_NM)
+def test_a_spectrum_over_what_is_no_nanometres_is_refused_and_the_unit_named(nm, words):
+    assert words in complaint(Spectrum, nm, np.ones(3))
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e-3, "micrometres"), (1e-9, "metres")])
+def test_bands_and_pictures_in_other_units_are_refused_and_the_unit_named(factor, unit):
+    nm = np.arange(385.0, 780.0, 10.0) * factor
+    for refuse in (
+        lambda: complaint(band_widths, nm, None),
+        lambda: complaint(band_widths, nm, 10.0 * factor),
+        lambda: complaint(SpectralRadiance, np.ones((2, 2, 40)), nm),
+        lambda: complaint(SpectralIrradiance, np.ones((2, 2, 40)), nm, 2.2),
+    ):
+        text = refuse()
+        assert text.startswith(f"wavelength_nm: {380 * factor:g} to {780 * factor:g} is outside 100 to 20000 nm")
+        assert f"they seem to be {unit}: multiply them" in text
+
+
+def test_the_ends_of_what_counts_as_nanometres_are_taken():
+    assert band_widths([105.0, 19_990.0], [10.0, 20.0]).tolist() == [10.0, 20.0]
+    assert "99.9 to" in complaint(band_widths, [105.0, 500.0], [10.2, 10.0])
+    assert Spectrum(np.array([100.0, 20_000.0]), np.ones(2)).band_average(550.0, 10.0) == 1.0
+
+
+@pytest.mark.parametrize("width", [20.0, [10.0, 10.3, 10.0], [10.0, 10.0, 10.3]])
+def test_bands_that_overlap_by_over_a_hundredth_are_refused(width):
+    text = complaint(band_widths, [400.0, 410.0, 420.0], width)
+    assert "overlap, and the light of both would count twice; give widths that don't" in text
+    assert "overlap" in complaint(SpectralRadiance, np.ones((2, 2, 3)), [400.0, 410.0, 420.0], 0.0, width)
+
+
+def test_a_narrow_band_inside_a_wide_one_is_refused():
+    assert "bands 0 and 1, 380 to 480 nm and 450 to 452 nm" in complaint(band_widths, [430.0, 451.0], [100.0, 2.0])
+
+
+def test_bands_that_touch_or_overlap_by_rounding_are_taken():
+    assert band_widths([400.0, 410.0], [10.1, 10.0]).tolist() == [10.1, 10.0]
+    line_and_rest = line_bands([435.8, 546.1, 577.0, 579.1])
+    assert np.array_equal(band_widths(*line_and_rest), line_and_rest[1])
+    edges = np.linspace(380.0, 780.0, 31)  # a third of a width isn't a float
+    assert band_widths((edges[1:] + edges[:-1]) / 2, np.diff(edges)).size == 30
+
+
+@pytest.mark.parametrize("temperature_k", [2856.0, 4200.0, 6504.0])
+def test_a_black_body_follows_plancks_law_with_si_constants(temperature_k):
+    spectrum = black_body(temperature_k)
+    metres = spectrum.wavelength_nm * 1e-9
+    law = metres**-5 / np.expm1(PLANCK_J_S * LIGHT_M_S / (metres * BOLTZMANN_J_K * temperature_k))
+    assert spectrum.values == pytest.approx(law / law[spectrum.wavelength_nm == 560.0], rel=1e-8)
+    assert spectrum.values[spectrum.wavelength_nm == 560.0] == pytest.approx(1.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("temperature_k", [3000.0, 4200.0, 6504.0, 9000.0])
+def test_a_black_body_peaks_where_wiens_law_says(temperature_k):
+    spectrum = black_body(temperature_k)
+    peak_nm = spectrum.wavelength_nm[spectrum.values.argmax()]
+    assert abs(peak_nm - WIEN_NM_K / temperature_k) <= 5.0  # the table's step
+
+
+def test_a_line_holds_its_power_and_stays_within_a_twentieth_of_a_nanometre():
+    doublet = line_spectrum([589.0, 589.6], [2.0, 1.0])
+    assert doublet.band_average([589.0, 589.6, 589.3], [0.1, 0.1, 1.0]) == pytest.approx([20.0, 10.0, 3.0], rel=1e-9)
+    assert doublet.band_average([588.9, 589.3, 589.7], [0.1, 0.5, 0.1]) == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("lines", [[589.6, 589.0], [589.0, 589.05]])
+def test_lines_that_are_not_apart_are_refused(lines):
+    assert complaint(line_spectrum, lines, [1.0, 1.0]).startswith(f"lines_nm: {lines!r} is not allowed")
+
+
+def edges_of(centres, widths):
+    assert centres[1:] - widths[1:] / 2 == pytest.approx(centres[:-1] + widths[:-1] / 2, abs=1e-9)  # no gap, no overlap
+    return np.append(centres - widths / 2, centres[-1] + widths[-1] / 2)
+
+
+def test_without_lines_the_bands_are_the_default_ones():
+    centres, widths = line_bands([])
+    assert centres == pytest.approx(DEFAULT_WAVELENGTH_NM)
+    assert widths == pytest.approx(np.full(40, 10.0))
+
+
+def test_a_doublet_closer_than_a_nanometre_shares_one_band():
+    centres, widths = line_bands([589.6, 589.0])
+    assert edges_of(centres, widths)[20:25] == pytest.approx([580.0, 588.5, 590.1, 600.0, 610.0])
+
+
+def test_a_piece_of_under_a_nanometre_beside_a_line_joins_its_neighbour():
+    edges = edges_of(*line_bands([579.1], (560.0, 600.0)))
+    assert edges == pytest.approx([560.0, 570.0, 578.6, 579.6, 590.0, 600.0])
+
+
+@given(
+    lines=st.lists(st.floats(381.0, 779.0), min_size=1, max_size=12),
+    width=st.sampled_from([2.0, 5.0, 10.0, 33.0]),
+)
+def test_every_line_has_a_band_whose_edges_are_half_a_nanometre_from_a_line(lines, width):
+    centres, widths = line_bands(lines, width_nm=width)
+    edges = edges_of(centres, widths)
+    assert (edges[0], edges[-1]) == (380.0, 780.0)
+    assert widths.max() <= width + 2.0 + 1e-9
+    for line in lines:
+        band = np.searchsorted(edges, line) - 1
+        for edge in edges[band : band + 2]:
+            assert min(abs(abs(edge - other) - 0.5) for other in lines) < 1e-9
+
+
+@pytest.mark.parametrize("line", [380.2, 790.0])
+def test_a_line_outside_the_range_is_refused(line):
+    assert f"lines_nm: {[line]!r} is not inside 380 to 780" in complaint(line_bands, [line])

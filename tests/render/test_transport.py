@@ -1,0 +1,285 @@
+"""Relighting, on small transports written by hand: linearity to the bit, levels, errors. Nothing is rendered."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import transport_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from render.error_estimates import SharedPaths
+from render.illuminants import illuminant
+from render.level import PassMeans
+from render.photometry import luminance
+from render.scene import LightGroup
+from render.spectrum import Spectrum, flat
+from rodcone.errors import InputError
+
+NM, WIDTH_NM = np.arange(400.0, 701.0, 50.0), np.full(7, 50.0)
+SIZE = (5, 6)
+RAMP = Spectrum(np.array([300.0, 900.0]), np.array([0.1, 2.0]))
+
+
+def transport(radiance=None, *, seed=0, seen=None, irradiance=..., **changes):
+    """Two groups of random radiance, half differences that leave both halves positive, no light in view."""
+    rng = np.random.default_rng(seed)
+    drawn = rng.lognormal(0.0, 2.0, (2, NM.size, *SIZE)).astype(np.float32)
+    radiance = drawn if radiance is None else radiance.astype(np.float32)
+    made = transport_of(
+        radiance,
+        {"sky": LightGroup(("sky",), illuminant("D65"), 100.0), "lamp": LightGroup(("lamp",), RAMP, 0.3)},
+        NM,
+        WIDTH_NM,
+        half_difference=(radiance * rng.uniform(-0.5, 0.5, radiance.shape)).astype(np.float32),
+        variance=(radiance * rng.uniform(0.0, 0.1, radiance.shape)).astype(np.float32) ** 2,
+        seen=seen,
+        irradiance=rng.uniform(1.0, 4.0, (2, NM.size)) if irradiance is ... else irradiance,
+    )
+    return replace(made, **changes)
+
+
+def complaint(call, **options):
+    with pytest.raises(InputError) as caught:
+        call(**options)
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+def ulps(a, b):
+    """Largest distance in units of the last place of float32."""
+    return float((np.abs(a.astype(np.float64) - b) / np.spacing(np.abs(b).astype(np.float32))).max())
+
+
+POWERS_OF_TWO = [2.0**-20, 0.5, 2.0, 2.0**15]
+
+
+@pytest.mark.parametrize("factor", POWERS_OF_TWO)
+def test_lights_brighter_by_a_power_of_two_give_bit_equal_radiance(factor):
+    made = transport()
+    powers = {"sky": 100.0 * factor, "lamp": 0.3 * factor}
+    assert np.array_equal(made.relight(powers=powers).values, made.relight().values * np.float32(factor))
+
+
+@pytest.mark.parametrize("factor", POWERS_OF_TWO)
+def test_a_level_higher_by_a_power_of_two_gives_bit_equal_radiance(factor):
+    made = transport()
+    one = made.relight(luminance_cd_m2=3.7).values
+    assert np.array_equal(made.relight(luminance_cd_m2=3.7 * factor).values, one * np.float32(factor))
+    lux = made.relight(illuminance_lux=11.0).values
+    assert np.array_equal(made.relight(illuminance_lux=11.0 * factor).values, lux * np.float32(factor))
+
+
+@given(factor=st.floats(1e-9, 1e9), seed=st.integers(0, 1000))
+@settings(deadline=None, derandomize=True, max_examples=150)
+def test_lights_brighter_by_any_factor_agree_within_two_ulp(factor, seed):
+    made = transport(seed=seed)
+    scaled = made.relight(powers={"sky": 100.0 * factor, "lamp": 0.3 * factor}).values
+    assert scaled.dtype == np.float32
+    assert ulps(scaled, made.relight().values.astype(np.float64) * factor) <= 2
+
+
+@given(level=st.floats(1e-6, 1e6), other=st.floats(1e-6, 1e6))
+@settings(deadline=None, derandomize=True, max_examples=100)
+def test_two_levels_differ_by_their_ratio_within_two_ulp(level, other):
+    made = transport(seed=5)
+    one, two = (made.relight(luminance_cd_m2=value).values for value in (level, other))
+    assert ulps(two, one.astype(np.float64) * (other / level)) <= 2
+
+
+def test_relit_radiance_is_emission_times_transport_rounded_once():
+    made = transport()
+    emission = np.stack([100.0 * illuminant("D65").band_average(NM, WIDTH_NM), 0.3 * RAMP.band_average(NM, WIDTH_NM)])
+    expected = np.einsum("gb,gbhw->hwb", emission, made.radiance.astype(np.float64))
+    assert ulps(made.relight().values, expected) <= 0.5 + 1e-6
+
+
+def test_two_groups_sum_to_both_together():
+    made = transport()
+    sky = made.relight(powers={"lamp": 0.0}).values.astype(np.float64)
+    lamp = made.relight(powers={"sky": 0.0}).values.astype(np.float64)
+    assert ulps(made.relight().values, sky + lamp) <= 2
+
+
+def test_a_spectrum_given_replaces_the_groups_own_and_a_name_stands_for_a_light():
+    made = transport()
+    by_name = made.relight({"sky": "A"}, powers={"lamp": 0.0}).values
+    by_value = made.relight({"sky": illuminant("A")}, powers={"lamp": 0.0}).values
+    assert np.array_equal(by_name, by_value)
+    ratio = by_name / made.relight(powers={"lamp": 0.0}).values
+    expected = illuminant("A").band_average(NM, WIDTH_NM) / illuminant("D65").band_average(NM, WIDTH_NM)
+    assert ratio == pytest.approx(np.broadcast_to(expected, ratio.shape), rel=1e-6)
+
+
+@pytest.mark.parametrize("level", [0.036, 25.0, 1e5])
+def test_the_mean_luminance_asked_for_is_that_of_what_is_no_light(level):
+    """A lamp fills two pixels and an eighth of a third, in which the wall goes on: the wall's light over its area."""
+    seen = np.zeros((2, *SIZE), np.float32)
+    seen[1, 1:3, 4], seen[1, 3, 4] = 1.0, 0.125
+    wall = 1e-4 * transport().radiance * (1 - seen.sum(axis=0))
+    made = transport(wall + seen[:, None], seen=seen)
+    lit = made.relight(luminance_cd_m2=level)
+    uncovered = 1 - made.coverage
+    assert uncovered.sum() == 30 - 2.125
+    assert made.scattered_luminance(luminance_cd_m2=level).sum() / uncovered.sum() == pytest.approx(level, rel=1e-5)
+    assert lit.luminance()[uncovered == 1].sum() < level * uncovered.sum()  # the third pixel's wall belongs to it
+    assert lit.luminance()[1, 4] > 1000 * level
+
+
+def test_a_level_and_its_error_are_those_of_a_ratio_of_sums_over_passes():
+    """Against the jackknife over passes of unequal samples, which knows no formula of the ratio's variance."""
+    rng = np.random.default_rng(5)
+    spp = np.array([4, 4, 9, 9, 16, 16])
+    means = PassMeans(
+        spp=spp,
+        uncovered=rng.uniform(0.89, 0.91, 6),
+        radiance=rng.uniform(0.9, 1.1, (6, 1, 1)) * rng.uniform(0.5, 1.0, (1, 2, NM.size)),
+        irradiance=rng.uniform(0.9, 1.1, (6, 2, NM.size)),
+    )
+    made = transport(pass_means=means)
+
+    def mean_luminance(kept):
+        emitted = [x.spectrum.band_average(NM, WIDTH_NM) * x.power for x in made.groups.values()]
+        light = sum(
+            n * luminance((emitted * per_pass).sum(axis=0), NM, WIDTH_NM)
+            for n, per_pass in zip(spp[kept], means.radiance[kept], strict=True)
+        )
+        return float(light / (spp[kept] @ means.uncovered[kept]))
+
+    level, kept = made.level(), np.arange(6)
+    assert level.value == pytest.approx(mean_luminance(kept), rel=1e-12)
+    shares = spp / spp.sum()
+    # Delete-one jackknife of unequal parts (Busing, Meijer & Leeden 1999).
+    pseudo = [(level.value - (1 - s) * mean_luminance(kept != i)) / s for i, s in enumerate(shares)]
+    variance = np.mean([(x - level.value) ** 2 * s / (1 - s) for x, s in zip(pseudo, shares, strict=True)])
+    assert level.relative_error == pytest.approx(np.sqrt(variance) / level.value, rel=0.1)
+    assert made.relight(luminance_cd_m2=3.0).relative_level_error == level.relative_error
+    assert made.relight().relative_level_error is None
+    assert 0 < made.relight(illuminance_lux=3.0).relative_level_error < 0.1
+
+
+def test_the_illuminance_asked_for_is_reached_on_the_reference_plane():
+    made = transport()
+    values = made.relight(illuminance_lux=500.0).values
+    emission = np.stack([100.0 * illuminant("D65").band_average(NM, WIDTH_NM), 0.3 * RAMP.band_average(NM, WIDTH_NM)])
+    lux = luminance((emission * made.irradiance).sum(axis=0), NM, WIDTH_NM)
+    assert values / made.relight().values == pytest.approx(np.full(values.shape, 500.0 / lux), rel=1e-6)
+
+
+def test_illuminance_of_a_mean_luminance_is_the_one_that_gives_it():
+    made = transport()
+    lux = made.illuminance_lux(25.0)
+    assert made.relight(illuminance_lux=lux).luminance().mean() == pytest.approx(25.0, rel=1e-6)
+    assert transport(irradiance=None).illuminance_lux(25.0) is None
+
+
+def test_level_zero_is_dark():
+    assert not transport().relight(luminance_cd_m2=0.0).values.any()
+    assert not transport().relight(powers={"sky": 0.0, "lamp": 0.0}).values.any()
+
+
+def test_both_levels_at_once_are_refused():
+    text = complaint(transport().relight, luminance_cd_m2=1.0, illuminance_lux=1.0)
+    assert "both given; allowed: one of them" in text
+
+
+def test_illuminance_without_a_reference_plane_is_refused():
+    text = complaint(transport(irradiance=None).relight, illuminance_lux=1.0)
+    assert text == "illuminance_lux: the scene states no reference plane; give luminance_cd_m2 instead"
+
+
+def test_luminance_is_refused_where_every_pixel_sees_a_light():
+    seen = np.zeros((2, *SIZE), np.float32)
+    seen[0] = 1.0
+    made = transport(np.ones((2, NM.size, *SIZE), np.float32), seen=seen)
+    assert "every pixel sees a light directly" in complaint(made.relight, luminance_cd_m2=1.0)
+
+
+def test_a_level_of_a_scene_without_light_is_refused():
+    text = complaint(transport().relight, powers={"sky": 0.0, "lamp": 0.0}, luminance_cd_m2=2.0)
+    assert text.startswith("level: 2.0 can't be reached, the scene gives no light")
+
+
+@pytest.mark.parametrize("given", [{"spectra": {"ski": "D65"}}, {"powers": {"ski": 1.0}}])
+def test_an_unknown_group_is_refused_and_the_nearest_named(given):
+    text = complaint(transport().relight, **given)
+    assert text.startswith(f"{next(iter(given))}: light group: 'ski' is unknown; allowed: lamp, sky")
+    assert "did you mean 'sky'?" in text
+
+
+def test_an_unknown_illuminant_is_refused():
+    assert "illuminant: 'D66' is unknown" in complaint(transport().relight, spectra={"sky": "D66"})
+
+
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
+@pytest.mark.parametrize("name", ["powers", "luminance_cd_m2", "illuminance_lux"])
+def test_a_negative_or_infinite_level_or_power_is_refused_with_its_value(name, value):
+    text = complaint(transport().relight, **{name: {"lamp": value} if name == "powers" else value})
+    assert text.startswith(name)
+    assert f"{value!r} is outside 0 to" in text
+
+
+@pytest.mark.parametrize("level", [{}, {"luminance_cd_m2": 7.0}, {"illuminance_lux": 9.0}])
+def test_halves_average_to_the_relit_radiance(level):
+    made = transport()
+    options = {"spectra": {"lamp": flat(3.0)}, "powers": {"sky": 2.0}, **level}
+    even, odd = made.relight_halves(**options)
+    mean = (even.values.astype(np.float64) + odd.values) / 2
+    assert mean == pytest.approx(made.relight(**options).values, rel=5e-7)
+    assert np.abs(even.values - odd.values).max() > 0
+
+
+def test_halves_differ_by_twice_the_half_difference():
+    made = transport()
+    even, odd = made.relight_halves({"sky": flat(), "lamp": flat()}, powers={"sky": 1.0, "lamp": 0.0})
+    expected = np.moveaxis(2.0 * made.half_difference[0].astype(np.float64), 0, -1)
+    scale = np.moveaxis(made.radiance[0], 0, -1)
+    assert np.abs((even.values.astype(np.float64) - odd.values) - expected).max() <= 4e-7 * scale.max()
+
+
+def test_halves_whose_noise_crosses_zero_still_average_to_the_relit_radiance():
+    """Clipped at 0 they would differ by less than the render's noise."""
+    made = transport()
+    made = replace(made, half_difference=made.radiance * np.float32(-3.0))
+    even, odd = made.relight_halves()
+    lit = made.relight().values
+    assert even.values.min() < 0
+    assert (even.values.astype(np.float64) + odd.values) / 2 == pytest.approx(lit, rel=2e-6)
+    assert even.values - odd.values == pytest.approx(-6 * lit, rel=2e-6)
+
+
+def test_the_error_of_a_relit_scene_adds_the_groups_variances():
+    shape = (2, NM.size, *SIZE)
+    made = transport(radiance=np.ones(shape, np.float32), variance=np.full(shape, 0.01, np.float32))
+    lit = made.relight({"sky": flat(), "lamp": flat()}, powers={"sky": 3.0, "lamp": 1.0})
+    assert lit.relative_mc_error == pytest.approx(0.1 * np.sqrt(3.0**2 + 1.0) / 4.0, rel=1e-5)
+
+
+@pytest.mark.parametrize("correlation", [-1.0, -0.4, 0.7])
+def test_the_variance_of_groups_that_share_paths_holds_their_covariance(correlation):
+    made = transport()
+    made = replace(made, shared=SharedPaths((0, 1), np.full(made.variance.shape[1:], correlation, np.float32)))
+    given = np.stack([100.0 * illuminant("D65").band_average(NM, WIDTH_NM), 0.3 * RAMP.band_average(NM, WIDTH_NM)])
+    level = 12.0 / made.relight().luminance().mean()
+    sky, lamp = (level * given)[:, :, None, None] * np.sqrt(made.variance.astype(np.float64))
+    expected = sky**2 + lamp**2 + 2 * correlation * sky * lamp
+    found = made.relight_variance(luminance_cd_m2=12.0)
+    assert found.dtype == np.float32
+    assert np.abs(found - expected).max() <= 1e-6 * (sky + lamp).max() ** 2
+    assert found.min() >= 0
+    pooled = made.relight().relative_mc_error / replace(made, shared=None).relight().relative_mc_error
+    assert (pooled > 1) == (correlation > 0)
+
+
+def test_the_error_does_not_depend_on_the_level():
+    made = transport()
+    errors = [made.relight(luminance_cd_m2=level).relative_mc_error for level in (1e-5, 1.0, 1e5)]
+    assert errors == pytest.approx([made.relight().relative_mc_error] * 3, rel=1e-5)
+
+
+def test_relit_radiance_keeps_the_bands_and_lies_band_by_band_in_memory():
+    values = transport().relight()
+    assert np.array_equal(values.wavelength_nm, NM)
+    assert np.array_equal(values.widths_nm, WIDTH_NM)
+    assert np.moveaxis(values.values, -1, 0).flags.c_contiguous

@@ -1,0 +1,592 @@
+"""A user's scene: what is read, how its lights are grouped, and that nothing hostile gets as far as being loaded."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from render.engine import render
+from render.geometry import look_at, to_world
+from render.loader import mitsuba_module
+from render.user_scene.scene_dict import scene_from_dict
+from render.user_scene.scene_file import load_scene_file
+from render.user_scene.scene_parts import LONGEST_CHAIN, SceneFile
+from render.user_scene.scene_paths import MOST_NESTED
+from rodcone.errors import InputError
+
+CAMERA = """
+<sensor type="perspective" id="camera">
+  <float name="fov" value="20"/>
+  <transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="6"/></film>
+  <sampler type="independent"/>
+</sensor>"""
+SUN = '<emitter type="directional" id="sun"><vector name="direction" x="0" y="0" z="-1"/></emitter>'
+WALL = '<shape type="rectangle" id="wall"/>'
+QUAD = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n"
+
+
+def write(folder: Path, *parts: str, name: str = "scene.xml") -> Path:
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f'<scene version="3.0.0">{"".join(parts)}\n</scene>\n')
+    return path
+
+
+def refusal(path: Path, **options: bool) -> str:
+    with pytest.raises(InputError) as caught:
+        load_scene_file(path, **options)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def loaded_libraries() -> str:
+    maps = Path("/proc/self/maps")
+    if not maps.is_file():
+        pytest.skip("no /proc: the libraries that this process has loaded can't be listed")
+    return maps.read_text()
+
+
+@pytest.fixture
+def nothing_is_loaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fails the test where anything is instantiated."""
+
+    def refuse(*_: Any) -> None:
+        raise AssertionError("instantiated")
+
+    mi = mitsuba_module()
+    for module, name in ((mi, "load_dict"), (mi, "load_file"), (mi.parser, "instantiate")):
+        monkeypatch.setattr(module, name, refuse)
+
+
+# --- what is read
+
+
+def test_lit_mesh_has_the_radiance_of_the_closed_form(tmp_path: Path) -> None:
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "quad.obj").write_text(QUAD)
+    path = write(
+        tmp_path,
+        CAMERA,
+        '<emitter type="directional" id="sun"><vector name="direction" x="0" y="0" z="-1"/>'
+        '<spectrum name="irradiance" value="3"/></emitter>',
+        '<bsdf type="diffuse" id="grey"><spectrum name="reflectance" value="0.5"/></bsdf>',
+        '<shape type="obj" id="quad"><string name="filename" value="meshes/quad.obj"/><ref id="grey"/></shape>',
+    )
+    opened = load_scene_file(path)
+    assert (opened.size, opened.scene.reference_plane, opened.notes) == ((6, 8), None, ())
+    transport = render(opened.scene, opened.size, wavelength_nm=np.arange(420.0, 700.0, 80.0), spp=16)
+    # A diffuse surface under collimated irradiance E at normal incidence: L = rho E / pi, without Monte Carlo error.
+    np.testing.assert_allclose(transport.relight().values, 0.5 * 3 / np.pi, rtol=1e-5)
+
+
+def test_an_irradiance_meter_marks_the_plane_on_which_lux_are_meant(tmp_path: Path) -> None:
+    wall = '<shape type="rectangle" id="wall"><sensor type="irradiancemeter"/></shape>'
+    opened = load_scene_file(write(tmp_path, CAMERA, wall, '<emitter type="constant" id="sky"/>'))
+    assert opened.scene.reference_plane == "wall"
+    transport = render(opened.scene, (1, 1), wavelength_nm=np.arange(420.0, 700.0, 80.0), spp=16)
+    np.testing.assert_allclose(transport.irradiance, np.pi, rtol=1e-5)  # E = pi L under an even sky
+    # A light without size would be left out of what the meter reads, so the plane is left out instead.
+    opened = load_scene_file(write(tmp_path, CAMERA, wall, SUN))
+    assert opened.scene.reference_plane is None
+    assert "irradiance meter is left out" in opened.notes[0]
+
+
+FORMS = {
+    "absent": "",
+    "rgb": '<rgb name="{0}" value="3 1 0.5"/>',
+    "float": '<float name="{0}" value="2.5"/>',
+    "uniform": '<spectrum name="{0}" value="2.5"/>',
+    "even points": '<spectrum name="{0}" value="400:1,500:2,600:0.5"/>',
+    "uneven points": '<spectrum name="{0}" value="400:1,450:2,700:0.5"/>',
+    "blackbody": '<spectrum name="{0}" type="blackbody"><float name="temperature" value="3000"/></spectrum>',
+    "d65": '<spectrum name="{0}" type="d65"/>',
+    "tinted d65": '<spectrum name="{0}" type="d65"><rgb name="color" value="1 2 3"/></spectrum>',
+    "regular": '<spectrum name="{0}" type="regular"><float name="wavelength_min" value="400"/>'
+    '<float name="wavelength_max" value="700"/><string name="values" value="1, 2, 0.5"/></spectrum>',
+    "irregular": '<spectrum name="{0}" type="irregular"><string name="wavelengths" value="400, 450, 700"/>'
+    '<string name="values" value="1, 2, 0.5"/></spectrum>',
+}
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+def test_spectrum_of_a_light_is_what_stock_mitsuba_emits(form: str, tmp_path: Path) -> None:
+    lamp = f'<shape type="rectangle"><emitter type="area" id="lamp">{form.format("radiance")}</emitter></shape>'
+    path = write(tmp_path, CAMERA, lamp)
+    mi, nm = mitsuba_module(), [412.0, 451.5, 555.0, 687.25]
+    emitter = mi.load_file(str(path)).emitters()[0]
+    seen = mi.SurfaceInteraction3f()
+    seen.wi, seen.wavelengths = mi.Vector3f(0, 0, 1), mi.Spectrum(*nm)
+    group = load_scene_file(path).scene.groups["lamp"]
+    assert not group.own_colour
+    ours = np.interp(nm, group.spectrum.wavelength_nm, group.spectrum.values, left=0.0, right=0.0)
+    # 1e-3: between points 1 nm apart, d65's own 5 nm kinks are met half-way.
+    np.testing.assert_allclose(ours, np.array(emitter.eval(seen)).ravel(), rtol=1e-3)
+
+
+def test_without_llvm_a_light_has_the_same_spectrum(tmp_path: Path) -> None:
+    lamp = '<emitter type="point" id="lamp"><rgb name="intensity" value="3 1 0.5"/></emitter>'
+    path = write(tmp_path, CAMERA, lamp)
+    code = (
+        "import sys; from rodcone.jit import backend; from render.user_scene.scene_file import load_scene_file; "
+        "print(backend(), load_scene_file(sys.argv[1]).scene.groups['lamp'].spectrum.values.tolist())"
+    )
+    slow = os.environ | {"DRJIT_LIBLLVM_PATH": "/nonexistent/libLLVM.so"}
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(path)], env=slow, capture_output=True, text=True, timeout=60, check=True
+    )
+    used, values = done.stdout.splitlines()[-1].split(maxsplit=1)
+    if used == "cuda":
+        pytest.skip("a CUDA device answers here, whatever the LLVM library")
+    ours = load_scene_file(path).scene.groups["lamp"].spectrum.values
+    np.testing.assert_allclose(json.loads(values), ours, rtol=1e-5)
+
+
+def test_a_lamps_line_keeps_its_height_and_width(tmp_path: Path) -> None:
+    lamp = '<spectrum name="intensity" value="400:0,588.95:0,589:20,589.05:0,700:0"/>'
+    spectrum = load_scene_file(write(tmp_path, CAMERA, f'<emitter type="point">{lamp}</emitter>')).scene.groups
+    # A triangle 0.1 nm wide and 20 high holds 1; a grid of 1 nm would make it 20.
+    assert spectrum["emitter_0"].spectrum.band_average([589.0], [1.0])[0] == pytest.approx(1.0, rel=1e-9)
+
+
+def test_lights_are_grouped_by_id_or_their_shapes_up_to_a_colon(tmp_path: Path) -> None:
+    blue = '<rgb name="radiance" value="0 0 1"/>'
+    red = '<rgb name="radiance" value="1 0 0"/>'
+    path = write(
+        tmp_path,
+        CAMERA,
+        *(f'<shape type="disk" id="lamp:{i}"><emitter type="area">{blue}</emitter></shape>' for i in range(2)),
+        f'<shape type="disk" id="panel"><emitter type="area" id="own.id">{blue}</emitter></shape>',
+        f'<shape type="disk"><emitter type="area">{blue}</emitter></shape>',
+        f'<shape type="disk" id="mixed:a"><emitter type="area">{blue}</emitter></shape>',
+        f'<shape type="disk" id="mixed:b"><emitter type="area">{red}</emitter></shape>',
+        '<emitter type="point"/><emitter type="sunsky" id="sky"/>',
+    )
+    scene = load_scene_file(path).scene
+    assert {name: len(group.emitters) for name, group in scene.groups.items()} == {
+        **dict.fromkeys(("lamp", "mixed"), 2),
+        **dict.fromkeys(("own.id", "shape_0", "emitter_0", "sky"), 1),
+    }
+    assert {name for name, group in scene.groups.items() if group.own_colour} == {"mixed", "sky"}
+    assert scene.geometry["mixed:b"]["_arg_0"]["radiance"] == {"type": "rgb", "value": [1.0, 0.0, 0.0]}
+    assert "radiance" not in scene.geometry["lamp:1"]["_arg_0"]
+
+
+@pytest.mark.usefixtures("nothing_is_loaded")
+def test_a_file_is_checked_where_mitsuba_opens_it(tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    (tmp_path / "secret.spd").write_text("400 1\n700 1\n")
+    write(home, '<bsdf type="diffuse"><spectrum name="reflectance" filename="r.spd"/></bsdf>', name="in/real.xml")
+    (home / "in" / "r.spd").write_text("400 0.25\n700 0.75\n")
+    (home / "r.spd").symlink_to(tmp_path / "secret.spd")  # Mitsuba takes this one, beside the including file
+    (home / "link.xml").symlink_to(home / "in" / "real.xml")
+    for included in ("in/real.xml", "link.xml"):
+        told = refusal(write(home, f'<include filename="{included}"/>', CAMERA, SUN))
+        assert "file 'r.spd' lies outside" in told
+
+
+def test_textured_light_keeps_its_picture(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "p.png")
+    picture = '<texture type="bitmap" name="radiance"><string name="filename" value="p.png"/></texture>'
+    path = write(tmp_path, CAMERA, f'<shape type="disk" id="tv"><emitter type="area">{picture}</emitter></shape>')
+    scene = load_scene_file(path).scene
+    assert scene.groups["tv"].own_colour
+    assert scene.geometry["tv"]["_arg_0"]["radiance"]["filename"] == str((tmp_path / "p.png").resolve())
+
+
+def test_includes_defaults_aliases_and_spectrum_files_are_followed(tmp_path: Path) -> None:
+    write(
+        tmp_path,
+        '<bsdf type="diffuse" id="a"><spectrum name="reflectance" filename="parts/r.spd"/></bsdf>',
+        '<alias id="a" as="b"/>',
+        name="parts/materials.xml",
+    )
+    (tmp_path / "parts" / "r.spd").write_text("400 0.25\n700 0.75\n")
+    (tmp_path / "parts" / "parts").mkdir()  # not there: Mitsuba looks beside the including file
+    (tmp_path / "parts" / "parts" / "r.spd").write_text("400 1\n700 1\n")
+    path = write(
+        tmp_path,
+        '<default name="side" value="5"/><include filename="parts/materials.xml"/>',
+        CAMERA.replace('value="6"', 'value="$side"'),
+        SUN,
+        '<shape type="sphere"><ref id="b" name="bsdf"/></shape>',
+    )
+    opened = load_scene_file(path)
+    assert opened.size == (5, 8)
+    assert opened.scene.geometry["shape_0"]["bsdf"] == {"type": "ref", "id": "a"}
+    assert opened.scene.geometry["a"]["reflectance"]["values"] == "0.25,0.75"
+    mitsuba_module().load_dict(opened.scene.description)  # Mitsuba follows the reference too
+
+
+def test_an_included_files_name_may_hold_parameters(tmp_path: Path) -> None:
+    for name, value in (("d50", 1), ("d5000", 2), ("a", 3)):
+        light = f'<emitter type="point" id="lamp"><spectrum name="intensity" value="{value}"/></emitter>'
+        write(tmp_path, light, name=f"lights/{name}.xml")
+    # The first value of a parameter counts, and the longest name; one may hold another.
+    defaults = (("light", "d50"), ("light", "a"), ("light2", "${light}00"), ("folder", "lights"))
+    stated = "".join(
+        f'<default name="{name}" value="{value.replace("{light}", "light")}"/>' for name, value in defaults
+    )
+    path = write(tmp_path, stated, '<include filename="$folder/$light2.xml"/>', CAMERA)
+    assert load_scene_file(path).scene.groups["lamp"].spectrum.values[0] == 2
+
+
+def test_names_of_exporters_with_dots_and_blanks_are_kept_apart(tmp_path: Path) -> None:
+    grey = '<bsdf type="diffuse" id="{0}" name="{0}"/>'
+    wall = '<shape type="disk" id="wall 1"><bsdf type="diffuse" name="mat.1/2"/></shape>'
+    path = write(tmp_path, CAMERA, SUN, grey.format("mat.001"), grey.format("mat_001"), wall, WALL.replace("/>", ">"))
+    path.write_text(path.read_text().replace("</scene>", '<ref id="mat.001" name="mat 1"/></shape></scene>'))
+    geometry = load_scene_file(path).scene.geometry
+    assert {key: geometry[key]["id"] for key in ("mat_001", "mat_001_0", "wall_1", "wall")} == {
+        "mat_001": "mat_001",  # Mitsuba takes a key for an id as well
+        "mat_001_0": "mat.001",
+        "wall_1": "wall 1",
+        "wall": "wall",
+    }
+    assert geometry["wall"]["mat_1"] == {"type": "ref", "id": "mat.001"}
+    assert set(geometry["wall_1"]) == {"type", "id", "mat_1_2"}
+    mitsuba_module().load_dict(load_scene_file(path).scene.description)
+
+
+def test_an_area_light_stated_beside_its_shape_is_put_on_it(tmp_path: Path) -> None:
+    lamp = '<emitter type="area" id="lamp"><spectrum name="radiance" value="3"/></emitter>'
+    path = write(tmp_path, CAMERA, '<shape type="rectangle" id="ceiling"><ref id="lamp"/></shape>', lamp)
+    mi, opened = mitsuba_module(), load_scene_file(path)
+    assert opened.scene.groups["lamp"].emitters == ("ceiling/_arg_0",)
+    ours, stock = mi.load_dict(opened.scene.description).emitters(), mi.load_file(str(path)).emitters()
+    assert len(ours) == len(stock) == 1
+
+
+def test_what_the_engine_brings_itself_is_left_out_and_told(tmp_path: Path) -> None:
+    second = CAMERA.replace('id="camera"', 'id="second"').replace('value="8"', 'value="80"')
+    crop = '<integer name="crop_width" value="2"/></film>'
+    opened = load_scene_file(
+        write(tmp_path, '<integrator type="volpath"/>', CAMERA.replace("</film>", crop), second, SUN)
+    )
+    assert opened.size == (6, 8)
+    assert set(opened.scene.geometry["sensor"]) == {"type", "id", "fov", "to_world"}
+    assert {value["type"] for value in opened.scene.geometry.values() if isinstance(value, dict)} == {
+        *("perspective", "directional")
+    }
+    told = " ".join(opened.notes)
+    assert all(word in told for word in ("'volpath'", "1 of 2 cameras", "crop"))
+
+
+def test_many_uses_of_one_part_are_kept_as_references(tmp_path: Path) -> None:
+    # Written out, 40 levels of two references each would be 10^12 parts.
+    doubling = "".join(
+        f'<bsdf type="blendbsdf" id="b{i + 1}"><float name="weight" value="0.5"/>'
+        f'<ref id="b{i}" name="x"/><ref id="b{i}" name="y"/></bsdf>'
+        for i in range(40)
+    )
+    start = time.perf_counter()
+    opened = load_scene_file(write(tmp_path, CAMERA, SUN, '<bsdf type="diffuse" id="b0"/>', doubling))
+    assert time.perf_counter() - start < 5
+    assert opened.scene.geometry["b40"]["x"] == {"type": "ref", "id": "b39"}
+
+
+# --- what is refused, with one line
+
+
+MEDIUM = '<shape type="sphere"><medium type="homogeneous" name="interior"/></shape>'
+REFUSED = {
+    "no light": ([CAMERA, WALL], ["it has no light", "add one"]),
+    "no camera": ([SUN], ["camera 'none'", "perspective, thinlens"]),
+    "meter as camera": (['<sensor type="irradiancemeter"/>', SUN], ["camera 'irradiancemeter'"]),
+    "medium": ([CAMERA, SUN, MEDIUM], ["(line 7", "'homogeneous' is refused, participating media"]),
+    "polariser": ([CAMERA, SUN, '<bsdf type="polarizer"/>'], ["'polarizer'", "polarisation isn't simulated"]),
+    "projector": ([CAMERA, '<emitter type="projector"/>'], ["'projector'", "can't be relit", "sunsky"]),
+    "timed sky": ([CAMERA, '<emitter type="timed_sunsky"/>'], ["'timed_sunsky'", "can't be relit"]),
+    "parallel camera": ([CAMERA.replace("perspective", "orthographic"), SUN], ["'orthographic'", "perspective"]),
+    "unknown plug-in": ([CAMERA, SUN, '<bsdf type="difuse"/>'], ["'difuse'", "did you mean 'diffuse'?"]),
+    "memory reader": ([CAMERA, SUN, '<shape type="blender"/>'], ["'blender' is unknown"]),
+    "missing mesh": (
+        [CAMERA, SUN, '\n<shape type="obj"><string name="filename" value="no/teapot.obj"/></shape>'],
+        ["scene.xml (line 8", "'no/teapot.obj' is missing", "put it there"],
+    ),
+    "folder as mesh": ([CAMERA, SUN, '<shape type="obj"><string name="filename" value="."/></shape>'], ["a folder"]),
+    "missing include": ([CAMERA, SUN, '<include filename="no.xml"/>'], ["'no.xml' is missing"]),
+    "unknown element": (["\n\n<spher/>"], ["scene.xml (line 3, col 2)", "<spher>"]),
+    "bad number": ([CAMERA.replace('value="20"', 'value="wide"'), SUN], ["(line 3", '"wide"']),
+    "undefined parameter": ([CAMERA.replace('value="8"', 'value="$side"'), SUN], ["undefined parameter: $side"]),
+    "unknown reference": (
+        [CAMERA, SUN, '<bsdf type="diffuse" id="red"/><shape type="sphere"><ref id="rad"/></shape>'],
+        ["(line 7", "ref: 'rad' is unknown", "did you mean 'red'?"],
+    ),
+    "reference to a light": (
+        [CAMERA, SUN, '<shape type="sphere"><ref id="sun"/></shape>'],
+        ["'sun' points into a light"],
+    ),
+    "area light without a shape": ([CAMERA, '<emitter type="area" id="lamp"/>'], ["area light 'lamp' is on 0 shapes"]),
+    "area light on two shapes": (
+        [CAMERA, '<emitter type="area" id="lamp"/>', '<shape type="disk"><ref id="lamp"/></shape>' * 2],
+        ["area light 'lamp' is on 2 shapes"],
+    ),
+    "escaped parameter": ([CAMERA, SUN, r'<default name="a" value="\$b"/>'], ["(line 7", "escaped $"]),
+    "undefined parameter in a name": ([CAMERA, SUN, '<include filename="$a.xml"/>'], ["'$a.xml'", "undefined"]),
+    "circle": (
+        [
+            CAMERA,
+            SUN,
+            '<bsdf type="twosided" id="a"><ref id="b"/></bsdf><bsdf type="twosided" id="b"><ref id="a"/></bsdf>',
+        ],
+        ["circle"],
+    ),
+    "long chain": (
+        [
+            *(CAMERA, SUN, '<bsdf type="diffuse" id="b0"/>'),
+            *(f'<bsdf type="twosided" id="b{i + 1}"><ref id="b{i}"/></bsdf>' for i in range(LONGEST_CHAIN)),
+        ],
+        [f"over {LONGEST_CHAIN} deep"],
+    ),
+    "two planes": (
+        [CAMERA, SUN, *(f'<shape type="disk" id="d{i}"><sensor type="irradiancemeter"/></shape>' for i in (1, 2))],
+        ["d1, d2"],
+    ),
+    "camera in a shape": ([CAMERA, SUN, f'<shape type="disk">{CAMERA.replace("camera", "c2")}</shape>'], ["sensor"]),
+    "another plug-in by a property": (
+        [CAMERA, SUN, '<shape type="disk"><string name="type" value="evil"/></shape>'],
+        ["property name 'type'"],
+    ),
+    "negative spectrum": (
+        [CAMERA, SUN, '<bsdf type="diffuse"><spectrum name="reflectance" value="400:-1,500:1"/></bsdf>'],
+        [">= 0"],
+    ),
+    "film of no pixels": ([CAMERA.replace('value="8"', 'value="0"'), SUN], ["film width", "give pixels"]),
+}
+
+
+@pytest.mark.parametrize(("parts", "words"), REFUSED.values(), ids=REFUSED)
+def test_what_cannot_be_rendered_is_refused_with_place_and_fix(
+    parts: list[str], words: list[str], tmp_path: Path
+) -> None:
+    told = refusal(write(tmp_path, *parts))
+    assert [word for word in words if word not in told] == []
+
+
+def test_missing_and_malformed_files_are_named_with_the_line(tmp_path: Path) -> None:
+    assert "is missing or no file" in refusal(tmp_path / "none.xml")
+    assert "is missing or no file" in refusal(tmp_path)
+    path = tmp_path / "s.xml"
+    for text, words in {
+        '<scene version="3.0.0">\n<shape type="sphere">\n</scene>': "(line 3, col 3): not well-formed XML, mismatched",
+        "": "no element found",
+        "<scene/>": "missing version attribute",
+        '<bsdf version="3.0.0" type="diffuse"/>': "its root is 'diffuse'",
+    }.items():
+        path.write_text(text)
+        assert words in refusal(path)
+    path.write_text("<scene version='3.0.0'/>", encoding="utf-16")
+    assert "byte 0 is no UTF-8" in refusal(path)
+
+
+# --- what is hostile
+
+
+@pytest.mark.usefixtures("nothing_is_loaded")
+def test_native_code_of_a_scenes_own_is_refused_before_it_is_loaded(tmp_path: Path) -> None:
+    stock = Path(mitsuba_module().__file__).parent / "plugins" / "sphere.so"
+    (tmp_path / "plugins").mkdir()
+    shutil.copy(stock, tmp_path / "plugins" / "ball.so")  # native code that does load, as the next test shows
+    before = repr(mitsuba_module().file_resolver())
+    told = refusal(write(tmp_path, '<path value="."/>', CAMERA, SUN, '<shape type="ball"/>'))
+    assert "<path> lets a scene load native code" in told
+    assert "--trust-scene" in told
+    assert repr(mitsuba_module().file_resolver()) == before
+    write(tmp_path, '<path value="."/>', name="in.xml")
+    assert "<path>" in refusal(write(tmp_path, '<include filename="in.xml"/>', CAMERA, SUN))
+    assert "plug-in: 'ball' is unknown" in refusal(write(tmp_path, CAMERA, SUN, '<shape type="ball"/>'))
+    with pytest.raises(InputError, match="plug-in: 'ball' is unknown"):
+        scene_from_dict({"type": "scene", "s": {"type": "ball"}}, "s", folder=tmp_path)
+    with pytest.raises(InputError, match="plug-in: 'resources' is unknown"):
+        scene_from_dict({"type": "scene", "s": {"type": "resources", "path": str(tmp_path)}}, "s")
+    assert str(tmp_path) not in loaded_libraries()
+
+
+def test_a_trusted_scene_may_load_native_code_and_files_from_anywhere(tmp_path: Path) -> None:
+    stock = Path(mitsuba_module().__file__).parent / "plugins" / "sphere.so"
+    (tmp_path / "mine" / "plugins").mkdir(parents=True)
+    shutil.copy(stock, tmp_path / "mine" / "plugins" / "ball.so")
+    (tmp_path / "quad.obj").write_text(QUAD)
+    mesh = f'<shape type="obj" id="quad"><string name="filename" value="{tmp_path}/quad.obj"/></shape>'
+    path = write(tmp_path, '<path value="../mine"/>', CAMERA, SUN, mesh, '<shape type="ball"/>', name="a/scene.xml")
+    scene = load_scene_file(path, trust=True).scene
+    assert scene.geometry["quad"]["filename"] == str((tmp_path / "quad.obj").resolve())
+    mitsuba_module().load_dict(scene.description)
+    assert str(tmp_path / "mine") in loaded_libraries()
+
+
+def test_files_of_a_trusted_scene_are_looked_for_in_the_folders_of_its_paths(tmp_path: Path) -> None:
+    """Mesh, bitmap, spectrum, include: each in a folder beside the scene; the last <path> goes first."""
+    for name, height in (("models", 1), ("later", 2), ("a", 9)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "quad.obj").write_text(QUAD.replace(" 0\n", f" {height}\n"))
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "models" / "p.png")
+    (tmp_path / "later" / "r.spd").write_text("400 0.25\n700 0.75\n")
+    write(tmp_path / "models", SUN, name="lights/sun.xml")
+    cloth = '<texture name="reflectance" type="bitmap"><string name="filename" value="p.png"/></texture>'
+    parts = (
+        '<default name="place" value="../later"/><path value="../models"/><path value="$place"/>',
+        '<include filename="lights/sun.xml"/>',
+        CAMERA,
+        '<bsdf type="diffuse" id="grey"><spectrum name="reflectance" filename="r.spd"/></bsdf>',
+        f'<bsdf type="diffuse" id="red">{cloth}</bsdf>',
+        '<shape type="obj" id="quad"><string name="filename" value="quad.obj"/><ref id="red"/></shape>',
+    )
+    scene = load_scene_file(write(tmp_path / "a", *parts), trust=True).scene
+    assert Path(scene.geometry["quad"]["filename"]).resolve() == tmp_path.resolve() / "later" / "quad.obj"
+    assert Path(scene.geometry["red"]["reflectance"]["filename"]).resolve() == tmp_path.resolve() / "models" / "p.png"
+    assert scene.geometry["grey"]["reflectance"]["values"] == "0.25,0.75"
+    mi = mitsuba_module()
+    ours, stock = mi.load_dict(scene.description), mi.load_file(str(tmp_path / "a" / "scene.xml"))
+    assert ours.shapes()[0].bbox().min.z == stock.shapes()[0].bbox().min.z == 2
+    told = refusal(write(tmp_path / "a", '<path value="../none"/>', CAMERA, SUN), trust=True)
+    assert "<path> folder '../none' is missing" in told
+
+
+def test_a_stock_name_never_loads_a_file_beside_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Mitsuba looks for plugins/NAME.so on its search path, in which the working directory comes first.
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "plugins").mkdir()
+    for name in ("diffuse", "sphere", "hair"):
+        (tmp_path / "plugins" / f"{name}.so").write_text("hostile")
+    mi = mitsuba_module()
+    mi.file_resolver().prepend(str(tmp_path))  # as where Mitsuba was imported in this folder
+    opened = load_scene_file(write(tmp_path, CAMERA, SUN, '<shape type="sphere"><bsdf type="hair"/></shape>'))
+    stock = Path(mi.__file__).parent
+    assert Path(str(mi.file_resolver().resolve("plugins/hair.so"))) == stock / "plugins" / "hair.so"
+    mi.load_dict(opened.scene.description)
+    mi.file_resolver().prepend(str(tmp_path))
+    scene_from_dict({"type": "scene", "sun": {"type": "directional"}, "s": {"type": "perspective"}}, "s")
+    assert Path(str(mi.file_resolver().resolve("plugins/hair.so"))) == stock / "plugins" / "hair.so"
+
+
+@pytest.mark.usefixtures("nothing_is_loaded")
+@pytest.mark.parametrize(
+    "part",
+    [
+        '<shape type="ply"><string name="filename" value="{0}"/></shape>',
+        '<emitter type="envmap"><string name="filename" value="{0}"/></emitter>',
+        '<bsdf type="diffuse"><spectrum name="reflectance" filename="{0}"/></bsdf>',
+        '<include filename="{0}"/>',
+    ],
+    ids=["mesh", "envmap", "spectrum", "include"],
+)
+def test_files_outside_the_scenes_folder_are_refused_unread(part: str, tmp_path: Path) -> None:
+    secret = tmp_path / "secret.spd"
+    secret.write_text("secret words")
+    home = tmp_path / "home"
+    home.mkdir()
+    (home / "link.spd").symlink_to(secret)
+    (home / "linked").symlink_to(tmp_path)
+    for name in (str(secret), "../secret.spd", "link.spd", "linked/secret.spd", "../missing.spd", "/dev/zero"):
+        told = refusal(write(home, CAMERA, SUN, part.format(name)))
+        assert f"file {name!r} lies outside the scene's folder" in told
+        assert "--trust-scene" in told
+        assert "secret words" not in told
+        if "include" not in part and "spectrum" not in part:  # nor by way of a parameter
+            hidden = f'<default name="a" value="{name}"/>' + part.format("$a")
+            assert f"file {name!r} lies outside" in refusal(write(home, CAMERA, SUN, hidden))
+
+
+@pytest.mark.usefixtures("nothing_is_loaded")
+def test_bombs_are_refused_within_a_second(tmp_path: Path) -> None:
+    def deep(count: int) -> str:
+        return '<bsdf type="twosided">' * count + "</bsdf>" * count
+
+    ten_lines = '<default name="a0" value="0123456789"/>' + "".join(
+        f'<default name="a{i + 1}" value="{f"$a{i} " * 10}"/>' for i in range(10)
+    )
+    write(tmp_path, '<include filename="twice.xml"/><include filename="twice.xml"/>', name="once.xml")
+    write(tmp_path, '<include filename="last.xml"/>' * 300, name="twice.xml")
+    write(tmp_path, name="last.xml")
+    bombs = {
+        deep(MOST_NESTED): f"over {MOST_NESTED} deep",
+        deep(100_000): f"over {MOST_NESTED} deep",  # which ends Mitsuba's own parser, and the process with it
+        ten_lines: "$parameters grow past",
+        '<include filename="scene.xml"/>': "deep",
+        '<include filename="once.xml"/>': "200 files",
+    }
+    for text, words in bombs.items():
+        start = time.perf_counter()
+        assert words in refusal(write(tmp_path, text))
+        assert time.perf_counter() - start < 1
+    path = write(tmp_path, CAMERA, SUN)
+    path.write_text('<!DOCTYPE s [<!ENTITY a "evil">]>' + path.read_text().replace("hdrfilm", "&a;"))
+    assert "a DOCTYPE is not allowed" in refusal(path)
+
+
+# --- dicts
+
+
+def test_a_dict_gives_the_scene_of_the_same_xml(tmp_path: Path) -> None:
+    (tmp_path / "quad.obj").write_text(QUAD)
+    mesh = '<string name="filename" value="quad.obj"/><rgb name="unused" value="1"/>'
+    xml = load_scene_file(write(tmp_path, CAMERA, SUN, f'<shape type="obj" id="quad">{mesh}</shape>'))
+    mi = mitsuba_module()
+    turn = mi.ScalarTransform4f().look_at(origin=[0, 0, 4], target=[0, 0, 0], up=[0, 1, 0])
+    described = {
+        "type": "scene",
+        "integrator": {"type": "path"},
+        "eye": {
+            "type": "perspective",
+            "fov": np.float32(20.0),
+            "to_world": turn,
+            "film": {"type": "hdrfilm", "width": 8, "height": 6},
+        },
+        "sun": {"type": "directional", "direction": np.array([0, 0, -1.0]), "irradiance": {"type": "d65"}},
+        "quad": {"type": "obj", "filename": "quad.obj", "unused": {"type": "rgb", "value": 1}},
+    }
+    ours = scene_from_dict(described, "scene", folder=tmp_path)
+    assert (ours.size, len(ours.notes)) == (xml.size, 1)
+    np.testing.assert_allclose(
+        np.array(ours.scene.geometry["sensor"]["to_world"]), np.array(xml.scene.geometry["sensor"]["to_world"])
+    )
+    np.testing.assert_allclose(
+        np.array(xml.scene.geometry["sensor"]["to_world"]), np.array(to_world(look_at([0, 0, 4], [0, 0, 0])))
+    )
+    for part in ("sun", "quad"):
+        bare = {key: value for key, value in xml.scene.geometry[part].items() if key != "id"}
+        assert ours.scene.geometry[part] == bare
+    assert ours.scene.groups.keys() == xml.scene.groups.keys()
+    np.testing.assert_array_equal(ours.scene.groups["sun"].spectrum.values, xml.scene.groups["sun"].spectrum.values)
+
+
+def of_dict(**parts: Any) -> SceneFile:
+    return scene_from_dict({"type": "scene", "eye": {"type": "perspective"}, **parts}, "s")
+
+
+def test_live_objects_and_unreadable_values_in_a_dict_are_refused() -> None:
+    mi, sun = mitsuba_module(), {"type": "directional"}
+    circle: dict[str, Any] = {"type": "twosided"}
+    circle["again"] = circle
+    for parts, words in (
+        ({"lamp": mi.load_dict({"type": "point"})}, "'lamp' is of type Emitter"),
+        ({"wall": {"type": "rectangle", "bsdf": mi.load_dict({"type": "diffuse"})}}, "s/wall: 'bsdf' is of type"),
+        ({"wall": {"type": "rectangle", "to_world": [1, 2]}}, "'to_world' is of type list"),
+        ({"wall": {"bsdf": {"type": "diffuse"}}}, "s/wall: type None"),
+        ({"a/b": {"type": "rectangle"}}, "key 'a/b'"),
+        ({"a": circle}, f"over {MOST_NESTED} deep"),
+        ({"wall": {"type": "rectangle", "id": [1, 2, 3]}}, r"id [1, 2, 3]"),
+        ({"wall": {"type": "diffuse", "reflectance": {"type": "rgb", "value": "red"}}}, "rgb without a readable value"),
+        ({"sensor": {"type": "rectangle"}}, "part 'sensor' is not the camera"),
+        ({"wall": {"type": "ply", "filename": "none.ply"}}, "'none.ply' is missing"),
+    ):
+        with pytest.raises(InputError, match=re.escape(words)):
+            of_dict(sun=sun, **parts)
+
+
+def test_inline_spectra_of_a_dict_are_read() -> None:
+    point = {"type": "point", "intensity": {"type": "spectrum", "value": [(400, 1.0), (450, 3.0), (700, 2.0)]}}
+    opened = of_dict(lamp=point, other={"type": "point", "intensity": {"type": "spectrum", "value": 2.0}})
+    assert opened.scene.groups["lamp"].spectrum.values.tolist() == [1.0, 3.0, 2.0]
+    assert opened.scene.groups["other"].spectrum.values.tolist() == [2.0, 2.0]

@@ -1,0 +1,43 @@
+"""One line whatever a file makes an error quote, and ranges that no number slips through."""
+
+import math
+import pickle
+
+import pytest
+
+from rodcone.errors import MOST_TOLD, InputError, require_range
+
+
+@pytest.mark.parametrize(
+    ("quoted", "told"),
+    [
+        ("two\nlines", r"two\nlines"),
+        ("\x1b[2Jwiped", r"\x1b[2Jwiped"),  # a terminal would clear its screen
+        ("exe.\u202egnp", r"exe.\u202egnp"),  # and write this one backwards
+        ("\udcff", r"\udcff"),  # a file's name that is no UTF-8: print would fail
+        ("Grünes Licht, 緑", "Grünes Licht, 緑"),
+    ],
+)
+def test_a_message_is_one_line_that_a_terminal_only_shows(quoted: str, told: str) -> None:
+    assert str(InputError(f"name: {quoted!s} is not allowed")) == f"name: {told} is not allowed"
+
+
+def test_of_a_message_too_long_both_ends_are_told() -> None:
+    error = InputError("name: " + 1_000_000 * "x" + " is not allowed; correct it")
+    assert len(str(error)) == MOST_TOLD
+    assert str(error).startswith("name: xxx")
+    assert str(error).endswith("xxx is not allowed; correct it")
+    assert str(pickle.loads(pickle.dumps(error))) == str(error)  # from a worker it comes back the same
+    assert len(str(InputError(MOST_TOLD * "x"))) == MOST_TOLD
+    assert str(InputError(f"again: {error}")).endswith("; correct it")
+
+
+@pytest.mark.parametrize("value", [10**400, -(10**400), math.nan, math.inf, "3", None, 5.000001, -1e-9])
+def test_what_is_no_number_of_the_range_is_refused(value: object) -> None:
+    with pytest.raises(InputError, match="is outside 0 to 5; give less"):
+        require_range("side", value, 0.0, 5.0, "give less")
+
+
+@pytest.mark.parametrize("value", [0, 5, 2.5, True])
+def test_numbers_within_the_range_pass(value: float) -> None:
+    require_range("side", value, 0.0, 5.0, "give less")

@@ -1,0 +1,182 @@
+"""The scenes that the project ships: by name, with options, and lit as their builders promise."""
+
+import numpy as np
+import pytest
+
+from render.engine import render
+from render.scene import Scene
+from rodcone.errors import InputError
+from scenes.catalog import load, names
+from scenes.levels import DEMO_LEVELS
+from scenes.materials import metal
+from scenes.reflectances import band, color_checker, edge, grey
+
+BANDS_NM = np.arange(405.0, 780.0, 50.0)
+
+
+def complaint(*args, **options):
+    with pytest.raises(InputError) as caught:
+        load(*args, **options)
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+LIT_BY_NAME = ("color_checker", "cornell_box", "flat_field", "metamers", "siemens_star", "slanted_edge", "still_life")
+
+
+def test_names_are_the_scenes_in_order():
+    others = ("furnace", "lit_and_shadowed", "night_street", "still_life_outdoor")
+    assert names() == tuple(sorted((*LIT_BY_NAME, *others)))
+
+
+def nodes(node):
+    """All nodes of a scene's dict, the scene itself first."""
+    yield node
+    for value in node.values():
+        if isinstance(value, dict):
+            yield from nodes(value)
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_scene_keeps_compiling_quick_by_one_grid_and_few_kinds_of_material(name):
+    spectra = [node for node in nodes(load(name).geometry) if node.get("type") in ("regular", "irregular", "uniform")]
+    grids = {
+        (node["type"], node["wavelength_min"], node["wavelength_max"], node["values"].count(",")) for node in spectra
+    }
+    far = name == "color_checker"  # for studies of the near infrared
+    assert grids == {("regular", 380.0, 1100.0, 144) if far else ("regular", 380.0, 780.0, 80)}
+    kinds = {node["type"] for node in nodes(load(name).geometry)}
+    plugins = {"twosided", "diffuse", "roughplastic", "roughconductor", "dielectric", "checkerboard"}
+    shapes = {"rectangle", "cube", "sphere", "cylinder", "disk"}
+    assert kinds <= plugins | shapes | {"scene", "perspective", "regular", "area", "constant"}
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_scene_loads_under_its_own_name_with_a_light_and_a_reference_plane(name):
+    scene = load(name)
+    assert isinstance(scene, Scene)
+    assert scene.name == name
+    assert scene.groups
+    assert all(group.power > 0 for group in scene.groups.values())
+    assert scene.reference_plane in scene.geometry
+    assert scene.geometry["sensor"]["type"] == "perspective"
+
+
+@pytest.mark.parametrize("name", LIT_BY_NAME)
+def test_every_scene_of_one_light_takes_it_by_name(name):
+    (warm,), (cold,) = load(name, light="A").groups.values(), load(name, light="D65").groups.values()
+    red, blue = (warm.spectrum.band_average(nm, 20.0) / cold.spectrum.band_average(nm, 20.0) for nm in (650.0, 450.0))
+    assert red > 1.3 * blue
+    assert warm.power == cold.power
+
+
+def test_options_reach_the_builder():
+    values = load("flat_field", reflectance=0.25).geometry["wall"]["bsdf"]["bsdf"]["reflectance"]["values"]
+    assert set(values.split(",")) == {"0.25"}
+    values = load("slanted_edge", contrast=3.0).geometry["dark"]["bsdf"]["bsdf"]["reflectance"]["values"]
+    assert [float(value) for value in set(values.split(","))] == pytest.approx([0.2])
+    values = load("color_checker", surround=0.5).geometry["card"]["bsdf"]["bsdf"]["reflectance"]["values"]
+    assert set(values.split(",")) == {"0.5"}
+
+
+@pytest.mark.parametrize(("name", "nearest"), [("still_live", "still_life"), ("flatfield", "flat_field")])
+def test_an_unknown_scene_is_refused_and_the_nearest_named(name, nearest):
+    text = complaint(name)
+    assert text.startswith(f"scene: {name!r} is unknown; allowed: {', '.join(names())}")
+    assert text.endswith(f"did you mean {nearest!r}?")
+
+
+def test_an_unknown_option_is_refused_and_the_nearest_named():
+    text = complaint("flat_field", reflectence=0.3)
+    assert text.startswith("scene flat_field: option: 'reflectence' is unknown; allowed: light, reflectance")
+    assert text.endswith("did you mean 'reflectance'?")
+
+
+def test_an_unknown_light_is_refused():
+    assert complaint("still_life", light="D66").startswith("illuminant: 'D66' is unknown")
+
+
+@pytest.mark.parametrize("value", [-0.1, 1.01, np.nan, np.inf])
+@pytest.mark.parametrize(("name", "option"), [("flat_field", "reflectance"), ("color_checker", "surround")])
+def test_a_reflectance_outside_zero_to_one_is_refused_with_its_value(name, option, value):
+    assert complaint(name, **{option: value}).startswith(f"{option}: {value!r} is outside 0 to 1")
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "start"),
+    [
+        ("slanted_edge", {"contrast": 0.5}, "contrast: 0.5 is outside 1 to 1e+06"),
+        ("slanted_edge", {"angle_deg": 60.0}, "angle_deg: 60.0 is outside -45 to 45"),
+        ("siemens_star", {"spokes": 1}, "spokes: 1 is outside 2 to 720"),
+        ("siemens_star", {"spokes": 7.5}, "spokes: 7.5 is not a whole number"),
+        ("lit_and_shadowed", {"dark_cd_m2": -1.0}, "dark_cd_m2: -1.0 is outside 0 to 1e+09"),
+        ("lit_and_shadowed", {"lit_cd_m2": np.nan}, "lit_cd_m2: nan is outside 0 to 1e+09"),
+    ],
+)
+def test_an_option_out_of_range_is_refused_with_its_value(name, options, start):
+    assert complaint(name, **options).startswith(start)
+
+
+def test_the_chart_has_24_reflectances_that_rise_along_its_grey_row():
+    patches = color_checker()
+    assert len({name for name, _ in patches}) == 24
+    assert all(curve.values.min() >= 0 and curve.values.max() <= 1 for _, curve in patches)
+    greys = np.array([curve.band_average(550.0, 100.0) for _, curve in patches[18:]])
+    assert (np.diff(greys) < 0).all()
+    assert greys == pytest.approx([0.90, 0.59, 0.36, 0.20, 0.09, 0.03], abs=0.03)  # densities 0.05 to 1.50
+
+
+def test_reflectance_curves_stay_between_their_ends():
+    assert np.ptp(grey(0.3).values) == 0
+    for low, high in ((0.1, 0.7), (0.7, 0.1)):
+        curve = edge(580.0, 10.0, low, high)
+        assert curve.values[[0, -1]] == pytest.approx([low, high], abs=1e-6)
+        assert curve.band_average(580.0, 20.0) == pytest.approx(0.4, abs=1e-3)
+    bump = band(550.0, 20.0, 0.1, 0.6)
+    assert bump.values.max() == pytest.approx(0.6)
+    assert bump.wavelength_nm[bump.values.argmax()] == 550.0
+    assert bump.values.min() == pytest.approx(0.1, abs=1e-6)
+
+
+def test_demo_levels_rise_from_moonlight_to_daylight_and_name_their_sources():
+    levels = [level.luminance_cd_m2 for level in DEMO_LEVELS]
+    assert len(levels) == 7
+    assert (np.diff(levels) > 0).all()
+    assert levels[0] == 0.036
+    assert levels[3] == 25.0
+    assert levels[-1] == pytest.approx(1e5 * 0.18 / np.pi)
+    assert all(level.source for level in DEMO_LEVELS)
+
+
+def test_still_life_fills_a_picture_from_shadow_to_highlight():
+    made = render(load("still_life"), (48, 48), wavelength_nm=BANDS_NM, spp=32)
+    luminance = made.relight(luminance_cd_m2=25.0).luminance()
+    kept = luminance[made.coverage == 0]
+    assert kept.size > 0.95 * luminance.size
+    assert kept.mean() == pytest.approx(25.0, rel=1e-5)
+    assert 0.7 < np.median(kept) / kept.mean() < 1.3
+    assert kept.max() / kept.min() > 50
+    assert made.illuminance_lux(25.0) > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", names())
+def test_every_scene_renders_in_every_band_with_light_from_each_of_its_groups(name):
+    made = render(load(name), (24, 24), wavelength_nm=BANDS_NM[::2], width_nm=50.0, spp=16)
+    assert np.isfinite(made.radiance).all()
+    assert made.radiance.min() >= 0
+    assert (made.radiance.max(axis=(2, 3)) > 0).all()
+    assert (made.irradiance > 0).any()
+    assert made.relight().luminance().max() > 0
+
+
+@pytest.mark.parametrize(
+    ("material", "nm", "reflectance"),
+    [("Cu", 450.0, 0.55), ("Cu", 650.0, 0.93), ("Au", 450.0, 0.39), ("Au", 650.0, 0.96), ("Al", 550.0, 0.92)],
+)  # at normal incidence: CRC Handbook of Chemistry and Physics, optical properties of selected elements
+def test_a_metal_reflects_as_its_handbook_says(material, nm, reflectance):
+    bsdf = metal(material, 0.2)["bsdf"]
+    at = [float(bsdf[part]["values"].split(",")[round((nm - 380) / 5)]) for part in ("eta", "k")]
+    index = complex(*at)
+    assert abs((index - 1) / (index + 1)) ** 2 == pytest.approx(reflectance, abs=0.05)  # Fresnel; samples differ

@@ -1,0 +1,80 @@
+"""Pairs that are one colour under D65: by the sums that define colour, in bands of any width, and to a camera."""
+
+import numpy as np
+import pytest
+from skimage.color import deltaE_ciede2000, xyz2lab
+
+from isp.colour.camera_colour import adapt_to_d65
+from render.illuminants import illuminant
+from render.photometry import tristimulus
+from render.spectrum import Floats, Spectrum
+from scenes.catalog import load
+from scenes.metamers import HIGH, LOW, OTHER_LIGHT, PAIRS, TWINS_UNDER, pairs
+from sensor.curves import Responses, rgbw
+from sensor.filters import colorimetric
+
+
+def edges_of(width_nm: float) -> tuple[Floats, Floats]:
+    nm = np.arange(380.0 + width_nm / 2, 780.0, width_nm)
+    return nm, np.full(nm.shape, width_nm)
+
+
+def xyz(surface: Spectrum, light: str, width_nm: float) -> Floats:
+    """Colour as a share of the light's luminance."""
+    nm, width = edges_of(width_nm)
+    watts = illuminant(light).band_average(nm, width)
+    return tristimulus(surface.band_average(nm, width) * watts, nm, width) / tristimulus(watts, nm, width)[1]
+
+
+def delta_e(one: Spectrum, other: Spectrum, light: str, width_nm: float) -> float:
+    nm, width = edges_of(width_nm)
+    watts = illuminant(light).band_average(nm, width)
+    white = tristimulus(watts, nm, width)
+    lab = [xyz2lab(adapt_to_d65(xyz(each, light, width_nm), white)) for each in (one, other)]
+    return float(deltaE_ciede2000(*lab))
+
+
+def electrons(surface: Spectrum, responses: Responses, light: str) -> Floats:
+    nm, width = edges_of(1.0)
+    photons = illuminant(light).band_average(nm, width) * nm
+    return np.asarray(
+        responses.band_average(("R", "G", "B", "W"), nm, width) @ (photons * surface.band_average(nm, width))
+    )
+
+
+@pytest.mark.parametrize("width_nm", [1.0, 10.0])
+def test_a_pair_has_one_xyz_under_d65_and_two_under_other_lights(width_nm: float) -> None:
+    assert len(pairs()) == PAIRS
+    for one, other in pairs():
+        np.testing.assert_allclose(xyz(one, TWINS_UNDER, width_nm), xyz(other, TWINS_UNDER, width_nm), atol=1e-9)
+        for light, least in ((OTHER_LIGHT, 1.0), ("F11", 1.0), ("sodium_high", 3.0)):  # 1 can just be seen
+            assert least < delta_e(one, other, light, width_nm) < 30.0, light
+
+
+def test_bands_of_20_nm_part_a_pair_by_less_than_an_eye_sees() -> None:
+    # 0.0005 of white's Y is under 0.1 in CIELAB for these colours (L* rises by at most 116 / 3 / 0.02^(2/3) a unit)
+    for one, other in pairs():
+        assert np.abs(xyz(one, TWINS_UNDER, 20.0) - xyz(other, TWINS_UNDER, 20.0)).max() < 5e-4
+
+
+def test_a_colorimetric_camera_sees_a_pair_as_one_and_the_projects_own_as_two() -> None:
+    for one, other in pairs():
+        same = electrons(one, colorimetric(rgbw()), TWINS_UNDER) / electrons(other, colorimetric(rgbw()), TWINS_UNDER)
+        np.testing.assert_allclose(same[:3], 1.0, atol=1e-5)
+        ratio = electrons(one, rgbw(), TWINS_UNDER) / electrons(other, rgbw(), TWINS_UNDER)
+        assert 0.004 < np.abs(ratio - 1).max() < 0.5
+
+
+def test_made_reflectances_are_smooth_and_could_be_dyes() -> None:
+    for curve in (curve for pair in pairs() for curve in pair):
+        assert LOW <= curve.values.min() < curve.values.max() <= HIGH
+        assert np.abs(np.diff(curve.values)).max() < 0.1  # in steps of 5 nm
+
+
+def test_the_scene_holds_the_pairs_side_by_side() -> None:
+    scene = load("metamers", light="A")
+    for index, curve in enumerate(curve for pair in pairs() for curve in pair):
+        values = scene.geometry[f"patch{index:02d}"]["bsdf"]["bsdf"]["reflectance"]["values"]
+        assert np.array(values.split(","), dtype=float) == pytest.approx(curve.values)
+    left, right = (np.array(scene.geometry[f"patch{index:02d}"]["to_world"])[:3, 3] for index in (0, 1))
+    assert right - left == pytest.approx([0.045, 0.0, 0.0])

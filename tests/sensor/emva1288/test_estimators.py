@@ -1,0 +1,139 @@
+"""Estimators of EMVA 1288 on statistics whose answer is known; drawn chips are in `test_sensor_characterise.py`."""
+
+import numpy as np
+import pytest
+
+from rodcone.errors import InputError
+from sensor.emva1288 import estimators as emva
+from sensor.emva1288.photon_transfer import Stack, Transfer
+
+SHAPE = (40, 50)
+GAIN = (0.5, 0.001)  # DN/e-
+
+
+def stack(mean_dn, variance_dn2=4.0, frames=16):
+    return Stack(np.broadcast_to(np.asarray(mean_dn, dtype=float), SHAPE), variance_dn2, frames)
+
+
+def line(gain=0.5, dark_dn=20.0, dark_variance=4.0):
+    """An ideal camera: well of 1000 e-, where the variance falls to the dark's."""
+    light_e = np.linspace(50, 1100, 22)
+    signal = np.minimum(light_e, 1000.0)
+    return Transfer(light_e, dark_dn + gain * signal, dark_variance + gain**2 * np.where(light_e < 1000, light_e, 0.0))
+
+
+def test_the_gain_is_the_slope_of_variance_over_mean_whatever_the_dark():
+    for dark_variance in (0.0, 4.0, 100.0):
+        value, error = emva.gain(line(dark_variance=dark_variance), stack(20.0, dark_variance), 950.0)
+        assert value == pytest.approx(0.5, rel=1e-12)
+        assert 0 < error < 0.05
+
+
+def test_the_gain_s_line_ends_at_70_per_cent_of_saturation():
+    bent = line()
+    bent.variance_dn2[bent.light_e > 0.7 * 950] *= 3
+    assert emva.gain(bent, stack(20.0), 950.0)[0] == pytest.approx(0.5, rel=1e-12)
+    assert emva.gain(bent, stack(20.0), 1000.0)[0] > 0.6
+
+
+def test_the_gain_s_error_is_the_scatter_of_lines_with_chi_squared_variances():
+    rng, exact = np.random.default_rng(1), line()
+    pixels, gains, errors = SHAPE[0] * SHAPE[1], [], []
+    for _ in range(400):
+        variance = exact.variance_dn2 * rng.chisquare(pixels, exact.light_e.size) / pixels
+        dark = stack(20.0, 4.0 * rng.chisquare(pixels * 15) / (pixels * 15))
+        value, error = emva.gain(Transfer(exact.light_e, exact.mean_dn, variance), dark, 950.0)
+        gains.append(value)
+        errors.append(error)
+    # a spread of 400 has the standard error 1/sqrt(800): 4 of them, false-alarm rate 6.3e-5
+    assert np.std(gains) == pytest.approx(np.mean(errors), rel=4 / np.sqrt(800))
+
+
+@pytest.mark.parametrize("variance", [4.0, 3.9])
+def test_a_camera_whose_variance_does_not_grow_is_refused_in_one_line(variance):
+    flat = Transfer(line().light_e, line().mean_dn, np.full(22, variance))
+    with pytest.raises(InputError, match=r"gain: .*shows no shot noise.*give more bits") as error:
+        emva.gain(flat, stack(20.0), 950.0)
+    assert "\n" not in str(error.value)
+    with pytest.raises(InputError, match="gain"):
+        emva.gain(Transfer(line().light_e, np.full(22, 20.0), line().variance_dn2), stack(20.0), 950.0)
+
+
+def test_a_straight_camera_is_linear_and_a_bent_one_as_far_off_as_it_is_bent():
+    share, mean = emva.linearity(line(), 20.0, 950.0)
+    used = np.isfinite(share)
+    np.testing.assert_array_equal(used, line().light_e <= 0.95 * 950)
+    np.testing.assert_allclose(share[used], 0.0, atol=1e-12)
+    assert mean == pytest.approx(0.0, abs=1e-12)
+    light = line().light_e
+    share, mean = emva.linearity(Transfer(light, 20 + light + 2e-5 * light**2, light), 20.0, 950.0)
+    x, y = light[used], light[used] + 2e-5 * light[used] ** 2
+    line_of = np.linalg.lstsq(np.column_stack([1 / x, np.ones(x.size)]), y / x, rcond=None)[0]  # relative residuals
+    expected = y / (line_of[0] + line_of[1] * x) - 1
+    np.testing.assert_allclose(share[used], expected, atol=1e-12)
+    assert mean == pytest.approx(np.abs(expected).mean(), rel=1e-9)
+    assert expected.max() - expected.min() > 0.005
+
+
+def test_too_few_levels_in_the_range_leave_linearity_unknown_without_a_warning():
+    share, mean = emva.linearity(line(), 20.0, 60.0)
+    assert np.isnan(share).all()
+    assert np.isnan(mean)
+
+
+def test_dark_noise_is_less_quantisation_and_in_electrons():
+    value, error = emva.dark_noise(stack(20.0, 4.0 + 1 / 12), GAIN)
+    assert value == pytest.approx(2.0 / 0.5, rel=1e-12)
+    # relative: the gain's 0.2 %, and the variance's sqrt(2 / (2000 x 15)) halved, enlarged by the quantisation
+    assert error == pytest.approx(4.0 * np.hypot(0.002, (4 + 1 / 12) / 4 * np.sqrt(2 / 30_000) / 2), rel=1e-9)
+    assert emva.dark_noise(stack(20.0, 0.01), GAIN)[0] == 0.0
+
+
+def test_dsnu_and_prnu_are_spatial_spreads_with_the_dark_s_taken_off():
+    rng = np.random.default_rng(2)
+    offset, response = rng.normal(0, 3, SHAPE), rng.normal(1, 0.02, SHAPE)
+    dark, bright = stack(20 + offset, 0.0), stack(20 + offset + 400 * response, 0.0)
+    assert emva.dsnu(dark, GAIN)[0] == pytest.approx(offset.std() / 0.5, rel=1e-12)
+    expected = np.sqrt((offset + 400 * response).var() - offset.var()) / (400 * response.mean())
+    value, error = emva.prnu(dark, bright)
+    assert value == pytest.approx(expected, rel=1e-12)
+    assert abs(value - 0.02) < 4 * error  # 6.3e-5
+    assert emva.prnu(dark, stack(420 + offset, 0.0))[0] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_column_offsets_and_gains_come_from_column_means():
+    rng = np.random.default_rng(3)
+    offset, gain = rng.normal(0, 2, 50), rng.normal(1, 0.01, 50)
+    dark, bright = stack(20 + offset, 0.0), stack(20 + offset + 400 * gain, 0.0)
+    assert emva.column_offset(dark, GAIN)[0] == pytest.approx(offset.std(ddof=1) / 0.5, rel=1e-12)
+    assert emva.column_gain(dark, bright)[0] == pytest.approx(gain.std(ddof=1) / gain.mean(), rel=1e-9)
+
+
+def test_the_well_is_the_clipped_mean_with_the_half_normal_taken_off():
+    rng = np.random.default_rng(4)
+    noise = np.minimum(rng.normal(0, 2.0, (400, 500)), 0.0)  # the top at 20 + 500 DN cuts the upper half
+    full = Stack(520 + noise, 0.0, 2)
+    value, error = emva.well(full, stack(20.0, 4.0, frames=10**9), GAIN, 0.0, 7.0)
+    # mean of the half normal within 4 standard errors, in electrons: false-alarm rate 6.3e-5
+    assert abs(value - (1000 + 7)) < 4 * 2 * 0.58 / np.sqrt(200_000) / 0.5
+    assert error == pytest.approx(value * 0.002, rel=1e-9)
+
+
+def test_dark_current_leaves_hot_pixels_out_and_tells_them():
+    rng = np.random.default_rng(5)
+    slopes = rng.normal(10.0, 0.5, (300, 300))
+    slopes[::10, ::10] += 100.0
+    (current, current_error), (share, share_error), (hot, hot_error) = emva.dark_current(slopes, GAIN)
+    assert abs(current - 20.0) < 4 * current_error  # three times 6.3e-5
+    assert (share, share_error) == (0.01, pytest.approx(np.sqrt(0.01 * 0.99 / 90_000)))
+    assert abs(hot - 200.0) < 4 * hot_error
+    assert emva.dark_current(rng.normal(0, 1, (50, 50)), GAIN)[1:] == ((0.0, 0.0), (0.0, 0.0))
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.3])
+def test_what_is_absent_is_told_with_an_error_that_covers_it(offset):
+    rng = np.random.default_rng(6)
+    mean = 20 + offset + rng.normal(0, np.sqrt(4.0 / 16), SHAPE)  # what 16 frames leave of the temporal noise
+    value, error = emva.dsnu(stack(mean), GAIN)
+    assert value < 4 * error
+    assert 0 < error < 0.5

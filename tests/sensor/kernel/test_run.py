@@ -1,0 +1,321 @@
+"""A frame through the Dr.Jit form: expected electrons and noise beside the NumPy form and the exact laws."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from rodcone.jit import backend, dr
+from sensor.cfa import MOSAICS
+from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.device import Device, draw_device
+from sensor.kernel.run import expected_electrons_single, read_frame
+from sensor.optics import SpectralIrradiance
+from sensor.presets import preset
+from sensor.random import Term, philox
+from sensor.readout import read_out
+from sensor.response import electrons_per_irradiance, expected_electrons
+
+pytestmark = pytest.mark.skipif(backend() == "numpy", reason="Dr.Jit has neither LLVM nor CUDA here")
+
+NM = np.arange(385.0, 780.0, 10.0)
+PIXEL = PixelConfig(2.2, 0.9, full_well_e=60_000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
+COUNTS = SensorConfig(replace(PIXEL, full_well_e=65_535.0), LensConfig(2.8), bits=16, black_level_dn=0.0)  # 1 e-/DN
+NOISY = replace(
+    PIXEL,
+    full_well_e=900.0,
+    read_noise_e=3.0,
+    dsnu_e=4.0,
+    prnu=0.05,
+    dark_current_e_per_s=300.0,
+    column_gain_spread=0.03,
+    column_offset_e=2.0,
+    hot_pixel_share=0.1,
+    hot_pixel_dark_current_e_per_s=4000.0,
+    crosstalk=0.04,
+)
+EVERY_TERM = SensorConfig(NOISY, LensConfig(2.8), bits=12)
+
+
+def even(shape):
+    return Device(np.ones(shape), np.zeros(shape))
+
+
+def read(mean_e, sensor=COUNTS, shape=(1000, 1000), device=None, exposure_s=0.01, key=1):
+    light = np.ascontiguousarray(np.broadcast_to(np.float32(mean_e), shape))
+    return read_frame(light, sensor, even(shape) if device is None else device, exposure_s, key)
+
+
+# Expected electrons
+
+
+def irradiance(shape, order="planar", dtype=np.float32, bands=NM.size):
+    planes = np.random.default_rng(1).random((bands, *shape)).astype(dtype)
+    values = np.moveaxis(planes, 0, -1)
+    return values if order == "planar" else np.ascontiguousarray(values)
+
+
+@pytest.mark.parametrize("order", ["planar", "interleaved"])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("mosaic", sorted(MOSAICS))
+def test_expected_electrons_are_the_double_precision_ones_to_single_precision(mosaic, dtype, order):
+    sensor = preset("low_noise", mosaic)
+    image = SpectralIrradiance(irradiance((33, 50), order, dtype), NM, 2.2)
+    weights = electrons_per_irradiance(sensor, NM, image.widths_nm, 0.01)
+    exact = expected_electrons(replace(image, values=image.values.astype(np.float64)), sensor, 0.01)
+    made = expected_electrons_single(image.values, weights, sensor)
+    assert made.dtype == np.float32
+    np.testing.assert_allclose(made, exact, rtol=2e-6)
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (3, 5), (16, 16), (64, 64), (61, 47)])
+@pytest.mark.parametrize("shift", [0, 1, 3, 4, 16])
+def test_memory_of_any_alignment_gives_the_same_bits(shape, shift):
+    memory = np.zeros(NM.size * shape[0] * shape[1] + 32, dtype=np.float32)
+    planes = memory[shift : shift + NM.size * shape[0] * shape[1]].reshape(NM.size, *shape)
+    planes[:] = np.moveaxis(irradiance(shape), -1, 0)
+    sensor = preset("low_noise")
+    weights = electrons_per_irradiance(sensor, NM, np.full(NM.size, 10.0), 0.01)
+    made = expected_electrons_single(np.moveaxis(planes, 0, -1), weights, sensor)
+    np.testing.assert_array_equal(made, expected_electrons_single(irradiance(shape, "interleaved"), weights, sensor))
+
+
+def test_read_only_memory_is_read_and_left_alone():
+    values = irradiance((8, 16))
+    values.flags.writeable = False
+    weights = np.ones((4, NM.size))
+    np.testing.assert_allclose(
+        expected_electrons_single(values, weights, preset("low_noise")), values.sum(-1), rtol=1e-6
+    )
+
+
+def test_rows_that_start_within_the_tile_take_the_frame_s_letters():
+    values, sensor = irradiance((12, 10)), SensorConfig(PIXEL, LensConfig(2.8), cfa=("RG", "GB", "WW"))
+    weights = electrons_per_irradiance(sensor, NM, np.full(NM.size, 10.0), 0.01)
+    whole = expected_electrons_single(values, weights, sensor)
+    for first in (1, 2, 5):
+        np.testing.assert_array_equal(expected_electrons_single(values[first:], weights, sensor, first), whole[first:])
+
+
+# Shot noise
+
+
+@pytest.mark.parametrize("mean_e", [0.05, 0.3, 1.0, 10.0, 29.0, 31.0])
+def test_counts_follow_the_exact_law(mean_e):
+    counts = read(mean_e).ravel()
+    low, high = int(stats.poisson.ppf(1e-5, mean_e)), int(stats.poisson.isf(1e-5, mean_e))
+    inner = np.bincount(np.clip(counts, low, high), minlength=high + 1)[low:]
+    share = np.diff(stats.poisson.cdf(np.arange(low - 1, high + 1), np.float32(mean_e)))
+    share[0], share[-1] = stats.poisson.cdf(low, mean_e), stats.poisson.sf(high - 1, mean_e)
+    # chi-squared over all counts, tails merged; false-alarm rate 1e-4 each, 6e-4 together
+    assert stats.chisquare(inner, share / share.sum() * counts.size).pvalue > 1e-4
+
+
+@pytest.mark.parametrize("mean_e", [0.01, 0.05, 0.3, 1.0, 3.0, 10.0, 29.0, 31.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4])
+@pytest.mark.parametrize("gain_e_per_dn", [1.0, 1.7])
+def test_totals_and_variances_of_a_megapixel_are_the_exact_law_s_after_rounding(mean_e, gain_e_per_dn):
+    sensor = COUNTS
+    if gain_e_per_dn != 1:
+        well_e = gain_e_per_dn * (65_535 - 10)
+        sensor = replace(COUNTS, pixel=replace(PIXEL, full_well_e=well_e), black_level_dn=10)
+    dn = read(mean_e, sensor, key=int(mean_e * 100)).astype(np.float64)
+    counts = np.arange(stats.poisson.ppf(1e-13, mean_e), stats.poisson.isf(1e-13, mean_e) + 1)
+    weights = stats.poisson.pmf(counts, np.float32(mean_e))
+    weights /= weights.sum()
+    levels = np.rint(counts / sensor.gain_e_per_dn + sensor.black_dn)
+    mean = weights @ levels
+    variance, fourth = (weights @ (levels - mean) ** power for power in (2, 4))
+    # 56 comparisons within 4 standard errors: false-alarm rate 3.5e-3 for fresh keys
+    assert abs(dn.sum() - mean * dn.size) < 4 * np.sqrt(variance * dn.size)
+    assert abs(dn.var() - variance) < 4 * np.sqrt((fourth - variance**2) / dn.size)
+
+
+def test_one_photon_in_a_megapixel_is_one_on_average():
+    total = sum(int(read(1e-6, key=key).sum()) for key in range(16))
+    assert stats.poisson.cdf(total, 16) > 1e-5  # false-alarm rate 2e-5
+    assert stats.poisson.sf(total - 1, 16) > 1e-5
+
+
+# The order of the terms, beside the NumPy form
+
+
+def test_without_shot_and_read_noise_the_dns_are_the_numpy_form_s_bit_for_bit():
+    sensor = replace(EVERY_TERM, pixel=replace(NOISY, read_noise_e=0.0))
+    device = draw_device(sensor, (64, 48), np.random.default_rng(1))
+    for light in (0.0, 1e7):  # dark at exposure 0, and every well full
+        light_e = np.full((64, 48), light)
+        numpy_form = read_out(light_e, sensor, device, 0.0, np.random.default_rng(2))
+        dn = read(light, sensor, (64, 48), device, exposure_s=0.0)
+        assert dn.dtype == np.uint16
+        np.testing.assert_array_equal(dn, numpy_form.dn)
+    assert len(np.unique(dn)) > 20
+
+
+def test_every_pixel_has_the_mean_and_variance_of_the_numpy_form():
+    shape, frames = (32, 40), 100
+    device = draw_device(EVERY_TERM, shape, np.random.default_rng(1))
+    light_e = np.random.default_rng(2).uniform(0, 500, shape)
+    light_e[:4] = 2000.0  # full wells
+    light_e[4:8] = 0.0
+    rng = np.random.default_rng(3)
+    exact = np.array([read_out(light_e, EVERY_TERM, device, 0.05, rng).dn for _ in range(frames)], dtype=np.float64)
+    made = np.array([read(light_e, EVERY_TERM, shape, device, 0.05, key) for key in range(frames)], dtype=np.float64)
+    clipped = np.median(exact, axis=0) == EVERY_TERM.white_dn
+    assert (made[:, clipped] == EVERY_TERM.white_dn).mean() > 0.5
+    assert 0.01 < clipped.mean() < 0.1  # full wells behind a strong column
+    exact, made = exact[:, ~clipped], made[:, ~clipped]
+    variances = exact.var(axis=0, ddof=1), made.var(axis=0, ddof=1)
+    difference = (made.mean(axis=0) - exact.mean(axis=0)) ** 2 / ((variances[0] + variances[1]) / frames)
+    freedom = 2 * frames - 2
+    # a squared t has mean f / (f - 2) and variance 2 at large f; 1280 of them within 4.5 standard errors: 7e-6
+    assert abs(difference.mean() - freedom / (freedom - 2)) < 4.5 * np.sqrt(2.1 / difference.size)
+    ratio = np.log(variances[1] / variances[0])  # variance about 4 / f' with f' = 99
+    assert abs(ratio.mean()) < 4.5 * np.sqrt(4 / (frames - 1) / ratio.size)
+    assert difference.max() < stats.f.isf(1e-6 / difference.size, 1, freedom)
+
+
+def test_read_noise_alone_is_normal_with_its_stated_width():
+    sensor = replace(COUNTS, pixel=replace(COUNTS.pixel, read_noise_e=40.0), black_level_dn=400.0)
+    gain = sensor.gain_e_per_dn
+    dn = read(0.0, sensor, (512, 512)).astype(np.float64)
+    noise_e = (dn - 400.0 + np.random.default_rng(1).uniform(-0.5, 0.5, dn.shape)) * gain  # even out the lattice
+    assert stats.kstest(noise_e.ravel() / np.hypot(40.0, gain / 12**0.5), "norm").pvalue > 1e-4
+
+
+def test_read_noise_is_that_of_the_pixel_s_own_counter():
+    sensor = replace(COUNTS, pixel=replace(COUNTS.pixel, read_noise_e=100.0), black_level_dn=1000.0)
+    dn, key = read(0.0, sensor, (5, 7), key=2**40 + 3), 2**40 + 3
+    for row, column in np.ndindex(5, 7):
+        counter = tuple(np.array([word], np.uint64) for word in (column, row, int(Term.EXPOSURE), 0))
+        first, second = (int(word[0]) >> 1 for word in philox(counter, key)[:2])
+        noise_e = 100 * np.sqrt(-2 * np.log((first + 0.5) / 2**31)) * np.cos(2 * np.pi * second / 2**31)
+        assert abs(dn[row, column] - (1000 + noise_e / sensor.gain_e_per_dn)) < 0.51
+
+
+def test_shot_and_read_noise_of_a_pixel_are_independent():
+    for mean_e in (10.0, 1000.0):
+        shot = read(mean_e, shape=(512, 512)).astype(np.float64)
+        noisy = replace(COUNTS, pixel=replace(COUNTS.pixel, read_noise_e=40.0), black_level_dn=400.0)
+        dark = read(0.0, noisy, (512, 512)).astype(np.float64)
+        for power in (1, 2):
+            first, second = ((x - x.mean()).ravel() ** power for x in (shot, dark))
+            assert abs(np.corrcoef(first, second)[0, 1]) < 4.5 / 512
+
+
+# Draws by coordinates
+
+
+def test_one_key_gives_one_frame_and_every_bit_of_a_key_another():
+    frames = [read(1000.0, shape=(16, 16), key=key) for key in (5, 5, 4, 5 + 2**32, 5 + 2**63)]
+    np.testing.assert_array_equal(frames[0], frames[1])
+    for other in frames[2:]:
+        assert np.mean(frames[0] == other) < 0.1
+
+
+@pytest.mark.parametrize("shape", [(1, 2), (10, 64), (10, 20), (63, 3)])
+def test_a_crop_reads_as_the_full_frame_does_there(shape):
+    sensor = replace(EVERY_TERM, pixel=replace(NOISY, crosstalk=0.0))  # crosstalk knows the frame's border
+    device = draw_device(sensor, (64, 64), np.random.default_rng(1))
+    light_e = np.random.default_rng(3).uniform(0, 900, (64, 64)).astype(np.float32)
+    crop = np.s_[: shape[0], : shape[1]]
+    part = Device(
+        device.photo_response[crop], device.dark_offset_e[crop], device.column_gain[: shape[1]], device.hot[crop]
+    )
+    full = read_frame(light_e, sensor, device, 0.01, 7)
+    np.testing.assert_array_equal(read_frame(light_e[crop], sensor, part, 0.01, 7), full[crop])
+
+
+def test_neighbours_keys_and_the_chip_are_uncorrelated():
+    shape = (512, 512)
+    base = read(100.0, shape=shape, key=7).astype(np.float64)
+    device = draw_device(replace(COUNTS, pixel=replace(PIXEL, prnu=0.1, dsnu_e=5.0)), shape, np.random.default_rng(7))
+    key = int(np.random.default_rng(7).integers(0, 2**64, dtype=np.uint64))  # the chip's own
+    own = read(100.0, shape=shape, key=key).astype(np.float64)
+    pairs = [
+        (base, np.roll(base, 1, axis=0)),
+        (base, np.roll(base, 1, axis=1)),
+        (base, read(100.0, shape=shape, key=8).astype(np.float64)),
+        (own, device.photo_response),
+        (own, device.dark_offset_e),
+    ]
+    for first, second in pairs:  # five within 4.5 standard errors: false-alarm rate 3.4e-5
+        assert abs(np.corrcoef(first.ravel(), second.ravel())[0, 1]) < 4.5 / 512
+
+
+def test_inputs_are_left_as_they_were():
+    device = draw_device(EVERY_TERM, (8, 8), np.random.default_rng(1))
+    light_e = np.full((8, 8), 20.0, dtype=np.float32)
+    before = (light_e.copy(), device.photo_response.copy(), device.dark_offset_e.copy())
+    read_frame(light_e, EVERY_TERM, device, 0.01, 1)
+    for array, copy in zip((light_e, device.photo_response, device.dark_offset_e), before, strict=True):
+        np.testing.assert_array_equal(array, copy)
+
+
+# Ends of the range
+
+
+@pytest.mark.parametrize("full_well_e", [1.0, 1000.0, 1e12])
+@pytest.mark.parametrize("times", [1e8, np.inf])
+def test_light_of_1e8_full_wells_and_more_saturates_and_nothing_more(full_well_e, times):
+    sensor = replace(COUNTS, pixel=replace(PIXEL, full_well_e=full_well_e, prnu=0.5))
+    device = draw_device(sensor, (64, 64), np.random.default_rng(1))
+    dn = read(times * full_well_e, sensor, (64, 64), device)
+    answering = device.photo_response > 1e-3
+    np.testing.assert_array_equal(dn[answering], sensor.white_dn)
+    np.testing.assert_array_equal(dn[device.photo_response == 0], 0)  # and no infinity times nothing
+
+
+@pytest.mark.parametrize("crosstalk", [0.0, 0.1, 0.25])
+@pytest.mark.parametrize("light", [1e30, 1e300])
+def test_light_beyond_single_precision_saturates_without_a_warning(light, crosstalk):
+    sensor = replace(COUNTS, pixel=replace(COUNTS.pixel, crosstalk=crosstalk))
+    weights = np.full((4, 3), 1e20)
+    weights[0] = 0.0  # a letter that doesn't see it
+    expected_e = expected_electrons_single(np.full((6, 8, 3), light), weights, sensor)
+    assert not np.isnan(expected_e).any()
+    dn = read_frame(expected_e, sensor, even((6, 8)), 0.01, 1)
+    np.testing.assert_array_equal(dn[1::2], sensor.white_dn)  # rows of B and W
+    if crosstalk == 0:
+        np.testing.assert_array_equal(dn[::2, ::2], 0)
+
+
+@pytest.mark.parametrize("mean_e", [0.0, 1e-45, 1e-38, 1e-20])
+def test_no_light_and_the_smallest_numbers_read_black(mean_e):
+    np.testing.assert_array_equal(read(mean_e, shape=(64, 64)), 0)
+
+
+def test_a_dark_current_that_fills_the_well_saturates_without_light():
+    sensor = replace(COUNTS, pixel=replace(PIXEL, dark_current_e_per_s=1e12))
+    np.testing.assert_array_equal(read(0.0, sensor, (4, 4), exposure_s=1e7), sensor.white_dn)
+
+
+@pytest.mark.parametrize("bits", [1, 2, 16])
+def test_a_converter_gives_whole_numbers_from_0_to_its_top_and_never_wraps(bits):
+    sensor = SensorConfig(
+        replace(PIXEL, full_well_e=4e4, read_noise_e=1e5), LensConfig(2.8), bits=bits, black_level_dn=0.0
+    )
+    dn = read(np.linspace(0, 8e4, 256, dtype=np.float32), sensor, (256, 256))
+    assert (dn.min(), dn.max()) == (0, 2**bits - 1)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (5, 3)])
+def test_one_pixel_and_odd_frames_are_read(shape):
+    assert read(100.0, shape=shape).shape == shape
+
+
+def test_cameras_exposures_keys_and_sizes_share_one_compiled_kernel():
+    def launches(sensor, shape, key):
+        device = draw_device(sensor, shape, np.random.default_rng(1))
+        weights = electrons_per_irradiance(sensor, NM, np.full(NM.size, 10.0), 0.001 * key)
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            expected = expected_electrons_single(irradiance(shape) * 1e-3, weights, sensor)
+            read_frame(expected, sensor, device, 0.001 * key, key)
+            return list(dr.kernel_history([dr.KernelType.JIT]))
+
+    launches(preset("low_noise"), (32, 32), 1)
+    leaky = replace(preset("table1_output"), pixel=replace(PIXEL, dark_current_e_per_s=50.0), bits=10)
+    for sensor, shape, key in ((preset("table1_pixel"), (33, 46), 2), (leaky, (64, 4), 3)):
+        again = launches(sensor, shape, key)
+        assert again
+        assert all(launch["cache_hit"] for launch in again)

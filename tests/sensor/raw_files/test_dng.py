@@ -1,0 +1,422 @@
+"""Digital negatives: LibRaw's reading of them, the exact way back, and what a damaged or changed file is told."""
+
+import json
+import struct
+import tracemalloc
+from dataclasses import fields, replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rodcone.errors import InputError
+from sensor.calibration import ColourCalibration
+from sensor.cfa import MOSAICS, RGBW, Tile, channels
+from sensor.raw import RawImage
+from sensor.raw_files.dng import (
+    PRIVATE,
+    PRIVATE_DATA,
+    dng_tags,
+    exif_tags,
+    is_bayer,
+    is_rgbw,
+    rational,
+    read_dng,
+    write_dng,
+)
+from sensor.raw_files.tiff import CFA, EXIF, write_mosaic
+
+rawpy = pytest.importorskip("rawpy", reason="rawpy (LibRaw) is not installed")
+
+BAYER_PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
+RGBW_PHASES = [("RG", "BW"), ("GR", "WB"), ("BW", "RG"), ("WB", "GR")]
+
+
+def colour(count: int) -> ColourCalibration:
+    """Numbers without a short decimal or a small fraction."""
+    rng = np.random.default_rng(count)
+    a, d65 = (np.eye(count, 3) + 0.1 * rng.standard_normal((count, 3)) for _ in range(2))
+    return ColourCalibration(
+        rng.uniform(0.3, 2.0, count),
+        np.eye(3) + 0.1 * rng.random((3, 3)),
+        a,
+        d65,
+        np.linalg.pinv(a),
+        np.linalg.pinv(d65),
+    )
+
+
+def exposure(cfa: Tile = ("RG", "GB"), shape: tuple[int, int] = (30, 41), bits: int = 14) -> RawImage:
+    dn = np.random.default_rng(bits).integers(0, 2**bits, shape, dtype=np.uint16)
+    dn.flat[:2] = 0, 2**bits - 1
+    return RawImage(
+        dn,
+        cfa,
+        black_dn=10 if bits > 4 else 0,
+        white_dn=2**bits - 1,
+        gain_e_per_dn=0.1 + 0.2,
+        read_noise_e=1.5,
+        dsnu_e=1 / 3,
+        prnu=0.017,
+        exposure_s=1 / 30,
+        camera="low_noise",
+        f_number=2.8,
+        iso=51.56,
+        colour=colour(len(channels(cfa))),
+        engine="numpy",
+    )
+
+
+def same(one: RawImage, other: RawImage) -> bool:
+    """Whether every field is equal, numbers bit for bit and of the same type."""
+    for field in fields(RawImage):
+        a, b = getattr(one, field.name), getattr(other, field.name)
+        if field.name == "dn":
+            equal = a.dtype == b.dtype and np.array_equal(a, b)
+        elif field.name == "colour" and None not in (a, b):
+            equal = all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(ColourCalibration))
+        else:
+            equal = a == b and type(a) is type(b)
+        if not equal:
+            return False
+    return True
+
+
+@pytest.mark.parametrize("shape", [(22, 22), (31, 64), (64, 45)])
+@pytest.mark.parametrize("cfa", BAYER_PHASES + RGBW_PHASES)
+def test_libraw_reads_every_phase_bit_for_bit(cfa: Tile, shape: tuple[int, int], tmp_path: Path) -> None:
+    raw = exposure(cfa, shape)
+    write_dng(raw, tmp_path / "shot.dng")
+    with rawpy.imread(str(tmp_path / "shot.dng")) as theirs:
+        np.testing.assert_array_equal(theirs.raw_image, raw.dn)
+        letters = "RGBG" if is_bayer(cfa) else "RGBW"  # LibRaw counts a Bayer tile's second green as number 3
+        assert tuple("".join(letters[i] for i in row) for row in theirs.raw_pattern) == cfa
+        assert theirs.white_level == 2**14 - 1
+        assert theirs.black_level_per_channel == [10, 10, 10, 10]
+        gains = np.array(theirs.camera_whitebalance[: theirs.num_colors])
+        assert raw.colour is not None
+        assert gains / gains[1] == pytest.approx(raw.colour.neutral[1] / raw.colour.neutral, rel=1e-6)
+
+
+def test_libraw_reads_the_exposure(tmp_path: Path) -> None:
+    with rawpy.imread(str(write_dng(exposure(), tmp_path / "shot.dng"))) as theirs:
+        assert theirs.other.shutter_speed == pytest.approx(1 / 30, rel=1e-6)
+        assert (theirs.other.aperture, theirs.other.iso_speed) == (pytest.approx(2.8, rel=1e-6), 52.0)
+    bare = replace(exposure(), f_number=None, iso=None)
+    assert same(read_dng(write_dng(bare, tmp_path / "shot.dng")), bare)
+
+
+@pytest.mark.parametrize("bits", [1, 8, 16])
+def test_libraw_reads_every_depth_bit_for_bit(bits: int, tmp_path: Path) -> None:
+    raw = exposure(bits=bits)
+    write_dng(raw, tmp_path / "shot.dng")
+    with rawpy.imread(str(tmp_path / "shot.dng")) as theirs:
+        np.testing.assert_array_equal(theirs.raw_image, raw.dn)
+        assert theirs.white_level == 2**bits - 1
+
+
+@pytest.mark.parametrize("cfa", [*BAYER_PHASES, *RGBW_PHASES])
+def test_the_way_back_is_exact(cfa: Tile, tmp_path: Path) -> None:
+    raw = exposure(cfa)
+    assert same(read_dng(write_dng(raw, tmp_path / "shot.dng")), raw)
+    assert list(tmp_path.iterdir()) == [tmp_path / "shot.dng"]
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    st.integers(0, 1000),
+    st.floats(1e-12, 1e12),
+    st.floats(0.0, 1e9),
+    st.floats(0.0, 1.0),
+    st.floats(0.0, 1e7),
+    st.none() | st.floats(0.1, 1e4),
+)
+def test_the_way_back_is_exact_for_any_number(
+    tmp_path: Path, black: int, gain: float, noise: float, prnu: float, seconds: float, f_number: float | None
+) -> None:
+    raw = replace(
+        exposure(shape=(2, 2)),
+        black_dn=black,
+        gain_e_per_dn=gain,
+        read_noise_e=noise,
+        prnu=prnu,
+        exposure_s=seconds,
+        f_number=f_number,
+        iso=None,
+    )
+    assert same(read_dng(write_dng(raw, tmp_path / "shot.dng")), raw)
+
+
+def test_a_file_of_an_earlier_version_with_a_fraction_in_its_black_level_is_still_read(tmp_path: Path) -> None:
+    raw = replace(exposure(), black_dn=9.84)
+    write_mosaic(tmp_path / "shot.dng", raw.dn, CFA, dng_tags(raw), exif_tags(raw))
+    assert same(read_dng(tmp_path / "shot.dng"), raw)
+
+
+def test_public_tags_hold_what_the_specification_asks_for(tmp_path: Path) -> None:
+    raw = exposure(RGBW)
+    write_dng(raw, tmp_path / "shot.dng")
+    with tifffile.TiffFile(tmp_path / "shot.dng") as file:
+        tags = {tag.name: tag.value for tag in file.pages[0].tags}
+        np.testing.assert_array_equal(file.pages[0].asarray(), raw.dn)
+    assert tags["DNGVersion"] == bytes([1, 4, 0, 0])
+    assert (tags["PhotometricInterpretation"], tags["Compression"], tags["BitsPerSample"]) == (32803, 1, 16)
+    assert (tags["CFAPattern"], tags["CFAPlaneColor"], tags["CFARepeatPatternDim"]) == (
+        bytes([0, 1, 2, 6]),
+        bytes([0, 1, 2, 6]),
+        (2, 2),
+    )
+    assert (tags["CalibrationIlluminant1"], tags["CalibrationIlluminant2"]) == (17, 21)
+    assert tags["ActiveArea"] == (0, 0, 30, 41)
+    assert (tags["Make"], tags["Model"], tags["UniqueCameraModel"]) == ("rodcone", "low_noise", "rodcone low_noise")
+    assert (tags["Orientation"], tags["WhiteLevel"]) == (1, 16383)
+    exif = tags["ExifTag"]
+    assert (exif["ExposureTime"], exif["FNumber"], exif["ISOSpeedRatings"]) == ((1, 30), (14, 5), 52)
+    assert raw.colour is not None
+    for name, matrix in (
+        ("ColorMatrix1", raw.colour.xyz_to_camera_a),
+        ("ColorMatrix2", raw.colour.xyz_to_camera_d65),
+        ("ForwardMatrix1", raw.colour.camera_to_xyz_a),
+        ("ForwardMatrix2", raw.colour.camera_to_xyz_d65),
+    ):
+        pairs = np.reshape(tags[name], (-1, 2))
+        assert pairs[:, 0] / pairs[:, 1] == pytest.approx(matrix.ravel(), rel=1e-8), name
+
+
+def test_noise_profile_is_shot_noise_and_dark_noise_over_full_scale() -> None:
+    raw = replace(exposure(), black_dn=100.0, white_dn=1100, gain_e_per_dn=2.0, read_noise_e=3.0, dsnu_e=4.0)
+    kind, (slope, offset) = dng_tags(raw)[51041]
+    assert kind == "d"
+    assert slope == pytest.approx(1 / 2000, rel=1e-12)  # N(1)^2 = 2000 e-^2 / (2000 e-)^2
+    assert offset == pytest.approx((9 + 16 + 2.0**2 / 12) / 2000**2, rel=1e-12)
+
+
+def test_the_response_counts_as_linear_up_to_where_pixels_count_as_saturated() -> None:
+    raw = replace(exposure(), black_dn=100.0, white_dn=1100, gain_e_per_dn=2.0, read_noise_e=3.0, dsnu_e=4.0)
+    numerator, denominator = dng_tags(raw)[50734][1]
+    assert numerator / denominator == pytest.approx((2000 - 4 * np.sqrt(25 + 1 / 3) - 1) / 2000, rel=1e-9)
+
+
+@given(st.floats(-1e9, 1e9))
+def test_rationals_are_the_nearest_that_fit(value: float) -> None:
+    numerator, denominator = (int(part) for part in rational(value))
+    assert abs(numerator) < 2**31
+    assert 0 < denominator < 2**31
+    # the error of a best approximation of denominator up to n is at most 1 / n; n is (2^31 - 1) / max(|value|, 1)
+    assert abs(Fraction(numerator, denominator) - Fraction(value)) <= max(abs(value), 1.0) / (2**31 - 2)
+
+
+@pytest.mark.parametrize(("cfa", "bayer", "rgbw"), [
+    *[(phase, True, False) for phase in BAYER_PHASES],
+    *[(phase, False, True) for phase in RGBW_PHASES],
+    (("RG", "BG"), False, False),
+    (("RR", "GB"), False, False),
+    (("RGGB",), False, False),
+    (("RC", "CC"), False, False),
+    (MOSAICS["rgbw_4x4"], False, False),
+])  # fmt: skip
+def test_tiles_are_told_apart(cfa: Tile, bayer: bool, rgbw: bool) -> None:
+    assert (is_bayer(cfa), is_rgbw(cfa)) == (bayer, rgbw)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"cfa": ("RC", "CC"), "colour": None}, r"cfa: .* is not written as DNG; allowed: Bayer or 2x2 RGBW"),
+        ({"colour": None}, r"colour: the raw image holds no colour calibration"),
+        ({"black_dn": -1.0}, r"levels: black -1\.0 .* don't fit a DNG"),
+        ({"black_dn": 9.84}, r"black_dn: 9\.84 is no whole number, .* allowed: whole DN; write a \.tif instead"),
+        ({"white_dn": 1000.5}, r"levels: .*white 1000\.5 don't fit a DNG"),
+        ({"dn": np.zeros((4, 4), np.int32)}, r"dn: int32 of shape \(4, 4\) is not allowed"),
+    ],
+)
+def test_what_a_dng_cannot_hold_is_refused_and_nothing_written(
+    changes: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match=message):
+        write_dng(replace(exposure(), **changes), tmp_path / "shot.dng")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failed_write_leaves_the_older_file_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_dng(exposure(), tmp_path / "shot.dng")
+    before = path.read_bytes()
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(tifffile.TiffWriter, "write", full)
+    with pytest.raises(OSError, match="No space"):
+        write_dng(exposure(bits=8), path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def patched(content: bytes, code: int, entry: bytes) -> bytes:
+    """File with the type, count and value of one tag of the first directory replaced."""
+    (start,) = struct.unpack_from("<I", content, 4)
+    (count,) = struct.unpack_from("<H", content, start)
+    for place in range(start + 2, start + 2 + 12 * count, 12):
+        if struct.unpack_from("<H", content, place) == (code,):
+            return content[: place + 2] + entry + content[place + 2 + len(entry) :]
+    raise AssertionError(f"no tag {code}")
+
+
+@pytest.mark.parametrize(
+    ("code", "entry", "message"),
+    [
+        (256, struct.pack("<HII", 4, 1, 1 << 17), r"131072 x 30 pixels of 2 bytes don't fit its \d+ bytes"),
+        (256, struct.pack("<HII", 4, 1, 1 << 31), r"2147483648 x 30 pixels; allowed: 1 to 131072 a side"),
+        (257, struct.pack("<HII", 4, 1, 0), r"41 x 0 pixels; allowed: 1 to 131072"),
+        (256, struct.pack("<HII", 2, 1, 65), r"tag 256 is missing or holds no whole numbers"),
+        (258, struct.pack("<HII", 3, 1, 8), r"tag 258 is \(8,\); allowed: 16"),
+        (259, struct.pack("<HII", 3, 1, 7), r"tag 259 is \(7,\); allowed: 1"),
+        (262, struct.pack("<HII", 3, 1, 2), r"tag 262 is \(2,\); allowed: 32803"),
+        (277, struct.pack("<HII", 3, 1, 3), r"tag 277 is \(3,\); allowed: 1"),
+        (273, struct.pack("<HII", 4, 1, 1 << 30), r"41 x 30 pixels of 2 bytes don't fit"),
+        (273, struct.pack("<HII", 4, 1 << 30, 8), r"tag 273 claims bytes 8 to 4294967304 of \d+; it is cut off"),
+        (279, struct.pack("<HII", 4, 1, 100), r"41 x 30 pixels of 2 bytes don't fit"),
+        (PRIVATE_DATA, struct.pack("<HII", 2, 4, 0), r"its DNGPrivateData holds no calibration in electrons"),
+        (33422, struct.pack("<HI4B", 1, 4, 2, 1, 1, 0), r"CFAPattern is \(2, 1, 1, 0\), the calibration says \(0,"),
+        (50717, struct.pack("<HII", 4, 1, 4095), r"WhiteLevel is \(4095,\), the calibration says \(16383,\)"),
+        (EXIF, struct.pack("<HII", 4, 1, 1 << 30), r"its directory of tags at byte 1073741824 is not all there"),
+        (EXIF, struct.pack("<HII", 4, 1, 8), r"ExposureTime is missing, the calibration says \(1, 30\)"),
+        (EXIF, struct.pack("<HI4s", 2, 4, b"abc"), r"tag 34665 is missing or holds no whole numbers"),
+        (50717, struct.pack("<HI4s", 2, 4, b"abc"), r"WhiteLevel is \(97, 98, 99, 0\), the calibration says"),
+    ],
+)  # fmt: skip
+def test_a_changed_tag_is_refused_in_one_line(code: int, entry: bytes, message: str, tmp_path: Path) -> None:
+    path = write_dng(exposure(), tmp_path / "shot.dng")
+    path.write_bytes(patched(path.read_bytes(), code, entry))
+    with pytest.raises(InputError, match=message) as error:
+        read_dng(path)
+    assert "\n" not in str(error.value)
+
+
+def rewritten(content: bytes, **changes: object) -> bytes:
+    """File whose calibration in DNGPrivateData is changed, padded with blanks to its old length."""
+    start = content.index(PRIVATE + b"{") + len(PRIVATE)
+    held, length = json.JSONDecoder().raw_decode(content[start:].decode("latin-1"))
+    new = json.dumps(
+        {key: value for key, value in {**held, **changes}.items() if value != "drop"}, separators=(",", ":")
+    )
+    assert len(new) <= length
+    return content[:start] + new.encode().ljust(length) + content[start + length :]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"gain_e_per_dn": 0}, r"gain_e_per_dn: 0 is outside"),
+        ({"gain_e_per_dn": "2"}, r"gain_e_per_dn: '2' is not a number"),
+        ({"read_noise_e": -1}, r"read_noise_e: -1 is outside"),
+        ({"dsnu_e": None}, r"dsnu_e: None is not a number"),
+        ({"prnu": True}, r"prnu: True is not a number"),
+        ({"exposure_s": float("nan")}, r"exposure_s: nan is outside"),
+        ({"white_dn": float("inf")}, r"white_dn: inf is outside"),
+        ({"iso": "fast"}, r"iso: 'fast' is not a number"),
+        ({"f_number": 0.0}, r"f_number: 0\.0 is outside"),
+        ({"white_dn": 10**400, "colour": {}}, r"white_dn: 10+ \.\.\."),
+        ({"colour": None, "q" * 1000: 1}, r"calibration: 'q+' is unknown"),
+        ({"cfa": 7}, r"cfa: 7 is not a list of rows"),
+        ({"cfa": ["RG", "B"]}, r"cfa: rows of .* differ in length"),
+        ({"camera": "a\nb"}, r"camera: 'a\\nb' is not allowed"),
+        ({"engine": 3}, r"engine: 3 is not a text"),
+        ({"colour": {}}, r"colour: allowed is null, or an object of camera_to_xyz_a"),
+        ({"colour": None}, r"colour: the raw image holds no colour calibration"),
+        ({"version": 2}, r"its calibration is not that of a raw image; allowed: .* version 1"),
+        ({"prnu": "drop"}, r"its calibration lacks prnu"),
+        ({"prnu": "drop", "prn": 0}, r"calibration: 'prn' is unknown; .*did you mean 'prnu'"),
+    ],
+)
+def test_a_changed_calibration_is_refused_in_one_line(changes: dict[str, object], message: str, tmp_path: Path) -> None:
+    path = write_dng(exposure(), tmp_path / "shot.dng")
+    path.write_bytes(rewritten(path.read_bytes(), **changes))
+    with pytest.raises(InputError, match=message) as error:
+        read_dng(path)
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < len(str(path)) + 1000
+
+
+def test_a_file_cut_off_anywhere_is_refused(tmp_path: Path) -> None:
+    path = write_dng(exposure(shape=(4, 4)), tmp_path / "shot.dng")
+    content = path.read_bytes()
+    for length in [*range(600), *range(600, len(content), 37), len(content) - 1]:
+        path.write_bytes(content[:length])
+        with pytest.raises(InputError, match=r"shot\.dng: "):
+            read_dng(path)
+
+
+def refusal(path: Path) -> str | None:
+    """What reading a file of 4x4 pixels is refused with; None where it gives a raw image of that size."""
+    try:
+        return None if read_dng(path).dn.nbytes == 32 else "another size"
+    except InputError as error:
+        return str(error)
+
+
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 620), st.integers(0, 255)), min_size=1, max_size=4))
+def test_any_bytes_of_the_directory_give_a_raw_image_or_one_line(
+    tmp_path: Path, changes: list[tuple[int, int]]
+) -> None:
+    path = tmp_path / "shot.dng"
+    if not path.exists():
+        write_dng(exposure(shape=(4, 4)), tmp_path / "whole.dng")
+    content = bytearray((tmp_path / "whole.dng").read_bytes())
+    for place, value in changes:
+        content[place] = value
+    path.write_bytes(content)
+    said = refusal(path)
+    assert said is None or (said.startswith(str(path)) and "\n" not in said)
+
+
+def test_a_small_file_of_many_tags_takes_little_memory(tmp_path: Path) -> None:
+    length, tags = 1 << 16, 2000
+    entries = b"".join(struct.pack("<HHII", code, 1, length, 8) for code in range(tags))
+    content = b"II*\0" + struct.pack("<I", 8 + length) + bytes(length) + struct.pack("<H", tags) + entries
+    (tmp_path / "shot.dng").write_bytes(content)
+    tracemalloc.start()
+    with pytest.raises(InputError, match=r"tag 258 is \(0, 0, 0, 0\); allowed: 16"):
+        read_dng(tmp_path / "shot.dng")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    # the dozen tags that are read, at nine bytes a value, twice where they are checked; all 2000 would be 1.2 GB
+    assert peak < 20 * 9 * length
+
+
+def test_strips_that_all_claim_the_same_bytes_are_refused(tmp_path: Path) -> None:
+    strips, length, first = 512, 1024, 8 + 1024
+    arrays = struct.pack(f"<{strips}I", *[8] * strips) + struct.pack(f"<{strips}I", *[length] * strips)
+    one = {256: 512, 257: 512, 258: 16, 259: 1, 262: 32803, 277: 1}
+    tags = [(code, 1, value) for code, value in one.items()]
+    tags += [(273, strips, first), (279, strips, first + 4 * strips)]
+    entries = b"".join(struct.pack("<HHII", code, 4, count, value) for code, count, value in sorted(tags))
+    content = b"II*\0" + struct.pack("<I", first + len(arrays)) + bytes(length) + arrays
+    (tmp_path / "shot.dng").write_bytes(content + struct.pack("<H", len(tags)) + entries + bytes(4))
+    with pytest.raises(InputError, match=r"512 x 512 pixels of 2 bytes don't fit its \d{4} bytes"):
+        read_dng(tmp_path / "shot.dng")
+
+
+@pytest.mark.parametrize("content", [b"", b"II*\0", b"MM\0*" + bytes(40), b"II*\0\xff\xff\xff\xff", bytes(100)])
+def test_what_is_no_dng_is_refused(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / "shot.dng").write_bytes(content)
+    with pytest.raises(InputError, match=r"not a little-endian TIFF or DNG|cut off"):
+        read_dng(tmp_path / "shot.dng")
+
+
+def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "none.dng"):
+        with pytest.raises(InputError, match="there is no such file; give the path of a raw file"):
+            read_dng(path)
+
+
+def test_a_dng_of_another_camera_is_refused(tmp_path: Path) -> None:
+    tifffile.imwrite(tmp_path / "shot.dng", np.zeros((4, 4), np.uint16), photometric="cfa", metadata=None,
+                     extratags=[(50706, "B", 4, (1, 4, 0, 0), True)])  # fmt: skip
+    with pytest.raises(InputError, match="holds no calibration in electrons"):
+        read_dng(tmp_path / "shot.dng")

@@ -1,0 +1,288 @@
+"""Raw files of other cameras through LibRaw: levels, orientation, colours and noise, and what is refused."""
+
+import struct
+import sys
+import time
+from pathlib import Path
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+import tifffile
+
+from rodcone.errors import InputError
+from sensor.raw_files.dng import rational
+from sensor.raw_files.noise_profile import read_noise_profile
+from sensor.raw_files.photograph import ASSUMED_DARK_NOISE_E, ASSUMED_FULL_WELL_E, read_photograph
+from sensor.raw_files.raw_file import open_raw, read_raw
+from sensor.raw_files.tiff import CFA, Values, text, write_mosaic
+
+rawpy = pytest.importorskip("rawpy", reason="rodcone[photographs] (LibRaw) is not installed")
+
+SHAPE = (40, 60)
+BLACK = (512.0, 514.0, 510.0, 520.0)  # of the tile's sites, row by row
+WHITE = 16_000
+MATRIX = np.array([[0.9, -0.3, -0.1], [-0.4, 1.2, 0.2], [-0.05, 0.15, 0.6]])  # XYZ under D65 to the camera
+
+
+def other_camera(
+    path: Path,
+    dn: np.ndarray,
+    *,
+    pattern: tuple[int, ...] = (0, 1, 1, 2),
+    repeat: tuple[int, int] = (2, 2),
+    orientation: int = 1,
+    noise: tuple[float, ...] | None = None,
+    colours: bool = True,
+) -> Path:
+    """Digital negative of some camera: a black level a site, no word from rodcone."""
+    tags: dict[int, tuple[str, Values]] = {
+        254: ("I", (0,)),
+        271: text("Other"),
+        272: text("Model X"),
+        274: ("H", (orientation,)),
+        33421: ("H", repeat),
+        33422: ("B", pattern),
+        50706: ("B", (1, 4, 0, 0)),
+        50707: ("B", (1, 1, 0, 0)),
+        50708: text("Other Model X"),
+        50710: ("B", (0, 1, 2)),
+        50711: ("H", (1,)),
+        50713: ("H", (2, 2)),
+        50714: ("2I", rational(BLACK)),
+        50717: ("I", (WHITE,)),
+    }
+    if colours:
+        tags[50721] = ("2i", rational(MATRIX))
+        tags[50728] = ("2I", rational((0.5, 1.0, 0.7)))
+        tags[50778] = ("H", (21,))
+    if noise is not None:
+        tags[51041] = ("d", noise)
+    write_mosaic(path, dn, CFA, dict(sorted(tags.items())), {33434: ("2I", rational(0.01)), 33437: ("2I", rational(4))})
+    return path
+
+
+def levels(electrons: np.ndarray) -> np.ndarray:
+    """DN of a mosaic at one electron a DN, each site over its own black level."""
+    black = np.tile(np.array(BLACK).reshape(2, 2), (electrons.shape[0] // 2, electrons.shape[1] // 2))
+    return np.rint(np.minimum(electrons + black, WHITE)).astype(np.uint16)
+
+
+def test_each_channels_black_is_taken_off(tmp_path: Path) -> None:
+    above = np.random.default_rng(0).integers(0, 15_000, SHAPE).astype(np.float64)
+    raw = read_raw(other_camera(tmp_path / "shot.dng", levels(above)))
+    assert (raw.cfa, raw.shape, raw.black_dn, raw.white_dn) == (("RG", "GB"), SHAPE, 520.0, 16_000.0)
+    np.testing.assert_array_equal(raw.dn - raw.black_dn, above)
+    assert (raw.exposure_s, raw.f_number, raw.iso) == (pytest.approx(0.01), pytest.approx(4.0), None)
+
+
+def test_a_full_sample_is_full_whatever_its_black_was(tmp_path: Path) -> None:
+    raw = read_raw(other_camera(tmp_path / "shot.dng", np.full(SHAPE, WHITE, np.uint16)))
+    assert raw.saturated.all()
+    np.testing.assert_array_equal(raw.dn, np.full(SHAPE, WHITE))
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_frames_are_turned_upright_as_libraw_turns_its_own_pictures(orientation: int, tmp_path: Path) -> None:
+    above = np.full(SHAPE, 2000.0)
+    above[:20, :20] = 12_000.0  # a bright corner: its place and the frame's proportions tell all eight apart
+    path = other_camera(tmp_path / "shot.dng", levels(above), orientation=orientation)
+    raw = read_raw(path)
+    with rawpy.imread(str(path)) as theirs:
+        picture = theirs.postprocess(output_bps=16, no_auto_bright=True, gamma=(1, 1), half_size=False)
+    assert picture.shape[:2] == raw.shape
+    assert brightest_corner(picture[..., 1]) == brightest_corner(raw.dn)
+    # the letters are turned with the samples: each is found by its own level
+    shares = np.select([np.indices(SHAPE).sum(0) % 2 == 1, np.indices(SHAPE)[0] % 2 == 0], [1.0, 0.5], 0.25)
+    mosaic = read_raw(other_camera(tmp_path / "sites.dng", levels(8000.0 * shares), orientation=orientation))
+    by_value = np.where(mosaic.electrons == 8000 * mosaic.gain_e_per_dn, "G", "R")
+    by_value[np.isclose(mosaic.electrons, 2000 * mosaic.gain_e_per_dn)] = "B"
+    assert mosaic.cfa == tuple("".join(row) for row in by_value[:2, :2])
+
+
+def brightest_corner(frame: np.ndarray) -> int:
+    ends = (slice(2, 12), slice(-12, -2))
+    return int(np.argmax([frame[row, column].mean() for row in ends for column in ends]))
+
+
+def test_white_balance_and_matrix_are_the_files(tmp_path: Path) -> None:
+    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0))))
+    assert raw.colour is not None
+    assert raw.colour.neutral == pytest.approx([0.5, 1.0, 0.7], rel=1e-5)
+    assert raw.colour.to_srgb.sum(axis=1) == pytest.approx(np.ones(3), abs=1e-14)  # LibRaw's have 24 bits
+    # ColorMatrix1 is for D65 here: a camera colour of an XYZ goes back to that XYZ in sRGB, as DNG's chapter 6 has it
+    srgb_to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    to_camera = MATRIX @ srgb_to_xyz
+    balanced = to_camera / to_camera.sum(axis=1, keepdims=True)
+    assert raw.colour.to_srgb == pytest.approx(np.linalg.inv(balanced), abs=2e-3)
+    white = np.array([0.9505, 1.0, 1.089])
+    response = raw.colour.xyz_to_camera_d65 @ white
+    assert response / response[1] == pytest.approx(MATRIX @ white / (MATRIX @ white)[1], abs=2e-3)
+    assert raw.colour.camera_to_xyz_d65 @ np.ones(3) == pytest.approx([0.9642, 1.0, 0.8249], abs=2e-3)  # D50
+    assert (facts["as_shot"], facts["colour_matrix"]) == ("file", "LibRaw")
+
+
+def test_a_file_without_colours_says_so(tmp_path: Path) -> None:
+    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)), colours=False))
+    assert raw.colour is not None
+    assert facts["colour_matrix"] == "none"
+    np.testing.assert_array_equal(raw.colour.to_srgb, np.eye(3))
+
+
+def test_noise_comes_from_the_files_profile(tmp_path: Path) -> None:
+    # S = 1 / full scale in electrons, O = (dark / full scale)^2; three channels whose mean counts
+    full, dark = 31_000.0, 6.0
+    pair = (1 / full, (dark / full) ** 2)
+    path = other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)), noise=pair * 3)
+    raw, facts = open_raw(path)
+    assert facts["noise"] == "profile of the file"
+    assert raw.gain_e_per_dn == pytest.approx(full / (WHITE - 520))
+    assert raw.read_noise_e == pytest.approx(dark)
+
+
+@pytest.mark.parametrize("pair", [(0.0, 0.0), (float("nan"), 1.0), (-1e-4, 1e-9), (2.0, 1e-9), (1e-4, 2.0), (1e-4,)])
+def test_a_profile_that_says_nothing_is_not_believed(pair: tuple[float, ...], tmp_path: Path) -> None:
+    path = other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)), noise=pair)
+    assert read_noise_profile(path, 15_000.0) is None
+
+
+def test_noise_is_estimated_from_a_frame_large_enough_and_assumed_otherwise(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    ramp = np.tile(np.geomspace(20.0, 4000.0, 512), (400, 1))
+    electrons = rng.poisson(ramp) + 3.0 * rng.standard_normal(ramp.shape)  # at 0.5 e- a DN
+    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", levels(electrons / 0.5)))
+    assert facts["noise"] == "estimated from the frame"
+    assert facts["gain_e_per_dn"] == raw.gain_e_per_dn == pytest.approx(0.5, rel=0.2)
+    raw, facts = open_raw(other_camera(tmp_path / "small.dng", levels(np.full(SHAPE, 3000.0))))
+    assert facts["noise"] == "assumed"
+    assert (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn == pytest.approx(ASSUMED_FULL_WELL_E)
+    assert raw.read_noise_e == ASSUMED_DARK_NOISE_E
+
+
+def test_mosaics_that_are_not_bayers_are_refused(tmp_path: Path) -> None:
+    dn = levels(np.full((36, 60), 3000.0))
+    x_trans = (
+        1,
+        2,
+        1,
+        1,
+        0,
+        1,
+        0,
+        1,
+        0,
+        2,
+        1,
+        2,
+        1,
+        2,
+        1,
+        1,
+        0,
+        1,
+        1,
+        0,
+        1,
+        1,
+        2,
+        1,
+        2,
+        1,
+        2,
+        0,
+        1,
+        0,
+        1,
+        0,
+        1,
+        1,
+        2,
+        1,
+    )
+    other_camera(tmp_path / "x.dng", dn, pattern=x_trans, repeat=(6, 6))
+    other_camera(tmp_path / "row.dng", dn, pattern=(0, 1, 0, 2))
+    for name in ("x.dng", "row.dng"):
+        with pytest.raises(InputError, match=rf"{name}: .*; allowed: Bayer") as error:
+            read_photograph(tmp_path / name)
+        assert "\n" not in str(error.value)
+
+
+def test_without_rawpy_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)))
+    monkeypatch.setitem(sys.modules, "rawpy", None)
+    with pytest.raises(InputError, match=r"^rawpy: not installed .*pip install 'rodcone\[photographs\]'"):
+        read_raw(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"no raw file", b"II*\0" + bytes(40), b"MM\0*" + bytes(40)])
+@pytest.mark.parametrize("name", ["shot.nef", "shot.dng", "shot"])
+def test_what_libraw_cannot_read_is_one_line(name: str, content: bytes, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=r"shot.*: LibRaw can't read it \(.+\); allowed: raw files") as error:
+        read_raw(tmp_path / name)
+    assert "\n" not in str(error.value)
+    assert "b'" not in str(error.value)
+
+
+@pytest.mark.parametrize("side", [20_000, 60_000])
+def test_pixels_that_a_file_can_not_hold_are_refused_before_memory_is_taken(side: int, tmp_path: Path) -> None:
+    """LibRaw itself takes 0.8 GB for 20 000 pixels a side, whatever the file holds."""
+    content = other_camera(tmp_path / "shot.dng", levels(np.zeros(SHAPE))).read_bytes()
+    for code, held in ((256, SHAPE[1]), (257, SHAPE[0])):
+        entry = struct.pack("<HHII", code, 4, 1, held)
+        assert content.count(entry) == 1
+        content = content.replace(entry, struct.pack("<HHII", code, 4, 1, side))
+    (tmp_path / "shot.dng").write_bytes(content)
+    with pytest.raises(InputError, match=rf"bytes can't hold the {side} x {side} pixels"):
+        read_photograph(tmp_path / "shot.dng")
+
+
+@pytest.mark.parametrize("error", [NotImplementedError("filters: 148"), ValueError("a\nb"), np.linalg.LinAlgError("c")])
+def test_what_comes_of_a_damaged_file_by_chance_is_one_line(
+    error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With some damaged patterns LibRaw answers from memory that it never wrote to, each time something else."""
+    path = other_camera(tmp_path / "shot.dng", levels(np.zeros(SHAPE)))
+    monkeypatch.setattr("sensor.raw_files.photograph._raw_image", Mock(side_effect=error))
+    with pytest.raises(InputError, match=r"is no photograph \(.*\); it is damaged, copy it again"):
+        read_photograph(path)
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("below", [False, True])
+def test_a_profile_is_found_in_either_byte_order_and_below_the_first_picture(
+    order: str, below: bool, tmp_path: Path
+) -> None:
+    """Cameras keep a small picture in the first directory and the raw one below it; tifffile writes both here."""
+    profile, picture = [(51041, 12, 6, (1e-4, 1e-8) * 3, True)], np.zeros((8, 8), np.uint16)
+    with tifffile.TiffWriter(tmp_path / "a.dng", byteorder=order) as file:  # type: ignore[arg-type]
+        file.write(picture, subifds=2 if below else 0, extratags=[] if below else profile)
+        if below:
+            file.write(picture, subfiletype=1)
+            file.write(picture, extratags=profile)
+    read = read_noise_profile(tmp_path / "a.dng", 1000.0)
+    assert read is not None
+    assert read.gain_e_per_dn == pytest.approx(10.0)
+    assert read.dark_noise_e == pytest.approx(1.0)
+
+
+def test_directories_without_end_are_left_at_once(tmp_path: Path) -> None:
+    """Each of 100 000 directories of no tag names the next; the profile stands in the last, and one names itself."""
+    starts = range(8, 8 + 6 * 100_000, 6)
+    chain = b"".join(struct.pack("<HI", 0, start + 6) for start in starts)
+    last = struct.pack("<HHHIII", 1, 51041, 12, 2, 0, 0)
+    (tmp_path / "a.dng").write_bytes(b"II*\0" + struct.pack("<I", 8) + chain + last)
+    start = time.process_time()
+    assert read_noise_profile(tmp_path / "a.dng", 1000.0) is None
+    (tmp_path / "b.dng").write_bytes(b"II*\0" + struct.pack("<IHI", 8, 0, 8))
+    assert read_noise_profile(tmp_path / "b.dng", 1000.0) is None
+    assert time.process_time() - start < 0.5
+
+
+def test_a_profile_cut_off_anywhere_is_none_or_the_same(tmp_path: Path) -> None:
+    whole = other_camera(tmp_path / "whole.dng", levels(np.zeros(SHAPE)), noise=(1e-4, 1e-8)).read_bytes()
+    read = read_noise_profile(tmp_path / "whole.dng", 1000.0)
+    assert read is not None
+    for length in range(900):
+        (tmp_path / "cut.dng").write_bytes(whole[:length])
+        assert read_noise_profile(tmp_path / "cut.dng", 1000.0) in (None, read)

@@ -1,0 +1,234 @@
+"""Raw files by their ending: any mosaic as TIFF with its sidecar, exactly back, and what goes wrong in words."""
+
+import json
+import os
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rodcone.errors import InputError
+from rodcone.files import replacing
+from sensor.calibration import ColourCalibration
+from sensor.cfa import MOSAICS, Tile, channels
+from sensor.raw import RawImage
+from sensor.raw_files.raw_file import read_raw, write_raw
+from sensor.raw_files.raw_json import KEYS, MOST_BYTES, VERSION
+
+
+def colour(count: int) -> ColourCalibration:
+    rng = np.random.default_rng(count)
+    forth, back = (rng.standard_normal((2, *shape)) for shape in ((count, 3), (3, count)))
+    return ColourCalibration(rng.uniform(0.3, 2.0, count), rng.random((3, 3)), *forth, *back)
+
+
+def exposure(cfa: Tile, shape: tuple[int, int] = (9, 11)) -> RawImage:
+    letters = channels(cfa)
+    return RawImage(
+        np.random.default_rng(1).integers(0, 2**16, shape, dtype=np.uint16),
+        cfa,
+        black_dn=-0.1,
+        white_dn=65_535.0,
+        gain_e_per_dn=1 / 7,
+        read_noise_e=1e-17,
+        dsnu_e=2,
+        prnu=0.017,
+        exposure_s=1e-3,
+        camera="car camera",
+        colour=colour(len(letters)) if set("RGB") <= set(letters) else None,
+    )
+
+
+@pytest.mark.parametrize("ending", [".tif", ".TIFF"])
+@pytest.mark.parametrize("cfa", [*MOSAICS.values(), ("QZ", "ZQ"), ("RGBCY",)])
+def test_every_mosaic_comes_back_exactly_from_tiff_and_sidecar(cfa: Tile, ending: str, tmp_path: Path) -> None:
+    raw = exposure(cfa)
+    paths = write_raw(raw, tmp_path / f"shot{ending}")
+    assert paths == (tmp_path / f"shot{ending}", tmp_path / "shot.json")
+    assert sorted(tmp_path.iterdir()) == sorted(paths)
+    back = read_raw(paths[0])
+    np.testing.assert_array_equal(back.dn, raw.dn)
+    np.testing.assert_array_equal(tifffile.imread(paths[0]), raw.dn)
+    assert (back.dn.dtype, back.colour is None) == (np.uint16, raw.colour is None)
+    for name in (field.name for field in fields(RawImage) if field.name not in ("dn", "colour")):
+        assert (getattr(back, name), type(getattr(back, name))) == (getattr(raw, name), type(getattr(raw, name)))
+    if back.colour is not None and raw.colour is not None:
+        for field in fields(ColourCalibration):
+            np.testing.assert_array_equal(getattr(back.colour, field.name), getattr(raw.colour, field.name))
+
+
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(st.floats(-65_535, 0), st.floats(1e-3, 65_535), st.floats(1e-12, 1e12), st.floats(1e-6, 1e9))
+def test_any_calibration_comes_back_exactly(
+    tmp_path: Path, black: float, white: float, gain: float, iso: float
+) -> None:
+    raw = replace(exposure(("RC", "CC"), (2, 2)), black_dn=black, white_dn=white, gain_e_per_dn=gain, iso=iso)
+    back = read_raw(write_raw(raw, tmp_path / "shot.tif")[0])
+    assert (back.black_dn, back.white_dn, back.gain_e_per_dn, back.iso) == (black, white, gain, iso)
+
+
+def test_numbers_of_numpy_are_kept_as_numbers(tmp_path: Path) -> None:
+    raw = replace(exposure(("RC", "CC")), gain_e_per_dn=np.float32(1 / 7), white_dn=np.int64(1000))
+    back = read_raw(write_raw(raw, tmp_path / "shot.tif")[0])
+    assert (back.gain_e_per_dn, back.white_dn) == (float(np.float32(1 / 7)), 1000)
+
+
+def test_a_sidecar_without_every_field_of_a_raw_image_cannot_be_written() -> None:
+    assert {*KEYS, "dn"} == {field.name for field in fields(RawImage)}
+
+
+@pytest.mark.parametrize(
+    ("name", "cfa", "message"),
+    [
+        ("shot.png", "bayer", r"raw file: .*shot\.png' has another ending; allowed: \.dng, \.tif, \.tiff; rename it"),
+        ("shot", "bayer", r"has another ending"),
+        ("shot.dng", "rccc", r"can't hold the mosaic \('RC', 'CC'\); .*write shot\.tif"),
+        ("shot.dng", "rgbw_4x4", r"can't hold the mosaic .*write shot\.tif"),
+    ],
+)
+def test_a_name_that_does_not_fit_is_refused(name: str, cfa: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message):
+        write_raw(exposure(MOSAICS[cfa]), tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["shot.cr2", "shot.dng", "shot.tif"])
+def test_a_missing_file_is_named(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=rf"{name}: there is no such file; give the path of a raw file"):
+        read_raw(tmp_path / name)
+
+
+def test_a_list_of_defects_comes_back_from_the_sidecar(tmp_path: Path) -> None:
+    raw = replace(exposure(("RC", "CC")), defects=np.array([(3, 1), (8, 10)]))
+    back = read_raw(write_raw(raw, tmp_path / "shot.tif")[0])
+    np.testing.assert_array_equal(back.defects, [(3, 1), (8, 10)])
+
+
+def test_a_file_from_before_there_were_lists_is_read(tmp_path: Path) -> None:
+    write_raw(exposure(("RC", "CC")), tmp_path / "shot.tif")
+    assert "defects" not in json.loads((tmp_path / "shot.json").read_text())
+    assert read_raw(tmp_path / "shot.tif").defects is None
+
+
+def test_a_list_too_long_for_a_file_is_refused(tmp_path: Path) -> None:
+    shape = (300, 400)
+    raw = replace(exposure(("RC", "CC"), shape), defects=np.argwhere(np.ones(shape, dtype=bool)))
+    with pytest.raises(InputError, match=r"defects: 120000 pixels don't fit a raw file; .*list fewer"):
+        write_raw(raw, tmp_path / "shot.tif")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("places", [[[9, 0]], [[0]], "all", [[0, 1.5]]])
+def test_a_list_of_defects_that_cannot_be_is_refused(places: object, tmp_path: Path) -> None:
+    write_raw(exposure(("RC", "CC")), tmp_path / "shot.tif")
+    held = json.loads((tmp_path / "shot.json").read_text()) | {"defects": places}
+    (tmp_path / "shot.json").write_text(json.dumps(held))
+    with pytest.raises(InputError, match=r"shot\.json: defects: .* is not allowed; give rows and columns"):
+        read_raw(tmp_path / "shot.tif")
+
+
+def test_a_sidecar_of_another_exposure_is_refused(tmp_path: Path) -> None:
+    raw = exposure(("RC", "CC"))
+    write_raw(raw, tmp_path / "one.tif")
+    other = raw.dn.copy()
+    other[3, 4] ^= 1
+    write_raw(replace(raw, dn=other), tmp_path / "two.tif")
+    (tmp_path / "two.json").replace(tmp_path / "one.json")
+    with pytest.raises(InputError, match=r"one\.json: it describes other pixels than one\.tif; keep the two files"):
+        read_raw(tmp_path / "one.tif")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (b"", r"its calibration is not that of a raw image"),
+        (b"\xff\xfe{}", r"its calibration is not that of a raw image"),
+        (b"[" * 100_000, r"its calibration is not that of a raw image"),
+        (b"[1]", r"its calibration is not that of a raw image"),
+        (b'{"format": "rodcone raw image", "version": 1}', r"its calibration lacks cfa, black_dn"),
+        (b'{"format": "rodcone raw image", "version": 1, "dn": 3}', r"'dn' is unknown"),
+        (b" " * (MOST_BYTES + 1), r"over \d+ bytes; allowed: the sidecar that rodcone wrote"),
+    ],
+)
+def test_a_sidecar_that_is_none_is_refused_in_one_line(text: bytes, message: str, tmp_path: Path) -> None:
+    write_raw(exposure(("RC", "CC")), tmp_path / "shot.tif")
+    (tmp_path / "shot.json").write_bytes(text)
+    with pytest.raises(InputError, match=message) as error:
+        read_raw(tmp_path / "shot.tif")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("neutral", [1.0, 1.0]),
+        ("neutral", [1.0, -1.0, 1.0]),
+        ("neutral", [1.0, float("nan"), 1.0]),
+        ("neutral", ["a", "b", "c"]),
+        ("neutral", [10**400, 1, 1]),
+        ("to_srgb", [[1, 2, 3], [1, 2], [1]]),
+        ("to_srgb", [1, 2, 3]),
+        ("to_srgb", [[float("inf"), 0, 0], [0, 1, 0], [0, 0, 1]]),
+        ("xyz_to_camera_a", None),
+        ("camera_to_xyz_d65", [[1, 0, 0, 0]] * 3),
+    ],
+)
+def test_a_colour_calibration_that_cannot_be_is_refused(key: str, value: object, tmp_path: Path) -> None:
+    write_raw(exposure(("RG", "GB")), tmp_path / "shot.tif")
+    held = json.loads((tmp_path / "shot.json").read_text())
+    assert held["version"] == VERSION
+    held["colour"][key] = value
+    (tmp_path / "shot.json").write_text(json.dumps(held))
+    with pytest.raises(InputError, match=r"shot\.json: .* is not allowed; give") as error:
+        read_raw(tmp_path / "shot.tif")
+    assert "\n" not in str(error.value)
+
+
+def test_colours_of_another_mosaic_are_refused() -> None:
+    with pytest.raises(InputError, match=r"colour: 3 channels don't fit the mosaic's \('R', 'G', 'B', 'W'\)"):
+        replace(exposure(("RG", "BW")), colour=colour(3))
+
+
+def test_a_part_of_a_calibration_keeps_rows_and_columns_of_its_channels() -> None:
+    whole = colour(4)
+    part = whole.part((0, 1, 2))
+    np.testing.assert_array_equal(part.neutral, whole.neutral[:3])
+    np.testing.assert_array_equal(part.to_srgb, whole.to_srgb)
+    for light in ("a", "d65"):
+        forth, back = f"xyz_to_camera_{light}", f"camera_to_xyz_{light}"
+        np.testing.assert_array_equal(getattr(part, forth), getattr(whole, forth)[:3])
+        np.testing.assert_array_equal(getattr(part, back), getattr(whole, back)[:, :3])
+
+
+def test_a_missing_sidecar_is_named(tmp_path: Path) -> None:
+    write_raw(exposure(("RC", "CC")), tmp_path / "shot.tif")
+    (tmp_path / "shot.json").unlink()
+    with pytest.raises(InputError, match=r"shot\.json: can't be read .*; keep the sidecar beside shot\.tif"):
+        read_raw(tmp_path / "shot.tif")
+
+
+def test_files_are_replaced_together_or_not_at_all(tmp_path: Path) -> None:
+    one, two = tmp_path / "one", tmp_path / "two"
+    one.write_text("old")
+    with pytest.raises(FileNotFoundError), replacing(one, two) as (_, second):
+        second.write_text("the first was never written")
+    assert one.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [one]
+    with replacing(one, two) as (first, second):
+        first.write_text("new")
+        second.write_text("beside")
+    assert (one.read_text(), two.read_text()) == ("new", "beside")
+    assert sorted(tmp_path.iterdir()) == [one, two]
+
+
+@pytest.mark.timeout(10)
+def test_a_sidecar_that_is_a_pipe_is_refused_and_not_waited_for(tmp_path: Path) -> None:
+    picture, sidecar = write_raw(exposure(("RG", "BW")), tmp_path / "shot.tif")
+    sidecar.unlink()
+    os.mkfifo(sidecar)
+    with pytest.raises(InputError, match="a folder or a device"):
+        read_raw(picture)

@@ -1,0 +1,226 @@
+"""A photograph: its exact form is its three steps bit for bit, its quick form is independent of strips and threads."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from render.radiance import SpectralRadiance
+from render.spectrum import Spectrum
+from rodcone.errors import InputError
+from rodcone.jit import backend
+from sensor.capture import capture, capture_strips
+from sensor.curves import Responses
+from sensor.device import draw_device
+from sensor.optics import form_image
+from sensor.presets import names, preset
+from sensor.readout import read_out
+from sensor.response import expected_electrons
+
+NM = np.arange(385.0, 780.0, 10.0)
+
+
+def scene(dtype=np.float32, shape=(33, 48)):
+    return SpectralRadiance(np.random.default_rng(1).uniform(0, 0.006, (*shape, NM.size)).astype(dtype), NM)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("cfa", ["rgbw", "bayer"])
+@pytest.mark.parametrize("name", names())
+def test_an_exact_capture_is_the_chain_of_its_parts_bit_for_bit(name, cfa, dtype):
+    radiance, sensor = scene(dtype), preset(name, cfa)
+    device = draw_device(sensor, radiance.shape, np.random.default_rng(2))
+    raw = capture(radiance, sensor, 0.02, device, np.random.default_rng(3), exact=True)
+    expected_e = expected_electrons(form_image(radiance, sensor), sensor, 0.02)
+    parts = read_out(expected_e, sensor, device, 0.02, np.random.default_rng(3))
+    np.testing.assert_array_equal(raw.dn, parts.dn)
+    assert raw.engine == "numpy"
+    for field in ("cfa", "black_dn", "white_dn", "gain_e_per_dn", "read_noise_e", "dsnu_e", "prnu", "exposure_s"):
+        assert getattr(raw, field) == getattr(parts, field), field
+    assert 0.001 < np.mean(expected_e / sensor.pixel.full_well_e) < 0.9  # a picture, neither black nor white
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_one_capture_takes_one_key_from_the_generator(exact):
+    radiance, sensor = scene(), preset("low_noise")
+    rng, twin = np.random.default_rng(4), np.random.default_rng(4)
+    capture(radiance, sensor, 0.02, draw_device(sensor, radiance.shape, np.random.default_rng(2)), rng, exact=exact)
+    twin.integers(0, 2**64, dtype=np.uint64)
+    assert rng.bit_generator.state == twin.bit_generator.state
+
+
+@pytest.mark.parametrize(
+    ("exposure_s", "chip", "seed", "message"),
+    [
+        (-0.02, (33, 48), 0, r"exposure_s: -0\.02 is outside 0 to"),
+        (0.02, (33, 47), 0, r"radiance: a frame of \(33, 48\) is not the device's \(33, 47\)"),
+        (0.02, (33, 48), None, r"rng: 0 is not a NumPy Generator"),
+    ],
+)
+@pytest.mark.parametrize("exact", [False, True])
+def test_bad_input_is_refused_in_one_line_before_anything_is_taken(exact, exposure_s, chip, seed, message):
+    sensor = preset("low_noise")
+    device = draw_device(sensor, chip, np.random.default_rng(2))
+    rng = 0 if seed is None else np.random.default_rng(seed)
+    with pytest.raises(InputError, match=message) as error:
+        capture(scene(), sensor, exposure_s, device, rng, exact=exact)
+    assert "\n" not in str(error.value)
+
+
+def test_a_radiance_with_nan_never_becomes_a_picture():
+    values = scene().values.copy()
+    values[7, 9, 11] = np.nan
+    with pytest.raises(InputError, match=r"radiance: nan at row 7, column 9, band 11; allowed: finite numbers >= 0"):
+        SpectralRadiance(values, NM)
+
+
+def shoot(radiance, sensor, seed=3, exact=False, take=capture, **options):
+    device = draw_device(sensor, (33, 48), np.random.default_rng(2))
+    return take(radiance, sensor, 0.02, device, np.random.default_rng(seed), exact=exact, **options)
+
+
+def strips(radiance, *heights):
+    ends = np.cumsum(heights)
+    return [SpectralRadiance(radiance.values[end - n : end], NM) for n, end in zip(heights, ends, strict=True)]
+
+
+def test_the_raw_image_names_what_drew_it():
+    assert shoot(scene(), preset("low_noise")).engine == backend()
+    assert shoot(scene(), preset("low_noise"), exact=True).engine == "numpy"
+
+
+@pytest.mark.parametrize("view_deg", [0.0, 60.0])
+@pytest.mark.parametrize("exact", [False, True])
+@pytest.mark.parametrize("mosaic", ["rgbw", "rgbw_4x4"])
+def test_a_picture_in_strips_is_the_whole_picture_bit_for_bit(mosaic, exact, view_deg):
+    sensor = preset("low_noise", mosaic)
+    sensor = replace(sensor, lens=replace(sensor.lens, horizontal_view_deg=view_deg))
+    planes = np.moveaxis(np.ascontiguousarray(np.moveaxis(scene().values, -1, 0)), 0, -1)
+    for radiance in (scene(), SpectralRadiance(planes, NM)):
+        whole = shoot(radiance, sensor, exact=exact)
+        for heights in ((33,), (4, 29), (5, 7, 21), (16, 17)):
+            parts = shoot(iter(strips(radiance, *heights)), sensor, exact=exact, take=capture_strips)
+            np.testing.assert_array_equal(parts.dn, whole.dn)
+
+
+@pytest.mark.parametrize("heights", [(), (20,), (20, 14), (33, 2)])
+def test_strips_that_do_not_make_the_frame_are_refused(heights):
+    tall = scene(shape=(40, 48))
+    with pytest.raises(InputError, match=r"radiance: a frame of \(\d+, 48\) is not the device's \(33, 48\)"):
+        shoot(strips(tall, *heights), preset("low_noise"), take=capture_strips)
+
+
+@pytest.mark.parametrize("term", ["diffraction", "defocus_um", "veiling_glare"])
+def test_strips_behind_a_lens_that_spreads_light_are_refused(term):
+    sensor = preset("low_noise")
+    sensor = replace(sensor, lens=replace(sensor.lens, **{term: 0.5}))
+    with pytest.raises(InputError, match="lens: diffraction, defocus or veiling_glare reach beyond a strip"):
+        shoot(strips(scene(), 33), sensor, take=capture_strips)
+
+
+def mean_electrons(radiance, sensor, frames, **options):
+    raws = (shoot(radiance, sensor, seed, **options) for seed in range(frames))
+    return np.mean([raw.electrons for raw in raws], axis=0)
+
+
+@pytest.mark.parametrize(
+    "lens", [{}, {"horizontal_view_deg": 70.0}, {"diffraction": 1.0, "veiling_glare": 0.1, "defocus_um": 5.0}]
+)
+@pytest.mark.parametrize("samples", [1, 2])
+def test_both_forms_see_the_light_that_the_lens_gives(samples, lens):
+    sensor = preset("low_noise")
+    sensor = replace(sensor, lens=replace(sensor.lens, **lens))
+    few = scene(shape=(33 * samples, 48 * samples)).values[..., 4::8]  # bands of 80 nm
+    radiance = SpectralRadiance(few * np.float32(0.25), NM[4::8])
+    device = draw_device(sensor, (33, 48), np.random.default_rng(2))
+    expected_e = expected_electrons(form_image(radiance, sensor, samples), sensor, 0.02) * device.photo_response
+    assert expected_e.max() < sensor.pixel.full_well_e * 0.8
+    for exact in (False, True):
+        mean_e = mean_electrons(radiance, sensor, 25, exact=exact, samples_per_pixel=samples) - device.dark_offset_e
+        z = (mean_e - expected_e) / np.sqrt((expected_e + 1.5**2 + sensor.gain_e_per_dn**2 / 12) / 25)
+        # 1584 pixels: the sum of squares within its 1e-5 quantiles
+        assert stats.chi2.ppf(1e-5, z.size) < np.sum(z**2) < stats.chi2.isf(1e-5, z.size)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+@pytest.mark.parametrize("scale", [0.0, 1e-38, 1e8])
+def test_no_light_and_1e8_full_wells_give_frames_without_warnings(scale, exact):
+    sensor = preset("table1_pixel")
+    raw = shoot(SpectralRadiance(scene().values * np.float32(scale), NM), sensor, exact=exact)
+    if scale > 1:
+        assert raw.dn.min() > raw.white_dn - 8 * 252 / raw.gain_e_per_dn  # saturated, less fixed and read noise
+    else:
+        assert abs(raw.electrons.mean()) < 5 * 252 / np.sqrt(33 * 48)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_exposure_0_and_a_camera_that_does_not_answer_are_dark(exact):
+    sensor = preset("low_noise")
+    device = draw_device(sensor, (33, 48), np.random.default_rng(2))
+    dark = capture(scene(), sensor, 0.0, device, np.random.default_rng(1), exact=exact)
+    blind = replace(sensor, responses=Responses({x: Spectrum([380.0, 780.0], [0.0, 0.0]) for x in "RGBW"}))
+    unseen = capture(scene(), blind, 0.02, device, np.random.default_rng(1), exact=exact)
+    np.testing.assert_array_equal(dark.dn, unseen.dn)
+    assert abs(dark.electrons.mean()) < 5 * np.hypot(1.5, 1.0) / np.sqrt(dark.dn.size)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_a_frame_of_one_pixel_is_taken(exact):
+    sensor = preset("low_noise", "mono")
+    device = draw_device(sensor, (1, 1), np.random.default_rng(2))
+    raw = capture(scene(shape=(1, 1)), sensor, 0.02, device, np.random.default_rng(1), exact=exact)
+    assert raw.shape == (1, 1)
+    assert raw.electrons[0, 0] > 1000
+
+
+WITHOUT_LLVM = """
+import json
+import numpy as np
+from render.radiance import SpectralRadiance
+from sensor.capture import capture
+from sensor.device import draw_device
+from sensor.presets import preset
+
+nm = np.arange(385.0, 780.0, 10.0)
+radiance = SpectralRadiance(np.random.default_rng(1).uniform(0, 0.006, (33, 48, 40)).astype(np.float32), nm)
+device = draw_device(preset("low_noise"), (33, 48), np.random.default_rng(2))
+raw = capture(radiance, preset("low_noise"), 0.02, device, np.random.default_rng(3))
+print(json.dumps({"engine": raw.engine, "dn": raw.dn.tolist()}))
+"""
+
+
+def test_without_llvm_the_numpy_form_runs_and_the_raw_image_says_so():
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_LLVM],
+        env=os.environ | {"DRJIT_LIBLLVM_PATH": "/nonexistent/libLLVM.so"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    if said["engine"] == "cuda":
+        pytest.skip("a CUDA device answers here, whatever the LLVM library")
+    assert said["engine"] == "numpy"
+    np.testing.assert_array_equal(said["dn"], shoot(scene(), preset("low_noise"), exact=True).dn)
+
+
+@pytest.mark.skipif(backend() != "llvm", reason="threads are LLVM's")
+def test_the_number_of_threads_does_not_change_a_bit():
+    from rodcone.jit import dr
+
+    frames, before = [], dr.thread_count()
+    try:
+        for threads in (1, 2, 3):
+            dr.set_thread_count(threads)
+            frames.append(shoot(scene(), preset("low_noise")).dn)
+    finally:
+        dr.set_thread_count(before)
+    np.testing.assert_array_equal(frames[0], frames[1])
+    np.testing.assert_array_equal(frames[0], frames[2])

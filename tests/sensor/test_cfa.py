@@ -1,0 +1,107 @@
+"""Mosaics: which letter a pixel carries."""
+
+import numpy as np
+import pytest
+
+from rodcone.errors import InputError
+from sensor.cfa import BAYER, MOSAICS, RGBW, channels, check_covers, check_tile, letter_map, mask, tile_of
+
+RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
+
+
+def test_the_paper_s_tile_is_r_g_over_b_w_with_its_first_row_on_top():
+    assert letter_map(RGBW, (3, 5)).tolist() == [list("RGRGR"), list("BWBWB"), list("RGRGR")]
+    assert letter_map(BAYER, (2, 3)).tolist() == [list("RGR"), list("GBG")]
+
+
+@pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4, ("W",), ("RGB",)])
+@pytest.mark.parametrize("shape", [(4, 4), (7, 9), (5, 4)])
+def test_each_pixel_carries_the_tile_s_letter_modulo_its_size(tile, shape):
+    letters = letter_map(tile, shape)
+    assert letters.shape == shape
+    for row, column in np.ndindex(shape):
+        assert letters[row, column] == tile[row % len(tile)][column % len(tile[0])]
+
+
+@pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4])
+def test_masks_of_all_letters_cover_each_pixel_once(tile):
+    count = sum(mask(tile, letter, (7, 9)).astype(int) for letter in channels(tile))
+    np.testing.assert_array_equal(count, 1)
+
+
+def test_channels_come_as_r_g_b_w_and_others_behind_them():
+    assert channels(RGBW) == ("R", "G", "B", "W")
+    assert channels(BAYER) == ("R", "G", "B")
+    assert channels(("WB", "GR")) == ("R", "G", "B", "W")
+    assert channels(("YW", "CR")) == ("R", "W", "Y", "C")
+
+
+def test_a_list_of_rows_becomes_a_tuple():
+    assert check_tile(["RG", "BW"]) == RGBW
+
+
+@pytest.mark.parametrize("tile", ["RGBW", (), ("",), ("R1",), ("RG", 3), ("R G",)])
+def test_what_is_no_tile_of_letters_is_refused_with_an_example(tile):
+    with pytest.raises(InputError, match=r"not a tile.*allowed") as error:
+        check_tile(tile)
+    assert repr(tile) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_rows_that_differ_in_length_are_refused():
+    with pytest.raises(InputError, match=r"cfa: rows of \('RG', 'B'\) differ.*allowed: a rectangle"):
+        check_tile(("RG", "B"))
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (3, 2), (100, 100)])
+def test_a_frame_that_holds_a_tile_is_accepted(shape):
+    check_covers(RGBW, shape)
+
+
+@pytest.mark.parametrize("shape", [(1, 8), (8, 1), (8,), (8, 8, 3), (0, 0)])
+def test_a_frame_that_does_not_hold_a_tile_is_refused_with_its_shape(shape):
+    with pytest.raises(InputError) as error:
+        check_covers(RGBW, shape)
+    message = str(error.value)
+    assert str(shape) in message
+    assert "at least 2x2" in message
+    assert "\n" not in message
+
+
+# Mosaics by name
+
+
+def test_bayer_s_four_phases_are_one_mosaic_moved_by_a_row_and_a_column():
+    start = letter_map(BAYER, (4, 4))
+    for name, row, column in (("rggb", 0, 0), ("grbg", 0, 1), ("gbrg", 1, 0), ("bggr", 1, 1)):
+        moved = np.roll(start, (-row, -column), axis=(0, 1))[:2, :2]
+        assert tuple("".join(line) for line in moved) == MOSAICS[f"bayer_{name}"]
+        assert "".join(MOSAICS[f"bayer_{name}"]) == name.upper()
+    assert MOSAICS["bayer"] == MOSAICS["bayer_rggb"]
+
+
+def test_the_4x4_mosaic_is_a_white_checkerboard_with_a_bayer_mosaic_of_2x2_cells():
+    letters = letter_map(MOSAICS["rgbw_4x4"], (4, 4))
+    rows, columns = np.indices((4, 4))
+    np.testing.assert_array_equal(letters == "W", (rows + columns) % 2 == 0)
+    assert {letter: int((letters == letter).sum()) for letter in "RGB"} == {"R": 2, "G": 4, "B": 2}
+    cells = [["".join(letters[y : y + 2, x : x + 2].ravel()) for x in (0, 2)] for y in (0, 2)]
+    assert cells == [["WGGW", "WRRW"], ["WBBW", "WGGW"]]
+
+
+def test_rccc_has_one_red_pixel_in_four_and_three_clear_ones():
+    assert sorted("".join(MOSAICS["rccc"])) == ["C", "C", "C", "R"]
+
+
+def test_a_mosaic_is_taken_by_name_or_by_its_rows():
+    assert tile_of("bayer") == BAYER
+    assert tile_of(["CY", "YM"]) == ("CY", "YM")
+    with pytest.raises(InputError, match=r"cfa: 'rgwb' is unknown; allowed: bayer.*did you mean 'rgbw'"):
+        tile_of("rgwb")
+    with pytest.raises(InputError, match=r"cfa: 3 is not a tile"):
+        tile_of(3)
+
+
+def test_the_table_of_mosaics_cannot_be_written_to():
+    with pytest.raises(TypeError):
+        MOSAICS["mine"] = ("RG", "GB")

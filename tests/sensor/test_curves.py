@@ -1,0 +1,245 @@
+"""Responses of R, G, B, W: peaks and electron ratios of the published sensor, and curves from a file."""
+
+import os
+import warnings
+
+import numpy as np
+import pytest
+
+from render.illuminants import illuminant
+from render.spectrum import Spectrum
+from rodcone.errors import InputError
+from sensor.curves import MOST_BYTES, QuantumEfficiencyWarning, Responses, read_csv, read_curve, rgbw
+
+PEAKS = {"R": (0.560, 592.0), "G": (0.678, 540.0), "B": (0.415, 476.0), "W": (1.0, 620.0)}
+
+
+def electrons(letter, light, first_nm, last_nm):
+    """Relative electrons under a light given as energy: rectangle sum at 1 nm of energy x wavelength x response."""
+    nm = np.arange(first_nm, last_nm + 1.0)
+    spectrum, curve = illuminant(light), rgbw().curves[letter]
+    energy = np.interp(nm, spectrum.wavelength_nm, spectrum.values)
+    return np.sum(energy * nm * np.interp(nm, curve.wavelength_nm, curve.values))
+
+
+@pytest.mark.parametrize("letter", PEAKS)
+def test_each_curve_peaks_where_the_published_one_does(letter):
+    peak, nm = PEAKS[letter]
+    curve = rgbw().curves[letter]
+    assert curve.values.max() == pytest.approx(peak, abs=5e-4)
+    assert curve.wavelength_nm[curve.values.argmax()] == nm
+
+
+@pytest.mark.parametrize("letter", PEAKS)
+def test_each_curve_rises_to_its_peak_and_falls_behind_it_inside_0_to_1(letter):
+    curve = rgbw().curves[letter]
+    assert (curve.wavelength_nm[0], curve.wavelength_nm[-1]) == (380.0, 1068.0)
+    at = int(curve.values.argmax())
+    assert np.all(np.diff(curve.values[: at + 1]) > 0)
+    assert np.all(np.diff(curve.values[at:]) <= 0)
+    assert np.all((curve.values >= 0) & (curve.values <= 1))
+
+
+@pytest.mark.parametrize(
+    ("light", "first_nm", "last_nm", "ratios"),
+    [
+        ("E", 380, 780, (10.16, 5.85, 13.81)),
+        ("D65", 380, 780, (9.80, 4.88, 10.84)),
+        ("D65", 400, 700, (7.90, 3.93, 8.76)),
+    ],
+)
+def test_w_collects_the_published_multiple_of_r_g_and_b(light, first_nm, last_nm, ratios):
+    white = electrons("W", light, first_nm, last_nm)
+    for letter, ratio in zip("RGB", ratios, strict=True):
+        assert white / electrons(letter, light, first_nm, last_nm) == pytest.approx(ratio, rel=0.03)
+
+
+def test_the_band_average_is_the_mean_of_the_linear_pieces():
+    ramp = Responses({"R": Spectrum([500.0, 600.0], [0.0, 1.0]), "G": Spectrum([400.0, 700.0], [0.25, 0.25])})
+    average = ramp.band_average(("G", "R"), [550.0, 600.0], [20.0, 20.0])
+    # R over 590-610 nm: a trapezoid 0.9 to 1 over half of the band, nothing over the other half
+    np.testing.assert_allclose(average, [[0.25, 0.25], [0.5, 0.475]], rtol=1e-13)
+
+
+def test_curves_cannot_be_exchanged_afterwards():
+    with pytest.raises(TypeError):
+        rgbw().curves["R"] = rgbw().curves["W"]
+
+
+def test_a_letter_without_a_curve_is_refused_by_name():
+    with pytest.raises(InputError, match=r"'Y' is unknown; allowed: B, G, R, W"):
+        rgbw().band_average(("R", "Y"), [550.0], [10.0])
+
+
+def write(folder, text):
+    path = folder / "curves.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_csv_gives_the_curves_that_it_holds(tmp_path):
+    path = write(tmp_path, "wavelength_nm, R,W\n400,0.1,0.5\n\n500,0.3,1.0\n610,0,0.75\n")
+    responses = read_csv(path)
+    assert set(responses.curves) == {"R", "W"}
+    np.testing.assert_array_equal(responses.curves["R"].wavelength_nm, [400.0, 500.0, 610.0])
+    np.testing.assert_array_equal(responses.curves["R"].values, [0.1, 0.3, 0.0])
+    np.testing.assert_array_equal(responses.curves["W"].values, [0.5, 1.0, 0.75])
+    assert read_csv(str(path)).curves.keys() == responses.curves.keys()
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("nm,R\n400,0.1\n500,0.2\n", ("['nm', 'R']", "wavelength_nm and one letter a column")),
+        ("wavelength_nm\n400\n500\n", ("['wavelength_nm']", "one letter a column")),
+        ("wavelength_nm,R,G\n400,0.1\n500,0.2\n", ("['wavelength_nm', 'R', 'G']",)),
+        ("wavelength_nm,R\n", ("wavelength_nm", "header")),
+        ("", ("can't be read", "CSV of numbers with a header")),
+        ("wavelength_nm,R\n400,0.1\n500,high\n", ("can't be read", "'high'", "CSV of numbers")),
+        ("wavelength_nm,R\n400,0.1\n500\n", ("can't be read", "CSV of numbers")),
+        ("wavelength_nm,R,G\n400,20,30\n500,56,67.8\n", ("R reaches 56", "allowed: 0 to 1", "divide per cent by 100")),
+        ("wavelength_nm,R\n400,-0.1\n500,0.2\n", ("finite numbers >= 0",)),
+        ("wavelength_nm,R\n400,nan\n500,0.2\n", ("finite numbers >= 0",)),
+        ("wavelength_nm,R\n500,0.1\n400,0.2\n", ("wavelength_nm: [500.0, 400.0]", "strictly increasing")),
+    ],
+)
+def test_a_csv_that_holds_no_curves_is_refused_in_one_line(tmp_path, text, parts):
+    with pytest.raises(InputError) as error:
+        read_csv(write(tmp_path, text))
+    message = str(error.value)
+    assert "\n" not in message
+    for part in parts:
+        assert part in message, message
+
+
+def test_a_missing_csv_is_refused_with_its_name(tmp_path):
+    with pytest.raises(InputError, match=r"absent\.csv.*can't be read.*give a CSV") as error:
+        read_csv(tmp_path / "absent.csv")
+    assert "\n" not in str(error.value)
+
+
+# Range, infrared cut and quantum efficiency
+
+FILTERS = "wavelength_nm,G,W\n400,0,0.9\n500,0.8,0.9\n600,0.4,0.9\n800,0.2,0.9\n"
+
+
+def curve(responses, letter="G"):
+    one = responses.curves[letter]
+    return one.wavelength_nm.tolist(), one.values.tolist()
+
+
+def test_a_range_cuts_the_curves_with_a_point_at_each_end(tmp_path):
+    responses = read_csv(write(tmp_path, FILTERS), range_nm=(450.0, 700.0))
+    nm, values = curve(responses)
+    assert nm == [450.0, 500.0, 600.0, 700.0]
+    np.testing.assert_allclose(values, [0.4, 0.8, 0.4, 0.3], rtol=1e-15)
+    # nothing outside: W's 0.9 over 690-700 nm of a band of 690-710 nm
+    assert responses.band_average(("W",), [700.0], [20.0])[0, 0] == pytest.approx(0.45, rel=1e-12)
+
+
+@pytest.mark.parametrize("range_nm", [(399.0, 700.0), (400.0, 801.0), (700.0, 500.0), (500.0, np.nan)])
+def test_a_range_that_the_file_does_not_reach_is_refused(tmp_path, range_nm):
+    with pytest.raises(InputError, match=r"range_nm: .*400 to 800 nm; give a range that the file reaches"):
+        read_csv(write(tmp_path, FILTERS), range_nm=range_nm)
+
+
+def test_an_infrared_cut_is_a_wavelength_or_a_curve(tmp_path):
+    path = write(tmp_path, FILTERS)
+    nm, values = curve(read_csv(path, ir_cut=650.0))
+    assert nm == [400.0, 500.0, 600.0, 650.0]
+    np.testing.assert_allclose(values, [0.0, 0.8, 0.4, 0.35], rtol=1e-15)
+    assert curve(read_csv(path, ir_cut=900.0)) == curve(read_csv(path))
+    nm, values = curve(read_csv(path, ir_cut=Spectrum([300.0, 600.0, 700.0], [0.5, 0.5, 0.0])))
+    assert nm == [400.0, 500.0, 600.0, 700.0]
+    np.testing.assert_allclose(values, [0.0, 0.4, 0.2, 0.0], rtol=1e-15)
+    nm, _ = curve(read_csv(path, range_nm=(450.0, 640.0), ir_cut=650.0))
+    assert (nm[0], nm[-1]) == (450.0, 640.0)
+    nm, _ = curve(read_csv(path, range_nm=(450.0, 700.0), ir_cut=650.0))
+    assert (nm[0], nm[-1]) == (450.0, 650.0)
+
+
+def test_a_cut_before_the_first_wavelength_or_a_filter_elsewhere_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"ir_cut: 400\.0"):
+        read_csv(write(tmp_path, FILTERS), ir_cut=400.0)
+    with pytest.raises(InputError, match=r"range_nm: \(450\.0, 430\.0\)"):
+        read_csv(write(tmp_path, FILTERS), range_nm=(450.0, 700.0), ir_cut=430.0)
+    with pytest.raises(InputError, match=r"400-800 nm and a filter over 900-1000 nm share no range"):
+        read_csv(write(tmp_path, FILTERS), ir_cut=Spectrum([900.0, 1000.0], [1.0, 1.0]))
+
+
+def test_a_quantum_efficiency_multiplies_filters_without_a_word(tmp_path):
+    path = write(tmp_path, FILTERS)
+    nm, values = curve(read_csv(path, quantum_efficiency=0.5))
+    assert nm == [400.0, 500.0, 600.0, 800.0]
+    np.testing.assert_allclose(values, [0.0, 0.4, 0.2, 0.1], rtol=1e-15)
+    nm, values = curve(read_csv(path, quantum_efficiency=Spectrum([400.0, 700.0, 1000.0], [0.6, 0.6, 0.0])))
+    assert nm == [400.0, 500.0, 600.0, 700.0, 800.0]
+    np.testing.assert_allclose(values, [0.0, 0.48, 0.24, 0.18, 0.08], rtol=1e-14)
+
+
+@pytest.mark.parametrize("efficiency", [-0.1, 1.1, np.nan])
+def test_a_quantum_efficiency_out_of_range_is_refused(tmp_path, efficiency):
+    with pytest.raises(InputError, match="quantum_efficiency"):
+        read_csv(write(tmp_path, FILTERS), quantum_efficiency=efficiency)
+
+
+def test_filters_in_per_cent_are_told_so_although_the_product_would_fit(tmp_path):
+    with pytest.raises(InputError, match="divide per cent by 100"):
+        read_csv(write(tmp_path, "wavelength_nm,G\n400,20\n500,80\n"), quantum_efficiency=0.005)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("wavelength_nm,R,G\n400,0,0.1\n550,0.1,0.6\n650,0.55,0\n", "no curve exceeds 0.60"),
+        ("wavelength_nm,G,W\n400,0,0.4\n550,0.8,0.8\n650,0,1.0\n", "W passes all of 450-650 nm but falls to 0.53"),
+        ("wavelength_nm,C\n400,0.2\n450,0.31\n650,0.93\n", "C passes all of 450-650 nm but falls to 0.33"),
+    ],
+)
+def test_a_quantum_efficiency_that_would_be_applied_twice_is_warned_of_in_one_line(tmp_path, text, reason):
+    path = write(tmp_path, text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_csv(path)  # nothing is multiplied: no warning
+    with pytest.warns(QuantumEfficiencyWarning) as caught:
+        read_csv(path, quantum_efficiency=0.5)
+    (one,) = caught
+    assert one.filename == __file__
+    message = str(one.message)
+    assert "\n" not in message
+    for part in (reason, "curves.csv", "electrons per photon"):
+        assert part in message
+
+
+def test_the_project_s_own_curves_would_be_recognised_as_holding_it(tmp_path):
+    nm = np.arange(380.0, 781.0, 5.0)
+    columns = [np.interp(nm, one.wavelength_nm, one.values) for one in rgbw().curves.values()]
+    rows = [",".join(map(repr, map(float, row))) for row in zip(nm, *columns, strict=True)]
+    path = write(tmp_path, "\n".join(["wavelength_nm,R,G,B,W", *rows]))
+    with pytest.warns(QuantumEfficiencyWarning, match="W passes all"):
+        read_csv(path, quantum_efficiency=0.5)
+
+
+def test_a_single_curve_is_read_and_a_second_column_or_per_cent_refused(tmp_path):
+    one = read_curve(write(tmp_path, "wavelength_nm,t\n400,0.5\n500,1\n"))
+    assert (one.wavelength_nm.tolist(), one.values.tolist()) == ([400.0, 500.0], [0.5, 1.0])
+    with pytest.raises(InputError, match="2 columns beside wavelength_nm"):
+        read_curve(write(tmp_path, FILTERS))
+    with pytest.raises(InputError, match="divide per cent by 100"):
+        read_curve(write(tmp_path, "wavelength_nm,t\n400,50\n500,90\n"))
+
+
+@pytest.mark.timeout(10)
+def test_a_pipe_and_a_file_too_large_are_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe.csv")
+    with pytest.raises(InputError, match="a folder or a device"):
+        read_csv(tmp_path / "pipe.csv")
+    (tmp_path / "large.csv").write_bytes(b"wavelength_nm,R\n" + MOST_BYTES * b"1")
+    with pytest.raises(InputError, match="it is over 8388608 bytes"):
+        read_csv(tmp_path / "large.csv")
+
+
+def test_an_endless_wavelength_is_refused(tmp_path):
+    (tmp_path / "a.csv").write_text("wavelength_nm,R\n400,0.5\ninf,0.5\n")
+    with pytest.raises(InputError, match="strictly increasing"):
+        read_csv(tmp_path / "a.csv")

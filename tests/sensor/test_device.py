@@ -1,0 +1,154 @@
+"""One chip: its fixed patterns."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rodcone.errors import InputError
+from sensor.cfa import RGBW
+from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.device import draw_device
+
+
+def camera(prnu=0.02, dsnu_e=5.0):
+    return SensorConfig(PixelConfig(2.2, 0.9, 15_000.0, 3.0, dsnu_e, prnu), LensConfig(2.8))
+
+
+def test_patterns_have_the_stated_mean_and_spread():
+    device = draw_device(camera(), (512, 512), np.random.default_rng(1))
+    n = 512 * 512
+    # mean and standard deviation of two normal patterns within 4 standard errors: false-alarm rate 2.5e-4
+    for pattern, mean, sigma in ((device.photo_response, 1.0, 0.02), (device.dark_offset_e, 0.0, 5.0)):
+        assert abs(pattern.mean() - mean) < 4 * sigma / np.sqrt(n)
+        assert abs(pattern.std() - sigma) < 4 * sigma / np.sqrt(2 * n)
+
+
+def test_zero_switches_each_pattern_off_exactly_and_leaves_the_other():
+    both = draw_device(camera(), (16, 16), np.random.default_rng(2))
+    even = draw_device(camera(prnu=0.0), (16, 16), np.random.default_rng(2))
+    np.testing.assert_array_equal(even.photo_response, 1.0)
+    np.testing.assert_array_equal(even.dark_offset_e, both.dark_offset_e)
+    level = draw_device(camera(dsnu_e=0.0), (16, 16), np.random.default_rng(2))
+    np.testing.assert_array_equal(level.dark_offset_e, 0.0)
+    np.testing.assert_array_equal(level.photo_response, both.photo_response)
+
+
+def test_a_pattern_scales_with_its_standard_deviation_and_keeps_its_shape():
+    small, large = (draw_device(camera(x, 100 * x), (8, 8), np.random.default_rng(2)) for x in (0.01, 0.04))
+    np.testing.assert_allclose(large.photo_response - 1, 4 * (small.photo_response - 1), rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(large.dark_offset_e, 4 * small.dark_offset_e, rtol=1e-14)
+
+
+def test_a_pixel_never_answers_with_less_than_nothing():
+    device = draw_device(camera(prnu=1.0), (64, 64), np.random.default_rng(3))
+    assert device.photo_response.min() == 0.0
+
+
+def test_one_seed_makes_one_chip_and_two_seeds_make_two():
+    first, again, other = (draw_device(camera(), (256, 256), np.random.default_rng(seed)) for seed in (4, 4, 5))
+    np.testing.assert_array_equal(first.photo_response, again.photo_response)
+    np.testing.assert_array_equal(first.dark_offset_e, again.dark_offset_e)
+    # four correlations of n pixels within 4.5 standard errors: false-alarm rate 3e-5
+    for one, two in (
+        (first.photo_response, other.photo_response),
+        (first.dark_offset_e, other.dark_offset_e),
+        (first.photo_response, first.dark_offset_e),
+        (first.photo_response, other.dark_offset_e),
+    ):
+        assert abs(np.corrcoef(one.ravel(), two.ravel())[0, 1]) < 4.5 / 256
+
+
+def test_two_chips_from_one_generator_differ():
+    rng = np.random.default_rng(6)
+    first, second = (draw_device(camera(), (8, 8), rng) for _ in range(2))
+    assert not np.any(first.photo_response == second.photo_response)
+
+
+def test_a_smaller_chip_of_the_same_seed_is_the_larger_one_s_corner():
+    large, small = (draw_device(camera(), shape, np.random.default_rng(7)) for shape in ((20, 30), (6, 11)))
+    np.testing.assert_array_equal(small.photo_response, large.photo_response[:6, :11])
+    np.testing.assert_array_equal(small.dark_offset_e, large.dark_offset_e[:6, :11])
+    assert small.shape == (6, 11)
+
+
+@pytest.mark.parametrize("shape", [(1, 8), (8,), (8, 8, 3)])
+def test_a_chip_that_does_not_hold_a_tile_is_refused(shape):
+    with pytest.raises(InputError, match=r"mosaic: shape .*at least 2x2") as error:
+        draw_device(camera(), shape, np.random.default_rng(0))
+    assert str(RGBW) in str(error.value)
+
+
+def test_a_seed_instead_of_a_generator_is_refused():
+    with pytest.raises(InputError, match=r"rng: 7 is not a NumPy Generator"):
+        draw_device(camera(), (8, 8), 7)
+
+
+# Columns and hot pixels
+
+REAL = {"column_gain_spread": 0.01, "column_offset_e": 3.0, "hot_pixel_share": 0.02}
+
+
+def chip(shape=(512, 512), seed=1, dsnu_e=0.0, **terms):
+    sensor = camera(prnu=0.0, dsnu_e=dsnu_e)
+    sensor = replace(sensor, pixel=replace(sensor.pixel, **terms))
+    return draw_device(sensor, shape, np.random.default_rng(seed))
+
+
+def test_zero_leaves_columns_and_hot_pixels_out_and_the_other_patterns_alone():
+    plain, real = (draw_device(one, (64, 64), np.random.default_rng(1)) for one in (camera(), replaced(**REAL)))
+    assert plain.column_gain is None
+    assert plain.hot is None
+    np.testing.assert_array_equal(real.photo_response, plain.photo_response)
+
+
+def replaced(**terms):
+    return replace(camera(), pixel=replace(camera().pixel, **terms))
+
+
+def test_column_patterns_are_one_number_a_column_with_the_stated_spread():
+    device = chip((3, 40_000), column_gain_spread=0.01, column_offset_e=3.0)
+    assert device.column_gain.shape == (40_000,)
+    np.testing.assert_array_equal(device.dark_offset_e, np.broadcast_to(device.dark_offset_e[0], (3, 40_000)))
+    # means and standard deviations within 4 standard errors: false-alarm rate 2.5e-4
+    for pattern, mean, sigma in ((device.column_gain, 1.0, 0.01), (device.dark_offset_e[0], 0.0, 3.0)):
+        assert abs(pattern.mean() - mean) < 4 * sigma / np.sqrt(40_000)
+        assert abs(pattern.std() - sigma) < 4 * sigma / np.sqrt(80_000)
+    assert abs(np.corrcoef(device.column_gain, device.dark_offset_e[0])[0, 1]) < 4 / 200
+
+
+def test_column_offsets_add_to_dsnu():
+    both, columns, pixels = (chip(dsnu_e=d, column_offset_e=c) for d, c in ((5.0, 3.0), (0.0, 3.0), (5.0, 0.0)))
+    np.testing.assert_allclose(both.dark_offset_e, columns.dark_offset_e + pixels.dark_offset_e, rtol=1e-12)
+
+
+def test_a_wild_column_gain_is_no_negative_amplifier():
+    assert chip((2, 4096), column_gain_spread=1.0).column_gain.min() == 0.0
+
+
+@pytest.mark.parametrize("share", [0.001, 0.02, 0.7])
+def test_the_stated_share_of_pixels_is_hot(share):
+    hot = chip(hot_pixel_share=share).hot
+    assert hot.dtype == np.bool_
+    # binomial, within 4 standard errors: false-alarm rate 6.3e-5 each
+    assert abs(hot.mean() - share) < 4 * np.sqrt(share * (1 - share) / hot.size)
+
+
+def test_all_pixels_can_be_hot_and_more_hot_pixels_hold_the_fewer():
+    assert chip(hot_pixel_share=1.0).hot.all()
+    few, many = (chip(hot_pixel_share=share).hot for share in (0.01, 0.05))
+    assert np.all(many[few])
+
+
+def test_hot_pixels_lie_apart_from_the_other_patterns():
+    sensor = replaced(hot_pixel_share=0.3, column_offset_e=3.0)
+    device = draw_device(sensor, (512, 512), np.random.default_rng(1))
+    for pattern in (device.photo_response, device.dark_offset_e):
+        assert abs(np.corrcoef(device.hot.ravel(), pattern.ravel())[0, 1]) < 4.5 / 512  # twice 7e-6
+
+
+def test_a_smaller_chip_s_columns_and_hot_pixels_are_the_larger_one_s_corner():
+    large, small = (chip(shape, **REAL) for shape in ((20, 30), (6, 11)))
+    np.testing.assert_array_equal(small.column_gain, large.column_gain[:11])
+    np.testing.assert_array_equal(small.hot, large.hot[:6, :11])
+    np.testing.assert_array_equal(small.dark_offset_e, large.dark_offset_e[:6, :11])

@@ -1,0 +1,182 @@
+"""Filters of other cameras: sums and densities of the own curves, and cameras that carry them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from isp.colour.camera_colour import fit_matrix, neutral_response
+from render.illuminants import illuminant
+from render.photometry import photons_per_joule, tristimulus
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
+from rodcone.errors import InputError
+from scenes.reflectances import color_checker
+from sensor.cfa import MOSAICS, RGBW, channels
+from sensor.curves import Responses, rgbw
+from sensor.filters import (
+    as_csv,
+    colorimetric,
+    complementary,
+    infrared_cut,
+    infrared_open,
+    matched_transmittance,
+    neutral_density,
+    stretched,
+)
+from sensor.presets import preset
+from sensor.variations import VARIATIONS, vary
+from studies.commands import new as new_command
+
+NM = DEFAULT_WAVELENGTH_NM
+WIDTH = np.full(NM.shape, 10.0)
+
+
+def test_complementary_filters_pass_what_two_primaries_do() -> None:
+    primaries = dict(zip("RGB", rgbw().band_average(("R", "G", "B"), NM, WIDTH), strict=True))
+    cyan, magenta, yellow, white = complementary(rgbw()).band_average(("C", "M", "Y", "W"), NM, WIDTH)
+    assert cyan == pytest.approx(primaries["G"] + primaries["B"])
+    assert magenta == pytest.approx(primaries["R"] + primaries["B"])
+    assert yellow == pytest.approx(primaries["R"] + primaries["G"])
+    assert white == pytest.approx(rgbw().curves["W"].band_average(NM, WIDTH))
+    # a filter is no brighter than none
+    visible = (NM > 420) & (NM < 680)
+    assert np.all(np.array([cyan, magenta, yellow])[:, visible] < white[visible])
+
+
+def test_complementary_colours_lead_to_the_same_colours_as_the_primaries() -> None:
+    # balanced C, Y and M are mixtures of balanced R, G and B, so the fitted matrices differ by exactly that mixture
+    surfaces = np.array([reflectance.band_average(NM, WIDTH) for _, reflectance in color_checker()])
+    light = illuminant("D65").band_average(NM, WIDTH)
+    primary = fit_matrix(rgbw().band_average(("R", "G", "B"), NM, WIDTH), NM, light, surfaces)
+    curves = complementary(rgbw())
+    other = fit_matrix(curves.band_average(("C", "Y", "M"), NM, WIDTH), NM, light, surfaces)
+    red, green, blue = neutral_response(("R", "G", "B"))
+    mixture = np.array([[0, green, blue], [red, green, 0], [red, 0, blue]])
+    mixture /= mixture.sum(axis=1, keepdims=True)
+    assert other @ mixture == pytest.approx(primary, abs=1e-9)
+
+
+def test_a_matched_density_gives_w_greens_electrons() -> None:
+    share = matched_transmittance(rgbw())
+    green, white = neutral_response(("G", "W"), neutral_density(rgbw()))
+    assert white == pytest.approx(green, rel=1e-12)
+    assert 1 / 7 < share < 1 / 4  # the paper: W gathers about 6 times green's light
+    for letter in "RGB":
+        assert neutral_density(rgbw()).curves[letter] is rgbw().curves[letter]
+
+
+@pytest.mark.parametrize("name", [*MOSAICS, *VARIATIONS])
+def test_a_varied_camera_keeps_everything_but_mosaic_and_filters(name: str) -> None:
+    camera = preset("low_noise")
+    other = vary(camera, name)
+    assert (other.pixel, other.lens, other.bits, other.window_nm) == (
+        camera.pixel,
+        camera.lens,
+        camera.bits,
+        camera.window_nm,
+    )
+    assert other.cfa == (VARIATIONS[name][0] if name in VARIATIONS else MOSAICS[name])
+    assert set(channels(other.cfa)) <= set(other.responses.curves)
+
+
+def test_variations_are_named_by_what_they_change() -> None:
+    assert VARIATIONS["rgbw_nd"][0] == RGBW
+    assert channels(VARIATIONS["cmyw"][0]) == ("W", "C", "M", "Y")
+    assert vary(preset("low_noise"), "rccc").responses.curves["C"] is rgbw().curves["W"]
+
+
+def test_what_cannot_be_made_is_refused() -> None:
+    with pytest.raises(InputError, match=r"cfa: 'rgbwnd' is unknown; .*did you mean 'rgbw_nd'"):
+        vary(preset("low_noise"), "rgbwnd")
+    with pytest.raises(InputError, match=r"responses: no curve of B; allowed: R, G, B and W; add it"):
+        complementary(Responses({letter: rgbw().curves[letter] for letter in "RG"}))
+    dim = Responses({"G": rgbw().curves["W"], "W": rgbw().curves["G"]})
+    with pytest.raises(InputError, match=r"responses: W collects .* allowed: W more than G"):
+        matched_transmittance(dim)
+    bright = {letter: Spectrum(np.array([400.0, 700.0]), np.array([0.6, 0.6])) for letter in "RGB"}
+    with pytest.raises(InputError, match=r"responses: C reaches 1.2 electrons a photon"):
+        complementary(Responses(bright))
+
+
+def test_stretched_curves_keep_their_peaks_and_gather_by_the_factor() -> None:
+    fine = np.arange(385.5, 780.0)
+    own, wide = (
+        responses.band_average(("R", "G", "B"), fine, np.ones_like(fine))
+        for responses in (rgbw(), stretched(rgbw(), 1.5))
+    )
+    assert wide.max(axis=1) == pytest.approx(own.max(axis=1), rel=1e-3)
+    assert np.abs(fine[wide.argmax(axis=1)] - fine[own.argmax(axis=1)]).max() <= 1.0
+    # R lies far enough from the curves' ends for its whole area to grow by the factor; G and B lose a tail at 380 nm
+    assert wide[0].sum() == pytest.approx(1.5 * own[0].sum(), rel=1e-3)
+    assert (wide[1:].sum(axis=1) < 1.5 * own[1:].sum(axis=1)).all()
+    assert stretched(rgbw(), 1.5).curves["W"] is rgbw().curves["W"]
+    for letter in "RGB":
+        np.testing.assert_allclose(stretched(rgbw(), 1.0).curves[letter].values, rgbw().curves[letter].values)
+
+
+def test_a_colorimetric_camera_collects_in_proportion_to_xyz_under_any_light() -> None:
+    curves = colorimetric(rgbw())
+    nm = np.arange(380.5, 780.0)
+    width = np.ones_like(nm)
+    found = []
+    for light in ("D65", "A", "F11"):
+        watts = illuminant(light).band_average(nm, width)
+        electrons = curves.band_average(("R", "G", "B"), nm, width) @ (watts * photons_per_joule(nm))
+        found.append(electrons / tristimulus(watts, nm, width))
+    # curve times wavelength is linear between 1 nm points but for 1e-6: the ratios are constants of the camera
+    np.testing.assert_allclose(found, np.broadcast_to(found[0], (3, 3)), rtol=1e-5)
+
+
+def test_open_dyes_leave_the_visible_alone_and_meet_silicon_beyond() -> None:
+    opened = infrared_open(rgbw())
+    visible, beyond = np.arange(400.0, 680.0), np.arange(830.0, 1060.0)
+    for letter in "RGB":
+        own, now = (
+            np.interp(visible, one.curves[letter].wavelength_nm, one.curves[letter].values) for one in (rgbw(), opened)
+        )
+        np.testing.assert_allclose(now, own, atol=2e-3)  # 1 / (1 + exp(80 / 12)) is 0.0013
+        far, silicon = (
+            np.interp(beyond, opened.curves[x].wavelength_nm, opened.curves[x].values) for x in (letter, "W")
+        )
+        np.testing.assert_allclose(far, silicon, rtol=4e-3)  # 1 / (1 + exp(-70 / 12)) is 0.9971
+    assert opened.curves["W"] is rgbw().curves["W"]
+
+
+def test_the_filter_keeps_the_infrared_out_and_half_of_660_nm() -> None:
+    nm = np.arange(380.0, 1069.0)
+    share = np.interp([560.0, 660.0, 760.0], nm, infrared_cut(nm).values)
+    assert share == pytest.approx([1.0, 0.5, 0.0], abs=1e-8)
+    assert (np.diff(infrared_cut(nm).values) <= 0).all()
+
+
+SENSORS = Path(new_command.__file__).parents[1] / "configs" / "sensors"
+STORED_NM = np.arange(380.0, 1069.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "made"),
+    [
+        ("curves_narrow", stretched(rgbw(), 0.5).curves),
+        ("curves_wide", stretched(rgbw(), 2.0).curves),
+        ("curves_xyz", colorimetric(rgbw()).curves),
+        ("curves_infrared_open", infrared_open(rgbw()).curves),
+        ("infrared_filter", {"transmittance": infrared_cut(STORED_NM)}),
+    ],
+)
+def test_the_curves_that_examples_bring_are_those_that_the_functions_make(name: str, made: dict[str, Spectrum]) -> None:
+    assert (SENSORS / f"{name}.csv").read_text("utf-8") == as_csv(made, STORED_NM)
+
+
+def test_the_sensors_of_examples_are_low_noise_but_for_their_curves_and_window() -> None:
+    own = preset("low_noise")
+    cameras = {path.stem: preset(path) for path in sorted(SENSORS.glob("*.toml"))}
+    assert set(cameras) == {"narrow", "wide", "xyz", "with_filter", "without_filter"}
+    for camera in cameras.values():
+        assert (camera.pixel, camera.lens, camera.bits, camera.cfa) == (own.pixel, own.lens, own.bits, own.cfa)
+    # W behind the filter, by the product of curve and transmittance on the points of both
+    nm = np.array([500.0, 640.0, 660.0, 680.0, 900.0])
+    kept, all_of_it = (
+        np.interp(nm, cameras[name].responses.curves["W"].wavelength_nm, cameras[name].responses.curves["W"].values)
+        for name in ("with_filter", "without_filter")
+    )
+    np.testing.assert_allclose(kept / all_of_it, 1 / (1 + np.exp((nm - 660) / 5)), atol=1e-5)

@@ -1,0 +1,205 @@
+"""Presets as files: what ships, what a user copies and changes, and what is refused."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from render.spectrum import Spectrum
+from rodcone.errors import InputError
+from sensor.cfa import BAYER, MOSAICS, RGBW
+from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.config_file import read_sensor
+from sensor.curves import read_csv, rgbw
+from sensor.presets import low_noise, names, preset, preset_file, table1_output, table1_pixel
+
+LEAST = "[pixel]\npitch_um = 2.2\nfill_factor = 0.9\nfull_well_e = 15000\nread_noise_e = 3\ndsnu_e = 4\nprnu = 0.01\n"
+LENS = "[lens]\nf_number = 2.8\n"
+
+
+def write(folder, text, name="camera.toml"):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refusal(path, *parts):
+    with pytest.raises(InputError) as error:
+        read_sensor(path)
+    message = str(error.value)
+    assert "\n" not in message
+    for part in (path.name, *parts):
+        assert part in message, message
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_preset_is_a_file_that_says_what_it_is_and_names_every_pixel_term(name):
+    text = preset_file(name).read_text("utf-8")
+    assert text.startswith("# ")
+    table = text.partition("[pixel]")[2].partition("[lens]")[0]
+    assert {line.split(" = ")[0] for line in table.splitlines() if " = " in line and line[0] != "#"} == {
+        field.name for field in fields(PixelConfig)
+    }
+    assert preset(name).cfa == RGBW
+
+
+def test_no_other_file_lies_beside_the_presets():
+    assert {path.name for path in preset_file("low_noise").parent.iterdir()} == {f"{name}.toml" for name in names()}
+
+
+@pytest.mark.parametrize(
+    ("camera", "read_noise_e", "dsnu_e", "prnu"),
+    [
+        (table1_pixel, 4580.0 / 30.0, 6000.0 / 30.0, 0.017),
+        (table1_output, 4580.0 / (30.0 * 7.98), 6000.0 / (30.0 * 7.98), 0.017),
+        (low_noise, 1.5, 1.0, 0.01),
+    ],
+)
+@pytest.mark.parametrize("cfa", ["rgbw", "bayer"])
+def test_the_files_hold_the_last_bit_of_table_1_s_quotients(camera, read_noise_e, dsnu_e, prnu, cfa):
+    pixel = PixelConfig(2.2, 0.9, 15_000.0, read_noise_e, dsnu_e, prnu, analog_gain=7.98)
+    expected = SensorConfig(pixel, LensConfig(2.8), cfa=MOSAICS[cfa])
+    assert camera(cfa) == expected
+    assert camera(cfa).gain_e_per_dn == expected.gain_e_per_dn
+
+
+@pytest.mark.parametrize(("pitch_um", "f_number"), [(6.0, 4.0), (3.0, 2.8), (2.0, 4.0)])
+def test_variants_for_figures_1_and_5_change_pitch_well_and_f_number_alone(pitch_um, f_number):
+    sensor, base = preset(f"table1_output_{pitch_um:g}um"), table1_output()
+    well_e = 15_000.0 * (pitch_um / 2.2) ** 2
+    assert sensor.pixel.full_well_e == pytest.approx(well_e, rel=1e-12)
+    assert sensor.pixel == replace(base.pixel, pitch_um=pitch_um, full_well_e=sensor.pixel.full_well_e)
+    assert sensor == replace(base, pixel=sensor.pixel, lens=LensConfig(f_number))
+
+
+def test_a_copy_that_was_changed_reads_as_it_was_changed(tmp_path):
+    text = preset_file("low_noise").read_text("utf-8").replace("read_noise_e = 1.5", "read_noise_e = 2.5")
+    path = write(tmp_path, text.replace('cfa = "rgbw"', 'cfa = "rccc"'))
+    for given in (path, str(path)):
+        sensor = preset(given)
+        assert sensor.pixel == replace(low_noise().pixel, read_noise_e=2.5)
+        assert sensor.cfa == ("RC", "CC")
+    assert preset(path, "bayer").cfa == BAYER
+    assert preset(path, ["GR", "BG"]).cfa == ("GR", "BG")
+
+
+def test_the_least_file_leaves_the_rest_at_its_defaults(tmp_path):
+    expected = SensorConfig(PixelConfig(2.2, 0.9, 15_000, 3, 4, 0.01), LensConfig(2.8))
+    assert read_sensor(write(tmp_path, LEAST + LENS)) == expected
+    more = 'cfa = ["RG", "GB"]\nbits = 12\nblack_level_dn = 64\nwindow_nm = [400, 700]\n'
+    changed = replace(expected, cfa=BAYER, bits=12, black_level_dn=64, window_nm=(400.0, 700.0))
+    assert read_sensor(write(tmp_path, more + LEAST + LENS)) == changed
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("", ("pixel", "is not a table", "[pixel]")),
+        (LEAST, ("lens", "is not a table", "[lens]")),
+        ("pixel = 3\n" + LENS, ("pixel: 3 is not a table",)),
+        (LEAST + "read_nose_e = 3\n" + LENS, ("pixel key: 'read_nose_e' is unknown", "did you mean 'read_noise_e'?")),
+        (LEAST + LENS + "fnumber = 3\n", ("lens key: 'fnumber'", "did you mean 'f_number'?")),
+        ("bit = 12\n" + LEAST + LENS, ("key: 'bit'", "did you mean 'bits'?")),
+        (LEAST.replace("prnu = 0.01\n", "") + LENS, ("pixel: prnu is missing", "add it to [pixel]")),
+        (LEAST.replace("prnu = 0.01", "prnu = 1.7") + LENS, ("prnu: 1.7", "1.7 % is 0.017")),
+        (LEAST.replace("prnu = 0.01", 'prnu = "0.01"') + LENS, ("prnu: '0.01'",)),
+        (LEAST.replace("prnu = 0.01", "prnu = true") + LENS, ("prnu: True is not a number",)),
+        (LEAST.replace("prnu = 0.01", "prnu = nan") + LENS, ("prnu: nan",)),
+        (LEAST.replace("prnu = 0.01", "prnu = [1]") + LENS, ("prnu: [1]",)),
+        ("bits = 20\n" + LEAST + LENS, ("bits: 20", "1 to 16")),
+        ('bits = "14"\n' + LEAST + LENS, ("bits: '14'",)),
+        ("window_nm = [400]\n" + LEAST + LENS, ("window_nm: [400]", "[shortest, longest]")),
+        ('window_nm = ["a", "b"]\n' + LEAST + LENS, ("window_nm: ['a', 'b']",)),
+        ("window_nm = [700, 400]\n" + LEAST + LENS, ("window_nm: (700.0, 400.0)",)),
+        ('cfa = "bayr"\n' + LEAST + LENS, ("cfa: 'bayr'", "did you mean 'bayer'?")),
+        ('cfa = ["RG", "B"]\n' + LEAST + LENS, ("cfa", "differ in length")),
+        ("cfa = 3\n" + LEAST + LENS, ("cfa: 3",)),
+        ('cfa = ["RQ"]\n' + LEAST + LENS, ("responses: letter: 'Q'",)),
+        ("[pixel\n", ("can't be read", "rodcone new preset")),
+        ("\0", ("can't be read",)),
+    ],
+)
+def test_a_file_that_describes_no_camera_is_refused_in_one_line_with_its_name(tmp_path, text, parts):
+    refusal(write(tmp_path, text), *parts)
+
+
+def test_a_missing_or_a_binary_file_is_refused(tmp_path):
+    refusal(tmp_path / "absent.toml", "can't be read", "rodcone new preset NAME")
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00\x01")
+    refusal(binary, "can't be read")
+    refusal(tmp_path, "can't be read")
+
+
+# Measured responses
+
+CURVES = "wavelength_nm,R,G,B,W\n380,0,0,0.2,0.9\n500,0.1,0.8,0.8,0.9\n600,0.9,0.3,0,0.9\n780,0.8,0.1,0,0.9\n"
+STATED = '[responses]\ncsv = "curves.csv"\nrange_nm = [400, 700]\n'
+
+
+def test_measured_responses_are_read_beside_the_file_with_all_that_it_states(tmp_path):
+    write(tmp_path, CURVES, "curves.csv")
+    write(tmp_path, "wavelength_nm,t\n380,1\n600,1\n700,0\n", "cut.csv")
+    write(tmp_path, "wavelength_nm,qe\n380,0.5\n780,0.4\n", "qe.csv")
+    plain = read_sensor(write(tmp_path, LEAST + LENS + STATED + 'quantum_efficiency = "included"\n'))
+    expected = read_csv(tmp_path / "curves.csv", range_nm=(400.0, 700.0))
+    both = read_sensor(write(tmp_path, LEAST + LENS + STATED + 'quantum_efficiency = "qe.csv"\nir_cut = "cut.csv"\n'))
+    numbers = read_sensor(write(tmp_path, LEAST + LENS + STATED + "quantum_efficiency = 0.5\nir_cut = 650\n"))
+    cut = Spectrum([380.0, 600.0, 700.0], [1.0, 1.0, 0.0])
+    efficiency = Spectrum([380.0, 780.0], [0.5, 0.4])
+    for sensor, curves in (
+        (plain, expected),
+        (both, read_csv(tmp_path / "curves.csv", range_nm=(400, 700), ir_cut=cut, quantum_efficiency=efficiency)),
+        (numbers, read_csv(tmp_path / "curves.csv", range_nm=(400, 700), ir_cut=650.0, quantum_efficiency=0.5)),
+    ):
+        for letter in "RGBW":
+            one, other = sensor.responses.curves[letter], curves.curves[letter]
+            np.testing.assert_array_equal(one.wavelength_nm, other.wavelength_nm)
+            np.testing.assert_array_equal(one.values, other.values)
+    assert plain.responses.curves["W"].values.max() == 0.9
+    assert numbers.responses.curves["W"].values.max() == 0.45
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (STATED, ("responses: quantum_efficiency is missing", '"included"')),
+        ('[responses]\ncsv = "curves.csv"\nquantum_efficiency = 0.5\n', ("range_nm is missing",)),
+        ("[responses]\nrange_nm = [400, 700]\nquantum_efficiency = 0.5\n", ("csv is missing",)),
+        (STATED + 'quantum_efficency = "included"\n', ("responses key: 'quantum_efficency'", "did you mean")),
+        (STATED + "quantum_efficiency = true\n", ("quantum_efficiency: True",)),
+        (STATED + "quantum_efficiency = 56.0\n", ("quantum_efficiency: 56.0", "0 to 1")),
+        (STATED + 'quantum_efficiency = "absent.csv"\n', ("absent.csv", "can't be read")),
+        (STATED + 'quantum_efficiency = "curves.csv"\n', ("4 columns beside wavelength_nm",)),
+        (
+            STATED.replace("[400, 700]", "[300, 700]") + 'quantum_efficiency = "included"\n',
+            ("range_nm: (300.0, 700.0)",),
+        ),
+        (STATED.replace('"curves.csv"', "3") + "quantum_efficiency = 0.5\n", ("csv: 3 is not a file's name",)),
+        ("responses = 3\n", ("responses: 3 is not a table",)),
+    ],
+)
+def test_responses_that_leave_something_to_guess_are_refused(tmp_path, text, parts):
+    write(tmp_path, CURVES, "curves.csv")
+    refusal(write(tmp_path, text + LEAST + LENS if text.startswith("responses =") else LEAST + LENS + text), *parts)
+
+
+def test_without_responses_the_project_s_own_are_used_and_c_is_w_s_curve():
+    assert low_noise().responses is rgbw()
+    clear = preset("low_noise", "rccc").responses
+    assert clear.curves["C"] is rgbw().curves["W"]
+    assert clear.curves["R"] is rgbw().curves["R"]
+
+
+@pytest.mark.parametrize("cfa", MOSAICS)
+def test_every_named_mosaic_makes_a_camera(cfa):
+    assert preset("low_noise", cfa).cfa == MOSAICS[cfa]
+
+
+def test_an_unknown_preset_is_refused_by_name_also_for_its_file(tmp_path):
+    for call in (preset, preset_file):
+        with pytest.raises(InputError, match=r"sensor preset: 'table1_pixl' is unknown.*did you mean 'table1_pixel'"):
+            call("table1_pixl")
+    with pytest.raises(InputError, match=r"absent\.toml"):
+        preset(Path(tmp_path) / "absent.toml")

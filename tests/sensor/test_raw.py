@@ -1,0 +1,114 @@
+"""The raw image: electrons, the dark's spread, and which pixels count as saturated."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from rodcone.errors import InputError
+from sensor.cfa import RGBW
+from sensor.device import draw_device
+from sensor.presets import low_noise, table1_output, table1_pixel
+from sensor.raw import SATURATION_SIGMAS, RawImage
+from sensor.readout import read_out
+
+RAW = RawImage(np.full((4, 4), 120, np.uint16), RGBW, 100.0, 1100.0, 2.0, 3.0, 4.0, 0.01, 0.02)
+STATED = 3.2e-5  # of a normal under -4 sigma
+
+
+def test_electrons_are_dn_above_black_times_gain():
+    dn = np.array([[0, 100], [350, 1100]], np.uint16)
+    np.testing.assert_array_equal(replace(RAW, dn=dn).electrons, [[-200.0, 0.0], [500.0, 2000.0]])
+
+
+def test_electrons_turned_into_dn_are_the_dn_again():
+    dn = np.random.default_rng(0).integers(0, 2**16, (64, 64), dtype=np.uint16)
+    raw = replace(RAW, dn=dn, black_dn=37.25, white_dn=65_535.0, gain_e_per_dn=0.2357)
+    np.testing.assert_array_equal(np.rint(raw.electrons / raw.gain_e_per_dn + raw.black_dn), dn)
+
+
+def test_dark_spread_is_read_noise_dsnu_and_a_rounding_in_quadrature():
+    assert RAW.dark_noise_e == pytest.approx(np.sqrt(3.0**2 + 4.0**2 + 2.0**2 / 12), rel=1e-15)
+
+
+def test_saturation_begins_four_sigmas_of_the_dark_and_half_a_dn_under_the_well():
+    assert SATURATION_SIGMAS == 4.0
+    assert RAW.saturation_e == pytest.approx(2000.0 - 4 * np.sqrt(25 + 1 / 3) - 1.0, rel=1e-12)
+    dn = np.array([[1089, 1090], [1091, 1100]], np.uint16)  # 1978.87 e- is DN 1089.43
+    np.testing.assert_array_equal(replace(RAW, dn=dn).saturated, [[False, True], [True, True]])
+
+
+@pytest.mark.parametrize("sigma_dn", np.geomspace(0.05, 200, 60))
+def test_a_saturated_pixel_is_missed_with_at_most_the_stated_probability(sigma_dn):
+    raw = replace(RAW, gain_e_per_dn=1.0, read_noise_e=sigma_dn, dsnu_e=0.0)
+    first_flagged = np.ceil(raw.saturation_e - 1000.0)  # DN under the top
+    missed = stats.norm.cdf((first_flagged - 0.5) / sigma_dn)
+    assert missed <= STATED
+
+
+@pytest.mark.parametrize(
+    ("camera", "probability"), [(table1_pixel, STATED), (table1_output, STATED), (low_noise, STATED)]
+)
+def test_all_of_a_saturated_frame_is_flagged_and_nothing_of_a_dark_one(camera, probability):
+    sensor = camera()
+    device = draw_device(sensor, (1024, 1024), np.random.default_rng(1))
+    saturated = read_out(np.full((1024, 1024), 1e6), sensor, device, 0.01, np.random.default_rng(2)).saturated
+    allowed = probability * saturated.size
+    # a Poisson count of misses: false-alarm rate under 1e-4 each at the stated probability
+    assert np.count_nonzero(~saturated) <= stats.poisson.isf(1e-4, allowed)
+    dark = read_out(np.zeros((1024, 1024)), sensor, device, 0.01, np.random.default_rng(3))
+    assert not dark.saturated.any()
+
+
+def test_half_a_well_is_not_saturated():
+    sensor = table1_output()
+    device = draw_device(sensor, (256, 256), np.random.default_rng(1))
+    raw = read_out(np.full((256, 256), 7500.0), sensor, device, 0.01, np.random.default_rng(2))
+    assert not raw.saturated.any()  # the threshold lies 40 standard deviations above
+
+
+@pytest.mark.parametrize("shape", [(1, 4), (4, 1), (4,), (4, 4, 1)])
+def test_a_frame_that_does_not_hold_a_tile_is_refused(shape):
+    with pytest.raises(InputError, match=r"mosaic: shape .* doesn't fit the tile .*at least 2x2") as error:
+        replace(RAW, dn=np.zeros(shape, np.uint16))
+    assert str(shape) in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint16, np.int64, np.float32, np.float64, list])
+def test_whole_numbers_and_finite_floats_are_taken_as_they_are(dtype):
+    dn = np.array([[101, 102], [103, 104]], np.int64)
+    given = dn.tolist() if dtype is list else dn.astype(dtype)
+    np.testing.assert_array_equal(replace(RAW, dn=given).electrons, [[2.0, 4.0], [6.0, 8.0]])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"black_dn": 1100.0}, r"black_dn: 1100\.0 is not under white_dn 1100\.0; swap or correct"),
+        ({"black_dn": np.nan}, r"black_dn: nan is not under white_dn"),
+        ({"gain_e_per_dn": 0.0}, r"gain_e_per_dn: 0\.0 is outside .*give electrons per digital number"),
+        ({"read_noise_e": -1.0}, r"read_noise_e: -1\.0 is outside .*give electrons, 0 for none"),
+        ({"dsnu_e": np.inf}, r"dsnu_e: inf is outside .*give electrons, 0 for none"),
+        ({"prnu": 1.7}, r"prnu: 1\.7 is outside 0 to 1; give a fraction"),
+        ({"exposure_s": -1e-9}, r"exposure_s: -1e-09 is outside .*give seconds, 0 or more"),
+        ({"f_number": 0.0}, r"f_number: 0\.0 is outside"),
+        ({"iso": -100.0}, r"iso: -100\.0 is outside"),
+        ({"white_dn": 65_536.0}, r"white_dn: 65536\.0 is outside .*give digital numbers of 16 bits"),
+        ({"dn": np.full((2, 2), np.nan)}, r"dn: nan at \(0, 0\) is not allowed; give finite numbers"),
+        ({"dn": np.array([[1.0, 2.0], [-np.inf, 0.0]])}, r"dn: -inf at \(1, 0\)"),
+        ({"dn": np.ones((2, 2), complex)}, r"dn: samples of type complex128 are not allowed; give whole numbers or"),
+        ({"dn": np.ones((2, 2), bool)}, r"dn: samples of type bool"),
+        ({"dn": np.full((2, 2), None)}, r"dn: samples of type object"),
+        ({"dn": [["1", "2"], ["3", "4"]]}, r"dn: samples of type <U1"),
+        ({"dn": [[1, 2], [3]]}, r"dn: samples of type object"),
+        ({"black_dn": -np.inf}, r"black_dn: -inf is outside"),
+        ({"camera": ""}, r"camera: '' is not allowed; give a name in printable ASCII"),
+        ({"camera": "Käfer"}, r"camera: 'Käfer' is not allowed"),
+        ({"cfa": ("RG", "B")}, r"cfa: rows of .* differ in length"),
+    ],
+)
+def test_calibration_that_cannot_be_is_refused(changes, message):
+    with pytest.raises(InputError, match=message):
+        replace(RAW, **changes)

@@ -1,0 +1,387 @@
+"""From expected electrons to digital numbers: the order of the noise terms, each switched off, clipping, refusals.
+
+Moments of shot noise and photon transfer: `tests/statistics`.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from rodcone.errors import InputError
+from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.device import Device, draw_device
+from sensor.readout import read_out
+
+QUIET = PixelConfig(2.2, 0.9, full_well_e=1000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
+
+
+def camera(bits=14, black_level_dn=None, **pixel):
+    return SensorConfig(replace(QUIET, **pixel), LensConfig(2.8), bits=bits, black_level_dn=black_level_dn)
+
+
+def rng(seed=0):
+    return np.random.default_rng(seed)
+
+
+def even(shape):
+    return Device(np.ones(shape), np.zeros(shape))
+
+
+def expose(sensor, light_e, shape=(64, 64), device=None, exposure_s=0.01, seed=0):
+    device = even(shape) if device is None else device
+    return read_out(np.broadcast_to(light_e, shape), sensor, device, exposure_s, rng(seed))
+
+
+# Each term alone, and zero
+
+
+@pytest.mark.parametrize("bits", [1, 8, 14, 16])
+@pytest.mark.parametrize("black_level_dn", [None, 0])
+def test_no_light_and_no_noise_read_black_in_every_pixel(bits, black_level_dn):
+    sensor = camera(bits, black_level_dn)
+    raw = expose(sensor, 0.0)
+    np.testing.assert_array_equal(raw.dn, sensor.black_dn)
+    assert raw.dn.dtype == np.uint16
+
+
+def test_fixed_offsets_alone_are_read_exactly_and_are_never_drawn_again():
+    sensor = camera(dsnu_e=4.0)
+    device = draw_device(sensor, (64, 64), rng(1))
+    first, second = (expose(sensor, 0.0, device=device, seed=seed) for seed in (2, 3))
+    expected = np.rint(device.dark_offset_e / (1000.0 / (16_383 - 322)) + 322)  # 5 sigma of 4 e-: 321.2 DN, rounded up
+    np.testing.assert_array_equal(first.dn, np.clip(expected, 0, None))
+    np.testing.assert_array_equal(second.dn, first.dn)
+
+
+def test_read_noise_alone_has_its_stated_moments():
+    sensor = camera(read_noise_e=6.0)
+    dark_e = expose(sensor, 0.0, (512, 512)).electrons
+    n = dark_e.size
+    variance = 6.0**2 + sensor.gain_e_per_dn**2 / 12
+    # mean and variance within 4 standard errors: false-alarm rate 1.3e-4; black at 5 sigma keeps the clip at 0 away
+    assert abs(dark_e.mean()) < 4 * np.sqrt(variance / n)
+    assert abs(dark_e.var() - variance) < 4 * variance * np.sqrt(2 / n)
+
+
+def test_dark_current_alone_collects_rate_times_exposure():
+    sensor = camera(dark_current_e_per_s=50.0)
+    electrons = expose(sensor, 0.0, (256, 256), exposure_s=0.4).electrons
+    # Poisson of mean 20 on a lattice finer than one electron; mean and variance within 4 standard errors: 1.3e-4
+    n, variance = electrons.size, 20.0 + sensor.gain_e_per_dn**2 / 12
+    assert abs(electrons.mean() - 20.0) < 4 * np.sqrt(variance / n)
+    assert abs(electrons.var() - variance) < 4 * variance * np.sqrt((2 + 1 / 20) / n)
+
+
+def test_exposure_0_collects_no_dark_current():
+    raw = expose(camera(dark_current_e_per_s=1e9), 0.0, exposure_s=0.0)
+    np.testing.assert_array_equal(raw.dn, 0)
+    assert raw.exposure_s == 0.0
+
+
+def test_without_prnu_and_dsnu_a_drawn_chip_reads_as_an_even_one():
+    sensor = camera(read_noise_e=2.0)
+    drawn = expose(sensor, 50.0, device=draw_device(sensor, (64, 64), rng(4)))
+    np.testing.assert_array_equal(drawn.dn, expose(sensor, 50.0).dn)
+
+
+# The order of the terms
+
+
+def test_photo_response_scales_the_mean_before_the_poisson_draw():
+    columns = np.repeat([0.25, 1.0, 4.0], 200)
+    device = Device(np.broadcast_to(columns, (600, 600)), np.zeros((600, 600)))
+    sensor = camera(bits=16)
+    electrons = expose(sensor, 30.0, (600, 600), device).electrons
+    for response in (0.25, 1.0, 4.0):
+        here, mean = electrons[:, columns == response], 30.0 * response
+        # scaled after the draw, the variance would be 30 response^2. Six comparisons within 4 standard errors: 3.8e-4.
+        assert abs(here.mean() - mean) < 4 * np.sqrt(mean / here.size)
+        assert abs(here.var() - mean) < 4 * np.sqrt((2 * mean**2 + mean) / here.size)
+
+
+def test_variance_over_a_chip_is_mean_plus_prnu_squared_mean_squared():
+    sensor = camera(bits=16, prnu=0.2)
+    device = draw_device(sensor, (512, 512), rng(5))
+    electrons = expose(sensor, 10.0, (512, 512), device).electrons
+    variance = 10.0 + (0.2 * 10.0) ** 2  # after the draw: 10 (1 + 0.2^2) + 4 = 14.4, ten standard errors off
+    fourth = stats.moment(electrons.ravel(), 4)
+    # within 4 standard errors: false-alarm rate 6.3e-5
+    assert abs(electrons.var() - variance) < 4 * np.sqrt((fourth - variance**2) / electrons.size)
+
+
+def test_dark_current_is_not_scaled_by_photo_response():
+    response = np.broadcast_to(np.repeat([0.0, 1.0, 3.0], 100), (300, 300))
+    sensor = camera(bits=16, dark_current_e_per_s=400.0)
+    electrons = expose(sensor, 25.0, (300, 300), Device(response, np.zeros((300, 300))), exposure_s=0.1).electrons
+    for value in (0.0, 1.0, 3.0):
+        here, mean = electrons[response == value], 40.0 + 25.0 * value
+        assert abs(here.mean() - mean) < 4 * np.sqrt(mean / here.size)  # three times 6.3e-5
+
+
+def test_the_well_clips_before_dark_offsets_are_added():
+    sensor = camera(dsnu_e=4.0)
+    device = draw_device(sensor, (64, 64), rng(6))
+    raw = expose(sensor, 1e5, device=device)
+    expected = np.rint((1000.0 + device.dark_offset_e) / sensor.gain_e_per_dn + sensor.black_dn)
+    np.testing.assert_array_equal(raw.dn, np.clip(expected, 0, sensor.white_dn))
+    assert raw.dn.min() < raw.white_dn  # clipped after them, all would read the top
+
+
+def test_half_of_the_saturated_pixels_read_under_the_top_with_the_moments_of_a_half_normal():
+    sensor = camera(bits=16, read_noise_e=12.0)
+    raw = expose(sensor, 1e4, (512, 512))
+    n, sigma_dn = raw.dn.size, 12.0 / sensor.gain_e_per_dn
+    under = stats.norm.cdf(-0.5 / sigma_dn)  # rounding lifts half a DN to the top
+    # share and mean within 4 standard errors: false-alarm rate 1.3e-4
+    assert abs(np.mean(raw.dn < raw.white_dn) - under) < 4 * np.sqrt(0.25 / n)
+    mean = -12.0 / np.sqrt(2 * np.pi)  # of min(0, noise)
+    spread = 12.0 * np.sqrt(0.5 - 1 / (2 * np.pi))
+    assert abs(raw.electrons.mean() - (1000.0 + mean)) < 4 * spread / np.sqrt(n) + 0.01 * sensor.gain_e_per_dn
+    assert np.median(raw.electrons) == pytest.approx(1000.0, abs=sensor.gain_e_per_dn)  # the well, not more
+
+
+def test_without_dark_noise_a_saturated_pixel_reads_the_well_exactly():
+    raw = expose(camera(), 1e5)
+    np.testing.assert_array_equal(raw.dn, raw.white_dn)
+    np.testing.assert_allclose(raw.electrons, 1000.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("full_well_e", [1.0, 1000.0, 1e12])
+def test_light_of_1e8_full_wells_saturates_and_nothing_more(full_well_e):
+    raw = expose(camera(full_well_e=full_well_e, prnu=0.01), 1e8 * full_well_e, (4, 4))
+    np.testing.assert_array_equal(raw.dn, raw.white_dn)
+
+
+def test_a_dark_current_that_fills_the_well_saturates_without_light():
+    raw = expose(camera(dark_current_e_per_s=1e12), 0.0, (4, 4), exposure_s=1e7)
+    np.testing.assert_array_equal(raw.dn, raw.white_dn)
+
+
+# The converter
+
+
+@pytest.mark.parametrize("bits", [1, 2, 10, 16])
+def test_a_converter_gives_whole_numbers_from_0_to_its_top(bits):
+    sensor = camera(bits, black_level_dn=0.0, full_well_e=4e4, read_noise_e=1e3)
+    ramp = np.linspace(0, 8e4, 256 * 256).reshape(256, 256)
+    raw = read_out(ramp, sensor, even((256, 256)), 0.01, rng())
+    assert raw.dn.dtype == np.uint16
+    assert (raw.dn.min(), raw.dn.max()) == (0, 2**bits - 1)
+    if bits < 16:
+        assert set(np.unique(raw.dn)) == set(range(2**bits))
+
+
+def test_one_bit_tells_more_from_less_than_half_a_well():
+    raw = expose(camera(bits=1), np.repeat([100.0, 900.0], 32))
+    np.testing.assert_array_equal(raw.dn, np.broadcast_to(np.repeat([0, 1], 32), (64, 64)))
+
+
+def test_dn_are_electrons_over_gain_plus_black_rounded():
+    sensor = camera(bits=10, black_level_dn=100)
+    offsets = np.linspace(-150.0, 1200.1, 64 * 64).reshape(64, 64)
+    raw = expose(sensor, 0.0, device=Device(np.ones((64, 64)), offsets))
+    expected = np.floor(offsets * (1023 - 100) / 1000.0 + 100 + 0.5)
+    np.testing.assert_array_equal(raw.dn, np.clip(expected, 0, 1023))
+    assert (raw.black_dn, raw.white_dn) == (100, 1023)
+
+
+def test_the_raw_image_carries_the_calibration_of_the_camera():
+    sensor = camera(bits=12, read_noise_e=3.0, dsnu_e=2.0, prnu=0.015)
+    raw = expose(sensor, 10.0, exposure_s=0.066)
+    assert raw.cfa == sensor.cfa
+    assert (raw.read_noise_e, raw.dsnu_e, raw.prnu, raw.exposure_s) == (3.0, 2.0, 0.015, 0.066)
+    assert (raw.black_dn, raw.white_dn) == (sensor.black_dn, sensor.white_dn)
+    assert raw.gain_e_per_dn == sensor.gain_e_per_dn
+
+
+# Draws
+
+
+NOISY = {"read_noise_e": 3.0, "dsnu_e": 4.0, "prnu": 0.02, "dark_current_e_per_s": 100.0}
+
+
+def test_two_runs_are_equal_and_two_exposures_differ():
+    sensor = camera(**NOISY)
+    device = draw_device(sensor, (64, 64), rng(1))
+    first, again = (expose(sensor, 200.0, device=device, seed=2) for _ in range(2))
+    np.testing.assert_array_equal(first.dn, again.dn)
+    generator = rng(2)
+    frames = [read_out(np.full((64, 64), 200.0), sensor, device, 0.01, generator) for _ in range(2)]
+    np.testing.assert_array_equal(frames[0].dn, first.dn)
+    assert np.mean(frames[0].dn == frames[1].dn) < 0.1
+
+
+@pytest.mark.parametrize("shape", [(2, 64), (10, 64), (10, 20), (63, 3)])
+def test_a_crop_reads_as_the_full_frame_does_there(shape):
+    sensor = camera(**NOISY)
+    device = draw_device(sensor, (64, 64), rng(1))
+    light_e = rng(3).uniform(0, 900, (64, 64))
+    crop = np.s_[: shape[0], : shape[1]]
+    part = Device(device.photo_response[crop], device.dark_offset_e[crop])
+    full, cropped = read_out(light_e, sensor, device, 0.01, rng(4)), read_out(light_e[crop], sensor, part, 0.01, rng(4))
+    np.testing.assert_array_equal(cropped.dn, full.dn[crop])
+
+
+def test_the_light_of_one_row_does_not_change_another_row():
+    sensor = camera(**NOISY)
+    device = draw_device(sensor, (64, 64), rng(1))
+    light_e = np.full((64, 64), 200.0)
+    changed = light_e.copy()
+    changed[::2] = 700.0
+    first, second = (read_out(light, sensor, device, 0.01, rng(4)) for light in (light_e, changed))
+    np.testing.assert_array_equal(first.dn[1::2], second.dn[1::2])
+
+
+def test_a_chip_and_a_frame_of_one_seed_share_no_noise():
+    sensor = camera(bits=16, **NOISY)
+    device = draw_device(sensor, (256, 256), rng(7))  # a caller may well use one seed for both
+    plain = Device(np.ones((256, 256)), np.zeros((256, 256)))
+    dark, lit = (expose(sensor, light, (256, 256), plain, seed=7).electrons for light in (0.0, 300.0))
+    # five correlations within 4.5 standard errors: false-alarm rate 3.4e-5
+    for pattern in (device.photo_response, device.dark_offset_e):
+        for frame in (dark, lit):
+            assert abs(np.corrcoef(pattern.ravel(), frame.ravel())[0, 1]) < 4.5 / 256
+    read = expose(camera(bits=16, read_noise_e=3.0), 0.0, (256, 256), plain, seed=7).electrons
+    shot = expose(camera(bits=16), 300.0, (256, 256), plain, seed=7).electrons
+    assert abs(np.corrcoef(read.ravel(), shot.ravel())[0, 1]) < 4.5 / 256
+
+
+def test_inputs_are_left_as_they_were():
+    light_e, device = np.full((8, 8), 20.0), draw_device(camera(**NOISY), (8, 8), rng())
+    before = (light_e.copy(), device.photo_response.copy(), device.dark_offset_e.copy())
+    read_out(light_e, camera(**NOISY), device, 0.01, rng())
+    for array, copy in zip((light_e, device.photo_response, device.dark_offset_e), before, strict=True):
+        np.testing.assert_array_equal(array, copy)
+
+
+# Terms of real chips
+
+
+def test_a_column_s_amplifier_multiplies_counts_and_not_their_mean():
+    gains = np.repeat([0.5, 1.0, 2.0], 200)
+    device = Device(np.ones((600, 600)), np.zeros((600, 600)), column_gain=gains)
+    electrons = expose(camera(bits=16), 30.0, (600, 600), device).electrons
+    for gain in (0.5, 1.0, 2.0):
+        here, mean, variance = electrons[:, gains == gain], 30.0 * gain, 30.0 * gain**2  # a mean scaled by it: 30 gain
+        # six comparisons within 4 standard errors: 3.8e-4
+        assert abs(here.mean() - mean) < 4 * np.sqrt(variance / here.size)
+        assert abs(here.var() - variance) < 4 * gain**2 * np.sqrt((2 * 30.0**2 + 30.0) / here.size)
+
+
+def test_the_well_clips_before_the_column_s_amplifier_and_offsets_come_behind_it():
+    gains = np.tile([0.5, 0.8], 32)
+    device = Device(np.ones((64, 64)), np.full((64, 64), 20.0), column_gain=gains)
+    sensor = camera(bits=16)
+    raw = expose(sensor, 1e5, device=device)
+    expected = np.rint((1000.0 * gains + 20.0) / sensor.gain_e_per_dn + sensor.black_dn)
+    np.testing.assert_array_equal(raw.dn, np.broadcast_to(expected, (64, 64)))
+
+
+def test_a_hot_pixel_collects_its_own_dark_current_on_top_of_the_others_and_no_light_scales_it():
+    hot = np.zeros((300, 300), dtype=bool)
+    hot[:, ::3] = True
+    device = Device(np.full((300, 300), 2.0), np.zeros((300, 300)), hot=hot)
+    sensor = camera(bits=16, dark_current_e_per_s=50.0, hot_pixel_dark_current_e_per_s=400.0)
+    electrons = expose(sensor, 25.0, (300, 300), device, exposure_s=0.2).electrons
+    for where, mean in ((~hot, 60.0), (hot, 140.0)):
+        here = electrons[where]
+        # Poisson: mean and variance within 4 standard errors, four comparisons: 2.5e-4
+        assert abs(here.mean() - mean) < 4 * np.sqrt(mean / here.size)
+        assert abs(here.var() - mean) < 4 * np.sqrt((2 * mean**2 + mean) / here.size)
+
+
+def test_hot_pixels_are_cold_in_an_exposure_of_0_s():
+    device = Device(np.ones((8, 8)), np.zeros((8, 8)), hot=np.ones((8, 8), dtype=bool))
+    np.testing.assert_array_equal(expose(camera(hot_pixel_dark_current_e_per_s=1e12), 0.0, (8, 8), device, 0.0).dn, 0)
+
+
+def test_crosstalk_moves_means_before_photo_response_and_leaves_counts_poisson_and_independent():
+    light_e, response = np.zeros((512, 512)), np.ones((512, 512))
+    light_e[::4, ::4] = 800.0
+    response[1::4, ::4] = 0.5  # the pixels under the bright ones
+    device = Device(response, np.zeros((512, 512)))
+    electrons = expose(camera(bits=16, crosstalk=0.1), light_e, (512, 512), device).electrons
+    for rows, columns, mean in ((0, 0, 480.0), (0, 1, 80.0), (3, 0, 80.0), (1, 0, 40.0)):
+        here = electrons[rows::4, columns::4][1:-1, 1:-1]
+        # eight comparisons within 4 standard errors: 5e-4
+        assert abs(here.mean() - mean) < 4 * np.sqrt(mean / here.size)
+        assert abs(here.var() - mean) < 4 * np.sqrt((2 * mean**2 + mean) / here.size)
+    np.testing.assert_array_equal(electrons[2::4, 2::4], 0.0)
+    giver, taker = electrons[::4, ::4].ravel(), electrons[::4, 1::4].ravel()
+    assert abs(np.corrcoef(giver, taker)[0, 1]) < 4.5 / np.sqrt(giver.size)  # 7e-6
+
+
+def test_new_patterns_stay_with_the_chip_over_exposures_and_zero_switches_each_off():
+    terms = {"column_gain_spread": 0.05, "column_offset_e": 4.0, "hot_pixel_share": 0.1}
+    sensor = camera(bits=16, hot_pixel_dark_current_e_per_s=1e6, **terms)
+    device = draw_device(sensor, (64, 64), rng(1))
+    # hot pixels full, all others dark: no noise is left
+    first, second = (expose(sensor, 0.0, device=device, seed=seed, exposure_s=1.0).dn for seed in (2, 3))
+    np.testing.assert_array_equal(first, second)
+    black = np.rint(device.dark_offset_e / sensor.gain_e_per_dn + sensor.black_dn)
+    np.testing.assert_array_equal(first[~device.hot], np.clip(black, 0, None)[~device.hot])
+    off = camera(bits=16)
+    np.testing.assert_array_equal(expose(off, 50.0, device=draw_device(off, (64, 64), rng(1))).dn, expose(off, 50.0).dn)
+
+
+def test_the_raw_image_s_calibration_holds_column_noise_too():
+    raw = expose(camera(dsnu_e=3.0, column_offset_e=4.0, prnu=0.03, column_gain_spread=0.04), 10.0)
+    assert (raw.dsnu_e, raw.prnu) == (pytest.approx(5.0), pytest.approx(0.05))
+
+
+def test_full_pixels_of_weak_columns_count_as_saturated_too():
+    sensor = camera(bits=16, read_noise_e=2.0, column_gain_spread=0.02)
+    device = draw_device(sensor, (32, 512), rng(8))
+    full = expose(sensor, 1e5, (32, 512), device)
+    assert full.column_gain_spread == 0.02
+    assert full.electrons.min() < 1000.0 - 40.0
+    # a column under 4 standard deviations: 3.2e-5 of 512
+    assert full.saturated.all()
+    assert not expose(sensor, 700.0, (32, 512), device).saturated.any()
+
+
+def test_black_stands_five_sigmas_above_0_with_column_offsets_too():
+    sensor = camera(read_noise_e=2.0, dsnu_e=3.0, column_offset_e=6.0)
+    assert 35.0 <= sensor.black_e < 35.0 + 1.1 * sensor.gain_e_per_dn
+
+
+# Refusals
+
+
+def refusal(*arguments):
+    with pytest.raises(InputError) as error:
+        read_out(*arguments)
+    message = str(error.value)
+    assert "\n" not in message
+    return message
+
+
+@pytest.mark.parametrize("exposure_s", [-0.01, np.nan, np.inf])
+def test_an_exposure_that_cannot_be_is_refused(exposure_s):
+    message = refusal(np.ones((4, 4)), camera(), even((4, 4)), exposure_s, rng())
+    assert message.startswith(f"exposure_s: {exposure_s!r} is outside 0 to")
+    assert "give seconds, 0 or more" in message
+
+
+@pytest.mark.parametrize("value", [np.nan, -1e-6, np.inf])
+def test_electrons_that_cannot_be_are_refused_where_they_stand(value):
+    light_e = np.ones((4, 6))
+    light_e[2, 5] = value
+    message = refusal(light_e, camera(), even((4, 6)), 0.01, rng())
+    assert f"expected_e: {value} at row 2, column 5" in message
+    assert "allowed: finite numbers >= 0; repair the radiance" in message
+
+
+def test_a_frame_of_another_size_than_the_chip_s_is_refused():
+    message = refusal(np.ones((4, 6)), camera(), even((6, 4)), 0.01, rng())
+    assert "shape (4, 6) is not the device's (6, 4)" in message
+    assert "draw the device with the frame's shape" in message
+
+
+@pytest.mark.parametrize("generator", [0, None, np.random.RandomState(0)])
+def test_what_is_no_generator_is_refused(generator):
+    message = refusal(np.ones((4, 4)), camera(), even((4, 4)), 0.01, generator)
+    assert message.startswith("rng: ")
+    assert "allowed: numpy.random.default_rng(seed); pass one" in message

@@ -1,0 +1,158 @@
+"""Expected photo-electrons in closed form."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from render.radiance import SpectralRadiance
+from render.spectrum import flat
+from rodcone.errors import InputError
+from sensor.cfa import BAYER, RGBW, mask
+from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.curves import Responses
+from sensor.optics import form_image
+from sensor.response import channel_electrons, expected_electrons
+
+PIXEL = PixelConfig(pitch_um=3.0, fill_factor=0.5, full_well_e=1e5, read_noise_e=2.0, dsnu_e=2.0, prnu=0.1)
+QE = {"R": 0.25, "G": 0.5, "B": 0.125, "W": 1.0}
+JOULES = 6.62607015e-34 * 299792458.0  # of a photon, times its wavelength in metres
+
+
+def camera(**changes):
+    plain = SensorConfig(PIXEL, LensConfig(2.0), responses=Responses({x: flat(value) for x, value in QE.items()}))
+    return replace(plain, **changes)
+
+
+def uniform(value, nm, width_nm=10.0, shape=(4, 6)):
+    """Light in bands that touch, and dark bands beside them, so that no window is left open."""
+    nm = np.atleast_1d(np.asarray(nm, dtype=np.float64))
+    edges = np.array([200.0, nm[0] - width_nm / 2, nm[-1] + width_nm / 2, 1100.0])
+    centres = np.concatenate([edges[:2].mean(keepdims=True), nm, edges[2:].mean(keepdims=True)])
+    widths = np.concatenate([[edges[1] - edges[0]], np.full(nm.size, width_nm), [edges[3] - edges[2]]])
+    values = np.concatenate([[0.0], np.full(nm.size, value), [0.0]])
+    return SpectralRadiance(np.broadcast_to(values, (*shape, values.size)), centres, width_nm=widths)
+
+
+def expected(radiance, sensor, exposure_s):
+    return expected_electrons(form_image(radiance, sensor), sensor, exposure_s)
+
+
+@pytest.mark.parametrize("tile", [RGBW, BAYER])
+def test_a_uniform_scene_gives_each_letter_its_closed_form(tile):
+    sensor = camera(cfa=tile)
+    electrons = expected(uniform(2e-3, 550.0, width_nm=10.0), sensor, 0.02)
+    # irradiance x width x photons a joule x collecting area x time
+    photons = 2e-3 * pi / (1 + 4 * 2.0**2) * 10.0 * (550e-9 / JOULES) * (9e-12 * 0.5) * 0.02
+    for letter in set("".join(tile)):
+        np.testing.assert_allclose(electrons[mask(tile, letter, (4, 6))], QE[letter] * photons, rtol=1e-12)
+
+
+def test_bands_add_up_each_with_its_own_wavelength_and_width():
+    edges = np.array([380.0, 447.5, 452.5, 585.0, 615.0, 699.0, 701.0, 780.0])
+    nm, width_nm = (edges[1:] + edges[:-1]) / 2, np.diff(edges)  # 5 nm at 450, 30 at 600, 2 at 700, dark between
+    weights = np.array([0.0, 3.0, 0.0, 1.0, 0.0, 2.0, 0.0])
+    radiance = SpectralRadiance(np.broadcast_to(weights * 1e-3, (2, 2, 7)), nm, width_nm=width_nm)
+    photons = np.sum(weights * 1e-3 * width_nm * nm) * 1e-9 / JOULES * pi / 17 * 4.5e-12 * 0.01
+    electrons = expected(radiance, camera(), 0.01)
+    np.testing.assert_allclose(electrons, photons * np.array([[QE["R"], QE["G"]], [QE["B"], QE["W"]]]), rtol=1e-12)
+
+
+def test_the_prnu_and_the_dark_current_of_the_camera_do_not_enter():
+    noisy = camera(pixel=replace(PIXEL, prnu=0.5, dark_current_e_per_s=1e6))
+    scene = uniform(1e-3, [500.0, 510.0])
+    np.testing.assert_array_equal(expected(scene, noisy, 0.1), expected(scene, camera(), 0.1))
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.25, 1.0, 64.0])
+def test_electrons_are_linear_in_exposure(factor):
+    scene = uniform(1e-3, np.arange(405.0, 700.0, 10.0))
+    np.testing.assert_allclose(
+        expected(scene, camera(), 0.01 * factor), factor * expected(scene, camera(), 0.01), rtol=1e-13
+    )
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0, 3.0])
+def test_electrons_are_quadratic_in_pitch_and_linear_in_fill_factor(factor):
+    scene, plain = uniform(1e-3, [500.0, 510.0]), camera()
+    wider = camera(pixel=replace(PIXEL, pitch_um=3.0 * factor))
+    np.testing.assert_allclose(expected(scene, wider, 0.1), factor**2 * expected(scene, plain, 0.1), rtol=1e-13)
+    fuller = camera(pixel=replace(PIXEL, fill_factor=0.25 * factor))
+    np.testing.assert_allclose(expected(scene, fuller, 0.1), factor / 2 * expected(scene, plain, 0.1), rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("centre_nm", "width_nm", "inside"),
+    [
+        (550.0, 10.0, 1.0),
+        (400.0, 20.0, 0.5),  # 390-410 nm: half of it is let in
+        (395.0, 20.0, 0.25),  # 385-405 nm
+        (698.0, 8.0, 0.75),  # 694-702 nm
+        (390.0, 20.0, 0.0),  # ends at the edge
+        (900.0, 20.0, 0.0),
+        (550.0, 600.0, 0.5),  # 250-850 nm holds the whole window
+    ],
+)
+def test_the_window_cuts_bands_to_the_part_inside(centre_nm, width_nm, inside):
+    sensor = camera(window_nm=(400.0, 700.0))
+    scene = uniform(1e-3, centre_nm, width_nm=width_nm)
+    photons = 1e-3 * pi / 17 * width_nm * (centre_nm * 1e-9 / JOULES) * 4.5e-12 * 0.01
+    # `flat` is 1 over 300-1100 nm alone: the widest band's mean response is 550/600
+    response = 550 / 600 if width_nm == 600.0 else 1.0
+    white = expected(scene, sensor, 0.01)[1, 1]
+    assert white == pytest.approx(inside * response * photons, rel=1e-12, abs=1e-30)
+
+
+def test_no_window_lets_more_light_in_than_it_is_wide():
+    scene = uniform(1e-3, np.arange(385.0, 1065.0, 10.0))
+    visible, infrared = camera(), camera(window_nm=(380.0, 1068.0))
+    assert np.all(expected(scene, visible, 0.01) < expected(scene, infrared, 0.01))
+
+
+def test_single_precision_radiance_agrees_with_double_to_1e_6():
+    nm = np.arange(385.0, 780.0, 10.0)
+    values = np.random.default_rng(2).random((16, 16, nm.size)).astype(np.float32)
+    sensor = SensorConfig(PIXEL, LensConfig(2.0))
+    single = expected(SpectralRadiance(values, nm), sensor, 0.01)
+    double = expected(SpectralRadiance(values.astype(np.float64), nm), sensor, 0.01)
+    assert single.dtype == double.dtype == np.float64
+    np.testing.assert_allclose(single, double, rtol=1e-6)
+
+
+def test_each_pixel_takes_its_own_letter_s_plane():
+    nm = np.arange(385.0, 780.0, 10.0)
+    radiance = SpectralRadiance(np.random.default_rng(3).random((5, 7, nm.size)), nm)
+    sensor = SensorConfig(PIXEL, LensConfig(2.0))
+    image = form_image(radiance, sensor)
+    planes, mosaic = channel_electrons(image, sensor, 0.01), expected_electrons(image, sensor, 0.01)
+    assert planes.shape == (5, 7, 4)
+    for index, letter in enumerate("RGBW"):
+        here = mask(RGBW, letter, (5, 7))
+        np.testing.assert_array_equal(mosaic[here], planes[here, index])
+
+
+def test_memory_order_of_the_bands_does_not_matter():
+    nm = np.arange(385.0, 780.0, 10.0)
+    values = np.random.default_rng(4).random((6, 8, nm.size))
+    planar = np.moveaxis(np.ascontiguousarray(np.moveaxis(values, -1, 0)), 0, -1)
+    sensor = SensorConfig(PIXEL, LensConfig(2.0))
+    first, second = (expected(SpectralRadiance(x, nm), sensor, 0.01) for x in (values, planar))
+    np.testing.assert_allclose(first, second, rtol=1e-13)
+
+
+@pytest.mark.parametrize("exposure_s", [-1e-3, np.nan, np.inf])
+def test_an_exposure_that_cannot_be_is_refused(exposure_s):
+    with pytest.raises(InputError, match=r"exposure_s: .* is outside 0 to .*; give seconds, 0 or more") as error:
+        expected(uniform(1e-3, [500.0, 510.0]), camera(), exposure_s)
+    assert repr(exposure_s) in str(error.value)
+
+
+def test_an_image_smaller_than_the_tile_is_refused():
+    with pytest.raises(InputError, match=r"mosaic: shape \(1, 6\).*at least 2x2"):
+        expected(uniform(1e-3, [500.0, 510.0], shape=(1, 6)), camera(), 0.01)
+
+
+def test_responses_that_lack_a_letter_of_the_mosaic_are_refused():
+    with pytest.raises(InputError, match="'W' is unknown; allowed: B, G, R"):
+        camera(responses=Responses({"R": flat(0.5), "G": flat(0.5), "B": flat(0.5)}))

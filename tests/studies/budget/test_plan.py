@@ -1,0 +1,205 @@
+"""Plans of whole studies: what they hold, that they are always the same, and that they keep their word."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sensor.presets import preset
+from studies.budget import plan as planning
+from studies.budget.check import Check, check_plan
+from studies.budget.model_plan import Plan
+from studies.budget.plan import plan, reference_plan
+from studies.budget.plan_text import cost_over_reference, reasons
+from studies.commands.cli import main
+from studies.study.study import Condition, RenderLimits, SceneChoice, Study, conditions
+
+SMALL = Study(
+    scenes=(SceneChoice("slanted_edge"),),
+    levels=("0.05cd/m2", "500cd/m2"),
+    render=RenderLimits(size=16, spp=32),
+    sensors=("low_noise",),
+)
+FILE = """
+levels = ["0.05cd/m2"]
+processors = ["bayer"]
+scenes = [{ source = "slanted_edge" }]
+
+[render]
+size = 16
+spp = 32
+"""
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("renders")
+
+
+@pytest.fixture(scope="module")
+def planned(cache: Path) -> Plan:
+    return plan(SMALL, cache=cache)
+
+
+def test_a_plan_has_a_render_for_each_scene_and_an_image_for_each_condition(planned: Plan) -> None:
+    (model,) = planned.renders.values()
+    assert list(planned.renders) == list(SMALL.scenes)
+    assert set(planned.images) == set(conditions(SMALL)) == set(planned.shares)
+    assert model.spp == 32
+    assert sum(model.width_nm) == pytest.approx(400.0)
+    assert {(row.condition, row.mosaic) for row in planned.ledgers} == {
+        (condition, mosaic) for condition in conditions(SMALL) for mosaic in ("rgbw", "bayer")
+    }
+    assert all(planned.shares[row.condition] >= row.share for row in planned.ledgers)
+
+
+def test_the_dark_hides_what_daylight_shows(planned: Plan) -> None:
+    dark, bright = (planned.images[condition] for condition in conditions(SMALL))
+    assert dark.veiling_glare == 0.0
+    assert bright.diffraction == SMALL.lens.diffraction
+    assert bright.horizontal_view_deg == pytest.approx(20.0)  # the scene's own camera
+    assert not bright.exact
+
+
+def test_effects_left_out_keep_within_their_share(planned: Plan) -> None:
+    room = SMALL.budget.total - SMALL.budget.monte_carlo
+    for row in planned.ledgers:
+        off_e = sum(term.rms_e for term in row.terms[2:] if not term.modelled)
+        assert off_e**2 <= room * row.noise_e**2
+
+
+def test_a_plan_is_always_the_same(planned: Plan, cache: Path) -> None:
+    assert plan(SMALL) == planned
+    assert plan(SMALL, cache=cache) == planned  # from the cache
+
+
+def test_a_level_added_leaves_the_others_terms_alone(planned: Plan, cache: Path) -> None:
+    more = plan(replace(SMALL, levels=("3cd/m2", *SMALL.levels)), cache=cache)
+    for row in planned.ledgers:
+        (same,) = [x for x in more.ledgers if (x.condition, x.mosaic) == (row.condition, row.mosaic)]
+        effects = {term.name: term.rms_e for term in row.terms if term.name in ("diffraction", "veiling glare")}
+        assert {term.name: term.rms_e for term in same.terms if term.name in effects} == pytest.approx(effects)
+
+
+def test_the_reference_leaves_nothing_out() -> None:
+    reference = reference_plan(replace(SMALL, spectra=("own", "sodium_low")))
+    (model,) = reference.renders.values()
+    assert model.spp == 4 * 32
+    assert len(model.width_nm) > 40
+    assert min(model.width_nm) < 2.0
+    for image in reference.images.values():
+        assert (image.diffraction, image.veiling_glare, image.exact) == (1.0, 0.01, True)
+        assert image.horizontal_view_deg == pytest.approx(20.0)
+
+
+def test_a_sensors_own_lens_goes_before_the_studys(tmp_path: Path) -> None:
+    own = tmp_path / "mine.toml"
+    text = planning.preset.__globals__["preset_file"]("low_noise").read_text()
+    own.write_text(text.replace("f_number = 2.8", "f_number = 2.8\ndiffraction = 2.0\nveiling_glare = 0.2"))
+    assert preset(str(own)).lens.diffraction == 2.0
+    reference = reference_plan(replace(SMALL, sensors=(str(own),)))
+    assert {(image.diffraction, image.veiling_glare) for image in reference.images.values()} == {(2.0, 0.2)}
+
+
+def test_a_picture_file_is_planned_in_its_own_bands(tmp_path: Path) -> None:
+    from render.radiance import SpectralRadiance
+    from render.radiance_files.exr import write_exr
+
+    values = np.random.default_rng(1).uniform(0.1, 1.0, (24, 24, 8)).astype(np.float32)
+    path = tmp_path / "scene.exr"
+    write_exr(path, SpectralRadiance(values, np.arange(405.0, 780.0, 50.0)))
+    found = plan(replace(SMALL, scenes=(SceneChoice(str(path)),)))
+    assert not found.renders
+    assert len(found.images) == 2
+    for row in found.ledgers:
+        assert {term.name: term.share for term in row.terms}["Monte Carlo"] == 0.0
+
+
+def test_the_command_prints_a_ledger_and_why(tmp_path: Path, cache: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    study = tmp_path / "study.toml"
+    study.write_text(FILE)
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", str(study), "--cache", str(cache)])
+    assert ended.value.code == 0
+    out = capsys.readouterr().out
+    for word in ("Monte Carlo", "diffraction", "veiling glare", "cos^4", "Budget: 10%", "samples a pixel"):
+        assert word in out
+    with pytest.raises(SystemExit):
+        main(["plan", str(study), "--cache", str(cache), "--json", "--set", "budget.total=0.2"])
+    found = json.loads(capsys.readouterr().out)
+    assert found["budget"]["total"] == 0.2
+    assert found["conditions"][0]["terms"][0]["name"] == "Monte Carlo"
+    assert found["renders"][0]["spp"] == 32
+    assert 0 < found["renders"][0]["cost_over_reference"] < 1
+
+
+def test_a_bad_key_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    study = tmp_path / "study.toml"
+    study.write_text(FILE)
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", str(study), "--set", "budget.totl=0.2"])
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_check_measures_what_was_predicted(planned: Plan, cache: Path) -> None:
+    check = check_plan(SMALL, planned, reference_plan(SMALL), cache=cache)
+    assert len(check.rows) == len(planned.ledgers)
+    assert check.covered == 1.0
+    assert 1.0 <= check.median_ratio <= 3.0
+    lines = list(reasons(SMALL, planned, reference_plan(SMALL)))
+    assert any("diffraction: modelled in" in line for line in lines)
+
+
+STUDIES = (
+    Study(
+        scenes=(SceneChoice("still_life"),),
+        levels=("0.036cd/m2", "2cd/m2", "25cd/m2", "5000cd/m2"),
+        exposures=("auto", "5ms"),
+        sensors=("low_noise", "table1_output"),
+        render=RenderLimits(size=32, spp=128),
+    ),
+    Study(
+        scenes=(SceneChoice("cornell_box"),),
+        levels=("0.1cd/m2", "100cd/m2"),
+        spectra=("own", "F11"),
+        sensors=("low_noise", "table1_pixel"),
+        render=RenderLimits(size=32, spp=128, seed=1),
+    ),
+    Study(
+        scenes=(SceneChoice("color_checker"),),
+        levels=("0.02cd/m2", "0.5cd/m2", "10cd/m2", "1000cd/m2"),
+        spectra=("own", "A"),
+        sensors=("low_noise", "table1_output"),
+        render=RenderLimits(size=48, spp=256, seed=2),
+    ),
+)
+
+
+def checked(study: Study, cache: Path) -> Check:
+    return check_plan(study, plan(study), reference_plan(study), cache=cache)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_predictions_cover_what_is_measured_in_three_studies(tmp_path: Path) -> None:
+    """Issue: in at least 95 % of the conditions, with a median of predicted over measured of at most 3."""
+    rows = [row for study in STUDIES for row in checked(study, tmp_path).rows]
+    for row in rows:
+        if row.predicted_e < row.measured_e:
+            of: Condition = row.ledger.condition
+            print(f"{of.scene.source} {of.spectrum} {of.level} {of.sensor} {row.ledger.mosaic}: {row.predicted_e:.3g}")
+            print(f"  predicted, {row.measured_e:.3g} measured")
+    covered = np.mean([row.predicted_e >= row.measured_e for row in rows])
+    ratio = np.median([row.predicted_e / row.measured_e for row in rows])
+    print(f"{len(rows)} conditions: {covered:.1%} covered, median of predicted over measured {ratio:.2f}")
+    assert len(rows) >= 60
+    assert covered >= 0.95
+    assert 1.0 <= ratio <= 3.0
+
+
+def test_the_plan_is_counted_as_cheaper_than_the_reference(planned: Plan) -> None:
+    reference = reference_plan(SMALL)
+    assert 0 < cost_over_reference(planned, reference, SMALL.scenes[0]) <= 0.3

@@ -1,0 +1,115 @@
+"""Rendering until the render's noise is small beside the sensor's: what is asked for, and when it stops."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import transport_of
+
+from render.engine import render
+from render.illuminants import illuminant
+from render.scene import LightGroup
+from scenes.catalog import load
+from sensor.noise import noise_variance
+from sensor.presets import low_noise, table1_output
+from studies.budget import quiet_render
+from studies.budget.budget import MOST_SHARE, OF_PIXELS, pixel_share
+from studies.budget.quiet_render import render_quietly
+
+NM, WIDTH_NM = np.arange(405.0, 780.0, 50.0), np.full(8, 50.0)
+LONGEST_S = 0.066
+
+
+def grey(relative_error, size=(8, 10), **changes):
+    """An even picture whose bands all have the same relative standard error."""
+    shape = (1, NM.size, *size)
+    made = transport_of(
+        np.full(shape, 0.5, np.float32),
+        {"sky": LightGroup(("sky",), illuminant("D65"), 100.0)},
+        NM,
+        WIDTH_NM,
+        variance=np.full(shape, (0.5 * relative_error) ** 2, np.float32),
+        spp=128,
+    )
+    return replace(made, **changes)
+
+
+@pytest.mark.parametrize("sensor", [low_noise(), low_noise("bayer"), table1_output()])
+def test_an_even_picture_has_the_share_of_its_fullest_pixels(sensor):
+    # Auto exposure brings an even grey to 80 % of the well in its brightest channel that doesn't saturate; a channel of
+    # n electrons has Monte Carlo variance (error n)^2, and the share grows with n.
+    share = pixel_share(grey(0.01), sensor, 1e5, LONGEST_S)
+    most = sensor.pixel.full_well_e
+    bound = (0.01 * most) ** 2 / noise_variance(np.array(most), sensor, 1e-3)
+    assert 0.2 * bound < share < bound
+    assert pixel_share(grey(0.02), sensor, 1e5, LONGEST_S) == pytest.approx(4 * share, rel=1e-4)
+
+
+def test_in_the_dark_read_noise_hides_the_render():
+    bright, dark = (pixel_share(grey(0.01), table1_output(), level, LONGEST_S) for level in (1e4, 1e-3))
+    assert dark < 1e-4 * bright
+
+
+def test_the_share_is_of_the_noisiest_pixels_but_a_twentieth():
+    variance = grey(0.01).variance.copy()
+    variance[:, :, :, 0] *= 1e4  # one column of 100, pooled with its neighbour
+    few = grey(0.01, size=(8, 100))
+    some = few.variance.copy()
+    some[:, :, :, 0] *= 1e4
+    assert pixel_share(replace(few, variance=some), low_noise(), 100.0, LONGEST_S) == pytest.approx(
+        pixel_share(few, low_noise(), 100.0, LONGEST_S), rel=1e-3
+    )
+    assert pixel_share(grey(0.01, variance=variance), low_noise(), 100.0, LONGEST_S) > 100 * pixel_share(
+        grey(0.01), low_noise(), 100.0, LONGEST_S
+    )
+    assert OF_PIXELS == 0.95
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """What is asked of the engine; each answer has the samples asked for."""
+    asked = []
+
+    def answer(scene, size, *, max_spp, max_seconds, resume, **options):
+        asked.append((max_spp, resume.spp if resume else None))
+        return grey(0.1, spp=max_spp, stopped_by="seconds" if max_spp > 5000 else "samples")
+
+    monkeypatch.setattr(quiet_render, "render", answer)
+    return asked
+
+
+def quietly(share_at_128, max_spp=100_000):
+    return render_quietly(None, (8, 10), lambda made: share_at_128 * 128 / made.spp, max_spp=max_spp, max_seconds=9.0)
+
+
+def test_a_quiet_render_is_left_as_it_is(calls):
+    assert quietly(0.9 * MOST_SHARE).spp == 128
+    assert calls == [(128, None)]
+
+
+def test_a_noisy_one_goes_on_for_as_many_samples_as_it_takes(calls):
+    made = quietly(2 * MOST_SHARE)
+    assert calls == [(128, None), (269, 128)]  # 128 x 2 x 1.05, rounded up
+    assert made.spp == 269
+
+
+def test_samples_grow_at_most_fourfold_from_look_to_look(calls):
+    assert quietly(20 * MOST_SHARE).spp == pytest.approx(20 * 128 * 1.05, abs=2)
+    assert [asked for asked, _ in calls] == [128, 512, 2048, 2688]
+
+
+def test_the_caps_stop_it(calls):
+    assert quietly(1e6, max_spp=100).spp == 100
+    assert quietly(1e6, max_spp=600).spp == 600
+    assert quietly(1e6).stopped_by == "seconds"
+
+
+def test_a_real_render_reaches_the_share_it_is_asked_for():
+    scene = load("cornell_box")
+    share = lambda made: pixel_share(made, table1_output(), 0.1, LONGEST_S)  # noqa: E731
+    bands = {"wavelength_nm": np.arange(405.0, 780.0, 50.0), "seed": 3}
+    made = render_quietly(scene, (8, 8), share, max_spp=1024, max_seconds=60.0, **bands)
+    assert share(made) <= MOST_SHARE
+    assert made.spp > 128
+    once = render(scene, (8, 8), max_spp=made.spp, **bands)
+    assert np.array_equal(once.radiance, made.radiance)

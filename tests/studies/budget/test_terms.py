@@ -1,0 +1,343 @@
+"""The budget's terms against closed forms: bands, lens, noise and level on hand-made light; ledger and choice."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from builders import transport_of
+
+from render.illuminants import illuminant
+from render.scene import LightGroup
+from render.spectrum import Spectrum, flat, line_spectrum
+from render.transport import Transport
+from rodcone.jit import backend
+from sensor.kernel.run import expected_electrons_single
+from sensor.noise import noise_variance
+from sensor.optics import camera_equation, falloff, form_image
+from sensor.presets import low_noise
+from sensor.response import electrons_per_irradiance, expected_electrons
+from studies.budget.bands import COUNTS, emission_lines_nm, fine_bands, groups_of, merge_radiance, merge_transport
+from studies.budget.choice import choose, image_ns, render_ns
+from studies.budget.ledger import (
+    EFFECT_MARGIN,
+    KERNEL,
+    LEVEL,
+    LIGHT,
+    MONTE_CARLO,
+    NOISE_MARGIN,
+    RESPONSE,
+    PilotNoise,
+    Weighed,
+    ledger,
+    weigh,
+)
+from studies.budget.terms import LENS_TERMS, Effects, effects, horizontal_view_deg, kernel_rms_e
+from studies.study.study import BudgetShares, Condition, SceneChoice
+
+NM, WIDTH_NM = np.arange(385.0, 780.0, 10.0), np.full(40, 10.0)
+SIZE = (24, 24)
+QUIET = PilotNoise(128, 16, 0.0)
+CONDITION = Condition(SceneChoice("still_life"), "own", "25cd/m2", "auto", "low_noise")
+
+
+def transport(planes, *, noise=0.0, spectrum=None, seed=0) -> Transport:
+    """One light's transport of radiance (band, h, w). With `noise` (standard error over value) bands are off alike."""
+    planes = np.asarray(planes, np.float32)
+    shape = planes.shape[1:]
+    drawn = np.random.default_rng(seed).normal(0.0, noise, (2, *shape))
+    return transport_of(
+        (planes * (1 + drawn[0]))[None].astype(np.float32),
+        {"light": LightGroup(("light",), spectrum or illuminant("D65"))},
+        NM,
+        WIDTH_NM,
+        half_difference=(planes * drawn[1])[None].astype(np.float32),
+        variance=((planes * noise) ** 2)[None].astype(np.float32),
+        spp=128,
+    )
+
+
+def even(value=0.5) -> np.ndarray:
+    return np.full((40, *SIZE), value)
+
+
+def halved(low=0.2, high=0.8) -> np.ndarray:
+    planes = even(low)
+    planes[:, :, SIZE[1] // 2 :] = high
+    return planes
+
+
+def found(made: Transport, counts=(40,), **lens) -> Effects:
+    sensor = low_noise()
+    groups = {count: groups_of(made.width_nm, count) for count in counts}
+    return effects(made, sensor, replace(sensor.lens, **lens), groups, np.random.default_rng(0))
+
+
+def rms(pair) -> float:
+    return float(np.sqrt((pair[0] * pair[1]).mean()))
+
+
+def test_smooth_lights_are_referred_to_bands_of_10_nm() -> None:
+    nm, width_nm = fine_bands([illuminant("D65"), illuminant("F11")])
+    assert np.array_equal(nm, NM)
+    assert np.allclose(width_nm, 10.0)
+
+
+def test_a_lamps_lines_get_bands_of_their_own_that_no_plan_merges() -> None:
+    assert np.allclose(emission_lines_nm(illuminant("sodium_low")), [588.995, 589.592])
+    nm, width_nm = fine_bands([illuminant("sodium_low")])
+    line = int(np.argmin(width_nm))
+    assert nm[line] == pytest.approx(589.29, abs=0.01)
+    for count in COUNTS:
+        groups = groups_of(width_nm, count)
+        assert [group.tolist() for group in groups if line in group] == [[line]]
+        assert np.array_equal(np.concatenate(groups), np.arange(width_nm.size))
+
+
+def test_neighbouring_lines_stay_apart() -> None:
+    lamp = line_spectrum([588.0, 589.0], [1.0, 1.0])
+    nm, width_nm = fine_bands([lamp])
+    lines = [int(np.argmin(np.abs(nm - line))) for line in (588.0, 589.0)]
+    assert lines[1] == lines[0] + 1
+    groups = groups_of(width_nm, 4)
+    assert [group.tolist() for group in groups if set(lines) & set(group.tolist())] == [[line] for line in lines]
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_wide_bands_are_as_many_as_asked_for_and_as_even_as_can_be(count: int) -> None:
+    sizes = [len(group) for group in groups_of(WIDTH_NM, count)]
+    assert len(sizes) == count
+    assert sum(sizes) == 40
+    assert max(sizes) - min(sizes) <= 1
+
+
+def test_merged_bands_hold_means_weighted_by_width() -> None:
+    made = transport(np.arange(40.0)[:, None, None] * np.ones((1, 4, 4)))
+    made = replace(made, width_nm=np.r_[5.0, np.full(39, 10.0)], wavelength_nm=np.r_[387.5, NM[1:]])
+    merged = merge_transport(made, groups_of(made.width_nm, 20))
+    assert merged.radiance[0, 0, 0, 0] == pytest.approx((0 * 5 + 1 * 10) / 15)
+    assert merged.radiance[0, 1, 0, 0] == pytest.approx(2.5)
+    assert (merged.wavelength_nm[0], merged.width_nm[0]) == (392.5, 15.0)
+    radiance = merge_radiance(made.relight(), groups_of(made.width_nm, 20))
+    values = made.relight().values[0, 0]
+    assert radiance.values[0, 0, 0] == pytest.approx((values[0] * 5 + values[1] * 10) / 15, rel=1e-6)
+
+
+def test_light_within_bands_is_the_covariance_of_light_and_scene() -> None:
+    """A ramp in the transport under a ramp of light: two bands of one are off by a quarter of both steps' product."""
+    light = Spectrum(np.array([300.0, 1100.0]), np.array([0.0, 8.0]))  # rises 0.1 from band to band
+    step_light, step_scene = 0.1, 0.02
+    ramp = (0.1 + step_scene * np.arange(40.0))[:, None, None] * np.ones((1, *SIZE))
+    made = transport(ramp, spectrum=light)
+    missed = rms(found(made, counts=(20,)).bands[20].light)
+    sensor = low_noise()
+    groups = groups_of(WIDTH_NM, 20)
+    wide = merge_transport(made, groups)
+    weights = electrons_per_irradiance(sensor, wide.wavelength_nm, wide.width_nm, 1.0) * camera_equation(sensor.lens)
+    averaged = merge_radiance(made.relight(luminance_cd_m2=1.0), groups)
+    scale = 1 / made.relight().luminance().mean()
+    told = averaged.luminance().mean()
+    # product of means less mean of products, then brought to the level as wide bands tell it
+    product = averaged.values[0, 0] / scale - step_light * step_scene / 4
+    level = product * (1 / merge_transport(made, groups).relight().luminance().mean())
+    expected = np.sqrt(np.mean((weights @ (level - averaged.values[0, 0] / told)) ** 2))
+    assert missed == pytest.approx(expected, rel=2e-3)
+    assert expected > 0
+
+
+def test_a_scene_without_colour_has_no_light_term_in_any_light() -> None:
+    some = found(transport(even(), spectrum=illuminant("F11")), counts=COUNTS)
+    for count in COUNTS:
+        assert rms(some.bands[count].light) < 1e-6 * some.full.mean()
+    errors = [rms(some.bands[count].response) for count in (4, 8, 20, 40)]
+    assert errors[0] > errors[2] > 1e3 * errors[3]
+
+
+def test_the_finest_bands_have_no_error_and_no_jitter() -> None:
+    some = found(transport(halved() * np.linspace(0.5, 1.5, 40)[:, None, None]))
+    finest = some.bands[40]
+    assert rms(finest.response) + rms(finest.light) < 1e-7 * some.full.mean()  # rounding of single precision
+    assert not finest.jitter.any()
+
+
+def test_jitter_is_the_variance_over_the_places_within_a_band() -> None:
+    steps = np.where(np.arange(40) % 2, 0.7, 0.3)[:, None, None] * np.ones((1, *SIZE))
+    made = transport(steps, spectrum=flat())
+    some = found(made, counts=(20,))
+    sensor = low_noise()
+    halves = []
+    for first in (0.3, 0.7):  # every wide band at its first place, or at its second
+        radiance = made.relight(luminance_cd_m2=1.0)
+        scale = radiance.values[0, 0, 0] / 0.3
+        image = form_image(replace(radiance, values=np.full_like(radiance.values, first * scale)), sensor)
+        halves.append(expected_electrons(image, sensor, 1.0))
+    assert np.allclose(some.bands[20].jitter, (halves[1] - halves[0]) ** 2 / 4, rtol=1e-4)
+
+
+def test_glare_costs_its_share_of_the_distance_from_the_mean() -> None:
+    glare = 0.03
+    some = found(transport(halved()), veiling_glare=glare)
+    plain = found(transport(halved())).full[0]
+    sensor = low_noise()
+    image = form_image(transport(halved()).relight(luminance_cd_m2=1.0), sensor)
+    everywhere = replace(image, values=np.broadcast_to(image.values.mean(axis=(0, 1)), image.values.shape).copy())
+    mean = expected_electrons(everywhere, sensor, 1.0)
+    assert list(some.lens) == ["veiling glare"]
+    assert np.allclose(some.lens["veiling glare"][0], glare * (plain - mean), rtol=1e-3, atol=1e-3)
+
+
+def test_falloff_costs_what_is_lost_off_the_axis() -> None:
+    some = found(transport(even()), horizontal_view_deg=40.0)
+    plain = found(transport(even())).full[0]
+    lens = replace(low_noise().lens, horizontal_view_deg=40.0)
+    assert np.allclose(some.lens["cos^4"][0], plain * (1 - falloff(lens, SIZE)), rtol=1e-5, atol=1e-5 * plain.max())
+
+
+def test_an_effects_rms_is_free_of_monte_carlo_noise() -> None:
+    """An even picture with 5 % noise: diffraction changes nothing but the noise; 0 within 5 standard errors."""
+    some = found(transport(even(), noise=0.05, seed=1), diffraction=1.0)
+    product = some.lens["diffraction"][0] * some.lens["diffraction"][1]
+    one = some.lens["diffraction"][0].std() ** 2
+    assert abs(product.mean()) < 5 * product.std() / np.sqrt(product.size)
+    assert one > 5 * abs(product.mean())
+
+
+def test_a_ledger_counts_no_noise_as_an_effect() -> None:
+    """The same picture: the margin of two standard errors is all that is left, a third of the noise blurred away."""
+    some = found(transport(even(), noise=0.05, seed=1), diffraction=1.0)
+    row = weigh(CONDITION, "rgbw", low_noise(), some, 1.0, 1e-3, QUIET)
+    assert row.lens["diffraction"] < 0.5 * 1e-3 * some.lens["diffraction"][0].std()
+
+
+def test_monte_carlo_draws_have_the_passes_scatter() -> None:
+    """Draws are plus or minus one standard error, so that a plain lens shows exactly that; diffraction evens it out."""
+    some = found(transport(even(), noise=0.05), diffraction=1.0)
+    signal = found(transport(even())).full.mean(axis=0)
+    assert np.allclose(np.abs(some.sharp), 0.05 * signal, rtol=0.02)
+    assert (some.blurred**2).mean() < 0.7 * (some.sharp**2).mean()
+
+
+@pytest.mark.parametrize(
+    ("camera", "size", "degrees"),
+    [
+        ({"fov": 40.0}, (100, 200), 40.0),
+        ({"fov": 40.0, "fov_axis": "x"}, (200, 100), 40.0),
+        ({"fov": 40.0, "fov_axis": "smaller"}, (200, 100), 40.0),
+        ({"fov": 90.0, "fov_axis": "smaller"}, (100, 200), 126.8699),  # tan is twice 1
+        ({"fov": 90.0, "fov_axis": "y"}, (200, 100), 53.1301),
+        ({"fov": 90.0, "fov_axis": "larger"}, (200, 100), 53.1301),
+        ({"fov": 90.0, "fov_axis": "diagonal"}, (300, 400), 77.3196),  # tan is 4/5
+        ({"focal_length": "50mm"}, (100, 100), 0.0),
+    ],
+)
+def test_the_view_of_a_camera_is_across_the_picture(camera, size, degrees) -> None:
+    assert horizontal_view_deg(camera, size) == pytest.approx(degrees, abs=1e-4)
+
+
+@pytest.mark.skipif(backend() == "numpy", reason="needs LLVM or CUDA for the fast readout")
+def test_the_kernels_bound_holds_what_single_precision_is_off() -> None:
+    made = transport(np.random.default_rng(2).uniform(0.1, 1.0, (40, 64, 64)))
+    sensor = low_noise()
+    image = form_image(made.relight(luminance_cd_m2=5000.0), sensor)
+    weights = electrons_per_irradiance(sensor, NM, WIDTH_NM, 1e-3)
+    exact = expected_electrons(replace(image, values=image.values.astype(np.float64)), sensor, 1e-3)
+    off = np.abs(expected_electrons_single(image.values, weights, sensor) - exact)
+    bound = kernel_rms_e(exact, 40)
+    rounding = bound - kernel_rms_e(exact, -2)  # without the part of the draws
+    assert (off <= rounding).all()
+    assert off.max() > 1e-3 * rounding.max()
+
+
+def test_terms_grow_with_light_and_time_and_noise_falls_with_samples() -> None:
+    sensor = low_noise()
+    some = found(transport(halved(), noise=0.02), counts=(20, 40), veiling_glare=0.01)
+    once = weigh(CONDITION, "rgbw", sensor, some, 2.0, 0.01, QUIET)
+    more = weigh(CONDITION, "rgbw", sensor, some, 6.0, 0.01, QUIET)
+    assert more.lens["veiling glare"] == pytest.approx(3 * once.lens["veiling glare"])
+    assert more.bands[20][0] == pytest.approx(3 * once.bands[20][0])
+    assert more.sharp == pytest.approx(9 * once.sharp)
+    assert once.monte_carlo(40, 256, frozenset()) == pytest.approx(once.monte_carlo(40, 64, frozenset()) / 4)
+    signal = 2.0 * 0.01 * some.full.mean(axis=0)
+    assert once.noise_variance == pytest.approx(noise_variance(signal, sensor, 0.01).mean())
+    # noise of one sample a pixel is the pilot's times its samples; the margin is that of the mean over pixels
+    square = (0.02 * signal) ** 2 * 128
+    assert square.mean() < once.sharp < square.mean() + 1.2 * NOISE_MARGIN * square.std() / square.size**0.5
+
+
+def test_saturated_pixels_are_left_out() -> None:
+    sensor = low_noise()
+    some = found(transport(halved(0.01, 1.0)), veiling_glare=0.01)
+    bright = weigh(CONDITION, "rgbw", sensor, some, 500.0, 0.01, QUIET)
+    below = 5.0 * some.full[0] < sensor.pixel.full_well_e
+    assert 0.1 < below.mean() < 0.9
+    square = (5.0 * some.lens["veiling glare"][0][below]) ** 2
+    margin = EFFECT_MARGIN * square.std() / np.sqrt(square.size)
+    assert bright.lens["veiling glare"] ** 2 == pytest.approx(square.mean() + margin, rel=1e-6)
+    all_full = weigh(CONDITION, "rgbw", sensor, some, 1e9, 0.01, QUIET)
+    assert ledger(all_full, 40, 128, frozenset(LENS_TERMS)).share == 0.0
+
+
+def weighed(condition=CONDITION, mosaic="rgbw", noise_variance=100.0, paths=10.0, **lens) -> Weighed:
+    """Errors in electrons beside 10 e- of noise; bands miss 4, 1.5, 0.5 and 0 e-."""
+    bands = {4: (3.0, 1.0), 12: (1.0, 0.5), 20: (0.4, 0.1), 40: (0.0, 0.0)}
+    errors = {"diffraction": 5.0, "veiling glare": 1.0, "cos^4": 0.5} | lens
+    jitter = dict.fromkeys(bands, 0.0)
+    return Weighed(condition, mosaic, 0.01, noise_variance, 2 * paths, paths, jitter, 0.0, bands, errors, kernel=1e-3)
+
+
+def test_ledger_adds_effects_by_minkowski_and_noise_in_square() -> None:
+    row = ledger(replace(weighed(), level=64.0), 12, 64, frozenset({"veiling glare", KERNEL}))
+    rms_e = {term.name: term.rms_e for term in row.terms}
+    assert rms_e[MONTE_CARLO] ** 2 == pytest.approx(20.0 / 64)  # diffraction is modelled: the blurred noise
+    assert rms_e[LEVEL] ** 2 == pytest.approx(64.0 / 64)
+    assert (rms_e[RESPONSE], rms_e[LIGHT]) == (1.0, 0.5)
+    assert [term.name for term in row.terms if term.modelled] == ["diffraction", "cos^4"]
+    assert row.rms_e**2 == pytest.approx(20.0 / 64 + 1.0 + (1.0 + 0.5 + 1.0 + 1e-3) ** 2)
+    assert row.share == pytest.approx(row.rms_e**2 / 100.0)
+    sharp = ledger(weighed(), 12, 64, frozenset({"diffraction"}))
+    assert sharp.terms[0].rms_e ** 2 == pytest.approx(10.0 / 64)
+
+
+SIZES = {4: 4, 12: 12, 20: 20, 40: 40}
+
+
+def test_choice_is_the_cheapest_of_all_that_fit() -> None:
+    """Every model is tried by hand: 7 % of 100 e-^2 leave sqrt(7) e- for effects."""
+    other = replace(CONDITION, level="1cd/m2")
+    rows = [weighed(), weighed(mosaic="bayer", **{"veiling glare": 0.2}), weighed(other, noise_variance=1e6)]
+    choice = choose(rows, SIZES, BudgetShares(), 512)
+    names = (*LENS_TERMS, KERNEL)
+    subsets = [frozenset(some) for n in range(5) for some in combinations(names, n)]
+    costs = {}
+    for count in SIZES:
+        for first in subsets:
+            for second in subsets:
+                chosen = {CONDITION: first, other: second}
+                fits = all(
+                    (sum(r.bands[count]) + sum({**r.lens, KERNEL: r.kernel}[n] for n in chosen[r.condition])) ** 2
+                    <= 0.07 * r.noise_variance
+                    for r in rows
+                )
+                if fits:
+                    images = sum(image_ns(count, set(names) - out) for out in chosen.values())
+                    costs[count, first, second] = images + render_ns(count, 128)
+    best = min(costs.values())
+    assert costs[choice.count, choice.left_out[CONDITION], choice.left_out[other]] == best
+    assert choice.count == 12
+    assert choice.left_out[other] == frozenset(names)
+    assert "diffraction" not in choice.left_out[CONDITION]
+
+
+def test_a_tiny_budget_models_everything_and_a_huge_one_nothing() -> None:
+    tiny = choose([weighed()], SIZES, BudgetShares(1e-9, 1e-10), 512)
+    assert (tiny.count, tiny.left_out[CONDITION]) == (40, frozenset())
+    huge = choose([weighed()], SIZES, BudgetShares(100.0, 1.0), 512)
+    assert (huge.count, huge.left_out[CONDITION]) == (4, frozenset((*LENS_TERMS, KERNEL)))
+
+
+def test_samples_are_those_that_monte_carlos_share_asks_for_up_to_the_studys() -> None:
+    rows = [weighed(paths=600.0)]  # blurred 1200 e-^2 a sample against 3 e-^2
+    assert choose(rows, SIZES, BudgetShares(), 512).spp == 400
+    capped = choose(rows, SIZES, BudgetShares(), 256)
+    assert (capped.spp, capped.wanted_spp) == (256, 400)
+    assert choose([weighed(paths=1.0)], SIZES, BudgetShares(), 512).spp == 128

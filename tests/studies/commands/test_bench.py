@@ -1,0 +1,163 @@
+"""Speed against error: the front, what is measured, and the page."""
+
+import json
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rodcone.errors import InputError
+from studies.commands.cli import main
+from studies.pages.speed_page import bench_page, plane
+from studies.speed.points import Point, Stage, Times, front, stage_json, timed
+from studies.speed.setup import Bench, checked, more
+from studies.speed.stages import STAGES, stages
+
+TINY = Bench(
+    scene="flat_field", size=16, picture=32, bands=(4, 40), samples=(32, 64), neighbourhoods=(5, 7), patches=(1, 3)
+)
+
+
+def point(seconds: float, error_e: float, name: str = "x") -> Point:
+    return Point(name, Times(seconds, seconds, 2 * seconds), error_e)
+
+
+def stage(*points: Point) -> Stage:
+    return Stage("bands", "How many?", "the last", 10.0, points, points[-1].times)
+
+
+def test_the_front_holds_what_no_other_beats() -> None:
+    points = (point(1, 9, "a"), point(2, 4, "b"), point(2, 5, "c"), point(3, 4, "d"), point(4, 0, "e"))
+    assert [each.choice for each in front(points)] == ["a", "b", "e"]
+
+
+@given(st.lists(st.tuples(st.integers(1, 6), st.integers(0, 6)), min_size=1, max_size=12))
+def test_the_front_is_the_set_of_undominated_choices(pairs: list[tuple[int, int]]) -> None:
+    best = {(each.times.seconds, each.error_e) for each in front([point(*pair) for pair in pairs])}
+    undominated = {
+        one for one in pairs if not any(other != one and other[0] <= one[0] and other[1] <= one[1] for other in pairs)
+    }
+    assert best == undominated
+
+
+def test_calls_take_turns_the_first_does_not_count_and_the_median_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, calls = [0.0], []
+    monkeypatch.setattr("studies.speed.points.time.perf_counter", lambda: clock[0])
+    monkeypatch.setattr("studies.speed.points.time.process_time", lambda: 10 * clock[0])
+
+    def call(name: str, *seconds: float) -> int:
+        clock[0] += seconds[calls.count(name)]
+        calls.append(name)
+        return len(calls)
+
+    made = timed({"a": lambda: call("a", 9.0, 1.0, 5.0, 2.0), "b": lambda: call("b", 8.0, 3.0, 3.0, 4.0)}, 3)
+    assert calls == ["a", "b"] * 4
+    assert made == {"a": (7, Times(9.0, 2.0, 20.0)), "b": (8, Times(8.0, 3.0, 30.0))}
+    assert timed({"once": lambda: call("c", 6.0)}, 0) == {"once": (9, Times(6.0, 6.0, 60.0))}
+
+
+def test_ratios_stand_beside_seconds() -> None:
+    made = stage_json(stage(point(1.0, 5.0), point(4.0, 0.0)))
+    assert [each["time_over_reference"] for each in made["points"]] == [0.25, 1.0]
+    assert [each["share_of_noise_variance"] for each in made["points"]] == [0.25, 0.0]
+    assert all(each["on_front"] for each in made["points"])
+
+
+def test_a_chart_places_choices_by_their_logarithms() -> None:
+    drawn = plane(stage_json(stage(point(0.1, 1.0, "a"), point(1.0, 10.0, "b"), point(10.0, 100.0, "c"))))
+    marks = [place.mark for place in drawn.places]
+    assert [mark.x for mark in marks] == [drawn.left, (drawn.left + drawn.right) / 2, drawn.right]
+    assert [mark.y for mark in marks] == [drawn.bottom, (drawn.bottom + drawn.top) / 2, drawn.top]
+    assert [place.on_front for place in drawn.places] == [True, False, False]
+    assert drawn.noise is not None
+    assert drawn.noise.at == marks[1].y
+
+
+def test_the_default_is_a_part_of_what_full_measures() -> None:
+    full = more(Bench())
+    assert set(Bench().bands) < set(full.bands)
+    assert set(Bench().samples) < set(full.samples)
+    assert full.repeats > Bench().repeats
+
+
+@pytest.mark.parametrize("wrong", [{"scene": "still_live"}, {"sensor": "lownoise"}])
+def test_bad_input_is_refused_before_anything_is_measured(wrong: dict[str, str]) -> None:
+    with pytest.raises(InputError):
+        checked(replace(TINY, **wrong))
+
+
+@pytest.fixture(scope="module")
+def measured() -> list[Stage]:
+    return list(stages(TINY))
+
+
+def test_every_stage_is_measured(measured: list[Stage]) -> None:
+    assert len(measured) == STAGES
+    for made in measured:
+        assert made.reference_times.seconds > 0
+        assert made.noise_e > 0
+        assert all(each.times.seconds > 0 and np.isfinite(each.error_e) for each in made.points)
+    by_name = {made.name: made for made in measured}
+    assert by_name["bands"].points[-1].error_e == 0.0
+    # An even field: more light modelled is nearer to the whole lens, and diffraction changes nothing in it.
+    plain, falloff, glare, whole = (each.error_e for each in by_name["lens"].points)
+    assert plain > falloff > glare > whole == 0.0
+    assert by_name["reconstruction's precision"].points[0].error_e < 0.1
+
+
+class Page(HTMLParser):
+    """Elements, and everything that would be fetched."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.fetched: list[str] = []
+        self.policy = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        found = dict(attrs)
+        if found.get("http-equiv") == "Content-Security-Policy":
+            self.policy = found["content"] or ""
+        self.fetched += [v for k, v in attrs if k in ("src", "href") and v and not v.startswith(("data:", "#"))]
+
+
+def test_the_page_fetches_nothing_runs_nothing_and_escapes_everything(measured: list[Stage]) -> None:
+    results = {
+        "rodcone": "0.1.0",
+        "settings": {"scene": "<script>alert(1)</script>", "sensor": "low_noise"},
+        "machine": {"processor": "P", "cores": 2},
+        "environment": {"python": "3"},
+        "stages": [stage_json(made) for made in measured],
+    }
+    page = Page()
+    page.feed(bench_page(results))
+    assert "script" not in page.tags
+    assert page.fetched == []
+    assert "default-src 'none'" in page.policy
+    assert "script-src" not in page.policy
+    assert page.tags.count("table") == STAGES
+    assert page.tags.count("svg") >= STAGES - 1
+
+
+def test_the_command_writes_page_and_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, measured: list[Stage]
+) -> None:
+    monkeypatch.setattr("studies.speed.stages.stages", lambda task: iter(measured))
+    with pytest.raises(SystemExit) as ended:
+        main(["bench", "-o", str(tmp_path / "new"), "--scene", "flat_field"])
+    assert ended.value.code == 0
+    out = capsys.readouterr().out
+    assert all(word in out for word in ("processor:", "cores:", "drjit:", "ratio", "*40 bands"))
+    written = json.loads((tmp_path / "new" / "bench.json").read_text())
+    assert len(written["stages"]) == STAGES
+    assert written["machine"]["cores"] >= 1
+    assert (tmp_path / "new" / "bench.html").read_text().lstrip().lower().startswith("<!doctype html>")
+    with pytest.raises(SystemExit) as ended:
+        main(["bench", "-o", str(tmp_path / "other"), "--level", "500lux"])
+    assert ended.value.code == 2
+    assert not (tmp_path / "other").exists()

@@ -1,0 +1,492 @@
+"""`rodcone capture` and `rodcone develop`: files, exit codes, and grey walls whose picture is known on paper."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+from PIL import Image
+
+from isp.colour.camera_colour import encode_srgb
+from isp.colour.encoding import encode
+from render.illuminants import illuminant
+from render.photometry import luminance
+from render.radiance import SpectralRadiance
+from render.radiance_files.exr import write_exr
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from sensor.cfa import BAYER, RGBW, mask
+from sensor.left_out import left_out
+from sensor.optics import form_image
+from sensor.presets import preset
+from sensor.raw import RawImage
+from sensor.raw_files.raw_file import read_raw, write_raw
+from sensor.response import expected_electrons
+from studies.commands.cli import main
+from studies.photograph.calibrate import calibrate, iso_speed
+
+NM = DEFAULT_WAVELENGTH_NM
+WIDTH = band_widths(NM)
+SHAPE = (48, 64)
+
+
+def call(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    captured = capsys.readouterr()
+    return int(stopped.value.code or 0), captured.out, captured.err
+
+
+def wall(light: str = "D65") -> SpectralRadiance:
+    """A grey wall of 25 cd/m^2."""
+    spectrum = illuminant(light).band_average(NM, WIDTH)
+    spectrum *= 25.0 / luminance(spectrum, NM, WIDTH)
+    return SpectralRadiance(np.broadcast_to(spectrum, (*SHAPE, NM.size)).astype(np.float32), NM, 0.0, WIDTH)
+
+
+@pytest.fixture
+def exr(tmp_path: Path) -> Path:
+    path = tmp_path / "wall.exr"
+    write_exr(path, wall())
+    return path
+
+
+def test_a_scene_becomes_two_negatives_whose_paths_alone_are_printed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    arguments = ["capture", "flat_field", "--size", "32", "--spp", "4", "--level", "25cd/m2", "--exposure-s", "0.01"]
+    out = tmp_path / "new" / "shot.dng"
+    code, printed, _ = call([*arguments, "--sensor", "low_noise", "--cfa", "rgbw", "-o", str(out)], capsys)
+    beside = out.with_name("shot_bayer.dng")
+    assert (code, printed) == (0, f"{out}\n{beside}\n")
+    assert sorted(out.parent.iterdir()) == [out, beside]
+    raw, bayer = read_raw(out), read_raw(beside)
+    assert (raw.cfa, bayer.cfa, raw.shape, bayer.shape) == (RGBW, BAYER, (32, 32), (32, 32))
+    assert (raw.exposure_s, raw.camera, raw.f_number) == (0.01, "low_noise", 2.8)
+    kept = mask(RGBW, "R", (32, 32)) | mask(RGBW, "G", (32, 32))
+    np.testing.assert_array_equal(raw.dn[kept], bayer.dn[kept])
+
+
+@pytest.mark.parametrize(
+    ("more", "name", "written"),
+    [
+        (["--cfa", "bayer_grbg"], "shot.dng", ["shot.dng"]),
+        (["--cfa", "rgbw"], "shot.tif", ["shot.json", "shot.tif"]),
+        (["--cfa", "rgbw_4x4"], "shot.tiff", ["shot.json", "shot.tiff"]),
+    ],
+)
+def test_a_stored_radiance_becomes_what_its_name_says(
+    more: list[str], name: str, written: list[str], exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "o" / name
+    code, printed, err = call(["capture", str(exr), "-o", str(out), "--exposure-s", "0.02", *more], capsys)
+    assert (code, sorted(path.name for path in out.parent.iterdir())) == (0, written)
+    assert sorted(printed.split()) == [str(out.parent / file) for file in written]
+    assert err == "rodcone: wall.exr: its colours are judged under D65; give another light where that isn't so\n"
+    assert read_raw(out).shape == SHAPE
+
+
+def test_the_signal_is_that_of_the_level_and_exposure_asked_for(
+    exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    sensor = preset("low_noise", "bayer")
+    out = str(tmp_path / "shot.dng")
+    for level, exposure_s, factor in ((None, 0.02, 1.0), ("50cd/m2", 0.02, 2.0), ("50cd/m2", 0.005, 0.5)):
+        more = [] if level is None else ["--level", level]
+        arguments = ["capture", str(exr), "--cfa", "bayer", "--exposure-s", str(exposure_s), "-o", out, "--json", *more]
+        code, printed, _ = call(arguments, capsys)
+        facts = json.loads(printed)
+        assert (code, facts["paths"], facts["exposure_s"]) == (0, [out], exposure_s)
+        assert facts["left_out"] == list(left_out(sensor))
+        assert facts["luminance_cd_m2"] == pytest.approx(25.0 if level is None else 50.0, rel=1e-6)
+        expected = expected_electrons(form_image(wall(), sensor), sensor, 0.02) * factor
+        # mean over 3072 pixels: shot noise, PRNU and the dark; five standard errors
+        sigma = np.sqrt((expected + (0.01 * expected) ** 2 + 4).mean() / expected.size)
+        assert abs((read_raw(out).electrons - expected).mean()) < 5 * sigma
+
+
+@pytest.mark.parametrize(("columns", "told"), [(31, False), (33, True), (64, True)])
+def test_a_frame_more_than_half_saturated_is_told(
+    columns: int, told: bool, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    values = wall().values.copy()
+    values[:, :columns] *= 1e4
+    write_exr(tmp_path / "lit.exr", SpectralRadiance(values, NM, 0.0, WIDTH))
+    arguments = ["capture", str(tmp_path / "lit.exr"), "-o", str(tmp_path / "shot.dng"), "--exposure-s", "0.01"]
+    code, _, err = call(arguments, capsys)
+    words = (
+        f"rodcone: {columns / 64:.0%} of the pixels are saturated at 0.01 s; give a shorter --exposure-s (seconds: "
+        "20 ms is 0.02), or leave it out\n"
+    )
+    assert (code, words in err, "saturated" in err) == (0, told, told)
+
+
+def cut(path: Path, first_nm: float, last_nm: float) -> Path:
+    """A wall of whose bands those between two wavelengths alone are kept."""
+    kept = (first_nm < NM) & (last_nm > NM)
+    write_exr(path, SpectralRadiance(wall().values[..., kept], NM[kept], 0.0, WIDTH[kept]))
+    return path
+
+
+@pytest.mark.filterwarnings("default:radiance")
+def test_a_cube_that_ends_inside_the_window_is_photographed_with_a_warning(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "shot.dng"
+    code, printed, err = call(["capture", str(cut(tmp_path / "cut.exr", 380, 650)), "-o", str(out)], capsys)
+    assert (code, printed.split()[0], err.count("radiance: its bands, 380 to 650 nm, don't fill")) == (0, str(out), 1)
+    assert "they leave out 5.6% of R, 0.0% of G, 0.0% of B, 41.3% of W; give those bands, or narrow" in err
+
+
+def test_a_cube_that_lacks_more_than_half_of_a_channel_is_not_photographed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "shot.dng"
+    code, printed, err = call(["capture", str(cut(tmp_path / "cut.exr", 380, 550)), "-o", str(out)], capsys)
+    assert (code, printed, out.exists()) == (2, "", False)
+    assert "% of R, " in err
+    assert "allowed: half; give those bands, or narrow the camera's window_nm" in err.splitlines()[-1]
+
+
+@pytest.mark.filterwarnings("default:radiance")
+def test_a_sweep_of_such_a_cube_tells_and_refuses_alike(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    study = 'scenes = [{ source = "cut.exr", light = "D65" }]\nlevels = ["25cd/m2"]\nprocessors = ["bayer"]\n'
+    (tmp_path / "study.toml").write_text(study, "utf-8")
+    arguments = ["sweep", str(tmp_path / "study.toml"), "--workers", "1", "--as-stated", "-o"]
+    cut(tmp_path / "cut.exr", 450, 780)
+    code, _, err = call([*arguments, str(tmp_path / "out")], capsys)
+    # once for the processor's mosaic, and once for the preset's own, whose auto exposure it is
+    assert (code, err.count("radiance: its bands, 450 to 780 nm, don't fill")) == (0, 2)
+    cut(tmp_path / "cut.exr", 540, 780)
+    code, _, err = call([*arguments, str(tmp_path / "other")], capsys)
+    assert (code, "allowed: half; give those bands" in err.splitlines()[-1]) == (2, True)
+
+
+def test_seeds_draw_another_chip_and_another_exposure(
+    exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    paths = [tmp_path / name for name in ("one.dng", "again.dng", "other.dng")]
+    for seed, path in zip(("1", "1", "2"), paths, strict=True):
+        call(["capture", str(exr), "--seed", seed, "-o", str(path), "--exposure-s", "0.01"], capsys)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+    assert (read_raw(paths[0]).dn != read_raw(paths[2]).dn).mean() > 0.8
+
+
+def test_another_seed_is_another_chip(exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    frames = []
+    for seed in ("1", "2"):
+        arguments = ["--seed", seed, "-o", str(tmp_path / "shot.tif"), "--exposure-s", "0", "--sensor", "table1_pixel"]
+        call(["capture", str(exr), *arguments], capsys)
+        frames.append(read_raw(tmp_path / "shot.tif").electrons.ravel())
+    # In the dark DSNU makes 0.63 of the variance: so much would one chip's frames correlate. Five standard errors of 0.
+    assert abs(np.corrcoef(frames)[0, 1]) < 5 / np.sqrt(frames[0].size)
+
+
+def test_the_file_carries_the_calibration_for_the_white_balance_asked_for(
+    exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    sensor = preset("low_noise", "bayer")
+    for more, light in (([], "D65"), (["--white-balance", "A"], "A")):
+        call(["capture", str(exr), "--cfa", "bayer", "-o", str(tmp_path / "shot.dng"), *more], capsys)
+        raw = read_raw(tmp_path / "shot.dng")
+        assert raw.colour is not None
+        np.testing.assert_array_equal(raw.colour.neutral, calibrate(sensor, illuminant(light)).neutral)
+        assert raw.iso == iso_speed(sensor)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["color_cheker"], ["scene", "color_cheker", "did you mean 'color_checker'"]),
+        (["flat_field", "--sensor", "lownoise"], ["sensor preset", "did you mean 'low_noise'"]),
+        (["flat_field", "--cfa", "bayr"], ["rodcone: cfa: 'bayr' is unknown", "did you mean 'bayer'"]),
+        (["flat_field", "--trust-scene"], ["'flat_field' is no .xml scene"]),
+        (["scene.exr", "--trust-scene"], ["'scene.exr' is no .xml scene"]),
+        (["scene.exr", "--extend", "hold"], ["'scene.exr' is a picture", "leave --extend out"]),
+        (["flat_field", "--extend", "zero"], ["extend: 'zero' is unknown; allowed: hold"]),
+        (["none.xml"], ["'none.xml' is missing"]),
+        (["flat_field", "--cfa", "rccc"], ["can't hold the mosaic", "shot.tif"]),
+        (["flat_field", "--cfa", "rccc", "-o", "o/shot.tif"], ["has no G", "give exposure_s"]),
+        (["flat_field", "-o", "o/shot.cr2"], ["another ending", ".dng, .tif, .tiff"]),
+        (["flat_field", "--level", "25nits"], ["unit", "'nits'", "cd/m2, lux"]),
+        (["flat_field", "--exposure-s", "-1"], ["exposure_s", "-1", "give seconds"]),
+        (["flat_field", "--exposure-s", "nan"], ["exposure_s", "nan", "give seconds"]),
+        (["flat_field", "--size", "1"], ["doesn't fit the tile"]),
+        (["flat_field", "--size", "0"], ["size", "0"]),
+        (["flat_field", "--spp", "0"], ["spp", "0"]),
+        (["flat_field", "--seed", "-1"], ["seed", "-1"]),
+        (["flat_field", "--white-balance", "D66"], ["illuminant", "'D66'", "D65"]),
+        (["missing.exr"], ["missing.exr"]),
+        (["flat_field", "--bogus", "3"], ["--bogus"]),
+    ],
+)
+def test_bad_input_is_one_line_exit_code_2_and_no_file(
+    arguments: list[str],
+    words: list[str],
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = call(["capture", *arguments], capsys)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    for word in words:
+        assert word in err
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+SCENE = """<scene version="3.0.0">
+<sensor type="perspective"><float name="fov" value="20"/>
+  <transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="24"/></film></sensor>
+<shape type="rectangle" id="wall"><bsdf type="diffuse"><spectrum name="reflectance" value="0.5"/></bsdf></shape>
+<emitter type="directional" id="sun"><vector name="direction" x="0" y="0" z="-1"/>{}</emitter>
+</scene>"""
+
+
+def test_a_users_scene_is_photographed_as_large_as_its_film_says(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    scene, out = tmp_path / "room.xml", tmp_path / "shot.dng"
+    scene.write_text(SCENE.format('<spectrum name="irradiance" value="2"/>'))
+    arguments = ["capture", str(scene), "-o", str(out), "--cfa", "bayer", "--spp", "1"]
+    for more, shape in (([], (24, 32)), (["--size", "16"], (12, 16))):
+        code, printed, err = call([*arguments, "--level", "25cd/m2", *more], capsys)
+        assert (code, printed, err, read_raw(out).shape) == (0, f"{out}\n", "", shape)
+    code, _, err = call([*arguments, "--level", "25lux"], capsys)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "needs a reference plane, which scene room doesn't state" in err
+
+
+def test_light_with_colours_of_its_own_leaves_the_balance_at_daylight_and_says_so(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    scene, out = tmp_path / "room.xml", tmp_path / "shot.dng"
+    two = '<spectrum name="irradiance" value="2"/></emitter><emitter type="directional" id="sun:b">'
+    scene.write_text(SCENE.format(two + '<spectrum name="irradiance" value="380:1, 780:2"/>'))
+    arguments = ["capture", str(scene), "-o", str(out), "--cfa", "bayer", "--spp", "1", "--level", "25cd/m2"]
+    code, _, err = call(arguments, capsys)
+    assert (code, err.count("\n")) == (0, 1)
+    assert "light group 'sun' has colours of its own; white balance is set to D65, --white-balance sets it" in err
+    colour = read_raw(out).colour
+    assert colour is not None
+    np.testing.assert_array_equal(colour.neutral, calibrate(preset("low_noise", "bayer"), illuminant("D65")).neutral)
+
+
+def test_lux_of_a_file_without_a_plane_is_refused(
+    exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    code, out, err = call(["capture", str(exr), "--level", "5lux", "-o", str(tmp_path / "shot.dng")], capsys)
+    assert (code, out, list(tmp_path.iterdir())) == (2, "", [exr])
+    assert "needs a reference plane" in err
+
+
+def test_a_place_that_cannot_be_written_is_told_before_the_render(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    code, out, err = call(["capture", "flat_field", "-o", str(tmp_path / "file" / "shot.dng")], capsys)
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert "choose another place with --out" in err
+
+
+def negative(path: Path, cfa: str = "bayer", share: float = 0.25, light: str = "D65") -> RawImage:
+    """Noise-free exposure of the grey wall, written to `path`: green at `share` of the well."""
+    sensor = preset("low_noise", cfa)
+    expected = expected_electrons(form_image(wall(light=light), sensor), sensor, 0.02)
+    expected *= share * sensor.pixel.full_well_e / expected[mask(sensor.cfa, "G", SHAPE)].mean()
+    raw = RawImage(
+        np.rint(np.minimum(expected, 15_000) / sensor.gain_e_per_dn + sensor.black_dn).astype(np.uint16),
+        sensor.cfa,
+        sensor.black_dn,
+        sensor.white_dn,
+        sensor.gain_e_per_dn,
+        1.5,
+        1.0,
+        0.01,
+        0.02,
+        colour=calibrate(sensor, illuminant(light)),
+    )
+    write_raw(raw, path)
+    return raw
+
+
+@pytest.mark.parametrize(("cfa", "share"), [("bayer", 0.25), ("rgbw", 0.18)])
+@pytest.mark.parametrize("ev", [0.0, 1.0, -3.0])
+def test_a_grey_wall_at_a_share_of_the_well_is_shown_at_that_share(
+    cfa: str, share: float, ev: float, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    negative(tmp_path / "shot.dng", cfa, share)
+    code, out, _ = call(["develop", str(tmp_path / "shot.dng"), "--ev", str(ev)], capsys)
+    assert (code, out) == (0, f"{tmp_path / 'shot.png'}\n")
+    with Image.open(tmp_path / "shot.png") as picture:
+        pixels = np.asarray(picture)
+    assert pixels.shape == (*SHAPE, 3)
+    # half a level of 8 bits, and the raw data's rounding: 0.5 DN of 2000 and more
+    assert np.abs(pixels - 255 * encode_srgb(np.array(share * 2.0**ev))).max() <= 0.6
+
+
+def test_the_default_brightness_puts_the_99th_percentile_at_nine_tenths(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    negative(tmp_path / "shot.dng", share=0.01)
+    arguments = ["develop", str(tmp_path / "shot.dng"), "-o", str(tmp_path / "p" / "o.png"), "--json"]
+    code, out, _ = call(arguments, capsys)
+    facts = json.loads(out)
+    assert (code, facts["path"], facts["isp"]) == (0, str(tmp_path / "p" / "o.png"), "bayer")
+    assert facts["ev"] == pytest.approx(np.log2(0.9 / 0.01), abs=0.01)
+    with Image.open(tmp_path / "p" / "o.png") as picture:
+        assert np.abs(np.asarray(picture) - 255 * encode_srgb(np.array(0.9))).max() <= 1.0
+
+
+def test_a_picture_too_dark_for_gray_world_takes_the_files_neutral(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    raw = negative(tmp_path / "shot.dng", share=0.01, light="A")
+    write_raw(replace(raw, read_noise_e=2000.0), tmp_path / "shot.dng")  # 150 e- of green are 72 per standard error
+    code, out, _ = call(["develop", str(tmp_path / "shot.dng"), "--ev", "6", "--json"], capsys)
+    assert (code, set(json.loads(out)["balance"].values())) == (0, {"calibrated"})
+    with Image.open(tmp_path / "shot.png") as picture:
+        grey = np.asarray(picture)
+    # B is 37 DN, rounded by half of one: 1.4 % of linear light, times 1.6 in the matrix; 2 of the encoded 210 levels
+    assert np.abs(grey - 255 * encode_srgb(np.array(0.64))).max() <= 3.0
+
+
+@pytest.mark.parametrize("cfa", ["bayer", "rgbw"])
+def test_as_shot_balance_keeps_the_light_s_colour_that_gray_world_takes_away(
+    cfa: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    raw = negative(tmp_path / "shot.dng", cfa, 0.1, light="A")
+    colour = calibrate(preset("low_noise", cfa), illuminant("D65"))
+    write_raw(replace(raw, colour=colour), tmp_path / "shot.dng")  # balanced for daylight, taken under a lamp
+    signal = np.array([raw.electrons[mask(raw.cfa, letter, SHAPE)].mean() for letter in "RGB"])
+    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
+    orange = colour.to_srgb @ (signal / colour.neutral[:3] / full_e)
+    for balance, source, expected in (("as-shot", "given", orange), ("gray-world", "gray world", np.full(3, 0.1))):
+        out = tmp_path / f"{balance}.png"
+        arguments = ["develop", str(tmp_path / "shot.dng"), "--ev", "1", "--white-balance", balance, "-o", str(out)]
+        code, printed, _ = call([*arguments, "--json"], capsys)
+        assert (code, set(json.loads(printed)["balance"].values())) == (0, {source})
+        with Image.open(out) as picture:
+            pixels = np.asarray(picture)
+        # half a level of 8 bits, and the raw data's rounding: half a DN of 340 in B, 0.15 % of linear light
+        assert np.abs(pixels - 255 * encode_srgb(2 * expected)).max() <= 0.7
+    assert orange[0] > 2 * orange[2]  # R over B of illuminant A seen by daylight
+
+
+def test_sixteen_bits_hold_what_eight_round_away(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    negative(tmp_path / "shot.dng")
+    for bits in ("8", "16"):
+        out = str(tmp_path / f"{bits}.png")
+        assert call(["develop", str(tmp_path / "shot.dng"), "--bits", bits, "-o", out], capsys)[0] == 0
+    assert [(tmp_path / f"{bits}.png").read_bytes()[24] for bits in (8, 16)] == [8, 16]  # IHDR's depth
+
+
+def test_a_picture_in_display_p3_as_tiff_carries_its_profile(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    raw = negative(tmp_path / "shot.dng", share=0.1, light="A")
+    colour = calibrate(preset("low_noise", "bayer"), illuminant("D65"))
+    write_raw(replace(raw, colour=colour), tmp_path / "shot.dng")  # an orange wall, as above
+    signal = np.array([raw.electrons[mask(raw.cfa, letter, SHAPE)].mean() for letter in "RGB"])
+    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
+    orange = colour.to_srgb @ (signal / colour.neutral[:3] / full_e)
+    out = tmp_path / "wide.tif"
+    arguments = ["develop", str(tmp_path / "shot.dng"), "--encoding", "display-p3", "--bits", "16", "-o", str(out)]
+    code, printed, _ = call([*arguments, "--ev", "0", "--white-balance", "as-shot", "--json"], capsys)
+    assert (code, json.loads(printed)["encoding"]) == (0, "display-p3")
+    with Image.open(out) as picture:
+        assert b"D\0i\0s\0p\0l\0a\0y\0 \0P\x003" in picture.info["icc_profile"]
+    pixels = tifffile.imread(out)
+    assert pixels.dtype == np.uint16
+    assert np.abs(pixels / 65_535 - encode(orange, "display-p3")).max() <= 0.7 / 255
+    assert np.abs(encode(orange, "display-p3") - encode(orange, "srgb")).max() > 5 / 255
+
+
+@pytest.mark.parametrize("isp", ["bayer_malvar", "bayer_menon", "bayer_nlm"])
+def test_any_processor_of_the_mosaic_can_be_asked_for(
+    isp: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    negative(tmp_path / "shot.dng")
+    code, out, _ = call(["develop", str(tmp_path / "shot.dng"), "--isp", isp, "--ev", "0", "--json"], capsys)
+    assert (code, json.loads(out)["isp"]) == (0, isp)
+    with Image.open(tmp_path / "shot.png") as picture:
+        assert np.abs(np.asarray(picture) - 255 * encode_srgb(np.array(0.25))).max() <= 0.6
+
+
+def test_a_photograph_of_another_camera_is_developed_and_says_what_was_assumed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    raw = negative(tmp_path / "shot.dng")
+    with tifffile.TiffFile(tmp_path / "shot.dng") as file:
+        page = file.pages[0]
+        kept = (33421, 33422, 50706, 50707, 50710, 50711, 50714, 50717, 50722, 50728, 50779)  # the rest is ours
+        tags = [(tag.code, tag.dtype, tag.count, tag.value, True) for tag in page.tags.values() if tag.code in kept]
+        dn = page.asarray()
+    tifffile.imwrite(
+        tmp_path / "other.dng", dn, photometric=32803, metadata=None, extratags=[*tags, (271, "s", 0, "Other", True)]
+    )
+    code, out, _ = call(["develop", str(tmp_path / "other.dng"), "--ev", "0", "--json"], capsys)
+    facts = json.loads(out)
+    assert (code, facts["isp"], facts["noise"], facts["as_shot"]) == (0, "bayer", "assumed", "file")
+    assert facts["reader"].startswith("LibRaw 0.")
+    with Image.open(tmp_path / "other.png") as picture:
+        # the levels' rounding as above
+        assert np.abs(np.asarray(picture) - 255 * encode_srgb(np.array(0.25))).max() <= 0.7
+        assert picture.size == raw.shape[::-1]
+
+
+def test_black_frames_are_black_and_no_division_by_zero(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    raw = negative(tmp_path / "shot.dng")
+    write_raw(replace(raw, dn=np.zeros_like(raw.dn)), tmp_path / "shot.dng")
+    code, out, _ = call(["develop", str(tmp_path / "shot.dng"), "--json"], capsys)
+    assert (code, json.loads(out)["ev"], set(json.loads(out)["balance"].values())) == (0, 0.0, {"calibrated"})
+    with Image.open(tmp_path / "shot.png") as picture:
+        assert not np.asarray(picture).any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["none.dng"], ["none.dng", "no such file"]),
+        (["shot.dng", "--isp", "interleaved"], ["holds ('R', 'G', 'B')", "use the other camera's pipeline"]),
+        (["shot.dng", "--isp", "bayr"], ["isp", "'bayr'", "did you mean 'bayer'"]),
+        (["shot.dng", "--bits", "12"], ["bits: 12", "give 8 or 16"]),
+        (["shot.dng", "--white-balance", "as_shot"], ["white_balance", "did you mean 'as-shot'"]),
+        (["."], ["'.' is a folder"]),
+        (["shot.dng", "--ev", "inf"], ["ev: inf", "give stops"]),
+        (["shot.dng", "-o", "shot.jpg"], ["another ending", ".png"]),
+        (["none.cr2"], ["none.cr2", "no such file"]),
+        (["junk.nef"], ["junk.nef", "LibRaw can't read it"]),
+        (["shot.dng", "--encoding", "p3"], ["encoding: 'p3'", "display-p3, srgb"]),
+        (["shot.dng", "--isp", "rgbw_sato"], ["holds ('R', 'G', 'B')"]),
+        (["shot.dng", "--isp", "cmyw_yamagami"], ["is not C, M, Y and W"]),
+        (["cut.dng"], ["cut.dng", "cut off"]),
+        (["mono.tif"], ["no colour calibration"]),
+        (["four.tif"], ["use the other camera's pipeline"]),
+    ],
+)
+def test_what_cannot_be_developed_is_one_line_exit_code_2_and_no_picture(
+    arguments: list[str],
+    words: list[str],
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    raw = negative(Path("shot.dng"))
+    Path("cut.dng").write_bytes(Path("shot.dng").read_bytes()[:-1])
+    Path("junk.nef").write_bytes(b"no raw file")
+    write_raw(replace(raw, cfa=("W",), colour=None), Path("mono.tif"))
+    write_raw(replace(raw, cfa=("RC", "GB"), colour=calibrate_four()), Path("four.tif"))
+    code, out, err = call(["develop", *arguments], capsys)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    for word in words:
+        assert word in err
+    assert not list(tmp_path.rglob("*.png"))
+
+
+def calibrate_four():
+    """Calibration of four channels, of which one is no W."""
+    return calibrate(preset("low_noise", "rgbw"), illuminant("D65"))

@@ -1,0 +1,136 @@
+"""`rodcone characterise`: table, JSON and a plot that stands alone."""
+
+import json
+import re
+import warnings
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from sensor.emva1288.characterise import characterise, configured
+from sensor.presets import low_noise, preset_file
+from studies.commands.cli import main
+from studies.pages.transfer_chart import transfer_svg
+
+SMALL = ["--height", "32", "--width", "48"]
+
+
+def call(arguments, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    captured = capsys.readouterr()
+    return int(stopped.value.code or 0), captured.out, captured.err
+
+
+@pytest.fixture(scope="module")
+def found():
+    return characterise(low_noise(), (32, 48))
+
+
+def test_the_table_sets_every_figure_beside_its_configured_value(capsys, found):
+    code, out, err = call(["characterise", "low_noise", *SMALL], capsys)
+    assert (code, err) == (0, "")
+    rows = {line[:18].strip(): line.split() for line in out.splitlines()}
+    for figure in found.figures:
+        assert f"{figure.configured:.5g}" in rows[figure.name]
+        assert f"{figure.measured:.5g}" in rows[figure.name]
+        assert figure.unit in rows[figure.name]
+    assert all(note in out for note in found.notes)
+
+
+def test_json_holds_the_figures_and_the_series_and_no_nan(capsys, found):
+    code, out, _ = call(["characterise", "low_noise", "--json", *SMALL], capsys)
+    assert code == 0
+    data = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    truth = configured(low_noise(), 0.01)
+    assert {figure["name"]: figure["configured"] for figure in data["figures"]} == truth
+    assert [figure["measured"] for figure in data["figures"]] == [figure.measured for figure in found.figures]
+    assert data["series"]["variance_dn2"] == found.transfer.variance_dn2.tolist()
+    assert {len(values) for values in data["series"].values()} == {found.transfer.light_e.size}
+    assert None in data["series"]["linearity_share"]  # outside 5-95 % of saturation
+
+
+def test_the_plot_is_one_svg_with_every_level_in_it_and_nothing_from_outside(capsys, tmp_path, found):
+    path = tmp_path / "new" / "plot.svg"
+    assert call(["characterise", "low_noise", "-o", str(path), *SMALL], capsys)[0] == 0
+    text = path.read_text("utf-8")
+    root = ElementTree.fromstring(text)
+    space = "{http://www.w3.org/2000/svg}"
+    panels = root.findall(f"{space}g")
+    assert [panel.find(f"{space}text").text.split(":")[0] for panel in panels] == [
+        "Photon transfer",
+        "Photon transfer, logarithmic",
+        "Signal to noise",
+        "Linearity",
+    ]
+    circles = [panel.findall(f"{space}circle") for panel in panels]
+    assert len(circles[0]) == found.transfer.light_e.size
+    assert len(circles[3]) == np.count_nonzero(np.isfinite(found.linearity_share))
+    assert not re.search(r"(?:href|src|url\(|@import)", text)
+    assert "nan" not in text.lower().replace("liberation", "")
+    assert list(tmp_path.rglob("*")) == [tmp_path / "new", path]
+
+
+def test_points_of_the_linear_plot_lie_on_their_line_and_axes_hold_them(found):
+    root = ElementTree.fromstring(transfer_svg(found, "low_noise"))
+    space = "{http://www.w3.org/2000/svg}"
+    panel = root.findall(f"{space}g")[0]
+    xs, ys = (np.array([float(c.get(k)) for c in panel.findall(f"{space}circle")]) for k in ("cx", "cy"))
+    below = found.transfer.light_e < 0.7 * found.saturation_e
+    signal = found.transfer.mean_dn - found.dark_mean_dn
+    slope = np.polyfit(xs[below], signal[below], 1)
+    np.testing.assert_allclose(np.polyval(slope, xs[below]), signal[below], atol=5.0)  # a hundredth of a unit of SVG
+    up = np.polyfit(ys[below], found.transfer.variance_dn2[below], 1)
+    assert up[0] < 0  # SVG's y runs down
+    np.testing.assert_allclose(np.polyval(up, ys), found.transfer.variance_dn2, atol=5.0)
+    assert xs.min() >= 66
+    assert ys.max() <= 236
+
+
+def test_a_title_with_angle_brackets_is_text(found):
+    root = ElementTree.fromstring(transfer_svg(found, "<script>&"))
+    assert root.find("{http://www.w3.org/2000/svg}title").text == "<script>&"
+
+
+def test_a_file_of_the_user_s_own_is_measured_too(capsys, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(preset_file("low_noise").read_text("utf-8").replace("dsnu_e = 1.0", "dsnu_e = 9.0"), "utf-8")
+    code, out, _ = call(["characterise", str(path), "--json", *SMALL], capsys)
+    figures = {figure["name"]: figure for figure in json.loads(out)["figures"]}
+    assert code == 0
+    assert figures["DSNU"]["configured"] == 9.0
+    assert figures["DSNU"]["measured"] == pytest.approx(9.0, rel=0.1)
+
+
+def test_a_warning_is_one_line_without_its_place_in_the_code(capsys, tmp_path):
+    (tmp_path / "qe.csv").write_text(
+        "wavelength_nm,R,G,B,W\n400,0,0,0.4,0.4\n550,0,0.6,0,0.8\n700,0.5,0,0,0.9\n", "utf-8"
+    )
+    responses = '[responses]\ncsv = "qe.csv"\nrange_nm = [400.0, 700.0]\nquantum_efficiency = 0.5\n'
+    path = tmp_path / "mine.toml"
+    path.write_text(preset_file("low_noise").read_text("utf-8") + responses, "utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        code, out, err = call(["characterise", str(path), *SMALL], capsys)
+    assert (code, out.count("DSNU"), err.count("\n")) == (0, 1, 1)
+    assert err.startswith("rodcone: responses: ")
+    assert "seems to hold the quantum efficiency already" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["characterise", "low_nois"], "did you mean 'low_noise'?"),
+        (["characterise", "low_noise", "-o", "plot.png"], "allowed: .svg"),
+        (["characterise", "low_noise", "--height", "4"], "height: 4"),
+        (["characterise", "absent.toml"], "can't be read"),
+        (["characterise"], "PRESET"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(arguments, words, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = call(arguments, capsys)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert words in err
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,210 @@
+"""`rodcone sweep`, `export`, `new study` and `new cluster`: results alone on stdout, one line for whatever is wrong."""
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sweep_sample as SAMPLE
+
+from studies.commands.cli import app, main
+from studies.study.study_file import read_study
+from studies.sweep.database import VERSION
+from studies.sweep.run_sweep import duration
+
+TEXT = """
+scenes = [{source = "scene.exr", light = "E"}]
+levels = ["1cd/m2", "25cd/m2"]
+processors = ["bayer"]
+"""
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    SAMPLE.picture(tmp_path / "scene.exr")
+    path = tmp_path / "study.toml"
+    path.write_text(TEXT, "utf-8")
+    return path
+
+
+def call(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    captured = capsys.readouterr()
+    return int(stopped.value.code or 0), captured.out, captured.err
+
+
+def test_sweep_prints_the_ledger_alone_and_the_table_follows(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    command = ["sweep", str(study), "-o", str(out), "--workers", "1", "--as-stated"]
+    told = f"rodcone: its report is {out / 'report.html'}\n"
+    assert call(command, capsys) == (0, f"{out / 'ledger.sqlite'}\n", told)
+    assert (out / "report.html").read_text("utf-8").lstrip().startswith("<!doctype html>")
+    code, text, err = call([*command, "--json"], capsys)
+    assert (code, err) == (0, told)
+    facts = json.loads(text)
+    assert (facts["cells"], facts["made"], facts["ledger"]) == (2, 0, str(out / "ledger.sqlite"))
+    assert facts["report"] == str(out / "report.html")
+    assert call(["export", str(out), "-o", str(tmp_path / "t.csv")], capsys) == (0, f"{tmp_path / 't.csv'}\n", "")
+    header, *table = (tmp_path / "t.csv").read_text("utf-8").splitlines()
+    assert header.startswith("key,scene,spectrum,level,exposure,sensor,processor,seed,luminance_cd_m2,illuminance")
+    assert [line.split(",")[3] for line in table] == ["1cd/m2", "25cd/m2"]
+
+
+def test_a_sweep_follows_the_plan_and_reference_models_everything(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["sweep", str(study), "-o", str(tmp_path / "out"), "--workers", "1"]
+    for option in ([], ["--reference"], ["--as-stated"]):
+        code, _, err = call([*command, *option], capsys)
+        assert (code, err) == (0, f"rodcone: its report is {tmp_path / 'out' / 'report.html'}\n")
+    with closing(sqlite3.connect(tmp_path / "out" / "ledger.sqlite")) as base:
+        table = base.execute("SELECT lens, budget_share FROM cells").fetchall()
+    planned = [share for _, share in table if share is not None]
+    assert len(planned) == 2
+    assert max(planned) <= 0.10
+    lenses = [
+        (json.loads(lens)["diffraction"], json.loads(lens)["veiling_glare"]) for lens, share in table if not share
+    ]
+    assert sorted(lenses) == [(0.0, 0.0)] * 2 + [(1.0, 0.01)] * 2
+
+
+def test_dry_run_counts_and_computes_nothing(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    command = ["sweep", str(study), "-o", str(out), "--dry-run", "--set", "seeds=[0, 1, 2]"]
+    code, text, err = call(command, capsys)
+    assert (code, err) == (0, "")
+    assert text.startswith("6 cells, 0 in the ledger from the last run; 0 renders\nabout ")
+    assert not out.exists()
+    still = ["--set", 'scenes=["still_life"]', "--set", "render.spp=64", "--json", "--workers", "2"]
+    code, text, _ = call([*command, *still], capsys)
+    facts = json.loads(text)
+    assert (code, facts["cells"], facts["renders"], facts["workers"]) == (0, 6, 1, 2)
+    more = json.loads(call([*command, *still, "--set", "render.spp=512"], capsys)[1])
+    assert more["seconds"] > 4 * facts["seconds"]
+    larger = json.loads(call([*command, *still, "--set", "render.size=1024"], capsys)[1])
+    three_processes = 3 * 350e6  # this one and two workers; the rest goes with the pixels
+    assert larger["bytes"] - three_processes == pytest.approx(16 * (facts["bytes"] - three_processes), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--set", "lvels=3"], 2, "did you mean 'levels'?"),
+        (["--set", "scenes=absent.exr"], 2, "absent.exr"),
+        (["--set", "scenes=stil_life"], 2, "did you mean 'still_life'?"),
+        (["--set", "levels=10lux"], 2, "needs a reference plane"),
+        (["--workers", "0"], 2, "workers: 0 is outside 1 to 1024"),
+        (["--workers", "2", "--cluster", "tcp://127.0.0.1:1"], 2, "leave --workers or --cluster out"),
+        (["--reference", "--as-stated"], 2, "leave one of them out"),
+        (["--cluster", "127.0.0.1"], 2, "is not an address"),
+        (["--cluster", "tcp://127.0.0.1:x"], 2, "is not an address"),
+        (["-o", "study.toml/out", "--as-stated"], 1, "choose another place with --out"),
+    ],
+)
+def test_faults_are_one_line(
+    arguments: list[str],
+    code: int,
+    words: str,
+    study: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(study.parent)
+    found, out, err = call(["sweep", "study.toml", *arguments], capsys)
+    assert (found, out, err.count("\n")) == (code, "", 1)
+    assert words in err
+    assert not (study.parent / "out" / "sweep" / "ledger.sqlite").exists()
+
+
+def test_an_old_ledger_is_one_line_and_left_as_it_is(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["sweep", str(study), "-o", str(tmp_path / "out"), "--workers", "1", "--as-stated"]
+    assert call(command, capsys)[0] == 0
+    with closing(sqlite3.connect(tmp_path / "out" / "ledger.sqlite")) as base:
+        base.execute("PRAGMA user_version = 0")
+    code, out, err = call(command, capsys)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert f"it has version 0, this rodcone reads {VERSION}; allowed: that version; sweep again into" in err
+
+
+def test_a_full_disk_is_one_line_that_says_what_is_kept(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device", str(tmp_path / "out" / "pictures"))
+
+    monkeypatch.setattr("studies.sweep.run_cell.keep", full)
+    code, out, err = call(["sweep", str(study), "-o", str(tmp_path / "out"), "--workers", "1", "--as-stated"], capsys)
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert "pictures: No space left on device; make room: " in err
+    assert "keeps what is done" in err
+
+
+@pytest.mark.slow
+def test_ctrl_c_says_what_is_kept_and_exits_with_130(study: Path, tmp_path: Path) -> None:
+    """A real SIGINT to the whole group of processes, as a terminal sends it, while two workers run."""
+    command = [sys.executable, "-c", "from studies.commands.cli import main; main()", "sweep", str(study)]
+    options = ["-o", str(tmp_path / "out"), "--workers", "2", "--as-stated", "--set", f"seeds={list(range(400))}"]
+    process = subprocess.Popen(
+        [*command, *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    for _ in range(600):
+        if any((tmp_path / "out" / "pictures").rglob("*.png")):
+            break
+        time.sleep(0.1)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert (
+        err.splitlines()[-1] == f"rodcone: stopped; {tmp_path / 'out'} keeps what is done, and the same command goes on"
+    )
+    assert len(err.splitlines()) == 1
+    with closing(sqlite3.connect(tmp_path / "out" / "ledger.sqlite")) as base:
+        assert 0 < base.execute("SELECT count(*) FROM cells").fetchone()[0] < 800
+
+
+@pytest.mark.parametrize("name", ["light_levels", "spectra", "exposures"])
+def test_new_study_copies_an_example_that_reads(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "mine.toml"
+    assert call(["new", "study", name, "-o", str(path)], capsys) == (0, f"{path}\n", "")
+    assert read_study(path).name == name.replace("_", " ")
+    code, _, err = call(["new", "study", name, "-o", str(path)], capsys)
+    assert (code, "exists; allowed: a new file" in err) == (2, True)
+
+
+def test_new_study_and_cluster_refuse_what_they_cannot_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = call(["new", "study", "spectrum", "-o", str(tmp_path / "s.toml")], capsys)
+    assert (code, "did you mean 'spectra'?" in err) == (2, True)
+    assert call(["new", "cluster", "-o", str(tmp_path / "dask.yaml")], capsys)[0] == 0
+    assert "MALLOC_TRIM_THRESHOLD_: null" in (tmp_path / "dask.yaml").read_text("utf-8")
+    code, _, err = call(["new", "cluster", "-o", str(tmp_path / "dask.toml")], capsys)
+    assert (code, "write dask.yaml" in err) == (2, True)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_complete_the_sweeps_options(shell: Any) -> None:
+    text = app.generate_completion(prog_name="rodcone", shell=shell)
+    assert "dry-run" in text
+    assert "cluster" in text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(0.2, "0 s"), (99.4, "99 s"), (100.0, "2 min"), (5999.0, "100 min"), (6000.0, "1.7 h")]
+)
+def test_durations_read_as_estimates(seconds: float, words: str) -> None:
+    assert duration(seconds) == words

@@ -1,0 +1,145 @@
+"""Sharpness from a slanted edge: edges whose response is known in closed form, clean, noisy and rendered."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import erf
+from scipy.stats import t as student
+
+from render.engine import render
+from rodcone.errors import InputError
+from scenes.catalog import load
+from studies.metrics.mtf import edge_response
+
+SIDE = 80
+Profile = Callable[[np.ndarray], np.ndarray]
+
+
+def edge(degrees: float, profile: Profile, side: int = SIDE) -> np.ndarray:
+    """Dark to the left, bright to the right: `profile` of the distance [px] to an edge through the middle."""
+    row, column = np.indices((side, side)) - (side - 1) / 2
+    angle = np.radians(degrees)
+    return profile(column * np.cos(angle) - row * np.sin(angle))
+
+
+def gaussian(sigma_px: float) -> Profile:
+    return lambda distance: 0.5 * (1 + erf(distance / (sigma_px * np.sqrt(2))))
+
+
+def pixel_box(degrees: float) -> Profile:
+    """Share of a square pixel that lies on the bright side: a step blurred by boxes of the cosine and the sine."""
+    c, s = np.cos(np.radians(degrees)), abs(np.sin(np.radians(degrees)))
+    ends = (((c + s) / 2, 1), ((c - s) / 2, -1), (-(c - s) / 2, -1), (-(c + s) / 2, 1))
+    return lambda distance: sum(sign * np.maximum(distance + end, 0) ** 2 / 2 for end, sign in ends) / (c * s)
+
+
+def box_mtf(degrees: float, frequency: np.ndarray | float) -> np.ndarray:
+    angle = np.radians(degrees)
+    return np.sinc(frequency * np.cos(angle)) * np.sinc(frequency * np.sin(angle))
+
+
+def bounds(mtf50: float, steepness: float, sigma_px: float, degrees: float, side: int = SIDE) -> tuple[float, float]:
+    """Range of the relative error of MTF50 that the method allows itself.
+
+    The samples of a bin don't lie quite evenly in it: at most the bin's own response is wrong, 1 - sinc(f / 4), which
+    moves MTF50 by that over the steepness d ln MTF / d ln f. The window takes 0.46 pi^2 sigma^2 / (2 reach^2) off the
+    blur; its next order is under a fifth of that.
+    """
+    uneven = (1 - np.sinc(mtf50 / 4)) / steepness
+    reach = side / 2 - side / 2 * np.tan(np.radians(abs(degrees)))
+    window = 0.46 * np.pi**2 * sigma_px**2 / (2 * reach**2)
+    return -uneven, uneven + 1.2 * window
+
+
+@pytest.mark.parametrize("degrees", [3.0, 4.5, 5.0, 6.0, 7.3, 10.0, -5.0])
+@pytest.mark.parametrize("sigma_px", [0.5, 1.0, 2.0])
+def test_an_edge_with_a_gaussian_blur_has_its_closed_form(degrees: float, sigma_px: float) -> None:
+    found = edge_response(edge(degrees, gaussian(sigma_px)))
+    truth = np.sqrt(np.log(2) / 2) / (np.pi * sigma_px)
+    low, high = bounds(truth, 2 * np.log(2), sigma_px, degrees)
+    assert low <= found.mtf50_cycles_per_px / truth - 1 <= high
+    assert found.angle_deg == pytest.approx(degrees, abs=1e-3)
+
+
+@pytest.mark.parametrize("degrees", [3.0, 4.5, 5.0, 6.0, 7.3, 10.0, -5.0])
+def test_an_edge_on_square_pixels_has_their_response(degrees: float) -> None:
+    found = edge_response(edge(degrees, pixel_box(degrees)))
+    truth = brentq(lambda f: box_mtf(degrees, f) - 0.5, 0.1, 0.9)
+    low, high = bounds(truth, 1.638, np.sqrt(1 / 12), degrees)  # 1 - x cot x at x = 0.6034 pi, a box of a pixel
+    assert low <= found.mtf50_cycles_per_px / truth - 1 <= high
+    below = found.frequency_cycles_per_px <= 0.5
+    frequency = found.frequency_cycles_per_px[below]
+    error = found.mtf[below] / box_mtf(degrees, frequency) - 1
+    assert (np.abs(error) <= 1 - np.sinc(frequency / 4) + 0.002).all()  # 0.002: the window's, 1 - MTF near 0
+    assert found.mtf[0] == 1.0
+
+
+def test_scale_offset_sides_and_orientation_do_not_count() -> None:
+    picture = edge(5.0, gaussian(0.8))
+    found = edge_response(picture)
+    for same in (30 * picture + 7, 1 - picture, picture[::-1, ::-1], picture.T, -picture.T):
+        other = edge_response(same)
+        assert other.mtf50_cycles_per_px == pytest.approx(found.mtf50_cycles_per_px, rel=5e-3)  # other rows may go
+        assert other.angle_deg == pytest.approx(5.0, abs=1e-3)
+    assert edge_response(picture[:, ::-1]).angle_deg == pytest.approx(-5.0, abs=1e-3)
+
+
+def noise_of_mtf50(degrees: float, noise: float, truth: float) -> float:
+    """Relative standard deviation of MTF50 of a Gaussian blur, worked out on paper, for noise a share of the step.
+
+    A bin of a quarter pixel holds rows / 4 / cos samples. The derivative of two bins passes sin(2 pi f / 4) of their
+    noise, the window 0.397 of its variance (0.54^2 + 0.46^2 / 2) over 8 reach bins, of which the half in phase counts.
+    Both responses that are divided out raise it; the step itself is 1, MTF 0.5, its steepness 2 ln 2.
+    """
+    tilt, turn = np.tan(np.radians(degrees)), np.cos(np.radians(degrees))
+    rows = np.floor(SIDE * tilt) / tilt
+    bins, bin_noise = 8 * (SIDE / 2) * (1 - tilt) * turn, noise / np.sqrt(rows / 4 / turn)
+    passed = np.sin(2 * np.pi * truth / 4) / (np.sinc(truth / 2) * np.sinc(truth / 4))
+    return float(bin_noise * np.sqrt(0.397 * bins / 2) * passed / np.log(2))
+
+
+@pytest.mark.parametrize("degrees", [3.0, 7.0])
+def test_noise_scatters_mtf50_about_its_truth_by_what_it_must(degrees: float) -> None:
+    # 30 dB between the fields, 160 edges. By chance a bound fails once in 100 000: Student's for the mean, beside what
+    # the method allows itself, 4.4 standard errors for the deviation. 5 %: rows that end a turn, the edge's own fit.
+    noise, count, truth = 10**-1.5, 160, np.sqrt(np.log(2) / 2) / np.pi
+    rng, clean = np.random.default_rng(4), edge(degrees, gaussian(1.0))
+    found = [edge_response(clean + rng.normal(0, noise, clean.shape)).mtf50_cycles_per_px for _ in range(count)]
+    errors = np.array(found) / truth - 1
+    low, high = bounds(truth, 2 * np.log(2), 1.0, degrees)
+    chance = student.isf(0.5e-5, count - 1) * errors.std(ddof=1) / np.sqrt(count)
+    assert low - chance <= errors.mean() <= high + chance
+    expected = noise_of_mtf50(degrees, noise, truth)
+    assert errors.std(ddof=1) == pytest.approx(expected, rel=4.4 / np.sqrt(2 * (count - 1)) + 0.05)
+
+
+def test_the_rendered_edge_has_its_lean_and_the_response_of_its_pixels() -> None:
+    made = render(
+        load("slanted_edge", angle_deg=5.0), (80, 80), wavelength_nm=np.array([480.0, 680.0]), spp=256, seed=1
+    )
+    found = edge_response(made.radiance[0].mean(axis=0, dtype=np.float64))
+    truth = brentq(lambda f: box_mtf(5.0, f) - 0.5, 0.1, 0.9)
+    low, high = bounds(truth, 1.638, np.sqrt(1 / 12), 5.0)
+    # A pixel that the edge halves scatters by 0.5 / sqrt(256) at most: over 80 rows under 0.4 % of the edge's height.
+    assert low - 0.01 <= found.mtf50_cycles_per_px / truth - 1 <= high + 0.01
+    assert found.angle_deg == pytest.approx(5.0, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("picture", "told"),
+    [
+        (np.ones((40, 40)), "no edge crosses all its rows"),
+        (np.random.default_rng(0).normal(0, 1, (40, 40)), "no edge crosses all its rows"),
+        (edge(0.0, gaussian(1.0)), r"the edge moves 0\.00 pixels"),
+        (edge(0.5, gaussian(1.0)), r"the edge moves 0\.70 pixels"),
+        (edge(5.0, gaussian(1.0))[:, 30:], "pixels from a side"),
+        (np.ones((40, 8)), r"shape \(40, 8\)"),
+        (np.full((40, 40), np.nan), r"shape \(40, 40\)"),
+        (np.ones((40, 40, 3)), r"shape \(40, 40, 3\)"),
+    ],
+)
+def test_what_is_no_slanted_edge_is_refused(picture: np.ndarray, told: str) -> None:
+    with pytest.raises(InputError, match=f"^luminance: .*{told}"):
+        edge_response(picture)

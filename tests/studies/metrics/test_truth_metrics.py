@@ -1,0 +1,106 @@
+"""Truth, metrics, exposure and budget: closed forms and independent implementations."""
+
+import numpy as np
+import pytest
+from builders import transport_of
+
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from render.scene import LightGroup
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, flat
+from rodcone.errors import InputError
+from rodcone.tables import colour_science
+from sensor.exposure import LONGEST_S, auto_exposure_s
+from sensor.optics import form_image
+from sensor.presets import low_noise, table1_output
+from sensor.response import channel_electrons, expected_electrons
+from studies.budget.budget import monte_carlo_share
+from studies.metrics.quality import measure, psnr_db
+from studies.metrics.truth import green_scale, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
+
+NM = DEFAULT_WAVELENGTH_NM
+WIDTH = band_widths(NM)
+
+
+def neutral_scene(luminance_cd_m2: float, light: str = "D65", shape: tuple[int, int] = (16, 16)) -> SpectralRadiance:
+    values = illuminant(light).band_average(NM, WIDTH)
+    scene = SpectralRadiance(np.broadcast_to(values, (*shape, NM.size)).astype(np.float64), NM)
+    return SpectralRadiance(scene.values * (luminance_cd_m2 / scene.luminance()[0, 0]), NM)
+
+
+@pytest.mark.parametrize("light", ["D65", "A", "F11"])
+def test_neutral_is_white_in_the_truth_under_any_light(light: str) -> None:
+    truth = true_srgb(neutral_scene(50.0, light), light_in_bands(illuminant(light), NM, WIDTH), white_cd_m2=50.0)
+    assert truth == pytest.approx(np.ones((16, 16, 3)), abs=1e-6)
+
+
+def test_known_scale_is_green_electrons_per_luminance() -> None:
+    sensor, light = low_noise(), light_in_bands(illuminant("A"), NM, WIDTH)
+    electrons = channel_electrons(form_image(neutral_scene(20.0, "A"), sensor), sensor, 0.01)
+    assert 20.0 * neutral_electrons(sensor, light, 0.01) == pytest.approx(electrons[0, 0], rel=1e-9)
+    assert 20.0 * green_scale(sensor, light, 0.01) == pytest.approx(electrons[0, 0, 1], rel=1e-9)
+
+
+def test_psnr_closed_form() -> None:
+    assert psnr_db(np.full((4, 4, 3), 0.6), np.full((4, 4, 3), 0.5)) == pytest.approx(20.0)
+    assert psnr_db(np.ones((2, 2, 3)), np.ones((2, 2, 3))) == np.inf
+
+
+def test_equal_pictures_are_perfect() -> None:
+    picture = np.random.default_rng(0).uniform(0, 1, (32, 32, 3))
+    quality = measure(picture, picture)
+    assert (quality.psnr_db, quality.delta_e_median, quality.delta_e_p95) == (np.inf, 0.0, 0.0)
+    assert quality.ssim == pytest.approx(1.0)
+
+
+def test_delta_e_agrees_with_colour_science() -> None:
+    rng, colour = np.random.default_rng(1), colour_science()
+    first, second = rng.uniform(0.1, 0.9, (2, 16, 16, 3))
+    d65 = np.array([0.3127, 0.3290])
+    labs = [colour.XYZ_to_Lab(colour.sRGB_to_XYZ(picture), d65) for picture in (first, second)]
+    theirs = colour.delta_E(*labs, method="CIE 2000")
+    assert measure(first, second).delta_e_median == pytest.approx(float(np.median(theirs)), rel=2e-3)
+    assert measure(first, second).delta_e_p95 == pytest.approx(float(np.percentile(theirs, 95)), rel=2e-3)
+
+
+def test_exposure_puts_green_at_80_percent_of_the_well_or_stops_at_the_longest() -> None:
+    sensor = table1_output()
+    bright = form_image(neutral_scene(5000.0), sensor)
+    exposure_s = auto_exposure_s(bright, sensor)
+    assert channel_electrons(bright, sensor, exposure_s)[0, 0, 1] == pytest.approx(0.8 * 15_000, rel=1e-9)
+    assert auto_exposure_s(form_image(neutral_scene(0.036), sensor), sensor) == LONGEST_S
+    with pytest.raises(InputError, match=r"^longest_s: -1\.0"):
+        auto_exposure_s(bright, sensor, -1.0)
+
+
+def test_monte_carlo_share_is_the_ratio_of_variances() -> None:
+    # Halves with independent errors of 2 % make a mean with an error of 2 % / sqrt 2; the mean of 65 536 squares is
+    # right to 0.6 %, so 3 % is five standard deviations.
+    sensor, rng = low_noise(), np.random.default_rng(2)
+    scene = neutral_scene(20.0, shape=(256, 256))
+    halves = tuple(
+        SpectralRadiance(scene.values * (1 + 0.02 * rng.standard_normal((256, 256, 1))), NM) for _ in range(2)
+    )
+    expected_e = expected_electrons(form_image(scene, sensor), sensor, 0.01)
+    share = monte_carlo_share(expected_e, halves, sensor, 0.01)
+    noise = expected_e + (0.01 * expected_e) ** 2 + 1.5**2 + 1.0 + sensor.gain_e_per_dn**2 / 12
+    assert share == pytest.approx((0.02**2 / 2 * expected_e**2).mean() / noise.mean(), rel=0.03)
+
+
+def test_a_lamp_in_the_picture_does_not_set_the_white() -> None:
+    """Nor does its rim: there the surface counts, as far as it is seen."""
+    scene = neutral_scene(9.0)
+    coverage = np.zeros((1, 16, 16), np.float32)
+    coverage[0, :4, :4], coverage[0, :4, 4] = 1.0, 0.3
+    lamp = Spectrum(np.array([300.0, 1100.0]), np.array([1e4, 1e4]))
+    planes = (np.moveaxis(scene.values, -1, 0) / 1e4 + coverage).astype(np.float32)[None]
+    lit = transport_of(planes, {"lamp": LightGroup(("lamp",), lamp)}, NM, scene.widths_nm, seen=coverage)
+    assert shown_white_cd_m2(lit, None) == pytest.approx(10.0, rel=1e-4)
+
+
+def test_white_is_the_percentile_of_the_area_that_shows_no_light() -> None:
+    """Hundred greys of 1 to 100 cd/m^2: the 99th percentile is 99, at 90 % of white."""
+    unit = neutral_scene(1.0, shape=(10, 10))
+    planes = (np.moveaxis(unit.values, -1, 0) * np.arange(1, 101).reshape(10, 10)).astype(np.float32)[None]
+    lit = transport_of(planes, {"sky": LightGroup(("sky",), flat())}, NM, unit.widths_nm)
+    assert shown_white_cd_m2(lit, None) == pytest.approx(99 / 0.9, rel=1e-5)

@@ -1,0 +1,178 @@
+"""The report of a sweep: every row in it, names as text, pictures within a limit, and what isn't made yet said so."""
+
+import json
+import re
+import shutil
+import sqlite3
+from contextlib import closing
+from html import unescape
+from pathlib import Path
+
+import pytest
+import sweep_sample as SAMPLE
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rodcone.errors import InputError
+from studies.commands.cli import main
+from studies.pages.report import render_report
+from studies.pages.report_cells import ordered_cells
+from studies.pages.report_choice import chosen_conditions
+from studies.pages.report_sweep import ledger_results
+from studies.study.study import SceneChoice
+from studies.sweep.database import FILE
+from studies.sweep.export import read_rows
+
+NAME = "</script><b>study"
+FILES = ("<b>bold.exr", "other.exr")
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A sweep of two scenes, two levels, two exposures, two processors and two seeds: 32 cells."""
+    folder: Path = tmp_path_factory.mktemp("swept")
+    for name, size in zip(FILES, ((16, 20), (24, 16)), strict=True):
+        SAMPLE.picture(folder / name, size)
+    scenes = tuple(SceneChoice(str(folder / name), "E") for name in FILES)
+    study = SAMPLE.small_study(
+        folder, scenes=scenes, exposures=("auto", "2ms"), processors=("interleaved", "bayer"), name=NAME
+    )
+    SAMPLE.swept(study, folder / "out")
+    return folder / "out"
+
+
+def copied(out: Path, place: Path) -> Path:
+    """Ledger and pictures in a folder of their own, to be changed."""
+    (place / "pictures").symlink_to(out / "pictures")
+    with closing(sqlite3.connect(out / FILE)) as base, closing(sqlite3.connect(place / FILE)) as copy:
+        base.backup(copy)
+    return place
+
+
+def test_every_row_stands_in_the_results_as_it_is(out: Path) -> None:
+    results, pictures = ledger_results(out)
+    rows = {(r.scene, r.level, r.exposure, r.processor, r.seed): r for r in read_rows(out)}
+    assert len(rows) == len(results["cells"]) == 32
+    names = ("psnr_db", "flip_mean", "s_cielab_p95", "pu21_psnr_db", "mc_share", "exposure_s", "luminance_cd_m2")
+    for cell in results["cells"]:
+        level = ("1cd/m2", "25cd/m2")[cell["level"]]
+        row = rows[cell["scene"], level, cell["exposure"], cell["camera"], cell["seed"]]
+        assert [cell[name] for name in names] == [getattr(row, name) for name in names]
+        assert cell["file"] == f"pictures/{row.picture}"
+        assert cell["seconds"] == {"capture": row.capture_s, "develop": row.develop_s, "measure": row.measure_s}
+        assert cell["picture"] == (row.picture if row.seed == 0 else None)
+    for name, content in pictures.items():
+        assert (out / "pictures" / name).read_bytes() == content
+    assert [scene["size"] for scene in results["scenes"]] == [[16, 20], [24, 16]]
+    assert results["pictures_left_out"] == ""
+
+
+def test_the_page_holds_the_names_as_text_and_the_means_over_seeds(out: Path) -> None:
+    page = render_report(*ledger_results(out))
+    title = re.search(r"<title>(.*?)</title>", page)
+    assert title is not None
+    assert unescape(title[1]).startswith(f"{NAME}: Interleaved RGBW and Bayer")
+    assert "<b>bold" not in page
+    assert "<b>study" not in page
+    data = json.loads(page.split('id="data">')[1].split("</script>")[0])
+    assert [view["scene"] for view in data["views"]] == list(FILES)
+    rows = [
+        r for r in read_rows(out) if (r.scene, r.level, r.exposure, r.processor) == (FILES[1], "1cd/m2", "2ms", "bayer")
+    ]
+    # Cells by scene, exposure, level, camera: 1, 1, 0, 1.
+    assert data["cells"][8 + 4 + 1]["psnr_db"].startswith(
+        f"{(rows[0].psnr_db + rows[1].psnr_db) / 2:.1f}\N{NO-BREAK SPACE}±"
+    )
+    assert (
+        f"{rows[0].exposure_s * 1e3:g}\N{NO-BREAK SPACE}ms" == data["cells"][13]["exposure"] == "2\N{NO-BREAK SPACE}ms"
+    )
+    assert "2 seeds" in page
+    assert json.loads(rows[0].lens)["f_number"] == 2.8
+    assert "band_nm = 20.0" in page
+
+
+def test_fewer_pictures_than_there_are_leave_whole_groups_and_say_so(out: Path) -> None:
+    results, pictures = ledger_results(out, 8)
+    shown = {(cell["scene"], cell["exposure"], cell["level"]) for cell in results["cells"] if cell["picture"]}
+    # Eight pictures are four conditions of two cameras: of the four groups of two levels the first and the third.
+    assert shown == {(name, "auto", level) for name in FILES for level in (0, 1)}
+    assert len(pictures) == 8 + 2, "and each scene's truth"
+    assert results["pictures_left_out"].startswith("To keep the page small, pictures of 4 of 8 conditions are in it")
+    page = render_report(results, pictures)
+    assert page.count("data-cell=") == 8
+    assert results["pictures_left_out"] in page
+    assert len(json.loads(page.split('id="data">')[1].split("</script>")[0])["cells"]) == 16
+
+
+@settings(deadline=None)
+@given(st.integers(1, 12), st.integers(1, 9), st.integers(1, 120))
+def test_chosen_conditions_keep_to_their_number_and_take_whole_groups(groups: int, levels: int, most: int) -> None:
+    chosen = chosen_conditions(groups * levels, levels, most)
+    assert chosen <= set(range(groups * levels))
+    assert 0 in chosen
+    assert len(chosen) <= most
+    if most >= levels:
+        assert len(chosen) == levels * min(most // levels, groups) or most >= groups * levels == len(chosen)
+        assert all({place // levels * levels + level for level in range(levels)} <= chosen for place in chosen)
+    else:
+        assert len(chosen) == most
+        assert most == 1 or levels - 1 in chosen, "the brightest too"
+
+
+def test_cells_not_made_yet_are_dashes_and_the_page_says_how_many(out: Path, tmp_path: Path) -> None:
+    part = copied(out, tmp_path)
+    with closing(sqlite3.connect(part / FILE)) as base, base:
+        base.execute("DELETE FROM cells WHERE scene = ?", (FILES[1],))
+        base.execute("DELETE FROM cells WHERE seed = 1 AND level = '1cd/m2' AND processor = 'bayer'")
+    results, pictures = ledger_results(part)
+    assert results["notes"] == ["18 of 32 cells are not made yet: rodcone sweep goes on with them."]
+    found = {(cell["scene"], cell["exposure"], cell["level"], cell["camera"]): cell for cell in ordered_cells(results)}
+    assert found[FILES[0], "auto", 0, "bayer"]["psnr_db"] is None
+    assert found[FILES[0], "auto", 1, "bayer"]["psnr_db"] is not None
+    assert found[FILES[1], "auto", 1, "bayer"]["picture"] is None
+    page = render_report(results, pictures)
+    assert results["notes"][0] in page
+    assert re.search(r"\b(nan|None)\b", unescape(re.sub(r"base64,[^\"]*", "", page))) is None
+
+
+def test_what_is_no_sweep_or_has_lost_a_picture_is_one_line(out: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"holds no ledger\.sqlite"):
+        ledger_results(tmp_path)
+    part = copied(out, tmp_path)
+    (part / "pictures").unlink()
+    with pytest.raises(InputError, match=r"can't be read .*; run rodcone sweep again") as told:
+        ledger_results(part)
+    assert "\n" not in str(told.value)
+    with closing(sqlite3.connect(part / FILE)) as base, base:
+        base.execute("DELETE FROM cells")
+    with pytest.raises(InputError, match="has made no cell yet"):
+        ledger_results(part)
+
+
+def test_the_command_writes_the_page_whole_and_prints_its_path(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for arguments, place in ((["-o", str(tmp_path / "r.html")], tmp_path / "r.html"), ([], out / "report.html")):
+        with pytest.raises(SystemExit) as stopped:
+            main(["report", str(out), *arguments])
+        assert (stopped.value.code, capsys.readouterr().out) == (0, f"{place}\n")
+        assert place.read_text("utf-8").lstrip().startswith("<!doctype html>")
+    (out / "report.html").unlink()
+    for arguments, code in ((["--pictures", "0"], 2), (["-o", str(tmp_path / "absent" / "r.html")], 1)):
+        with pytest.raises(SystemExit) as stopped:
+            main(["report", str(out), *arguments])
+        assert stopped.value.code == code
+        assert capsys.readouterr().err.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["r.html"]
+
+
+def test_a_picture_that_is_a_link_out_of_the_folder_is_not_read(out: Path, tmp_path: Path) -> None:
+    shutil.copytree(out / "pictures", tmp_path / "swept" / "pictures")
+    with closing(sqlite3.connect(out / FILE)) as base, closing(sqlite3.connect(tmp_path / "swept" / FILE)) as copy:
+        base.backup(copy)
+    (tmp_path / "secret").write_bytes(b"not for the report")
+    picture = tmp_path / "swept" / "pictures" / read_rows(out)[0].picture
+    picture.unlink()
+    picture.symlink_to(tmp_path / "secret")
+    with pytest.raises(InputError, match="does not lie in"):
+        ledger_results(tmp_path / "swept")

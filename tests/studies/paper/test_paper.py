@@ -1,0 +1,189 @@
+"""The paper's command, small: figures as files, one page, claims with verdicts; and in full, where there is time."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import report_browser as CHROME
+from PIL import Image
+
+from isp.colour.camera_colour import encode_srgb
+from studies.commands.cli import main
+from studies.paper.camera import decode_srgb, noise
+from studies.paper.checks import Check, at_least, at_most
+from studies.paper.figure1b import gain_db
+from studies.paper.figure4 import edge_columns
+from studies.paper.figure5 import likeness
+from studies.paper.numbers import moonlight_photons
+from studies.paper.page import range_text, value_text
+from studies.paper.paper import Paper, as_json, make, write
+from studies.paper.setup import READINGS, Setup, sensor_of
+
+FIGURES = ["1a", "1b", "2", "3", "4", "5", "6"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("paper")
+
+
+@pytest.fixture(scope="module")
+def paper(folder: Path) -> Paper:
+    made = make(Setup(folder, size=24, spp=4, band_nm=100.0, seeds=2))
+    write(made, folder)
+    return made
+
+
+def test_every_figure_is_written_as_svg_and_png(paper: Paper, folder: Path) -> None:
+    assert [figure.name for figure in paper.figures] == FIGURES
+    for name in FIGURES:
+        svg = (folder / f"figure_{name}.svg").read_text("utf-8")
+        assert svg.lstrip().startswith("<svg")
+        assert svg.count("<image") == svg.count("data:image/png;base64,")
+        assert "http" not in svg.replace("http://www.w3.org/2000/svg", "")
+        with Image.open(folder / f"figure_{name}.png") as picture:
+            assert np.asarray(picture.convert("L")).std() > 5  # not blank
+
+
+def test_page_is_self_contained_and_names_every_claim_with_its_verdict(paper: Paper, folder: Path) -> None:
+    page = (folder / "paper.html").read_text("utf-8")
+    assert "default-src 'none'; img-src data:; style-src 'unsafe-inline'" in page
+    assert "<script" not in page
+    assert page.count('<td class="verdict') == len(paper.claims)
+    for claim in paper.claims:
+        assert claim.verdict.capitalize() in page
+
+
+def test_claims_cover_the_figures_the_table_and_both_readings(paper: Paper) -> None:
+    assert len(paper.claims) == 26  # and as many rows in test_studies_paper_checks.py: a new claim needs one there
+    places = {claim.where for claim in paper.claims}
+    assert places >= {"Table 1", *(f"Figure {name}" for name in FIGURES)}
+    told = " ".join(check.condition for claim in paper.claims for check in claim.checks)
+    assert all(reading in told for reading in READINGS)
+
+
+def test_json_holds_what_the_page_says(paper: Paper, folder: Path) -> None:
+    held = json.loads((folder / "paper.json").read_text("utf-8"))
+    assert held == json.loads(json.dumps(as_json(paper)))
+    assert sum(held["verdicts"].values()) == len(held["claims"]) == len(paper.claims)
+    assert [claim["verdict"] for claim in held["claims"]] == [claim.verdict for claim in paper.claims]
+
+
+def test_another_run_takes_up_the_renders_and_gives_the_same_numbers(
+    paper: Paper, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("render.engine._render", lambda *_, **__: pytest.fail("rendered again"))
+    again = make(Setup(folder, size=24, spp=4, band_nm=100.0, seeds=2))
+    assert again.claims == paper.claims
+
+
+def test_failed_write_leaves_no_file(paper: Paper, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = Path.write_bytes
+
+    def full_disk(path: Path, data: bytes) -> int:
+        if path.name == "paper.html":
+            raise OSError(28, "No space left on device", str(path))
+        return real(path, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full_disk)
+    with pytest.raises(OSError, match="No space left"):
+        write(paper, tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("option", "value"), [("--size", "4"), ("--spp", "0"), ("--seeds", "1")])
+def test_bad_numbers_are_refused_before_anything_is_made(
+    option: str, value: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["paper", "-o", str(tmp_path / "out"), option, value])
+    assert left.value.code == 2
+    assert capsys.readouterr().err.startswith(f"rodcone: {option[2:]}: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_readings_keep_table_1s_own_noise_behind_other_pixels() -> None:
+    assert sensor_of("table1_pixel", pitch_um=3).pixel.read_noise_e == pytest.approx(4580 / 30)
+    assert sensor_of("table1_output", pitch_um=3).pixel.read_noise_e == pytest.approx(4580 / 30 / 7.98)
+    assert sensor_of("table1_pixel", pitch_um=3).pixel.full_well_e == pytest.approx(15_000 * (3 / 2.2) ** 2)
+
+
+def test_numbers_of_the_paper_in_closed_form() -> None:
+    assert moonlight_photons(400, 700) == pytest.approx(9.71, rel=2e-3)
+    assert gain_db("table1_output", shot_alone=True) == pytest.approx(9.542425, abs=1e-6)
+
+
+def test_noise_is_the_standard_deviation_of_luminance_over_exposures() -> None:
+    rng = np.random.default_rng(0)
+    field = np.linspace(0.1, 0.9, 64 * 64).reshape(64, 64)  # the scene itself is no noise
+    pictures = [np.repeat((field + rng.normal(0.0, 0.05, field.shape))[..., None], 3, axis=2) for _ in range(4)]
+    # A variance of 3 degrees of freedom over 4096 pixels: relative error of its root 0.64 %; 5 of them.
+    assert noise(pictures) == pytest.approx(0.05, rel=0.032)
+
+
+def test_decoding_undoes_encoding() -> None:
+    values = np.linspace(0.0, 1.0, 101)
+    np.testing.assert_allclose(decode_srgb(encode_srgb(values)), values, atol=1e-7)
+
+
+def test_edge_is_found_at_the_first_bright_column() -> None:
+    field = np.ones((3, 10))
+    for row, column in enumerate((4, 5, 6)):
+        field[row, :column] = 0.25
+    np.testing.assert_array_equal(edge_columns(field), [4, 5, 6])
+
+
+def test_likeness_is_a_correlation_and_none_without_pixels() -> None:
+    plane, where = np.arange(16.0).reshape(4, 4), np.ones((4, 4), bool)
+    assert likeness(2 * plane + 1, plane, where) == pytest.approx(1.0)
+    assert likeness(-plane, plane, where) == pytest.approx(-1.0)
+    assert likeness(np.ones((4, 4)), plane, where) == 0.0
+    assert likeness(plane, plane, ~where) == 0.0
+
+
+def test_numbers_and_ranges_in_words() -> None:
+    assert range_text(at_least("", 1.0, 0.95)) == "at least 0.95"
+    assert range_text(at_most("", 1.0, 30.0)) == "at most 30"
+    assert range_text(Check("", 9.5, 9.04, 10.04)) == "9.04 to 10.04"
+    assert range_text(Check("", 1.0, 1.0, 1.0)) == "exactly 1"
+    assert value_text(Check("", 9.5424, 9.04, 10.04, "dB")) == "9.54\N{NO-BREAK SPACE}dB"
+    # 0.9496 would read 0.95 beside "at least 0.95", and fail: another digit tells why
+    assert value_text(at_least("", 0.94996, 0.95)) == "0.94996"
+
+
+@pytest.mark.skipif(
+    CHROME.CHROMIUM is None or sys.platform == "win32",
+    reason="needs `chromium` on PATH (Debian: apt install chromium) and POSIX file descriptors",
+)
+def test_page_is_quiet_in_a_browser_and_fits_a_phone(paper: Paper, folder: Path, tmp_path: Path) -> None:
+    browser = CHROME.Browser(tmp_path / "profile")
+    try:
+        shades = []
+        for dark in (False, True):
+            page = CHROME.Page(browser, folder / "paper.html", width=360, dark=dark)
+            page.value("Promise.all([...document.images].map((image) => image.decode()))")
+            assert page.requests() == []
+            assert page.complaints() == []
+            assert page.value("document.documentElement.scrollWidth") == 360
+            shades.append(float(np.median(page.screenshot())))
+        assert shades[0] > 200  # the page's own shade: light
+        assert shades[1] < 60  # and dark
+    finally:
+        browser.close()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_full_command_judges_every_claim(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["paper", "-o", str(tmp_path)])
+    assert left.value.code == 0
+    assert capsys.readouterr().out.strip() == str(tmp_path / "paper.html")
+    verdicts = {
+        claim["claim"]: claim["verdict"] for claim in json.loads((tmp_path / "paper.json").read_text())["claims"]
+    }
+    assert verdicts["Interleaved is less noisy than Bayer at 5, 10 and 20 ms"] == "reproduced"
+    assert verdicts["W replaces the luminance at 5 ms, and not at 10 and 20 ms"] == "reproduced"
+    assert verdicts["The voltage swing is what a full well gives"] == "not reproduced"

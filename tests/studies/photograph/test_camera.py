@@ -1,0 +1,71 @@
+"""A photograph with every processor: on a known grey and on colours, all show the scene's own numbers."""
+
+import numpy as np
+import pytest
+
+from isp.colour.camera_colour import encode_srgb
+from isp.processors.catalogue import PROCESSORS
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from scenes.reflectances import color_checker
+from sensor.optics import form_image
+from sensor.response import expected_electrons
+from studies.metrics.truth import light_in_bands, true_srgb
+from studies.photograph.camera import build_camera, photograph
+
+NM = DEFAULT_WAVELENGTH_NM
+WIDTH = band_widths(NM)
+LIGHT = light_in_bands(illuminant("D65"), NM, WIDTH)
+QUICK = [name for name in PROCESSORS if name != "bayer_bm3d"]
+SIDE = 16  # pixels of a patch
+
+
+EXPOSURE_S = 0.025  # W collects 10 600 of its 15 000 e- from a perfect white
+
+
+def chart(reflectances: np.ndarray) -> SpectralRadiance:
+    """Patches (4, 6, band) under D65, 100 cd/m^2 from a perfect white."""
+    values = 100.0 * np.repeat(np.repeat(reflectances, SIDE, axis=0), SIDE, axis=1) * LIGHT.spectrum
+    return SpectralRadiance(values, NM)
+
+
+def patches(name: str, radiance: SpectralRadiance) -> tuple[np.ndarray, np.ndarray]:
+    """Mean colour of each patch as the camera shows it, and the right one, (4, 6, 3), encoded."""
+    camera = build_camera(name, "low_noise", LIGHT, radiance.shape, np.random.default_rng(0))
+    expected = expected_electrons(form_image(radiance, camera.sensor), camera.sensor, EXPOSURE_S)
+    truth = encode_srgb(true_srgb(radiance, LIGHT, 100.0))
+    shot = photograph(camera, expected, truth, LIGHT, 100.0, EXPOSURE_S, np.random.default_rng(1))
+    assert not shot.raw.saturated.any()
+    inside = slice(4, -4)
+    shown, right = (
+        picture.reshape(4, SIDE, 6, SIDE, 3).swapaxes(1, 2)[:, :, inside, inside] for picture in (shot.encoded, truth)
+    )
+    return shown.mean((2, 3)), right.mean((2, 3))
+
+
+def require_library(name: str) -> None:
+    if PROCESSORS[name].extra is not None:
+        pytest.importorskip("colour_demosaicing", reason=f"rodcone[{PROCESSORS[name].extra}] is not installed")
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_every_camera_shows_greys_at_their_own_level(name: str) -> None:
+    require_library(name)
+    greys = np.broadcast_to(np.linspace(0.05, 0.9, 24).reshape(4, 6, 1), (4, 6, NM.size))
+    shown, right = patches(name, chart(greys))
+    # The darkest patch has 126 e- in green and 16 samples of a colour: 2.2 % of linear light, half of that encoded,
+    # times 2 in the matrix of R, G and B or 4 in that of C, Y and M, and 3.5 sigma for the largest of 72: 15 %. On
+    # average over the greys a fifth of it. A unit mixed up, such as green's for yellow's, would be 20 % everywhere.
+    assert np.abs(shown / right - 1).max() < 0.15
+    assert np.abs(shown / right - 1).mean() < 0.02
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_every_camera_shows_the_colour_checkers_colours(name: str) -> None:
+    require_library(name)
+    surfaces = np.array([reflectance.band_average(NM, WIDTH) for _, reflectance in color_checker()])
+    shown, right = patches(name, chart(surfaces.reshape(4, 6, -1)))
+    hues = [(one - one.mean(-1, keepdims=True)).ravel() for one in (shown, right)]
+    # Gray World on a chart that isn't grey shifts all of them; a matrix with its columns mixed up turns them
+    assert np.corrcoef(*hues)[0, 1] > 0.9

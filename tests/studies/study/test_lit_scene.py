@@ -1,0 +1,127 @@
+"""A study's scene: opened with its faults told, and lit by another spectrum at the luminance of its own."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from render.radiance_files.radiance_source import as_transport
+from render.scene import LightGroup
+from render.transport import Transport
+from rodcone.digests import digest
+from rodcone.errors import InputError
+from scenes.catalog import load
+from studies.study.lit_scene import (
+    digest_scene,
+    level_luminance,
+    open_choice,
+    spectral_luminance,
+    under,
+    white_spectrum,
+)
+from studies.study.study import OWN, SceneChoice, Study
+
+NM = np.arange(385.0, 780.0, 10.0)
+STUDY = Study((SceneChoice("still_life"),), ("25cd/m2",))
+
+
+def transport(luminances: tuple[float, float] = (100.0, 3.0)) -> Transport:
+    """Two lights of which each fills one half of the picture, in equal shares at every wavelength."""
+    flat = as_transport(SpectralRadiance(np.ones((2, 2, NM.size), dtype=np.float32), NM))
+    halves = np.zeros((2, NM.size, 2, 2), dtype=np.float32)
+    halves[0, :, :, 0] = halves[1, :, :, 1] = 1.0
+    groups = {name: LightGroup((), illuminant("D65") * x) for name, x in zip("ab", luminances, strict=True)}
+    return replace(flat, radiance=halves, half_difference=0 * halves, variance=0 * halves, groups=groups)
+
+
+@pytest.mark.parametrize("spectrum", ["A", "F11", "LED-B3"])
+def test_another_spectrum_keeps_the_luminance_of_each_light(spectrum: str) -> None:
+    lit = under(transport(), spectrum).relight()
+    # bands of 10 nm against the 1 nm in which an illuminant is brought to 1 cd/m^2: 1 % with the lines of F11
+    np.testing.assert_allclose(lit.luminance(), [[100.0, 3.0]] * 2, rtol=0.01)
+    shape = illuminant(spectrum).band_average(NM, np.full(NM.size, 10.0))
+    np.testing.assert_allclose(lit.values[0, 0], shape * 100.0, rtol=1e-6)
+
+
+def test_own_changes_nothing_and_a_spectrum_has_its_luminance() -> None:
+    given = transport()
+    assert under(given, OWN) is given
+    assert spectral_luminance(illuminant("A") * 7.0) == pytest.approx(7.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("level", "per_cd_m2", "luminance"), [("25cd/m2", None, 25.0), ("25cd/m2", 4.0, 25.0), ("500lux", 4.0, 125.0)]
+)
+def test_levels_become_luminances(level: str, per_cd_m2: float | None, luminance: float) -> None:
+    assert level_luminance(level, per_cd_m2) == luminance
+
+
+@pytest.mark.parametrize("per_cd_m2", [None, 0.0])
+def test_lux_need_light_on_a_plane(per_cd_m2: float | None) -> None:
+    with pytest.raises(InputError, match="give it in cd/m2"):
+        level_luminance("500lux", per_cd_m2)
+
+
+def test_the_longer_side_is_as_asked_and_a_file_keeps_its_own_proportions(tmp_path: Path) -> None:
+    assert open_choice(SceneChoice("still_life"), STUDY).size == (256, 256)
+    study = replace(STUDY, render=replace(STUDY.render, size=96))
+    assert open_choice(SceneChoice("still_life"), study).size == (96, 96)
+    text = """<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm"><integer name="width" value="80"/>
+        <integer name="height" value="40"/></film></sensor><emitter type="constant"/></scene>"""
+    (tmp_path / "wide.xml").write_text(text, "utf-8")
+    choice = SceneChoice(str(tmp_path / "wide.xml"))
+    assert open_choice(choice, STUDY).size == (40, 80)
+    assert open_choice(choice, study).size == (48, 96)
+    with pytest.raises(InputError, match="a file has its own"):
+        open_choice(replace(choice, light="A"), STUDY)
+
+
+def test_what_a_scene_cannot_do_is_told_when_it_is_opened(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="did you mean 'still_life'"):
+        open_choice(SceneChoice("stil_life"), STUDY)
+    sky = SceneChoice(str(tmp_path / "sky.xml"))
+    Path(sky.source).write_text(
+        '<scene version="3.0.0"><sensor type="perspective"/><emitter type="sunsky"/></scene>', "utf-8"
+    )
+    study = replace(STUDY, render=replace(STUDY.render, range_nm=(380.0, 720.0)))
+    assert white_spectrum(open_choice(sky, study), OWN) is illuminant("D65")
+    with pytest.raises(InputError, match="a sunsky is known over 320-720 nm alone"):
+        open_choice(sky, STUDY)
+    with pytest.raises(InputError, match="colours of their own"):
+        open_choice(sky, replace(study, spectra=("own", "A")))
+
+
+def test_colours_are_set_to_the_scenes_light_or_the_one_that_is_put_in_its_place() -> None:
+    opened = open_choice(SceneChoice("color_checker", "A"), STUDY)
+    assert opened.scene is not None
+    own = next(iter(opened.scene.groups.values())).spectrum
+    assert white_spectrum(opened, OWN) is own
+    assert white_spectrum(opened, "D65") is illuminant("D65")
+    file = replace(opened, scene=None, choice=SceneChoice("x.exr", "A"))
+    assert white_spectrum(file, OWN) is illuminant("A")
+
+
+def test_a_scenes_identity_is_its_content() -> None:
+    first, other = (open_choice(SceneChoice("color_checker", light), STUDY).identity for light in ("A", "D65"))
+    assert first == open_choice(SceneChoice("color_checker", "A"), STUDY).identity
+    assert first != other
+
+
+def test_files_that_a_scene_names_count_by_their_content(tmp_path: Path) -> None:
+    scene, mesh = load("flat_field"), tmp_path / "mesh.ply"
+    mesh.write_bytes(b"one")
+    with_mesh = replace(scene, geometry={**scene.geometry, "bunny": {"type": "ply", "filename": str(mesh)}})
+    before = digest_scene(with_mesh)
+    assert before == digest_scene(with_mesh)
+    mesh.write_bytes(b"two")
+    assert digest_scene(with_mesh) != before
+
+
+def test_digests_tell_values_apart_to_the_last_bit_and_not_their_containers() -> None:
+    assert digest([1.0, "a"]) == digest((1.0, "a"))
+    assert digest({"x": 1, "y": 2}) == digest({"y": 2, "x": 1})
+    assert digest(np.array([0.1, 0.2])) == digest([0.1, 0.2])
+    assert len({digest(value) for value in (0.1, np.nextafter(0.1, 1), "0.1", [0.1], None, True)}) == 6

@@ -1,0 +1,96 @@
+"""A study's axes: every combination once, and faults told before any scene is opened."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rodcone.errors import InputError
+from sensor.presets import preset_file
+from studies.study.study import SceneChoice, Study, check, conditions, label, mosaics, parse_exposure
+
+STUDY = Study((SceneChoice("still_life"), SceneChoice("flat_field", "A")), ("1cd/m2", "25cd/m2", "500lux"))
+
+
+def test_conditions_are_the_product_of_five_axes_each_once() -> None:
+    study = replace(STUDY, spectra=("own", "A"), exposures=("auto", "5ms"), sensors=("low_noise", "table1_output"))
+    made = conditions(study)
+    assert len(made) == len(set(made)) == 2 * 2 * 3 * 2 * 2
+    first, second = made[0], made[1]
+    assert (first.scene.source, first.spectrum, first.level, first.exposure) == ("still_life", "own", "1cd/m2", "auto")
+    assert (first.sensor, second.sensor) == study.sensors  # the last runs fastest
+    assert replace(second, sensor=first.sensor) == first
+
+
+def test_mosaics_are_those_of_the_processors_each_once() -> None:
+    assert mosaics(replace(STUDY, processors=("bayer", "interleaved"))) == ("bayer", "rgbw")
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"), [("auto", None), ("10ms", 0.01), ("0.5 s", 0.5), ("200us", 2e-4), ("1e-2s", 0.01)]
+)
+def test_exposures_are_times_with_a_unit_or_auto(text: str, seconds: float | None) -> None:
+    assert parse_exposure(text) == (None if seconds is None else pytest.approx(seconds, rel=1e-15))
+
+
+@pytest.mark.parametrize(("value", "name"), [("/a/b/desk.exr", "desk.exr"), ("low_noise", "low_noise"), (3, "3")])
+def test_files_are_called_by_their_own_names(value: object, name: str) -> None:
+    assert label(value) == name
+
+
+def test_the_default_study_is_allowed() -> None:
+    check(STUDY)
+
+
+def test_auto_exposure_needs_a_green_in_the_presets_own_mosaic(tmp_path: Path) -> None:
+    text = preset_file("low_noise").read_text("utf-8").replace('cfa = "rgbw"', 'cfa = ["RB", "BW"]')
+    (tmp_path / "mine.toml").write_text(text, "utf-8")
+    study = replace(STUDY, sensors=(str(tmp_path / "mine.toml"),))
+    with pytest.raises(InputError, match=r"looks at G, which mine.toml's mosaic lacks; give times such as 5ms"):
+        check(study)
+    check(replace(study, exposures=("5ms",)))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"levels": ()}, "levels: [] is not allowed; give one or more"),
+        ({"seeds": (1, 1)}, "seeds: ['1', '1']"),
+        ({"scenes": (SceneChoice("a/x.exr"), SceneChoice("b/x.exr"))}, "files under names of their own"),
+        ({"levels": ("25nits",)}, "'nits' is unknown"),
+        ({"exposures": ("10",)}, "write 10ms"),
+        ({"exposures": ("0s",)}, "give a time above 0"),
+        ({"spectra": ("D66",)}, "did you mean 'D65'"),
+        ({"scenes": (SceneChoice("still_life", "AA"),)}, "illuminant: 'AA' is unknown"),
+        ({"scenes": (SceneChoice("x.exr"),), "spectra": ("A",)}, "can't relight x.exr"),
+        ({"sensors": ("low_nose",)}, "did you mean 'low_noise'"),
+        ({"processors": ("bayers",)}, "did you mean 'bayer'"),
+        ({"seeds": (-1,)}, "give whole numbers"),
+        ({"longest_exposure_s": 0.0}, "longest_exposure_s"),
+        ({"render": replace(STUDY.render, spp=0)}, "render.spp"),
+        ({"render": replace(STUDY.render, size=8)}, "render.size"),
+        ({"lens": replace(STUDY.lens, veiling_glare=2.0)}, "lens.veiling_glare"),
+        ({"budget": replace(STUDY.budget, monte_carlo=0.2)}, "within budget.total"),
+    ],
+)
+def test_faults_are_told_in_one_line(changes: dict[str, object], words: str) -> None:
+    with pytest.raises(InputError) as told:
+        check(replace(STUDY, **changes))  # type: ignore[arg-type]
+    assert words in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+def test_the_near_infrared_asks_for_lights_that_are_known_there() -> None:
+    far = replace(STUDY.render, range_nm=(380.0, 1070.0))
+    check(replace(STUDY, render=far, spectra=("own", "sunlight", "moonlight", "2856K", "E", "LED-B5")))
+    for light in ("D65", "A", "LED-V1", "sodium_high", "sodium_low"):
+        check(replace(STUDY, spectra=(light,)))
+        with pytest.raises(InputError, match=f"spectra: '{light}' is known over .* take one of them") as error:
+            check(replace(STUDY, render=far, spectra=(light,)))
+        assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("range_nm", [(380.0,), (780.0, 380.0), (200.0, 780.0), (380.0, 1200.0), (380.0, 400.0)])
+def test_a_range_without_lights_or_without_a_band_is_refused(range_nm: tuple[float, ...]) -> None:
+    with pytest.raises(InputError, match=r"render\.range_nm: \["):
+        check(replace(STUDY, render=replace(STUDY.render, range_nm=range_nm)))

@@ -1,0 +1,99 @@
+"""Studies as TOML: strict keys and types, files beside the study, values changed from the command line."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rodcone.errors import InputError
+from studies.study import study_file
+from studies.study.study import SceneChoice, Study
+from studies.study.study_file import read_study
+
+EXAMPLES = sorted((Path(study_file.__file__).parents[1] / "configs").glob("*.toml"))
+TEXT = """
+scenes = ["still_life", {source = "desk.exr", light = "A"}]
+levels = ["1cd/m2", "25cd/m2"]
+sensors = ["low_noise"]
+[render]
+spp = 16
+"""
+
+
+def written(folder: Path, text: str = TEXT) -> Path:
+    path = folder / "study.toml"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def told(folder: Path, text: str = TEXT, *changes: str) -> str:
+    with pytest.raises(InputError) as error:
+        read_study(written(folder, text), changes)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_a_file_becomes_a_study_with_files_beside_it(tmp_path: Path) -> None:
+    study = read_study(written(tmp_path))
+    scenes = (SceneChoice("still_life"), SceneChoice(str(tmp_path / "desk.exr"), "A"))
+    expected = Study(scenes, ("1cd/m2", "25cd/m2"))
+    assert study == replace(expected, render=replace(expected.render, spp=16))
+
+
+def test_a_scenes_surfaces_may_be_held_beyond_their_tables(tmp_path: Path) -> None:
+    text = TEXT.replace('{source = "desk.exr", light = "A"}', '{source = "room.xml", extend = "hold"}')
+    assert read_study(written(tmp_path, text)).scenes[1] == SceneChoice(str(tmp_path / "room.xml"), extend="hold")
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=[path.stem for path in EXAMPLES])
+def test_every_example_is_a_study(path: Path) -> None:
+    assert read_study(path).name == path.stem.replace("_", " ")
+
+
+def test_changes_take_toml_values_and_plain_words_and_make_tables(tmp_path: Path) -> None:
+    study = read_study(
+        written(tmp_path),
+        ["render.spp=64", "seeds=[3, 4]", "sensors=table1_output", "budget.total=0.2", 'levels=["2cd/m2"]'],
+    )
+    assert (study.render.spp, study.seeds, study.sensors) == (64, (3, 4), ("table1_output",))
+    assert (study.budget.total, study.levels) == (0.2, ("2cd/m2",))
+
+
+@pytest.mark.parametrize(("given", "seeds"), [("3", (0, 1, 2)), ("1", (0,)), ("[3]", (3,)), ("[5, 2]", (5, 2))])
+def test_a_number_of_seeds_counts_from_0_and_a_list_names_them(
+    given: str, seeds: tuple[int, ...], tmp_path: Path
+) -> None:
+    study = read_study(written(tmp_path), [f"seeds={given}", "scenes=still_life"])
+    assert (study.seeds, study.scenes) == (seeds, (SceneChoice("still_life"),))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (["lvels=3"], "key: 'lvels' is unknown; allowed: budget, exposures"),
+        (["lvels=3"], "did you mean 'levels'?"),
+        (["render.ssp=3"], "render: key: 'ssp' is unknown; allowed: band_nm, max_seconds, range_nm, seed, size, spp"),
+        (['scenes=[{sorce="x"}]'], "did you mean 'source'?"),
+        (["seeds=[true]"], "seeds: True is not a whole number"),
+        (['seeds=["1"]'], "seeds: '1' is not a whole number"),
+        (["seeds=0"], "seeds: 0 is outside 1 to 100000; give how many, from 0 on, or a list such as [7]"),
+        (["seeds=-3"], "seeds: -3 is outside 1 to"),
+        (["seeds=true"], "seeds: True is not a whole number"),
+        (["render.spp=1.5"], "render: spp: 1.5 is not a whole number"),
+        (["name=3"], "name: 3 is not a text in quotes"),
+        (["render=3"], "render: what stands there is not a table"),
+        (["scenes=[3]"], "3 is not a scene"),
+        (["sensors.x=3"], "'sensors' of 'sensors.x' is not a table"),
+        (["spp"], "write KEY=VALUE"),
+        (["levels=[]"], "levels: [] is not allowed"),
+    ],
+)
+def test_wrong_keys_and_values_are_told_in_one_line(changes: list[str], words: str, tmp_path: Path) -> None:
+    assert words in told(tmp_path, TEXT, *changes)
+
+
+def test_what_is_missing_or_unreadable_is_told(tmp_path: Path) -> None:
+    assert "key 'levels' is missing" in told(tmp_path, 'scenes = ["still_life"]')
+    assert "can't be read" in told(tmp_path, "levels = [")
+    with pytest.raises(InputError, match=r"rodcone new study -o FILE"):
+        read_study(tmp_path / "absent.toml")

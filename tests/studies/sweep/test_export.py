@@ -1,0 +1,69 @@
+"""A ledger as a table: CSV that no spreadsheet runs, Parquet and pandas with the same values."""
+
+import csv
+from dataclasses import asdict, replace
+from io import StringIO
+from pathlib import Path
+
+import pandas as pd
+import pyarrow.parquet
+import pytest
+from sweep_sample import ROW
+
+from rodcone.errors import InputError
+from studies.sweep.database import COLUMNS, add, open_ledger, want
+from studies.sweep.export import read_rows, to_csv, to_pandas, write_table
+
+
+@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
+def test_a_text_that_a_spreadsheet_would_run_is_quoted(start: str) -> None:
+    table = list(csv.reader(StringIO(to_csv([replace(ROW, scene=f"{start}cmd|' /C calc'!A0")]), newline="")))
+    assert table[1][COLUMNS.index("scene")] == f"'{start}cmd|' /C calc'!A0"
+
+
+def test_csv_holds_every_value_and_numbers_as_they_are() -> None:
+    header, values = csv.reader(StringIO(to_csv([ROW]), newline=""))
+    assert tuple(header) == COLUMNS
+    found = dict(zip(header, values, strict=True))
+    assert (found["scene"], found["ssim"], found["snr_db"]) == ("desk, lit.exr", "-0.25", "-3.5")
+    assert float(found["exposure_s"]) == ROW.exposure_s  # every digit
+    assert (found["illuminance_lux"], found["psnr_db"]) == ("", "inf")
+
+
+def test_parquet_and_pandas_hold_the_same_values(tmp_path: Path) -> None:
+    table = [ROW, replace(ROW, key="01", illuminance_lux=500.0)]
+    write_table(table, tmp_path / "t.parquet")
+    read = pyarrow.parquet.read_table(tmp_path / "t.parquet").to_pylist()
+    assert read == [asdict(row) for row in table]
+    frame = to_pandas(table)
+    assert list(frame.columns) == list(COLUMNS)
+    assert frame.loc[1, "illuminance_lux"] == 500.0
+    assert pd.isna(frame.loc[0, "illuminance_lux"])
+    assert frame["exposure_s"].tolist() == [ROW.exposure_s] * 2
+
+
+def test_rows_come_from_the_ledger_in_the_studys_order_or_all(tmp_path: Path) -> None:
+    with open_ledger(tmp_path) as base:
+        for key in ("a", "b", "c"):
+            add(base, replace(ROW, key=key))
+        want(base, ["c", "a"])
+    assert [row.key for row in read_rows(tmp_path)] == ["c", "a"]
+    assert read_rows(tmp_path, everything=True) == [replace(ROW, key=key) for key in "abc"]
+
+
+def test_wrong_places_are_told_and_nothing_is_left(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"holds no ledger.sqlite"):
+        read_rows(tmp_path)
+    with pytest.raises(InputError, match=r"'.txt' is unknown; allowed: .csv, .parquet"):
+        write_table([ROW], tmp_path / "t.txt")
+    with pytest.raises(OSError, match="absent"):
+        write_table([ROW], tmp_path / "absent" / "t.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_library_that_is_absent_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("studies.sweep.export.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"rodcone\[parquet\]"):
+        write_table([ROW], tmp_path / "t.parquet")
+    with pytest.raises(InputError, match=r"rodcone\[pandas\]"):
+        to_pandas([ROW])

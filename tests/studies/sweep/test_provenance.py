@@ -1,0 +1,232 @@
+"""What a row says that made it is what did: versions, engines, threads, counted another way; and nothing is mixed."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields, replace
+from functools import partial
+from importlib import import_module, metadata
+from pathlib import Path
+
+import pytest
+import sweep_sample as SAMPLE
+
+from isp.processors.catalogue import PROCESSORS
+from rodcone.errors import InputError
+from rodcone.jit import LIBLLVM, backend, dr
+from studies.budget.model_plan import Plan
+from studies.commands.cli import main
+from studies.pages.duels import cases_of
+from studies.pages.report_sweep import ledger_results
+from studies.study.study import RenderLimits, SceneChoice, Study
+from studies.sweep import provenance
+from studies.sweep.cells import Cell
+from studies.sweep.database import add, open_ledger
+from studies.sweep.export import read_rows
+from studies.sweep.provenance import Provenance, versions
+from studies.sweep.row import Row
+from studies.sweep.run_cell import run_cell
+from studies.sweep.run_sweep import sweep
+from studies.sweep.workers import cores, run_in_processes
+
+
+def inexact(plan: Plan) -> Plan:
+    """The same, read out in single precision where there is a backend."""
+    return replace(plan, images={place: replace(model, exact=False) for place, model in plan.images.items()})
+
+
+def test_versions_are_those_that_the_modules_tell_themselves() -> None:
+    found = versions()
+    own = {"scikit-image": "skimage", "colour-science": "colour"}
+    for name in ("numpy", "scipy", "mitsuba", "drjit", *own):
+        assert found[name] == import_module(own.get(name, name)).__version__
+    assert found["rodcone"].startswith(metadata.version("rodcone") + "+")
+    if backend() == "llvm":
+        assert LIBLLVM is not None
+        mapped = {line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if "libLLVM" in line}
+        assert any(Path(path).name.endswith(found["llvm"].rsplit(".", 1)[0]) for path in mapped), mapped
+    else:
+        assert found["llvm"] == "none"
+
+
+def kernels_in(work: Callable[[], Row]) -> tuple[Row, int]:
+    """Kernels that Dr.Jit launches meanwhile, by its own history."""
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history()
+        row = work()
+        return row, len([one for one in dr.kernel_history() if "cache_hit" in one])
+
+
+@pytest.mark.skipif(backend() == "numpy", reason="no kernel runs without a backend")
+@pytest.mark.parametrize("exact", [True, False])
+@pytest.mark.parametrize("name", [name for name, one in PROCESSORS.items() if one.extra is None])
+def test_a_row_names_the_engines_that_kernels_ran_on(name: str, exact: bool, tmp_path: Path) -> None:
+    """Kernels are launched if readout or development say so, and twice where both do."""
+    study = SAMPLE.small_study(tmp_path, processors=(name,), levels=("1cd/m2",), seeds=(0,))
+    plan = SAMPLE.stated(study) if exact else inexact(SAMPLE.stated(study))
+    made: list[tuple[Row, int]] = []
+
+    def runner(cells):  # type: ignore[no-untyped-def]
+        for cell in cells:
+            run_cell(cell)  # compiles
+            made.append(kernels_in(partial(run_cell, cell)))
+            assert cell.made_by == Provenance(*(getattr(made[-1][0], field.name) for field in fields(Provenance)))
+            yield made[-1][0]
+
+    sweep(study, tmp_path / "out", plan, runner)
+    (row, kernels), of_readout = made[0], 0 if exact else 1
+    assert row.variant == "none", "a picture file is not rendered"
+    assert row.readout_engine == ("numpy" if exact else backend())
+    assert (kernels > of_readout) == (row.development_engine == backend())
+    if row.development_engine == "numpy":
+        assert kernels == of_readout
+
+
+THREADS = """
+import json, os, sys
+import numpy as np
+from pathlib import Path
+from rodcone.jit import dr, arrays, backend
+sys.path.insert(0, sys.argv[1])
+import sweep_sample as SAMPLE
+from studies.sweep.run_cell import run_cell
+from studies.sweep.database import open_ledger
+from studies.study.lit_scene import open_all
+from studies.sweep.prepare import Job, scene_cells
+folder = Path(sys.argv[2])
+study = SAMPLE.small_study(folder, processors=("interleaved",), levels=("1cd/m2",), seeds=(0,))
+with open_ledger(folder) as base:
+    job = Job(study, SAMPLE.stated(study), folder, base)
+    cells = [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
+threads = lambda: len(os.listdir("/proc/self/task"))
+dr.set_thread_count(1)
+others = threads() - 1
+row = run_cell(cells[0], int(sys.argv[3]))
+dr.eval(dr.arange(arrays().Float, 1 << 20) * 2)
+dr.sync_thread()
+print(json.dumps([row.threads, threads() - others, backend()]))
+"""
+
+
+@pytest.mark.skipif(backend() != "llvm", reason="Dr.Jit's threads are LLVM's")
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted in /proc")
+@pytest.mark.parametrize("count", [1, 3])
+def test_threads_told_are_those_that_the_working_process_has(count: int, tmp_path: Path) -> None:
+    command = [sys.executable, "-c", THREADS, str(Path(__file__).resolve().parents[2]), str(tmp_path), str(count)]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout.splitlines()[-1]) == [count, count, "llvm"]
+
+
+def test_rows_of_two_processes_tell_their_own_threads_not_the_parents(tmp_path: Path) -> None:
+    SAMPLE.swept(SAMPLE.small_study(tmp_path), tmp_path / "out", partial(run_in_processes, workers=2))
+    found = read_rows(tmp_path / "out")
+    assert [row.threads for row in found] == 4 * [max(1, cores() // 2) if backend() == "llvm" else 1]
+    assert os.getpid() not in {row.worker for row in found}
+
+
+def test_a_rows_variant_is_the_one_that_mitsuba_has_set(tmp_path: Path) -> None:
+    limits = RenderLimits(size=16, spp=16, band_nm=100.0)
+    study = Study((SceneChoice("flat_field"),), ("1cd/m2",), processors=("bayer",), render=limits)
+    SAMPLE.swept(study, tmp_path)
+    (row,) = read_rows(tmp_path)
+    assert row.variant == import_module("mitsuba").variant()
+
+
+def versions_of_numpy(monkeypatch: pytest.MonkeyPatch, version: str) -> None:
+    tell = metadata.version
+    monkeypatch.setattr(provenance.metadata, "version", lambda name: version if name == "numpy" else tell(name))
+    provenance.versions.cache_clear()
+
+
+@pytest.fixture
+def restored() -> Iterator[None]:
+    yield
+    provenance.versions.cache_clear()
+
+
+@pytest.mark.usefixtures("restored")
+def test_cells_of_other_versions_are_made_anew_and_kept_where_that_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A sweep ended after one cell, gone on with under another NumPy: no mean holds cells of both."""
+    study, out = SAMPLE.small_study(tmp_path), tmp_path / "out"
+
+    def ended(cells: Sequence[Cell]) -> Iterator[Row]:
+        yield from SAMPLE.here(cells[:1])
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        versions_of_numpy(patched, "1.9")
+        with pytest.raises(KeyboardInterrupt):
+            SAMPLE.swept(study, out, ended)
+    provenance.versions.cache_clear()
+    assert sweep(study, out, SAMPLE.stated(study), SAMPLE.here, keep_old=True).made == 4
+    told = [json.loads(row.versions)["numpy"] for row in read_rows(out, everything=True)]
+    assert sorted(told) == ["1.9"] + 4 * [metadata.version("numpy")]
+    assert {json.loads(row.versions)["numpy"] for row in read_rows(out)} == {metadata.version("numpy")}
+    assert len(cases_of([replace(row, processor=name) for row in read_rows(out) for name in ("a", "b")])) == 2
+    assert ledger_results(out)[0]["environment"]["numpy"] == metadata.version("numpy")
+    assert SAMPLE.swept(study, out).made == 0
+    assert len(read_rows(out, everything=True)) == 4, "removed where it isn't asked for"
+
+
+def test_a_report_or_ranking_over_mixed_cells_is_refused_in_one_line(tmp_path: Path) -> None:
+    study, out = SAMPLE.small_study(tmp_path), tmp_path / "out"
+    SAMPLE.swept(study, out)
+    for change, words in (
+        ({"versions": json.dumps(versions() | {"scipy": "0.1"})}, "scipy"),
+        ({"variant": "llvm_ad_spectral"}, "Mitsuba variant none and llvm_ad_spectral"),
+        ({"readout_engine": "llvm"}, "engine of captures numpy and llvm"),
+        ({"development_engine": "llvm"}, "engine of development numpy and llvm"),
+    ):
+        found = read_rows(out)
+        mixed = [*found[:-1], replace(found[-1], **change)]  # type: ignore[arg-type]
+        with pytest.raises(InputError, match=words) as told:
+            cases_of(mixed)
+        assert "\n" not in str(told.value)
+    with open_ledger(out) as base:
+        add(base, replace(found[-1], variant="llvm_ad_spectral"))
+    with pytest.raises(InputError, match="Mitsuba variant"):
+        ledger_results(out)
+
+
+IN_NUMPY = """
+import sys
+from studies.commands.cli import main
+main(sys.argv[1:])
+"""
+
+
+def in_numpy(*arguments: str) -> str:
+    """What the command prints in a process that has no LLVM."""
+    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": "/nonexistent/libLLVM.so"}
+    command = [sys.executable, "-c", IN_NUMPY, *arguments]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.skipif(backend() != "llvm", reason="two engines are to meet in one folder")
+def test_a_folder_swept_without_a_backend_and_then_with_one_holds_no_mean_of_both(tmp_path: Path) -> None:
+    """The second sweep makes all anew; each row tells its own engine, threads and LLVM."""
+    SAMPLE.picture(tmp_path / "scene.exr")
+    study, out = tmp_path / "study.toml", tmp_path / "out"
+    study.write_text(
+        'scenes = [{source = "scene.exr", light = "E"}]\nlevels = ["1cd/m2"]\nprocessors = ["interleaved"]\n', "utf-8"
+    )
+    in_numpy("sweep", str(study), "-o", str(out), "--workers", "1", "--as-stated")
+    (slow,) = read_rows(out)
+    assert (slow.development_engine, slow.threads, json.loads(slow.versions)["llvm"]) == ("numpy", 1, "none")
+    command = ["sweep", str(study), "-o", str(out), "--workers", "1", "--as-stated", "--keep-old", "--json"]
+    with pytest.raises(SystemExit):
+        main(command)
+    (fast,) = read_rows(out)
+    assert (fast.development_engine, json.loads(fast.versions)["llvm"]) == ("llvm", versions()["llvm"])
+    assert len(read_rows(out, everything=True)) == 2
+    environment = ledger_results(out)[0]["environment"]
+    assert environment["engine of development"] == "llvm"
+    assert environment["threads"] == str(fast.threads)

@@ -1,0 +1,186 @@
+"""One cell against the same steps written out, and what the files that cells share have to hold."""
+
+import hashlib
+import json
+import pickle
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sweep_sample as SAMPLE
+from PIL import Image
+
+from isp.colour.camera_colour import encode_srgb
+from isp.colour.colour_fit import fit_colours
+from isp.pipeline import picture_bayer
+from render.illuminants import illuminant
+from render.radiance_files.radiance_source import as_transport, load_radiance
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from rodcone.errors import InputError
+from scenes.reflectances import color_checker
+from sensor.device import draw_device
+from sensor.exposure import auto_exposure_s
+from sensor.optics import falloff, form_image
+from sensor.presets import preset
+from sensor.readout import read_out
+from sensor.response import expected_electrons
+from studies.budget.model_plan import Plan
+from studies.metrics.appearance import appearance, true_picture
+from studies.metrics.quality import measure
+from studies.metrics.truth import light_in_bands, neutral_electrons, true_srgb
+from studies.study.lit_scene import open_all
+from studies.study.model import ImageModel
+from studies.study.study import RenderLimits, SceneChoice, conditions
+from studies.sweep.cells import Cell, device_stream, exposure_stream
+from studies.sweep.database import open_ledger
+from studies.sweep.prepare import Job, scene_cells
+from studies.sweep.run_cell import run_cell
+from studies.sweep.stored import keep
+
+
+def made(folder: Path, plan: Plan | None = None, **changes: Any) -> list[Cell]:
+    """Cells of the small study, their shared files made."""
+    study = SAMPLE.small_study(folder, **changes)
+    with open_ledger(folder) as base:
+        job = Job(study, plan or SAMPLE.stated(study), folder, base)
+        return [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
+
+
+def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
+    cell = next(cell for cell in made(tmp_path) if cell.at.level == "25cd/m2")
+    row = run_cell(cell)
+
+    transport = as_transport(load_radiance(tmp_path / "scene.exr"))
+    radiance = transport.relight(luminance_cd_m2=25.0)
+    sensor = preset("low_noise", "bayer")
+    irradiance = form_image(radiance, sensor)
+    exposure_s = auto_exposure_s(irradiance, preset("low_noise"), 0.066)
+    expected_e = expected_electrons(irradiance, sensor, exposure_s)
+    light = light_in_bands(illuminant("E"), transport.wavelength_nm, transport.width_nm)
+    nm, width = DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM)
+    surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
+    fine = light_in_bands(illuminant("E"), nm, width)
+    responses = sensor.responses.band_average(("R", "G", "B"), nm, width)
+    colours = fit_colours(("R", "G", "B"), responses, nm, fine.spectrum, surfaces, width)
+    device = draw_device(sensor, radiance.shape, device_stream(cell.at, "bayer"))
+    raw = read_out(expected_e, sensor, device, exposure_s, exposure_stream(cell.at, "bayer"))
+    neutral = neutral_electrons(sensor, light, exposure_s)
+    white = float(np.percentile(radiance.luminance(), 99.0, method="inverted_cdf")) / 0.9
+    linear = picture_bayer(raw, colours, neutral=neutral).rgb / (neutral[1] * white)
+    truth = true_srgb(radiance, light, white)
+    encoded = encode_srgb(linear)
+    quality, seen = measure(encoded, encode_srgb(truth)), appearance(linear, true_picture(truth), white)
+
+    assert row.exposure_s == pytest.approx(exposure_s, rel=1e-6)  # the level is put on before or after float32
+    assert row.psnr_db == pytest.approx(quality.psnr_db, abs=1e-3)
+    assert row.ssim == pytest.approx(quality.ssim, abs=1e-5)
+    assert row.delta_e_median == pytest.approx(quality.delta_e_median, abs=1e-3)
+    for name, tolerance in (("s_cielab_median", 1e-3), ("s_cielab_p95", 1e-2), ("flip_mean", 1e-4)):
+        assert getattr(row, name) == pytest.approx(getattr(seen, name), abs=tolerance)
+    assert row.pu21_psnr_db == pytest.approx(seen.pu21_psnr_db, abs=1e-3)  # in absolute luminance: at 25 cd/m^2
+    assert (row.mtf50_cy_per_px, row.chart_delta_e_mean, row.patch_snr_db) == (None, None, None)
+    shown_truth = np.asarray(Image.open(tmp_path / "pictures" / row.truth), dtype=int)
+    assert (np.abs(shown_truth - np.rint(encode_srgb(truth) * 255)) <= 1).all()
+    content = (tmp_path / "pictures" / row.picture).read_bytes()
+    shown = np.asarray(Image.open(BytesIO(content)), dtype=int)
+    assert (np.abs(shown - np.rint(encoded * 255)) <= 1).all()
+    assert hashlib.sha256(content).hexdigest().startswith(Path(row.picture).stem)
+    assert json.loads(row.mean_electrons)["G"] == pytest.approx(expected_e[::2, 1::2].mean(), rel=0.2)
+    assert (row.luminance_cd_m2, row.illuminance_lux, row.mc_share) == (25.0, None, 0.0)
+
+
+def test_the_monte_carlo_share_is_of_the_pixels_below_saturation(tmp_path: Path) -> None:
+    """Half of the pixels at 400 e- with an error of 3 e- each, half beyond the well with 5000 e-, in numbers."""
+    cell = made(tmp_path, levels=("1cd/m2",), exposures=("10ms",), seeds=(0,))[0]
+    saturated = np.arange(SAMPLE.SIZE[1]) >= SAMPLE.SIZE[1] // 2
+    expected_e = np.broadcast_to(np.where(saturated, 2.0 * cell.sensor.pixel.full_well_e, 400.0), SAMPLE.SIZE)
+    error_e = np.broadcast_to(np.where(saturated, 5000.0, 3.0), SAMPLE.SIZE)
+    given = {}
+    for name, array in (("electrons", expected_e), ("half_difference", error_e)):
+        file = BytesIO()
+        np.save(file, array / 0.01)  # at 1 cd/m^2 and 1 s
+        given[name] = tmp_path / keep(tmp_path, file.getvalue(), ".npy")
+    row = run_cell(replace(cell, **given))
+    pixel, sensor = cell.sensor.pixel, cell.sensor
+    dark_e = pixel.dark_current_e_per_s * 0.01
+    dark = pixel.read_noise_e**2 + pixel.dsnu_e**2 + sensor.gain_e_per_dn**2 / 12
+    own = 400.0 + dark_e + (pixel.prnu * 400.0) ** 2 + dark
+    assert row.mc_share == pytest.approx(9.0 / own, rel=1e-6)
+
+
+def test_a_cell_gives_the_same_row_and_picture_each_time(tmp_path: Path) -> None:
+    cell = made(tmp_path)[0]
+    first, second = run_cell(cell), run_cell(cell)
+    times = dict.fromkeys(("render_s", "capture_s", "develop_s", "measure_s"), 0.0) | {"finished": ""}
+    assert replace(first, **times) == replace(second, **times)  # type: ignore[arg-type]
+
+
+def test_seeds_share_no_noise_and_processors_of_a_mosaic_share_all(tmp_path: Path) -> None:
+    first, second = (run_cell(cell) for cell in made(tmp_path, levels=("1cd/m2",)))
+    assert first.picture != second.picture
+    assert first.psnr_db == pytest.approx(second.psnr_db, abs=2.0)  # 320 pixels: 3 standard errors of the mean square
+
+
+def test_single_precision_readout_draws_a_frame_of_the_same_statistics(tmp_path: Path) -> None:
+    study = SAMPLE.small_study(tmp_path)
+    plan = SAMPLE.stated(study)
+    images = {key: replace(model, exact=False) for key, model in plan.images.items()}
+    exact, single = made(tmp_path)[0], made(tmp_path, replace(plan, images=images))[0]
+    assert exact.key != single.key
+    assert run_cell(exact).picture != run_cell(single).picture
+    assert run_cell(exact).psnr_db == pytest.approx(run_cell(single).psnr_db, abs=2.0)
+
+
+def test_the_falloff_that_a_lens_is_known_to_have_is_taken_out_of_the_picture(tmp_path: Path) -> None:
+    """Bright and nearly without noise: PSNR with 60 degrees of view is that without, 3 dB more would be lost else."""
+    study = SAMPLE.small_study(tmp_path, levels=("25cd/m2",), seeds=(0,), exposures=("20ms",))
+    plain = made(tmp_path, levels=("25cd/m2",), seeds=(0,), exposures=("20ms",))[0]
+    wide = Plan({}, dict.fromkeys(conditions(study), ImageModel(0.0, 0.0, 60.0)))
+    shaded = made(tmp_path, wide, levels=("25cd/m2",), seeds=(0,), exposures=("20ms",))[0]
+    assert falloff(shaded.sensor.lens, SAMPLE.SIZE)[0, 0] < 0.6
+    with_, without = run_cell(shaded), run_cell(plain)
+    assert json.loads(with_.mean_electrons)["G"] < 0.95 * json.loads(without.mean_electrons)["G"]
+    assert with_.psnr_db == pytest.approx(without.psnr_db, abs=2.0)
+
+
+def test_a_cell_weighs_the_same_whatever_the_pictures_size_and_travels_as_it_is(tmp_path: Path) -> None:
+    small, large = tmp_path / "small", tmp_path / "large"
+    large.mkdir()
+    SAMPLE.picture(large / "scene.exr", (64, 64))
+    small.mkdir()
+    weights = [pickle.dumps(made(folder)[0]) for folder in (small, large)]
+    assert abs(len(weights[0]) - len(weights[1])) < 500  # 3776 pixels more would be 30 kB
+    assert pickle.loads(weights[0]).key == made(small)[0].key
+    assert np.load(pickle.loads(weights[1]).electrons).shape == (64, 64)
+
+
+def test_other_code_and_arrays_out_of_reach_are_told_in_one_line(tmp_path: Path) -> None:
+    cell = made(tmp_path)[0]
+    with pytest.raises(InputError, match="install the same rodcone"):
+        run_cell(replace(cell, made_by=replace(cell.made_by, versions='{"rodcone": "0.0.0+other"}')))
+    with pytest.raises(InputError, match="a folder that all workers see") as told:
+        run_cell(replace(cell, electrons=tmp_path / "absent.npy"))
+    assert "\n" not in str(told.value)
+    cell.truth.write_bytes(b"no array")
+    with pytest.raises(InputError, match="can't be read"):
+        run_cell(cell)
+
+
+def test_targets_have_their_own_figures_on_their_own_scene(tmp_path: Path) -> None:
+    """A bright chart and a bright edge, nearly without noise; each figure is None on the other's scene."""
+    changes = {"levels": ("100cd/m2",), "seeds": (0,), "render": RenderLimits(size=96, spp=16)}
+    scenes = (SceneChoice("color_checker"), SceneChoice("slanted_edge"))
+    chart, edge = (run_cell(cell) for cell in made(tmp_path, scenes=scenes, **changes))
+    assert chart.mtf50_cy_per_px is None
+    assert chart.chart_delta_e_mean is not None
+    assert 0.3 < chart.chart_delta_e_mean < 8  # what the matrix's fit leaves, and some noise
+    assert chart.patch_snr_db is not None
+    assert 20 < chart.patch_snr_db < 45
+    assert (edge.chart_delta_e_mean, edge.patch_snr_db) == (None, None)
+    assert edge.mtf50_cy_per_px is not None
+    # Bilinear green keeps less than a pixel's own box does (0.6 cycles a pixel), and more than a box of three pixels.
+    assert 0.2 < edge.mtf50_cy_per_px < 0.6
+    assert chart.render_s > 0

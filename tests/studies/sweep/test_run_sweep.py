@@ -1,0 +1,332 @@
+"""Sweeps: the same ledger and pictures whatever ran them, in whatever order, and however often they were ended."""
+
+import errno
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from multiprocessing import active_children
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sweep_sample as SAMPLE
+
+from render.engine import render
+from rodcone.errors import InputError
+from scenes.catalog import load
+from sensor.optics import form_image
+from sensor.presets import preset
+from sensor.response import expected_electrons
+from studies.budget.budget import monte_carlo_share
+from studies.study.study import RenderLimits, SceneChoice, Study
+from studies.sweep import run_cell as cell_run
+from studies.sweep.cells import Cell
+from studies.sweep.database import open_ledger, rows
+from studies.sweep.row import Row
+from studies.sweep.run_sweep import LEFT_S
+from studies.sweep.workers import run, run_in_processes
+
+content, half_pictures, here, parts_left, small_study, swept = (
+    getattr(SAMPLE, name) for name in ("content", "half_pictures", "here", "parts_left", "small_study", "swept")
+)
+
+
+def ended_after(count: int, error: type[BaseException], cells: Sequence[Cell]) -> Iterator[Row]:
+    """Run that ends with an error after so many cells."""
+    yield from here(cells[:count])
+    raise error
+
+
+def test_every_cell_gets_a_row_in_the_studys_order_and_a_second_run_makes_none(tmp_path: Path) -> None:
+    study = small_study(tmp_path)
+    first = swept(study, tmp_path / "out")
+    assert (first.cells, first.made) == (4, 4)
+    with open_ledger(tmp_path / "out") as base:
+        found = [(row.level, row.seed, row.luminance_cd_m2) for row in rows(base)]
+    assert found == [("1cd/m2", 0, 1.0), ("1cd/m2", 1, 1.0), ("25cd/m2", 0, 25.0), ("25cd/m2", 1, 25.0)]
+    before = content(tmp_path / "out")
+    assert swept(study, tmp_path / "out").made == 0
+    assert content(tmp_path / "out") == before
+
+
+def test_order_and_executor_change_nothing(tmp_path: Path) -> None:
+    study = small_study(tmp_path)
+    swept(study, tmp_path / "one")
+    swept(study, tmp_path / "turned", lambda cells: here(cells[::-1]))
+    with ThreadPoolExecutor(2) as pool:
+        swept(study, tmp_path / "threads", partial(run, executor=pool, at_once=3))
+    assert content(tmp_path / "one") == content(tmp_path / "turned") == content(tmp_path / "threads")
+
+
+def test_a_wider_study_leaves_the_cells_it_shares_as_they_are(tmp_path: Path) -> None:
+    study = small_study(tmp_path)
+    swept(study, tmp_path / "out")
+    before = content(tmp_path / "out")
+    wider = replace(study, levels=("0.1cd/m2", *study.levels), seeds=(5, *study.seeds))
+    again = swept(wider, tmp_path / "out")
+    assert (again.cells, again.made) == (9, 5)
+    assert set(before) < set(content(tmp_path / "out"))
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+def test_an_ended_run_is_gone_on_with_and_ends_as_one_never_ended(error: type[BaseException], tmp_path: Path) -> None:
+    study = small_study(tmp_path)
+    swept(study, tmp_path / "whole")
+    with pytest.raises(error):
+        swept(study, tmp_path / "out", partial(ended_after, 3, error))
+    assert swept(study, tmp_path / "out").made == 1
+    assert content(tmp_path / "out") == content(tmp_path / "whole")
+
+
+def test_ctrl_c_waits_for_what_runs_and_keeps_it(tmp_path: Path) -> None:
+    study = small_study(tmp_path)
+
+    def interrupted(cells: Sequence[Cell]) -> Iterator[Row]:
+        with ThreadPoolExecutor(1) as pool:
+            running = run(cells, pool, at_once=2)
+            yield next(running)
+            yield running.throw(KeyboardInterrupt)
+            yield from running
+
+    with pytest.raises(KeyboardInterrupt):
+        swept(study, tmp_path / "out", interrupted)
+    assert 1 <= 4 - swept(study, tmp_path / "out").made <= 3
+
+
+def test_a_full_disk_leaves_nothing_half_done_and_the_next_run_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, pictures = small_study(tmp_path), 0
+    write = Path.write_bytes
+
+    def full(path: Path, data: bytes) -> int:
+        nonlocal pictures
+        pictures += "pictures" in path.parts
+        if pictures > 4:  # two cells, each with its picture and the truth
+            write(path, data[:100])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        return write(path, data)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(cell_run.Path, "write_bytes", full)
+        with pytest.raises(OSError, match="No space left"):
+            swept(study, tmp_path / "out")
+    assert len(content(tmp_path / "out")) == 2
+    assert half_pictures(tmp_path / "out") == parts_left(tmp_path / "out") == []
+    assert swept(study, tmp_path / "out").made == 2
+
+
+def rows_of(out: Path) -> list[Row]:
+    with open_ledger(out) as base:
+        return rows(base)
+
+
+@pytest.mark.parametrize(("column", "cells"), [("picture", 1), ("truth", 4)])
+def test_a_picture_that_is_gone_is_made_again(column: str, cells: int, tmp_path: Path) -> None:
+    """All four cells are compared with one truth: white is white at both levels."""
+    study, out = small_study(tmp_path), tmp_path / "out"
+    swept(study, out)
+    before = content(out)
+    (out / "pictures" / getattr(rows_of(out)[0], column)).unlink()
+    assert swept(study, out).made == cells
+    assert content(out) == before
+    assert (out / "pictures" / getattr(rows_of(out)[0], column)).exists()
+
+
+def test_what_a_killed_run_had_begun_to_write_is_cleared_when_it_is_old(tmp_path: Path) -> None:
+    study, out = small_study(tmp_path), tmp_path / "out"
+    swept(study, out)
+    old, new, file = out / "pictures" / "ab" / ".part-x", out / "frames" / ".part-y", out / "renders" / "z.part"
+    for path in (old, new, file.parent):
+        path.mkdir(parents=True)
+    (old / "half.png").write_bytes(b"half")
+    file.write_bytes(b"half")
+    for path in (old, file):
+        os.utime(path, (time.time() - 2 * LEFT_S,) * 2)
+    before = content(out)
+    assert swept(study, out).made == 0
+    assert (old.exists(), new.exists(), file.exists()) == (False, True, False)
+    assert content(out) == before
+
+
+@pytest.mark.parametrize("damage", ["{", "{}", "[]", '{"light": 1, "auto_s": [], "white_cd_m2": "x"}'])
+def test_shared_files_that_are_damaged_or_gone_are_made_again(damage: str, tmp_path: Path) -> None:
+    study = small_study(tmp_path)
+    swept(study, tmp_path / "out")
+    before = content(tmp_path / "out")
+    for path in [path for path in (tmp_path / "out" / "frames").rglob("*") if path.is_file()]:
+        path.write_text(damage, "utf-8") if path.suffix == ".json" else damage == "{" and path.unlink()
+    (tmp_path / "out" / "pictures" / rows_of(tmp_path / "out")[0].picture).unlink()
+    assert swept(study, tmp_path / "out").made == 1
+    assert content(tmp_path / "out") == before
+
+
+def test_a_scene_that_cannot_be_read_is_told_before_the_first_is_rendered(tmp_path: Path) -> None:
+    study = small_study(tmp_path)
+    damaged = tmp_path / "damaged.xml"
+    damaged.write_text("<scene", "utf-8")
+    for scene in ("absent.exr", "damaged.xml", "still_live"):
+        choice = SceneChoice(str(tmp_path / scene) if "." in scene else scene)
+        with pytest.raises(InputError) as told:
+            swept(replace(study, scenes=(*study.scenes, choice)), tmp_path / "out")
+        assert "\n" not in str(told.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_render_serves_all_spectra_and_a_finer_one_goes_on_from_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A grey wall under an even sky: 1 cd/m^2 of it is pi / 0.5 lux whatever the light's spectrum."""
+    asked: list[Any] = []
+    make = sys.modules["studies.study.lit_scene"].render
+    monkeypatch.setattr("studies.study.lit_scene.render", lambda *a, **k: asked.append(k["max_spp"]) or make(*a, **k))
+    limits = RenderLimits(size=16, spp=16, band_nm=100.0)
+    study = Study(
+        (SceneChoice("flat_field"),), ("1cd/m2", "100lux"), ("own", "A"), processors=("bayer",), render=limits
+    )
+    assert swept(study, tmp_path).made == 4
+    assert swept(study, tmp_path).made == 0
+    assert asked == [16]
+    with open_ledger(tmp_path) as base:
+        table = rows(base)
+        for row in table:
+            assert row.illuminance_lux == pytest.approx(row.luminance_cd_m2 * 2 * 3.141593, rel=1e-5)
+            expected = 1.0 if row.level == "1cd/m2" else 100.0 / (2 * 3.141593)
+            assert row.luminance_cd_m2 == pytest.approx(expected, rel=1e-5)
+        assert len({row.picture for row in table}) == 4
+    assert swept(replace(study, render=replace(limits, spp=32)), tmp_path).made == 0  # the same light, to the bit
+    assert asked == [16, 32]
+
+
+def test_a_finer_request_goes_on_from_the_coarser_render_and_makes_its_cells_anew(tmp_path: Path) -> None:
+    limits = RenderLimits(size=16, spp=16, band_nm=100.0)
+    study = Study((SceneChoice("slanted_edge"),), ("1cd/m2",), processors=("bayer",), render=limits)
+    finer = replace(study, render=replace(limits, spp=64))
+    assert [swept(each, tmp_path / "out").made for each in (study, finer, study)] == [1, 1, 0]
+    assert len(list((tmp_path / "out" / "renders").iterdir())) == 1
+    with open_ledger(tmp_path / "out") as base:
+        assert [row.spp for row in rows(base)] == [16]  # what the last run asked for
+        coarse, fine = sorted(rows(base, everything=True), key=lambda row: row.spp)
+    assert (coarse.spp, fine.spp) == (16, 64)
+    model = SAMPLE.stated(finer).renders[study.scenes[0]]
+    bands = {"wavelength_nm": model.wavelength_nm, "width_nm": model.width_nm}
+    transport = render(load("slanted_edge"), (16, 16), **bands, max_spp=64, cache=tmp_path / "out" / "renders")
+    sensor = preset("low_noise", "bayer")
+    whole = expected_electrons(form_image(transport.relight(luminance_cd_m2=1.0), sensor), sensor, fine.exposure_s)
+    share = monte_carlo_share(whole, transport.relight_halves(luminance_cd_m2=1.0), sensor, fine.exposure_s)
+    assert fine.mc_share == pytest.approx(share, rel=1e-4)  # float32 halves
+    assert 0 < fine.mc_share < coarse.mc_share
+
+
+def test_two_processes_one_of_them_killed_give_what_one_gives(tmp_path: Path) -> None:
+    study = small_study(tmp_path, seeds=tuple(range(6)))
+    swept(study, tmp_path / "serial")
+    killed: list[int] = []
+
+    def with_a_death(cells: Sequence[Cell]) -> Iterator[Row]:
+        for row in run_in_processes(cells, 2):
+            if not killed:
+                victim = active_children()[0]
+                killed.append(victim.pid or 0)
+                victim.kill()
+            yield row
+
+    assert swept(study, tmp_path / "two", with_a_death).made == 12
+    assert killed
+    assert content(tmp_path / "serial") == content(tmp_path / "two")
+    assert active_children() == []
+
+
+ENDLESS = """
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from functools import partial
+from pathlib import Path
+spec = spec_from_file_location("sweep_sample", sys.argv[1])
+sample = module_from_spec(spec)
+spec.loader.exec_module(sample)
+from studies.sweep.workers import run_in_processes
+if __name__ == "__main__":
+    folder = Path(sys.argv[2])
+    study = sample.small_study(folder, seeds=tuple(range(100)))
+    runner = partial(run_in_processes, workers=2) if sys.argv[4] == "2" else sample.here
+    print("ready", flush=True)
+    sample.swept(study, Path(sys.argv[3]), runner)
+"""
+
+
+def started(script: Path, folder: Path, out: Path, workers: int) -> "subprocess.Popen[str]":
+    arguments = [
+        sys.executable,
+        str(script),
+        str(Path(__file__).resolve().parents[2] / "sweep_sample.py"),
+        str(folder),
+        str(out),
+    ]
+    process = subprocess.Popen([*arguments, str(workers)], stdout=subprocess.PIPE, text=True, start_new_session=True)
+    assert process.stdout is not None
+    with process.stdout as told:
+        assert told.readline() == "ready\n"
+    return process
+
+
+def until_more_than(count: int, out: Path) -> None:
+    """Wait until the ledger holds more cells, or has them all."""
+    for _ in range(600):
+        if (out / "ledger.sqlite").exists():
+            with open_ledger(out) as base:
+                if count == 200 or len(rows(base, everything=True)) > count:
+                    return
+        time.sleep(0.05)
+    raise AssertionError("the run makes no cells")
+
+
+def running_in(session: int) -> list[int]:
+    """Processes of a session that are still there, zombies left out."""
+    found = []
+    for pid in (int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()):
+        with suppress(OSError):  # it has ended since
+            state = Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()[0]
+            if os.getsid(pid) == session and state != "Z":
+                found.append(pid)
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
+def test_killed_at_ten_random_moments_and_gone_on_with_is_as_never_killed(workers: int, tmp_path: Path) -> None:
+    """Ten times in one process and ten with a pool of two: twenty kills of the whole run, by SIGKILL."""
+    study = small_study(tmp_path, seeds=tuple(range(100)))
+    swept(study, tmp_path / "whole")
+    script = tmp_path / "run.py"
+    script.write_text(ENDLESS, "utf-8")
+    moments, grew = random.Random(workers), [0]
+    for turn in range(10):
+        process = started(script, tmp_path, tmp_path / "out", workers)
+        if turn % 3:  # a third of the kills fall before the first cell, or soon after: into shared files and start-up
+            until_more_than(grew[-1], tmp_path / "out")
+        time.sleep(moments.uniform(0.0, 0.3))
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+        for _ in range(100):  # workers see that their parent is gone, and end
+            if not running_in(process.pid):
+                break
+            time.sleep(0.1)
+        assert running_in(process.pid) == []
+        if (tmp_path / "out" / "ledger.sqlite").exists():
+            with open_ledger(tmp_path / "out") as base:
+                grew.append(len(rows(base, everything=True)))
+    print("cells in the ledger after each kill:", grew)
+    assert half_pictures(tmp_path / "out") == []
+    assert grew == sorted(grew)  # nothing is lost from kill to kill
+    assert len(set(grew) - {0, 200}) >= 4  # kills did fall amid the cells
+    assert swept(study, tmp_path / "out").made == 200 - grew[-1]
+    assert content(tmp_path / "out") == content(tmp_path / "whole")

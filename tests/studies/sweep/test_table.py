@@ -1,0 +1,112 @@
+"""Tables of a sweep's figures: means and intervals by hand, electrons by letter, and what is refused."""
+
+import json
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import get_type_hints
+
+import numpy as np
+import pytest
+
+from isp.colour.camera_colour import encode_srgb
+from rodcone.errors import InputError
+from scenes.catalog import load
+from studies.metrics.chart_colours import daylight_srgb
+from studies.metrics.patches import patch_masks
+from studies.photograph.png import to_png
+from studies.sweep.prepare import PICTURES
+from studies.sweep.row import Row
+from studies.sweep.stored import keep
+from studies.sweep.table import FIGURES, lines, markdown
+
+HINTS = get_type_hints(Row)
+BLANK = Row(**{field.name: "" if HINTS[field.name] is str else 0 for field in fields(Row)} | {"versions": "{}"})
+HERE = Path()
+
+
+def cell(processor: str, seed: int, psnr_db: float, **more: object) -> Row:
+    electrons = json.dumps({"G": 10.0, "W": 40.0 + seed} if processor == "interleaved" else {"G": 10.0})
+    return replace(
+        BLANK, processor=processor, level="1lux", seed=seed, psnr_db=psnr_db, mean_electrons=electrons, **more
+    )
+
+
+ROWS = [cell("interleaved", 0, 20.0), cell("interleaved", 1, 22.0), cell("bayer", 0, 12.0), cell("bayer", 1, 12.0)]
+
+
+def test_means_and_intervals_are_those_of_the_seeds() -> None:
+    table = lines(ROWS, HERE, ["processor"], ["psnr_db", "electrons_W"], {})
+    assert [line.at for line in table] == [("interleaved",), ("bayer",)]
+    assert table[0].means == (21.0, 40.5)
+    # Student's t of one degree of freedom at 97.5 % is tan(0.475 pi); the standard error of 20 and 22 is 1
+    assert table[0].halves[0] == pytest.approx(np.tan(0.475 * np.pi))
+    assert (table[1].means, table[1].halves) == ((12.0, None), (0.0, None))
+    text = markdown(table, ["processor"], ["psnr_db", "electrons_W"])
+    assert text.splitlines() == [
+        "| processor | psnr_db | electrons_W |",
+        "| --- | ---: | ---: |",
+        "| interleaved | 21.0 ± 12.7 | 40.5 ± 6.4 |",
+        "| bayer | 12.0 | - |",
+    ]
+
+
+def test_one_seed_has_no_interval_and_a_figure_that_a_seed_lacks_has_no_mean() -> None:
+    (line,) = lines(ROWS[:1], HERE, [], ["psnr_db"], {})
+    assert (line.means, line.halves) == ((20.0,), (None,))
+    both = [replace(ROWS[0], snr_db=3.0), replace(ROWS[1], snr_db=None)]
+    assert lines(both, HERE, [], ["snr_db"], {})[0].means == (None,)
+
+
+def test_where_chooses_and_a_mean_over_cameras_is_refused() -> None:
+    assert lines(ROWS, HERE, [], ["psnr_db"], {"processor": "bayer"})[0].means == (12.0,)
+    for by, show, where, words in (
+        ([], ["psnr_db"], {}, "by: a line of all would be a mean over processor interleaved, bayer"),
+        (["procesor"], ["psnr_db"], {}, "axis: 'procesor' is unknown; .*did you mean 'processor'"),
+        (["processor"], ["psnr"], {}, "show: 'psnr' is unknown; .*did you mean 'psnr_db'"),
+        (["processor"], ["psnr_db"], {"level": "2lux"}, r"where: no cell has \{'level': '2lux'\}"),
+        (["processor"], ["pair_delta_e"], {}, "pair_delta_e is known of scene metamers"),
+    ):
+        with pytest.raises(InputError, match=words):
+            lines(ROWS, HERE, by, show, where)
+
+
+def test_figures_are_the_ledgers_numbers() -> None:
+    assert {"psnr_db", "delta_e_median", "exposure_s", "snr_db", "chart_delta_e_mean", "substitution"} <= set(FIGURES)
+    assert not {"key", "picture", "seed", "mean_electrons", "host"} & set(FIGURES)
+
+
+def test_chart_colours_are_read_from_the_pictures(tmp_path: Path) -> None:
+    masks = patch_masks(load("color_checker"), (128, 128))
+    linear = np.full((128, 128, 3), 0.2)
+    for mask, colour in zip(masks, daylight_srgb(), strict=True):
+        linear[mask] = colour
+    picture = keep(tmp_path / PICTURES, to_png(encode_srgb(linear)), ".png")
+    row = replace(ROWS[0], scene="color_checker", picture=picture)
+    (line,) = lines([row], tmp_path, [], ["daylight_delta_e"], {})
+    # 8 bits, and cyan's and a few others' share beyond sRGB clipped: well under one, far from none
+    assert line.means[0] is not None
+    assert 0.0 < line.means[0] < 0.5
+    with pytest.raises(InputError, match="run rodcone sweep again"):
+        lines([replace(row, picture="b.png")], tmp_path, [], ["daylight_delta_e"], {})
+    (tmp_path / PICTURES / picture).write_bytes(b"\x89")
+    with pytest.raises(InputError, match="isn't what was written"):
+        lines([row], tmp_path, [], ["daylight_delta_e"], {})
+
+
+def test_a_mean_over_cells_that_other_versions_variants_or_engines_made_is_refused() -> None:
+    for change in ({"versions": '{"numpy": "1"}'}, {"variant": "scalar"}, {"readout_engine": "llvm"}):
+        mixed = [replace(ROWS[0], **{**change, "versions": change.get("versions", '{"numpy": "2"}')}), ROWS[1]]
+        mixed[1] = replace(mixed[1], versions='{"numpy": "2"}')
+        with pytest.raises(InputError, match="would be in one mean or comparison"):
+            lines(mixed, HERE, ["processor"], ["psnr_db"], {})
+    apart = [replace(row, development_engine=f"of {row.processor}") for row in ROWS]
+    assert len(lines(apart, HERE, ["processor"], ["psnr_db"], {})) == 2, "each processor has its engine"
+
+
+def test_what_the_observer_sees_of_pairs_depends_on_the_light_alone() -> None:
+    rows = [replace(row, scene="metamers", spectrum=light) for light in ("D65", "own", "A") for row in ROWS]
+    table = lines(rows, HERE, ["spectrum", "processor"], ["true_pair_delta_e"], {})
+    found = np.array([line.means[0] for line in table])
+    assert found[:4] == pytest.approx(np.zeros(4), abs=1e-6)
+    assert found[4] == found[5]
+    assert 1.0 < found[4] < 10.0

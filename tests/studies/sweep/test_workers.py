@@ -1,0 +1,111 @@
+"""Running cells: any executor, pools that outlive deaths, threads shared out, no process left behind."""
+
+import os
+import time
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
+from multiprocessing import active_children
+from pathlib import Path
+from typing import Any
+
+import pytest
+import sweep_sample as SAMPLE
+
+from rodcone.errors import InputError
+from studies.study.lit_scene import open_all
+from studies.sweep import workers
+from studies.sweep.cells import Cell
+from studies.sweep.database import open_ledger
+from studies.sweep.prepare import Job, scene_cells
+from studies.sweep.workers import InThisProcess, WorkerLostError, run, run_in_processes
+
+
+class Deadly:
+    """Ends the process that unpickles it."""
+
+    def __reduce__(self) -> Any:
+        return os._exit, (9,)
+
+
+class Breaking(Executor):
+    """Executor that gives one result and breaks."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        self.calls += 1
+        future: Future[Any] = Future()
+        if self.calls == 1:
+            future.set_result(fn(*args, **kwargs))
+        else:
+            future.set_exception(BrokenExecutor("gone"))
+        return future
+
+
+@pytest.fixture
+def cells(tmp_path: Path) -> list[Cell]:
+    study = SAMPLE.small_study(tmp_path)
+    with open_ledger(tmp_path) as base:
+        job = Job(study, SAMPLE.stated(study), tmp_path, base)
+        return [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
+
+
+@pytest.mark.parametrize("at_once", [1, 3, 100])
+def test_every_cell_comes_back_once(at_once: int, cells: list[Cell]) -> None:
+    with ThreadPoolExecutor(2) as pool:
+        keys = [row.key for row in run(cells, pool, at_once=at_once)]
+    assert sorted(keys) == sorted(cell.key for cell in cells)
+    assert [row.key for row in run(cells, InThisProcess())] == [cell.key for cell in cells]
+    assert list(run([], InThisProcess())) == []
+
+
+def test_what_was_ready_comes_before_the_error(cells: list[Cell], tmp_path: Path) -> None:
+    bad = replace(cells[1], truth=tmp_path / "absent.npy")
+    running = run([cells[0], bad, cells[2]], InThisProcess(), at_once=2)
+    assert next(running).key == cells[0].key
+    with pytest.raises(InputError, match="can't be read"):
+        list(running)
+
+
+def test_a_broken_executor_tells_which_cells_it_held(cells: list[Cell]) -> None:
+    running = run(cells, Breaking(), at_once=3)
+    assert next(running).key == cells[0].key
+    with pytest.raises(WorkerLostError) as lost:
+        next(running)
+    assert {cell.key for cell in lost.value.cells} == {cell.key for cell in cells[1:3]}
+
+
+def test_a_cell_that_ends_its_worker_is_given_up_and_all_others_are_made(
+    cells: list[Cell], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workers, "MOST_DEATHS", 2)
+    deadly = replace(cells[1], colours=Deadly())  # type: ignore[arg-type]
+    made = []
+    with pytest.raises(InputError, match=r"1 ended their worker 2 times, the first at Coordinates\(") as told:
+        made.extend(row.key for row in run_in_processes([cells[0], deadly, *cells[2:]], 1))
+    assert sorted(made) == sorted(cell.key for cell in (cells[0], *cells[2:]))
+    assert "\n" not in str(told.value)
+    assert active_children() == []
+
+
+def test_workers_share_the_cores_and_the_environment_is_left_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    with workers._pool(1, 3) as pool:
+        assert isinstance(pool, ProcessPoolExecutor)
+        assert [pool.submit(os.getenv, name).result() for name in workers._THREAD_VARIABLES] == ["3"] * 4
+    assert (os.environ["OMP_NUM_THREADS"], os.environ.get("MKL_NUM_THREADS")) == ("7", None)
+
+
+def test_a_worker_that_can_not_leave_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As one whose neighbour was killed with the queue's lock in its hands, just when all cells were done."""
+    monkeypatch.setattr(workers, "LEAVE_S", 0.5)
+    began = time.monotonic()
+    with workers._pool(2, 1) as pool:
+        endless = pool.submit(time.sleep, 600)
+        while not endless.running():
+            time.sleep(0.05)
+    assert isinstance(endless.exception(), BrokenExecutor)
+    assert active_children() == []
+    assert time.monotonic() - began < 60

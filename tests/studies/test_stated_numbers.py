@@ -1,0 +1,82 @@
+"""What a row and the demo's results state of how pictures were made, counted another way: paths, arrays, wells."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from path_counter import count_paths
+from sweep_sample import swept
+
+from render.engine import render
+from rodcone.jit import backend
+from sensor.presets import low_noise
+from studies.budget import quiet_render
+from studies.commands import demo
+from studies.commands.demo import Demo
+from studies.study.study import RenderLimits, SceneChoice, Study
+from studies.sweep.database import open_ledger, rows
+
+
+def test_bands_and_samples_are_those_of_the_stored_render(tmp_path: Path) -> None:
+    limits = RenderLimits(size=16, spp=17, band_nm=50.0)
+    study = Study((SceneChoice("flat_field"),), ("1cd/m2",), processors=("bayer",), render=limits)
+    swept(study, tmp_path)
+    (stored,) = (tmp_path / "renders").iterdir()
+    with np.load(stored) as render, open_ledger(tmp_path) as base:
+        (row,) = rows(base)
+        assert row.bands == render["radiance"].shape[1] == 8
+        assert row.spp == render["pass_spp"].sum()
+
+
+def test_an_automatic_exposure_fills_the_well_or_ends_at_the_longest(tmp_path: Path) -> None:
+    """A flat grey: at 1000 cd/m^2 green holds 80 % of its well, at 1e-3 it can't."""
+    limits = RenderLimits(size=16, spp=16, band_nm=50.0)
+    study = Study(
+        (SceneChoice("flat_field"),),
+        ("1000cd/m2", "0.001cd/m2"),
+        exposures=("auto",),
+        processors=("bayer",),
+        longest_exposure_s=0.05,
+        render=limits,
+    )
+    swept(study, tmp_path)
+    with open_ledger(tmp_path) as base:
+        bright, dark = sorted(rows(base), key=lambda row: -row.luminance_cd_m2)
+    well = low_noise("bayer").pixel.full_well_e
+    assert max(json.loads(bright.mean_electrons).values()) == pytest.approx(0.8 * well, rel=0.05)
+    assert bright.exposure_s < 0.05
+    assert dark.exposure_s == 0.05
+    assert max(json.loads(dark.mean_electrons).values()) < 0.01 * well
+
+
+@pytest.mark.skipif(backend() == "numpy", reason="counts the wavefronts of Dr.Jit")
+def test_the_demos_results_state_the_render_and_the_exposures_that_were_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    paths, made = count_paths(monkeypatch), []
+    monkeypatch.setattr(quiet_render, "render", lambda *a, **k: made.append(render(*a, **k)) or made[-1])
+    size, longest_s = 16, 0.05
+    asked = Demo(
+        scene="slanted_edge", size=size, spp=33, sensors=("low_noise",), levels=("0.001cd/m2", "1000cd/m2"),
+        longest_s=longest_s,
+    )  # fmt: skip
+    results = demo.run(asked).results
+    (transport,), told = made, results["render"]
+    assert told["spp"] == paths["camera"] / size**2 / len(transport.groups)
+    assert told["passes"] == len(transport.pass_means.radiance)
+    assert told["stopped_by"] == "samples"
+    assert told["bands"] == transport.radiance.shape[1]
+    low, high = told["first_nm"] - told["width_nm"] / 2, told["last_nm"] + told["width_nm"] / 2
+    assert (low, high) == pytest.approx((380, 780))
+    assert told["bands"] * told["width_nm"] == pytest.approx(high - low)
+    scattered = transport.pass_means.radiance.sum(axis=(1, 2))  # one light of one power in every band
+    assert told["relative_level_error"] == pytest.approx(scattered.std(ddof=1) / 8**0.5 / scattered.mean(), rel=0.3)
+    well = low_noise().pixel.full_well_e
+    for cell in results["cells"]:
+        fullest = max(cell["mean_electrons"].values())
+        if cell["level"] == 0:
+            assert cell["exposure_s"] == longest_s
+            assert fullest < 0.01 * well
+        else:
+            assert cell["exposure_s"] < longest_s
+            assert 0.2 * well < cell["mean_electrons"]["G"] < 0.8 * well  # the brightest greens have 80 %
+        assert cell["saturated"] <= 0.3
