@@ -49,7 +49,7 @@ class Order:
 def render(
     source: str,
     *,
-    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("render.radiance_files.exr"),
+    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("render.exr"),
     height: int | None = None,
     width: int | None = None,
     bands: str | None = None,
