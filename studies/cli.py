@@ -121,7 +121,6 @@ app.command("studies.paper_command:paper", name="paper", help="Compute the paper
 app.command("studies.plan_command:plan", name="plan", help="Compute a study's error budget and the cheapest model.")
 app.command("studies.render_command:render", name="render", help="Render a scene into a spectral OpenEXR file.")
 app.command("studies.report_command:report", name="report", help="Write the report of a sweep as one HTML file.")
-app.command("studies.stress_command:stress", name="stress", help="Measure hard cases by the invariants they keep.")
 app.command("studies.sweep_command:sweep", name="sweep", help="Make every picture of a study, and go on after any end.")
 app.command("studies.sweep_command:export", name="export", help="Write a sweep's ledger as CSV or Parquet.")
 app.command("studies.table_command:table", name="table", help="Print a sweep's figures as a Markdown table.")
