@@ -2,8 +2,8 @@
 
     python tests/contract_names.py [COMMIT]
 
-Whoever wrote a program after one of these pages finds the names where they stood. The list is committed, so that the test
-needs no history of the repository.
+Whoever wrote a program after one of these pages finds the names where they stood. The list is committed, so that the
+test needs no history of the repository.
 """
 
 import json
