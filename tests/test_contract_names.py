@@ -6,7 +6,7 @@ from contract_names import LEFT_OUT, LIST, imports
 NAMES = [tuple(line.split()) for line in LIST.read_text("utf-8").splitlines()]
 
 
-@pytest.mark.parametrize(("module", "name"), NAMES, ids=" ".join)
+@pytest.mark.parametrize(("module", "name"), NAMES, ids=[f"{module}.{name}" for module, name in NAMES])
 def test_a_name_of_the_contract_is_importable(module, name):
     exec(f"from {module} import {name}", {})  # as a page writes it: a submodule counts too
 
