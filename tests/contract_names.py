@@ -14,9 +14,8 @@ from pathlib import Path
 
 COMMIT = "35f5fbe"
 LIST = Path(__file__).with_name("contract_names.txt")
-_IMPORT = re.compile(
-    r"\bfrom[ \t]+((?:render|scenes|sensor|isp|studies)(?:\.\w+)*)[ \t]+import[ \t]+(\([^)]*\)|[^\n(;\"'`]+)"
-)
+PACKAGES = ("rodcone", "render", "scenes", "sensor", "isp", "studies")
+_IMPORT = re.compile(rf"\bfrom[ \t]+((?:{'|'.join(PACKAGES)})(?:\.\w+)*)[ \t]+import[ \t]+(\([^)]*\)|[^\n(;\"'`]+)")
 # What the pages import and the contract leaves out.
 LEFT_OUT = {
     ("isp.two_by_two", "picture_two_by_two"): "docs/how_to/own_processor.md writes this module itself",

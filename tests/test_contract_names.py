@@ -1,7 +1,10 @@
 """Names that README, docs and notebooks have told users to import stay importable; `contract_names.py` lists them."""
 
+import subprocess
+import sys
+
 import pytest
-from contract_names import LEFT_OUT, LIST, imports
+from contract_names import LEFT_OUT, LIST, PACKAGES, imports
 
 NAMES = [tuple(line.split()) for line in LIST.read_text("utf-8").splitlines()]
 
@@ -9,6 +12,28 @@ NAMES = [tuple(line.split()) for line in LIST.read_text("utf-8").splitlines()]
 @pytest.mark.parametrize(("module", "name"), NAMES, ids=[f"{module}.{name}" for module, name in NAMES])
 def test_a_name_of_the_contract_is_importable(module, name):
     exec(f"from {module} import {name}", {})  # as a page writes it: a submodule counts too
+
+
+def test_each_module_of_the_contract_may_be_the_first_that_a_program_imports():
+    """A circle of imports shows where one of its modules comes first; so each is, with none of the project's loaded."""
+    program = """
+import sys
+from importlib import import_module
+packages, *modules = sys.argv[1:]
+wrong = {}
+for module in modules:
+    for name in [name for name in sys.modules if name.partition(".")[0] in packages.split(",")]:
+        del sys.modules[name]
+    try:
+        import_module(module)
+    except ImportError as error:
+        wrong[module] = str(error)
+print(wrong)
+"""
+    modules = dict.fromkeys(module for module, _ in NAMES)
+    command = [sys.executable, "-c", program, ",".join(PACKAGES), *modules]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "{}"
 
 
 def test_the_list_is_the_whole_contract():
