@@ -99,7 +99,8 @@ def decisions_page() -> str:
 def api_page() -> str:
     """List of the packages, in the order in which light goes through them."""
     rows = [f"| [`{name}`]({name}/index.md) | {summary(ROOT / name / '__init__.py')} |" for name in PACKAGES]
-    told = "Imports point one way: `studies > isp > (scenes | sensor) > render > rodcone`. The commands: [Commands](commands.md)."
+    order = "`studies > isp > (scenes | sensor) > render > rodcone`"
+    told = f"Imports point one way: {order}. The commands: [Commands](commands.md)."
     return f"# API\n\n{told}\n\n| package | what |\n|---|---|\n" + "\n".join(rows)
 
 
