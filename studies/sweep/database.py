@@ -10,6 +10,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
@@ -30,6 +31,7 @@ _HINTS = get_type_hints(Row)
 COLUMNS = tuple(field.name for field in fields(Row))
 _COLUMNS = ", ".join(f"cells.{name}" for name in (*COLUMNS, "digest"))
 _REAL = {name for name in COLUMNS if _HINTS[name] in (float, float | None)}
+_TEXT = partial(str, encoding="utf-8", errors="replace")  # a row whose bytes have changed is told by its digest
 Found = TypeVar("Found")
 _CREATE = (
     "CREATE TABLE cells ("
@@ -72,6 +74,7 @@ def open_ledger(folder: Path) -> Iterator[sqlite3.Connection]:
     path = folder / FILE
     with _told(path):
         base = sqlite3.connect(path, timeout=_WAIT_S, isolation_level=None)
+        base.text_factory = _TEXT
         try:
             _prepare(base, path)
             _check_whole(base, path)
@@ -97,6 +100,7 @@ def read_ledger(folder: Path) -> Iterator[sqlite3.Connection]:
     with _told(path):
         address = f"{path.resolve().as_uri()}?mode=ro{'&immutable=1' if still else ''}"
         base = sqlite3.connect(address, timeout=_WAIT_S, isolation_level=None, uri=True)
+        base.text_factory = _TEXT
         try:
             if not _has_tables(base, path):
                 raise InputError(f"{path}: it is no ledger (it is empty); run the sweep again in another folder")
@@ -145,6 +149,8 @@ def _told(path: Path) -> Iterator[None]:
     """Turn SQLite's errors into those that the command line tells in one line."""
     try:
         yield
+    except UnicodeDecodeError as error:  # in an error that quotes the file
+        raise InputError(f"{path}: it is no ledger (its names are no text); move it away") from error
     except sqlite3.DatabaseError as error:
         code = getattr(error, "sqlite_errorcode", None)
         if code is None:  # a fault of ours, not of the file's
