@@ -1,18 +1,18 @@
 """The command `rodcone capture`."""
 
-import json as notation
 import sys
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
+from rodcone.progress import progress
+from studies.commands.console import Flag, Out, print_result, say
+from studies.photograph.shot import Order, take
 
 
 def capture(
     source: str,
     /,
     *,
-    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("shot.dng"),
+    out: Out = Path("shot.dng"),
     sensor: str = "low_noise",
     cfa: str | None = None,
     exposure_s: float | None = None,
@@ -21,10 +21,10 @@ def capture(
     size: int | None = None,
     spp: int = 64,
     seed: int = 0,
-    trust_scene: Annotated[bool, Parameter(negative="")] = False,
+    trust_scene: Flag = False,
     extend: str | None = None,
-    force: Annotated[bool, Parameter(negative="")] = False,
-    json: Annotated[bool, Parameter(negative="")] = False,
+    force: Flag = False,
+    json: Flag = False,
 ) -> None:
     """Photograph a scene and write raw files that raw converters open; prints their paths.
 
@@ -64,14 +64,10 @@ def capture(
     json
         Print one JSON object with the paths and facts of the exposure instead of the paths.
     """
-    from rodcone.progress import progress
-    from studies.photograph.shot import Order, take
-
     order = Order(
         source, out, sensor, cfa, exposure_s, level, white_balance, size, spp, seed, trust_scene, extend, force
     )
     with progress(sys.stderr) as step:
         taken = take(order, step)
-    for note in taken.notes:
-        print(f"rodcone: {note}", file=sys.stderr)
-    print(notation.dumps(taken.facts) if json else "\n".join(str(path) for path in taken.paths))
+    say(*taken.notes)
+    print_result("\n".join(map(str, taken.paths)), taken.facts, json=json)

@@ -1,21 +1,25 @@
 """The command `rodcone characterise`."""
 
 import json as notation
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from math import isfinite
+from typing import Any
 
-from cyclopts import Parameter
+from rodcone.files import check_place, replacing
+from sensor.emva1288.characterise import Characterisation
+from sensor.emva1288.characterise import characterise as measure
+from sensor.presets import preset as sensor_preset
+from studies.commands.console import Flag, OutOrNone, print_table, require_ending
+from studies.pages.transfer_chart import transfer_svg
 
-if TYPE_CHECKING:
-    from sensor.emva1288.characterise import Characterisation
+HEAD = ("figure", "unit", "configured", "measured", "std. error", "in std. errors")
 
 
 def characterise(
     preset: str,
     /,
     *,
-    out: Annotated[Path | None, Parameter(name=["--out", "-o"])] = None,
-    json: Annotated[bool, Parameter(negative="")] = False,
+    out: OutOrNone = None,
+    json: Flag = False,
     height: int = 256,
     width: int = 320,
     exposure_s: float = 0.01,
@@ -40,59 +44,45 @@ def characterise(
     seed
         Seed of the chip and of its frames.
     """
-    from rodcone.errors import InputError
-    from rodcone.files import check_place, replacing
-    from sensor.emva1288.characterise import characterise as run
-    from sensor.presets import preset as camera
-    from studies.pages.transfer_chart import transfer_svg
-
-    if out is not None and out.suffix.lower() != ".svg":
-        raise InputError(f"out: {str(out)!r} has another ending; allowed: .svg; rename it")
-    sensor = camera(preset)
+    sensor = sensor_preset(preset)
     if out is not None:
+        require_ending(out, ".svg")
         check_place(out)
-    result = run(sensor, (height, width), seed, exposure_s)
+    found = measure(sensor, (height, width), seed, exposure_s)
     if out is not None:
         with replacing(out) as (place,):
-            place.write_text(transfer_svg(result, f"{preset}, characterised after EMVA 1288"), "utf-8")
-    print(notation.dumps(as_data(result), allow_nan=False) if json else as_table(result))
+            place.write_text(transfer_svg(found, f"{preset}, characterised after EMVA 1288"), "utf-8")
+    if json:
+        print(notation.dumps(_facts(found), allow_nan=False))
+        return
+    # The last column is measured less configured in standard errors; a figure without an error has none.
+    rows = []
+    for figure in found.figures:
+        error, off = f"{figure.error:.2g}", f"{(figure.measured - figure.configured) / (figure.error or 1.0):+.1f}"
+        errors = (error, off) if figure.error > 0 else ("", "")
+        rows.append((figure.name, figure.unit, f"{figure.configured:.5g}", f"{figure.measured:.5g}", *errors))
+    print_table(HEAD, rows, words=2)
+    print("\n".join(["", *(f"- {note}" for note in found.notes)]))
 
 
-def as_data(result: "Characterisation") -> dict[str, Any]:
-    """Plain data; what isn't finite becomes None."""
+def _facts(found: Characterisation) -> dict[str, Any]:
+    """Return the measurement as JSON holds it."""
     series = {
-        "light_e": result.transfer.light_e,
-        "mean_dn": result.transfer.mean_dn,
-        "variance_dn2": result.transfer.variance_dn2,
-        "snr": result.snr,
-        "linearity_share": result.linearity_share,
+        "light_e": found.transfer.light_e,
+        "mean_dn": found.transfer.mean_dn,
+        "variance_dn2": found.transfer.variance_dn2,
+        "snr": found.snr,
+        "linearity_share": found.linearity_share,
     }
     return {
-        "figures": [
-            {key: _finite(value) if isinstance(value, float) else value for key, value in vars(figure).items()}
-            for figure in result.figures
-        ],
-        "series": {name: [_finite(float(value)) for value in values] for name, values in series.items()},
-        "dark_mean_dn": result.dark_mean_dn,
-        "dark_variance_dn2": result.dark_variance_dn2,
-        "notes": list(result.notes),
+        "figures": [{name: _finite(value) for name, value in vars(figure).items()} for figure in found.figures],
+        "series": {name: [_finite(value) for value in values.tolist()] for name, values in series.items()},
+        "dark_mean_dn": found.dark_mean_dn,
+        "dark_variance_dn2": found.dark_variance_dn2,
+        "notes": list(found.notes),
     }
 
 
-def _finite(value: float) -> float | None:
-    return value if abs(value) < float("inf") else None
-
-
-def as_table(result: "Characterisation") -> str:
-    """Aligned text; the last column is measured less configured in standard errors."""
-    rows = [("figure", "unit", "configured", "measured", "std. error", "in std. errors")]
-    for figure in result.figures:
-        off = f"{(figure.measured - figure.configured) / figure.error:+.1f}" if figure.error > 0 else ""
-        error = f"{figure.error:.2g}" if figure.error > 0 else ""
-        rows.append((figure.name, figure.unit, f"{figure.configured:.5g}", f"{figure.measured:.5g}", error, off))
-    widths = [max(len(row[column]) for row in rows) for column in range(6)]
-    lines = [
-        "  ".join(cell.ljust(width) if index < 2 else cell.rjust(width) for index, (cell, width) in enumerate(pair))
-        for pair in (list(zip(row, widths, strict=True)) for row in rows)
-    ]
-    return "\n".join([*(line.rstrip() for line in lines), "", *(f"- {note}" for note in result.notes)])
+def _finite(value: Any) -> Any:
+    """Return None for NaN and infinity, which JSON lacks."""
+    return None if isinstance(value, float) and not isfinite(value) else value

@@ -2,20 +2,18 @@
 
 import sys
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
-# Packages named render, sensor, ... exist in other distributions: `doctor` tells which ones Python finds, and must
-# come so far. So nothing of them is imported at the top.
+from rodcone.errors import InputError
+from studies.commands.console import INTERRUPTED, say
 
+# Commands are imported when they run: other distributions have packages named render, sensor, ..., and `doctor`, which
+# says which ones Python finds, has to start all the same.
 BAD_INPUT = 2
 
 app = App(
@@ -96,75 +94,43 @@ def demo(
     print(job.write(outcome, out))
 
 
-@app.command
-def doctor() -> int:
-    """Print versions, the LLVM library, the engine, and whether rodcone's packages are its own; exit 1 if not."""
-    from studies.commands.doctor import report
-
-    found = report()
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(no_wrap=True)
-    table.add_column(overflow="fold")
-    for row in found.rows:
-        table.add_row(row.name, escape(row.value) if row.ok else f"[red]{escape(row.value)}[/red]")
-    Console().print(table)
-    return 0 if found.ok else 1
-
-
 app.command("studies.commands.bench:bench", name="bench", help="Measure speed against error, stage by stage.")
 app.command("studies.commands.capture:capture", name="capture", help="Photograph a scene into raw files.")
 app.command("studies.commands.characterise:characterise", name="characterise", help="Measure a chip after EMVA 1288.")
 app.command("studies.commands.develop:develop", name="develop", help="Develop a raw file into a PNG.")
+app.command("studies.commands.doctor:doctor", name="doctor", help="Print versions, and what is wrong.")
 app.command("studies.commands.new:app", name="new", help="Write files to start from: preset, study, cluster.")
 app.command("studies.commands.opponents:opponents", name="opponents", help="Rank a sweep's cameras on one page.")
-app.command("studies.commands.paper:paper", name="paper", help="Compute the paper's figures and judge its claims.")
+app.command("studies.commands.paper:paper", name="paper", help="Compute the paper's figures and check its claims.")
 app.command("studies.commands.plan:plan", name="plan", help="Compute a study's error budget and the cheapest model.")
 app.command("studies.commands.render:render", name="render", help="Render a scene into a spectral OpenEXR file.")
 app.command("studies.commands.report:report", name="report", help="Write the report of a sweep as one HTML file.")
-app.command(
-    "studies.commands.sweep:sweep", name="sweep", help="Make every picture of a study, and go on after any end."
-)
-app.command("studies.commands.sweep:export", name="export", help="Write a sweep's ledger as CSV or Parquet.")
+app.command("studies.commands.sweep:sweep", name="sweep", help="Make every picture of a study, or those still missing.")
+app.command("studies.commands.sweep:export", name="export", help="Write a sweep's results as CSV or Parquet.")
 app.command("studies.commands.table:table", name="table", help="Print a sweep's figures as a Markdown table.")
-app.register_install_completion_command(help="Complete rodcone's commands and options in this shell from now on.")
+app.register_install_completion_command(help="Let this shell complete rodcone's commands and options.")
 
 
 def main(arguments: list[str] | None = None) -> Any:
     """Run the command; one line on stderr and exit code 2 for bad input, 1 for a file that can't be written."""
     try:
-        with _warnings_in_one_line():
+        with warnings.catch_warnings():
+            # Warnings look like errors, without the place in the code; each is printed once.
+            once = cache(say)
+            warnings.showwarning = lambda message, *_: once(str(message))
             code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         fail(" ".join(str(error).split()), BAD_INPUT)
+    except InputError as error:
+        fail(str(error), BAD_INPUT)
     except OSError as error:
         fail(f"{error.filename or 'file'}: {error.strerror or error}; choose another place with --out", 1)
-    except ValueError as error:
-        from rodcone.errors import InputError  # late, so that a foreign `render` doesn't keep the doctor from starting
-
-        if not isinstance(error, InputError):
-            raise
-        fail(str(error), BAD_INPUT)
     except KeyboardInterrupt:
-        fail("stopped; nothing was written", 130)
+        fail("stopped; nothing was written", INTERRUPTED)
     sys.exit(code or 0)
-
-
-@contextmanager
-def _warnings_in_one_line() -> Iterator[None]:
-    """Print warnings as errors are, without the place in the code, each once."""
-    told: set[str] = set()
-
-    def tell(message: str) -> None:
-        if message not in told:
-            told.add(message)
-            print(f"rodcone: {message}", file=sys.stderr)
-
-    with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_: tell(str(message))
-        yield
 
 
 def fail(message: str, code: int) -> None:
     """Print one line on stderr and exit."""
-    print(f"rodcone: {message}", file=sys.stderr)
+    say(message)
     sys.exit(code)

@@ -1,23 +1,25 @@
 """The command `rodcone develop`."""
 
-import json as notation
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
+from rodcone.errors import InputError
+from rodcone.files import check_place
+from studies.commands.console import Flag, OutOrNone, print_result
+from studies.photograph.develop import develop_file
+from studies.photograph.picture_file import check_picture_file, write_picture
 
 
 def develop(
     raw: Path,
     /,
     *,
-    out: Annotated[Path | None, Parameter(name=["--out", "-o"])] = None,
+    out: OutOrNone = None,
     isp: str | None = None,
     bits: int = 8,
     ev: float | None = None,
     white_balance: str = "gray-world",
     encoding: str = "srgb",
-    json: Annotated[bool, Parameter(negative="")] = False,
+    json: Flag = False,
 ) -> None:
     """Develop a raw file of `rodcone capture`, or any camera's with a Bayer mosaic, into a picture; prints its path.
 
@@ -43,11 +45,6 @@ def develop(
     json
         Print one JSON object with the path and what was decided instead of the path.
     """
-    from rodcone.errors import InputError
-    from rodcone.files import check_place
-    from studies.photograph.develop import develop_file
-    from studies.photograph.picture_file import check_picture_file, write_picture
-
     if not raw.name:
         raise InputError(f"raw: {str(raw)!r} is a folder; give the path of a raw file")
     picture = raw.with_suffix(".png") if out is None else out
@@ -55,4 +52,4 @@ def develop(
     check_place(picture)
     developed = develop_file(raw, isp, ev, white_balance, encoding)
     write_picture(developed.encoded, picture, bits, encoding)
-    print(notation.dumps({"path": str(picture), **developed.facts}) if json else picture)
+    print_result(picture, {"path": str(picture), **developed.facts}, json=json)

@@ -1,4 +1,4 @@
-"""What `rodcone doctor` tells: versions, the LLVM library, the backend, and whose packages Python finds.
+"""The command `rodcone doctor`: versions, the LLVM library, the backend, and whose packages Python finds.
 
 Nothing of `render` is imported before its place is known: where another distribution's `render` shadows rodcone's,
 the report says so instead of failing at an import.
@@ -6,11 +6,13 @@ the report says so instead of failing at an import.
 
 import os
 import platform
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import metadata, util
-from importlib.machinery import ModuleSpec
 from pathlib import Path
+
+from rich.text import Text
+
+from studies.commands.console import print_table
 
 PACKAGES = ("scenes", "render", "sensor", "isp", "studies")
 NEEDED = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR", "scikit-image", "flip-evaluator")
@@ -20,13 +22,9 @@ FALLBACK = (
     "and capture and reconstruction run their NumPy forms"
 )
 
-ENGINE_UNASKED = "not asked: a package named below is not rodcone's own"
-
-FindSpec = Callable[[str], ModuleSpec | None]
-
 
 @dataclass(frozen=True)
-class Row:
+class Finding:
     """One line of the report; `ok` is False where rodcone can't work as it should."""
 
     name: str
@@ -34,36 +32,44 @@ class Row:
     ok: bool = True
 
 
-@dataclass(frozen=True)
-class Report:
-    """All rows in the order in which they are printed."""
-
-    rows: tuple[Row, ...]
-
-    @property
-    def ok(self) -> bool:
-        """Whether no row is at fault; the command line exits with code 1 otherwise."""
-        return all(row.ok for row in self.rows)
+def doctor() -> int:
+    """Print versions, the LLVM library, the engine, and whether rodcone's packages are its own; exit 1 if not."""
+    found = findings()
+    print_table(("", ""), [(each.name, Text(each.value, style="" if each.ok else "red")) for each in found], words=2)
+    return 0 if all(each.ok for each in found) else 1
 
 
-def installed_version(distribution: str) -> str | None:
-    """Version of an installed distribution, None where it is absent."""
-    try:
-        return metadata.version(distribution)
-    except metadata.PackageNotFoundError:
-        return None
+def findings() -> tuple[Finding, ...]:
+    """Collect all that is printed. Where a package is foreign or missing, the engine isn't imported."""
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    home = Path(__file__).resolve().parents[2]
+    others = intruders(home)
+    packages = [package_finding(name, home, others.get(name)) for name in PACKAGES]
+    unknown = Finding("engine", "not imported: a package named below is not rodcone's own", False)
+    return (
+        distribution_finding("rodcone", needed=False),
+        Finding("Python", platform.python_version()),
+        Finding("platform", platform.platform()),
+        Finding("CPU threads", f"{usable} of {os.cpu_count()}"),
+        *(engine_findings() if all(each.ok for each in packages) else [unknown]),
+        *map(distribution_finding, NEEDED),
+        distribution_finding(LLVM_WHEEL, needed=False),
+        *packages,
+    )
 
 
-def distribution_row(name: str, *, needed: bool = True) -> Row:
+def distribution_finding(name: str, *, needed: bool = True) -> Finding:
     """Version of a distribution; its absence is a fault only where it is needed."""
-    version = installed_version(name)
-    return Row(name, version or "not installed", bool(version) or not needed)
+    try:
+        return Finding(name, metadata.version(name))
+    except metadata.PackageNotFoundError:
+        return Finding(name, "not installed", not needed)
 
 
 def intruders(home: Path) -> dict[str, str]:
     """Other distributions that installed files into rodcone's own folders in `home`, by package name.
 
-    Two wheels with one top-level name are merged into one folder, which no path can tell.
+    Two wheels with one top-level name are merged into one folder, so that its path doesn't tell.
     """
     others = (item for item in metadata.distributions() if item.name.lower() != "rodcone")
     here = [item for item in others if Path(str(item.locate_file(""))).resolve() == home.resolve()]
@@ -71,54 +77,42 @@ def intruders(home: Path) -> dict[str, str]:
     return {name: other for other, names in tops.items() for name in PACKAGES if name in names}
 
 
-def package_row(name: str, home: Path, intruder: str | None = None, find_spec: FindSpec = util.find_spec) -> Row:
-    """Tell whether the package `name` that Python finds lies in `home`, the folder that holds rodcone's packages."""
-    label = f"package {name}"
-    spec = find_spec(name)
+def package_finding(name: str, home: Path, intruder: str | None = None) -> Finding:
+    """Check whether the package that Python finds lies in `home`, the folder that holds rodcone's packages."""
+    label, fix = f"package {name}", "install rodcone into an environment of its own"
+    spec = util.find_spec(name)
     if spec is None:
-        return Row(label, "not found; install rodcone again", False)
+        return Finding(label, "not found; install rodcone again", False)
     places = [Path(place).resolve() for place in spec.submodule_search_locations or [spec.origin or "built in"]]
-    fix = "install rodcone into an environment of its own"
     if places != [home.resolve() / name]:
         found = ", ".join(map(str, places))
-        return Row(label, f"foreign, {found}; rodcone's lies in {home}: {fix}, or clear PYTHONPATH", False)
+        return Finding(label, f"foreign, {found}; rodcone's lies in {home}: {fix}, or clear PYTHONPATH", False)
     if intruder:
-        return Row(label, f"shared with {intruder} in {places[0]}: {fix}", False)
-    return Row(label, f"rodcone's own, {places[0]}")
+        return Finding(label, f"shared with {intruder} in {places[0]}: {fix}", False)
+    return Finding(label, f"rodcone's own, {places[0]}")
 
 
-def package_rows(find_spec: FindSpec = util.find_spec) -> tuple[Row, ...]:
-    """Look for each of rodcone's packages beside the `studies` that this module was imported from."""
-    home = Path(__file__).resolve().parents[2]
-    others = intruders(home)
-    return tuple(package_row(name, home, others.get(name), find_spec) for name in PACKAGES)
-
-
-def llvm_origin(library: Path) -> str:
-    """Where the choice of the library came from, judged by where it lies."""
+def llvm_finding(library: Path | None, version: int | None, oldest: int) -> Finding:
+    """Path, version and origin of the LLVM library, and the fix where it can't be used."""
+    if library is None:
+        return Finding("LLVM", f"none of version {oldest} or newer; pip install {LLVM_WHEEL} (Linux x86-64) brings one")
+    fix = f"unset DRJIT_LIBLLVM_PATH or name a library of version {oldest} or newer"
+    if not library.is_file():
+        return Finding("LLVM", f"{library} doesn't exist; {fix}", False)
+    if version is not None and version < oldest:
+        return Finding("LLVM", f"{library} is version {version}; {fix}", False)
     try:
         wheel = [Path(str(file.locate())).resolve() for file in metadata.files(LLVM_WHEEL) or []]
     except metadata.PackageNotFoundError:
         wheel = []
-    if library.resolve() in wheel:
-        return f"from {LLVM_WHEEL}"
-    return "from DRJIT_LIBLLVM_PATH" if wheel else "from the system or DRJIT_LIBLLVM_PATH"
+    origin = "the system or DRJIT_LIBLLVM_PATH"
+    if wheel:
+        origin = LLVM_WHEEL if library.resolve() in wheel else "DRJIT_LIBLLVM_PATH"
+    known = f"version {version}" if version else "version not in its name"
+    return Finding("LLVM", f"{library}, {known}, from {origin}")
 
 
-def llvm_row(library: Path | None, version: int | None, oldest: int) -> Row:
-    """Tell the LLVM library, and the fix where it can't serve."""
-    if library is None:
-        return Row("LLVM", f"none of version {oldest} or newer; pip install {LLVM_WHEEL} (Linux x86-64) brings one")
-    fix = f"unset DRJIT_LIBLLVM_PATH or name a library of version {oldest} or newer"
-    if not library.is_file():
-        return Row("LLVM", f"{library} doesn't exist; {fix}", False)
-    if version is not None and version < oldest:
-        return Row("LLVM", f"{library} is version {version}; {fix}", False)
-    told = f"version {version}" if version else "version not told by its name"
-    return Row("LLVM", f"{library}, {told}, {llvm_origin(library)}")
-
-
-def engine_rows() -> tuple[Row, ...]:
+def engine_findings() -> list[Finding]:
     """LLVM library, backend, variant and threads, as the render and the kernels use them."""
     try:
         from render.loader import integrator_name, variant
@@ -126,32 +120,13 @@ def engine_rows() -> tuple[Row, ...]:
     except (ImportError, NameError) as error:  # Dr.Jit stumbles with a NameError over a failed import of its own
         cause = str(error.__context__ or error)
         fix = "; Debian: apt install libatomic1" if "libatomic" in cause else ""
-        return (Row("engine", f"can't be imported: {cause}{fix}", False),)
+        return [Finding("engine", f"can't be imported: {cause}{fix}", False)]
     version = jit.llvm_version(jit.LIBLLVM) if jit.LIBLLVM else None
     backend = jit.backend()
-    return (
-        llvm_row(jit.LIBLLVM, version, jit.OLDEST_LLVM),
-        Row("backend", FALLBACK if backend == "numpy" else backend),
-        Row("Mitsuba variant", variant()),
-        Row("integrator", integrator_name()),
-        Row("Dr.Jit threads", str(jit.dr.thread_count())),
-    )
-
-
-def machine_rows() -> tuple[Row, ...]:
-    """Python, platform and the CPU threads that this process may use."""
-    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return (
-        Row("rodcone", installed_version("rodcone") or "not installed; run from its folder"),
-        Row("Python", platform.python_version()),
-        Row("platform", platform.platform()),
-        Row("CPU threads", f"{usable} of {os.cpu_count()}"),
-    )
-
-
-def report() -> Report:
-    """Collect every row. Where a package is foreign or missing, the engine isn't asked."""
-    packages = package_rows()
-    engine = engine_rows() if all(row.ok for row in packages) else (Row("engine", ENGINE_UNASKED, False),)
-    versions = (*map(distribution_row, NEEDED), distribution_row(LLVM_WHEEL, needed=False))
-    return Report((*machine_rows(), *engine, *versions, *packages))
+    return [
+        llvm_finding(jit.LIBLLVM, version, jit.OLDEST_LLVM),
+        Finding("backend", FALLBACK if backend == "numpy" else backend),
+        Finding("Mitsuba variant", variant()),
+        Finding("integrator", integrator_name()),
+        Finding("Dr.Jit threads", str(jit.dr.thread_count())),
+    ]

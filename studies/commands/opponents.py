@@ -1,16 +1,19 @@
 """The command `rodcone opponents`."""
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
+from rodcone.files import check_place
+from studies.commands.console import Out, require_ending
+from studies.pages.duels_page import write_page
+from studies.sweep.database import last_study, read_ledger
+from studies.sweep.export import read_rows
 
 
 def opponents(
     folder: Path,
     /,
     *,
-    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("opponents.md"),
+    out: Out = Path("opponents.md"),
     camera: str = "interleaved",
 ) -> None:
     """Write a page on one camera beside the other processors of a sweep, its losses included; prints its path.
@@ -26,14 +29,7 @@ def opponents(
     camera
         Processor whose leads and losses the page tells.
     """
-    from rodcone.errors import InputError
-    from rodcone.files import check_place
-    from studies.pages.duels_page import write_page
-    from studies.sweep.database import last_study, read_ledger
-    from studies.sweep.export import read_rows
-
-    if out.suffix != ".md":
-        raise InputError(f"out: {str(out)!r} doesn't end in .md; allowed: that ending; write {out.stem}.md")
+    require_ending(out, ".md")
     check_place(out)
     rows = read_rows(folder)
     with read_ledger(folder) as base:

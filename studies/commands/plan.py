@@ -2,20 +2,29 @@
 
 import json as notation
 import sys
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated, Any
+from tempfile import TemporaryDirectory
 
-from cyclopts import Parameter
+from rich.console import Console
+
+from rodcone.progress import progress
+from studies.budget.check import check_json, check_plan
+from studies.budget.plan import plan as plan_study
+from studies.budget.plan import reference_plan
+from studies.budget.plan_text import plan_json, plan_table, reasons
+from studies.commands.console import Flag, Several
+from studies.study.study_file import read_study
 
 
 def plan(
     study: Path,
     /,
     *,
-    set: Annotated[list[str] | None, Parameter(negative_iterable=())] = None,
-    check: Annotated[bool, Parameter(negative="")] = False,
+    set: Several = None,
+    check: Flag = False,
     cache: Path | None = None,
-    json: Annotated[bool, Parameter(negative="")] = False,
+    json: Flag = False,
 ) -> None:
     """Compute a study's error budget and choose the cheapest model within it.
 
@@ -32,24 +41,20 @@ def plan(
     json
         Print one JSON object.
     """
-    from rich.console import Console
-
-    from rodcone.progress import progress
-    from studies.budget import plan as budget
-    from studies.budget import plan_text as report
-    from studies.study.study_file import read_study
-
     task = read_study(study, set or ())
-    everything = budget.reference_plan(task)
+    everything = reference_plan(task)
+    checked = None
     with progress(sys.stderr) as step:
-        chosen = budget.plan(task, cache=cache, step=step)
-        found = report.plan_json(task, chosen, everything)
-        checked = _check(task, chosen, everything, cache, step) if check else None
+        chosen = plan_study(task, cache=cache, step=step)
+        found = plan_json(task, chosen, everything)
+        if check:
+            with nullcontext(cache) if cache else TemporaryDirectory() as folder:
+                checked = check_json(check_plan(task, chosen, everything, cache=Path(folder), step=step))
     if json:
         print(notation.dumps(found | ({"check": checked} if checked else {})))
         return
-    Console(width=None if sys.stdout.isatty() else 200).print(report.plan_table(chosen))
-    print("\n".join(report.reasons(task, chosen, everything)))
+    Console(width=None if sys.stdout.isatty() else 200).print(plan_table(chosen))
+    print("\n".join(reasons(task, chosen, everything)))
     if checked:
         print(
             "Check: the prediction covers {covered:.1%} of {conditions} conditions, median of predicted over measured "
@@ -57,13 +62,3 @@ def plan(
                 **checked
             )
         )
-
-
-def _check(task: Any, chosen: Any, everything: Any, cache: Path | None, step: Any) -> dict[str, Any]:
-    """Measure in a folder of renders of its own where none is given."""
-    from tempfile import TemporaryDirectory
-
-    from studies.budget.check import check_json, check_plan
-
-    with TemporaryDirectory() as folder:
-        return check_json(check_plan(task, chosen, everything, cache=cache or Path(folder), step=step))

@@ -1,13 +1,11 @@
 """The command `rodcone render`."""
 
-import json as notation
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from cyclopts import Parameter
 
 from render.engine import render as render_transport
 from render.illuminants import illuminant
@@ -21,22 +19,22 @@ from rodcone.errors import InputError, require_keys, require_whole
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import progress
+from studies.commands.console import INTERRUPTED, Flag, Out, Several, print_result, require_ending, say
 from studies.pages.results import render_facts
 from studies.study.lit_scene import spectral_luminance
 from studies.study.scene_source import asked_level, open_scene
 
 MOST_BANDS = 1000
-INTERRUPTED = 130  # exit code after Ctrl-C: 128 + SIGINT
 
 
 def render(
     source: str,
     *,
-    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("render.exr"),
+    out: Out = Path("render.exr"),
     height: int | None = None,
     width: int | None = None,
     bands: str | None = None,
-    light: Annotated[list[str] | None, Parameter(negative_iterable=())] = None,
+    light: Several = None,
     level: str | None = None,
     spp: int | None = None,
     noise: float | None = None,
@@ -44,10 +42,10 @@ def render(
     max_depth: int = 8,
     seed: int = 0,
     cache: Path | None = None,
-    trust_scene: Annotated[bool, Parameter(negative="")] = False,
+    trust_scene: Flag = False,
     extend: str | None = None,
-    force: Annotated[bool, Parameter(negative="")] = False,
-    json: Annotated[bool, Parameter(negative="")] = False,
+    force: Flag = False,
+    json: Flag = False,
 ) -> int:
     """Render a scene into a spectral OpenEXR file; prints its path.
 
@@ -95,9 +93,8 @@ def render(
     json
         Print one JSON object with the path and facts of the render instead of the path.
     """
-    # What can be told before the render
-    if out.suffix.lower() != ".exr":
-        raise InputError(f"out: {str(out)!r} is not allowed; give a file ending in .exr")
+    # Check what can be checked before the render
+    require_ending(out, ".exr")
     wavelength_nm, width_nm = _bands(bands)
     opened = open_scene(source, trust_scene, extend)
     scene, size = opened.scene, _size(opened.size, height, width)
@@ -124,13 +121,12 @@ def render(
         )
     radiance = transport.relight(spectra, luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
     write_exr(out, radiance, scene=scene.name)
-    # Tell
-    for note in opened.notes:
-        print(f"rodcone: {note}", file=sys.stderr)
+    # Say what was done
+    say(*opened.notes)
     interrupted = transport.stopped_by == "interrupt"
     if interrupted:
-        print(f"rodcone: stopped; {transport.spp} samples a pixel are kept in {out}", file=sys.stderr)
-    print(notation.dumps({"path": str(out), **_facts(opened, transport, radiance)}) if json else out)
+        say(f"stopped; {transport.spp} samples a pixel are kept in {out}")
+    print_result(out, {"path": str(out), **_facts(opened, transport, radiance)}, json=json)
     return INTERRUPTED if interrupted else 0
 
 

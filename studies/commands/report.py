@@ -1,12 +1,10 @@
 """The command `rodcone report`."""
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from rodcone.errors import require_whole
 from rodcone.files import replacing
+from studies.commands.console import OutOrNone
 from studies.pages.report import render_report
 from studies.pages.report_sweep import ledger_results
 
@@ -17,7 +15,7 @@ def report(
     folder: Path,
     /,
     *,
-    out: Annotated[Path | None, Parameter(name=["--out", "-o"])] = None,
+    out: OutOrNone = None,
     pictures: int | None = None,
 ) -> None:
     """Write the report of a sweep, one HTML file that needs no other; prints its path.

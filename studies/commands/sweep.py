@@ -3,7 +3,6 @@
 import errno
 import json as notation
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
@@ -20,6 +19,7 @@ from studies.budget.model_plan import Plan
 from studies.budget.model_plan import as_stated as plan_as_stated
 from studies.budget.plan import plan as plan_study
 from studies.budget.plan import reference_plan
+from studies.commands.console import INTERRUPTED, Flag, Out, Several, say
 from studies.commands.estimate import Estimate, as_facts, estimate
 from studies.commands.report import FILE as REPORT
 from studies.commands.report import write_report
@@ -35,8 +35,6 @@ from studies.sweep.run_sweep import sweep as run_sweep
 from studies.sweep.workers import InThisProcess, cores, run, run_in_processes
 
 MOST_WORKERS = 1024
-INTERRUPTED = 130  # exit code after Ctrl-C: 128 + SIGINT
-LINE_EVERY_S = 30.0  # of progress, where stderr is no terminal
 PILOTS = "pilots"  # folder of a plan's renders beside the ledger
 
 
@@ -44,16 +42,16 @@ def sweep(
     study: Path,
     /,
     *,
-    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("out/sweep"),
-    set: Annotated[list[str] | None, Parameter(negative_iterable=())] = None,
+    out: Out = Path("out/sweep"),
+    set: Several = None,
     workers: int | None = None,
     cluster: str | None = None,
-    reference: Annotated[bool, Parameter(negative="")] = False,
-    as_stated: Annotated[bool, Parameter(negative="")] = False,
-    keep_old: Annotated[bool, Parameter(negative="")] = False,
-    dry_run: Annotated[bool, Parameter(negative="")] = False,
-    force: Annotated[bool, Parameter(negative="")] = False,
-    json: Annotated[bool, Parameter(negative="")] = False,
+    reference: Flag = False,
+    as_stated: Flag = False,
+    keep_old: Flag = False,
+    dry_run: Flag = False,
+    force: Flag = False,
+    json: Flag = False,
 ) -> int:
     """Make every picture of a study, note each in a ledger and write a report; prints the ledger's path.
 
@@ -104,14 +102,13 @@ def sweep(
     out.mkdir(parents=True, exist_ok=True)  # a place that can't be written is told before anything is rendered
     with _kept_told(out), ExitStack() as held:
         runner: Runner = _local(workers) if cluster is None else held.enter_context(on_cluster(cluster))
-        step = held.enter_context(_steps())
+        step = held.enter_context(progress(sys.stderr))
         with clock.stage("plan"):
             plan = _plan(task, out, reference, as_stated, step)
         swept = run_sweep(task, out, plan, runner, step, keep_old=keep_old, clock=clock)
-    for note in swept.notes:
-        print(f"rodcone: {note}", file=sys.stderr)
+    say(*swept.notes)
     report = write_report(out, out / REPORT)
-    print(f"rodcone: its report is {report}", file=sys.stderr)
+    say(f"its report is {report}")
     print(notation.dumps(_facts(swept) | {"report": str(report)}) if json else swept.out / FILE)
     return 0
 
@@ -120,7 +117,7 @@ def export(
     folder: Path,
     /,
     *,
-    out: Annotated[Path, Parameter(name=["--out", "-o"])],
+    out: Out,
     everything: Annotated[bool, Parameter(name="--all", negative="")] = False,
 ) -> None:
     """Write the ledger of a sweep as a table, a row a cell; prints its path.
@@ -170,34 +167,16 @@ def _facts(swept: Swept) -> dict[str, object]:
 
 
 @contextmanager
-def _steps() -> Iterator[Step]:
-    """Progress on stderr: a bar on a terminal, else a line now and then, for the logs of a batch system."""
-    if sys.stderr.isatty():
-        with progress(sys.stderr) as step:
-            yield step
-        return
-    told = time.monotonic()
-
-    def line(what: str, share: float) -> None:
-        nonlocal told
-        if time.monotonic() - told >= LINE_EVERY_S:
-            told = time.monotonic()
-            print(f"rodcone: {share:.0%}, {what}", file=sys.stderr)
-
-    yield line
-
-
-@contextmanager
 def _kept_told(out: Path) -> Iterator[None]:
     """Say what is kept where Ctrl-C or a full disk ends the sweep."""
     try:
         yield
     except KeyboardInterrupt:
-        print(f"rodcone: stopped; {out} keeps what is done, and the same command goes on", file=sys.stderr)
+        say(f"stopped; {out} keeps what is done, and the same command goes on")
         raise SystemExit(INTERRUPTED) from None
     except OSError as error:
         if error.errno not in (errno.ENOSPC, errno.EDQUOT):
             raise
-        words = f"{error.filename or out}: {error.strerror}; make room: {out} keeps what is done, and the same command"
-        print(f"rodcone: {words} goes on", file=sys.stderr)
+        full = f"{error.filename or out}: {error.strerror}"
+        say(f"{full}; make room: {out} keeps what is done, and the same command goes on")
         raise SystemExit(1) from None

@@ -1,15 +1,11 @@
 """The command `rodcone table`."""
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from rodcone.errors import InputError
+from studies.commands.console import Several
 from studies.sweep.export import read_rows
 from studies.sweep.table import lines, markdown
-
-Listed = Annotated[list[str] | None, Parameter(negative_iterable=())]
 
 
 def table(
@@ -18,7 +14,7 @@ def table(
     *,
     by: str = "spectrum,level,processor",
     show: str = "psnr_db,delta_e_median",
-    where: Listed = None,
+    where: Several = None,
 ) -> None:
     """Print figures of a sweep as a Markdown table: means over the seeds, with the half width of their 95 % interval.
 

@@ -3,15 +3,25 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from statistics import median
 from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Times:
-    """Of the first call, compilation included [s]; medians of the later ones, on the clock and of the processor [s]."""
+    """Seconds of a call.
+
+    Attributes
+    ----------
+    first_s : float
+        First call, compilation included.
+    seconds, processor_s : float
+        Medians of the later calls: on the clock, and of the processor (all threads together).
+    """
 
     first_s: float
     seconds: float
@@ -19,8 +29,8 @@ class Times:
 
 
 @dataclass(frozen=True)
-class Point:
-    """One choice: its times, its error [e-]."""
+class Measured:
+    """One choice: its times, and its error [e-]."""
 
     choice: str
     times: Times
@@ -29,16 +39,16 @@ class Point:
 
 @dataclass(frozen=True)
 class Stage:
-    """One stage's choices.
+    """One stage of the chain, and its choices.
 
     Attributes
     ----------
     name, question : str
     reference : str
-        What errors are differences to, and what the times are ratios of.
+        What errors are differences from, and what the times are divided by.
     noise_e : float
-        The sensor's own noise, root mean square, to judge errors by.
-    points : tuple of Point
+        Root mean square of the sensor's own noise, to compare the errors with.
+    points : tuple of Measured
     reference_times : Times
     """
 
@@ -46,39 +56,44 @@ class Stage:
     question: str
     reference: str
     noise_e: float
-    points: tuple[Point, ...]
+    points: tuple[Measured, ...]
     reference_times: Times
 
 
-def front(points: Sequence[Point]) -> tuple[Point, ...]:
-    """Pareto front, quickest first: no other choice is at least as quick and as near, and better in one of the two."""
-    best: list[Point] = []
+def front(points: Sequence[Measured]) -> tuple[Measured, ...]:
+    """Pareto front, fastest first: no other choice is as fast and as accurate, and better in one of the two."""
+    best: list[Measured] = []
     for point in sorted(points, key=lambda each: (each.times.seconds, each.error_e)):
         if not best or point.error_e < best[-1].error_e:
             best.append(point)
     return tuple(best)
 
 
-def timed(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[T, Times]]:
-    """Result and times of each call: all are made once, then take `repeats` turns, so that they meet one machine."""
-    made: dict[str, T] = {}
+def laps(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[T, NDArray[np.float64]]]:
+    """Last result and seconds of each call, (1 + repeats, 2): on the clock, and of the processor.
+
+    The calls take turns: where other programs run, all of them meet much the same machine.
+    """
+    results: dict[str, T] = {}
     seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in calls}
     for _ in range(repeats + 1):
         for name, call in calls.items():
             wall, processor = time.perf_counter(), time.process_time()
-            made[name] = call()
+            results[name] = call()
             seconds[name].append((time.perf_counter() - wall, time.process_time() - processor))
-    return {name: (made[name], _times(all_s)) for name, all_s in seconds.items()}
+    return {name: (results[name], np.array(seconds[name])) for name in calls}
 
 
-def _times(seconds: Sequence[tuple[float, float]]) -> Times:
-    """Times of a first call and those after it; where there are none, it counts itself."""
-    walls, processors = zip(*(seconds[1:] or seconds), strict=True)
-    return Times(seconds[0][0], median(walls), median(processors))
+def timed(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[T, Times]]:
+    """Last result and times of each call; without repeats the first call counts."""
+    made = {}
+    for name, (result, seconds) in laps(calls, repeats).items():
+        made[name] = result, Times(float(seconds[0, 0]), *np.median(seconds[min(repeats, 1) :], axis=0).tolist())
+    return made
 
 
 def stage_json(stage: Stage) -> dict[str, Any]:
-    """A stage as JSON takes it: times and errors, ratios beside them."""
+    """Return a stage as JSON holds it: times and errors with their ratios."""
     best = front(stage.points)
     return {
         "name": stage.name,

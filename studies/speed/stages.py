@@ -1,24 +1,259 @@
-"""Every stage of the chain, measured one after the other."""
+"""What `rodcone bench` measures: each stage's choices, with errors in electrons, over pixels below saturation."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
 
-from scenes.catalog import load
-from sensor.presets import preset
-from studies.speed.camera_choices import by_lens, by_readout, by_reconstruction, camera_of
-from studies.speed.points import Stage
-from studies.speed.render_choices import by_bands, by_samples
-from studies.speed.setup import Bench
+import numpy as np
+from numpy.typing import NDArray
 
+from isp.interleaved import reconstruct
+from isp.reference import reconstruct_reference
+from render.engine import render
+from render.radiance import SpectralRadiance
+from render.scene import Scene
+from render.spectrum import Floats
+from render.transport import Transport
+from sensor.capture import capture
+from sensor.config import SensorConfig
+from sensor.device import draw_device
+from sensor.exposure import auto_exposure_s
+from sensor.noise import noise_variance
+from sensor.optics import form_image
+from sensor.raw import RawImage
+from sensor.response import channel_electrons, expected_electrons
+from studies.budget.bands import fine_bands, groups_of
+from studies.budget.terms import horizontal_view_deg
+from studies.speed.points import Measured, Stage, Times, timed
+
+MOST_BANDS = 40
 STAGES = 6
+Image = NDArray[np.float64]
+T = TypeVar("T")
 
 
-def stages(bench: Bench) -> Iterator[Stage]:
-    """Measure one stage after the other."""
-    scene, sensor = load(bench.scene), preset(bench.sensor)
-    finest, made = by_bands(bench, scene, sensor)
-    yield made
-    yield by_samples(bench, scene, sensor)
-    camera = camera_of(bench, scene, sensor, finest)
-    yield by_lens(bench, camera)
-    yield by_readout(bench, camera)
-    yield from by_reconstruction(bench, camera)
+@dataclass(frozen=True)
+class Bench:
+    """What is measured, and how large.
+
+    Attributes
+    ----------
+    scene, sensor : str
+    level_cd_m2 : float
+    size : int
+        Side of the renders in pixels.
+    picture : int
+        Side of the pictures that lens, readout and reconstruction work on; mirror images of the render fill it.
+    bands, samples : tuple of int
+        Numbers of bands; samples a pixel, increasing; a render of four times the last is the reference.
+    neighbourhoods, patches : tuple of int
+    repeats : int
+        Calls after the first; their median counts.
+    seed : int
+    """
+
+    scene: str = "still_life"
+    sensor: str = "low_noise"
+    level_cd_m2: float = 25.0
+    size: int = 40
+    picture: int = 128
+    bands: tuple[int, ...] = (4, 8, 20, MOST_BANDS)
+    samples: tuple[int, ...] = (32, 128, 512)
+    neighbourhoods: tuple[int, ...] = (9, 15, 21)
+    patches: tuple[int, ...] = (3, 5)
+    repeats: int = 1
+    seed: int = 0
+
+
+def more(bench: Bench) -> Bench:
+    """Return the bench with more choices of everything, and more repeats."""
+    return replace(
+        bench,
+        bands=(4, 8, 12, 16, 20, 28, MOST_BANDS),
+        samples=(32, 64, 128, 256, 512, 1024, 2048),
+        neighbourhoods=(7, 11, 15, 21, 27),
+        patches=(1, 3, 5, 7),
+        repeats=3,
+    )
+
+
+def stages(bench: Bench, scene: Scene, sensor: SensorConfig) -> Iterator[Stage]:
+    """Measure one stage after the other, `STAGES` of them."""
+    finest, stage = _bands(bench, scene, sensor)
+    yield stage
+    yield _samples(bench, scene, sensor)
+    radiance = _mirrored(bench, finest)
+    exposure_s = _auto_exposure_s(bench, sensor, finest)
+    view_deg = horizontal_view_deg(scene.geometry["sensor"], radiance.shape[:2])
+    yield _lens(bench, sensor, radiance, exposure_s, view_deg)
+    yield _readout(bench, sensor, radiance, exposure_s)
+    yield from _reconstruction(bench, sensor, radiance, exposure_s)
+
+
+def _bands(bench: Bench, scene: Scene, sensor: SensorConfig) -> tuple[Transport, Stage]:
+    """Render the same paths in ever more bands; the finest is the reference."""
+    nm, width_nm = fine_bands(group.spectrum for group in scene.groups.values())
+    calls = {}
+    for count in sorted({*bench.bands, MOST_BANDS}):
+        groups = groups_of(width_nm, count)
+        first = np.array([nm[group[0]] - width_nm[group[0]] / 2 for group in groups])
+        widths = np.array([width_nm[group].sum() for group in groups])
+        calls[f"{count} bands"] = _render(bench, scene, first + widths / 2, widths, bench.samples[0], bench.seed)
+    made = timed(calls, bench.repeats)
+    finest, _ = made[f"{MOST_BANDS} bands"]
+    error_e, noise_e = _render_errors(bench, sensor, finest)
+    question = f"How many bands? {bench.scene}, {bench.size}x{bench.size}, {bench.samples[0]} samples a pixel"
+    return finest, _stage("bands", question, f"{MOST_BANDS} bands of the same paths", noise_e, made, error_e)
+
+
+def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
+    """Render with ever more samples; another render, of four times the most, is the reference."""
+    edges = np.linspace(380.0, 780.0, 9)
+    call = partial(_render, bench, scene, (edges[1:] + edges[:-1]) / 2, np.diff(edges))
+    made = timed({f"{spp} samples": call(spp, bench.seed) for spp in bench.samples}, bench.repeats)
+    most = 4 * bench.samples[-1]
+    truth, truth_times = timed({"": call(most, bench.seed + 1)}, 0)[""]
+    error_e, noise_e = _render_errors(bench, sensor, truth)
+    question = f"How many samples a pixel? {bench.scene}, {bench.size}x{bench.size}, 8 bands"
+    reference = f"{most} samples of another seed; the errors include its own noise"
+    return replace(_stage("samples", question, reference, noise_e, made, error_e), reference_times=truth_times)
+
+
+def _lens(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float, view_deg: float) -> Stage:
+    """Add the terms of the lens one after the other; all of them are the reference."""
+    falloff = replace(sensor.lens, horizontal_view_deg=view_deg)
+    glare = replace(falloff, diffraction=0.0, veiling_glare=0.01)
+    lenses = {
+        "plain": sensor.lens,
+        "+ cos^4": falloff,
+        "+ cos^4, glare": glare,
+        "+ cos^4, glare, diffraction": replace(glare, diffraction=1.0),
+    }
+    sensors = {name: replace(sensor, lens=lens) for name, lens in lenses.items()}
+    calls = {name: _capture(bench, each, radiance, exposure_s) for name, each in sensors.items()}
+    times = {name: times for name, (_, times) in timed(calls, bench.repeats + 1).items()}
+    images = {name: _electrons(radiance, each, exposure_s) for name, each in sensors.items()}
+    truth = list(images.values())[-1]
+    made = {name: (image, times[name]) for name, image in images.items()}
+    question = f"What does the lens do? Captures, {bench.picture}x{bench.picture}, {MOST_BANDS} bands"
+    noise_e = _noise_e(truth, sensor, exposure_s)
+    return _stage("lens", question, "the whole lens", noise_e, made, lambda image: _rms_e(image, truth, sensor))
+
+
+def _readout(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float) -> Stage:
+    """Compare the fast readout with the exact one."""
+    calls = {name: _capture(bench, sensor, radiance, exposure_s, exact=name == "exact") for name in ("fast", "exact")}
+    frames = timed(calls, bench.repeats + 1)
+    # The two draw different frames of the same statistics: only the mean over the frame can be compared.
+    means = {name: (float(raw.electrons.mean()), times) for name, (raw, times) in frames.items()}
+    question = "Which readout? Error: of the frame's mean, whose own random error both frames have"
+    noise_e = _noise_e(_electrons(radiance, sensor, exposure_s), sensor, exposure_s)
+    return _stage(
+        "readout", question, "NumPy's exact sampler", noise_e, means, lambda mean_e: abs(mean_e - means["exact"][0])
+    )
+
+
+def _reconstruction(
+    bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float
+) -> Iterator[Stage]:
+    """Compare neighbourhoods and patches with the noise-free channels, and the kernel with NumPy's double precision."""
+    raw = _capture(bench, sensor, radiance, exposure_s)()
+    noise_e = _noise_e(_electrons(radiance, sensor, exposure_s), sensor, exposure_s)
+    truth = channel_electrons(form_image(radiance, sensor), sensor, exposure_s)
+    calls = {
+        f"{width}x{width}, patch {patch}": partial(reconstruct, raw, neighbourhood=width, patch=patch)
+        for patch in bench.patches
+        for width in bench.neighbourhoods
+    }
+    question = f"How far does the reconstruction look? {bench.picture}x{bench.picture}"
+    reference = "the noise-free channels; times: of the largest neighbourhood and patch"
+    made = timed(calls, bench.repeats)
+    yield _stage(
+        "neighbourhood and patch", question, reference, noise_e, made, lambda image: _rms_e(image, truth, sensor)
+    )
+    small, width, patch = replace(raw, dn=raw.dn[:64, :64]), bench.neighbourhoods[0], bench.patches[0]
+    forms: dict[str, Callable[[], NDArray[np.floating]]] = {
+        "Dr.Jit, single": partial(reconstruct, small, neighbourhood=width, patch=patch),
+        "NumPy, double": partial(reconstruct_reference, small, neighbourhood=width, patch=patch),
+    }
+    results = timed(forms, 1)
+    exact, _ = results["NumPy, double"]
+    question = "Kernel or the equations as written?"
+    yield _stage(
+        "reconstruction's precision",
+        question,
+        "NumPy, double",
+        noise_e,
+        results,
+        lambda image: float(np.sqrt(np.mean((image.astype(np.float64) - exact) ** 2))),
+    )
+
+
+def _stage(
+    name: str,
+    question: str,
+    reference: str,
+    noise_e: float,
+    made: Mapping[str, tuple[T, Times]],
+    error_e: Callable[[T], float],
+) -> Stage:
+    """Measure each choice's error; the last choice's times are the reference's."""
+    points = tuple(Measured(choice, times, error_e(result)) for choice, (result, times) in made.items())
+    return Stage(name, question, reference, noise_e, points, points[-1].times)
+
+
+def _render(bench: Bench, scene: Scene, nm: Floats, width_nm: Floats, spp: int, seed: int) -> Callable[[], Transport]:
+    size = (bench.size, bench.size)
+    return partial(render, scene, size, wavelength_nm=nm, width_nm=width_nm, spp=spp, seed=seed)
+
+
+def _render_errors(
+    bench: Bench, sensor: SensorConfig, reference: Transport
+) -> tuple[Callable[[Transport], float], float]:
+    """Return what gives a render's error against the reference's mosaic [e-], and the sensor's own noise [e-]."""
+    exposure_s = _auto_exposure_s(bench, sensor, reference)
+
+    def mosaic_e(transport: Transport) -> Image:
+        return _electrons(transport.relight(luminance_cd_m2=bench.level_cd_m2), sensor, exposure_s)
+
+    truth = mosaic_e(reference)
+    return lambda transport: _rms_e(mosaic_e(transport), truth, sensor), _noise_e(truth, sensor, exposure_s)
+
+
+def _mirrored(bench: Bench, transport: Transport) -> SpectralRadiance:
+    """Return a render as large as the bench's picture, filled with mirror images."""
+    radiance = transport.relight(luminance_cd_m2=bench.level_cd_m2)
+    times = -(-bench.picture // bench.size)
+    wide = np.pad(radiance.values, [(0, (times - 1) * bench.size)] * 2 + [(0, 0)], mode="symmetric")
+    planes = np.ascontiguousarray(np.moveaxis(wide[: bench.picture, : bench.picture], -1, 0))
+    return SpectralRadiance(np.moveaxis(planes, 0, -1), radiance.wavelength_nm, 0.0, radiance.width_nm)
+
+
+def _capture(
+    bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float, *, exact: bool = False
+) -> Callable[[], RawImage]:
+    """Return a call that takes one frame, the same each time."""
+    device = draw_device(sensor, radiance.shape, np.random.default_rng(bench.seed))
+    return lambda: capture(radiance, sensor, exposure_s, device, np.random.default_rng(bench.seed), exact=exact)
+
+
+def _auto_exposure_s(bench: Bench, sensor: SensorConfig, transport: Transport) -> float:
+    return auto_exposure_s(form_image(transport.relight(luminance_cd_m2=bench.level_cd_m2), sensor), sensor)
+
+
+def _electrons(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float) -> Image:
+    """Expected electrons of the mosaic, (h, w)."""
+    return expected_electrons(form_image(radiance, sensor), sensor, exposure_s)
+
+
+def _rms_e(image_e: NDArray[np.floating], truth_e: Image, sensor: SensorConfig) -> float:
+    """RMS of a difference over pixels below saturation [e-]."""
+    below = truth_e < sensor.pixel.full_well_e
+    return float(np.sqrt(np.mean((image_e.astype(np.float64) - truth_e)[below] ** 2)))
+
+
+def _noise_e(expected_e: Image, sensor: SensorConfig, exposure_s: float) -> float:
+    """The sensor's own noise: root of its mean variance below saturation [e-]."""
+    below = expected_e < sensor.pixel.full_well_e
+    return float(np.sqrt(noise_variance(expected_e, sensor, exposure_s)[below].mean()))

@@ -10,33 +10,38 @@ import pytest
 
 from rodcone import jit
 from studies.commands import doctor
+from studies.commands.cli import main
 
 HOME = Path(doctor.__file__).resolve().parents[2]
 
 
 def test_every_row_is_there_and_this_environment_is_sound() -> None:
-    report = doctor.report()
-    rows = {row.name: row for row in report.rows}
+    found = doctor.findings()
+    rows = {each.name: each for each in found}
     wanted = {"rodcone", "Python", "platform", "CPU threads", "LLVM", "backend", "Mitsuba variant", "Dr.Jit threads"}
     wanted |= {*doctor.NEEDED, doctor.LLVM_WHEEL, *(f"package {name}" for name in doctor.PACKAGES)}
     assert wanted <= rows.keys()
-    assert len(rows) == len(report.rows), "a name stands twice"
-    assert all("\n" not in row.value and row.value for row in report.rows)
-    assert report.ok, [row for row in report.rows if not row.ok]
+    assert len(rows) == len(found), "a name stands twice"
+    assert all("\n" not in each.value and each.value for each in found)
+    assert all(each.ok for each in found), [each for each in found if not each.ok]
     assert rows["backend"].value.split(":")[0] == jit.backend()
     assert int(rows["Dr.Jit threads"].value) >= 1
 
 
-def test_one_row_at_fault_makes_the_report_not_ok() -> None:
-    good, bad = doctor.Row("a", "1"), doctor.Row("b", "2", False)
-    assert doctor.Report((good, good)).ok
-    assert not doctor.Report((good, bad, good)).ok
+def test_one_fault_makes_the_exit_code_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    good, bad = doctor.Finding("a", "1"), doctor.Finding("b", "[2]", False)
+    for found, code in (((good, good), 0), ((good, bad, good), 1)):
+        monkeypatch.setattr(doctor, "findings", lambda found=found: found)
+        with pytest.raises(SystemExit) as ended:
+            main(["doctor"])
+        assert ended.value.code == code
+        assert [line.split() for line in capsys.readouterr().out.splitlines()] == [[e.name, e.value] for e in found]
 
 
 def test_without_llvm_and_cuda_the_fallback_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(jit, "LIBLLVM", None)
     monkeypatch.setattr(jit, "backend", lambda: "numpy")
-    rows = {row.name: row for row in doctor.engine_rows()}
+    rows = {each.name: each for each in doctor.engine_findings()}
     assert rows["LLVM"].value.startswith("none of version 17 or newer")
     assert rows["backend"].ok, "slower, but it works"
     for part in ("numpy", "path + specfilm", "scalar_spectral", "capture and reconstruction", "NumPy forms"):
@@ -51,7 +56,7 @@ def test_an_engine_that_cannot_be_imported_is_a_row_and_no_traceback(tmp_path: P
         "except ImportError:\n"
         "    missing.name\n"  # what Dr.Jit 1.5 does
     )
-    done = in_new_python(tmp_path, "from studies.commands.doctor import engine_rows\nprint(engine_rows())")
+    done = in_new_python(tmp_path, "from studies.commands.doctor import engine_findings\nprint(engine_findings())")
     assert "libatomic.so.1: cannot open" in done
     assert "apt install libatomic1" in done
     assert "ok=False" in done
@@ -61,15 +66,15 @@ def test_an_engine_that_cannot_be_imported_is_a_row_and_no_traceback(tmp_path: P
     ("name", "version", "ok"),
     [("libLLVM-16.so", 16, False), ("libLLVM-17.so", 17, True), ("libLLVM.so", None, True), ("gone.so", None, False)],
 )
-def test_llvm_row_names_the_library_and_the_fix(tmp_path: Path, name: str, version: int | None, ok: bool) -> None:
+def test_llvm_finding_names_the_library_and_the_fix(tmp_path: Path, name: str, version: int | None, ok: bool) -> None:
     library = tmp_path / name
     if name != "gone.so":
         library.touch()
-    row = doctor.llvm_row(library, version, 17)
-    assert row.ok is ok
-    assert str(library) in row.value
-    assert ("unset DRJIT_LIBLLVM_PATH" in row.value) is not ok
-    assert "DRJIT_LIBLLVM_PATH" in row.value, "a library outside the wheel is the user's or the system's"
+    found = doctor.llvm_finding(library, version, 17)
+    assert found.ok is ok
+    assert str(library) in found.value
+    assert ("unset DRJIT_LIBLLVM_PATH" in found.value) is not ok
+    assert "DRJIT_LIBLLVM_PATH" in found.value, "a library outside the wheel is the user's or the system's"
 
 
 def in_new_python(folder: Path, code: str) -> str:
@@ -88,27 +93,19 @@ def in_new_python(folder: Path, code: str) -> str:
     return done.stdout.strip()
 
 
-def spec_at(folder: Path | None) -> doctor.FindSpec:
-    def find_spec(name: str) -> ModuleSpec | None:
-        if folder is None:
-            return None
-        spec = ModuleSpec(name, None, is_package=True)
-        spec.submodule_search_locations = [str(folder / name)]
-        return spec
+def test_a_package_is_own_foreign_missing_or_shared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def found(folder: Path | None, intruder: str | None = None) -> doctor.Finding:
+        spec = ModuleSpec("scenes", None, is_package=True)
+        spec.submodule_search_locations = [str(folder / "scenes")] if folder else []
+        monkeypatch.setattr(doctor.util, "find_spec", lambda name: spec if folder else None)
+        return doctor.package_finding("scenes", HOME, intruder)
 
-    return find_spec
-
-
-def test_a_package_is_own_foreign_missing_or_shared(tmp_path: Path) -> None:
-    own = doctor.package_row("scenes", HOME, find_spec=spec_at(HOME))
+    own, foreign, missing, shared = found(HOME), found(tmp_path), found(None), found(HOME, "stage-tools")
     assert own.ok
     assert own.value.startswith("rodcone's own")
-    foreign = doctor.package_row("scenes", HOME, find_spec=spec_at(tmp_path))
     assert not foreign.ok
     assert str(tmp_path / "scenes") in foreign.value
-    missing = doctor.package_row("scenes", HOME, find_spec=spec_at(None))
     assert not missing.ok
-    shared = doctor.package_row("scenes", HOME, "stage-tools", find_spec=spec_at(HOME))
     assert not shared.ok
     assert "stage-tools" in shared.value
 
@@ -129,9 +126,9 @@ def test_a_distribution_that_wrote_into_rodcones_folder_is_found(
 
 
 def test_a_missing_distribution_is_a_fault_only_where_it_is_needed() -> None:
-    assert doctor.distribution_row("pytest").value == pytest.__version__
-    assert not doctor.distribution_row("rodcone-no-such-thing").ok
-    assert doctor.distribution_row("rodcone-no-such-thing", needed=False) == doctor.Row(
+    assert doctor.distribution_finding("pytest").value == pytest.__version__
+    assert not doctor.distribution_finding("rodcone-no-such-thing").ok
+    assert doctor.distribution_finding("rodcone-no-such-thing", needed=False) == doctor.Finding(
         "rodcone-no-such-thing", "not installed", True
     )
 
@@ -140,12 +137,9 @@ def test_a_foreign_render_is_named_in_a_new_python(tmp_path: Path) -> None:
     (tmp_path / "render").mkdir()
     (tmp_path / "render" / "__init__.py").write_text("raise RuntimeError('the doctor must not import this')\n")
     code = (
-        "from studies.commands.doctor import report\n"
-        "found = report()\n"
-        "print(found.ok, *[row for row in found.rows if not row.ok], sep='\\n')"
+        "from studies.commands.doctor import findings\nprint(*[each for each in findings() if not each.ok], sep='\\n')"
     )
-    verdict, engine, render = in_new_python(tmp_path, code).splitlines()
-    assert verdict == "False"
+    engine, render = in_new_python(tmp_path, code).splitlines()
     assert "engine" in engine
     assert "package render" in render
     assert str(tmp_path / "render") in render

@@ -1,0 +1,48 @@
+"""What the commands share: kinds of options, and what is printed where."""
+
+import json as notation
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from rodcone.errors import InputError
+
+Out = Annotated[Path, Parameter(name=["--out", "-o"])]
+OutOrNone = Annotated[Path | None, Parameter(name=["--out", "-o"])]
+Flag = Annotated[bool, Parameter(negative="")]
+Several = Annotated[list[str] | None, Parameter(negative_iterable=())]
+
+INTERRUPTED = 130  # exit code after Ctrl-C: 128 + SIGINT
+
+
+def say(*notes: str) -> None:
+    """Print notes on stderr, a line each."""
+    for note in notes:
+        print(f"rodcone: {note}", file=sys.stderr)
+
+
+def print_result(text: object, facts: Mapping[str, Any], *, json: bool) -> None:
+    """Print a command's result on stdout: the text, or with --json the facts as one JSON object on one line."""
+    print(notation.dumps(facts) if json else text)
+
+
+def print_table(head: Sequence[str], rows: Iterable[Sequence[str | Text]], words: int = 1) -> None:
+    """Print a table on stdout whose first `words` columns hold words and the others numbers; no line is cut off."""
+    table = Table(box=None, pad_edge=False, show_header=any(head))
+    for index, name in enumerate(head):
+        table.add_column(name, justify="left" if index < words else "right", overflow="fold", no_wrap=index == 0)
+    for row in rows:
+        table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in row))
+    Console(width=None if sys.stdout.isatty() else 200).print(table)
+
+
+def require_ending(out: Path, ending: str) -> None:
+    """Raise `InputError` where a file to write has another ending."""
+    if out.suffix.lower() != ending:
+        raise InputError(f"out: {str(out)!r} doesn't end in {ending}; allowed: {ending}; write {out.stem}{ending}")
