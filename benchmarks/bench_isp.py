@@ -3,13 +3,13 @@
 Run ``python benchmarks/bench_isp.py`` (five to ten minutes; ``--large`` adds 24 megapixels). It prints the environment,
 the first call in a fresh process with an empty kernel cache, then
 
-- one megapixel, 21x21 and 5x5, on frames that take the kernel's different ways, preparation included;
-- what others take: OpenCV's ``fastNlMeansDenoising`` on one 8-bit plane with the same windows (the yardstick of the
+- one megapixel, 21x21 and 5x5, on frames for which the kernel does different work, preparation included;
+- the time of other programs: OpenCV's ``fastNlMeansDenoising`` on one 8-bit plane with the same windows (the yardstick of the
   ratios) and ``fastNlMeansDenoisingColored``, where `cv2` is installed, and scikit-image's ``denoise_nl_means`` on four
   planes;
 - frames from 0.25 megapixels up;
-- Mpx/s and error by patch, neighbourhood and way, the best trades marked: nothing faster in the table is as accurate
-  and looks as far.
+- Mpx/s and error by guide, patch and neighbourhood. On the front: nothing faster in the table is as accurate and looks
+  as far.
 
 Times are medians of calls in turn, on the clock and of the processor; ratios are medians over pairs of calls. Where
 other programs run, trust the ratios of processor time. All of it runs on CUDA where a device answers.
@@ -65,11 +65,11 @@ def compare(name: str, function: Call, yardstick: Call, rounds: int = 9) -> None
 
 
 def first_call() -> None:
-    """Time of the first calls in this process: two small frames that between them run every quick kernel."""
-    # Wide enough for lanes that lie inside, and with edges of saturation.
+    """Time of the first calls in this process: two small frames that between them run every kernel of the fixed scale."""
+    # Wide enough for blocks away from the border, and with edges of saturation.
     small, edge = frame(300.0, size=96), frame(14000.0, size=96)
     wall, cpu = seconds_of(lambda: [reconstruct(raw, **PATCHES) for raw in (small, edge)])
-    print(f"first calls, all quick kernels compiled: {wall:.2f} s, processor {cpu:.2f} s", flush=True)
+    print(f"first calls, kernels compiled: {wall:.2f} s, processor {cpu:.2f} s", flush=True)
 
 
 def others() -> Call:
@@ -93,15 +93,15 @@ def others() -> Call:
 
 
 def ways(yardstick: Call) -> None:
-    """Frames that take the kernel's different ways."""
+    """Time frames for which the kernel does different work."""
     frames = {
         "one pixel a patch, the default": (frame(300.0), {"patch": PATCH, "sigma_s": SIGMA_S}),
-        "nothing saturated (W judges)": (frame(300.0), {}),
+        "nothing saturated (guide: W)": (frame(300.0), {}),
         "3 % saturated": (frame(3000.0, saturated_disc=0.03), {}),
         "5 % saturated": (frame(3000.0, saturated_disc=0.05), {}),
-        "all saturated (each band judges itself)": (frame(1e6), {}),
-        "at the edge of saturation (both judge)": (frame(14000.0), {}),
-        "sigma_s = 0.5 (exact sums nearly everywhere)": (frame(300.0), {"sigma_s": 0.5}),
+        "all saturated (guide: each channel itself)": (frame(1e6), {}),
+        "at the edge of saturation (guide: mixed)": (frame(14000.0), {}),
+        "sigma_s = 0.5 (running maximum nearly everywhere)": (frame(300.0), {"sigma_s": 0.5}),
         "7x7 patches, nothing saturated": (frame(300.0), {"patch": 7}),
         "raw distance": (frame(300.0), {"distance": "raw", "sigma_s": 50.0}),
     }
@@ -111,11 +111,11 @@ def ways(yardstick: Call) -> None:
 
 
 def trades() -> None:
-    """Speed against error by patch, neighbourhood and way of judging."""
-    print("\n| judges | patch | neighbourhood | Mpx/s | Mpx/CPU s | largest error | RMS error | |")
+    """Speed against error by guide, patch and neighbourhood."""
+    print("\n| guide | patch | neighbourhood | Mpx/s | Mpx/CPU s | largest error | RMS error | |")
     print("|---|---|---|---|---|---|---|---|")
     rows = []
-    for judge, mean in (("W", 300.0), ("band", 1e6), ("both", 14000.0)):
+    for guide, mean in (("W", 300.0), ("channel", 1e6), ("mixed", 14000.0)):
         small, large = frame(mean, size=80), frame(mean, size=512)
         for patch in (1, 3, 5, 7):
             for neighbourhood in (11, 21):
@@ -125,7 +125,7 @@ def trades() -> None:
                 clock, cpu = np.median(times, axis=0)
                 size = large.dn.size / 1e6
                 rows.append(
-                    (judge, patch, neighbourhood, size / clock, size / cpu, error.max(), (error**2).mean() ** 0.5)
+                    (guide, patch, neighbourhood, size / clock, size / cpu, error.max(), (error**2).mean() ** 0.5)
                 )
     for row in rows:
         better = [other for other in rows if other[0] == row[0] and other[4] > row[4] and other[6] <= row[6]]

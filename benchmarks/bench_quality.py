@@ -38,7 +38,7 @@ from sensor.optics import form_image
 from sensor.readout import read_out
 from sensor.response import expected_electrons
 from studies.commands.demo import WAVELENGTH_NM
-from studies.metrics.confidence import Estimate, mean_with_confidence
+from studies.metrics.confidence import SeedMean, mean_with_confidence
 from studies.metrics.quality import Quality, measure
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import Camera, build_camera, photograph
@@ -188,7 +188,7 @@ def print_processor(name: str, shots: Sequence[Quality], ours: Sequence[Quality]
     print(flush=True)
 
 
-def lead_over(ours: Sequence[Quality], others: Sequence[Quality], key: str, sign: int) -> Estimate:
+def lead_over(ours: Sequence[Quality], others: Sequence[Quality], key: str, sign: int) -> SeedMean:
     """How much better the interleaved camera is: mean over the seeds that both have, with its 95 % interval."""
     return mean_with_confidence(
         [sign * (getattr(a, key) - getattr(b, key)) for a, b in zip(ours, others, strict=False)]

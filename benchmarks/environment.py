@@ -1,47 +1,33 @@
 """What every benchmark shares: the machine and versions that its figures belong to, and how calls are timed."""
 
-import os
 import platform
-import time
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.jit import LIBLLVM, backend, dr
+from studies.speed.machine import processor_facts
+from studies.speed.points import laps
 
 
 def print_environment() -> None:
-    """Print processor, cores, versions, engine and load."""
-    processor = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        names = [line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if "model name" in line]
-        processor = names[0] if names else processor
+    """Print processor, cores, load, versions and engine."""
+    print("\n".join(f"{name}: {fact}" for name, fact in processor_facts().items()))
     library = LIBLLVM.name if LIBLLVM else "none"
-    print(f"{processor}, {os.cpu_count()} cores, {dr.thread_count()} threads; Python {platform.python_version()}")
-    print(f"NumPy {np.__version__}, Dr.Jit {dr.__version__} on {backend()}, LLVM library {library}")
-    if hasattr(os, "getloadavg"):
-        print(f"load before the run: {os.getloadavg()[0]:.1f}")
+    print(f"{dr.thread_count()} threads; Python {platform.python_version()}, NumPy {np.__version__}")
+    print(f"Dr.Jit {dr.__version__} on {backend()}, LLVM library {library}")
 
 
 def seconds_of(function: Callable[[], object]) -> tuple[float, float]:
     """Seconds of one call: on the clock, and of the processor (all threads together)."""
-    wall, cpu = time.perf_counter(), time.process_time()
-    function()
-    return time.perf_counter() - wall, time.process_time() - cpu
+    wall, processor = laps({"": function}, 0)[""][1][0].tolist()
+    return wall, processor
 
 
 def in_turn(functions: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, NDArray[np.float64]]:
-    """Seconds of each call, (round, 2): clock, processor. All take turns, after one call each that doesn't count.
-
-    Where other programs run, a call is twice as long as a minute before; calls in turn meet much the same machine.
-    """
-    for function in functions.values():
-        function()
-    laps = [[seconds_of(function) for function in functions.values()] for _ in range(rounds)]
-    return dict(zip(functions, np.moveaxis(np.array(laps), 1, 0), strict=True))
+    """Seconds of each call, (round, 2): clock, processor. All take turns, after one call each that doesn't count."""
+    return {name: seconds[1:] for name, (_, seconds) in laps(functions, rounds).items()}
 
 
 def beside(name: str, times: Mapping[str, NDArray[np.float64]], yardstick: str) -> str:

@@ -3,17 +3,16 @@
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import App
 
-from rodcone.errors import InputError, unknown
+from rodcone.errors import InputError, require_keys
 from rodcone.files import replacing
 from rodcone.toml_file import read_toml
 from sensor.presets import preset_file
+from studies.commands.console import Out, require_ending
 
 app = App(name="new", help="Write files to start from.")
-Out = Annotated[Path, Parameter(name=["--out", "-o"])]
 _STUDIES = Path(__file__).parent.parent / "configs"
 _CLUSTER = Path(__file__).parent.parent / "data" / "dask.yaml"
 
@@ -49,8 +48,7 @@ def study(name: str = "light_levels", /, *, out: Out) -> None:
         sensors beside it, where files of the same content may stand.
     """
     examples = {path.stem: path for path in sorted(_STUDIES.glob("*.toml"))}
-    if name not in examples:
-        raise unknown("study", name, examples)
+    require_keys("study", [name], examples)
     beside = {out.parent / each: _STUDIES / each for each in _named(examples[name])}
     for target, source in beside.items():
         if target.exists() and target.read_bytes() != source.read_bytes():
@@ -85,16 +83,13 @@ def _named(study_file: Path) -> list[str]:
 
 
 def _copy(source: Path, out: Path, ending: str, beside: Mapping[Path, Path] = MappingProxyType({})) -> None:
-    """Copy a text to a new file, others to their places first, and print its path."""
-    text = source.read_text("utf-8")
-    if out.suffix != ending:
-        raise InputError(f"out: {str(out)!r} doesn't end in {ending}; allowed: that ending; write {out.stem}{ending}")
+    """Copy a file to a new one, after the files that belong beside it, and print its path."""
+    require_ending(out, ending)
     if out.exists():
         raise InputError(f"out: {str(out)!r} exists; allowed: a new file; choose another name or remove it")
-    for target, other in beside.items():
-        target.parent.mkdir(exist_ok=True)
+    for target, other in {**beside, out: source}.items():
+        if target != out:
+            target.parent.mkdir(exist_ok=True)
         with replacing(target) as (place,):
             place.write_bytes(other.read_bytes())
-    with replacing(out) as (place,):
-        place.write_text(text, "utf-8")
     print(out)

@@ -11,15 +11,15 @@ from rodcone.errors import InputError, require_range
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """Mean of a figure over seeds.
+class SeedMean:
+    """Mean of a figure over seeds, and its confidence interval.
 
     Attributes
     ----------
     mean, low, high : float
         In the figure's own unit; the interval is `low` to `high`.
     count : int
-        Seeds that it comes from.
+        Number of seeds.
     """
 
     mean: float
@@ -28,22 +28,22 @@ class Estimate:
     count: int
 
 
-def mean_with_confidence(values: Sequence[float] | NDArray[np.floating], confidence: float = 0.95) -> Estimate:
+def mean_with_confidence(values: Sequence[float] | NDArray[np.floating], confidence: float = 0.95) -> SeedMean:
     """Mean with Student's interval: mean -+ t s / sqrt(n), t of n - 1 degrees of freedom, s the sample's deviation.
 
-    It is exact for figures that scatter by a normal law, and close for means of many pixels, which nearly do.
+    It is exact for normally distributed figures, and close for means of many pixels, which are nearly normal.
 
     Parameters
     ----------
     values : (seed,) array_like
         One figure a seed, independent of each other.
     confidence : float
-        Share of such intervals that hold the true mean: 0.95 is what papers mostly state.
+        Share of such intervals that hold the true mean; most papers state 0.95.
 
     Raises
     ------
     InputError
-        For fewer than two values: one says nothing of its scatter; or for one that isn't finite.
+        For fewer than two values, which have no scatter, or a value that isn't finite.
     """
     require_range("confidence", confidence, 0.01, 0.999999, "give a share: 95 % is 0.95")
     sample = np.asarray(values, dtype=np.float64)
@@ -53,4 +53,4 @@ def mean_with_confidence(values: Sequence[float] | NDArray[np.floating], confide
         raise InputError(f"values: {sample[~np.isfinite(sample)][0]} is not allowed; give finite figures")
     half = float(student.isf((1 - confidence) / 2, sample.size - 1)) * float(sample.std(ddof=1)) / sample.size**0.5
     mean = float(sample.mean())
-    return Estimate(mean, mean - half, mean + half, sample.size)
+    return SeedMean(mean, mean - half, mean + half, sample.size)

@@ -10,8 +10,6 @@ from scipy.fft import dctn, idctn
 from skimage.color import deltaE_cie76, rgb2xyz, xyz2lab
 
 from render.spectrum import Floats
-from rodcone.errors import InputError, require_range
-from studies.metrics.quality import require_finite
 
 # A 3840 pixels wide, 0.7 m wide display seen from 0.7 m: FLIP's own default, so that both look from one place.
 PIXELS_PER_DEGREE = 3840 * np.pi / 180
@@ -66,15 +64,6 @@ def s_cielab(
     picture, truth : (h, w, 3) float64
         Encoded sRGB in [0, 1]; D65 is the white.
     pixels_per_degree : float
-        Of the eye's view. Fewer, the picture nearer: finer things are seen.
-
-    Raises
-    ------
-    InputError
-        Where the shapes differ, for a value that is NaN or infinite, or for `pixels_per_degree` outside 1 to 10 000.
+        Of the eye's view. With fewer the picture is nearer, and finer detail is seen.
     """
-    require_range("pixels_per_degree", pixels_per_degree, 1.0, 1e4, "give those of a display: 67 at arm's length")
-    if picture.shape != truth.shape or picture.ndim != 3 or picture.shape[2] != 3:
-        raise InputError(f"picture: shape {picture.shape} beside {truth.shape} is not allowed; give (h, w, 3) twice")
-    require_finite(picture=picture, truth=truth)
-    return np.asarray(deltaE_cie76(*(seen_lab(encoded, pixels_per_degree) for encoded in (picture, truth))))
+    return np.asarray(deltaE_cie76(seen_lab(picture, pixels_per_degree), seen_lab(truth, pixels_per_degree)))

@@ -12,7 +12,7 @@ from rodcone.errors import InputError, unknown
 from sensor.presets import names, preset
 from sensor.readout import as_raw
 from sensor.variations import vary
-from studies.metrics.confidence import Estimate, mean_with_confidence
+from studies.metrics.confidence import SeedMean, mean_with_confidence
 from studies.pages.report_text import DELTA_E, PSNR, Metric
 from studies.sweep.provenance import require_alike
 from studies.sweep.row import Row
@@ -64,13 +64,13 @@ class Duel:
     ----------
     case : Case
     opponent : str
-    lead : Estimate
+    lead : SeedMean
         Over pairs of pictures of the same seed.
     """
 
     case: Case
     opponent: str
-    lead: Estimate
+    lead: SeedMean
 
     @property
     def outcome(self) -> str:
@@ -133,7 +133,7 @@ def duels(cases: Sequence[Case], camera: str, opponent: str, metric: Metric) -> 
     ]
 
 
-def lead_over(case: Case, camera: str, opponent: str, metric: Metric) -> Estimate:
+def lead_over(case: Case, camera: str, opponent: str, metric: Metric) -> SeedMean:
     """How much better a camera is than another: mean over the seeds' pairs, with its 95 % interval."""
     sign = 1 if metric.higher else -1
     pairs = zip(case.rows[camera], case.rows[opponent], strict=True)

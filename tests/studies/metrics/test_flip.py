@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from skimage.color import rgb2lab
 
-from rodcone.errors import InputError
 from studies.metrics.flip import flip
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE
 
@@ -65,17 +64,3 @@ def test_fine_noise_is_seen_less_from_afar() -> None:
 
 def test_a_view_of_memory_is_read_as_it_is_indexed() -> None:
     assert (flip(FIRST[::-1, ::2], SECOND[::-1, ::2]) == flip(FIRST[::-1, ::2].copy(), SECOND[::-1, ::2].copy())).all()
-
-
-@pytest.mark.parametrize(
-    ("picture", "ppd", "told"),
-    [
-        (FIRST[:8], 67.0, r"^picture: shape \(8, 48, 3\)"),
-        (FIRST * 1.5, 67.0, "^picture: .* is outside 0 to 1"),
-        (FIRST * np.nan, 67.0, "^picture: nan"),
-        (FIRST, 0.0, "^pixels_per_degree: 0.0"),
-    ],
-)
-def test_what_does_not_fit_is_refused(picture: np.ndarray, ppd: float, told: str) -> None:
-    with pytest.raises(InputError, match=told):
-        flip(picture, SECOND, ppd)

@@ -5,7 +5,6 @@ import pytest
 from scipy.ndimage import gaussian_filter
 from skimage.color import deltaE_cie76, rgb2lab
 
-from rodcone.errors import InputError
 from rodcone.tables import colour_science
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE, SPREADS, XYZ_TO_OPPONENT, s_cielab, seen_xyz, transfer
 
@@ -99,10 +98,3 @@ def test_fine_noise_is_seen_less_from_afar_and_coloured_noise_least() -> None:
 
 def test_no_frequency_changes_an_even_field() -> None:
     assert [float(transfer(plane, np.zeros(1))[0]) for plane in range(3)] == pytest.approx([1.0, 1.0, 1.0], abs=1e-15)
-
-
-def test_what_does_not_fit_is_refused() -> None:
-    with pytest.raises(InputError, match=r"^picture: shape \(24, 40, 3\) beside \(24, 39, 3\)"):
-        s_cielab(even((0, 0, 0)), even((0, 0, 0))[:, :39])
-    with pytest.raises(InputError, match=r"^pixels_per_degree: 0\.0"):
-        s_cielab(even((0, 0, 0)), even((0, 0, 0)), 0.0)
