@@ -1,15 +1,15 @@
-"""Speed and error of the interleaved reconstruction, beside other non-local means, in one run.
+"""Speed of the interleaved reconstruction beside other non-local means, in one run.
 
 Run ``python benchmarks/bench_isp.py`` (five to ten minutes; ``--large`` adds 24 megapixels). It prints the environment,
 the first call in a fresh process with an empty kernel cache, then
 
 - one megapixel, 21x21 and 5x5, on frames for which the kernel does different work, preparation included;
-- the time of other programs: OpenCV's ``fastNlMeansDenoising`` on one 8-bit plane with the same windows (the yardstick of the
-  ratios) and ``fastNlMeansDenoisingColored``, where `cv2` is installed, and scikit-image's ``denoise_nl_means`` on four
-  planes;
-- frames from 0.25 megapixels up;
-- Mpx/s and error by guide, patch and neighbourhood. On the front: nothing faster in the table is as accurate and looks
-  as far.
+- the time of other programs: OpenCV's ``fastNlMeansDenoising`` on one 8-bit plane with the same windows (the yardstick
+  of the ratios) and ``fastNlMeansDenoisingColored``, where `cv2` is installed, and scikit-image's ``denoise_nl_means``
+  on four planes;
+- frames from 0.25 megapixels up.
+
+`rodcone bench` measures speed against error by patch and neighbourhood.
 
 Times are medians of calls in turn, on the clock and of the processor; ratios are medians over pairs of calls. Where
 other programs run, trust the ratios of processor time. All of it runs on CUDA where a device answers.
@@ -28,7 +28,6 @@ from environment import beside, in_turn, print_environment, seconds_of
 from skimage.restoration import denoise_nl_means
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
-from isp.reference import reconstruct_reference
 from isp.settings import PATCH, SIGMA_S
 from rodcone.jit import backend
 from sensor.cfa import RGBW, letter_map
@@ -65,7 +64,7 @@ def compare(name: str, function: Call, yardstick: Call, rounds: int = 9) -> None
 
 
 def first_call() -> None:
-    """Time of the first calls in this process: two small frames that between them run every kernel of the fixed scale."""
+    """Time of the first calls in this process: two small frames that run every kernel of the fixed scale."""
     # Wide enough for blocks away from the border, and with edges of saturation.
     small, edge = frame(300.0, size=96), frame(14000.0, size=96)
     wall, cpu = seconds_of(lambda: [reconstruct(raw, **PATCHES) for raw in (small, edge)])
@@ -110,30 +109,6 @@ def ways(yardstick: Call) -> None:
     compare("nothing saturated, with the noise", partial(reconstruct_with_noise, frame(300.0), **PATCHES), yardstick)
 
 
-def trades() -> None:
-    """Speed against error by guide, patch and neighbourhood."""
-    print("\n| guide | patch | neighbourhood | Mpx/s | Mpx/CPU s | largest error | RMS error | |")
-    print("|---|---|---|---|---|---|---|---|")
-    rows = []
-    for guide, mean in (("W", 300.0), ("channel", 1e6), ("mixed", 14000.0)):
-        small, large = frame(mean, size=80), frame(mean, size=512)
-        for patch in (1, 3, 5, 7):
-            for neighbourhood in (11, 21):
-                settings = {**PATCHES, "patch": patch, "neighbourhood": neighbourhood}
-                error = np.abs(reconstruct(small, **settings) - reconstruct_reference(small, **settings)) / FULL_E
-                times = in_turn({"": partial(reconstruct, large, **settings)}, 3)[""]
-                clock, cpu = np.median(times, axis=0)
-                size = large.dn.size / 1e6
-                rows.append(
-                    (guide, patch, neighbourhood, size / clock, size / cpu, error.max(), (error**2).mean() ** 0.5)
-                )
-    for row in rows:
-        better = [other for other in rows if other[0] == row[0] and other[4] > row[4] and other[6] <= row[6]]
-        beaten = any(other[1] >= row[1] and other[2] >= row[2] for other in better)
-        numbers = f"{row[3]:.2f} | {row[4]:.2f} | {row[5]:.1e} | {row[6]:.1e}"
-        print(f"| {row[0]} | {row[1]} | {row[2]} | {numbers} | {'' if beaten else 'on the front'} |")
-
-
 def sizes(yardstick: Call, large: bool) -> None:
     """Frames of other sizes; a ratio over the size is the ratio a megapixel."""
     print()
@@ -151,7 +126,6 @@ def main() -> None:
     yardstick = others()
     ways(yardstick)
     sizes(yardstick, "--large" in sys.argv[1:])
-    trades()
 
 
 if __name__ == "__main__":

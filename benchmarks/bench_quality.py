@@ -55,7 +55,7 @@ METRICS = (("PSNR", "psnr_db", 1), ("dE2000", "delta_e_median", -1))  # sign: wh
 
 
 @dataclass(frozen=True)
-class Stage:
+class RenderedScene:
     """A rendered scene at a mean of 1 cd/m^2: its radiance, light, white and truth."""
 
     radiance: Any
@@ -64,7 +64,7 @@ class Stage:
     truth: NDArray[np.float64]
 
 
-def open_stage(name: str, max_spp: int) -> Stage:
+def open_stage(name: str, max_spp: int) -> RenderedScene:
     scene = load(name)
     transport = render(
         scene,
@@ -77,13 +77,13 @@ def open_stage(name: str, max_spp: int) -> Stage:
     light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
     radiance = transport.relight(luminance_cd_m2=1.0)
     white = shown_white_cd_m2(transport, 1.0)
-    return Stage(radiance, light, white, encode_srgb(true_srgb(radiance, light, white)))
+    return RenderedScene(radiance, light, white, encode_srgb(true_srgb(radiance, light, white)))
 
 
-class Bench:
+class SceneAndSensor:
     """One scene and sensor: photographs at any level, exposure and seed; images formed once a camera."""
 
-    def __init__(self, stage: Stage, sensor: str) -> None:
+    def __init__(self, stage: RenderedScene, sensor: str) -> None:
         self.stage, self.sensor, self._images = stage, sensor, {}
 
     def camera(self, name: str, seed: int) -> Camera:
@@ -123,7 +123,7 @@ class Bench:
         return float(10.0**exponent)
 
 
-def transitions(bench: Bench, seeds: int) -> dict[str, list[dict[str, float]]]:
+def transitions(bench: SceneAndSensor, seeds: int) -> dict[str, list[dict[str, float]]]:
     """Quality in half octaves of light, until 1 % of the colours' samples are saturated."""
     curves: dict[str, list[dict[str, float]]] = {}
     for name, exposure in ((f"{FIXED_S * 1e3:g} ms", FIXED_S), ("auto exposure", "G")):
@@ -158,7 +158,7 @@ def print_transitions(curves: dict[str, list[dict[str, float]]]) -> None:
         print("deepest drop over one octave: {:.2f} dB, up to {:.4g} cd/m2".format(*max(drops)))
 
 
-def ranking(bench: Bench, conditions: Iterable[tuple[float, float]], names: Sequence[str]) -> None:
+def ranking(bench: SceneAndSensor, conditions: Iterable[tuple[float, float]], names: Sequence[str]) -> None:
     """Means over seeds of processors, the first interleaved; conditions are light [cd/m^2] and exposure time [s]."""
     for level, seconds in conditions:
         green, white = bench.snr_db("bayer", "G", level, seconds), bench.snr_db("interleaved", "W", level, seconds)
@@ -208,7 +208,7 @@ def verdict(found: dict[str, list[Quality]], white_snr_db: float) -> str:
     return "; ".join(said)
 
 
-def daylight(bench: Bench) -> None:
+def daylight(bench: SceneAndSensor) -> None:
     """In bright light, with an exposure by green as all cameras choose it, and one that keeps W below saturation."""
     for name, channel in (("bayer", "G"), ("bayer_menon", "G"), ("interleaved", "G"), ("interleaved", "W")):
         shots = [bench.shot(bench.camera(name, s), DAYLIGHT_CD_M2, channel, s) for s in range(5)]
@@ -221,7 +221,7 @@ def daylight(bench: Bench) -> None:
         print(flush=True)
 
 
-def substitution(bench: Bench) -> None:
+def substitution(bench: SceneAndSensor) -> None:
     """Figure 6: 25 cd/m^2 at 5, 10 and 20 ms, each reading of Table 1 with its own threshold."""
     threshold = THRESHOLDS[bench.sensor]
     for level, seconds in FIGURE_6:
@@ -234,7 +234,7 @@ def substitution(bench: Bench) -> None:
         )
 
 
-def settings(bench: Bench, levels: Sequence[float]) -> None:
+def settings(bench: SceneAndSensor, levels: Sequence[float]) -> None:
     """Mean loss of PSNR against the best of the sweep at each level, and mean ratio of dE2000 to its best."""
     choices = [(p, d, s) for p in (1, 3, 5) for d in (3.0, 6.0, 10.0) for s in (2.0, 3.0, 4.0, 8.0, 16.0)]
     camera, stage = bench.camera("interleaved", 0), bench.stage
@@ -273,7 +273,7 @@ def main() -> None:
         stage = open_stage(scene, max_spp=768)
         for sensor in options.sensor if options.what != "substitution" else THRESHOLDS:
             print(f"\n== {scene}, {sensor}", flush=True)
-            bench = Bench(stage, sensor)
+            bench = SceneAndSensor(stage, sensor)
             if options.what == "transitions":
                 print_transitions(transitions(bench, options.seeds))
             elif options.what == "ranking":

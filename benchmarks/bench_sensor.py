@@ -3,10 +3,10 @@
 Run ``python benchmarks/bench_sensor.py``. It prints the environment, the first capture of a fresh process with an empty
 kernel cache (compilation included), then for each size and light the medians of rounds in turn: ``capture``; reading
 the bands' memory once, which nothing can undercut; and NumPy's `Generator.poisson` alone on the same means, which the
-whole is measured against; at the end, the exact form and a lens that diffracts. Before that, the largest memory of two
-fresh processes (``--memory`` runs these alone): 24 megapixels taken from strips, and the picture behind the lens that
-diffracts, beside the size of its bands. NumPy's sampler runs on one thread, and the capture's two or more get less of a
-CPU that others use too: trust the ratios of processor time.
+whole is measured against. Before that, the largest memory of two fresh processes (``--memory`` runs these alone): 24
+megapixels taken from strips, and the picture behind a lens that diffracts, beside the size of its bands. NumPy's
+sampler runs on one thread, and the capture's two or more get less of a CPU that others use too: trust the ratios of
+processor time. `rodcone bench` measures the exact readout and the lens.
 """
 
 import os
@@ -123,17 +123,6 @@ def main() -> None:
             print(f"{side}x{side}, {light}; in brackets over NumPy's poisson")
             times = in_turn(calls(scene(side, level)), 9)
             print("\n".join("  " + beside(name, times, NUMPY) for name in times), flush=True)
-    sensor, radiance = preset("low_noise"), scene(1024, LIGHTS["a lit room"])
-    device, rng = draw_device(sensor, radiance.shape, np.random.default_rng(1)), np.random.default_rng(2)
-    lens = replace(sensor.lens, diffraction=1.0, veiling_glare=0.02)
-    slow = {
-        "capture": lambda: capture(radiance, sensor, EXPOSURE_S, device, rng),
-        "exact capture": lambda: capture(radiance, sensor, EXPOSURE_S, device, rng, exact=True),
-        "image behind a lens that diffracts": lambda: form_image(radiance, replace(sensor, lens=lens)),
-    }
-    times = in_turn(slow, 2)
-    print("1024x1024, a lit room; in brackets over the capture")
-    print("\n".join("  " + beside(name, times, "capture") for name in times), flush=True)
 
 
 PARTS = {"--first-call": first_call, "--strips": strips_memory, "--lens": lens_memory, "--memory": memory}

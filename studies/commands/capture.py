@@ -58,9 +58,9 @@ def capture(
     trust_scene
         Let a .xml scene load plug-ins of its own, which are native code, and files from anywhere.
     extend
-        Give hold to let surfaces go on at their end values outside their tables; bands beyond are refused by default.
+        hold: surfaces keep their end values outside their tables' wavelengths; by default bands there are refused.
     force
-        Go on where more memory is needed than is free.
+        Run even where more memory is needed than is free.
     json
         Print one JSON object with the paths and facts of the exposure instead of the paths.
     """

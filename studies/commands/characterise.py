@@ -32,13 +32,13 @@ def characterise(
     preset
         Sensor preset by name, or a .toml file (see `rodcone new preset`).
     out
-        Plot to write besides: photon transfer (linear and logarithmic), SNR and linearity, as .svg.
+        Plot to write as well: photon transfer (linear and logarithmic), SNR and linearity, as .svg.
     json
-        Print one JSON object in place of the table, with the photon-transfer series in it.
+        Print one JSON object, which also holds the photon-transfer series, instead of the table.
     height
-        Of the chip in pixels; more of them make the standard errors smaller.
+        Height of the chip in pixels; a larger chip has smaller standard errors.
     width
-        Of the chip in pixels; column noise needs width.
+        Width of the chip in pixels; more columns measure the column noise better.
     exposure_s
         Exposure time of the photon-transfer series in seconds.
     seed

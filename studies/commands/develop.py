@@ -26,24 +26,24 @@ def develop(
     Parameters
     ----------
     raw
-        Raw file: .dng, or .tif with its .json beside it; or a camera's, such as .nef, .cr2 or .dng, which takes
+        Raw file: .dng, or .tif with its .json beside it; or a camera's, such as .nef, .cr2 or .dng, which needs
         pip install 'rodcone[photographs]'.
     out
         Picture to write, .png or .tif; the raw file's name with .png by default.
     isp
-        Pipeline: interleaved (RGBW) or bayer, by the mosaic in the file where left out. For Bayer also bayer_malvar,
+        Pipeline: interleaved (RGBW) or bayer, by default the one for the file's mosaic. For Bayer also bayer_malvar,
         bayer_menon, bayer_nlm and bayer_bm3d; for RGBW rgbw_sato, rgbw_kijima, rgbw_yamagami and rgbw_gindele.
     bits
         Of each channel: 8 or 16.
     ev
-        Brightness in stops, at 0 a full well is white; by default the 99th percentile of the picture's luminance is
+        Brightness in stops; at 0 a full well is white. By default the 99th percentile of the picture's luminance is
         shown at 90 % of white.
     white_balance
         gray-world, as in the paper, or as-shot: what capture's --white-balance or the camera set, as raw converters do.
     encoding
         Colours of the picture: srgb, or display-p3 for screens with a wider gamut.
     json
-        Print one JSON object with the path and what was decided instead of the path.
+        Print one JSON object with the path and the choices made instead of the path.
     """
     if not raw.name:
         raise InputError(f"raw: {str(raw)!r} is a folder; give the path of a raw file")

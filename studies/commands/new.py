@@ -27,7 +27,7 @@ def preset(name: str, /, *, out: Out) -> None:
         Preset by name: low_noise, table1_pixel, table1_output, or table1_output_6um, _3um and _2um for the paper's
         Figures 1 and 5.
     out
-        File to write, ending in .toml; one that exists is left alone. Wherever a preset's name goes, so does this path.
+        File to write, ending in .toml; one that exists is left alone. Its path can replace any preset name.
     """
     _copy(preset_file(name), out, ".toml")
 
@@ -45,7 +45,7 @@ def study(name: str = "light_levels", /, *, out: Out) -> None:
         opponents), or paper_1b and paper_6 (of the paper's figures).
     out
         File to write, ending in .toml; one that exists is left alone. Sensors and their curves go into the folder
-        sensors beside it, where files of the same content may stand.
+        sensors beside it, where files of the same content are kept.
     """
     examples = {path.stem: path for path in sorted(_STUDIES.glob("*.toml"))}
     require_keys("study", [name], examples)

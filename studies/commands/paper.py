@@ -23,7 +23,7 @@ def paper(
     Parameters
     ----------
     out
-        Folder for paper.html, paper.json, the figures as SVG and PNG, and the renders, which another run takes up.
+        Folder for paper.html, paper.json, the figures as SVG and PNG, and the renders, which another run uses again.
     size
         Side of the pictures in pixels.
     spp

@@ -56,8 +56,8 @@ def render(
     ----------
     source
         Scene by name such as color_checker, or a Mitsuba scene (.xml). Its lights are grouped by their ids up to a
-        colon; its files have to lie in its folder; a shape with an irradiancemeter is the plane on which lux are meant;
-        RGB colours are upsampled to spectra by Mitsuba, and lights stated so have no unit: give --level.
+        colon; its files have to lie in its folder; lux are measured on the shape that has an irradiancemeter. Mitsuba
+        upsamples RGB colours to spectra; lights given as RGB have no unit, so give --level.
     out
         File to write, ending in .exr.
     height
@@ -87,9 +87,9 @@ def render(
     trust_scene
         Let the scene file load plug-ins of its own, which are native code, and files from anywhere.
     extend
-        Give hold to let surfaces go on at their end values outside their tables; bands beyond are refused by default.
+        hold: surfaces keep their end values outside their tables' wavelengths; by default bands there are refused.
     force
-        Go on where more memory is needed than is free.
+        Run even where more memory is needed than is free.
     json
         Print one JSON object with the path and facts of the render instead of the path.
     """

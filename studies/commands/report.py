@@ -18,7 +18,7 @@ def report(
     out: OutOrNone = None,
     pictures: int | None = None,
 ) -> None:
-    """Write the report of a sweep, one HTML file that needs no other; prints its path.
+    """Write the report of a sweep as one self-contained HTML file; prints its path.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def report(
     out
         File to write; report.html in the sweep's folder by default.
     pictures
-        Most pictures to put into the page; by default as many as have 8 MB. Numbers are there of all.
+        Pictures to put into the page, at most; by default as many as fit into 8 MB. Numbers are given for all of them.
     """
     if pictures is not None:
         require_whole("pictures", pictures, 1, 100_000, "give a number of pictures")

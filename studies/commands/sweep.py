@@ -64,7 +64,7 @@ def sweep(
     out
         Folder of the ledger, the pictures and the renders.
     set
-        KEY=VALUE in place of the file's own, such as render.spp=64; may be given several times.
+        KEY=VALUE that replaces the file's own, such as render.spp=64; may be given several times.
     workers
         Processes on this machine, one for each core by default; 1 runs all in this one.
     cluster
@@ -74,12 +74,12 @@ def sweep(
     as_stated
         Render and image as study and sensors state, without a plan.
     keep_old
-        Keep cells that other versions, another variant or other engines made as rows of their own, which rodcone export
-        --all writes; they are removed once they are made anew otherwise.
+        Keep cells that other versions, another variant or other engines made as rows of their own, for rodcone export
+        --all; by default they are removed when they are made anew.
     dry_run
         Print cells, renders, and an estimate of time and memory; compute nothing.
     force
-        Go on where the estimate needs more memory than is free.
+        Run even where the estimate needs more memory than is free.
     json
         Print one JSON object instead of the path.
     """
@@ -129,7 +129,7 @@ def export(
     out
         File to write: .csv, or .parquet with the extra of that name.
     everything
-        Also the cells of earlier runs that the last one didn't ask for.
+        Also write the cells of earlier runs that the last run didn't ask for.
     """
     write_table(read_rows(folder, everything), out)
     print(out)

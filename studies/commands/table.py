@@ -23,12 +23,12 @@ def table(
     folder
         Folder of the sweep.
     by
-        Axes with a line for each combination, joined by commas: scene, spectrum, level, exposure, sensor, processor.
+        Axes joined by commas, with a line for each combination: scene, spectrum, level, exposure, sensor, processor.
     show
         Figures, joined by commas: the ledger's columns, electrons_W (G, R, B), pair_delta_e and
         true_pair_delta_e of scene metamers, daylight_delta_e of scene color_checker.
     where
-        AXIS=VALUE that alone counts, such as level=10lux; may be given several times.
+        AXIS=VALUE to keep, such as level=10lux; may be given several times.
     """
     axes, figures = ([name.strip() for name in text.split(",")] for text in (by, show))
     chosen = {}

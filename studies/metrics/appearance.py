@@ -17,7 +17,7 @@ Image = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TruePicture:
-    """The noise-free picture, and what comparisons need of it, worked out once for all that are compared with it.
+    """The noise-free picture, and what comparisons need of it, computed once for all pictures compared with it.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Appearance:
 
 
 def true_picture(linear: Image) -> TruePicture:
-    """Work out what comparisons need of linear sRGB (h, w, 3); `InputError` for a value that is NaN or infinite."""
+    """Compute what comparisons need of linear sRGB (h, w, 3); `InputError` for a value that is NaN or infinite."""
     require_finite(truth=linear)
     encoded = encode_srgb(linear)
     return TruePicture(linear, encoded, rgb2lab(encoded), seen_lab(encoded))
@@ -71,8 +71,8 @@ def appearance(linear: Image, truth: TruePicture, white_cd_m2: float) -> Appeara
         sRGB, not clipped; 1 stands for `white_cd_m2`.
     truth : TruePicture
     white_cd_m2 : float
-        Luminance of white. FLIP and S-CIELAB see the pictures as a display shows them, whatever this is; PU21 sees the
-        scene's own luminance, adapted to D65.
+        Luminance of white. FLIP and S-CIELAB compare the pictures as a display shows them, whatever this is; PU21
+        compares the scene's own luminance, adapted to D65.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a chart's patches tell of colour: pairs told apart, and colours as they are in daylight."""
+"""Colour figures of a chart's patches: how far pairs differ, and how far colours are from those in daylight."""
 
 from functools import cache
 

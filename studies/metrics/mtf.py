@@ -23,12 +23,12 @@ _PASSES = 4  # each centres the rows' window on the line found before; the stand
 
 @dataclass(frozen=True)
 class EdgeResponse:
-    """What an edge tells.
+    """Sharpness of an edge.
 
     Attributes
     ----------
     angle_deg : float
-        Lean from the vertical, anticlockwise; of an edge nearer the horizontal that of the transposed picture.
+        Angle from the vertical, anticlockwise; for an edge nearer the horizontal, of the transposed picture.
     frequency_cycles_per_px : (n,) float64
         From 0 to 1; Nyquist is 0.5.
     mtf : (n,) float64
@@ -47,7 +47,7 @@ def edge_response(luminance: ArrayLike) -> EdgeResponse:
     """Measure the sharpness of one straight edge between two even fields.
 
     Noise scatters the result: 2.4 % for 80 x 80 pixels, a step of 30 dB over the noise and MTF50 at 0.19. From 20 dB
-    down half is met too early: -2 % there, -13 % at 10 dB, over 160 x 160 pixels. Average pictures over seeds first.
+    down MTF50 is too low: -2 % there, -13 % at 10 dB, over 160 x 160 pixels. Average pictures over seeds first.
 
     Parameters
     ----------

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from rodcone.errors import InputError
 from studies.metrics.quality import require_finite
 
-LEAST_CD_M2, MOST_CD_M2 = 0.005, 10_000.0  # the encoding's range: what lies outside reads as its end
-PEAK = 256.0  # the authors' peak for PSNR: nearly what white of a 100 cd/m^2 display reads, as 255 does in 8 bits
+LEAST_CD_M2, MOST_CD_M2 = 0.005, 10_000.0  # the encoding's range: luminance outside counts as its end
+PEAK = 256.0  # the authors' peak for PSNR: about the value of a 100 cd/m^2 display's white, as 255 is in 8 bits
 # Fit "banding_glare", the authors' own choice: steps in smooth gradients are seen, through the glare of the eye.
 _P = (0.353487901, 0.3734658629, 8.277049286e-05, 0.9062562627, 0.09150303166, 0.9099517204, 596.3148142)
 
@@ -19,7 +19,7 @@ _P = (0.353487901, 0.3734658629, 8.277049286e-05, 0.9062562627, 0.09150303166, 0
 def pu21_encode(luminance_cd_m2: ArrayLike) -> NDArray[np.float64]:
     """Perceptually uniform value, 0 to 595.4, of luminance [cd/m^2] of any shape; 100 cd/m^2 give 256.4.
 
-    Luminance outside 0.005 to 10 000 cd/m^2, also noise below 0, reads as the nearer end.
+    Luminance outside 0.005 to 10 000 cd/m^2, noise below 0 included, counts as the nearer end.
 
     Raises
     ------

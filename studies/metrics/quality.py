@@ -21,7 +21,7 @@ class Quality:
 
 
 def require_finite(**arrays: ArrayLike) -> None:
-    """Raise `InputError` at the first NaN or infinity of an array: no figure of quality would tell it."""
+    """Raise `InputError` for the first NaN or infinity in an array, which no figure of quality would show."""
     for name, values in arrays.items():
         if not np.isfinite(values).all():
             where = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
@@ -48,8 +48,8 @@ def measure(
 ) -> Quality:
     """Compare encoded sRGB pictures (h, w, 3) in [0, 1].
 
-    SSIM is Wang et al. 2004 with its Gaussian window; CIEDE2000 takes D65 as the white. Who compares many pictures with
-    one truth gives the truth's CIELAB too.
+    SSIM is Wang et al. 2004 with its Gaussian window; CIEDE2000 takes D65 as the white. `truth_lab`, the
+    truth's CIELAB, saves its computation where many pictures are compared with one truth.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a target tells beyond quality: sharpness of the slanted edge, colour and noise of the ColorChecker."""
+"""Figures of test targets: sharpness of the slanted edge, colour and noise of the ColorChecker."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -17,17 +17,17 @@ EDGE, CHART = "slanted_edge", "color_checker"  # names in `scenes.catalog`
 
 @dataclass(frozen=True)
 class TargetFigures:
-    """Figures of a picture of a target; None on other scenes, and where the picture doesn't let them be measured.
+    """Figures of a picture of a target; None for other scenes, and where they can't be measured.
 
     Attributes
     ----------
     mtf50_cy_per_px : float or None
-        Of the slanted edge's luminance (ISO 12233); None where noise hides the edge, too.
+        Of the slanted edge's luminance (ISO 12233); None also where noise hides the edge.
     chart_delta_e_mean : float or None
         CIEDE2000 between mean colours, mean over the ColorChecker's patches; None where these have under four pixels.
     patch_snr_db : float or None
-        Mean over deviation of luminance, median over the patches; the render's own noise counts. None where it isn't
-        finite, too.
+        Mean over deviation of luminance, median over the patches; the render's own noise counts. None also where
+        it isn't finite.
     """
 
     mtf50_cy_per_px: float | None = None
@@ -36,7 +36,7 @@ class TargetFigures:
 
 
 def target_figures(scene: str, linear: NDArray[np.float64], truth: NDArray[np.float64]) -> TargetFigures:
-    """Measure a picture by what its scene is known to be.
+    """Measure the figures that a picture's scene allows.
 
     Parameters
     ----------
