@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isp.processors.bayer import bilinear
+from isp.bilinear import bilinear
 from rodcone.errors import InputError
 from rodcone.jit import backend
 from sensor.cfa import letter_map
