@@ -89,21 +89,22 @@ class WhiteBalance:
             return ChannelGains(self.given[names.index("G")] / self.given, dict.fromkeys(names, "given"))
         neutral = neutral_response(names) if self.neutral is None else self.neutral
         usable = ~saturated_nearby(raw, "RGB")
-        groups = [("RGB", usable)]
-        if "W" in names:
-            groups.append(("GW", usable & ~saturated_nearby(raw, "W")))
-        factors: dict[str, float] = {}
-        sources: dict[str, BalanceSource] = {}
-        for group, pixels in groups:
+        groups = {"RGB": usable}
+        if "W" in names:  # before the colours, which then say where green's gain comes from
+            groups = {"GW": usable & ~saturated_nearby(raw, "W"), "RGB": usable}
+        factors = np.ones(len(names))
+        sources: dict[str, BalanceSource] = dict.fromkeys(names, "calibrated")
+        for group, pixels in groups.items():
             index = [names.index(channel) for channel in group]
             samples = np.array([max((pixels & mask(raw.cfa, channel, raw.shape)).sum(), 1) for channel in group])
             means = planes[pixels].mean(axis=0)[index] if pixels.any() else np.zeros(len(group))
             errors = np.sqrt((np.maximum(means, 0.0) + raw.dark_noise_e**2) / samples)
-            found, certain = gray_world(planes[..., index], pixels, errors, neutral[index], group.index("G"))
-            for channel, factor, sure in zip(group, found.tolist(), certain, strict=True):
-                factors.setdefault(channel, factor)  # green, which is in both groups, keeps what the colours say of it
-                sources.setdefault(channel, "gray world" if sure else "calibrated")
-        return ChannelGains(np.array([factors[name] for name in names]), sources)
+            factors[index], certain = gray_world(
+                planes[..., index], pixels, errors, neutral[index], green=group.index("G")
+            )
+            for channel, sure in zip(group, certain, strict=True):
+                sources[channel] = "gray world" if sure else "calibrated"
+        return ChannelGains(factors, sources)
 
 
 def neutral_response(names: Sequence[str], responses: Responses | None = None) -> Floats:
