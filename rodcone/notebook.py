@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from rodcone.colour_spaces import encode_srgb
 
-# XYZ to linear sRGB, IEC 61966-2-1, equation (F.8).
-XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # this percentile of a picture is shown at 90 % of white
 SIDE = 512  # most pixels of a shown picture's longer side
 

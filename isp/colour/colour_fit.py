@@ -174,7 +174,7 @@ def fit_matrix(
 def fit_through_neutral(signals: Floats, target: Floats) -> Floats:
     """Least-squares matrix (output, channel) from signals (patch, channel) to targets (patch, output); rows sum to 1.
 
-    So a neutral stays neutral. The last coefficient is 1 minus the others: differences from the last channel are fitted.
+    So a neutral stays neutral. The last coefficient is 1 minus the others: differences from the last one are fitted.
     """
     free, *_ = np.linalg.lstsq(signals[:, :-1] - signals[:, -1:], target - signals[:, -1:], rcond=None)
     return np.concatenate([free, 1.0 - free.sum(axis=0, keepdims=True)]).T

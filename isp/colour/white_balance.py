@@ -15,7 +15,7 @@ from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from rodcone.errors import InputError
-from sensor.cfa import channels, mask
+from sensor.cfa import channels, letter_map
 from sensor.curves import Responses, rgbw
 from sensor.raw import RawImage
 
@@ -92,16 +92,15 @@ class WhiteBalance:
         groups = {"RGB": usable}
         if "W" in names:  # before the colours, which then say where green's gain comes from
             groups = {"GW": usable & ~saturated_nearby(raw, "W"), "RGB": usable}
+        sites = letter_map(raw.cfa, raw.shape)
         factors = np.ones(len(names))
         sources: dict[str, BalanceSource] = dict.fromkeys(names, "calibrated")
         for group, pixels in groups.items():
             index = [names.index(channel) for channel in group]
-            samples = np.array([max((pixels & mask(raw.cfa, channel, raw.shape)).sum(), 1) for channel in group])
-            means = planes[pixels].mean(axis=0)[index] if pixels.any() else np.zeros(len(group))
+            samples = np.array([max((pixels & (sites == channel)).sum(), 1) for channel in group])
+            means = planes[..., index][pixels].mean(axis=0) if pixels.any() else np.zeros(len(group))
             errors = np.sqrt((np.maximum(means, 0.0) + raw.dark_noise_e**2) / samples)
-            factors[index], certain = gray_world(
-                planes[..., index], pixels, errors, neutral[index], green=group.index("G")
-            )
+            factors[index], certain = gray_world(means, errors, neutral[index], green=group.index("G"))
             for channel, sure in zip(group, certain, strict=True):
                 sources[channel] = "gray world" if sure else "calibrated"
         return ChannelGains(factors, sources)

@@ -449,8 +449,8 @@ ISP = (
     _fault(
         "white balance inverted",
         "isp/colour/gray_world.py",
-        "np.where(certain, means[green] / np.where(certain, means, 1.0), calibrated)",
-        "np.where(certain, np.where(certain, means, 1.0) / means[green], calibrated)",
+        "means[green] / np.where(certain, means, 1.0)",
+        "np.where(certain, means, 1.0) / means[green]",
         *_COLOUR,
     ),
     _fault(

@@ -17,6 +17,18 @@ def test_neutral_response_has_the_published_electron_ratios() -> None:
     assert [white / red, white / green, white / blue] == pytest.approx([9.80, 4.88, 10.84], rel=0.03)
 
 
+def test_pixels_near_a_full_colour_do_not_count_and_none_left_means_calibrated_gains() -> None:
+    dn, planes = np.tile([[600, 1100], [500, 5100]], (8, 8)), np.empty((16, 16, 4))
+    planes[:] = [500.0, 1000.0, 400.0, 5000.0]
+    dn[0, 0] = dn[15, 0] = 15_100  # red sites and blue ones: the tile's reach is one pixel
+    planes[:2, :2] = planes[14:, :2] = 1e6
+    balance = WhiteBalance(neutral=np.array([1.0, 2.0, 1.0, 8.0]))
+    assert balance.gains(raw(dn), planes).factors == pytest.approx([2.0, 1.0, 2.5, 0.2], rel=1e-12)
+    gains = balance.gains(raw(np.full((16, 16), 15_100)), planes)
+    assert gains.factors == pytest.approx([2.0, 1.0, 2.0, 0.25], rel=1e-12)
+    assert gains.sources == dict.fromkeys("RGBW", "calibrated")
+
+
 def test_w_that_is_full_everywhere_takes_the_calibrated_gain_and_leaves_the_colours_alone() -> None:
     dn = np.tile([[600, 1100], [500, 15_100]], (8, 8))
     planes = np.broadcast_to([500.0, 1000.0, 400.0, 15_000.0], (16, 16, 4))
