@@ -17,7 +17,7 @@ from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish
 from isp.planes import Plane
-from isp.processors.demosaic import demosaicked, menon, require_bayer
+from isp.processors.demosaic import menon, picture_demosaicked, require_bayer
 from rodcone.optional import optional_library
 from sensor.raw import RawImage
 
@@ -41,7 +41,7 @@ def picture_bayer_nlm(raw: RawImage, colours: ColourFit, *, balance: WhiteBalanc
 def picture_bayer_bm3d(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop a Bayer raw image with BM3D on the mosaic, then Menon's demosaicking."""
     require_bayer(raw.cfa)
-    return demosaicked(raw, bm3d_mosaic(raw), menon, colours, balance)
+    return picture_demosaicked(raw, colours, balance=balance, demosaic=menon, electrons=bm3d_mosaic(raw))
 
 
 def bm3d_mosaic(raw: RawImage) -> Plane:

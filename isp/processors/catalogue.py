@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any
@@ -16,7 +17,7 @@ from isp.pipeline import picture_bayer, picture_interleaved
 from isp.processors.bayer_denoised import EXTRA as BM3D
 from isp.processors.bayer_denoised import picture_bayer_bm3d, picture_bayer_nlm
 from isp.processors.demosaic import EXTRA as DEMOSAICKING
-from isp.processors.demosaic import picture_malvar, picture_menon
+from isp.processors.demosaic import malvar, menon, picture_demosaicked
 from isp.processors.fusion import picture_complementary, picture_kijima, picture_sato, picture_yamagami
 from isp.processors.gindele import picture_gindele
 from rodcone.errors import InputError
@@ -80,14 +81,16 @@ class Processor:
         return self.picture(raw, ColourFit.of(matrix), balance=white_balance, **options)
 
 
+_MALVAR = partial(picture_demosaicked, demosaic=malvar)
+_MENON = partial(picture_demosaicked, demosaic=menon)
 _EARLY = "W as luminance by early fusion"
 # The first two are the paper's.
 PROCESSORS: Mapping[str, Processor] = MappingProxyType(
     {
         "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)", on_backend=True),
         "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
-        "bayer_malvar": Processor("bayer", picture_malvar, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
-        "bayer_menon": Processor("bayer", picture_menon, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
+        "bayer_malvar": Processor("bayer", _MALVAR, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
+        "bayer_menon": Processor("bayer", _MENON, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
         "bayer_nlm": Processor(
             "bayer", picture_bayer_nlm, "the interleaved camera's non-local means on Bayer", on_backend=True
         ),

@@ -52,26 +52,17 @@ def menon(mosaic: Plane, cfa: Tile) -> Image:
     return _demosaic("demosaicing_CFA_Bayer_Menon2007", mosaic, cfa, MENON_REACH)
 
 
-def picture_malvar(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop a Bayer raw image with Malvar's demosaicking."""
-    return demosaicked(raw, raw.electrons, malvar, colours, balance)
-
-
-def picture_menon(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop a Bayer raw image with Menon's demosaicking."""
-    return demosaicked(raw, raw.electrons, menon, colours, balance)
-
-
-def demosaicked(
+def picture_demosaicked(
     raw: RawImage,
-    electrons: Plane,
-    demosaic: Callable[[Plane, Tile], Image],
     colours: ColourFit,
+    *,
     balance: WhiteBalance,
+    demosaic: Callable[[Plane, Tile], Image],
+    electrons: Plane | None = None,
 ) -> Picture:
-    """Picture of a Bayer mosaic [e-], as it is or denoised: balanced, then demosaicked."""
+    """Develop a Bayer raw image with `malvar` or `menon`: its mosaic, or a denoised one [e-], is balanced first."""
     require_bayer(raw.cfa)
-    mosaic, sources = balance_mosaic(raw, electrons, balance)
+    mosaic, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
     return Picture(to_rgb(raw, demosaic(mosaic, raw.cfa), colours, MALVAR_REACH), sources)
 
 

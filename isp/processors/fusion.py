@@ -88,7 +88,8 @@ def picture_kijima(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) 
     require_letters(raw, CHANNELS)
     mosaic, sources = balance_mosaic(raw, raw.electrons, balance)
     white = fill(mosaic, raw.cfa, "W")
-    planes = np.stack([white + combine(mosaic - white, raw.cfa, channel) for channel in "RGB"], axis=-1)
+    differences = mosaic - white
+    planes = np.stack([white + combine(differences, raw.cfa, channel) for channel in "RGB"], axis=-1)
     return Picture(to_rgb(raw, planes, colours, MATCHED_RADIUS), sources)
 
 
