@@ -126,9 +126,9 @@ def test_a_processor_added_as_its_page_says_is_one_of_rodcones(tmp_path: Path) -
     for hunk in change.split("@@\n")[1:]:
         lines = hunk.splitlines(keepends=True)
         before, after = ("".join(line[1:] for line in lines if line[0] in signs) for signs in (" -", " +"))
-        source = (tmp_path / "isp" / "processors.py").read_text("utf-8")
+        source = (tmp_path / "isp" / "processors" / "catalogue.py").read_text("utf-8")
         assert source.count(before) == 1, before
-        (tmp_path / "isp" / "processors.py").write_text(source.replace(before, after), "utf-8")
+        (tmp_path / "isp" / "processors" / "catalogue.py").write_text(source.replace(before, after), "utf-8")
     program = (
         "from studies.commands.cli import main\n"
         "for words in ['capture flat_field --cfa bayer --size 32 --spp 4 --level 5cd/m2 -o flat.dng',"

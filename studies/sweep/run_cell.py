@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import encode_srgb
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
+from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.cfa import channels

@@ -42,9 +42,10 @@ _READOUT = (
 )
 _LENS = ("sensor/test_optics", "sensor/test_diffraction", "sensor/test_hard_cases")
 _LIGHT = ("render/test_photometry", "render/test_spectrum", "render/test_illuminants", "sensor/test_optics")
-_SIMILARITY = ("test_isp_similarity", "test_isp_planes", "isp/processors/test_bayer", "test_isp_interleaved")
+_SIMILARITY = ("test_isp_similarity", "test_isp_planes", "isp/test_bilinear", "test_isp_interleaved")
 _COLOUR = (
-    "isp/colour/test_camera_colour",
+    "rodcone/test_colour_spaces",
+    "isp/colour/test_gray_world",
     "isp/colour/test_colour_fit",
     "isp/test_pipeline",
     "studies/metrics/test_truth_metrics",
@@ -432,12 +433,12 @@ ISP = (
     ),
     _fault(
         "Anscombe without dark noise",
-        "isp/planes.py",
+        "isp/anscombe.py",
         "return np.asarray(2.0 * np.sqrt(np.maximum(electrons + (0.375 + dark_noise_e**2), 0.0)))",
         "return np.asarray(2.0 * np.sqrt(np.maximum(electrons + 0.375, 0.0)))",
         *_SIMILARITY,
     ),
-    _fault("PRNU left out of the transform", "isp/planes.py", "0.0) + (prnu * seen) ** 2", "0.0)", *_SIMILARITY),
+    _fault("PRNU left out of the transform", "isp/anscombe.py", "0.0) + (prnu * seen) ** 2", "0.0)", *_SIMILARITY),
     _fault(
         "box in place of tent",
         "isp/planes.py",
@@ -447,32 +448,32 @@ ISP = (
     ),
     _fault(
         "white balance inverted",
-        "isp/colour/camera_colour.py",
-        "np.where(certain, means[green] / np.where(certain, means, 1.0), calibrated)",
-        "np.where(certain, np.where(certain, means, 1.0) / means[green], calibrated)",
+        "isp/colour/gray_world.py",
+        "means[green] / np.where(certain, means, 1.0)",
+        "np.where(certain, means, 1.0) / means[green]",
         *_COLOUR,
     ),
     _fault(
         "Gray World over saturated pixels",
         "isp/colour/white_balance.py",
-        '    colours = ~saturated_nearby(raw, "RGB")\n',
-        "    colours = np.ones(raw.shape, dtype=bool)\n",
+        '        usable = ~saturated_nearby(raw, "RGB")\n',
+        "        usable = np.ones(raw.shape, dtype=bool)\n",
         "isp/test_pipeline",
     ),
     _fault(
         "highlights not held",
-        "isp/colour/white_balance.py",
+        "isp/colour/highlights.py",
         "np.where(clipped[..., None], np.minimum(balanced, full_e(raw)), balanced)",
         "balanced",
         "isp/test_pipeline",
         "isp/processors/test_catalogue",
     ),
-    _fault("gamma 2.2", "isp/colour/camera_colour.py", "clipped ** (1 / 2.4)", "clipped ** (1 / 2.2)", *_COLOUR),
+    _fault("gamma 2.2", "rodcone/colour_spaces.py", "clipped ** (1 / 2.4)", "clipped ** (1 / 2.2)", *_COLOUR),
     _fault(
         "adaptation the wrong way",
-        "isp/colour/camera_colour.py",
-        "np.diag(_BRADFORD @ xyz_from_xy(_D65_XY) / source)",
-        "np.diag(source / (_BRADFORD @ xyz_from_xy(_D65_XY)))",
+        "rodcone/colour_spaces.py",
+        "np.diag(_BRADFORD @ xyz_from_xy(D65_XY) / source)",
+        "np.diag(source / (_BRADFORD @ xyz_from_xy(D65_XY)))",
         *_COLOUR,
     ),
     _fault(

@@ -9,7 +9,8 @@ from hard.chain import CAMERAS, behind, develop, develop_fixed, expected, plain_
 from numpy.typing import NDArray
 from scipy.stats import t
 
-from isp.colour.camera_colour import encode_srgb, neutral_response
+from isp.colour.white_balance import neutral_response
+from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import channels, letter_map
 from sensor.config import BLACK_SIGMAS, SensorConfig
 from sensor.crosstalk import spread_charge

@@ -15,13 +15,14 @@ from hard.precision import Found, Parameters, Stage, beside_noise
 from numpy.typing import NDArray
 from scipy.stats import poisson
 
-from isp.colour.camera_colour import encode_srgb
+from isp.anscombe import LEAST_PRNU, stabilise
 from isp.interleaved import reconstruct
-from isp.planes import LEAST_PRNU, fill, stabilise
+from isp.planes import fill
 from isp.reference import sum_weights
 from isp.settings import SIGMA_S, Settings
 from render.spectrum import band_widths
 from render.transport import emission
+from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import RGBW, channels, letter_map
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from skimage.color import deltaE_ciede2000, xyz2lab
 
-from isp.colour.camera_colour import adapt_to_d65
 from render.illuminants import illuminant
 from render.photometry import tristimulus
 from render.spectrum import Floats, Spectrum
+from rodcone.colour_spaces import adapt_to_d65
 from scenes.catalog import load
 from scenes.metamers import HIGH, LOW, OTHER_LIGHT, PAIRS, TWINS_UNDER, pairs
 from sensor.curves import Responses, rgbw

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isp.colour.camera_colour import fit_matrix, neutral_response
+from isp.colour.colour_fit import fit_matrix
+from isp.colour.white_balance import neutral_response
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule, tristimulus
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
