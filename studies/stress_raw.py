@@ -11,9 +11,8 @@ from isp.colour.camera_colour import encode_srgb, neutral_response
 from render.radiance import SpectralRadiance
 from sensor.cfa import channels, letter_map
 from sensor.config import BLACK_SIGMAS, SensorConfig
-from sensor.crosstalk import spread_charge
-from sensor.noise import noise_variance
 from sensor.raw import SATURATION_SIGMAS, RawImage
+from sensor.readout import noise_variance, spread_charge
 from studies.stress_case import Margin, Situation, worse, worst_of
 from studies.stress_chain import (
     CAMERAS,

@@ -1,4 +1,4 @@
-"""Yamagami's camera with cyan, magenta and yellow filters around W (see `fusion` and `sensor.filters`)."""
+"""Yamagami's camera with cyan, magenta and yellow filters around W (see `fusion` and `sensor.curves`)."""
 
 from dataclasses import replace
 
@@ -10,8 +10,7 @@ from isp.picture import Picture
 from isp.processors.fusion import picture_yamagami
 from rodcone.errors import InputError
 from sensor.cfa import channels
-from sensor.curves import rgbw
-from sensor.filters import complementary
+from sensor.curves import complementary, rgbw
 from sensor.raw import RawImage
 
 # Places in which the shared steps see the three: yellow, the brightest, where green stands, as the unit of the picture.

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from rodcone.jit import arrays, dr
 from sensor.cfa import channels, letter_map
 from sensor.config import SensorConfig
-from sensor.crosstalk import spread_charge
 from sensor.device import Device
 from sensor.kernel.kernel import Chip, Divisor, Frame, expected_lanes, letter_lanes, read_lanes
 from sensor.kernel.poisson import alias_table
+from sensor.readout import spread_charge
 
 BANDS_AT_ONCE = 8  # a CPU reads ahead in some dozen places; 40 at once take a third longer, and fight for its cache
 LARGEST = np.finfo(np.float32).max

@@ -33,9 +33,9 @@ def _fault(name: str, file: str, there: str, instead: str, *tests: str) -> Fault
 
 
 _READOUT = (
-    "sensor/test_noise",
+    "sensor/test_readout_variance",
     "sensor/test_capture",
-    "sensor/test_crosstalk",
+    "sensor/test_readout_crosstalk",
     "sensor/test_device",
     "sensor/kernel/test_run",
     "sensor/emva1288/test_estimators",
@@ -114,8 +114,8 @@ SENSOR = (
     _fault(
         "hot pixels without the exposure time",
         "sensor/readout.py",
-        "hot_pixel_dark_current_e_per_s * exposure_s",
-        "hot_pixel_dark_current_e_per_s",
+        "+= pixel.hot_pixel_dark_current_e_per_s * exposure_s",
+        "+= pixel.hot_pixel_dark_current_e_per_s",
         *_READOUT,
     ),
     _fault(
@@ -128,24 +128,24 @@ SENSOR = (
     ),
     _fault(
         "quantisation noise of gain^2 / 2",
-        "sensor/noise.py",
+        "sensor/readout.py",
         "sensor.gain_e_per_dn**2 / 12",
         "sensor.gain_e_per_dn**2 / 2",
         *_READOUT,
     ),
     _fault(
         "PRNU not squared in the variance",
-        "sensor/noise.py",
+        "sensor/readout.py",
         "(pixel.prnu * signal) ** 2",
         "(pixel.prnu * signal)",
         *_READOUT,
     ),
     _fault(
         "crosstalk makes charge",
-        "sensor/crosstalk.py",
+        "sensor/readout.py",
         "(1 - 4 * crosstalk)",
         "(1 - 3 * crosstalk)",
-        "sensor/test_crosstalk",
+        "sensor/test_readout_crosstalk",
         *_READOUT,
     ),
     _fault(
@@ -925,15 +925,25 @@ NONSENSE = (
     ),
     _fault(
         "lost share of energy instead of photons",
-        "sensor/window.py",
+        "sensor/response.py",
         " * photons_per_joule(nm) * step",
         " * step",
-        "sensor/test_window",
+        "sensor/test_response_window",
     ),
     _fault(
-        "window left open, untold", "sensor/window.py", "LEAST_TOLD = 5e-3", "LEAST_TOLD = 0.5", "sensor/test_window"
+        "window left open, untold",
+        "sensor/response.py",
+        "LEAST_TOLD = 5e-3",
+        "LEAST_TOLD = 0.5",
+        "sensor/test_response_window",
     ),
-    _fault("channel without light", "sensor/window.py", "MOST_LOST = 0.5", "MOST_LOST = 1.0", "sensor/test_window"),
+    _fault(
+        "channel without light",
+        "sensor/response.py",
+        "MOST_LOST = 0.5",
+        "MOST_LOST = 1.0",
+        "sensor/test_response_window",
+    ),
     _fault(
         "white frame untold",
         "studies/photograph/shot.py",
