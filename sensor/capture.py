@@ -12,7 +12,7 @@ from rodcone.jit import backend
 from sensor.cfa import check_covers
 from sensor.config import SensorConfig
 from sensor.device import Device
-from sensor.kernel.run import expected_electrons_single, read_frame
+from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import camera_equation, falloff, form_image, spreads
 from sensor.random import draw_key
 from sensor.raw import RawImage

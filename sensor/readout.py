@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from rodcone.errors import InputError, require_range
 from sensor.config import SensorConfig
 from sensor.device import Device
-from sensor.random import Term, draw_key, normals, poisson
+from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
 
 
@@ -52,13 +52,13 @@ def read_out(
     if device.hot is not None:
         mean_e[device.hot] += pixel.hot_pixel_dark_current_e_per_s * exposure_s
     # Poisson far above the well is the well with certainty; the bound keeps the draw inside 64-bit integers.
-    collected_e = poisson(key, Term.SHOT, np.minimum(mean_e, 2 * pixel.full_well_e + 1e4)).astype(np.float64)
+    collected_e = poisson(key, NoiseTerm.SHOT, np.minimum(mean_e, 2 * pixel.full_well_e + 1e4)).astype(np.float64)
     np.minimum(collected_e, pixel.full_well_e, out=collected_e)
     if device.column_gain is not None:
         collected_e *= device.column_gain
     collected_e += device.dark_offset_e
     if pixel.read_noise_e:
-        collected_e += pixel.read_noise_e * normals(key, Term.READ, expected.shape)
+        collected_e += pixel.read_noise_e * normals(key, NoiseTerm.READ, expected.shape)
     dn = np.rint(collected_e / sensor.gain_e_per_dn + sensor.black_dn)
     dn = np.clip(dn, 0, sensor.white_dn).astype(np.uint16)
     return as_raw(dn, sensor, exposure_s, engine="numpy", hot=device.hot)

@@ -11,7 +11,7 @@ from render.spectrum import Floats
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import draw_device
-from sensor.kernel.run import read_frame
+from sensor.kernel.kernel import read_frame
 from sensor.random import draw_key
 from sensor.readout import read_out
 

@@ -18,7 +18,7 @@ class RenderModel:
 class ImageModel:
     """Terms of the lens, as `sensor.config.LensConfig` has them (0: left out), and the readout.
 
-    `exact` reads out in NumPy; otherwise `sensor.kernel.run.read_frame` does in single precision.
+    `exact` reads out in NumPy; otherwise `sensor.kernel.kernel.read_frame` does in single precision.
     """
 
     diffraction: float

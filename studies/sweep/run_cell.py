@@ -18,7 +18,7 @@ from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.cfa import channels
 from sensor.device import Device, draw_device
-from sensor.kernel.run import read_frame
+from sensor.kernel.kernel import read_frame
 from sensor.optics import falloff
 from sensor.random import draw_key
 from sensor.raw import RawImage

@@ -37,7 +37,7 @@ _READOUT = (
     "sensor/test_capture",
     "sensor/test_readout_crosstalk",
     "sensor/test_device",
-    "sensor/kernel/test_run",
+    "sensor/kernel/test_kernel_frames",
     "sensor/emva1288/test_estimators",
 )
 _LENS = ("sensor/test_optics", "sensor/test_diffraction", "sensor/test_hard_cases")
@@ -107,8 +107,8 @@ SENSOR = (
     _fault(
         "read noise the same in every exposure",
         "sensor/readout.py",
-        "normals(key, Term.READ",
-        "normals(0, Term.READ",
+        "normals(key, NoiseTerm.READ",
+        "normals(0, NoiseTerm.READ",
         *_READOUT,
     ),
     _fault(
@@ -121,8 +121,8 @@ SENSOR = (
     _fault(
         "DSNU drawn with PRNU's numbers",
         "sensor/device.py",
-        "normals(key, Term.DSNU, shape)",
-        "normals(key, Term.PRNU, shape)",
+        "normals(key, NoiseTerm.DSNU, shape)",
+        "normals(key, NoiseTerm.PRNU, shape)",
         "sensor/test_device",
         *_READOUT,
     ),
@@ -169,7 +169,7 @@ SENSOR = (
         "sensor/kernel/kernel.py",
         "dr.fma(finite_e, jit.Float(chip.photo_response), chip.dark_e)",
         "finite_e + chip.dark_e",
-        "sensor/kernel/test_run",
+        "sensor/kernel/test_kernel_frames",
         "sensor/kernel/test_kernel",
     ),
     _fault(
@@ -177,7 +177,7 @@ SENSOR = (
         "sensor/kernel/kernel.py",
         "dr.minimum(collected_e, chip.full_well_e)",
         "collected_e",
-        "sensor/kernel/test_run",
+        "sensor/kernel/test_kernel_frames",
         "sensor/kernel/test_kernel",
     ),
     _fault(

@@ -10,7 +10,7 @@ from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.device import draw_device
 from sensor.emva1288.characterise import Plan, characterise, configured, measure, plan_for
 from sensor.emva1288.photon_transfer import bench
-from sensor.kernel.run import read_frame
+from sensor.kernel.kernel import read_frame
 from sensor.random import draw_key
 from sensor.readout import as_raw, read_out
 

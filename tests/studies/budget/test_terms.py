@@ -12,7 +12,7 @@ from render.scene import LightGroup
 from render.spectrum import Spectrum, flat, line_spectrum
 from render.transport import Transport
 from rodcone.jit import backend
-from sensor.kernel.run import expected_electrons_single
+from sensor.kernel.kernel import expected_electrons_single
 from sensor.optics import camera_equation, falloff, form_image
 from sensor.presets import low_noise
 from sensor.readout import noise_variance
