@@ -1,4 +1,4 @@
-"""What a camera is: pixel, lens, mosaic, responses, converter. Zero switches a term off; there are no mode flags."""
+"""What a camera is: pixel, lens, mosaic, responses, converter. Zero switches a term off."""
 
 from dataclasses import dataclass, field
 from math import ceil, hypot
@@ -151,7 +151,7 @@ class SensorConfig:
     cfa : tuple of str
         Tile of letters, such as ``("RG", "BW")``.
     responses : Responses
-        Electrons per photon of each letter.
+        Electrons per photon of each channel.
     bits : int
         Of the converter, 1 to 16.
     black_level_dn : int or None
@@ -175,7 +175,7 @@ class SensorConfig:
             require_whole("black_level_dn", self.black_level_dn, 0, self.white_dn - 1, "give DN under the white level")
         if not (isinstance(self.window_nm, tuple | list) and len(self.window_nm) == 2 and _increasing(self.window_nm)):
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give (shortest, longest) in 100-20000 nm")
-        self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every letter has a curve
+        self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every channel needs a curve
 
     @property
     def white_dn(self) -> int:

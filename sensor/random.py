@@ -1,4 +1,4 @@
-"""Random numbers by coordinates: key, row, column and term decide a draw, so tiling and threads don't.
+"""Random numbers by coordinates: a draw depends on key, row, column and term, not on threads or order.
 
 Philox4x32-10 is the counter-based generator of Salmon et al., "Parallel random numbers: as easy as 1, 2, 3" (SC 2011).
 """
@@ -14,11 +14,11 @@ _U32 = np.uint64(0xFFFFFFFF)
 MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
 WEYL = (0x9E3779B9, 0xBB67AE85)
 ROUNDS = 10
-_PIXELS_AT_ONCE = 1 << 18  # the words of a draw take ten times its memory
+_PIXELS_AT_ONCE = 1 << 18  # a draw's random words take ten times its own memory
 
 
 class NoiseTerm(IntEnum):
-    """Noise term of a draw: one independent stream each."""
+    """Noise term: each has an independent stream."""
 
     PRNU = 1
     DSNU = 2

@@ -18,11 +18,11 @@ from sensor.calibration import ColourCalibration
 from sensor.cfa import Tile, channels
 from sensor.raw import RawImage
 from sensor.raw_files.raw_json import parse_json, raw_image, to_json
-from sensor.raw_files.tiff import CFA, EXIF, MAKER, Tags, Values, read_make, read_mosaic, text, write_mosaic
+from sensor.raw_files.tiff import CFA, EXIF, Tags, Values, read_mosaic, read_tags, text, write_mosaic
 
 PRIVATE = b"rodcone\0"
 PRIVATE_DATA = 50740
-MAKE = "rodcone"
+MAKER, MAKE = 271, "rodcone"
 CFA_REPEAT, CFA_PATTERN, BLACK_LEVEL, WHITE_LEVEL = 33421, 33422, 50714, 50717
 OPCODES = 51008  # OpcodeList1: what is done to the samples as read
 EXPOSURE_TIME, F_NUMBER, ISO = 33434, 33437, 34855
@@ -83,26 +83,30 @@ def read_dng(path: Path) -> RawImage:
         For a file that is missing, damaged, of another camera, or was changed since.
     """
     dn, tags = read_mosaic(path, CFA, (PRIVATE_DATA, EXIF, *_COMPARED))
-    kind, private = tags.get(PRIVATE_DATA, ("", ()))
-    content = bytes(int(value) for value in private) if kind == "B" else b""
-    if not content.startswith(PRIVATE):
+    _, content = tags.get(PRIVATE_DATA, ("B", b""))
+    if not isinstance(content, bytes) or not content.startswith(PRIVATE):
         raise InputError(
             f"{path}: its DNGPrivateData holds no calibration in electrons; allowed: files that `rodcone capture` wrote"
         )
     raw = raw_image(parse_json(content[len(PRIVATE) :], str(path)), dn, str(path))
     expected = {**dng_tags(raw), **exif_tags(raw)}
     for code, name in _COMPARED.items():
-        (_, held), (_, meant) = (found.get(code, ("", "missing")) for found in (tags, expected))
+        held, meant = (some[code][1] if code in some else None for some in (tags, expected))
         if held != meant:
+            found, right = ("missing" if values is None else tuple(values[:8]) for values in (held, meant))
             raise InputError(
-                f"{path}: {name} is {held[:8]}, the calibration says {meant}; allowed: an unchanged file; write it anew"
+                f"{path}: {name} is {found}, the calibration says {right}; allowed: an unchanged file; write it anew"
             )
     return raw
 
 
 def is_own(path: Path) -> bool:
     """Whether a file says that `write_dng` wrote it; what doesn't is some camera's or program's."""
-    return read_make(path) == MAKE
+    try:
+        with path.open("rb") as file:
+            return read_tags(file, (MAKER,), str(path)).get(MAKER) == text(MAKE)
+    except (InputError, OSError):
+        return False
 
 
 def dng_tags(raw: RawImage) -> Tags:
@@ -113,7 +117,6 @@ def dng_tags(raw: RawImage) -> Tags:
     where the well begins to clip (`RawImage.saturation_e`).
     """
     colour = _require(raw)
-    letters = channels(raw.cfa)
     full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
     height, width = raw.shape
     tags: dict[int, tuple[str, Values]] = {
@@ -122,11 +125,11 @@ def dng_tags(raw: RawImage) -> Tags:
         272: text(raw.camera),
         274: ("H", (1,)),  # Orientation: upright
         CFA_REPEAT: ("H", (2, 2)),
-        CFA_PATTERN: ("B", tuple(_COLOURS[letter] for row in raw.cfa for letter in row)),
-        50706: ("B", (1, 4, 0, 0)),  # DNGVersion
-        50707: ("B", (1, 1, 0, 0)),  # DNGBackwardVersion: all that is newer may be skipped
+        CFA_PATTERN: ("B", bytes(_COLOURS[channel] for row in raw.cfa for channel in row)),
+        50706: ("B", bytes((1, 4, 0, 0))),  # DNGVersion
+        50707: ("B", bytes((1, 1, 0, 0))),  # DNGBackwardVersion: all that is newer may be skipped
         50708: text(f"rodcone {raw.camera}"),  # UniqueCameraModel
-        50710: ("B", tuple(_COLOURS[letter] for letter in letters)),  # CFAPlaneColor
+        50710: ("B", bytes(_COLOURS[channel] for channel in channels(raw.cfa))),  # CFAPlaneColor
         50711: ("H", (1,)),  # CFALayout: a rectangle
         BLACK_LEVEL: ("2I", rational(raw.black_dn)),
         WHITE_LEVEL: ("I", (int(raw.white_dn),)),
@@ -137,8 +140,8 @@ def dng_tags(raw: RawImage) -> Tags:
     }
     tags |= _colour_tags(colour)
     if raw.defects is not None and is_bayer(raw.cfa):
-        tags[OPCODES] = ("U", tuple(_bad_pixels(raw.cfa, raw.defects)))
-    tags[PRIVATE_DATA] = ("B", tuple(PRIVATE + to_json(raw).encode("ascii")))
+        tags[OPCODES] = ("U", _bad_pixels(raw.cfa, raw.defects))
+    tags[PRIVATE_DATA] = ("B", PRIVATE + to_json(raw).encode("ascii"))
     return dict(sorted(tags.items()))
 
 
@@ -153,7 +156,7 @@ def exif_tags(raw: RawImage) -> Tags:
     """Tags of the exposure (Exif 2.3, CIPA DC-008)."""
     tags: dict[int, tuple[str, Values]] = {
         EXPOSURE_TIME: ("2I", rational(raw.exposure_s)),
-        36864: ("B", tuple(b"0230")),  # ExifVersion
+        36864: ("U", b"0230"),  # ExifVersion
     }
     if raw.f_number is not None:
         tags[F_NUMBER] = ("2I", rational(raw.f_number))
