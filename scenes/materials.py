@@ -1,4 +1,4 @@
-"""Mitsuba nodes for surfaces and flat shapes, so that each scene reads as a list of things."""
+"""Mitsuba nodes for surfaces and shapes, so that each scene reads as a list of things."""
 
 from render.geometry import rotate, scale, to_world, translate
 from render.optical_constants import optical_constant

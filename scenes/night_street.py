@@ -2,10 +2,11 @@
 
 from math import cos, pi, radians, sin, tan
 
-from render.geometry import look_at, rotate, to_world, translate
+from render.geometry import look_at, rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Floats, Spectrum
+from scenes.camera_and_sky import camera
 from scenes.materials import block, disk, floor, glossy, matte, panel, rod
 from scenes.reflectances import band, edge, grey
 
@@ -25,16 +26,10 @@ DARK = grey(0.03)
 
 def night_street() -> Scene:
     """Street 5 m wide between house fronts; light groups ``moon``, ``sodium``, ``led`` and ``window``, all in view."""
-    camera = {
-        "type": "perspective",
-        "fov": 58.0,
-        "fov_axis": "smaller",
-        "to_world": to_world(look_at((-0.5, 1.65, 9.0), (0.1, 3.3, -9.0))),
-    }
     left, right = rotate((0, 1, 0), 90), rotate((0, 1, 0), -90)
     geometry: Node = {
         "type": "scene",
-        "sensor": camera,
+        "sensor": camera(58.0, (-0.5, 1.65, 9.0), (0.1, 3.3, -9.0)),
         **_ground(),
         **_house("left0", translate(-4, 0, -2) @ left, 8.2, edge(480, 60, 0.34, 0.52)),
         **_house("left1", translate(-4, 0, -14) @ left, 9.0, edge(560, 45, 0.18, 0.50)),

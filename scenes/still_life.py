@@ -6,6 +6,7 @@ from render.geometry import look_at, rotate, scale, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Spectrum
+from scenes.camera_and_sky import camera
 from scenes.color_checker import color_checker_nodes
 from scenes.materials import ball, checks, floor, glass, glossy, matte, metal, panel, rod
 from scenes.reflectances import band, edge, grey
@@ -23,13 +24,14 @@ def still_life(light: str = "D65") -> Scene:
     light : str
         Illuminant of the softbox, the only light (group ``softbox``).
     """
-    camera = {
-        "type": "perspective",
-        "fov": 26.0,
-        "fov_axis": "smaller",
-        "to_world": to_world(look_at((0.0, 0.52, 2.05), (0.0, 0.21, 0.0))),
+    view = camera(26.0, (0.0, 0.52, 2.05), (0.0, 0.21, 0.0))
+    geometry: Node = {"type": "scene", "sensor": view, **_room(), **_things(), **_lights()}
+        "type": "scene",
+        "sensor": camera(26.0, (0.0, 0.52, 2.05), (0.0, 0.21, 0.0)),
+        **_room(),
+        **_things(),
+        **_lights(),
     }
-    geometry: Node = {"type": "scene", "sensor": camera, **_room(), **_things(), **_lights()}
     groups = {"softbox": LightGroup(("softbox/emitter",), illuminant(light), LIGHT_LUMINANCE_CD_M2)}
     return Scene("still_life", geometry, groups, reference_plane="meter_card")
 

@@ -2,9 +2,10 @@
 
 from math import cos, pi, radians, sin, sqrt, tan
 
-from render.geometry import look_at, rotate, to_world, translate
+from render.geometry import look_at, rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
+from scenes.camera_and_sky import camera
 from scenes.materials import ball, block, checks, disk, floor, glass, glossy, matte, metal, panel, rod
 from scenes.reflectances import band, edge, grey
 
@@ -28,15 +29,9 @@ def still_life_outdoor() -> Scene:
 
     The glass stands in the shade of the crate: sunlight focused by glass on its way to a surface can't be sampled.
     """
-    camera = {
-        "type": "perspective",
-        "fov": 26.0,
-        "fov_axis": "smaller",
-        "to_world": to_world(look_at((0.10, 0.62, 2.05), (0.0, 0.17, 0.0))),
-    }
     geometry: Node = {
         "type": "scene",
-        "sensor": camera,
+        "sensor": camera(26.0, (0.10, 0.62, 2.05), (0.0, 0.17, 0.0)),
         **_garden(),
         **_table(),
         **_fruit(),
