@@ -1,4 +1,4 @@
-"""The 24-patch ColorChecker on grey card, in a constant environment; a chart of any other 24 reflectances in its place."""
+"""The 24-patch ColorChecker on grey card in a constant environment, or a chart of any other 24 reflectances."""
 
 from collections.abc import Sequence
 from dataclasses import replace

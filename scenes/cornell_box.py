@@ -43,12 +43,6 @@ def cornell_box(light: str | None = None) -> Scene:
     """
     view = camera(float(CAMERA_FOV_DEG), (0.278, 0.273, -0.8), (0.278, 0.273, 0.0))
     geometry: Node = {"type": "scene", "sensor": view, **_walls(), **_blocks(), "lamp": _lamp()}
-        "type": "scene",
-        "sensor": camera(float(CAMERA_FOV_DEG), (0.278, 0.273, -0.8), (0.278, 0.273, 0.0)),
-        **_walls(),
-        **_blocks(),
-        "lamp": _lamp(),
-    }
     spectrum = illuminant(light) if light else lamp_spectrum()
     groups = {"lamp": LightGroup(("lamp/emitter",), spectrum, LAMP_LUMINANCE_CD_M2)}
     return Scene("cornell_box", geometry, groups, reference_plane="meter_card")

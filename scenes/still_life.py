@@ -26,12 +26,6 @@ def still_life(light: str = "D65") -> Scene:
     """
     view = camera(26.0, (0.0, 0.52, 2.05), (0.0, 0.21, 0.0))
     geometry: Node = {"type": "scene", "sensor": view, **_room(), **_things(), **_lights()}
-        "type": "scene",
-        "sensor": camera(26.0, (0.0, 0.52, 2.05), (0.0, 0.21, 0.0)),
-        **_room(),
-        **_things(),
-        **_lights(),
-    }
     groups = {"softbox": LightGroup(("softbox/emitter",), illuminant(light), LIGHT_LUMINANCE_CD_M2)}
     return Scene("still_life", geometry, groups, reference_plane="meter_card")
 

@@ -18,7 +18,7 @@ LEAST_VARIANCE_DN2 = 0.24
 
 @dataclass(frozen=True)
 class ExposurePlan:
-    """What to expose: levels of light [e-], their exposure time [s], frames of a stack, times of the dark series [s]."""
+    """What to expose: levels of light [e-], exposure time [s], frames of a stack, times of the dark series [s]."""
 
     light_e: Floats
     exposure_s: float
