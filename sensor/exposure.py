@@ -10,9 +10,6 @@ from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.response import channel_electrons
 
-CHANNEL = "G"
-PERCENTILE = 99.0
-WELL_SHARE = 0.8
 LONGEST_S = 0.066  # Parmar & Wandell 2009, Figure 5: 66 ms
 RULE = "the 99th percentile of expected G at 80 % of the well, never longer than {longest:g} ms"
 
@@ -22,9 +19,9 @@ def auto_exposure_s(
     sensor: SensorConfig,
     longest_s: float = LONGEST_S,
     *,
-    channel: str = CHANNEL,
-    percentile: float = PERCENTILE,
-    well_share: float = WELL_SHARE,
+    channel: str = "G",
+    percentile: float = 99.0,
+    well_share: float = 0.8,
 ) -> float:
     """Exposure that puts a percentile of one channel's expected electrons at a share of the well [s].
 

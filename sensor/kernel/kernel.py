@@ -35,41 +35,6 @@ class Divisor:
     inverse: Any
 
 
-@dataclass(frozen=True)
-class Chip:
-    """What the readout needs to know of camera, chip and exposure.
-
-    Attributes
-    ----------
-    key : pair of UInt
-        Lower and upper half.
-    photo_response, dark_offset_e : Float64
-        A value a pixel.
-    column_gain : Float64 or None
-        A value a column, None where all are 1.
-    dark_e : Float
-        Expected dark electrons: one value, or one a pixel.
-    most_e, full_well_e : Float
-        Bound of the mean, and the well.
-    read_noise_e, gain_e_per_dn, black_dn, white_dn : Float64
-    table : UInt
-        `sensor.kernel.poisson.alias_table`, flat.
-    """
-
-    key: tuple[Any, Any]
-    photo_response: Any
-    dark_offset_e: Any
-    column_gain: Any
-    dark_e: Any
-    most_e: Any
-    full_well_e: Any
-    read_noise_e: Any
-    gain_e_per_dn: Any
-    black_dn: Any
-    white_dn: Any
-    table: Any
-
-
 # Expected electrons
 
 
@@ -171,47 +136,34 @@ def read_frame(
 ) -> NDArray[np.uint16]:
     """Digital numbers of one exposure, shape (h, w): what `sensor.readout.read_out` does, with other draws."""
     jit, pixel = arrays(), sensor.pixel
-    expected = expected_e
     if pixel.crosstalk:
-        expected = _single(spread_charge(np.minimum(expected_e, np.float64(LARGEST)), pixel.crosstalk))
+        expected_e = _single(spread_charge(np.minimum(expected_e, np.float64(LARGEST)), pixel.crosstalk))
+    row, column = position(dr.arange(jit.UInt, expected_e.size), _divisor(expected_e.shape[1]))
+    halves = dr.opaque(jit.UInt, key & 0xFFFFFFFF), dr.opaque(jit.UInt, key >> 32)
+    words = philox((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), jit.UInt(0)), halves)
+    shot, read = normal_pair(words[0], words[1])
+
+    # The Poisson mean, PRNU on the light alone. Far above the well the draw is the well with certainty: the bound of
+    # the mean, as in `read_out`. An infinite sum times a response of 0 would be NaN: the bound of the light.
     dark_e = dr.opaque(jit.Float, pixel.dark_current_e_per_s * exposure_s)
     if device.hot is not None:
         hot_e = pixel.hot_pixel_dark_current_e_per_s * exposure_s
         dark_e = dark_e + _upload(np.float32(hot_e) * device.hot, jit.Float)
-    chip = Chip(
-        key=(dr.opaque(jit.UInt, key & 0xFFFFFFFF), dr.opaque(jit.UInt, key >> 32)),
-        photo_response=_upload(device.photo_response, jit.Float64),
-        dark_offset_e=_upload(device.dark_offset_e, jit.Float64),
-        column_gain=None if device.column_gain is None else _upload(device.column_gain, jit.Float64),
-        dark_e=dark_e,
-        # Poisson far above the well is the well with certainty, as in `read_out`.
-        most_e=dr.opaque(jit.Float, 2 * pixel.full_well_e + 1e4),
-        full_well_e=dr.opaque(jit.Float, pixel.full_well_e),
-        read_noise_e=dr.opaque(jit.Float64, pixel.read_noise_e),
-        gain_e_per_dn=dr.opaque(jit.Float64, sensor.gain_e_per_dn),
-        black_dn=dr.opaque(jit.Float64, sensor.black_dn),
-        white_dn=dr.opaque(jit.Float64, float(sensor.white_dn)),
-        table=_upload(alias_table(), jit.UInt),
+    light_e = dr.minimum(_upload(expected_e, jit.Float), _FINITE_E)
+    mean_e = dr.fma(light_e, jit.Float(_upload(device.photo_response, jit.Float64)), dark_e)
+    most_e = dr.opaque(jit.Float, 2 * pixel.full_well_e + 1e4)
+    collected_e = poisson(dr.minimum(mean_e, most_e), shot, words[2:], _upload(alias_table(), jit.UInt))
+
+    # Double precision behind the well: whole electrons lie on the same DN as in the NumPy form.
+    read_e = jit.Float64(dr.minimum(collected_e, dr.opaque(jit.Float, pixel.full_well_e)))
+    if device.column_gain is not None:
+        read_e *= dr.gather(jit.Float64, _upload(device.column_gain, jit.Float64), column)
+    read_e += _upload(device.dark_offset_e, jit.Float64) + dr.opaque(jit.Float64, pixel.read_noise_e) * jit.Float64(
+        read
     )
-    dn = read_pixels(_upload(expected, jit.Float), chip, _divisor(expected.shape[1]))
-    return np.asarray(dn.numpy().astype(np.uint16).reshape(expected.shape))
-
-
-def read_pixels(expected_e: Any, chip: Chip, width: Divisor) -> Any:
-    """DN of each pixel of a frame `width` wide, Int, in the order of `sensor.readout.read_out`."""
-    jit = arrays()
-    row, column = position(dr.arange(jit.UInt, len(expected_e)), width)
-    words = philox((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), jit.UInt(0)), chip.key)
-    shot, read = normal_pair(words[0], words[1])
-    finite_e = dr.minimum(expected_e, _FINITE_E)  # an infinite sum times a response of 0 is NaN
-    mean_e = dr.fma(finite_e, jit.Float(chip.photo_response), chip.dark_e)
-    collected_e = poisson(dr.minimum(mean_e, chip.most_e), shot, words[2:], chip.table)
-    read_e = jit.Float64(dr.minimum(collected_e, chip.full_well_e))
-    if chip.column_gain is not None:
-        read_e *= dr.gather(jit.Float64, chip.column_gain, column)
-    read_e += chip.dark_offset_e + chip.read_noise_e * jit.Float64(read)
-    # Double precision here: whole electrons lie on the same DN as in the NumPy form.
-    return jit.Int(dr.clip(dr.round(read_e / chip.gain_e_per_dn + chip.black_dn), 0.0, chip.white_dn))
+    dn = read_e / dr.opaque(jit.Float64, sensor.gain_e_per_dn) + dr.opaque(jit.Float64, sensor.black_dn)
+    dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(sensor.white_dn))))
+    return np.asarray(dn.numpy().astype(np.uint16).reshape(expected_e.shape))
 
 
 def philox(counter: tuple[Any, ...], key: tuple[Any, Any]) -> tuple[Any, ...]:

@@ -15,15 +15,23 @@ from numpy.typing import NDArray
 from rodcone.errors import InputError
 
 Values = bytes | tuple[int, ...] | tuple[float, ...]
-Tags = Mapping[int, tuple[str, Values]]  # by code: struct format of one value, values; a rational is a pair of numbers
+Tags = Mapping[int, tuple[str, Values]]  # by code: format of one value (below), values; a rational is two numbers
 
-IMAGE_WIDTH, IMAGE_LENGTH, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC = 256, 257, 258, 259, 262
+WIDTH, HEIGHT, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC = 256, 257, 258, 259, 262
 STRIP_OFFSETS, SAMPLES_PER_PIXEL, STRIP_BYTE_COUNTS = 273, 277, 279
 EXIF = 34665
 _EXIF_PLACE = 34664  # no tag's code: tifffile doesn't write EXIF, so this entry is written and then changed into it
 MIN_IS_BLACK, CFA = 1, 32803
-_LAYOUT = (IMAGE_WIDTH, IMAGE_LENGTH, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC)
-_STRIPS = (STRIP_OFFSETS, SAMPLES_PER_PIXEL, STRIP_BYTE_COUNTS)
+_LAYOUT = {
+    WIDTH,
+    HEIGHT,
+    BITS_PER_SAMPLE,
+    COMPRESSION,
+    PHOTOMETRIC,
+    STRIP_OFFSETS,
+    SAMPLES_PER_PIXEL,
+    STRIP_BYTE_COUNTS,
+}
 
 _FORMATS = dict(enumerate(("B", "s", "H", "I", "2I", "b", "U", "h", "i", "2i", "f", "d", "I"), start=1))  # by type
 _BYTES = "BsU"  # formats whose values are bytes: numbers, ASCII, and those whose meaning is the tag's own
@@ -45,10 +53,10 @@ def write_mosaic(path: Path, dn: NDArray[np.uint16], photometric: int, tags: Tag
     if dn.ndim != 2 or dn.dtype != np.uint16:
         raise InputError(f"dn: {dn.dtype} of shape {dn.shape} is not allowed; give (h, w) of uint16")
     tags = {**tags, **({_EXIF_PLACE: ("I", (0,))} if exif else {})}
-    extra: list[Any] = []
-    for code, (form, values) in tags.items():
-        value = bytes(int(value) for value in values) if form in _BYTES else values[0] if len(values) == 1 else values
-        extra.append((code, _TYPES[form], _count(form, values), value, True))
+    extra: list[Any] = [
+        (code, _TYPES[form], _count(form, values), values if form in _BYTES or len(values) > 1 else values[0], True)
+        for code, (form, values) in tags.items()
+    ]
     pixels = np.ascontiguousarray(dn)
     with tifffile.TiffWriter(path, byteorder="<", bigtiff=False) as file:
         file.write(pixels, photometric=photometric, metadata=None, software="rodcone", extratags=extra)
@@ -66,11 +74,7 @@ def _directory(tags: Tags, start: int) -> bytes:
     """Directory of tags that stands at byte `start` (an even one), the values that don't fit into it behind it."""
     entries, behind = struct.pack("<H", len(tags)), b""
     for code, (form, values) in sorted(tags.items()):
-        packed = (
-            bytes(int(value) for value in values)
-            if form in _BYTES
-            else struct.pack(f"<{len(values)}{form[-1]}", *values)
-        )
+        packed = values if isinstance(values, bytes) else struct.pack(f"<{len(values)}{form[-1]}", *values)
         entries += struct.pack("<HHI", code, _TYPES[form], _count(form, values))
         if len(packed) > 4:
             entries += struct.pack("<I", start + 2 + 12 * len(tags) + 4 + len(behind))
@@ -103,7 +107,7 @@ def read_mosaic(path: Path, photometric: int, codes: Collection[int] = ()) -> tu
         raise InputError(f"{name}: there is no such file; give the path of a raw file")
     try:
         with path.open("rb") as file:
-            tags = read_tags(file, {*_LAYOUT, *_STRIPS, *codes}, name)
+            tags = read_tags(file, {*_LAYOUT, *codes}, name)
             return _read_strips(file, tags, photometric, name), tags
     except OSError as error:
         raise InputError(f"{name}: can't be read ({error.strerror or error}); give the path of a raw file") from error
@@ -179,7 +183,7 @@ def _read_strips(file: BinaryIO, tags: Tags, photometric: int, name: str) -> NDA
     for code, allowed in fixed.items():
         if (found := whole(tags, code, name)) != (allowed,):
             raise InputError(f"{name}: tag {code} is {found[:4]}; allowed: {allowed}; use a rodcone file")
-    width, height = (whole(tags, code, name)[0] for code in (IMAGE_WIDTH, IMAGE_LENGTH))
+    width, height = (whole(tags, code, name)[0] for code in (WIDTH, HEIGHT))
     offsets, counts = whole(tags, STRIP_OFFSETS, name), whole(tags, STRIP_BYTE_COUNTS, name)
     if not (1 <= width <= _LONGEST_SIDE and 1 <= height <= _LONGEST_SIDE):
         raise InputError(f"{name}: {width} x {height} pixels; allowed: 1 to {_LONGEST_SIDE} a side; it is damaged")

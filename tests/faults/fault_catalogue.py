@@ -167,15 +167,15 @@ SENSOR = (
     _fault(
         "kernel leaves PRNU out",
         "sensor/kernel/kernel.py",
-        "dr.fma(finite_e, jit.Float(chip.photo_response), chip.dark_e)",
-        "finite_e + chip.dark_e",
+        "dr.fma(light_e, jit.Float(_upload(device.photo_response, jit.Float64)), dark_e)",
+        "light_e + dark_e",
         "sensor/kernel/test_kernel_frames",
         "sensor/kernel/test_kernel",
     ),
     _fault(
         "kernel's well does not clip",
         "sensor/kernel/kernel.py",
-        "dr.minimum(collected_e, chip.full_well_e)",
+        "dr.minimum(collected_e, dr.opaque(jit.Float, pixel.full_well_e))",
         "collected_e",
         "sensor/kernel/test_kernel_frames",
         "sensor/kernel/test_kernel",
