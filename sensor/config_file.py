@@ -24,7 +24,7 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     ----------
     path : str or Path
         TOML with the tables ``[pixel]`` and ``[lens]`` (fields of `PixelConfig` and `LensConfig`), optionally ``cfa``
-        (a name of `sensor.cfa.MOSAICS`, or rows of letters), ``bits``, ``black_level_dn``, ``window_nm``, and
+        (a name of `sensor.cfa.MOSAICS`, or rows of channels), ``bits``, ``black_level_dn``, ``window_nm``, and
         ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency`` ("included", a number, or a CSV) and
         ``ir_cut`` (nm, or a CSV). Names of CSV files are relative to the TOML's folder.
     cfa : str or sequence of str, optional

@@ -37,7 +37,7 @@ def preset(name: str | Path, cfa: str | Sequence[str] | None = None) -> SensorCo
     name : str or Path
         One of `names`, or a path that ends in ``.toml``.
     cfa : str or sequence of str, optional
-        Mosaic: a name of `sensor.cfa.MOSAICS`, or rows of letters. None takes the file's own, RGBW in every preset.
+        Mosaic: a name of `sensor.cfa.MOSAICS`, or rows of channels. None takes the file's own, RGBW in every preset.
 
     Raises
     ------

@@ -158,9 +158,8 @@ def read_frame(
     read_e = jit.Float64(dr.minimum(collected_e, dr.opaque(jit.Float, pixel.full_well_e)))
     if device.column_gain is not None:
         read_e *= dr.gather(jit.Float64, _upload(device.column_gain, jit.Float64), column)
-    read_e += _upload(device.dark_offset_e, jit.Float64) + dr.opaque(jit.Float64, pixel.read_noise_e) * jit.Float64(
-        read
-    )
+    read_noise_e = dr.opaque(jit.Float64, pixel.read_noise_e) * jit.Float64(read)
+    read_e += _upload(device.dark_offset_e, jit.Float64) + read_noise_e
     dn = read_e / dr.opaque(jit.Float64, sensor.gain_e_per_dn) + dr.opaque(jit.Float64, sensor.black_dn)
     dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(sensor.white_dn))))
     return np.asarray(dn.numpy().astype(np.uint16).reshape(expected_e.shape))

@@ -26,8 +26,8 @@ def read_noise_profile(path: Path, full_dn: float) -> NoiseEstimate | None:
     full_dn : float
         White level above black [DN].
     """
-    values = _values(path)
-    if values is None or values.size < 2 or values.size % 2 or not np.all(np.isfinite(values)):
+    values = _profile(path)
+    if values.size < 2 or values.size % 2 or not np.all(np.isfinite(values)):
         return None
     with np.errstate(over="ignore"):
         slope, offset = values.reshape(-1, 2).mean(axis=0)
@@ -36,34 +36,31 @@ def read_noise_profile(path: Path, full_dn: float) -> NoiseEstimate | None:
     return NoiseEstimate(float(1.0 / slope / full_dn), float(np.sqrt(offset) / slope))
 
 
-def _values(path: Path) -> Floats | None:
-    """Numbers of the tag, from the first directory that has it: of the chain of pictures, and of those below them.
+def _profile(path: Path) -> Floats:
+    """Numbers of the first profile among the file's chain of pictures and those below them; empty where none is found.
 
     tifffile follows damaged chains for minutes; here a few directories are looked into, and no tag is read but two.
     """
-    try:
-        with path.open("rb") as file:
-            head = file.read(8)
-            order = {b"II*\0": "<", b"MM\0*": ">"}.get(head[:4])
-            if order is None or len(head) < 8:
-                return None  # no TIFF, but a camera's own format
-            waiting, seen = list(struct.unpack(f"{order}I", head[4:])), set[int]()
-            while waiting and len(seen) < _MOST_DIRECTORIES:
-                start = waiting.pop(0)
-                if not start or start in seen:
-                    continue
-                seen.add(start)
-                try:
-                    tags, following = read_directory(file, start, (NOISE_PROFILE, _SUB_DIRECTORIES), str(path), order)
-                except InputError:
-                    continue  # damaged: others may be whole
-                form, values = tags.get(NOISE_PROFILE, ("", ()))
-                if form == "d":
-                    return np.array(values)
-                form, starts = tags.get(_SUB_DIRECTORIES, ("", ()))
-                if form == "I":
-                    waiting += [int(each) for each in starts[:_MOST_DIRECTORIES]]
-                waiting.append(following)
-    except OSError:
-        pass
-    return None
+    with path.open("rb") as file:
+        head = file.read(8)
+        order = {b"II*\0": "<", b"MM\0*": ">"}.get(head[:4])
+        if order is None or len(head) < 8:
+            return np.empty(0)  # no TIFF, but a camera's own format
+        waiting, seen = list(struct.unpack(f"{order}I", head[4:])), {0}
+        while waiting and len(seen) <= _MOST_DIRECTORIES:
+            start = waiting.pop(0)
+            if start in seen:
+                continue
+            seen.add(start)
+            try:
+                tags, following = read_directory(file, start, (NOISE_PROFILE, _SUB_DIRECTORIES), str(path), order)
+            except InputError:
+                continue  # damaged: others may be whole
+            form, values = tags.get(NOISE_PROFILE, ("", ()))
+            if form == "d":
+                return np.array(values)
+            form, starts = tags.get(_SUB_DIRECTORIES, ("", ()))
+            if form == "I":
+                waiting += [int(each) for each in starts[:_MOST_DIRECTORIES]]
+            waiting.append(following)
+    return np.empty(0)

@@ -22,17 +22,7 @@ STRIP_OFFSETS, SAMPLES_PER_PIXEL, STRIP_BYTE_COUNTS = 273, 277, 279
 EXIF = 34665
 _EXIF_PLACE = 34664  # no tag's code: tifffile doesn't write EXIF, so this entry is written and then changed into it
 MIN_IS_BLACK, CFA = 1, 32803
-_LAYOUT = {
-    WIDTH,
-    HEIGHT,
-    BITS_PER_SAMPLE,
-    COMPRESSION,
-    PHOTOMETRIC,
-    STRIP_OFFSETS,
-    SAMPLES_PER_PIXEL,
-    STRIP_BYTE_COUNTS,
-}
-
+_LAYOUT = (WIDTH, HEIGHT, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC, STRIP_OFFSETS, SAMPLES_PER_PIXEL)
 _FORMATS = dict(enumerate(("B", "s", "H", "I", "2I", "b", "U", "h", "i", "2i", "f", "d", "I"), start=1))  # by type
 _BYTES = "BsU"  # formats whose values are bytes: numbers, ASCII, and those whose meaning is the tag's own
 _TYPES = {form: kind for kind, form in reversed(_FORMATS.items())}
@@ -107,7 +97,7 @@ def read_mosaic(path: Path, photometric: int, codes: Collection[int] = ()) -> tu
         raise InputError(f"{name}: there is no such file; give the path of a raw file")
     try:
         with path.open("rb") as file:
-            tags = read_tags(file, {*_LAYOUT, *codes}, name)
+            tags = read_tags(file, {*_LAYOUT, STRIP_BYTE_COUNTS, *codes}, name)
             return _read_strips(file, tags, photometric, name), tags
     except OSError as error:
         raise InputError(f"{name}: can't be read ({error.strerror or error}); give the path of a raw file") from error
