@@ -1,11 +1,13 @@
 """Mitsuba nodes for surfaces and shapes, so that each scene reads as a list of things."""
 
-from render.geometry import rotate, scale, to_world, translate
+from math import radians, tan
+
+from render.geometry import look_at, rotate, scale, to_world, translate
 from render.optical_constants import optical_constant
 from render.scene import Node, spectrum_node
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError
-from scenes.reflectances import resampled
+from scenes.reflectances import grey, resampled
 
 
 def matte(reflectance: Spectrum) -> Node:
@@ -53,12 +55,8 @@ def checks(first: Spectrum, second: Spectrum, columns: float, rows: float) -> No
 
 def panel(place: Floats, width_m: float, height_m: float, bsdf: Node, **more: Node) -> Node:
     """Rectangle centred on the origin of `place`, facing its +z."""
-    return {
-        "type": "rectangle",
-        "to_world": to_world(place, scale(width_m / 2, height_m / 2, 1.0)),
-        "bsdf": bsdf,
-        **more,
-    }
+    size = scale(width_m / 2, height_m / 2, 1.0)
+    return {"type": "rectangle", "to_world": to_world(place, size), "bsdf": bsdf, **more}
 
 
 def floor(x: float, y: float, z: float) -> Floats:
@@ -69,6 +67,13 @@ def floor(x: float, y: float, z: float) -> Floats:
 def disk(place: Floats, radius_m: float, bsdf: Node, **more: Node) -> Node:
     """Round plate centred on the origin of `place`, facing its +z."""
     return {"type": "disk", "to_world": to_world(place, scale(radius_m, radius_m, 1.0)), "bsdf": bsdf, **more}
+
+
+def far_disk(towards: tuple[float, float, float], distance_m: float, radius_deg: float) -> Node:
+    """Emitting disk of an angular radius as seen from the origin, such as the sun; `towards` has length 1."""
+    place = look_at(tuple(distance_m * x for x in towards), (0.0, 0.0, 0.0))
+    radius_m = distance_m * tan(radians(radius_deg))
+    return disk(place, radius_m, matte(grey(0.02)), emitter={"type": "area"})
 
 
 def star(place: Floats, radius_m: float, first: Spectrum, second: Spectrum, spokes: int) -> Node:
@@ -89,13 +94,8 @@ def block(place: Floats, width_m: float, height_m: float, depth_m: float, bsdf: 
 
 def rod(start: tuple[float, float, float], end: tuple[float, float, float], radius_m: float, bsdf: Node) -> Node:
     """Open cylinder between two points."""
-    return {
-        "type": "cylinder",
-        "p0": [float(x) for x in start],
-        "p1": [float(x) for x in end],
-        "radius": radius_m,
-        "bsdf": bsdf,
-    }
+    ends = {"p0": [float(x) for x in start], "p1": [float(x) for x in end]}
+    return {"type": "cylinder", **ends, "radius": radius_m, "bsdf": bsdf}
 
 
 def glass() -> Node:

@@ -1,13 +1,13 @@
 """A street by night: moon, sodium lamp, LED lamp and a lit window, seven decades of luminance in one picture."""
 
-from math import cos, pi, radians, sin, tan
+from math import cos, pi, radians, sin
 
-from render.geometry import look_at, rotate, translate
+from render.geometry import rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Floats, Spectrum
 from scenes.camera_and_sky import camera
-from scenes.materials import block, disk, floor, glossy, matte, panel, rod
+from scenes.materials import block, disk, far_disk, floor, glossy, matte, panel, rod
 from scenes.reflectances import band, edge, grey
 
 # Full moon high in a clear sky: 0.25 lux on a surface that faces it (Kyba, Mohar and Posch 2017, Astronomy &
@@ -55,9 +55,7 @@ def night_street() -> Scene:
 def _moon() -> Node:
     height, bearing = radians(MOON_HEIGHT_DEG), radians(MOON_BEARING_DEG)
     towards = (sin(bearing) * cos(height), sin(height), -cos(bearing) * cos(height))
-    place = look_at(tuple(MOON_DISTANCE_M * x for x in towards), (0.0, 0.0, 0.0))
-    radius = MOON_DISTANCE_M * tan(radians(MOON_RADIUS_DEG))
-    return disk(place, radius, matte(grey(0.02)), emitter={"type": "area"})
+    return far_disk(towards, MOON_DISTANCE_M, MOON_RADIUS_DEG)
 
 
 def _ground() -> dict[str, Node]:

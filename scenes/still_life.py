@@ -70,14 +70,11 @@ def _box(x: float, y: float, z: float, width: float, height: float, turn: float,
 def _star(x: float, y: float, z: float, radius: float) -> dict[str, Node]:
     """Thin black spokes: every spatial frequency at once (a Siemens star)."""
     nodes: dict[str, Node] = {}
-    width = 2 * radius * sin(pi / (2 * SPOKES)) * 0.9
+    width, middle = 2 * radius * sin(pi / (2 * SPOKES)) * 0.9, 0.58 * radius
     for index in range(SPOKES):
         angle = 360.0 * index / SPOKES
-        middle = 0.58 * radius
-        place = translate(x + middle * cos(angle * pi / 180), y + middle * sin(angle * pi / 180), z) @ rotate(
-            (0, 0, 1), angle
-        )
-        nodes[f"spoke{index:02d}"] = panel(place, 0.84 * radius, width, matte(BLACK))
+        centre = translate(x + middle * cos(angle * pi / 180), y + middle * sin(angle * pi / 180), z)
+        nodes[f"spoke{index:02d}"] = panel(centre @ rotate((0, 0, 1), angle), 0.84 * radius, width, matte(BLACK))
     return nodes
 
 

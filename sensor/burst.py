@@ -142,14 +142,9 @@ def _weighted(
     whole_s = sum(group.count * group.exposure_s for group in groups)
     rate = np.asarray(sum(group.rate * (group.count * group.exposure_s / whole_s) for group in groups))
     for _ in range(_ROUNDS):
-        weights = [_weight(group, rate, temporal_e2) for group in groups]
+        noise_e2 = [np.maximum(rate, 0.0) * group.exposure_s + temporal_e2 for group in groups]
+        weights = [group.count * group.exposure_s**2 / noise for group, noise in zip(groups, noise_e2, strict=True)]
         total = np.asarray(sum(weights))
         rate = sum(w * group.rate for w, group in zip(weights, groups, strict=True)) / total
     per_s = np.asarray(sum(w / group.exposure_s for w, group in zip(weights, groups, strict=True))) / total
     return rate, 1 / total, per_s
-
-
-def _weight(group: _Group, rate: NDArray[np.float64], temporal_e2: float) -> NDArray[np.float64]:
-    """Inverse variance of a group's rate."""
-    noise_e2 = np.maximum(rate, 0.0) * group.exposure_s + temporal_e2
-    return np.asarray(group.count * group.exposure_s**2 / noise_e2)

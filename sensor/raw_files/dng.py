@@ -1,8 +1,8 @@
 """A Bayer or 2x2 RGBW mosaic as a digital negative: DNG 1.4, uncompressed, one 16-bit CFA image.
 
 Tags and their meaning: Adobe, "Digital Negative (DNG) Specification", version 1.4.0.0, 2012. What they can't hold
-exactly (most have rationals of 32 bits) stands once more in DNGPrivateData, as JSON behind ``rodcone`` and a zero byte;
-reading takes the calibration from there, and refuses a file whose public levels and mosaic say something else.
+exactly (most have rationals of 32 bits) is repeated in DNGPrivateData, as JSON behind ``rodcone`` and a zero byte.
+Reading takes the calibration from there, and refuses a file whose public levels and mosaic disagree with it.
 """
 
 import struct
@@ -101,7 +101,7 @@ def read_dng(path: Path) -> RawImage:
 
 
 def is_own(path: Path) -> bool:
-    """Whether a file says that `write_dng` wrote it; what doesn't is some camera's or program's."""
+    """Whether a file says that `write_dng` wrote it, and not a camera or another program."""
     try:
         with path.open("rb") as file:
             return read_tags(file, (MAKER,), str(path)).get(MAKER) == text(MAKE)
@@ -134,11 +134,18 @@ def dng_tags(raw: RawImage) -> Tags:
         BLACK_LEVEL: ("2I", rational(raw.black_dn)),
         WHITE_LEVEL: ("I", (int(raw.white_dn),)),
         50728: ("2I", rational(colour.neutral / colour.neutral.max())),  # AsShotNeutral
+        50721: ("2i", rational(colour.xyz_to_camera_a)),  # ColorMatrix1, for illuminant A
+        50722: ("2i", rational(colour.xyz_to_camera_d65)),  # ColorMatrix2, for D65
+        50778: ("H", (_ILLUMINANT_A,)),  # CalibrationIlluminant1
+        50779: ("H", (_ILLUMINANT_D65,)),  # CalibrationIlluminant2
+        50964: ("2i", rational(colour.camera_to_xyz_a)),  # ForwardMatrix1
+        50965: ("2i", rational(colour.camera_to_xyz_d65)),  # ForwardMatrix2
         50734: ("2I", rational(min(max(raw.saturation_e / full_e, 0.0), 1.0))),  # LinearResponseLimit
         50829: ("I", (0, 0, height, width)),  # ActiveArea
         51041: ("d", (1 / full_e, (raw.dark_noise_e / full_e) ** 2)),  # NoiseProfile
     }
-    tags |= _colour_tags(colour)
+    if colour.neutral.size == 4:  # a fourth plane asks for a way back to three: W carries no colour here
+        tags |= dict.fromkeys((50725, 50726), ("2i", rational(np.eye(3, 4))))  # ReductionMatrix1, 2
     if raw.defects is not None and is_bayer(raw.cfa):
         tags[OPCODES] = ("U", _bad_pixels(raw.cfa, raw.defects))
     tags[PRIVATE_DATA] = ("B", PRIVATE + to_json(raw).encode("ascii"))
@@ -146,7 +153,7 @@ def dng_tags(raw: RawImage) -> Tags:
 
 
 def _bad_pixels(tile: Tile, defects: NDArray[np.intp]) -> bytes:
-    """Opcode FixBadPixelsList of DNG 1.3, chapter 6: big-endian, to be skipped by who doesn't know it; Bayer alone."""
+    """Opcode FixBadPixelsList of DNG 1.3, chapter 6: big-endian, optional for readers; for Bayer only."""
     phase = ("RG", "GR", "GB", "BG").index(tile[0])
     parameters = struct.pack(">3I", phase, len(defects), 0) + defects.astype(">u4").tobytes()
     return struct.pack(">IIIII", 1, 5, 0x01030000, 1, len(parameters)) + parameters
@@ -162,21 +169,6 @@ def exif_tags(raw: RawImage) -> Tags:
         tags[F_NUMBER] = ("2I", rational(raw.f_number))
     if raw.iso is not None:
         tags[ISO] = ("H", (min(max(round(raw.iso), 1), 65_535),))
-    return tags
-
-
-def _colour_tags(colour: ColourCalibration) -> dict[int, tuple[str, Values]]:
-    """Matrices for illuminants A and D65."""
-    tags: dict[int, tuple[str, Values]] = {
-        50721: ("2i", rational(colour.xyz_to_camera_a)),  # ColorMatrix1, 2
-        50722: ("2i", rational(colour.xyz_to_camera_d65)),
-        50778: ("H", (_ILLUMINANT_A,)),  # CalibrationIlluminant1, 2
-        50779: ("H", (_ILLUMINANT_D65,)),
-        50964: ("2i", rational(colour.camera_to_xyz_a)),  # ForwardMatrix1, 2
-        50965: ("2i", rational(colour.camera_to_xyz_d65)),
-    }
-    if colour.neutral.size == 4:  # a fourth plane asks for a way back to three: W carries no colour here
-        tags |= dict.fromkeys((50725, 50726), ("2i", rational(np.eye(3, 4))))  # ReductionMatrix1, 2
     return tags
 
 
