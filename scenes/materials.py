@@ -31,15 +31,13 @@ def metal(material: str, roughness: float) -> Node:
 
     On the common grid: named as Mitsuba's `material`, each metal has a grid of its own and takes 7 s more to compile.
     """
-    eta, k = (spectrum_node(_on_common_grid(material, part)) for part in ("eta", "k"))
-    return {"type": "twosided", "bsdf": {"type": "roughconductor", "eta": eta, "k": k, "alpha": roughness}}
-
-
-def _on_common_grid(material: str, part: str) -> Spectrum:
-    table = optical_constant(material, part)
-    if table is None:
-        raise InputError(f"metal: Mitsuba has no {material!r}; allowed: names such as Au, Cu, Al; correct it")
-    return resampled(table.wavelength_nm, table.values)
+    index: dict[str, Node] = {}
+    for part in ("eta", "k"):
+        table = optical_constant(material, part)
+        if table is None:
+            raise InputError(f"metal: Mitsuba has no {material!r}; allowed: names such as Au, Cu, Al; correct it")
+        index[part] = spectrum_node(resampled(table.wavelength_nm, table.values))
+    return {"type": "twosided", "bsdf": {"type": "roughconductor", **index, "alpha": roughness}}
 
 
 def checks(first: Spectrum, second: Spectrum, columns: float, rows: float) -> Node:
