@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.jit import arrays, dr
-from sensor.cfa import channels, letter_map
+from sensor.cfa import channels, check_covers, letter_map
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.kernel.poisson import alias_table, poisson
@@ -60,9 +60,15 @@ def expected_electrons_single(
     -------
     (h, w) float32
         May be infinite where single precision ends, at 3e38.
+
+    Raises
+    ------
+    InputError
+        For a frame smaller than the mosaic's tile.
     """
     jit = arrays()
     height, width, bands = values.shape
+    check_covers(sensor.cfa, (height, width))
     planes = _single(np.moveaxis(values, -1, 0).reshape(bands, -1))
     scalars = [[dr.opaque(jit.Float, float(weight)) for weight in row] for row in weights]
     tile = letter_map(sensor.cfa, (len(sensor.cfa), len(sensor.cfa[0])))
