@@ -46,17 +46,17 @@ def chart_scene(name: str, curves: Sequence[Spectrum], surround: Spectrum, light
     return replace(scene, geometry=scene.geometry | chart(translate(0, 0, 0.0002) @ FACING, curves, board))
 
 
-def color_checker_nodes(place: Floats) -> dict[str, Node]:
-    """Nodes of a ColorChecker centred on `place` and facing its +z, 380-780 nm."""
-    return chart(place, [curve for _, curve in patches()], grey(BOARD))
+def color_checker_nodes(pose: Floats) -> dict[str, Node]:
+    """Nodes of a ColorChecker centred on `pose` and facing its +z, 380-780 nm."""
+    return chart(pose, [curve for _, curve in patches()], grey(BOARD))
 
 
-def chart(place: Floats, curves: Sequence[Spectrum], board: Spectrum) -> dict[str, Node]:
-    """Nodes of a chart's board and 24 patches, row by row, centred on `place` and facing its +z."""
+def chart(pose: Floats, curves: Sequence[Spectrum], board: Spectrum) -> dict[str, Node]:
+    """Nodes of a chart's board and 24 patches, row by row, centred on `pose` and facing its +z."""
     step = PATCH_M + GAP_M
-    nodes = {"chart_board": panel(place, COLUMNS * step + GAP_M, ROWS * step + GAP_M, matte(board))}
+    nodes = {"chart_board": panel(pose, COLUMNS * step + GAP_M, ROWS * step + GAP_M, matte(board))}
     for index, reflectance in enumerate(curves):
         row, column = divmod(index, COLUMNS)
         x, y = (column - (COLUMNS - 1) / 2) * step, ((ROWS - 1) / 2 - row) * step
-        nodes[f"patch{index:02d}"] = panel(place @ translate(x, y, 0.0005), PATCH_M, PATCH_M, matte(reflectance))
+        nodes[f"patch{index:02d}"] = panel(pose @ translate(x, y, 0.0005), PATCH_M, PATCH_M, matte(reflectance))
     return nodes

@@ -85,5 +85,5 @@ def _blocks() -> dict[str, Node]:
 
 
 def _lamp() -> Node:
-    place = translate(0.278, HEIGHT_M - 0.0005, 0.2795) @ rotate((1, 0, 0), 90)
-    return panel(place, 0.130, 0.105, matte(paint("white")), emitter={"type": "area"})
+    pose = translate(0.278, HEIGHT_M - 0.0005, 0.2795) @ rotate((1, 0, 0), 90)
+    return panel(pose, 0.130, 0.105, matte(paint("white")), emitter={"type": "area"})

@@ -114,14 +114,14 @@ def _lower(middle: Floats) -> dict[str, Node]:
     }
 
 
-def _ball(place: Floats, middle: tuple[float, float, float], radius_m: float, bsdf: Node) -> Node:
-    x, y, z = (place @ (*middle, 1.0))[:3].tolist()
+def _ball(pose: Floats, middle: tuple[float, float, float], radius_m: float, bsdf: Node) -> Node:
+    x, y, z = (pose @ (*middle, 1.0))[:3].tolist()
     return ball(x, y, z, radius_m, bsdf)
 
 
-def _cup(place: Floats, name: str, radius_m: float, height_m: float, bsdf: Node) -> dict[str, Node]:
-    """Open cylinder that stands on the origin of `place`, and its floor."""
-    x, y, z = place[:3, 3].tolist()
+def _cup(pose: Floats, name: str, radius_m: float, height_m: float, bsdf: Node) -> dict[str, Node]:
+    """Open cylinder that stands on the origin of `pose`, and its floor."""
+    x, y, z = pose[:3, 3].tolist()
     return {
         name: rod((x, y + 0.0005, z), (x, y + height_m, z), radius_m, bsdf),
         f"{name}_floor": disk(floor(x, y + 0.003, z), radius_m, bsdf),

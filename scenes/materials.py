@@ -51,10 +51,10 @@ def checks(first: Spectrum, second: Spectrum, columns: float, rows: float) -> No
     return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": texture}}
 
 
-def panel(place: Floats, width_m: float, height_m: float, bsdf: Node, **more: Node) -> Node:
-    """Rectangle centred on the origin of `place`, facing its +z."""
+def panel(pose: Floats, width_m: float, height_m: float, bsdf: Node, **more: Node) -> Node:
+    """Rectangle centred on the origin of `pose`, facing its +z."""
     size = scale(width_m / 2, height_m / 2, 1.0)
-    return {"type": "rectangle", "to_world": to_world(place, size), "bsdf": bsdf, **more}
+    return {"type": "rectangle", "to_world": to_world(pose, size), "bsdf": bsdf, **more}
 
 
 def floor(x: float, y: float, z: float) -> Floats:
@@ -62,21 +62,21 @@ def floor(x: float, y: float, z: float) -> Floats:
     return translate(x, y, z) @ rotate((1, 0, 0), -90)
 
 
-def disk(place: Floats, radius_m: float, bsdf: Node, **more: Node) -> Node:
-    """Round plate centred on the origin of `place`, facing its +z."""
-    return {"type": "disk", "to_world": to_world(place, scale(radius_m, radius_m, 1.0)), "bsdf": bsdf, **more}
+def disk(pose: Floats, radius_m: float, bsdf: Node, **more: Node) -> Node:
+    """Round plate centred on the origin of `pose`, facing its +z."""
+    return {"type": "disk", "to_world": to_world(pose, scale(radius_m, radius_m, 1.0)), "bsdf": bsdf, **more}
 
 
 def far_disk(towards: tuple[float, float, float], distance_m: float, radius_deg: float) -> Node:
     """Emitting disk of an angular radius as seen from the origin, such as the sun; `towards` has length 1."""
-    place = look_at(tuple(distance_m * x for x in towards), (0.0, 0.0, 0.0))
+    pose = look_at(tuple(distance_m * x for x in towards), (0.0, 0.0, 0.0))
     radius_m = distance_m * tan(radians(radius_deg))
-    return disk(place, radius_m, matte(grey(0.02)), emitter={"type": "area"})
+    return disk(pose, radius_m, matte(grey(0.02)), emitter={"type": "area"})
 
 
-def star(place: Floats, radius_m: float, first: Spectrum, second: Spectrum, spokes: int) -> Node:
+def star(pose: Floats, radius_m: float, first: Spectrum, second: Spectrum, spokes: int) -> Node:
     """Disk of `spokes` sectors of each of two colours: its second texture coordinate is the angle."""
-    return disk(place, radius_m, checks(first, second, 0.4, spokes))  # 0.4: under half a check from middle to rim
+    return disk(pose, radius_m, checks(first, second, 0.4, spokes))  # 0.4: under half a check from middle to rim
 
 
 def ball(x: float, y: float, z: float, radius_m: float, bsdf: Node) -> Node:
@@ -84,10 +84,10 @@ def ball(x: float, y: float, z: float, radius_m: float, bsdf: Node) -> Node:
     return {"type": "sphere", "center": [x, y, z], "radius": radius_m, "bsdf": bsdf}
 
 
-def block(place: Floats, width_m: float, height_m: float, depth_m: float, bsdf: Node, **more: Node) -> Node:
-    """Cuboid that stands on the origin of `place`: x across, y up, z to the front."""
+def block(pose: Floats, width_m: float, height_m: float, depth_m: float, bsdf: Node, **more: Node) -> Node:
+    """Cuboid that stands on the origin of `pose`: x across, y up, z to the front."""
     half = scale(width_m / 2, height_m / 2, depth_m / 2)
-    return {"type": "cube", "to_world": to_world(place, translate(0, height_m / 2, 0), half), "bsdf": bsdf, **more}
+    return {"type": "cube", "to_world": to_world(pose, translate(0, height_m / 2, 0), half), "bsdf": bsdf, **more}
 
 
 def rod(start: tuple[float, float, float], end: tuple[float, float, float], radius_m: float, bsdf: Node) -> Node:

@@ -17,7 +17,7 @@ PAIRS = 12
 LOW, HIGH = 0.02, 0.95  # range of the made reflectances: soot to white paper
 SHARE = 0.5  # at most this much of a base's room is used, so that the curves stay like dyes'
 BUMP_NM = 30.0  # standard deviation of the bumps that a difference is made of: dyes' bands are no narrower
-# Bases by their place in the ColorChecker: muted ones, which leave room on both sides.
+# Bases by their index in the ColorChecker: muted colours, which leave room on both sides.
 _BASES = (0, 1, 2, 4, 5, 9, 19, 20, 21, 7, 3, 10)
 
 

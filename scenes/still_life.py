@@ -58,13 +58,13 @@ def _things() -> dict[str, Node]:
 
 
 def _lights() -> dict[str, Node]:
-    place = look_at((-1.5, 1.75, 1.35), (0.05, 0.15, -0.05))
-    return {"softbox": panel(place, 1.7, 1.7, matte(BLACK), emitter={"type": "area"})}
+    pose = look_at((-1.5, 1.75, 1.35), (0.05, 0.15, -0.05))
+    return {"softbox": panel(pose, 1.7, 1.7, matte(BLACK), emitter={"type": "area"})}
 
 
 def _box(x: float, y: float, z: float, width: float, height: float, turn: float, bsdf: Node) -> Node:
-    place = to_world(translate(x, y, z), rotate((0, 1, 0), turn), scale(width / 2, height / 2, width / 2.6))
-    return {"type": "cube", "to_world": place, "bsdf": bsdf}
+    pose = to_world(translate(x, y, z), rotate((0, 1, 0), turn), scale(width / 2, height / 2, width / 2.6))
+    return {"type": "cube", "to_world": pose, "bsdf": bsdf}
 
 
 def _star(x: float, y: float, z: float, radius: float) -> dict[str, Node]:

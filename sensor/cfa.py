@@ -34,7 +34,7 @@ MOSAICS: Mapping[str, Tile] = MappingProxyType(
 
 
 def tile_of(mosaic: str | Sequence[str]) -> Tile:
-    """Tile of a mosaic given by a name of `MOSAICS`, or by its rows of letters.
+    """Tile of a mosaic given by a name of `MOSAICS`, or by its rows of channels.
 
     Raises
     ------

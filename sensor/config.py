@@ -144,7 +144,7 @@ class SensorConfig:
     pixel : PixelConfig
     lens : LensConfig
     cfa : tuple of str
-        Tile of letters, such as ``("RG", "BW")``.
+        Tile of channels, such as ``("RG", "BW")``.
     responses : Responses
         Electrons per photon of each channel.
     bits : int

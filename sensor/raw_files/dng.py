@@ -69,8 +69,8 @@ def write_dng(raw: RawImage, path: Path) -> Path:
             "DN; write a .tif instead"
         )
     tags = dng_tags(raw)
-    with replacing(path) as (place,):
-        write_mosaic(place, raw.dn, CFA, tags, exif_tags(raw))
+    with replacing(path) as (part,):
+        write_mosaic(part, raw.dn, CFA, tags, exif_tags(raw))
     return path
 
 
@@ -113,7 +113,7 @@ def dng_tags(raw: RawImage) -> Tags:
     """Tags of the first directory, without those that describe the TIFF itself.
 
     NoiseProfile is N(x)^2 = S x + O for x from black (0) to white (1), the same for all channels: S is the shot noise,
-    1 / full scale in electrons, O the dark noise; PRNU grows with x^2 and has no place there. LinearResponseLimit is
+    1 / full scale in electrons, O the dark noise; PRNU grows with x^2 and doesn't fit the form. LinearResponseLimit is
     where the well begins to clip (`RawImage.saturation_e`).
     """
     colour = _require(raw)

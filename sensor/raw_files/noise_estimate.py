@@ -64,7 +64,7 @@ def _blocks(
     """
     height, width = (size // 4 * 4 for size in above_black_dn.shape)
     sites = above_black_dn[:height, :width].reshape(height // 4, 2, 2, width // 4, 2, 2)
-    sites = sites.transpose(2, 5, 1, 4, 0, 3).reshape(4, 4, height // 4, width // 4)  # site, place in the block
+    sites = sites.transpose(2, 5, 1, 4, 0, 3).reshape(4, 4, height // 4, width // 4)  # site, position in the block
     a, b, c, d = sites.swapaxes(0, 1)
     diagonal = (a - b - c + d) / 2
     around = np.full((1, 3, 3), 1.0)
