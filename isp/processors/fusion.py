@@ -6,7 +6,7 @@ the other elements.
 
 Yamagami: T. Yamagami et al., 1994, as Parmar & Wandell 2009 cite it (US patent 5 323 233 to our knowledge; its text
 could not be consulted). Taken from their account: luminance and colour differences, with the sensitivities matched by a
-neutral density in front of W or by complementary filters (`sensor.filters`), so that W doesn't saturate first.
+neutral density in front of W or by complementary filters (`sensor.curves`), so that W doesn't saturate first.
 
 Kijima: T. Kijima et al., "Image sensor with improved light sensitivity", US patent application 11/341 210, 2006
 (published 2007). Taken: a picture of W in full resolution and one of the colours in less, colour samples of one kind
@@ -32,8 +32,7 @@ from isp.processors.mosaic import Image, balance_mosaic, to_rgb
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels, mask
-from sensor.curves import rgbw
-from sensor.filters import complementary, matched_transmittance
+from sensor.curves import complementary, matched_transmittance, rgbw
 from sensor.raw import RawImage
 
 # A tent of 7 over samples 2 apart averages like (8^2 / 24)^2 = 7.1 of them: W gathers 6 to 10 times a colour's light.
@@ -54,7 +53,7 @@ def picture_sato(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) ->
 def picture_yamagami(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop an RGBW raw image whose W is behind a neutral density: W's luminance, low-passed colour differences.
 
-    The default neutral knows the density of `sensor.filters`.
+    The default neutral knows the density of `sensor.curves`.
     """
     require_letters(raw, CHANNELS)
     if balance.neutral is None:

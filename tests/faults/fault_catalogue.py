@@ -33,11 +33,11 @@ def _fault(name: str, file: str, there: str, instead: str, *tests: str) -> Fault
 
 
 _READOUT = (
-    "sensor/test_noise",
+    "sensor/test_readout_variance",
     "sensor/test_capture",
-    "sensor/test_crosstalk",
+    "sensor/test_readout_crosstalk",
     "sensor/test_device",
-    "sensor/kernel/test_run",
+    "sensor/kernel/test_kernel_frames",
     "sensor/emva1288/test_estimators",
 )
 _LENS = ("sensor/test_optics", "sensor/test_diffraction", "sensor/test_hard_cases")
@@ -108,45 +108,45 @@ SENSOR = (
     _fault(
         "read noise the same in every exposure",
         "sensor/readout.py",
-        "normals(key, Term.READ",
-        "normals(0, Term.READ",
+        "normals(key, NoiseTerm.READ",
+        "normals(0, NoiseTerm.READ",
         *_READOUT,
     ),
     _fault(
         "hot pixels without the exposure time",
         "sensor/readout.py",
-        "hot_pixel_dark_current_e_per_s * exposure_s",
-        "hot_pixel_dark_current_e_per_s",
+        "+= pixel.hot_pixel_dark_current_e_per_s * exposure_s",
+        "+= pixel.hot_pixel_dark_current_e_per_s",
         *_READOUT,
     ),
     _fault(
         "DSNU drawn with PRNU's numbers",
         "sensor/device.py",
-        "normals(key, Term.DSNU, shape)",
-        "normals(key, Term.PRNU, shape)",
+        "normals(key, NoiseTerm.DSNU, shape)",
+        "normals(key, NoiseTerm.PRNU, shape)",
         "sensor/test_device",
         *_READOUT,
     ),
     _fault(
         "quantisation noise of gain^2 / 2",
-        "sensor/noise.py",
+        "sensor/readout.py",
         "sensor.gain_e_per_dn**2 / 12",
         "sensor.gain_e_per_dn**2 / 2",
         *_READOUT,
     ),
     _fault(
         "PRNU not squared in the variance",
-        "sensor/noise.py",
+        "sensor/readout.py",
         "(pixel.prnu * signal) ** 2",
         "(pixel.prnu * signal)",
         *_READOUT,
     ),
     _fault(
         "crosstalk makes charge",
-        "sensor/crosstalk.py",
+        "sensor/readout.py",
         "(1 - 4 * crosstalk)",
         "(1 - 3 * crosstalk)",
-        "sensor/test_crosstalk",
+        "sensor/test_readout_crosstalk",
         *_READOUT,
     ),
     _fault(
@@ -168,17 +168,17 @@ SENSOR = (
     _fault(
         "kernel leaves PRNU out",
         "sensor/kernel/kernel.py",
-        "dr.fma(finite_e, jit.Float(chip.photo_response), chip.dark_e)",
-        "finite_e + chip.dark_e",
-        "sensor/kernel/test_run",
+        "dr.fma(light_e, jit.Float(_upload(device.photo_response, jit.Float64)), dark_e)",
+        "light_e + dark_e",
+        "sensor/kernel/test_kernel_frames",
         "sensor/kernel/test_kernel",
     ),
     _fault(
         "kernel's well does not clip",
         "sensor/kernel/kernel.py",
-        "dr.minimum(collected_e, chip.full_well_e)",
+        "dr.minimum(collected_e, dr.opaque(jit.Float, pixel.full_well_e))",
         "collected_e",
-        "sensor/kernel/test_run",
+        "sensor/kernel/test_kernel_frames",
         "sensor/kernel/test_kernel",
     ),
     _fault(
@@ -926,15 +926,25 @@ NONSENSE = (
     ),
     _fault(
         "lost share of energy instead of photons",
-        "sensor/window.py",
+        "sensor/response.py",
         " * photons_per_joule(nm) * step",
         " * step",
-        "sensor/test_window",
+        "sensor/test_response_window",
     ),
     _fault(
-        "window left open, untold", "sensor/window.py", "LEAST_TOLD = 5e-3", "LEAST_TOLD = 0.5", "sensor/test_window"
+        "window left open, untold",
+        "sensor/response.py",
+        "LEAST_TOLD = 5e-3",
+        "LEAST_TOLD = 0.5",
+        "sensor/test_response_window",
     ),
-    _fault("channel without light", "sensor/window.py", "MOST_LOST = 0.5", "MOST_LOST = 1.0", "sensor/test_window"),
+    _fault(
+        "channel without light",
+        "sensor/response.py",
+        "MOST_LOST = 0.5",
+        "MOST_LOST = 1.0",
+        "sensor/test_response_window",
+    ),
     _fault(
         "white frame untold",
         "studies/photograph/shot.py",

@@ -21,7 +21,7 @@ from rodcone.jit import backend
 from sensor.capture import capture
 from sensor.cfa import Tile, channels
 from sensor.device import draw_device
-from sensor.kernel.run import expected_electrons_single
+from sensor.kernel.kernel import expected_electrons_single
 from sensor.optics import camera_equation, falloff, form_image, spreads
 from sensor.presets import low_noise
 from sensor.raw import RawImage

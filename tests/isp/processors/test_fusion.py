@@ -13,8 +13,7 @@ from isp.processors.fusion import (
 )
 from rodcone.colour_spaces import luminance_of_srgb
 from sensor.cfa import RGBW, Tile, channels, letter_map
-from sensor.curves import rgbw
-from sensor.filters import complementary, matched_transmittance
+from sensor.curves import complementary, matched_transmittance, rgbw
 from sensor.raw import RawImage
 
 MATRIX = np.array([[1.6, -0.5, -0.1], [-0.2, 1.4, -0.2], [0.0, -0.5, 1.5]])
