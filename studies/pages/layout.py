@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import encode_srgb
+from rodcone.colour_spaces import encode_srgb
 from studies.pages.charts import Scale, decades, linear_ticks, spread, tick_text
 from studies.pages.drawing import Drawing, Line, Mark, Picture, Text
 

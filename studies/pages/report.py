@@ -102,7 +102,7 @@ def page_view(results: Mapping[str, Any], pictures: Mapping[str, bytes]) -> dict
         "speed": speed,
         "speed_charts": speed_charts(speed),
         "renders": render_rows(results, cells),
-        # Effect and cost, as `sensor.left_out.left_out` parts them.
+        # Effect and cost, as `sensor.optics.left_out` parts them.
         "left_out": [line.partition(": ")[::2] for line in results["left_out"]],
         "scenes": scenes(results),
         "configuration": list(results.get("configuration", {}).items()),

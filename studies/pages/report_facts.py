@@ -7,7 +7,7 @@ from typing import Any
 
 from rodcone.errors import InputError
 from sensor.config import LensConfig
-from sensor.left_out import left_out
+from sensor.optics import left_out
 from sensor.presets import preset
 from studies.pages.report_text import significant
 from studies.pages.results import sensor_facts

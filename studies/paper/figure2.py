@@ -8,7 +8,7 @@ import numpy as np
 
 from render.spectrum import Floats
 from sensor.curves import rgbw
-from sensor.noise import noise_variance
+from sensor.readout import noise_variance
 from studies.pages.drawing import Box, Drawing, Mark, Text
 from studies.pages.layout import HEIGHT, WIDTH, Figure, curves
 from studies.paper.checks import Claim, about, at_least

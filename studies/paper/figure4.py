@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import encode_srgb
 from isp.planes import planes
+from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import channels
 from sensor.raw import RawImage
 from studies.pages.drawing import Box, Drawing, Mark, Picture, Text

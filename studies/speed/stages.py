@@ -19,9 +19,9 @@ from sensor.capture import capture
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
-from sensor.noise import noise_variance
 from sensor.optics import form_image
 from sensor.raw import RawImage
+from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
 from studies.budget.bands import fine_bands, groups_of
 from studies.budget.terms import horizontal_view_deg

@@ -8,6 +8,7 @@ import re
 import struct
 import zlib
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from random import Random
 from typing import Any
 
@@ -200,7 +201,7 @@ def _change_value(random: Random, held: Any) -> None:
     elif isinstance(held, dict) and random.random() < 0.1:
         held[key] = held[random.choice(keys)]
     else:
-        held[key] = random.choice(_VALUES)
+        held[key] = deepcopy(random.choice(_VALUES))  # a later mutation changes lists in place
 
 
 _VALUES: Sequence[Any] = (
