@@ -1,5 +1,6 @@
 """Colour figures of a chart's patches: how far pairs differ, and how far colours are from those in daylight."""
 
+from collections.abc import Iterable
 from functools import cache
 
 import numpy as np
@@ -8,11 +9,11 @@ from skimage.color import deltaE_ciede2000, xyz2lab
 
 from render.illuminants import illuminant
 from render.photometry import tristimulus
-from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths
 from rodcone.colour_spaces import SRGB_TO_XYZ, adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from scenes.metamers import pairs
 from scenes.reflectances import color_checker
-from studies.metrics.patches import Masks, patch_means
+from studies.metrics.patches import Masks, patch_labs
 from studies.metrics.truth import WHITE_AT
 
 WHITE_PATCH = 18  # of the ColorChecker's 24: its 99th percentile of luminance, which pictures show at `WHITE_AT`
@@ -28,7 +29,7 @@ def pair_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float6
     masks : (patch, h, w) bool
         Of `studies.metrics.patches.patch_masks`.
     """
-    lab = _lab(patch_means(linear, masks))
+    lab = patch_labs(linear, masks)
     return np.asarray(deltaE_ciede2000(lab[0::2], lab[1::2]))
 
 
@@ -37,12 +38,8 @@ def true_pair_delta_e(light: str) -> NDArray[np.float64]:
 
     In closed form, in the renderer's bands of 10 nm, adapted to D65 as pictures are.
     """
-    nm = DEFAULT_WAVELENGTH_NM
-    width = band_widths(nm)
-    watts = illuminant(light).band_average(nm, width)
-    white = tristimulus(watts, nm, width)
-    surfaces = np.array([curve.band_average(nm, width) for pair in pairs() for curve in pair])
-    lab = xyz2lab(adapt_to_d65(tristimulus(surfaces * watts, nm, width) / white[1], white))
+    surfaces, white = _xyz(light, [curve for pair in pairs() for curve in pair])
+    lab = xyz2lab(adapt_to_d65(surfaces / white[1], white))
     return np.asarray(deltaE_ciede2000(lab[0::2], lab[1::2]))
 
 
@@ -52,20 +49,20 @@ def daylight_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.fl
     Both show the white patch's luminance, under its own light, at `truth.WHITE_AT`: nothing is fitted to the
     picture.
     """
-    return np.asarray(deltaE_ciede2000(_lab(patch_means(linear, masks)), _lab(daylight_srgb())))
+    return np.asarray(deltaE_ciede2000(patch_labs(linear, masks), xyz2lab(daylight_srgb() @ SRGB_TO_XYZ.T)))
 
 
 @cache
 def daylight_srgb() -> NDArray[np.float64]:
     """Linear sRGB of the ColorChecker's patches under D65, shape (patch, 3)."""
-    nm = DEFAULT_WAVELENGTH_NM
-    width = band_widths(nm)
-    light = illuminant("D65").band_average(nm, width)
-    surfaces = np.array([curve.band_average(nm, width) for _, curve in color_checker()])
-    xyz = tristimulus(surfaces * light, nm, width)
+    xyz, _ = _xyz("D65", [curve for _, curve in color_checker()])
     linear = xyz_to_srgb(xyz)
     return np.asarray(linear * (WHITE_AT / luminance_of_srgb(linear)[WHITE_PATCH]))
 
 
-def _lab(linear: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(xyz2lab(linear @ SRGB_TO_XYZ.T))
+def _xyz(light: str, surfaces: Iterable[Spectrum]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """XYZ of reflectances under a light, shape (surface, 3), and that of white, shape (3,)."""
+    nm, width = DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM)
+    watts = illuminant(light).band_average(nm, width)
+    reflectances = np.array([surface.band_average(nm, width) for surface in surfaces])
+    return tristimulus(reflectances * watts, nm, width), tristimulus(watts, nm, width)

@@ -66,6 +66,11 @@ def patch_means(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float6
     return np.stack([picture[mask].mean(axis=0) for mask in masks])
 
 
+def patch_labs(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
+    """CIELAB of each patch's mean colour, shape (patch, 3), of linear sRGB (h, w, 3)."""
+    return np.asarray(xyz2lab(patch_means(linear, masks) @ SRGB_TO_XYZ.T))
+
+
 def patch_snr_db(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
     """SNR 20 log10(mean / standard deviation) of each patch and channel [dB], shape (patch, channel).
 
@@ -90,6 +95,4 @@ def patch_colour_errors(picture: NDArray[np.float64], truth: NDArray[np.float64]
         left; clipping or encoding first would turn noise into a shift.
     masks : (patch, h, w) bool
     """
-    matrix = SRGB_TO_XYZ.T
-    labs = [xyz2lab(patch_means(linear, masks) @ matrix) for linear in (picture, truth)]
-    return np.asarray(deltaE_ciede2000(*labs))
+    return np.asarray(deltaE_ciede2000(patch_labs(picture, masks), patch_labs(truth, masks)))
