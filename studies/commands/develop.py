@@ -34,7 +34,7 @@ def develop(
         Pipeline: interleaved (RGBW) or bayer, by default the one for the file's mosaic. For Bayer also bayer_malvar,
         bayer_menon, bayer_nlm and bayer_bm3d; for RGBW rgbw_sato, rgbw_kijima, rgbw_yamagami and rgbw_gindele.
     bits
-        Of each channel: 8 or 16.
+        Bits a channel: 8 or 16.
     ev
         Brightness in stops; at 0 a full well is white. By default the 99th percentile of the picture's luminance is
         shown at 90 % of white.

@@ -27,7 +27,7 @@ def opponents(
     out
         Page to write, ending in .md.
     camera
-        Processor whose leads and losses the page tells.
+        Processor that the page compares with the others.
     """
     require_ending(out, ".md")
     check_place(out)

@@ -18,7 +18,7 @@ def paper(
     seeds: int = 4,
     json: Flag = False,
 ) -> None:
-    """Compute the figures and claims of Parmar & Wandell 2009 and judge each claim; prints the page's path.
+    """Compute the figures and claims of Parmar & Wandell 2009 and check each claim; prints the page's path.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def paper(
         Print the claims, their numbers and verdicts as one JSON object instead of the path.
     """
     setup = Setup(out, size, spp, seeds=seeds)
-    out.mkdir(parents=True, exist_ok=True)  # a place that can't be written is told before the first render
+    out.mkdir(parents=True, exist_ok=True)  # a folder that can't be written fails before the first render
     with progress(sys.stderr) as step:
         made = make(replace(setup, step=step))
     page = write(made, out)

@@ -33,7 +33,7 @@ def plan(
     study
         Study file (.toml), as `rodcone new study` writes one.
     set
-        Change of the study such as budget.total=0.05; may be given several times.
+        KEY=VALUE that replaces the file's own, such as budget.total=0.05; may be given several times.
     check
         Render both models as well, and compare their expected electrons with what the budget predicts.
     cache

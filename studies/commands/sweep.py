@@ -66,7 +66,7 @@ def sweep(
     set
         KEY=VALUE that replaces the file's own, such as render.spp=64; may be given several times.
     workers
-        Processes on this machine, one for each core by default; 1 runs all in this one.
+        Processes on this machine, one for each core by default; 1 runs everything in this process.
     cluster
         Address of a dask scheduler whose workers do it instead, such as tcp://127.0.0.1:8786.
     reference
