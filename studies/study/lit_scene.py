@@ -1,6 +1,5 @@
 """A study's scene: opened, rendered once, and lit by the spectra that the study asks for."""
 
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 from render.engine import render
 from render.illuminants import illuminant
 from render.photometry import luminance
+from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import is_radiance_file
 from render.scene import Scene
 from render.scene_range import check_range
@@ -21,6 +21,7 @@ from rodcone.errors import InputError
 from scenes.catalog import load
 from studies.study.levels import parse_level
 from studies.study.model import RenderModel
+from studies.study.quiet_render import render_quietly
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.study.scene_source import CATALOGUE_SIDE, asked_level, open_scene
 from studies.study.study import OWN, SceneChoice, Study
@@ -99,9 +100,23 @@ def _check_relit(scene: Scene, spectrum: str) -> None:
 
 
 def make_transport(
-    opened: OpenedScene, study: Study, model: RenderModel | None, cache: Path, progress: Progress
-) -> Transport:
-    """Render a scene, or read a picture file; a coarser render in `cache` is gone on from, a finer one is taken.
+    opened: OpenedScene,
+    study: Study,
+    model: RenderModel | None,
+    cache: Path,
+    progress: Progress,
+    share: Callable[[Transport], float] | None = None,
+) -> tuple[Transport, tuple[str, ...]]:
+    """Render a scene, or read a picture file, with what had to be assumed of the file.
+
+    Parameters
+    ----------
+    model : RenderModel or None
+        None for a picture file.
+    cache : Path
+        Folder of renders: a coarser one is continued, a finer one is taken.
+    share : callable, optional
+        Noise variance of a render over the sensor's own, for a study with a `noise_share`.
 
     Raises
     ------
@@ -112,24 +127,71 @@ def make_transport(
     """
     if opened.scene is None or model is None:
         transport, _, assumed = open_radiance_file(opened.choice.source, opened.choice.light)
-        for note in assumed:
-            warnings.warn(note, stacklevel=2)
-        return transport
+        return transport, tuple(assumed)
     limits = study.render
-    transport = render(
-        opened.scene,
-        opened.size,
-        wavelength_nm=model.wavelength_nm,
-        width_nm=model.width_nm,
-        max_spp=model.spp,  # in passes of 16 samples, so that a finer request goes on from a coarser one's
-        max_seconds=limits.max_seconds,
-        seed=limits.seed,
-        cache=cache,
-        progress=progress,
-    )
+    asked: dict[str, Any] = {
+        "wavelength_nm": model.wavelength_nm,
+        "width_nm": model.width_nm,
+        "max_spp": model.spp,  # in passes of 16 samples, so that a finer request goes on from a coarser one's
+        "max_seconds": limits.max_seconds,
+        "seed": limits.seed,
+        "cache": cache,
+        "progress": progress,
+    }
+    if limits.noise_share is None or share is None:
+        transport = render(opened.scene, opened.size, **asked)
+    else:
+        transport = render_quietly(opened.scene, opened.size, share, most_share=limits.noise_share, **asked)
     if transport.stopped_by == "interrupt":
         raise KeyboardInterrupt
-    return transport
+    return transport, ()
+
+
+@dataclass(frozen=True)
+class RenderFacts:
+    """How a render was made, as `render.transport.Transport` has it, and the error that it reached.
+
+    Attributes
+    ----------
+    integrator, variant, stopped_by : str
+    seconds : float
+    spp, passes, bands : int
+    relative_mc_error, relative_level_error : float or None
+        Of the lit scene, as `render.radiance.SpectralRadiance`.
+    first_nm, last_nm, width_nm : float
+        Centres of the first and the last band, and the width of the first.
+    """
+
+    integrator: str
+    variant: str
+    seconds: float
+    spp: int
+    passes: int
+    stopped_by: str
+    relative_mc_error: float | None
+    relative_level_error: float | None
+    bands: int
+    first_nm: float
+    last_nm: float
+    width_nm: float
+
+
+def render_facts(transport: Transport, radiance: SpectralRadiance) -> RenderFacts:
+    """Return the facts of a render; `radiance` is the scene that it lights."""
+    return RenderFacts(
+        integrator=transport.integrator,
+        variant=transport.variant,
+        seconds=transport.seconds,
+        spp=transport.spp,
+        passes=transport.passes,
+        stopped_by=transport.stopped_by,
+        relative_mc_error=radiance.relative_mc_error,
+        relative_level_error=radiance.relative_level_error,
+        bands=transport.wavelength_nm.size,
+        first_nm=float(transport.wavelength_nm[0]),
+        last_nm=float(transport.wavelength_nm[-1]),
+        width_nm=float(transport.width_nm[0]),
+    )
 
 
 def under(transport: Transport, spectrum: str) -> Transport:

@@ -3,6 +3,7 @@
 import sqlite3
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,13 +17,21 @@ from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
+from studies.budget.budget import render_share
 from studies.budget.model_plan import Plan
 from studies.photograph.clock import Clock
-from studies.study.lit_scene import OpenedScene, level_luminance, make_transport, under, white_spectrum
+from studies.study.lit_scene import (
+    OpenedScene,
+    level_luminance,
+    make_transport,
+    render_facts,
+    under,
+    white_spectrum,
+)
 from studies.study.model import ImageModel, modelled
 from studies.study.study import Condition, Study, conditions, parse_exposure
-from studies.sweep.cells import Cell, cell_key, coordinates
-from studies.sweep.database import RenderRecord, note_render, render_record
+from studies.sweep.cells import Cell, RenderRecord, cell_key, coordinates
+from studies.sweep.database import note_render, render_record
 from studies.sweep.frames import (
     Frame,
     LitScene,
@@ -38,6 +47,10 @@ from studies.sweep.provenance import provenance, versions
 
 Progress = Callable[[float, float], None]
 RENDERS, FRAMES, PICTURES = "renders", "frames", "pictures"  # folders beside the ledger
+FELL_BACK = (
+    "Neither LLVM nor CUDA answered: stock path + specfilm rendered in scalar_spectral, captures and the "
+    "reconstruction ran their NumPy forms.",
+)
 
 
 @dataclass(frozen=True)
@@ -89,14 +102,14 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
         return cells
     with job.clock.stage("renders"):
         model = job.plan.renders.get(opened.choice)
-        transport = make_transport(opened, job.study, model, job.out / RENDERS, progress)
+        share = partial(_brightest_share, job, opened)
+        transport, assumed = make_transport(opened, job.study, model, job.out / RENDERS, progress, share)
     with job.clock.stage("what cells share"):
         record = RenderRecord(
-            digest_bytes(np.ascontiguousarray(transport.radiance).data),
-            transport.variant,
-            transport.spp,
-            transport.wavelength_nm.size,
-            transport.seconds,
+            content=digest_bytes(np.ascontiguousarray(transport.radiance).data),
+            facts=render_facts(transport, transport.relight(luminance_cd_m2=1.0)),
+            brightest_share=None if job.study.render.noise_share is None else share(transport),
+            notes=(*opened.notes, *assumed, *(FELL_BACK if backend() == "numpy" else ())),
         )
         _make_files(job, opened, record, transport)
         note_render(job.base, _request(job, opened), record)
@@ -104,6 +117,21 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
     if cells is None:
         raise OSError(None, "files just written are gone", str(job.out / FRAMES))
     return cells
+
+
+def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> float:
+    """Largest `render_share` of the study's sensors in its brightest light: where a render's noise shows most."""
+    study, shares = job.study, []
+    for variant in _variants(job, opened):
+        lit = under(transport, variant.spectrum)
+        lux = lit.illuminance_lux(1.0)
+        brightest = max(level_luminance(level, lux) for level in study.levels)
+        _, sensor = _sensors(variant)
+        shares += [
+            render_share(lit, sensor, brightest, study.longest_exposure_s, parse_exposure(exposure))
+            for exposure in study.exposures
+        ]
+    return max(shares)
 
 
 def _request(job: Job, opened: OpenedScene) -> str:
@@ -181,7 +209,7 @@ def _cell(
     luminance = level_luminance(condition.level, scene.lux_per_cd_m2)
     asked_s = parse_exposure(condition.exposure)
     exposure_s = min(job.study.longest_exposure_s, frame.auto_s / luminance) if asked_s is None else asked_s
-    made_by = provenance(record.variant, processor, exact=job.plan.images[condition].exact)
+    made_by = provenance(record.facts.variant, processor, exact=job.plan.images[condition].exact)
     return Cell(
         key=cell_key(at, frame.key, luminance, exposure_s, shared.colours, made_by),
         at=at,
@@ -197,8 +225,6 @@ def _cell(
         half_difference=frame.half_difference.resolve(),
         truth=scene.truth.resolve(),
         pictures=(job.out / PICTURES).resolve(),
-        spp=record.spp,
-        bands=record.bands,
-        render_s=record.seconds,
+        render=record,
         budget_share=job.plan.shares.get(condition),
     )

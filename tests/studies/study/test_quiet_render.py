@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders import transport_of
+from studies.budget.quiet_render import render_quietly
 
 from render.engine import render
 from render.illuminants import illuminant
@@ -14,7 +15,6 @@ from sensor.noise import noise_variance
 from sensor.presets import low_noise, table1_output
 from studies.budget import quiet_render
 from studies.budget.budget import MOST_SHARE, OF_PIXELS, pixel_share
-from studies.budget.quiet_render import render_quietly
 
 NM, WIDTH_NM = np.arange(405.0, 780.0, 50.0), np.full(8, 50.0)
 LONGEST_S = 0.066
