@@ -10,8 +10,9 @@ from isp.colour.camera_colour import encode_srgb
 from isp.processors.catalogue import PROCESSORS
 from isp.substitution import SUBSTITUTION_SNR
 from sensor.raw import RawImage
+from studies.metrics.chart_colours import decode_srgb
 from studies.pages.layout import Figure, sheet
-from studies.paper.camera import Image, View, decode_srgb, develop, exposures, noise, quality_db
+from studies.paper.camera import Image, View, develop, exposures, noise, quality_db
 from studies.paper.checks import Claim, at_least, at_most, near
 from studies.paper.figure1b import shown
 from studies.paper.setup import READINGS, Setup, sensor_of, swept, view

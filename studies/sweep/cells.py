@@ -82,7 +82,7 @@ class Cell:
     white_cd_m2 : float
         Luminance shown as white.
     electrons, half_difference, truth : Path
-        As `studies.sweep.frames.Frame` and `LitScene` hold them.
+        As `studies.sweep.frames.Frame` holds them.
     pictures : Path
         Folder that the picture goes to, under the hash of its content.
     render : RenderRecord

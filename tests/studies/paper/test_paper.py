@@ -11,7 +11,8 @@ from PIL import Image
 
 from isp.colour.camera_colour import encode_srgb
 from studies.commands.cli import main
-from studies.paper.camera import decode_srgb, noise
+from studies.metrics.chart_colours import decode_srgb
+from studies.paper.camera import noise
 from studies.paper.checks import Check, at_least, at_most
 from studies.paper.figure1b import gain_db
 from studies.paper.figure4 import edge_columns
