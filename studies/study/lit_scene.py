@@ -18,12 +18,11 @@ from render.spectrum import Floats, Spectrum
 from render.transport import Transport
 from rodcone.digests import digest, digest_file
 from rodcone.errors import InputError
-from scenes.catalog import load
 from studies.study.levels import parse_level
 from studies.study.model import RenderModel
 from studies.study.quiet_render import render_quietly
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
-from studies.study.scene_source import CATALOGUE_SIDE, asked_level, open_scene
+from studies.study.scene_source import asked_level, film_size, open_scene
 from studies.study.study import OWN, SceneChoice, Study
 
 Progress = Callable[[float, float], None]
@@ -66,28 +65,15 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
             raise InputError(f"scenes: extend for {choice.source}, a picture without surfaces; leave it out")
         check_radiance_file(choice.source, study.levels)
         return OpenedScene(choice, None, (0, 0), digest([digest_file(choice.source), choice.light]))
-    if choice.source.endswith(".xml"):
-        if choice.light is not None:
-            raise InputError(f"scenes: light {choice.light!r} for {choice.source}; allowed: none, a file has its own")
-        opened = open_scene(choice.source, extend=choice.extend)
-        scene, own_size, notes = opened.scene, opened.size, opened.notes
-    else:
-        scene = load(choice.source, **({} if choice.light is None else {"light": choice.light}))
-        scene = replace(scene, extend=choice.extend)
-        own_size, notes = (CATALOGUE_SIDE, CATALOGUE_SIDE), ()
+    opened = open_scene(choice.source, extend=choice.extend, light=choice.light)
+    scene = opened.scene
     for level in study.levels:
         asked_level(scene, level)
     for spectrum in study.spectra:
         _check_relit(scene, spectrum)
     check_range(scene, *study.render.range_nm)
-    size = _size(own_size, study.render.size)
-    return OpenedScene(choice, scene, size, digest([digest_scene(scene), size]), tuple(notes))
-
-
-def _size(own: tuple[int, int], longest: int | None) -> tuple[int, int]:
-    """Height and width of the film, or its proportions with the longer side that was asked for."""
-    scale = 1.0 if longest is None else longest / max(own)
-    return max(1, round(own[0] * scale)), max(1, round(own[1] * scale))
+    size = film_size(opened.size, study.render.size)
+    return OpenedScene(choice, scene, size, digest([digest_scene(scene), size]), tuple(opened.notes))
 
 
 def _check_relit(scene: Scene, spectrum: str) -> None:

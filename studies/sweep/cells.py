@@ -111,14 +111,8 @@ class Cell:
 
 def coordinates(condition: Condition, processor: str, seed: int) -> Coordinates:
     """Coordinates of a condition's cell, files under their names."""
-    scene, spectrum, level, exposure, sensor = (
-        condition.scene.source,
-        condition.spectrum,
-        condition.level,
-        condition.exposure,
-        condition.sensor,
-    )
-    return Coordinates(label(scene), spectrum, level, exposure, label(sensor), processor, seed)
+    scene, sensor = label(condition.scene.source), label(condition.sensor)
+    return Coordinates(scene, condition.spectrum, condition.level, condition.exposure, sensor, processor, seed)
 
 
 def cell_key(

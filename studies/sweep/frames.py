@@ -6,7 +6,7 @@ cell reads one (h, w) array from its path, whatever the number of bands, and no 
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 
@@ -15,24 +15,19 @@ from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
-from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
 from rodcone.digests import digest
 from rodcone.files import replacing
 from sensor.config import SensorConfig
-from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.response import expected_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
 from studies.study.lit_scene import OpenedScene
-from studies.study.model import ImageModel, modelled
+from studies.study.model import unit_exposure_s
 from studies.sweep.provenance import versions
 from studies.sweep.stored import is_whole, keep
-
-_PLAIN = ImageModel(diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0)
-_DARK_S = 1e7  # what `auto_exposure_s` answers where there is no light: longer than any exposure
 
 
 @dataclass(frozen=True)
@@ -121,22 +116,12 @@ def make_frames(
     for key, (preset, sensor) in wanted.items():
         whole, even, odd = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in views)
         facts = scene | {
-            "auto_s": _auto_s(views[0], preset),
+            "auto_s": unit_exposure_s(views[0], preset),
             "electrons": keep(folder, _npy(whole), ".npy"),
             "half_difference": keep(folder, _npy(((even - odd) / 2).astype(np.float32)), ".npy"),
         }
         with replacing(folder / f"{key}.json") as (text,):
             text.write_text(json.dumps({"facts": facts, "digest": digest(facts)}), "utf-8")
-
-
-def _auto_s(radiance: SpectralRadiance, preset: SensorConfig) -> float:
-    """Auto exposure at 1 cd/m^2 [s], without a longest time.
-
-    It is the same for every processor and every model of the lens, so that their pictures can be compared: the preset's
-    own mosaic behind a lens that spreads no light.
-    """
-    plain = modelled(replace(preset, lens=replace(preset.lens, defocus_um=0.0)), _PLAIN)
-    return auto_exposure_s(form_image(radiance, plain), plain, _DARK_S)
 
 
 def colours_under(sensor: SensorConfig, processor: Processor, spectrum: Spectrum) -> ColourFit:

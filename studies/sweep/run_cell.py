@@ -54,7 +54,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     _check_provenance(cell)
     if most_threads is not None:
         limit_threads(most_threads)
-    truth = _truth(cell.truth)
+    truth, truth_png = _truth(cell.truth)
     light = cell.luminance_cd_m2 * cell.exposure_s  # the frame's electrons are those at 1 cd/m^2 and 1 s
     expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
     error_e = _array(cell.half_difference) * light
@@ -87,7 +87,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         development_engine=picture.engine,
         versions=cell.made_by.versions,
         picture=keep(cell.pictures, to_png(encoded), ".png"),
-        truth=keep(cell.pictures, _true_png(cell.truth, cell.truth.stat().st_mtime_ns), ".png"),
+        truth=keep(cell.pictures, truth_png, ".png"),
         render_s=cell.render.facts.seconds,
         measure_s=measure_s,
         **seconds,
@@ -145,19 +145,16 @@ def _check_provenance(cell: Cell) -> None:
             )
 
 
-def _truth(path: Path) -> TruePicture:
+def _truth(path: Path) -> tuple[TruePicture, bytes]:
+    """The truth, and its PNG."""
     _array(path)  # tells what can't be read
-    return _worked_out(path, path.stat().st_mtime_ns)
+    return _worked_out(path)
 
 
 @lru_cache(maxsize=2)  # cells of one scene under one spectrum come one after the other
-def _worked_out(path: Path, changed_ns: int) -> TruePicture:
-    return true_picture(np.array(_array(path)))
-
-
-@lru_cache(maxsize=2)
-def _true_png(path: Path, changed_ns: int) -> bytes:
-    return to_png(_worked_out(path, changed_ns).encoded)
+def _worked_out(path: Path) -> tuple[TruePicture, bytes]:
+    truth = true_picture(np.array(_array(path)))
+    return truth, to_png(truth.encoded)
 
 
 def _array(path: Path) -> Image:

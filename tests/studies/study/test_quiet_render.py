@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders import transport_of
-from studies.budget.quiet_render import render_quietly
 
 from render.engine import render
 from render.illuminants import illuminant
@@ -15,6 +14,7 @@ from sensor.noise import noise_variance
 from sensor.presets import low_noise, table1_output
 from studies.budget.budget import MOST_SHARE, OF_PIXELS, render_share
 from studies.study import quiet_render
+from studies.study.quiet_render import render_quietly
 
 NM, WIDTH_NM = np.arange(405.0, 780.0, 50.0), np.full(8, 50.0)
 LONGEST_S = 0.066
