@@ -121,7 +121,12 @@ def test_a_render_counts_once_however_many_cells_share_it(
 ) -> None:
     module = sys.modules["studies.sweep.prepare"]
     make = work.taking("render", 7.0, module.make_transport)
-    monkeypatch.setattr(module, "make_transport", lambda *given: replace(make(*given), seconds=7.0))
+
+    def slow(*given: Any) -> Any:
+        transport, notes = make(*given)
+        return replace(transport, seconds=7.0), notes
+
+    monkeypatch.setattr(module, "make_transport", slow)
     SAMPLE.swept(SAMPLE.small_study(tmp_path), tmp_path / "out")
     stages = {stage["name"]: stage["seconds"] for stage in ledger_results(tmp_path / "out")[0]["stages"]}
     assert work.of("render") == stages["renders"] == 7.0
