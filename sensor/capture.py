@@ -69,10 +69,9 @@ def capture(
     image = form_image(radiance, sensor, samples_per_pixel)
     _check_frame(image.values.shape[0], image.values.shape[1], device)
     if _numpy_runs(exact):
-        return _read(expected_electrons(image, sensor, exposure_s), sensor, exposure_s, device, rng, exact)
+        return expose(expected_electrons(image, sensor, exposure_s), sensor, exposure_s, device, rng, exact=exact)
     weights = electrons_per_irradiance(sensor, image.wavelength_nm, image.widths_nm, exposure_s)
-    expected_e = expected_electrons_single(image.values, weights, sensor)
-    return _read(expected_e, sensor, exposure_s, device, rng, exact)
+    return expose(expected_electrons_single(image.values, weights, sensor), sensor, exposure_s, device, rng)
 
 
 def capture_strips(
@@ -119,7 +118,7 @@ def capture_strips(
     _check_frame(row, device.shape[1], device)
     if sensor.lens.horizontal_view_deg:
         expected_e *= falloff(sensor.lens, device.shape).astype(expected_e.dtype)
-    return _read(expected_e, sensor, exposure_s, device, rng, exact)
+    return expose(expected_e, sensor, exposure_s, device, rng, exact=exact)
 
 
 def expose(
@@ -148,21 +147,10 @@ def expose(
         For a frame that isn't the device's size, negative or non-finite electrons, a negative exposure, or no
         Generator.
     """
-    require_range("exposure_s", exposure_s, 0.0, 1e7, "give seconds, 0 or more")
-    check_expected(expected_e, device)
-    return _read(expected_e, sensor, exposure_s, device, rng, exact)
-
-
-def _read(
-    expected_e: NDArray[np.floating],
-    sensor: SensorConfig,
-    exposure_s: float,
-    device: Device,
-    rng: np.random.Generator,
-    exact: bool,
-) -> RawImage:
     if _numpy_runs(exact):
         return read_out(expected_e, sensor, device, exposure_s, rng)
+    require_range("exposure_s", exposure_s, 0.0, 1e7, "give seconds, 0 or more")
+    check_expected(expected_e, device)
     single = np.asarray(expected_e, dtype=np.float32)
     dn = read_frame(single, sensor, device, exposure_s, draw_key(rng))
     return as_raw(dn, sensor, exposure_s, engine=backend(), hot=device.hot)
