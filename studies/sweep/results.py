@@ -55,7 +55,7 @@ def overview(folder: Path) -> bytes:
         with Image.open(BytesIO(read_whole(folder / PICTURES, name))) as picture:
             sheet.paste(picture, (study["levels"].index(level) * width, lines.index((sensor, processor)) * height))
     file = BytesIO()
-    sheet.save(file, "PNG", optimize=True)
+    sheet.save(file, "PNG")
     return file.getvalue()
 
 
