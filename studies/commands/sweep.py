@@ -4,8 +4,8 @@ import errno
 import json as notation
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -21,8 +21,7 @@ from studies.budget.model_plan import as_stated as plan_as_stated
 from studies.budget.plan import plan as plan_study
 from studies.budget.plan import reference_plan
 from studies.commands.estimate import Estimate, as_facts, estimate
-from studies.commands.report import FILE as REPORT
-from studies.commands.report import write_report
+from studies.commands.report import write_results
 from studies.photograph.clock import Clock
 from studies.study.lit_scene import open_all
 from studies.study.study import Study
@@ -97,23 +96,60 @@ def sweep(
         found = _estimated(task, out, reference, workers or cores())
         print(notation.dumps(as_facts(found)) if json else _words(found))
         return 0
-    for name in task.processors:
-        require_libraries(name)
-    found = _estimated(task, out, reference, 0 if cluster else workers or cores())
-    require_memory(Memory(found.bytes, found.largest_bytes), force)
-    out.mkdir(parents=True, exist_ok=True)  # a place that can't be written is told before anything is rendered
-    with _kept_told(out), ExitStack() as held:
-        runner: Runner = _local(workers) if cluster is None else held.enter_context(on_cluster(cluster))
-        step = held.enter_context(_steps())
-        with clock.stage("plan"):
-            plan = _plan(task, out, reference, as_stated, step)
-        swept = run_sweep(task, out, plan, runner, step, keep_old=keep_old, clock=clock)
-    for note in swept.notes:
-        print(f"rodcone: {note}", file=sys.stderr)
-    report = write_report(out, out / REPORT)
+    check_memory(task, out, reference=reference, workers=0 if cluster else workers or cores(), force=force)
+    with _kept_told(out), nullcontext(_local(workers)) if cluster is None else on_cluster(cluster) as runner:
+        swept, report = make_all(
+            task,
+            out,
+            lambda step: _plan(task, out, reference, as_stated, step),
+            runner,
+            keep_old=keep_old,
+            clock=clock,
+        )
     print(f"rodcone: its report is {report}", file=sys.stderr)
     print(notation.dumps(_facts(swept) | {"report": str(report)}) if json else swept.out / FILE)
     return 0
+
+
+def check_memory(study: Study, out: Path, *, reference: bool, workers: int, force: bool) -> None:
+    """Raise `InputError` where a study's processors lack a library, or more memory is needed than is free."""
+    for name in study.processors:
+        require_libraries(name)
+    found = _estimated(study, out, reference, workers)
+    require_memory(Memory(found.bytes, found.largest_bytes), force)
+
+
+def make_all(
+    study: Study,
+    out: Path,
+    planned: Callable[[Step], Plan],
+    runner: Runner,
+    *,
+    keep_old: bool = False,
+    clock: Clock,
+) -> tuple[Swept, Path]:
+    """Sweep a study into a folder and write its report there; says on stderr how far it is and what it had to assume.
+
+    Parameters
+    ----------
+    planned : callable
+        Makes the plan; its progress goes to what it is given.
+    clock : Clock
+        Whose start is the run's.
+
+    Returns
+    -------
+    Swept, Path
+        What was made, and the report.
+    """
+    out.mkdir(parents=True, exist_ok=True)  # a place that can't be written is told before anything is rendered
+    with _kept_told(out), _steps() as step:
+        with clock.stage("plan"):
+            plan = planned(step)
+        swept = run_sweep(study, out, plan, runner, step, keep_old=keep_old, clock=clock)
+    for note in swept.notes:
+        print(f"rodcone: {note}", file=sys.stderr)
+    return swept, write_results(out)
 
 
 def export(

@@ -11,26 +11,29 @@ from sensor.optics import left_out
 from sensor.presets import preset
 from studies.pages.report_text import significant
 from studies.pages.results import sensor_facts
-from studies.study.levels import parse_level
+from studies.study.levels import NAMED, parse_level
 from studies.study.study import label
 from studies.sweep.provenance import made_by, told
 from studies.sweep.row import Row
 
 
 def render_of(rows: Sequence[Row], scene: str) -> dict[str, Any]:
-    """Return samples, bands and seconds of a scene's render; unknown where no cell of it is made yet."""
+    """Return what is known of a scene's render; unknown where no cell of it is made yet."""
     first = next((row for row in rows if row.scene == scene), None)
-    return {
+    known = {
         "scene": scene,
         "spp": first and first.spp,
         "bands": first and first.bands,
         "seconds": first and first.render_s,
     }
+    return known if first is None else known | {"variant": first.variant} | json.loads(first.render)
 
 
 def level_of(text: str) -> dict[str, Any]:
     """Return a level as the study asks for it; what it is in the other unit depends on the scene."""
     value, unit = parse_level(text)
+    if text in NAMED:
+        return vars(NAMED[text]) | {"illuminance_lux": None}
     return {
         "name": significant(value, unit.replace("2", "²")),
         "luminance_cd_m2": value if unit == "cd/m2" else None,

@@ -78,6 +78,10 @@ def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[dict
     pictures = {name: read_whole(folder / PICTURES, name) for name in truths if name is not None}
     sizes = {name: _size(pictures, truths[place * len(study["spectra"])]) for place, name in enumerate(names)}
     missing = ledger.wanted - len(ledger.rows)
+    renders = [render_of(ledger.rows, name) for name in names]
+    notes = [note for render in renders for note in render.get("notes", ())]
+    if missing:
+        notes.append(f"{missing} of {ledger.wanted} cells are not made yet: rodcone sweep goes on with them.")
     left = _choose(folder, cells, study, most_pictures)
     pictures |= {cell["picture"]: read_whole(folder / PICTURES, cell["picture"]) for cell in cells if cell["picture"]}
     results = {
@@ -91,8 +95,8 @@ def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[dict
         "exposures": study["exposures"],
         "truths": truths,
         "environment": environment_of(ledger.rows),
-        "render": None,
-        "renders": [render_of(ledger.rows, name) for name in names],
+        "render": renders[0] if len(names) == 1 and "passes" in renders[0] else None,
+        "renders": renders,
         "exposure_rule": RULE.format(longest=study["longest_exposure_s"] * 1e3),
         "display_white": DISPLAY_WHITE,
         "levels": [level_of(level) for level in study["levels"]],
@@ -101,9 +105,7 @@ def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[dict
         "cells": cells,
         "stages": [{"name": name, "seconds": seconds} for name, seconds in ledger.stages.items()],
         "left_out": lenses_left_out(ledger.rows, study["sensors"]),
-        "notes": []
-        if missing == 0
-        else [f"{missing} of {ledger.wanted} cells are not made yet: rodcone sweep goes on with them."],
+        "notes": list(dict.fromkeys(notes)),
         "pictures_left_out": left,
         "configuration": configuration(study),
     }

@@ -206,12 +206,16 @@ def headline(levels: Sequence[str], cells: Sequence[Sequence[Mapping[str, Any]]]
 def render_sentence(render: Mapping[str, Any]) -> str:
     """Say how long the render ran, why it stopped and what error it reached."""
     why = STOPPED_BY.get(str(render["stopped_by"]), f"of: {render['stopped_by']}")
-    return (
+    said = (
         f"The render made {render['passes']} passes, {render['spp']} samples a pixel, in {duration(render['seconds'])} "
         f"and stopped because {why}. The relative Monte Carlo error it reached is "
-        f"{percent(render['relative_mc_error'])}. In the brightest light its noise variance is at most "
-        f"{percent(render['brightest_share'])} of the sensor's own in {percent(OF_PIXELS)} of the pixels "
-        f"({percent(MOST_SHARE)} is the aim)."
+        f"{percent(render['relative_mc_error'])}."
+    )
+    if render["brightest_share"] is None:
+        return said
+    return (
+        f"{said} In the brightest light its noise variance is at most {percent(render['brightest_share'])} of the "
+        f"sensor's own in {percent(OF_PIXELS)} of the pixels ({percent(MOST_SHARE)} is the aim)."
     )
 
 
