@@ -45,6 +45,8 @@ def data_uri(name: str, picture: bytes) -> str:
         kind = "png"
     elif picture[:4] == b"RIFF" and picture[8:12] == b"WEBP":
         kind = "webp"
+    elif picture.startswith(b"<svg"):
+        kind = "svg+xml"
     else:
         raise InputError(f"picture {name!r}: starts with {picture[:8]!r}; allowed: PNG, WebP; encode it as one of them")
     return f"data:image/{kind};base64,{b64encode(picture).decode('ascii')}"

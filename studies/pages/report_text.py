@@ -7,6 +7,7 @@ from math import floor, isfinite, isinf, isnan, log10
 from typing import Any
 
 from studies.budget.budget import MOST_SHARE, OF_PIXELS
+from studies.study.levels import parse_level
 
 MISSING = "—"
 NBSP = "\N{NO-BREAK SPACE}"
@@ -64,6 +65,12 @@ def significant(value: float | None, unit: str = "", digits: int = 3) -> str:
     text = f"{rounded:,.{max(decimals, 0)}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "\N{MINUS SIGN}") + (NBSP + unit if unit else "")
+
+
+def level_text(level: str) -> str:
+    """Write ``25cd/m2`` as prose does."""
+    value, unit = parse_level(level)
+    return significant(value, unit.replace("m2", "m²"))
 
 
 def percent(value: float | None) -> str:

@@ -5,15 +5,19 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 
 from render.spectrum import Floats
 from sensor.curves import rgbw
 from sensor.noise import noise_variance
-from studies.pages.drawing import Box, Drawing, Mark, Text
-from studies.pages.layout import HEIGHT, WIDTH, Figure, curves
+from studies.pages.plots import BLUE, CHART, COLOURS, GREEN, INK, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks
 from studies.paper.checks import Claim, about, at_least
 from studies.paper.flat import channel_e, light_of, snr, without_prnu
 from studies.paper.numbers import MOONLIGHT_CD_M2
+from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, TODAY, sensor_of
 
 NM: Floats = np.arange(400.0, 701.0, 2.0)  # the paper's range
@@ -138,7 +142,7 @@ def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
     )
 
 
-def figure_2() -> tuple[Figure, tuple[Claim, ...]]:
+def figure_2() -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Curves, tile and W's gain over light, with the claims about them."""
     moon = {name: snr_gains(name, MOONLIGHT_CD_M2) for name in READINGS}
     bright = {name: snr_gains(name, bright_cd_m2(name)) for name in READINGS}
@@ -148,26 +152,38 @@ def figure_2() -> tuple[Figure, tuple[Claim, ...]]:
         "Electrons per photon of R, G, B and W, and the 2×2 tile. On the right W's gain in SNR over G, one pixel at "
         f"{SNR_EXPOSURE_S * 1e3:g} ms and f/2.8 under D65: the signal's ratio in the dark, less in light."
     )
-    return Figure("2", caption, _drawing()), (*claims, *snr_claims(moon, bright, pure))
+    description = "response over wavelength, the tile R G over B W, and W's gain in SNR over luminance"
+    return PaperFigure("2", caption, description, _drawing()), (*claims, *snr_claims(moon, bright, pure))
 
 
-def _drawing() -> Drawing:
+@rc_context(STYLE)
+def _drawing() -> Figure:
+    """Responses, the tile, and W's gain."""
+    figure = blank(2 * CHART[0], CHART[1])
+    left, middle, right = figure.subplots(1, 3, width_ratios=(10, 2, 10))
     responses = rgbw().band_average(tuple(LETTERS), NM, np.full(NM.size, 2.0))
-    colours = {"R": "1", "G": "2", "B": "0", "W": "ink"}
-    lines = [(x, line.tolist(), colours[x], x == "W") for x, line in zip(LETTERS, responses, strict=True)]
-    marks: list[Mark] = list(curves("Responses, electrons per photon", "wavelength, nm", NM.tolist(), lines))
+    for letter, response, colour in zip(LETTERS, responses, (ORANGE, GREEN, BLUE, INK), strict=True):
+        left.plot(NM, response, color=colour, linestyle="--" if letter == "W" else "-")
+        peak = int(response.argmax())
+        left.annotate(letter, (NM[peak], response[peak]), (0, 3), textcoords="offset points", color=colour, ha="center")
+    left.set(title="Responses, electrons per photon", xlabel="wavelength, nm", ylim=(0.0, None))
+    _draw_tile(middle)
+    ends = []
+    for slot, name in enumerate(SENSORS):
+        gains = [snr_gains(name, float(level))["G"].ratio for level in LEVELS]
+        right.semilogx(LEVELS, gains, color=COLOURS[slot], linestyle="--" if slot == 1 else "-")
+        ends.append((name, gains[-1], COLOURS[slot]))
+    root = sqrt(signal_ratios("D65")["G"])
+    right.axhline(root, color=SOFT, linestyle="--")
+    right.set(title="W's SNR over G's, one pixel", xlabel="luminance, cd/m²", xlim=(LEVELS[0], LEVELS[-1]))
+    plain_ticks(right)
+    name_at_ends(right, [*ends, ("√ of signals' ratio", root, SOFT)])
+    return figure
+
+
+def _draw_tile(axes: Axes) -> None:
+    """Draw the 2x2 tile, a letter in each pixel."""
+    axes.set_axis_off()
+    axes.imshow([[to_rgb(FILLS[letter]) for letter in row] for row in ("RG", "BW")])
     for index, letter in enumerate(LETTERS):
-        x, y = WIDTH - 40 + 34 * (index % 2), HEIGHT - 112 + 34 * (index // 2)
-        marks += [Box(x, y, 34, 34, "soft", FILLS[letter]), Text(x + 17, y + 21, letter, "middle", "tile")]
-    gains = [
-        (name, [snr_gains(name, float(level))["G"].ratio for level in LEVELS], str(slot), slot == 1)
-        for slot, name in enumerate(SENSORS)
-    ]
-    root = [sqrt(signal_ratios("D65")["G"])] * LEVELS.size
-    gains.append(("√ of signals' ratio", root, "soft", True))
-    corner = (WIDTH + 60, 0.0)
-    marks += curves(
-        "W's SNR over G's, one pixel", "luminance, cd/m²", LEVELS.tolist(), gains, log=(True, False), at=corner
-    )
-    described = "response over wavelength, the tile R G over B W, and W's gain in SNR over luminance"
-    return Drawing(2 * WIDTH + 70, HEIGHT, "Figure 2", described, tuple(marks))
+        axes.text(index % 2, index // 2, letter, ha="center", va="center")

@@ -10,10 +10,11 @@ from isp.colour.camera_colour import encode_srgb
 from isp.processors.catalogue import PROCESSORS
 from isp.substitution import SUBSTITUTION_SNR
 from sensor.raw import RawImage
-from studies.pages.layout import Figure, sheet
+from studies.pages.plots import picture_rows
 from studies.paper.camera import Image, View, decode_srgb, develop, exposures, noise, quality_db
 from studies.paper.checks import Claim, at_least, at_most, near
 from studies.paper.figure1b import shown
+from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, Setup, sensor_of, swept, view
 from studies.photograph.camera import colour_fit
 from studies.study.study import parse_exposure
@@ -105,7 +106,7 @@ def claims_6(
     )
 
 
-def figure_6(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
+def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Pictures of the study `paper_6.toml`, and what substitution does at 5 ms.
 
     A processor in a sweep substitutes by the threshold of `table1_output`; under the other reading the interleaved
@@ -133,8 +134,9 @@ def figure_6(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
         for own in pictures.values():
             table.append([(f"{reading}: {own[0][0]}", own[0][1]), *own[1:]])
     claims = claims_6(bayer, interleaved, {name: swap(setup, seen, name) for name in READINGS})
-    drawing = sheet("Figure 6", "Bayer above interleaved at 5, 10 and 20 ms, under both readings of Table 1", table)
-    return Figure("6", "Bayer and interleaved with Table 1's pixel at 25 cd/m², by exposure time.", drawing), claims
+    caption = "Bayer and interleaved with Table 1's pixel at 25 cd/m², by exposure time."
+    description = "Bayer above interleaved at 5, 10 and 20 ms, under both readings of Table 1"
+    return PaperFigure("6", caption, description, picture_rows(table)), claims
 
 
 def swap(setup: Setup, seen: View, reading: str) -> Swap:

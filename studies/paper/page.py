@@ -1,16 +1,28 @@
 """The page "claim, computed, verdict": self-contained HTML without a script."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from studies.pages import report_text as text
-from studies.pages.drawing import TEMPLATES, drawing_style, to_svg
-from studies.pages.layout import Figure
+from studies.pages.plots import svg_text
+from studies.pages.report import TEMPLATES, data_uri
 from studies.paper.checks import VERDICTS, Check, Claim
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure: the paper's number, its caption, what it shows for those who don't see it, and the drawing."""
+
+    name: str
+    caption: str
+    description: str
+    drawing: Figure
 
 
 def range_text(check: Check) -> str:
@@ -40,12 +52,12 @@ def summary(claims: Sequence[Claim]) -> str:
     return f"Of {len(claims)} claims, {text.join(parts)}."
 
 
-def paper_page(figures: Sequence[Figure], claims: Sequence[Claim], facts: Mapping[str, Any]) -> str:
+def paper_page(figures: Sequence[PaperFigure], claims: Sequence[Claim], facts: Mapping[str, Any]) -> str:
     """Write the page.
 
     Parameters
     ----------
-    figures : sequence of Figure
+    figures : sequence of PaperFigure
     claims : sequence of Claim
     facts : mapping
         Set-up and versions, as `studies.paper.paper.Paper` has them.
@@ -58,8 +70,8 @@ def paper_page(figures: Sequence[Figure], claims: Sequence[Claim], facts: Mappin
         lstrip_blocks=True,
     )
     styles = ("report.css", "paper.css")
-    style = "\n".join((TEMPLATES / name).read_text(encoding="utf-8") for name in styles) + drawing_style()
-    drawn = [(figure, Markup(to_svg(figure.drawing, alone=False))) for figure in figures]  # escaped by its template
+    style = "\n".join((TEMPLATES / name).read_text(encoding="utf-8") for name in styles)
+    drawn = [(figure, data_uri(figure.name, svg_text(figure.drawing).encode())) for figure in figures]
     return environment.get_template("paper.html.j2").render(
         figures=drawn,
         claims=claims,
