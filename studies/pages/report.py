@@ -7,31 +7,24 @@ page only through Jinja's escaping (text) and ``tojson`` (the script's data bloc
 from base64 import b64encode
 from collections.abc import Mapping
 from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
-
 from rodcone.errors import InputError
+from studies.budget.budget import MOST_SHARE, OF_PIXELS
 from studies.pages import report_text as text
+from studies.pages.page import own_file, write_out
 from studies.pages.report_charts import SHARE, group_charts, shown_metrics, speed_charts, speed_rows
 from studies.pages.report_data import ReportData
 from studies.pages.report_view import (
     AT_FIRST,
     FURTHER_ROWS,
-    budget_text,
+    budget_share,
     finding_rows,
-    headline,
-    render_rows,
-    seeds_text,
-    share_text,
-    stage_rows,
+    known_shares,
+    leads,
     titles,
     viewer_data,
 )
-
-TEMPLATES = Path(__file__).parent / "templates"
 
 
 def data_uri(name: str, picture: bytes) -> str:
@@ -64,14 +57,15 @@ def page_view(report: ReportData, pictures: Mapping[str, bytes]) -> dict[str, An
         "titles": titles(report.cameras),
         "metrics": metrics,
         "on_targets": [metric.key for metric in text.ON_TARGETS],
-        "at_first": [metric.key for metric in AT_FIRST],
-        "at_first_names": [metric.name for metric in AT_FIRST],
+        "at_first": AT_FIRST,
         "rows": [(metric.key, metric.name) for metric in metrics] + list(FURTHER_ROWS),
-        "headline": headline(report),
+        "leads": leads(report),
         "findings": [finding_rows(report, cells) for cells in report.by_group],
-        "share": share_text(report),
-        "budget": budget_text(report),
-        "seeds": seeds_text(report.seeds),
+        "shares": known_shares(report.cells),
+        "scene_shares": [known_shares(cells) for cells in report.by_scene],
+        "budget_share": budget_share(report),
+        "aim": MOST_SHARE,
+        "of_pixels": OF_PIXELS,
         "groups": data["groups"],
         # Each scene under each spectrum: its title, the places of its groups, what names them within it, what is known.
         "views": [
@@ -89,11 +83,8 @@ def page_view(report: ReportData, pictures: Mapping[str, bytes]) -> dict[str, An
         "share_charts": group_charts(report, SHARE),
         "speed": speed,
         "speed_charts": speed_charts(speed),
-        "renders": render_rows(report),
         # Effect and cost, as `sensor.left_out.left_out` parts them.
         "left_out": [line.partition(": ")[::2] for line in report.left_out],
-        "stages": stage_rows(report.stages),
-        "total": text.duration(sum(report.stages.values())),
         "text": text,
     }
 
@@ -112,16 +103,8 @@ def render_report(report: ReportData, pictures: Mapping[str, bytes]) -> str:
     str
         HTML that needs no other file and may fetch none.
     """
-    style = (TEMPLATES / "report.css").read_text(encoding="utf-8")
-    script = (TEMPLATES / "report.js").read_text(encoding="utf-8")
+    script = own_file("report.js")
     digest = b64encode(sha256(script.encode()).digest()).decode("ascii")
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
+    return write_out(
+        "report.html.j2", **page_view(report, pictures), style=own_file("report.css"), script=script, digest=digest
     )
-    page = environment.get_template("report.html.j2")
-    # The style and the script are files of this package, never input.
-    return page.render(page_view(report, pictures), style=Markup(style), script=Markup(script), digest=digest)

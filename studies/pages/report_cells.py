@@ -32,12 +32,9 @@ def over_seeds(
     figures: dict[str, float | None] = {}
     intervals: dict[str, tuple[float, float]] = {}
     for key in SCATTERED:
-        values = [None if row is None else getattr(row, key) for row in rows]
-        if len(values) == 1:
-            figures[key] = values[0]
-        elif any(value is None or not isfinite(value) for value in values):
-            figures[key] = None
-        else:
+        values = [value for row in rows if row and (value := getattr(row, key)) is not None]
+        figures[key] = values[0] if len(rows) == len(values) == 1 else None
+        if len(rows) > 1 and len(values) == len(rows) and all(map(isfinite, values)):
             estimate = mean_with_confidence(values)
             figures[key], intervals[key] = estimate.mean, (estimate.low, estimate.high)
     states = [row.substitution for row in rows if row is not None and row.substitution is not None]
@@ -55,5 +52,5 @@ def over_seeds(
         intervals=intervals,
         substitution=sum(states) / len(states) if len(states) == len(rows) else None,
         balance=(balances[0] if first else {}) | fallen,
-        picture=first and first.picture,
+        picture=first.picture if first else None,
     )

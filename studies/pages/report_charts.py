@@ -46,7 +46,7 @@ def group_charts(report: ReportData, metric: text.Metric) -> list[Chart]:
         charts.append(
             line_chart(
                 f"{metric.name}, {own[0].group}",
-                f"{metric.name} over scene luminance for {text.join(names)}. The table of all pictures holds the "
+                f"{metric.name} over scene luminance for {', '.join(names)}. The table of all pictures holds the "
                 "numbers.",
                 [stand_in if value is None else value for value in known],
                 [_line(report, own[slot :: len(names)], metric) for slot in range(len(names))],
@@ -103,8 +103,8 @@ def _speed_of(sensor: str, conditions: Sequence[Sequence[ReportCell]]) -> list[S
     made = []
     for slot, cell in enumerate(conditions[0]):
         firsts = [condition[slot].first for condition in conditions]
-        capture_s = _mean([first and first.capture_s for first in firsts])
-        develop_s = _mean([first and first.develop_s for first in firsts])
+        capture_s = _mean([first.capture_s if first else None for first in firsts])
+        develop_s = _mean([first.develop_s if first else None for first in firsts])
         made.append((cell.camera, capture_s, develop_s, _mean([values[slot] for values in judged])))
     fastest_db = min(made, key=lambda row: float("inf") if row[2] is None else row[2])[3]
     gains = [None if psnr_db is None or fastest_db is None else psnr_db - fastest_db for *_, psnr_db in made]

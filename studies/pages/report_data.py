@@ -158,6 +158,11 @@ class ReportData:
         """The cells by group: all levels and cameras of one scene, spectrum, sensor and exposure."""
         return _parted(self.cells, len(self.cameras) * len(self.levels))
 
+    @property
+    def by_scene(self) -> list[tuple[ReportCell, ...]]:
+        """The cells by scene."""
+        return _parted(self.cells, len(self.cells) // len(self.scenes))
+
 
 def _parted(cells: tuple[ReportCell, ...], count: int) -> list[tuple[ReportCell, ...]]:
     return [cells[start : start + count] for start in range(0, len(cells), count)]

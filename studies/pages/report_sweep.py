@@ -152,7 +152,8 @@ def _choose(
     """Leave pictures out of the cells until `most` are left; says in words which."""
     cameras = len(study["processors"])
     if most is None:
-        sizes = [(folder / PICTURES / cell.picture).stat().st_size for cell in cells if cell.picture]
+        files = [folder / PICTURES / cell.picture for cell in cells if cell.picture]
+        sizes = [file.stat().st_size for file in files if file.is_file()]  # `read_whole` tells of one that is gone
         most = int(SHOWN_BYTES * len(sizes) / sum(sizes)) if sizes else len(cells)
     count = len(cells) // cameras
     chosen = chosen_conditions(count, len(study["levels"]), max(most // cameras, 1))
@@ -160,6 +161,6 @@ def _choose(
         return list(cells), ""
     shown = [cell if index // cameras in chosen else replace(cell, picture=None) for index, cell in enumerate(cells)]
     return shown, (
-        f"To keep the page small, pictures of {len(chosen)} of {count} conditions are in it, numbers of all; the others "
-        "are files beside the results database, and rodcone report --pictures N puts more into the page."
+        f"To keep the page small, pictures of {len(chosen)} of {count} conditions are in it, numbers of all; the "
+        "others are files beside the results database, and rodcone report --pictures N puts more into the page."
     )

@@ -104,11 +104,6 @@ def camera_name(camera: str) -> str:
     return CAMERA_NAMES.get(camera, camera)
 
 
-def join(parts: Sequence[str]) -> str:
-    """Join with commas and a last "and"."""
-    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1] if parts else ""
-
-
 def leader(metric: Metric, cells: Sequence[ReportCell]) -> tuple[ReportCell | None, float]:
     """Return the cell that is best in `metric` and its lead over the next; None where nothing is to be told apart.
 

@@ -19,7 +19,6 @@ FURTHER_ROWS = (
 )
 AT_FIRST = (text.PSNR, text.SSIM, text.DELTA_E)  # the metrics shown before others are asked for
 MOST_NAMED = 3  # cameras in a title
-STOPPED_BY = {"seconds": "time", "noise": "error reached", "samples": "all samples done", "interrupt": "interrupted"}
 
 
 def balance_text(balance: Mapping[str, str]) -> str:
@@ -37,15 +36,15 @@ def cell_view(cell: ReportCell, level: ReportLevel, rivals: Sequence[ReportCell]
     return {
         **{metric.key: text.metric_text(metric, cell) for metric in text.METRICS},
         "snr_db": text.interval_text(cell, "snr_db", 1, "dB"),
-        "exposure": text.duration(row and row.exposure_s),
+        "exposure": text.duration(row.exposure_s if row else None),
         "saturated": text.percent(cell.figures["saturated"]),
         "substitution": text.substitution_text(cell.substitution),
         "balance": balance_text(cell.balance),
         "mc_share": text.percent(share),
         "over": share is not None and share > MOST_SHARE,
         "electrons": " ".join(f"{name}\N{NBSP}{text.significant(mean)}" for name, mean in electrons.items()),
-        "capture": text.duration(row and row.capture_s),
-        "develop": text.duration(row and row.develop_s),
+        "capture": text.duration(row.capture_s if row else None),
+        "develop": text.duration(row.develop_s if row else None),
         "best": [metric.key for metric in text.METRICS if text.leader(metric, rivals)[0] is cell],
         "file": f"pictures/{row.picture}" if row else "",
         "alt": f"{text.camera_name(cell.camera)} picture, {level.name}, {cell.group}",
@@ -93,14 +92,6 @@ def viewer_data(report: ReportData) -> dict[str, Any]:
     }
 
 
-def headline(report: ReportData) -> str:
-    """Count the conditions in which each camera leads in PSNR."""
-    leaders = [text.leader(text.PSNR, condition)[0] for condition in report.conditions]
-    led = [cell.camera for cell in leaders if cell is not None]
-    counts = [f"{text.camera_name(camera)} {led.count(camera)}" for camera in report.cameras]
-    return f"PSNR over {len(leaders)} conditions, by who leads: {', '.join(counts)}, none {len(leaders) - len(led)}."
-
-
 def finding_rows(report: ReportData, cells: Sequence[ReportCell]) -> list[list[str]]:
     """Return a row for each level of a group: who leads in each metric by how much, and what fell back in whom."""
     rows = []
@@ -119,41 +110,24 @@ def finding_rows(report: ReportData, cells: Sequence[ReportCell]) -> list[list[s
     return rows
 
 
-def share_text(report: ReportData) -> str:
-    """Judge the Monte Carlo share of all cells against the aim."""
-    found = ((cell.figures["mc_share"], cell) for cell in report.cells)
+def leads(report: ReportData) -> list[tuple[str, int]]:
+    """Return in how many conditions each camera leads in PSNR, and in how many none does."""
+    leaders = [text.leader(text.PSNR, condition)[0] for condition in report.conditions]
+    led = [cell.camera if cell else "none" for cell in leaders]
+    return [(text.camera_name(camera), led.count(camera)) for camera in (*report.cameras, "none")]
+
+
+def known_shares(cells: Sequence[ReportCell]) -> list[tuple[float, ReportCell]]:
+    """Return the cells whose Monte Carlo share is known, the largest first."""
+    found = ((cell.figures["mc_share"], cell) for cell in cells)
     known = [(share, cell) for share, cell in found if share is not None and isfinite(share)]
-    if not known:
-        return "The Monte Carlo share is not known for any picture."
-    most, worst = max(known, key=lambda pair: pair[0])
-    over = sum(share > MOST_SHARE for share, _ in known)
-    where = f"{report.levels[worst.level].name}, {worst.group}, {text.camera_name(worst.camera)}"
-    noise = " There, noise of the render counts as texture of the scene, and the metrics see it." if over else ""
-    return (
-        f"Largest Monte Carlo share: {text.percent(most)} ({where}); above the {text.percent(MOST_SHARE)} aim: "
-        f"{over} of {len(known)} pictures.{noise}"
-    )
+    return sorted(known, key=lambda pair: -pair[0])
 
 
-def budget_text(report: ReportData) -> str:
-    """Say what a plan predicts that its approximations add; empty where the pictures follow none."""
-    shares = [cell.first.budget_share for cell in report.cells if cell.first and cell.first.budget_share is not None]
-    if not shares:
-        return ""
-    return (
-        f"By the plan that the pictures follow, all its approximations together add at most {text.percent(max(shares))}"
-        " to the variance of the sensor's own noise."
-    )
-
-
-def seeds_text(seeds: Sequence[int]) -> str:
-    """Say how many seeds the numbers come from, and what that means for them."""
-    if len(seeds) == 1:
-        return f"One seed ({seeds[0]}): how far another draw of the noise would move the numbers is not known here."
-    return (
-        f"Means over {len(seeds)} seeds; ± and bands are the 95{text.NBSP}% confidence interval of the mean (Student's "
-        f"t), and where the intervals of two cameras overlap none leads. Pictures are those of seed {seeds[0]}."
-    )
+def budget_share(report: ReportData) -> float | None:
+    """Return the largest share of the noise variance that a plan predicts for all its approximations."""
+    shares = (cell.first.budget_share for cell in report.cells if cell.first)
+    return max((share for share in shares if share is not None), default=None)
 
 
 def titles(cameras: Sequence[str]) -> list[str]:
@@ -161,32 +135,3 @@ def titles(cameras: Sequence[str]) -> list[str]:
     if len(cameras) > MOST_NAMED:
         return [f"{len(cameras)} cameras"]
     return [text.CAMERA_TITLES.get(camera, text.camera_name(camera)) for camera in cameras]
-
-
-def render_rows(report: ReportData) -> list[list[str]]:
-    """Return each render's cost and error; the share is the largest of the pictures made from it."""
-    per_scene = len(report.cells) // len(report.scenes)
-    rows = []
-    for place, made in enumerate(report.renders):
-        own = [cell.figures["mc_share"] for cell in report.cells[place * per_scene : (place + 1) * per_scene]]
-        rows.append(
-            [
-                made.scene,
-                made.integrator or text.MISSING,
-                text.significant(made.spp),
-                text.significant(made.passes),
-                STOPPED_BY.get(made.stopped_by or "", made.stopped_by or text.MISSING),
-                text.significant(made.bands),
-                text.duration(made.seconds),
-                text.percent(made.relative_mc_error),
-                text.percent(max((share for share in own if share is not None), default=None)),
-                text.percent(made.brightest_share),
-            ]
-        )
-    return rows
-
-
-def stage_rows(stages: Mapping[str, float]) -> list[tuple[str, str, float]]:
-    """Return each stage with its time as text and as a share of the whole (0 to 100)."""
-    total = sum(stages.values()) or 1.0
-    return [(name, text.duration(seconds), round(100 * seconds / total, 2)) for name, seconds in stages.items()]

@@ -3,30 +3,19 @@
 from collections.abc import Mapping
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from studies.pages import report_text as text
+from studies.pages.page import own_file, write_out
 from studies.pages.plots import BLUE, CHART, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
-from studies.pages.report import TEMPLATES, data_uri
+from studies.pages.report import data_uri
 
 
 def bench_page(results: Mapping[str, Any]) -> str:
     """Return the HTML of a bench's results as `rodcone bench --json` prints them."""
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    style = (TEMPLATES / "report.css").read_text(encoding="utf-8")
     drawn = [(stage, data_uri(stage["name"], svg_text(plane(stage)).encode())) for stage in results["stages"]]
-    page = environment.get_template("bench.html.j2")
-    # The style is a file of this package, never input.
-    return page.render(results=results, stages=drawn, text=text, style=Markup(style))
+    return write_out("bench.html.j2", results=results, stages=drawn, text=text, style=own_file("report.css"))
 
 
 @rc_context(STYLE)

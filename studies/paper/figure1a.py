@@ -81,5 +81,4 @@ def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         f"One photograph of a cabinet: the left half at {DARK_CD_M2:g} cd/m², the right one at {LIT_CD_M2:g}. "
         "Beside it the same with the left half brightened on the screen: what the camera recorded there."
     )
-    description = "one photograph, its left half in the dark of night, its right half lit"
-    return PaperFigure("1a", caption, description, picture_rows(rows)), claims_1a(dark, lit)
+    return PaperFigure("1a", caption, picture_rows(rows)), claims_1a(dark, lit)

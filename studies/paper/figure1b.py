@@ -86,5 +86,4 @@ def figure_1b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     caption = (
         "The same scene at 100 cd/m², f/4 and 10 ms with pixels of 6 µm and of 2 µm; both pictures have as many pixels."
     )
-    description = "one scene with pixels of 6 and of 2 micrometres"
-    return PaperFigure("1b", caption, description, picture_rows([pictures])), claims
+    return PaperFigure("1b", caption, picture_rows([pictures])), claims

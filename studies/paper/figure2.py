@@ -152,8 +152,7 @@ def figure_2() -> tuple[PaperFigure, tuple[Claim, ...]]:
         "Electrons per photon of R, G, B and W, and the 2×2 tile. On the right W's gain in SNR over G, one pixel at "
         f"{SNR_EXPOSURE_S * 1e3:g} ms and f/2.8 under D65: the signal's ratio in the dark, less in light."
     )
-    description = "response over wavelength, the tile R G over B W, and W's gain in SNR over luminance"
-    return PaperFigure("2", caption, description, _drawing()), (*claims, *snr_claims(moon, bright, pure))
+    return PaperFigure("2", caption, _drawing()), (*claims, *snr_claims(moon, bright, pure))
 
 
 @rc_context(STYLE)

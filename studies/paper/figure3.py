@@ -96,5 +96,4 @@ def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         f"One exposure at {LUMINANCE_CD_M2:g} cd/m² and {EXPOSURE_S * 1e3:g} ms: R, G and B filled in bilinearly, W "
         "filled in, and the interleaved reconstruction with luminance substitution."
     )
-    description = "colour image, W image and the result of both, in low light"
-    return PaperFigure("3", caption, description, picture_rows(rows)), claims_3(stages)
+    return PaperFigure("3", caption, picture_rows(rows)), claims_3(stages)

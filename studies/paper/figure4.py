@@ -112,8 +112,7 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         f"W beside an edge at {next(iter(LEVELS))}, in units of noise, and the patches around x, y and z enlarged. "
         "The numbers are their distances."
     )
-    description = "an edge, and the patches around x, y and z"
-    return PaperFigure("4", caption, description, _drawing(parts)), claims_4(shares)
+    return PaperFigure("4", caption, _drawing(parts)), claims_4(shares)
 
 
 @rc_context(STYLE)

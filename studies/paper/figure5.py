@@ -136,8 +136,7 @@ def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             ]
         )
     caption = "R as recorded, W as recorded with much of it full, and the result, at 200 cd/m², 66 ms and 3 µm."
-    description = "R image, W image that is partly saturated, and the result"
-    return PaperFigure("5", caption, description, picture_rows(rows)), claims_5(found, gains_db)
+    return PaperFigure("5", caption, picture_rows(rows)), claims_5(found, gains_db)
 
 
 def _shoot(

@@ -135,8 +135,7 @@ def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             table.append([(f"{reading}: {own[0][0]}", own[0][1]), *own[1:]])
     claims = claims_6(bayer, interleaved, {name: swap(setup, seen, name) for name in READINGS})
     caption = "Bayer and interleaved with Table 1's pixel at 25 cd/m², by exposure time."
-    description = "Bayer above interleaved at 5, 10 and 20 ms, under both readings of Table 1"
-    return PaperFigure("6", caption, description, picture_rows(table)), claims
+    return PaperFigure("6", caption, picture_rows(table)), claims
 
 
 def swap(setup: Setup, seen: View, reading: str) -> Swap:

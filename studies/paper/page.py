@@ -5,23 +5,21 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from studies.pages import report_text as text
+from studies.pages.page import own_file, write_out
 from studies.pages.plots import svg_text
-from studies.pages.report import TEMPLATES, data_uri
+from studies.pages.report import data_uri
 from studies.paper.checks import VERDICTS, Check, Claim
 
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """A figure: the paper's number, its caption, what it shows for those who don't see it, and the drawing."""
+    """A figure: the paper's number, its caption, and the drawing."""
 
     name: str
     caption: str
-    description: str
     drawing: Figure
 
 
@@ -45,13 +43,6 @@ def value_text(check: Check) -> str:
     return f"{shown}\N{NO-BREAK SPACE}{check.unit}" if check.unit else shown
 
 
-def summary(claims: Sequence[Claim]) -> str:
-    """How many claims have which verdict, as a sentence."""
-    counts = [(verdict, sum(claim.verdict == verdict for claim in claims)) for verdict in VERDICTS]
-    parts = [f"{count} {'is' if count == 1 else 'are'} {verdict}" for verdict, count in counts if count]
-    return f"Of {len(claims)} claims, {text.join(parts)}."
-
-
 def paper_page(figures: Sequence[PaperFigure], claims: Sequence[Claim], facts: Mapping[str, Any]) -> str:
     """Write the page.
 
@@ -62,23 +53,13 @@ def paper_page(figures: Sequence[PaperFigure], claims: Sequence[Claim], facts: M
     facts : mapping
         Set-up and versions, as `studies.paper.paper.Paper` has them.
     """
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    styles = ("report.css", "paper.css")
-    style = "\n".join((TEMPLATES / name).read_text(encoding="utf-8") for name in styles)
-    drawn = [(figure, data_uri(figure.name, svg_text(figure.drawing).encode())) for figure in figures]
-    return environment.get_template("paper.html.j2").render(
-        figures=drawn,
+    return write_out(
+        "paper.html.j2",
+        figures=[(figure, data_uri(figure.name, svg_text(figure.drawing).encode())) for figure in figures],
         claims=claims,
         facts=facts,
-        summary=summary(claims),
         verdicts=VERDICTS,
         value_text=value_text,
         range_text=range_text,
-        style=Markup(style),  # files of this package, never input
+        style=own_file("report.css") + own_file("paper.css"),
     )

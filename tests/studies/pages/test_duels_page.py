@@ -7,16 +7,7 @@ from typing import Any
 import pytest
 import sweep_sample as ROWS
 import sweep_sample as SAMPLE
-
-from isp.processors import catalogue as processors
-from isp.processors.catalogue import PROCESSORS, require_libraries
-from rodcone.errors import InputError
-from studies.commands.cli import main
-from studies.pages import duels_page as opponents_page
 from studies.pages.drawing import Line, Text
-from studies.pages.duels import cases_of
-from studies.pages.duels_figure import figure_of, hardest
-from studies.pages.duels_page import page_of, write_page
 from studies.pages.duels_text import (
     beside,
     best_by_light,
@@ -27,6 +18,15 @@ from studies.pages.duels_text import (
     level_text,
     loss_table,
 )
+
+from isp.processors import catalogue as processors
+from isp.processors.catalogue import PROCESSORS, require_libraries
+from rodcone.errors import InputError
+from studies.commands.cli import main
+from studies.pages import duels_page as opponents_page
+from studies.pages.duels import cases_of
+from studies.pages.duels_figure import figure_of, hardest
+from studies.pages.duels_page import page_of, write_page
 from studies.pages.report_text import PSNR
 from studies.study.study_file import read_study
 from studies.sweep.row import Row
