@@ -113,8 +113,8 @@ def finding_rows(report: ReportData, cells: Sequence[ReportCell]) -> list[list[s
 def leads(report: ReportData) -> list[tuple[str, int]]:
     """Return in how many conditions each camera leads in PSNR, and in how many none does."""
     leaders = [text.leader(text.PSNR, condition)[0] for condition in report.conditions]
-    led = [cell.camera if cell else "none" for cell in leaders]
-    return [(text.camera_name(camera), led.count(camera)) for camera in (*report.cameras, "none")]
+    led = [cell.camera if cell else "no lead" for cell in leaders]
+    return [(text.camera_name(camera), led.count(camera)) for camera in (*report.cameras, "no lead")]
 
 
 def known_shares(cells: Sequence[ReportCell]) -> list[tuple[float, ReportCell]]:

@@ -253,7 +253,7 @@ def test_summary_states_wins_and_losses() -> None:
         return replace(row, psnr_db=psnr_db, ssim=0.5, delta_e_median=5.0 if row.processor == "bayer" else 6.5)
 
     page = unescape(page_of(SAMPLE.sample_report(led))).replace("\N{NO-BREAK SPACE}", " ")
-    assert "PSNR over 14 conditions, by who leads: Interleaved 6, Bayer 8, none 0." in page
+    assert "Best PSNR in 14 conditions: Interleaved 6, Bayer 8, no lead 0." in page
     table = page[page.index('<table class="cells leads">') : page.index("</table>")]
     rows = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", table)]
     assert rows[0] == ["Level", *(f"{name} led by" for name in ("PSNR", "SSIM", "ΔE2000, median")),
