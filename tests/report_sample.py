@@ -172,7 +172,7 @@ def sample_views() -> ReportData:
 def _encode(linear: np.ndarray) -> bytes:
     file = BytesIO()
     Image.fromarray((255 * np.clip(linear, 0, 1) ** (1 / 2.2)).round().astype(np.uint8)).save(
-        file, "WEBP", lossless=True, quality=0, method=0
+        file, "PNG", compress_level=1
     )
     return file.getvalue()
 

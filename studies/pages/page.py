@@ -1,5 +1,6 @@
 """Pages from the templates beside this module: everything that is put into them is escaped."""
 
+from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,11 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 TEMPLATES = Path(__file__).parent / "templates"
+
+
+def address(kind: str, picture: bytes) -> str:
+    """Return a picture as a ``data:`` address; `kind` is ``png`` or ``svg+xml``."""
+    return f"data:image/{kind};base64,{b64encode(picture).decode('ascii')}"
 
 
 def own_file(name: str) -> Markup:

@@ -9,10 +9,9 @@ from collections.abc import Mapping
 from hashlib import sha256
 from typing import Any
 
-from rodcone.errors import InputError
 from studies.budget.budget import MOST_SHARE, OF_PIXELS
 from studies.pages import report_text as text
-from studies.pages.page import own_file, write_out
+from studies.pages.page import address, own_file, write_out
 from studies.pages.report_charts import SHARE, group_charts, shown_metrics, speed_charts, speed_rows
 from studies.pages.report_data import ReportData
 from studies.pages.report_view import (
@@ -27,19 +26,6 @@ from studies.pages.report_view import (
 )
 
 
-def data_uri(name: str, picture: bytes) -> str:
-    """Return `picture` as a ``data:`` address; its type comes from its first bytes."""
-    if picture.startswith(b"\x89PNG\r\n\x1a\n"):
-        kind = "png"
-    elif picture[:4] == b"RIFF" and picture[8:12] == b"WEBP":
-        kind = "webp"
-    elif picture.startswith(b"<svg"):
-        kind = "svg+xml"
-    else:
-        raise InputError(f"picture {name!r}: starts with {picture[:8]!r}; allowed: PNG, WebP; encode it as one of them")
-    return f"data:image/{kind};base64,{b64encode(picture).decode('ascii')}"
-
-
 def page_view(report: ReportData, pictures: Mapping[str, bytes]) -> dict[str, Any]:
     """Return the template's variables."""
     data = viewer_data(report)
@@ -47,7 +33,7 @@ def page_view(report: ReportData, pictures: Mapping[str, bytes]) -> dict[str, An
     speed = speed_rows(report)
     view_names = text.view_names([scene.name for scene in report.scenes], report.spectra)
     per_view, per_cells = len(data["groups"]) // len(view_names), len(report.cells) // len(view_names)
-    addresses = {name: data_uri(name, picture) for name, picture in pictures.items()}
+    addresses = {name: address("png", picture) for name, picture in pictures.items()}
     return {
         "report": report,
         "data": data,
@@ -96,7 +82,7 @@ def render_report(report: ReportData, pictures: Mapping[str, bytes]) -> str:
     ----------
     report : ReportData
     pictures : mapping of str to bytes
-        PNG or WebP files by the names that cells and truths have for them.
+        PNG files by the names that cells and truths have for them.
 
     Returns
     -------

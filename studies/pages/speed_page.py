@@ -7,14 +7,13 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from studies.pages import report_text as text
-from studies.pages.page import own_file, write_out
+from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import BLUE, CHART, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
-from studies.pages.report import data_uri
 
 
 def bench_page(results: Mapping[str, Any]) -> str:
     """Return the HTML of a bench's results as `rodcone bench --json` prints them."""
-    drawn = [(stage, data_uri(stage["name"], svg_text(plane(stage)).encode())) for stage in results["stages"]]
+    drawn = [(stage, address("svg+xml", svg_text(plane(stage)).encode())) for stage in results["stages"]]
     return write_out("bench.html.j2", results=results, stages=drawn, text=text, style=own_file("report.css"))
 
 

@@ -8,9 +8,8 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from studies.pages import report_text as text
-from studies.pages.page import own_file, write_out
+from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import svg_text
-from studies.pages.report import data_uri
 from studies.paper.checks import VERDICTS, Check, Claim
 
 
@@ -55,7 +54,7 @@ def paper_page(figures: Sequence[PaperFigure], claims: Sequence[Claim], facts: M
     """
     return write_out(
         "paper.html.j2",
-        figures=[(figure, data_uri(figure.name, svg_text(figure.drawing).encode())) for figure in figures],
+        figures=[(figure, address("svg+xml", svg_text(figure.drawing).encode())) for figure in figures],
         claims=claims,
         facts=facts,
         verdicts=VERDICTS,

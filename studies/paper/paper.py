@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib import metadata
 from pathlib import Path
@@ -90,14 +90,7 @@ def as_json(paper: Paper) -> dict[str, Any]:
             "claim": claim.text,
             "verdict": claim.verdict,
             "checks": [
-                {
-                    "condition": check.condition,
-                    "value": _finite(check.value),
-                    "low": _finite(check.low),
-                    "high": _finite(check.high),
-                    "unit": check.unit,
-                    "holds": check.holds,
-                }
+                {name: _finite(value) for name, value in asdict(check).items()} | {"holds": check.holds}
                 for check in claim.checks
             ],
             "note": claim.note,
@@ -108,6 +101,6 @@ def as_json(paper: Paper) -> dict[str, Any]:
     return {**paper.facts, "verdicts": count, "claims": claims}
 
 
-def _finite(value: float) -> float | None:
+def _finite(value: float | str) -> float | str | None:
     """Number as JSON has it: none for what isn't finite."""
-    return value if abs(value) < float("inf") else None
+    return value if isinstance(value, str) or abs(value) < float("inf") else None
