@@ -11,13 +11,14 @@ DEMO_OUT ?= out/demo
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-plain-cpu verify faults docs fuzz lint clean FORCE
+.PHONY: help demo test test-plain-cpu verify hard-cases faults docs fuzz lint clean FORCE
 
 help:
 	@echo "make demo    set up $(VENV), render the still life from moonlight to daylight, write $(DEMO_OUT)/report.html"
 	@echo "make test    set up $(VENV), lint, types, import contracts and every test that is not slow"
 	@echo "make test-plain-cpu  the same tests with every instruction set beyond NumPy's baseline off"
 	@echo "make verify  slow tests, hard cases, planted faults, damaged files, soak: hours; goes on where it was ended"
+	@echo "make hard-cases  a hundred hard cases with the margin by which each invariant is kept, as docs/hard_cases.md"
 	@echo "make faults  plant the faults of tests/faults one by one and show that a test notices each (resumable)"
 	@echo "make docs    the documentation, with its figures made anew where the code has changed, as out/site"
 	@echo "make lint    ruff, mypy and the import contracts alone"
@@ -37,6 +38,9 @@ test-plain-cpu: $(VENV)/installed-dev
 
 verify: $(VENV)/installed-dev
 	@$(BIN)/python tests/verification/verify.py
+
+hard-cases: $(VENV)/installed-dev
+	@PYTHONPATH=tests $(BIN)/python -m hard.page
 
 faults: $(VENV)/installed-dev
 	@$(BIN)/python tests/faults/plant_faults.py

@@ -99,13 +99,17 @@ def decisions_page() -> str:
 def api_page() -> str:
     """List of the packages, in the order in which light goes through them."""
     rows = [f"| [`{name}`]({name}/index.md) | {summary(ROOT / name / '__init__.py')} |" for name in PACKAGES]
-    told = "Imports point one way: `studies > isp > (scenes | sensor) > render > rodcone`. The commands: [Commands](commands.md)."
+    order = "`studies > isp > (scenes | sensor) > render > rodcone`"
+    told = f"Imports point one way: {order}. The commands: [Commands](commands.md)."
     return f"# API\n\n{told}\n\n| package | what |\n|---|---|\n" + "\n".join(rows)
 
 
 def package_page(package: str) -> str:
     """List of a package's modules, a line each."""
-    rows = [f"| [`{name}`]({name}.md) | {summary(ROOT.joinpath(package, *name.split('.')).with_suffix('.py'))} |" for name in modules(package)]
+    rows = [
+        f"| [`{name}`]({name}.md) | {summary(ROOT.joinpath(package, *name.split('.')).with_suffix('.py'))} |"
+        for name in modules(package)
+    ]
     text = summary(ROOT / package / "__init__.py")
     return f"# {package}\n\n{text}\n\n| module | what |\n|---|---|\n" + "\n".join(rows)
 

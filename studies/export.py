@@ -1,5 +1,5 @@
 """Name that written code imports: `studies.sweep.export` under its earlier path."""
 
-from studies.sweep.export import read_rows
+from studies.sweep.export import read_rows, to_pandas
 
-__all__ = ["read_rows"]
+__all__ = ["read_rows", "to_pandas"]

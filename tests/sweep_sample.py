@@ -12,7 +12,6 @@ import numpy as np
 
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
-from sensor.presets import preset
 from studies.budget.model_plan import Plan, as_stated
 from studies.study.study import SceneChoice, Study
 from studies.sweep.cells import Cell
@@ -97,7 +96,7 @@ def small_study(folder: Path, **changes: Any) -> Study:
 
 
 def stated(study: Study) -> Plan:
-    return as_stated(study, {name: preset(name).lens for name in study.sensors})
+    return as_stated(study)
 
 
 def here(cells: Sequence[Cell]) -> Iterator[Row]:

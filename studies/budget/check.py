@@ -17,7 +17,7 @@ from sensor.variations import vary
 from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger
 from studies.budget.model_plan import Plan
 from studies.study.lit_scene import level_luminance, make_transport, open_all, under
-from studies.study.model import ImageModel, modelled
+from studies.study.model import ImageModel
 from studies.study.study import Condition, SceneChoice, Study
 
 REFERENCE_SEED = 1 << 33  # added to the study's: the reference's render is independent of plan and pilot
@@ -123,7 +123,7 @@ def model_electrons(transport: Transport, row: Ledger, model: ImageModel) -> NDA
     condition: Condition = row.condition
     lit = under(transport, condition.spectrum)
     level = level_luminance(condition.level, lit.illuminance_lux(1.0))
-    sensor = modelled(vary(preset(condition.sensor), row.mosaic), model)
+    sensor = replace(vary(preset(condition.sensor), row.mosaic), lens=model.lens)
     image = form_image(lit.relight(luminance_cd_m2=level), sensor)
     if model.exact:
         return expected_electrons(image, sensor, row.exposure_s)

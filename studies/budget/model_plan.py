@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sensor.config import LensConfig
+from sensor.presets import preset
 from studies.budget.ledger import Ledger
 from studies.study.model import ImageModel, RenderModel
 from studies.study.study import Condition, SceneChoice, Study, conditions
@@ -29,15 +29,13 @@ class Plan:
         return plan_html(self)
 
 
-def as_stated(study: Study, lenses: Mapping[str, LensConfig]) -> Plan:
+def as_stated(study: Study) -> Plan:
     """Plan without a budget: bands and samples as the study states, lenses as the sensors state."""
     low, high = study.render.range_nm
     edges = np.linspace(low, high, max(1, round((high - low) / study.render.band_nm)) + 1)
     render = RenderModel(
         tuple(((edges[1:] + edges[:-1]) / 2).tolist()), tuple(np.diff(edges).tolist()), study.render.spp
     )
-    images = {}
-    for condition in conditions(study):
-        lens = lenses[condition.sensor]
-        images[condition] = ImageModel(lens.diffraction, lens.veiling_glare, lens.horizontal_view_deg)
-    return Plan(dict.fromkeys(study.scenes, render), images)
+    lenses = {name: preset(name).lens for name in study.sensors}
+    images = {condition: ImageModel(lenses[condition.sensor]) for condition in conditions(study)}
+    return Plan(renders=dict.fromkeys(study.scenes, render), images=images)

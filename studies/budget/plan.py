@@ -16,7 +16,7 @@ from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.budget.bands import counts, fine_bands, groups_of, wide_bands
-from studies.budget.choice import Choice, choose
+from studies.budget.choice import choose
 from studies.budget.ledger import KERNEL, Ledger, PilotNoise, Weighed, ledger, weigh
 from studies.budget.model_plan import Plan
 from studies.budget.terms import LENS_TERMS, effects, horizontal_view_deg
@@ -78,9 +78,12 @@ def plan(study: Study, *, cache: Path | None = None, step: Step = lambda what, s
             nm, width_nm = wide_bands(pilot.transport, pilot.groups[choice.count])
             renders[opened.choice] = RenderModel(tuple(nm.tolist()), tuple(width_nm.tolist()), choice.spp)
         for row in rows:
-            images[row.condition] = _image(full_lens(study, pilot, preset(row.condition.sensor)), choice, row.condition)
-            ledgers.append(ledger(row, choice.count, choice.spp, choice.left_out[row.condition]))
-    return Plan(renders, images, _worst(ledgers), tuple(ledgers))
+            left_out = choice.left_out[row.condition]
+            lens = full_lens(study, preset(row.condition.sensor).lens, pilot.view_deg)
+            without = {field: 0.0 for name, field in LENS_TERMS.items() if name in left_out}
+            images[row.condition] = ImageModel(replace(lens, **without), exact=KERNEL not in left_out)
+            ledgers.append(ledger(row, choice.count, choice.spp, left_out))
+    return Plan(renders=renders, images=images, shares=_worst(ledgers), ledgers=tuple(ledgers))
 
 
 def reference_plan(study: Study) -> Plan:
@@ -93,9 +96,9 @@ def reference_plan(study: Study) -> Plan:
             renders[opened.choice] = RenderModel(tuple(nm.tolist()), tuple(width_nm.tolist()), spp)
         for condition in conditions(study):
             if condition.scene == opened.choice:
-                lens = _full_lens(study, preset(condition.sensor).lens, _view_deg(opened))
-                images[condition] = ImageModel(lens.diffraction, lens.veiling_glare, lens.horizontal_view_deg, True)
-    return Plan(renders, images)
+                lens = full_lens(study, preset(condition.sensor).lens, _view_deg(opened))
+                images[condition] = ImageModel(lens)
+    return Plan(renders=renders, images=images)
 
 
 def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> Pilot:
@@ -123,12 +126,8 @@ def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> 
     return Pilot(opened, transport, groups, True, _view_deg(opened))
 
 
-def full_lens(study: Study, pilot: Pilot, sensor: SensorConfig) -> LensConfig:
+def full_lens(study: Study, lens: LensConfig, view_deg: float) -> LensConfig:
     """Lens of the reference: what the sensor's own states, and what it leaves out as the study states it."""
-    return _full_lens(study, sensor.lens, pilot.view_deg)
-
-
-def _full_lens(study: Study, lens: LensConfig, view_deg: float) -> LensConfig:
     asked = study.lens
     view = view_deg if asked.horizontal_view_deg is None else asked.horizontal_view_deg
     return replace(
@@ -160,7 +159,7 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
             auto_s = _auto_s(lit, preset(name))
             for mosaic in mosaics(study):
                 sensor = vary(preset(name), mosaic)
-                found = effects(lit, sensor, full_lens(study, pilot, sensor), pilot.groups, rng)
+                found = effects(lit, sensor, full_lens(study, sensor.lens, pilot.view_deg), pilot.groups, rng)
                 for condition in conditions(study):
                     if (condition.scene, condition.spectrum, condition.sensor) == (pilot.opened.choice, spectrum, name):
                         level = level_luminance(condition.level, lux)
@@ -184,12 +183,6 @@ def _auto_s(transport: Transport, sensor: SensorConfig) -> float:
     bare = replace(sensor.lens, diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0, defocus_um=0.0)
     plain = replace(sensor, lens=bare)
     return auto_exposure_s(form_image(transport.relight(luminance_cd_m2=1.0), plain), plain, _FOREVER_S)
-
-
-def _image(lens: LensConfig, choice: Choice, condition: Condition) -> ImageModel:
-    left_out = choice.left_out[condition]
-    kept = {field: 0.0 if name in left_out else getattr(lens, field) for name, field in LENS_TERMS.items()}
-    return ImageModel(**kept, exact=KERNEL not in left_out)
 
 
 def _worst(ledgers: Sequence[Ledger]) -> dict[Condition, float]:

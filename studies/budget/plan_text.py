@@ -11,6 +11,7 @@ from studies.budget.choice import image_ns, render_ns
 from studies.budget.ledger import KERNEL, MONTE_CARLO, Ledger, Term
 from studies.budget.model_plan import Plan
 from studies.budget.terms import LENS_TERMS
+from studies.study.model import ImageModel
 from studies.study.study import SceneChoice, Study, label
 
 EVERYTHING = (*LENS_TERMS, KERNEL)
@@ -30,8 +31,12 @@ def plan_json(study: Study, plan: Plan, reference: Plan) -> dict[str, Any]:
             }
             for scene, model in plan.renders.items()
         ],
-        "conditions": [asdict(row) | {"image": asdict(plan.images[row.condition])} for row in plan.ledgers],
+        "conditions": [asdict(row) | {"image": _image_json(plan.images[row.condition])} for row in plan.ledgers],
     }
+
+
+def _image_json(model: ImageModel) -> dict[str, Any]:
+    return {field: getattr(model.lens, field) for field in LENS_TERMS.values()} | {"exact": model.exact}
 
 
 def plan_table(plan: Plan) -> Table:
@@ -111,7 +116,7 @@ def cost_over_reference(plan: Plan, reference: Plan, scene: SceneChoice) -> floa
         for row in plan.ledgers:
             if row.condition.scene == scene:
                 image = model.images[row.condition]
-                kept = [name for name, field in LENS_TERMS.items() if getattr(image, field)]
+                kept = [name for name, field in LENS_TERMS.items() if getattr(image.lens, field)]
                 cost += image_ns(bands, [*kept, KERNEL] if image.exact else kept)
         costs.append(cost)
     return costs[0] / costs[1]

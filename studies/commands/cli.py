@@ -121,7 +121,6 @@ app.command("studies.commands.paper:paper", name="paper", help="Compute the pape
 app.command("studies.commands.plan:plan", name="plan", help="Compute a study's error budget and the cheapest model.")
 app.command("studies.commands.render:render", name="render", help="Render a scene into a spectral OpenEXR file.")
 app.command("studies.commands.report:report", name="report", help="Write the report of a sweep as one HTML file.")
-app.command("studies.stress_command:stress", name="stress", help="Measure hard cases by the invariants they keep.")
 app.command(
     "studies.commands.sweep:sweep", name="sweep", help="Make every picture of a study, and go on after any end."
 )

@@ -2,7 +2,7 @@
 
 import json as notation
 import sys
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,10 +11,9 @@ from cyclopts import Parameter
 
 from render.engine import render as render_transport
 from render.illuminants import illuminant
-from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
-from render.scene import LightGroup, Scene
+from render.scene import Scene
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
@@ -23,33 +22,17 @@ from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import progress
 from studies.pages.results import render_facts
+from studies.study.lit_scene import spectral_luminance
 from studies.study.scene_source import asked_level, open_scene
 
 MOST_BANDS = 1000
 INTERRUPTED = 130  # exit code after Ctrl-C: 128 + SIGINT
 
 
-@dataclass(frozen=True)
-class Order:
-    """What to render, as it stands on the command line."""
-
-    source: str
-    out: Path
-    height: int | None = None
-    width: int | None = None
-    bands: str | None = None
-    light: tuple[str, ...] = ()
-    level: str | None = None
-    limits: dict[str, Any] = field(default_factory=dict)  # spp, noise, max_seconds, max_depth, seed, cache
-    trust: bool = False
-    extend: str | None = None
-    force: bool = False
-
-
 def render(
     source: str,
     *,
-    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("render.radiance_files.exr"),
+    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("render.exr"),
     height: int | None = None,
     width: int | None = None,
     bands: str | None = None,
@@ -112,52 +95,43 @@ def render(
     json
         Print one JSON object with the path and facts of the render instead of the path.
     """
-    limits = {"spp": spp, "noise": noise, "max_seconds": max_seconds, "max_depth": max_depth, "seed": seed}
-    lights = tuple(light or ())
-    limited = {**limits, "cache": cache}
-    order = Order(source, out, height, width, bands, lights, level, limited, trust_scene, extend, force)
-    facts = run(order)
-    for note in facts["notes"]:
-        print(f"rodcone: {note}", file=sys.stderr)
-    if facts["stopped_by"] == "interrupt":
-        print(f"rodcone: stopped; {facts['spp']} samples a pixel are kept in {out}", file=sys.stderr)
-    print(notation.dumps(facts) if json else out)
-    return INTERRUPTED if facts["stopped_by"] == "interrupt" else 0
-
-
-def run(order: Order) -> dict[str, Any]:
-    """Render and write the file; gives the facts of the render.
-
-    Raises
-    ------
-    InputError
-        For anything in `order` that isn't allowed, before anything is rendered.
-    OSError
-        Where the file can't be written; what can be told before the render is.
-    """
-    if order.out.suffix.lower() != ".exr":
-        raise InputError(f"out: {str(order.out)!r} is not allowed; give a file ending in .exr")
-    nm, widths = _bands(order.bands)
-    opened = open_scene(order.source, order.trust, order.extend)
-    scene, size = opened.scene, _size(opened.size, order.height, order.width)
-    spectra = _spectra(scene, order.light)
-    luminance_cd_m2, illuminance_lux = asked_level(scene, order.level)
-    count = DEFAULT_WAVELENGTH_NM.size if nm is None else nm.size
-    require_memory(memory(size[0] * size[1], count, len(scene.groups)), order.force)
-    check_place(order.out)
+    # What can be told before the render
+    if out.suffix.lower() != ".exr":
+        raise InputError(f"out: {str(out)!r} is not allowed; give a file ending in .exr")
+    wavelength_nm, width_nm = _bands(bands)
+    opened = open_scene(source, trust_scene, extend)
+    scene, size = opened.scene, _size(opened.size, height, width)
+    spectra = _spectra(scene, light or ())
+    luminance_cd_m2, illuminance_lux = asked_level(scene, level)
+    count = DEFAULT_WAVELENGTH_NM.size if wavelength_nm is None else wavelength_nm.size
+    require_memory(memory(size[0] * size[1], count, len(scene.groups)), force)
+    check_place(out)
+    # Render and write
     with progress(sys.stderr) as step:
         step("render", 0.0)
         transport = render_transport(
             scene,
             size,
-            wavelength_nm=nm,
-            width_nm=widths,
+            wavelength_nm=wavelength_nm,
+            width_nm=width_nm,
+            spp=spp,
+            noise=noise,
+            max_seconds=max_seconds,
+            max_depth=max_depth,
+            seed=seed,
+            cache=cache,
             progress=lambda share, error: step(f"render, relative error {error:.3f}", share),
-            **order.limits,
         )
     radiance = transport.relight(spectra, luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
-    write_exr(order.out, radiance, scene=scene.name)
-    return _facts(order, opened, transport, radiance)
+    write_exr(out, radiance, scene=scene.name)
+    # Tell
+    for note in opened.notes:
+        print(f"rodcone: {note}", file=sys.stderr)
+    interrupted = transport.stopped_by == "interrupt"
+    if interrupted:
+        print(f"rodcone: stopped; {transport.spp} samples a pixel are kept in {out}", file=sys.stderr)
+    print(notation.dumps({"path": str(out), **_facts(opened, transport, radiance)}) if json else out)
+    return INTERRUPTED if interrupted else 0
 
 
 def _bands(text: str | None) -> tuple[Floats | None, Floats | None]:
@@ -188,7 +162,7 @@ def _size(own: tuple[int, int], height: int | None, width: int | None) -> tuple[
     return (max(1, round(width * own[0] / own[1])), width) if width is not None else own
 
 
-def _spectra(scene: Scene, lights: tuple[str, ...]) -> dict[str, Spectrum]:
+def _spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
     """Illuminants by light group, each at the luminance of the group's own spectrum."""
     found: dict[str, Spectrum] = {}
     for text in lights:
@@ -196,28 +170,21 @@ def _spectra(scene: Scene, lights: tuple[str, ...]) -> dict[str, Spectrum]:
         if not group or not name:
             raise InputError(f"light: {text!r} is not allowed; write GROUP=ILLUMINANT, such as lamp=A")
         require_keys(f"scene {scene.name}: light group", [group], scene.groups)
-        found[group] = illuminant(name) * _luminance(scene, group, scene.groups[group])
+        lit = scene.groups[group]
+        own = spectral_luminance(lit.spectrum)
+        if lit.own_colour or own <= 0:
+            why = "has colours of its own" if lit.own_colour else "is dark"
+            raise InputError(f"light: group {group!r} of scene {scene.name} {why}; leave it as it is")
+        found[group] = illuminant(name) * own
     return found
 
 
-def _luminance(scene: Scene, name: str, group: LightGroup) -> float:
-    """Luminance of a group's spectrum at power 1, which another illuminant is brought to."""
-    if group.own_colour:
-        raise InputError(f"light: group {name!r} of scene {scene.name} has colours of its own; leave it as it is")
-    nm, width = np.arange(360.5, 830.0), np.ones(470)  # as in `render.illuminants.unit_luminance`
-    own = float(luminance(group.spectrum.band_average(nm, width), nm, width))
-    if own <= 0:
-        raise InputError(f"light: group {name!r} of scene {scene.name} is dark; give it a spectrum in the scene")
-    return own
-
-
-def _facts(order: Order, opened: SceneFile, transport: Transport, radiance: SpectralRadiance) -> dict[str, Any]:
+def _facts(opened: SceneFile, transport: Transport, radiance: SpectralRadiance) -> dict[str, Any]:
     groups = {
         name: {"emitters": list(group.emitters), "power": group.power, "own_colour": group.own_colour}
         for name, group in opened.scene.groups.items()
     }
     return {
-        "path": str(order.out),
         "scene": opened.scene.name,
         "size": list(radiance.shape[:2]),
         **render_facts(transport),

@@ -16,7 +16,6 @@ from isp.processors.catalogue import require_libraries
 from rodcone.errors import InputError, require_whole
 from rodcone.memory import Memory, require_memory
 from rodcone.progress import progress
-from sensor.presets import preset
 from studies.budget.model_plan import Plan
 from studies.budget.model_plan import as_stated as plan_as_stated
 from studies.budget.plan import plan as plan_study
@@ -148,17 +147,13 @@ def _plan(study: Study, out: Path, reference: bool, stated: bool, step: Step) ->
     if reference:
         return reference_plan(study)
     if stated:
-        return _as_stated(study)
+        return plan_as_stated(study)
     return plan_study(study, cache=out / PILOTS, step=lambda what, share: step(f"plan: {what}", 0.0))
-
-
-def _as_stated(study: Study) -> Plan:
-    return plan_as_stated(study, {name: preset(name).lens for name in study.sensors})
 
 
 def _estimated(study: Study, out: Path, reference: bool, workers: int) -> Estimate:
     """Estimate without a plan's pilot renders: the study as stated is the most that a plan chooses."""
-    plan = reference_plan(study) if reference else _as_stated(study)
+    plan = reference_plan(study) if reference else plan_as_stated(study)
     return estimate(study, plan, open_all(study), workers, len(read_rows(out)) if (out / FILE).is_file() else 0)
 
 

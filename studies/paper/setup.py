@@ -94,7 +94,7 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
     spp = max(1, round(setup.spp * _SPP_SHARE.get(scene, 1.0)))
     study = Study((SceneChoice(scene),), ("1cd/m2",), render=RenderLimits(setup.size, setup.band_nm, spp))
     opened = open_choice(study.scenes[0], study)
-    model = as_stated(study, {name: preset(name).lens for name in study.sensors}).renders[opened.choice]
+    model = as_stated(study).renders[opened.choice]
     folder = setup.out / SWEEP / RENDERS  # the sweeps' own: one render serves them and this
     transport = make_transport(opened, study, model, folder, lambda share, _: setup.step(f"render {scene}", share))
     group = transport.groups[white or next(iter(transport.groups))]
@@ -110,6 +110,6 @@ def swept(setup: Setup, figure: str) -> list[Row]:
         render=RenderLimits(setup.size, setup.band_nm, setup.spp),
     )
     folder = setup.out / SWEEP
-    plan = as_stated(study, {name: preset(name).lens for name in study.sensors})
+    plan = as_stated(study)
     sweep(study, folder, plan, partial(run, executor=InThisProcess()), setup.step)
     return read_rows(folder)

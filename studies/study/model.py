@@ -1,8 +1,8 @@
-"""What is modelled: how each scene is rendered, and which terms of the lens each condition's image holds."""
+"""What is modelled: how each scene is rendered, and what each condition's image holds."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from sensor.config import SensorConfig
+from sensor.config import LensConfig
 
 
 @dataclass(frozen=True)
@@ -16,23 +16,10 @@ class RenderModel:
 
 @dataclass(frozen=True)
 class ImageModel:
-    """Terms of the lens, as `sensor.config.LensConfig` has them (0: left out), and the readout.
+    """The lens whose terms an image holds (0: left out), and the readout.
 
-    `exact` reads out in NumPy; otherwise `sensor.kernel.run.read_frame` does in single precision.
+    `exact` reads out in NumPy's double precision; otherwise Dr.Jit does in single precision, where it runs.
     """
 
-    diffraction: float
-    veiling_glare: float
-    horizontal_view_deg: float
+    lens: LensConfig
     exact: bool = True
-
-
-def modelled(sensor: SensorConfig, model: ImageModel) -> SensorConfig:
-    """Sensor whose lens has the model's terms."""
-    lens = replace(
-        sensor.lens,
-        diffraction=model.diffraction,
-        veiling_glare=model.veiling_glare,
-        horizontal_view_deg=model.horizontal_view_deg,
-    )
-    return replace(sensor, lens=lens)

@@ -27,11 +27,9 @@ from sensor.response import expected_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
 from studies.study.lit_scene import OpenedScene, white_spectrum
-from studies.study.model import ImageModel, modelled
 from studies.sweep.provenance import versions
 from studies.sweep.stored import is_whole, keep
 
-_PLAIN = ImageModel(diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0)
 _DARK_S = 1e7  # what `auto_exposure_s` answers where there is no light: longer than any exposure
 
 
@@ -158,7 +156,8 @@ def _auto_s(radiance: SpectralRadiance, preset: SensorConfig) -> float:
     It is the same for every processor and every model of the lens, so that their pictures can be compared: the preset's
     own mosaic behind a lens that spreads no light.
     """
-    plain = modelled(replace(preset, lens=replace(preset.lens, defocus_um=0.0)), _PLAIN)
+    bare = replace(preset.lens, diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0, defocus_um=0.0)
+    plain = replace(preset, lens=bare)
     return auto_exposure_s(form_image(radiance, plain), plain, _DARK_S)
 
 

@@ -2,7 +2,7 @@
 
 import sqlite3
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ from sensor.variations import vary
 from studies.budget.model_plan import Plan
 from studies.photograph.clock import Clock
 from studies.study.lit_scene import OpenedScene, level_luminance, make_transport, under, white_spectrum
-from studies.study.model import ImageModel, modelled
+from studies.study.model import ImageModel
 from studies.study.study import Condition, Study, conditions, parse_exposure
 from studies.sweep.cells import Cell, cell_key, coordinates
 from studies.sweep.database import RenderRecord, note_render, render_record
@@ -128,7 +128,7 @@ def _conditions(job: Job, opened: OpenedScene) -> Iterator[Condition]:
 def _sensors(variant: Variant) -> tuple[SensorConfig, SensorConfig]:
     """Preset of a variant, and the sensor that is modelled."""
     own = preset(variant.sensor)
-    return own, modelled(vary(own, PROCESSORS[variant.processor].mosaic), variant.model)
+    return own, replace(vary(own, PROCESSORS[variant.processor].mosaic), lens=variant.model.lens)
 
 
 def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: Transport) -> None:

@@ -74,7 +74,7 @@ def sweep(
     out : Path
         Folder; made where it isn't there.
     plan : Plan
-        Of `studies.study.model.as_stated`, `studies.budget.plan.plan` or `reference_plan`.
+        Of `studies.budget.model_plan.as_stated`, `studies.budget.plan.plan` or `reference_plan`.
     runner : callable
         Takes cells, gives rows as they come.
     step : callable

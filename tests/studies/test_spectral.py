@@ -105,7 +105,7 @@ def test_under_low_pressure_sodium_all_colours_collapse_and_under_d65_none_do() 
 def test_a_study_renders_the_range_that_it_asks_for() -> None:
     far = Study((SceneChoice("color_checker"),), ("1lux",), render=RenderLimits(range_nm=(380.0, 1070.0)))
     check(far)
-    (model,) = as_stated(far, {"low_noise": preset("low_noise").lens}).renders.values()
+    (model,) = as_stated(far).renders.values()
     edges = np.array(model.wavelength_nm) - np.array(model.width_nm) / 2
     assert edges[0] == 380.0
     assert model.wavelength_nm[-1] + model.width_nm[-1] / 2 == pytest.approx(1070.0)

@@ -1,7 +1,7 @@
 """All that is too long for `make test`, part by part: ``python tests/verification/verify.py [--part NAME]``.
 
-Slow tests, the tests of `make test` with NumPy's baseline alone, the catalogue of hard cases, planted faults, damaged
-files and the soak. What a part found is kept in out/verify.json beside the state of the code it was found with, so an
+Slow tests (hard cases among them), the tests of `make test` with NumPy's baseline alone, planted faults, damaged files
+and the soak. What a part found is kept in out/verify.json beside the state of the code it was found with, so an
 ended run goes on where it was; a part that fails is tried again the next time. Prints the table that
 docs/verification.md holds.
 """
@@ -45,14 +45,6 @@ def slow_tests(file: str) -> Found:
     return code == 0, closing[-1].strip("= ") if closing else said[-300:]
 
 
-def hard_cases() -> Found:
-    code, said = command(
-        "-c", "from studies.commands.cli import main; raise SystemExit(main())", "stress", "-o", "out/stress"
-    )
-    counted = re.search(r"\d+ cases, \d+ invariants measured:[^\n]*", said)
-    return code == 0, counted[0] if counted else said[-300:]
-
-
 def faults() -> Found:
     code, said = command("tests/faults/plant_faults.py")
     survivors = [line.split("  ")[0] for line in said.splitlines() if line.startswith("SURVIVED")]
@@ -93,8 +85,7 @@ def code_digest() -> str:
 
 def parts(wanted: str | None) -> list[tuple[str, Callable[[], Found]]]:
     """Steps by name; the slow tests a step a file."""
-    alone = {"plain processor": plain_processor, "hard cases": hard_cases, "faults": faults}
-    alone |= {"damaged files": damaged_files, "soak": soak}
+    alone = {"plain processor": plain_processor, "faults": faults, "damaged files": damaged_files, "soak": soak}
     if wanted in alone:
         return [(str(wanted), alone[str(wanted)])]
     if wanted not in (None, "slow tests"):

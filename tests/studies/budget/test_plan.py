@@ -57,9 +57,9 @@ def test_a_plan_has_a_render_for_each_scene_and_an_image_for_each_condition(plan
 
 def test_the_dark_hides_what_daylight_shows(planned: Plan) -> None:
     dark, bright = (planned.images[condition] for condition in conditions(SMALL))
-    assert dark.veiling_glare == 0.0
-    assert bright.diffraction == SMALL.lens.diffraction
-    assert bright.horizontal_view_deg == pytest.approx(20.0)  # the scene's own camera
+    assert dark.lens.veiling_glare == 0.0
+    assert bright.lens.diffraction == SMALL.lens.diffraction
+    assert bright.lens.horizontal_view_deg == pytest.approx(20.0)  # the scene's own camera
     assert not bright.exact
 
 
@@ -90,8 +90,8 @@ def test_the_reference_leaves_nothing_out() -> None:
     assert len(model.width_nm) > 40
     assert min(model.width_nm) < 2.0
     for image in reference.images.values():
-        assert (image.diffraction, image.veiling_glare, image.exact) == (1.0, 0.01, True)
-        assert image.horizontal_view_deg == pytest.approx(20.0)
+        assert (image.lens.diffraction, image.lens.veiling_glare, image.exact) == (1.0, 0.01, True)
+        assert image.lens.horizontal_view_deg == pytest.approx(20.0)
 
 
 def test_a_sensors_own_lens_goes_before_the_studys(tmp_path: Path) -> None:
@@ -100,7 +100,7 @@ def test_a_sensors_own_lens_goes_before_the_studys(tmp_path: Path) -> None:
     own.write_text(text.replace("f_number = 2.8", "f_number = 2.8\ndiffraction = 2.0\nveiling_glare = 0.2"))
     assert preset(str(own)).lens.diffraction == 2.0
     reference = reference_plan(replace(SMALL, sensors=(str(own),)))
-    assert {(image.diffraction, image.veiling_glare) for image in reference.images.values()} == {(2.0, 0.2)}
+    assert {(image.lens.diffraction, image.lens.veiling_glare) for image in reference.images.values()} == {(2.0, 0.2)}
 
 
 def test_a_picture_file_is_planned_in_its_own_bands(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ import json
 import sqlite3
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from sweep_sample import ROW
@@ -187,9 +186,7 @@ def test_a_ledger_that_nobody_can_write_to_is_read(tmp_path: Path, monkeypatch: 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("CREATE VIEW more AS SELECT * FROM cells", "its tables are not a ledger's"),
-        ("CREATE TRIGGER t AFTER INSERT ON cells BEGIN DELETE FROM wanted; END", "its tables are not a ledger's"),
-        ("DROP TABLE cells", "its tables are not a ledger's"),
+        ("DROP TABLE cells", "it is no ledger"),
         ("UPDATE cells SET picture = '/etc/passwd'", "isn't what was written"),
         ("UPDATE cells SET ssim = -0.125", "row '00ff' isn't what was written"),
     ],
@@ -202,24 +199,13 @@ def test_what_a_sweep_never_writes_is_refused(change: str, words: str, tmp_path:
         rows(base, everything=True)
 
 
-def test_a_number_of_another_type_is_noticed_and_any_bytes_are_text(tmp_path: Path) -> None:
+def test_bytes_that_changed_on_the_disk_are_noticed(tmp_path: Path) -> None:
     with open_ledger(tmp_path) as base:
         add(base, replace(ROW, host="hostname of mine"))
     content = (tmp_path / FILE).read_bytes()
-    (tmp_path / FILE).write_bytes(content.replace(b"hostname of mine", b"hostname\xff of min"))
+    (tmp_path / FILE).write_bytes(content.replace(b"hostname of mine", b"hostname of mime"))
     with pytest.raises(InputError, match="isn't what was written"), read_ledger(tmp_path) as base:
         rows(base, everything=True)
-    with sqlite3.connect(tmp_path / FILE) as base:  # a table without STRICT under the same words
-        base.execute("PRAGMA writable_schema = ON")
-        base.execute("UPDATE sqlite_master SET sql = replace(sql, ' STRICT', '') WHERE name = 'cells'")
-    base.close()
-    with sqlite3.connect(tmp_path / FILE) as base:
-        base.execute("UPDATE cells SET seed = 'many'")
-        base.execute("PRAGMA writable_schema = ON")
-        base.execute("UPDATE sqlite_master SET sql = sql || ' STRICT' WHERE name = 'cells'")
-    base.close()
-    with pytest.raises(InputError, match=r"it is no whole ledger .*seed"), read_ledger(tmp_path):
-        pass
 
 
 @pytest.mark.parametrize("content", [b"", b"SQLite format 3\0" + bytes(500)])
@@ -228,12 +214,3 @@ def test_a_file_without_tables_is_no_ledger_to_read(content: bytes, tmp_path: Pa
     with pytest.raises(InputError, match="it is no"), read_ledger(tmp_path):
         pass
     assert (tmp_path / FILE).read_bytes() == content
-
-
-@pytest.mark.parametrize("opened", [open_ledger, read_ledger])
-def test_what_a_file_says_of_itself_runs_no_functions(opened: Any, tmp_path: Path) -> None:
-    with open_ledger(tmp_path):
-        pass
-    with opened(tmp_path) as base:
-        values = {name: base.execute(f"PRAGMA {name}").fetchone()[0] for name in ("trusted_schema", "cell_size_check")}
-    assert values == {"trusted_schema": 0, "cell_size_check": 1}

@@ -138,7 +138,8 @@ def test_the_falloff_that_a_lens_is_known_to_have_is_taken_out_of_the_picture(tm
     """Bright and nearly without noise: PSNR with 60 degrees of view is that without, 3 dB more would be lost else."""
     study = SAMPLE.small_study(tmp_path, levels=("25cd/m2",), seeds=(0,), exposures=("20ms",))
     plain = made(tmp_path, levels=("25cd/m2",), seeds=(0,), exposures=("20ms",))[0]
-    wide = Plan({}, dict.fromkeys(conditions(study), ImageModel(0.0, 0.0, 60.0)))
+    lens = replace(preset(study.sensors[0]).lens, horizontal_view_deg=60.0)
+    wide = Plan({}, dict.fromkeys(conditions(study), ImageModel(lens)))
     shaded = made(tmp_path, wide, levels=("25cd/m2",), seeds=(0,), exposures=("20ms",))[0]
     assert falloff(shaded.sensor.lens, SAMPLE.SIZE)[0, 0] < 0.6
     with_, without = run_cell(shaded), run_cell(plain)

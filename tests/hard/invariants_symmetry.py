@@ -1,21 +1,18 @@
-"""Invariant of pictures: a raw image that is flipped or shifted, with its mosaic, develops into the same picture."""
+"""Invariant of pictures: a raw image that is mirrored or cut, with its mosaic, develops into the same picture."""
 
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from hard.case import Image, Margin, Situation, worse, worst_of
+from hard.chain import CAMERAS, develop_fixed, shoot, to_picture
 
 from isp.reference import sum_weights
 from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, WINDOW, Settings
 from sensor.cfa import Tile, channels, letter_map
 from sensor.raw import RawImage
-from studies.stress_case import Margin, Situation, worse, worst_of
-from studies.stress_chain import CAMERAS, develop_fixed, shoot, to_picture
 
-Image = NDArray[np.float64]
-
-# What the kernel states: 1e-4 of the samples' range, or what single precision makes of the largest log weight, some 16
-# roundings of it (isp.weighted_sums, isp.kernel). Two developments differ by twice that.
+# The kernel's own bound: 1e-4 of the samples' range, or some 16 roundings of the largest log weight
+# (isp.weighted_sums, isp.kernel). Two developments differ by twice that.
 KERNEL_ERROR = 1e-4
 KERNEL_ROUNDINGS = 16 * 2.0**-24
 DOUBLE_ROUNDINGS = 64 * 2.0**-53  # bilinear planes and their matrix, all in double precision
@@ -34,13 +31,12 @@ def equivariant(situation: Situation) -> Margin | None:
         inside = _interior(raw, situation)
         if inside is not None:
             pairs.append((develop_fixed(cut(raw), situation), picture[1:, 1:], inside))
-        for found, same, where in pairs:
-            margins.append(_judge(found[where] - same[where], raw, situation))
+        margins += [_margin(found[where] - same[where], raw, situation) for found, same, where in pairs]
     return worse(*margins)
 
 
 def mirrored(raw: RawImage, axis: int) -> RawImage:
-    """The frame as it reads from its other end along an axis, with the mosaic and the defects there."""
+    """The frame mirrored along an axis, with its mosaic and its list of defects."""
     lines = raw.shape[axis]
     period = (len(raw.cfa), len(raw.cfa[0]))[axis]
     turned = _turn(raw.cfa, lines % period, axis)
@@ -77,8 +73,8 @@ def _interior(raw: RawImage, situation: Situation) -> tuple[slice, slice] | None
     return np.s_[margin:-margin, margin:-margin]
 
 
-def _judge(error: Image, raw: RawImage, situation: Situation) -> Margin:
-    """Error beside what the arithmetic may differ by; the reference is asked only where the plain bound is passed."""
+def _margin(error: Image, raw: RawImage, situation: Situation) -> Margin:
+    """Error over what the arithmetic may differ by; the slow reference runs only where the plain bound is passed."""
     if "W" not in channels(raw.cfa):
         return _beside(error, raw, situation, DOUBLE_ROUNDINGS * float(np.abs(raw.electrons).max()))
     settings = _settings(situation)
@@ -93,7 +89,7 @@ def _judge(error: Image, raw: RawImage, situation: Situation) -> Margin:
 
 
 def _beside(error: Image, raw: RawImage, situation: Situation, channel_e: float) -> Margin:
-    """Error of a picture beside twice an error of its channels, through balance and matrix."""
+    """Error of a picture over twice the error `channel_e` of its channels, through balance and matrix."""
     through = np.abs(to_picture(raw.cfa, situation.develop)).sum(axis=1)
     return worst_of(error, np.broadcast_to(2 * channel_e * through + NOTHING_E, error.shape), "e⁻")
 

@@ -6,9 +6,9 @@ from functools import cache
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
+from hard.case import Image, Situation
 
-from isp.colour.camera_colour import fit_matrix, neutral_response
+from isp.colour.camera_colour import neutral_response
 from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
@@ -16,10 +16,8 @@ from isp.substitution import matrix_with_white
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.jit import backend
-from scenes.reflectances import color_checker
 from sensor.capture import capture
 from sensor.cfa import Tile, channels
-from sensor.curves import rgbw
 from sensor.device import draw_device
 from sensor.kernel.run import expected_electrons_single
 from sensor.optics import camera_equation, falloff, form_image, spreads
@@ -28,18 +26,16 @@ from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance, expected_electrons
 from studies.metrics.truth import light_in_bands
 from studies.photograph.camera import colour_fit
-from studies.stress_case import Situation
 
-Image = NDArray[np.float64]
 CAMERAS = ("interleaved", "bayer")
-MOST_E = 1e30  # where the readout holds a mean (sensor.kernel.kernel): over any well
-# The fixed settings take W into every picture: what it did wrong would show. Automatic ones decide by the frame.
+MOST_E = 1e30  # the readout's largest mean (sensor.kernel.kernel), over any well
+# With W in every picture its errors would show; the automatic settings decide by the frame.
 FIXED: Mapping[str, float] = MappingProxyType({"substitution_snr": np.inf})
 
 
 @dataclass(frozen=True)
 class Developed:
-    """One camera's raw image, its picture at a fixed colour balance, and the one that the camera makes by itself."""
+    """A camera's raw image, its picture at a fixed white balance, and the one with automatic settings."""
 
     raw: RawImage
     fixed: Image
@@ -54,7 +50,7 @@ def behind(situation: Situation, name: str) -> Situation:
 
 
 def expected(situation: Situation) -> Image:
-    """Expected photo-electrons as `sensor.capture.capture` forms them, (h, w) [e-]; held at `MOST_E`, as it does."""
+    """Expected photo-electrons as `sensor.capture.capture` forms them, (h, w) [e-]; at most `MOST_E`, as there."""
     radiance, sensor, samples = situation.radiance, situation.sensor, situation.samples_per_pixel
     if backend() == "numpy":
         return np.minimum(
@@ -71,15 +67,15 @@ def expected(situation: Situation) -> Image:
 
 
 def shoot(situation: Situation, name: str, seed: int = 0) -> RawImage:
-    """One exposure of one chip, both drawn by `seed`."""
+    """One exposure by one chip, both drawn by `seed`."""
     of = behind(situation, name)
     device, rng = draw_device(of.sensor, of.shape, np.random.default_rng([seed, 0])), np.random.default_rng([seed, 1])
     return capture(of.radiance, of.sensor, of.exposure_s, device, rng, samples_per_pixel=of.samples_per_pixel)
 
 
 def develop_fixed(raw: RawImage, situation: Situation) -> Image:
-    """Picture at the balance of a neutral under D65, linear in the reconstructed channels, (h, w, 3) [e-]."""
-    name = "interleaved" if "W" in channels(raw.cfa) else "bayer"
+    """Picture at the white balance of D65, linear in the reconstructed channels, (h, w, 3) [e-]."""
+    name = camera_of(raw)
     options = {**FIXED, **situation.develop} if name == "interleaved" else {}
     balance = options.pop("balance", neutral_response(channels(raw.cfa)))
     return PROCESSORS[name].develop(raw, plain_matrix(), balance=balance, **options).rgb
@@ -87,34 +83,35 @@ def develop_fixed(raw: RawImage, situation: Situation) -> Image:
 
 def develop(raw: RawImage, situation: Situation) -> Developed:
     """Both ways to develop one raw image."""
-    name = "interleaved" if "W" in channels(raw.cfa) else "bayer"
-    options = dict(situation.develop) if name == "interleaved" else {}
+    name = camera_of(raw)
+    options = situation.develop if name == "interleaved" else {}
     automatic = PROCESSORS[name].develop(raw, colours(name), **options)
     return Developed(raw, develop_fixed(raw, situation), automatic)
+
+
+def camera_of(raw: RawImage) -> str:
+    """Which of `CAMERAS` took it."""
+    return "interleaved" if "W" in channels(raw.cfa) else "bayer"
 
 
 def to_picture(cfa: Tile, develop: Mapping[str, float]) -> Image:
     """Matrix (3, channel) from a camera's channels [e-] to its fixed picture, away from saturation."""
     letters = channels(cfa)
-    balance = np.asarray(
-        develop.get("balance", neutral_response(letters)) if "W" in letters else neutral_response("RGB")
-    )
-    matrix = matrix_with_white(plain_matrix(), 0.0, 1.0) if "W" in letters else plain_matrix()
+    with_white = "W" in letters
+    balance = np.asarray(develop.get("balance", neutral_response(letters)) if with_white else neutral_response("RGB"))
+    matrix = matrix_with_white(plain_matrix(), 0.0, 1.0) if with_white else plain_matrix()
     return np.asarray(matrix * (balance[letters.index("G")] / balance))
 
 
 @cache
-def plain_matrix() -> Image:
-    """Matrix from balanced R, G, B to linear sRGB of the project's curves under D65, fitted on the ColorChecker."""
-    nm, width = DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM)
-    surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
-    light = illuminant("D65").band_average(nm, width)
-    return fit_matrix(rgbw().band_average(("R", "G", "B"), nm, width), nm, light, surfaces, width)
-
-
-@cache
 def colours(name: str) -> ColourFit:
-    """Fit with which a camera decides its colours by itself."""
+    """Fit of one of `CAMERAS` on the ColorChecker under D65, with the project's own curves."""
     nm = DEFAULT_WAVELENGTH_NM
     sensor = low_noise(PROCESSORS[name].mosaic)
     return colour_fit(sensor, PROCESSORS[name], light_in_bands(illuminant("D65"), nm, band_widths(nm)))
+
+
+@cache
+def plain_matrix() -> Image:
+    """Matrix (3, 3) from balanced R, G, B to linear sRGB, without noise and without W."""
+    return colours("bayer").matrix()

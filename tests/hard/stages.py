@@ -1,6 +1,6 @@
 """The chain's stages in single precision, each beside the same arithmetic in double precision.
 
-Noise is the least that a sensor can have: shot noise, and what dark noise the stage's parameters say. Levels end at
+Noise is the least that a sensor can have: shot noise, and the dark noise among the stage's parameters. Levels end at
 1e6 e-, the largest well. Bounds count roundings, each of u = 2^-24 of the number that is rounded.
 """
 
@@ -8,6 +8,10 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from hard.case import Image, Margin, worse, worst_of
+from hard.chain import to_picture
+from hard.light import at_level, transport
+from hard.precision import Found, Parameters, Stage, beside_noise
 from numpy.typing import NDArray
 from scipy.stats import poisson
 
@@ -16,7 +20,6 @@ from isp.interleaved import reconstruct
 from isp.planes import LEAST_PRNU, fill, stabilise
 from isp.reference import sum_weights
 from isp.settings import SIGMA_S, Settings
-from render.radiance import SpectralRadiance
 from render.spectrum import band_widths
 from render.transport import emission
 from sensor.cfa import RGBW, channels, letter_map
@@ -28,12 +31,6 @@ from sensor.presets import low_noise
 from sensor.random import Term, philox
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance, expected_electrons
-from studies.stress_case import Margin, worse, worst_of
-from studies.stress_chain import to_picture
-from studies.stress_light import at_level, transport
-from studies.stress_precision import Found, Parameters, Stage, beside_noise
-
-Image = NDArray[np.float64]
 
 ROUNDING = 2.0**-24  # u: half a step of single precision
 MOST_E = 1e6  # the largest well
@@ -73,8 +70,8 @@ def _relit(at: Parameters) -> Found:
     coefficients = emission(lights, made.wavelength_nm, made.width_nm)
     exact = np.einsum("gb,gbhw->hwb", coefficients, made.radiance.astype(np.float64))
     one, two = (
-        expected_electrons(form_image(SpectralRadiance(v, made.wavelength_nm, 0.0, made.width_nm), camera), camera, 1.0)
-        for v in (lit.values.astype(np.float64), exact)
+        expected_electrons(form_image(replace(lit, values=values), camera), camera, 1.0)
+        for values in (lit.values.astype(np.float64), exact)
     )
     level = at["level_e"] / max(two.mean(), 1e-300)
     found = _within_well((one - two) * level, two * level, ROUNDING * 1.001 * two * level)
@@ -94,7 +91,7 @@ def _imaged(spread: bool, at: Parameters) -> Found:
     if spread:
         lens = LensConfig(at["f_number"], diffraction=1.0, veiling_glare=min(at["view_deg"] / 120, 1.0))
     camera, seen = replace(_camera(), lens=lens), at_level(10.0)
-    double = SpectralRadiance(seen.values.astype(np.float64), seen.wavelength_nm, 0.0, seen.width_nm)
+    double = replace(seen, values=seen.values.astype(np.float64))
     single = form_image(seen, camera)
     one, two = (
         expected_electrons(replace(single, values=image.values.astype(np.float64)), camera, 1.0)
@@ -110,7 +107,7 @@ def _imaged(spread: bool, at: Parameters) -> Found:
 
 
 def _band_by_band(single: NDArray[np.floating], double: NDArray[np.floating], roundings: int) -> Margin:
-    """Error of each band beside its roundings, before sums over bands even them out [of the band's own value]."""
+    """Error of each band over its roundings, before sums over bands even them out [of the band's value]."""
     lit = double > 0
     relative = single.astype(np.float64)[lit] / double[lit] - 1.0
     return worst_of(relative, roundings * ROUNDING * 1.001, "of a band's value")
@@ -124,8 +121,8 @@ def _summed(at: Parameters) -> Found:
     planes = (10.0 ** _rng(at).uniform(-3.0, 0.0, (count, *SHAPE))).astype(np.float32)
     weights = electrons_per_irradiance(camera, nm, band_widths(nm, np.diff(edges)), 1.0) * camera_equation(LENS)
     single = expected_electrons_single(np.moveaxis(planes, 0, -1), weights, camera).astype(np.float64)
-    own = np.vectorize(channels(RGBW).index)(letter_map(RGBW, SHAPE))
-    double = np.einsum("hwb,bhw->hw", weights[own], planes.astype(np.float64))
+    channel = np.vectorize(channels(RGBW).index)(letter_map(RGBW, SHAPE))
+    double = np.einsum("hwb,bhw->hw", weights[channel], planes.astype(np.float64))
     level = at["level_e"] / double.mean()
     # weight, first product or fma in each of at most 8, then one addition for each 8 bands
     roundings = 1 + min(count, 8) + -(-count // 8)

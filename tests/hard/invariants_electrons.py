@@ -3,17 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+from hard.case import Image, Margin, Situation, worst_of
+from hard.chain import expected
 from numpy.typing import NDArray
 
-from render.radiance import SpectralRadiance
 from sensor.optics import spreads
-from studies.stress_case import Margin, Situation, worst_of
-from studies.stress_chain import expected
-
-Image = NDArray[np.float64]
 
 TOLERANCE = 1e-6  # of the expected electrons of each pixel
-NOTHING_E = 1e-12  # a photo-electron in 10^12 exposures: what subnormal numbers lose is less
+NOTHING_E = 1e-12  # one photo-electron in 10^12 exposures: more than subnormal numbers lose
 # Of the frame's sum, where a lens spreads light: an FFT errs by 7 u log2(n) of its norm at most (Higham, "Accuracy and
 # Stability of Numerical Algorithms", theorem 24.2); there and back, n = 64 x 64, and two results compared.
 TRANSFORM = 2 * 2 * 12 * 7 * 2.0**-53
@@ -22,29 +19,28 @@ STEP = 3.0  # factors between radiances; no power of two, which would be exact w
 
 def monotone(situation: Situation) -> Margin:
     """More light never gives fewer electrons: every value of the radiance raised by a share of its own, 0 to 1e-3."""
-    seen = situation.radiance
-    raised = seen.values.astype(np.float64) * (1 + 1e-3 * _shares(seen.values.shape))
-    most = np.finfo(seen.values.dtype).max
-    more = _with(seen, np.maximum(np.minimum(raised, most).astype(seen.values.dtype), seen.values))
-    before, after = _electrons(situation, seen), _electrons(situation, more)
+    values = situation.radiance.values
+    raised = values.astype(np.float64) * (1 + 1e-3 * np.random.default_rng(8).uniform(0.0, 1.0, values.shape))
+    raised = np.minimum(raised, np.finfo(values.dtype).max).astype(values.dtype)
+    before, after = _electrons(situation, values), _electrons(situation, np.maximum(raised, values))
     return worst_of(np.maximum(before - after, 0.0), _allowed(before, situation), "e⁻")
 
 
 def linear(situation: Situation) -> Margin:
     """Two lights together give the sum of what each gives alone: the scene upside down is added to a part of it."""
-    seen = situation.radiance
-    part = seen.values / seen.values.dtype.type(STEP)
+    values = situation.radiance.values
+    part = values / values.dtype.type(STEP)
     other = np.ascontiguousarray(part[::-1])
-    together = _electrons(situation, _with(seen, part + other))
-    alone = _electrons(situation, _with(seen, part)) + _electrons(situation, _with(seen, other))
+    together = _electrons(situation, part + other)
+    alone = _electrons(situation, part) + _electrons(situation, other)
     return worst_of(together - alone, _allowed(alone, situation), "e⁻")
 
 
 def reciprocal(situation: Situation) -> Margin:
     """Three times the light in a third of the exposure gives the same electrons (without dark current)."""
-    brighter = _with(situation.radiance, situation.radiance.values * situation.radiance.values.dtype.type(STEP))
-    same = expected(replace(situation, radiance=brighter, exposure_s=situation.exposure_s / STEP))
-    once = _electrons(situation, situation.radiance)
+    values = situation.radiance.values
+    shorter = replace(situation, exposure_s=situation.exposure_s / STEP)
+    same, once = _electrons(shorter, values * values.dtype.type(STEP)), expected(situation)
     return worst_of(same - once, _allowed(once, situation), "e⁻")
 
 
@@ -58,24 +54,17 @@ def shifted(situation: Situation) -> Margin | None:
         return None
     values = np.zeros_like(situation.radiance.values)  # dark outside, so that the border's mirror image stays as it is
     values[kept] = situation.radiance.values[kept]
-    moved = _with(situation.radiance, np.roll(values, [samples * size for size in tile], (0, 1)))
-    before = np.roll(_electrons(situation, _with(situation.radiance, values)), tile, (0, 1))[inside]
+    moved = np.roll(values, [samples * size for size in tile], (0, 1))
+    before = np.roll(_electrons(situation, values), tile, (0, 1))[inside]
     return worst_of(_electrons(situation, moved)[inside] - before, _allowed(before, situation), "e⁻")
 
 
-def _electrons(situation: Situation, radiance: SpectralRadiance) -> Image:
-    return expected(replace(situation, radiance=radiance))
+def _electrons(situation: Situation, values: NDArray[np.floating]) -> Image:
+    """Electrons expected from other values of the radiance."""
+    return expected(replace(situation, radiance=replace(situation.radiance, values=values)))
 
 
 def _allowed(electrons: Image, situation: Situation) -> Image:
-    """A millionth of each pixel's electrons; besides what double precision loses where light of bright ones spreads."""
+    """A millionth of each pixel's electrons, and what double precision loses where a lens spreads light."""
     transform = TRANSFORM * electrons.sum() if spreads(situation.sensor.lens) else 0.0
     return np.asarray(TOLERANCE * electrons + transform + NOTHING_E)
-
-
-def _with(radiance: SpectralRadiance, values: NDArray[np.floating]) -> SpectralRadiance:
-    return SpectralRadiance(values, radiance.wavelength_nm, 0.0, radiance.width_nm)
-
-
-def _shares(shape: tuple[int, ...]) -> Image:
-    return np.random.default_rng(8).uniform(0.0, 1.0, shape)

@@ -1,8 +1,11 @@
 """Light for hard cases: one small render, lit again at every level, and what is made from it."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from hard.case import Image, Situation
+from hard.chain import expected
 from numpy.typing import NDArray
 
 from render.engine import render
@@ -12,8 +15,6 @@ from render.spectrum import VISIBLE_NM, Floats, line_bands
 from render.transport import Transport
 from scenes.catalog import load
 from sensor.config import SensorConfig
-from studies.stress_case import Situation
-from studies.stress_chain import expected
 
 SCENE = "cornell_box"
 SIDE = 64
@@ -55,9 +56,9 @@ def of_lines(light: str) -> SpectralRadiance:
     return made.relight(dict.fromkeys(made.groups, light), luminance_cd_m2=10.0)
 
 
-def even(luminance_cd_m2: float, shape: tuple[int, int] = (SIDE, SIDE), light: str = "D65") -> SpectralRadiance:
-    """An even field."""
-    spectrum = illuminant(light).band_average(BANDS_NM, np.full(BANDS_NM.shape, 20.0)) * luminance_cd_m2
+def even(luminance_cd_m2: float, shape: tuple[int, int] = (SIDE, SIDE)) -> SpectralRadiance:
+    """An even field under D65."""
+    spectrum = illuminant("D65").band_average(BANDS_NM, np.full(BANDS_NM.shape, 20.0)) * luminance_cd_m2
     return planar(np.ones(shape), spectrum)
 
 
@@ -65,44 +66,52 @@ def even_lines(light: str, luminance_cd_m2: float) -> SpectralRadiance:
     """An even field under a light of lines, each in a band of its own."""
     centres, widths = line_bands(lines_nm(light), VISIBLE_NM, 40.0)
     spectrum = illuminant(light).band_average(centres, widths) * luminance_cd_m2
-    values = np.broadcast_to(spectrum.astype(np.float32), (SIDE, SIDE, centres.size)).copy()
-    return SpectralRadiance(values, centres, 0.0, widths)
+    return planar(np.ones((SIDE, SIDE)), spectrum, centres, widths)
 
 
-def planar(pattern: NDArray[np.floating], spectrum: Floats, centres_nm: Floats = BANDS_NM) -> SpectralRadiance:
+def planar(
+    pattern: NDArray[np.floating], spectrum: Floats, centres_nm: Floats = BANDS_NM, width_nm: Floats | None = None
+) -> SpectralRadiance:
     """Pattern (h, w) times a spectrum (band,) as float32 in band-planar memory, as renders are."""
     values = (np.asarray(spectrum)[:, None, None] * pattern).astype(np.float32)
-    width = None if len(centres_nm) > 1 else np.array([10.0])
-    return SpectralRadiance(np.moveaxis(values, 0, -1), centres_nm, 0.0, width)
+    return SpectralRadiance(np.moveaxis(values, 0, -1), centres_nm, width_nm=width_nm)
+
+
+def planes_of(radiance: SpectralRadiance) -> NDArray[np.floating]:
+    """Values as planes (band, h, w)."""
+    return np.moveaxis(radiance.values, -1, 0)
+
+
+def with_planes(radiance: SpectralRadiance, planes: NDArray[np.floating]) -> SpectralRadiance:
+    """Radiance of the same bands with other planes (band, h, w)."""
+    return replace(radiance, values=np.moveaxis(planes, 0, -1))
 
 
 def times(radiance: SpectralRadiance, pattern: NDArray[np.floating]) -> SpectralRadiance:
     """Radiance times a pattern (h, w)."""
-    planes = np.moveaxis(radiance.values, -1, 0) * pattern.astype(radiance.values.dtype)
-    return SpectralRadiance(np.moveaxis(planes, 0, -1), radiance.wavelength_nm, 0.0, radiance.width_nm)
+    return with_planes(radiance, planes_of(radiance) * pattern.astype(radiance.values.dtype))
 
 
 def with_glint(radiance: SpectralRadiance, row: int, column: int) -> SpectralRadiance:
     """One pixel shows the sun."""
-    values = np.moveaxis(radiance.values, -1, 0).copy()
-    values[:, row, column] = even(GLINT_CD_M2, (1, 1)).values[0, 0]
-    return SpectralRadiance(np.moveaxis(values, 0, -1), radiance.wavelength_nm, 0.0, radiance.width_nm)
+    planes = planes_of(radiance).copy()
+    planes[:, row, column] = even(GLINT_CD_M2, (1, 1)).values[0, 0]
+    return with_planes(radiance, planes)
 
 
-def checkerboard(cell: int, shape: tuple[int, int] = (SIDE, SIDE)) -> NDArray[np.float64]:
+def checkerboard(cell: int) -> Image:
     """1 and 10^8 in turn, in squares of `cell` pixels."""
-    rows, columns = np.indices(shape)
+    rows, columns = np.indices((SIDE, SIDE))
     return np.where((rows // cell + columns // cell) % 2 == 0, 1.0, 1e8)
 
 
 def cropped(radiance: SpectralRadiance, shape: tuple[int, int]) -> SpectralRadiance:
     """The frame's middle, or the frame repeated where that is larger."""
-    planes = np.moveaxis(radiance.values, -1, 0)
-    repeats = [-(-size // have) for size, have in zip(shape, planes.shape[1:], strict=True)]
+    planes = planes_of(radiance)
+    repeats = [-(-size // side) for size, side in zip(shape, planes.shape[1:], strict=True)]
     tiled = np.tile(planes, (1, *repeats))
-    first = [(have - size) // 2 for size, have in zip(shape, tiled.shape[1:], strict=True)]
-    part = tiled[:, first[0] : first[0] + shape[0], first[1] : first[1] + shape[1]].copy()
-    return SpectralRadiance(np.moveaxis(part, 0, -1), radiance.wavelength_nm, 0.0, radiance.width_nm)
+    row, column = ((side - size) // 2 for size, side in zip(shape, tiled.shape[1:], strict=True))
+    return with_planes(radiance, tiled[:, row : row + shape[0], column : column + shape[1]].copy())
 
 
 def scaled_to(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float, mean_e: float) -> SpectralRadiance:

@@ -4,11 +4,11 @@ from math import inf
 from typing import Any
 
 import numpy as np
+from hard.case import Case, Situation
+from hard.light import GLINT_CD_M2, SIDE, at_level, even, times
 
 from render.radiance import SpectralRadiance
 from sensor.presets import low_noise, table1_pixel
-from studies.stress_case import Case, Situation
-from studies.stress_light import GLINT_CD_M2, SIDE, at_level, even, times
 
 
 def _settings(luminance_cd_m2: float = 30.0, **develop: Any) -> Situation:
@@ -16,7 +16,7 @@ def _settings(luminance_cd_m2: float = 30.0, **develop: Any) -> Situation:
 
 
 def _islands() -> SpectralRadiance:
-    """Squares of full wells in a frame of ordinary light: all three ways of eq. (6) to judge occur."""
+    """Squares of full wells in a frame of ordinary light: all three guides of eq. (6) occur."""
     rows, columns = np.indices((SIDE, SIDE))
     full = (rows % 21 < 5) & (columns % 23 < 6)
     return times(even(1.0), np.where(full, GLINT_CD_M2, 20.0 + columns))

@@ -3,6 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+from hard.case import Case, Margin, Situation, worse, worst_of
+from hard.chain import expected
+from hard.light import BANDS_NM, at_level, even_lines, in_bands, of_lines, planes_of, times, with_planes
 
 from render.illuminants import lines_nm
 from render.photometry import photons_per_joule
@@ -10,28 +13,28 @@ from render.radiance import SpectralRadiance
 from render.spectrum import VISIBLE_NM
 from sensor.cfa import channels, letter_map
 from sensor.optics import camera_equation
-from studies.stress_case import Case, Margin, Situation, worse, worst_of
-from studies.stress_chain import expected
-from studies.stress_light import BANDS_NM, at_level, even_lines, in_bands, of_lines, times
 
 SODIUM = "sodium_low"
 
 
 def _line_closed_form(situation: Situation) -> Margin:
     """Electrons of a doublet: its power times the response and the photons per joule at the lines themselves."""
-    lines, powers = np.array(lines_nm(SODIUM)), np.array([2.0, 1.0]) / 3.0
-    sensor, area_m2 = situation.sensor, (situation.sensor.pixel.pitch_um * 1e-6) ** 2
-    reach = np.array([lines[0] - 0.5, lines[1] + 0.5])  # the lines' band: within it response and photons may differ
-    at, edges = (sensor.responses.band_average(channels(sensor.cfa), nm, np.full(2, 1e-3)) for nm in (lines, reach))
+    lines = np.array(lines_nm(SODIUM))
+    edges = np.array([lines[0] - 0.5, lines[1] + 0.5])  # of the band: within it response and photons may differ
+    sensor = situation.sensor
+    at_lines, at_edges = (
+        sensor.responses.band_average(channels(sensor.cfa), nm, np.full(2, 1e-3)) for nm in (lines, edges)
+    )
     # Of 1 cd/m^2: V weighs the lines as `render.illuminants` does, so the radiance is what the picture itself holds.
     radiance = float(np.median(situation.radiance.values @ situation.radiance.widths_nm))
-    factor = camera_equation(sensor.lens) * area_m2 * sensor.pixel.fill_factor * situation.exposure_s * radiance
-    exact = (at * photons_per_joule(lines)) @ powers * factor
+    area_m2 = (sensor.pixel.pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
+    powers = np.array([2.0, 1.0]) / 3.0 * camera_equation(sensor.lens) * area_m2 * situation.exposure_s * radiance
+    exact = (at_lines * photons_per_joule(lines)) @ powers
     letters = letter_map(sensor.cfa, situation.shape)
     found = expected(situation)
     margins = []
     for number, letter in enumerate(channels(sensor.cfa)):
-        slack = float(np.ptp(edges[number]) / at[number].min() + np.ptp(reach) / lines[0])
+        slack = float(np.ptp(at_edges[number]) / at_lines[number].min() + np.ptp(edges) / lines[0])
         margins.append(worst_of(found[letters == letter] - exact[number], slack * exact[number], "e⁻"))
     return worse(*margins)
 
@@ -39,25 +42,24 @@ def _line_closed_form(situation: Situation) -> Margin:
 def _parts_add(situation: Situation) -> Margin:
     """Odd bands and even bands alone add up to all bands."""
     every = situation.radiance
-    halves = [_bands(every, np.arange(every.wavelength_nm.size) % 2 == odd) for odd in (0, 1)]
+    halves = [_only(every, np.arange(every.wavelength_nm.size) % 2 == odd) for odd in (0, 1)]
     both = expected(situation)
     parts = sum(expected(replace(situation, radiance=half)) for half in halves)
     return worst_of(both - parts, 1e-6 * both, "e⁻")
 
 
-def _bands(radiance: SpectralRadiance, kept: np.ndarray) -> SpectralRadiance:
+def _only(radiance: SpectralRadiance, kept: np.ndarray) -> SpectralRadiance:
     """The same bands, those that aren't kept dark."""
-    planes = np.moveaxis(radiance.values, -1, 0) * kept[:, None, None].astype(radiance.values.dtype)
-    return SpectralRadiance(np.moveaxis(planes, 0, -1), radiance.wavelength_nm, 0.0, radiance.width_nm)
+    return with_planes(radiance, planes_of(radiance) * kept[:, None, None].astype(radiance.values.dtype))
 
 
 def _some_bands(*kept_nm: float) -> SpectralRadiance:
-    return _bands(at_level(100.0), np.isin(BANDS_NM, kept_nm))
+    return _only(at_level(100.0), np.isin(BANDS_NM, kept_nm))
 
 
 def _one_narrow() -> SpectralRadiance:
     """10 cd/m^2 in 1 nm at 555 nm, and dark bands on both sides: a camera refuses a window left open."""
-    alone = _bands(in_bands((467.25, 555.0, 667.75), (174.5, 1.0, 224.5)), np.array([False, True, False]))
+    alone = _only(in_bands((467.25, 555.0, 667.75), (174.5, 1.0, 224.5)), np.array([False, True, False]))
     return times(alone, np.full(alone.shape, 10.0 / alone.luminance().mean()))
 
 

@@ -4,33 +4,21 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from hard.case import Image, Margin, Situation, worse, worst_of
+from hard.chain import CAMERAS, behind, develop, develop_fixed, expected, plain_matrix, shoot, to_picture
 from numpy.typing import NDArray
 from scipy.stats import t
 
 from isp.colour.camera_colour import encode_srgb, neutral_response
-from render.radiance import SpectralRadiance
 from sensor.cfa import channels, letter_map
 from sensor.config import BLACK_SIGMAS, SensorConfig
 from sensor.crosstalk import spread_charge
 from sensor.noise import noise_variance
 from sensor.raw import SATURATION_SIGMAS, RawImage
-from studies.stress_case import Margin, Situation, worse, worst_of
-from studies.stress_chain import (
-    CAMERAS,
-    behind,
-    develop,
-    develop_fixed,
-    expected,
-    plain_matrix,
-    shoot,
-    to_picture,
-)
-
-Image = NDArray[np.float64]
 
 ROUNDING = 1e-5  # a weighted mean in single precision leaves the range of its samples by less
 RAW_FRAMES, PICTURES = 32, 12  # each with a chip and noise of its own; a picture takes five times as long
-FALSE_ALARM = 1e-6  # of each mean that is judged; all cases judge about a thousand
+FALSE_ALARM = 1e-6  # of each mean; all cases together test about a thousand
 FLAT_SIDE = 32
 ROOM_SIGMAS = 6.0  # between a mean and the full well: less than 1e-9 of the draws reach it
 
@@ -66,7 +54,7 @@ def _picture_bound(raw: RawImage, situation: Situation) -> Image:
 
 
 def raw_unbiased(situation: Situation) -> Margin | None:
-    """The mean over chips and exposures of each letter's pixels is what was expected, dark current included."""
+    """The mean over chips and exposures of each channel's pixels is what was expected, dark current included."""
     margins = []
     for name in CAMERAS:
         sensor = behind(situation, name).sensor
@@ -75,11 +63,11 @@ def raw_unbiased(situation: Situation) -> Margin | None:
         letters = letter_map(sensor.cfa, mean_e.shape)
         frames = [shoot(situation, name, 100 + seed) for seed in range(RAW_FRAMES)] if room.any() else []
         for letter in channels(sensor.cfa):
-            here = room & (letters == letter)
-            sound = [(raw.electrons - mean_e)[here & ~_defective(raw)] for raw in frames]
+            pixels = room & (letters == letter)
+            sound = [(raw.electrons - mean_e)[pixels & ~_defective(raw)] for raw in frames]
             errors = np.array([error.mean() for error in sound if error.size])
             if errors.size:
-                margins.append(bias(errors, float(mean_e[here].mean())))
+                margins.append(bias(errors, float(mean_e[pixels].mean())))
     return worse(*margins) if margins else None
 
 
@@ -107,12 +95,7 @@ def flat_field(situation: Situation) -> Situation:
     total = values.sum(axis=-1, dtype=np.float64)
     median = values.reshape(-1, values.shape[-1])[np.argsort(total, axis=None)[total.size // 2]]
     shape = tuple(min(FLAT_SIDE, size) for size in situation.shape)
-    even = SpectralRadiance(
-        np.broadcast_to(median, (*shape, median.size)).copy(),
-        situation.radiance.wavelength_nm,
-        0.0,
-        situation.radiance.width_nm,
-    )
+    even = replace(situation.radiance, values=np.broadcast_to(median, (*shape, median.size)).copy())
     lens = replace(situation.sensor.lens, horizontal_view_deg=0.0)
     return replace(situation, radiance=even, sensor=replace(situation.sensor, lens=lens), samples_per_pixel=1)
 
@@ -125,7 +108,7 @@ def _collected(situation: Situation) -> Image:
 
 
 def _leaves_room(mean_e: Image, sensor: SensorConfig, exposure_s: float) -> NDArray[np.bool_]:
-    """Where black is five standard deviations of the dark or more, and the well isn't reached."""
+    """Pixels where black is five standard deviations of the dark or more, and the well isn't reached."""
     pixel = sensor.pixel
     dark_e = float(np.hypot(pixel.read_noise_e, pixel.fixed_dark_e))
     sigma_e = np.sqrt(noise_variance(mean_e, sensor, exposure_s))

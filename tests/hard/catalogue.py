@@ -1,18 +1,17 @@
-"""Every hard case through the whole chain, and the margins by which the invariants are kept."""
+"""Every hard case, the invariants that all cases are measured by, and the limits that are known."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from rodcone.errors import unknown
-from studies.stress_case import Case, Margin, Measure
-from studies.stress_cases_camera import EXPOSURE_CASES, FRAME_CASES, PIXEL_CASES
-from studies.stress_cases_light import LIGHT_CASES
-from studies.stress_cases_picture import PICTURE_CASES
-from studies.stress_cases_spectrum import SPECTRUM_CASES
-from studies.stress_electrons import linear, monotone, reciprocal, shifted
-from studies.stress_pictures import equivariant
-from studies.stress_raw import bounded, pictures_unbiased, raw_unbiased
+from hard.case import Case, Margin, Measure
+from hard.cases_camera import EXPOSURE_CASES, FRAME_CASES, PIXEL_CASES
+from hard.cases_light import LIGHT_CASES
+from hard.cases_picture import PICTURE_CASES
+from hard.cases_spectrum import SPECTRUM_CASES
+from hard.invariants_electrons import linear, monotone, reciprocal, shifted
+from hard.invariants_raw import bounded, pictures_unbiased, raw_unbiased
+from hard.invariants_symmetry import equivariant
 
 CASES: tuple[Case, ...] = (
     *LIGHT_CASES,
@@ -23,7 +22,7 @@ CASES: tuple[Case, ...] = (
     *PICTURE_CASES,
 )
 
-# In the order of the chain; every case is measured by all of them, as far as they say something about it.
+# In the order of the chain. The first line of each docstring stands on the page.
 INVARIANTS: Mapping[str, Measure] = MappingProxyType(
     {
         "bounded": bounded,
@@ -42,7 +41,7 @@ _BORDER = "beyond the border a lens sees the picture's mirror image, which doesn
 _CLAMP = "the image of a point, sampled once a pixel, has lobes under 0, which are cut: 4 samples a pixel have none"
 _COARSE = "a step of 3922 e⁻ hides 1000 e⁻: without noise as wide as a step, rounding isn't evened out"
 
-# What isn't kept, and why: exactly these. A fault is mended, not listed.
+# Exactly what isn't kept, and why. A fault is mended, not listed.
 LIMITS: Mapping[tuple[str, str], str] = MappingProxyType(
     {
         ("glint_with_diffraction", "monotone"): _CLAMP,
@@ -85,21 +84,6 @@ class Result:
         return tuple(name for name, margin in self.margins.items() if margin is not None and not margin.kept)
 
 
-def choose(names: Sequence[str] | None) -> tuple[Case, ...]:
-    """Cases by name, in the catalogue's order; all of them without names.
-
-    Raises
-    ------
-    InputError
-        For a name that isn't in the catalogue.
-    """
-    known = [case.name for case in CASES]
-    for name in names or ():
-        if name not in known:
-            raise unknown("case", name, known)
-    return tuple(case for case in CASES if not names or case.name in names)
-
-
 def run_case(case: Case) -> Result:
     """Measure one case."""
     situation = case.situation()
@@ -108,26 +92,16 @@ def run_case(case: Case) -> Result:
     return Result(case, margins)
 
 
-def run_cases(cases: Sequence[Case], step: Callable[[str, float], None] = lambda what, share: None) -> list[Result]:
-    """Measure cases one after the other; `step` is told each one's name and the share that is done."""
-    results = []
-    for number, case in enumerate(cases):
-        step(case.name, number / len(cases))
-        results.append(run_case(case))
-    return results
-
-
-def unexpected(results: Sequence[Result]) -> list[str]:
-    """What isn't kept though no limit says so, and limits that are kept after all: one line each."""
+def unexpected(result: Result) -> list[str]:
+    """One line for each invariant that is broken though no limit says so, or kept though a limit says otherwise."""
     faults = []
-    for result in results:
-        for name, margin in result.margins.items():
-            known = (result.case.name, name) in LIMITS
-            if margin is not None and not margin.kept and not known:
-                faults.append(
-                    f"case {result.case.name}, {name}: {margin.worst:.3g} {margin.unit} where {margin.allowed:.3g} is "
-                    "allowed; a fault, or a limit to be listed with its reason"
-                )
-            elif known and (margin is None or margin.kept):
-                faults.append(f"case {result.case.name}, {name}: kept, though listed as a limit; take it off the list")
+    for name, margin in result.margins.items():
+        broken, known = name in result.broken, (result.case.name, name) in LIMITS
+        if broken and not known:
+            faults.append(
+                f"{result.case.name}, {name}: {margin.worst:.3g} {margin.unit} where {margin.allowed:.3g} is allowed; "
+                "mend the fault, or list the limit with its reason"
+            )
+        elif known and not broken:
+            faults.append(f"{result.case.name}, {name}: kept, though listed as a limit; take it off the list")
     return faults

@@ -1,16 +1,18 @@
-"""What a hard case is: a situation, the invariants it must keep, and by what margin it keeps them."""
+"""A hard case: a situation, what it must keep, and the margin by which it keeps it."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from render.radiance import SpectralRadiance
 from sensor.cfa import BAYER, Tile
 from sensor.config import SensorConfig
 from sensor.presets import low_noise
+
+Image = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -48,12 +50,12 @@ class Situation:
 
 @dataclass(frozen=True)
 class Margin:
-    """Worst error found, beside what is allowed there; kept while the share of it is 1 or less.
+    """Worst error and the error allowed there; the invariant is kept while their ratio is 1 or less.
 
     Attributes
     ----------
     worst, allowed : float
-        At the place where their ratio is largest; NaN and infinity are never kept.
+        At the pixel where their ratio is largest; NaN and infinity are never kept.
     unit : str
     """
 
@@ -89,8 +91,9 @@ class Case:
     situation : callable
         Makes the situation.
     own : callable or None
-        What this case must keep besides the invariants of all cases, and its words.
+        Measures what this case must keep besides the invariants of all cases.
     promise : str
+        The same in words.
     """
 
     name: str
@@ -101,16 +104,16 @@ class Case:
 
 
 def worst_of(error: ArrayLike, allowed: ArrayLike, unit: str) -> Margin:
-    """Margin at the place where error over allowed is largest; arrays of one shape, or one allowance for all."""
+    """Margin at the pixel where error over allowed is largest; arrays of one shape, or one allowance for all."""
     found = np.abs(np.asarray(error, dtype=np.float64)).ravel()
     limit = np.broadcast_to(np.asarray(allowed, dtype=np.float64), np.shape(error)).ravel()
     found = np.where(np.isfinite(found), found, np.inf)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(found > 0, found / limit, 0.0)
-    at = int(np.argmax(share))
-    return Margin(float(found[at]), float(limit[at]), unit)
+    index = int(np.argmax(share))
+    return Margin(float(found[index]), float(limit[index]), unit)
 
 
 def worse(*margins: Margin) -> Margin:
-    """The one with the larger share."""
+    """The margin with the largest share."""
     return max(margins, key=lambda margin: margin.share)

@@ -1,17 +1,12 @@
-"""Hard cases of light: from starlight to the sun's glint, 10^8 between neighbours, lines, one band and 401."""
+"""Hard cases of light: from starlight to the sun's glint, 10^8 between neighbours, the ends of single precision."""
 
 from dataclasses import replace
 
 import numpy as np
-
-from isp.interleaved import reconstruct
-from render.radiance import SpectralRadiance
-from sensor.cfa import channels, letter_map
-from sensor.config import LensConfig, SensorConfig
-from sensor.presets import low_noise, table1_pixel
-from studies.stress_case import Case, Margin, Situation, worse, worst_of
-from studies.stress_chain import CAMERAS, develop, expected, shoot
-from studies.stress_light import (
+from hard.case import Case, Margin, Situation, worse, worst_of
+from hard.chain import CAMERAS, develop, expected, shoot
+from hard.invariants_raw import bias
+from hard.light import (
     BANDS_NM,
     GLINT_CD_M2,
     SIDE,
@@ -21,11 +16,18 @@ from studies.stress_light import (
     cropped,
     even,
     planar,
+    planes_of,
     scaled_to,
     times,
     with_glint,
+    with_planes,
 )
-from studies.stress_raw import bias
+
+from isp.interleaved import reconstruct
+from render.radiance import SpectralRadiance
+from sensor.cfa import channels, letter_map
+from sensor.config import LensConfig, SensorConfig
+from sensor.presets import low_noise, table1_pixel
 
 MIDDLE = SIDE // 2
 
@@ -53,24 +55,23 @@ def _one_pixel(inside: float, outside: float) -> SpectralRadiance:
 
 def _dim_alone(situation: Situation) -> Margin:
     """Dim pixels beside bright ones expect what they expect without them."""
-    pattern = checkerboard(1)
-    alone = times(situation.radiance, np.where(pattern == 1.0, 1.0, 0.0))
-    both = expected(situation)[pattern == 1.0]
-    one = expected(replace(situation, radiance=alone))[pattern == 1.0]
-    return worst_of(both - one, 1e-6 * one, "e⁻")
+    dim = checkerboard(1) == 1.0
+    both = expected(situation)[dim]
+    alone = expected(replace(situation, radiance=times(situation.radiance, 1.0 * dim)))[dim]
+    return worst_of(both - alone, 1e-6 * alone, "e⁻")
 
 
 def _glint_alone(situation: Situation) -> Margin:
     """The glint changes its own pixel and no other."""
-    keep = np.ones(situation.radiance.shape)
-    keep[MIDDLE, MIDDLE] = 0.0
-    both = expected(situation)
-    one = expected(replace(situation, radiance=times(situation.radiance, keep)))
-    return worst_of((both - one)[keep > 0], 1e-6 * one[keep > 0] + 1e-12, "e⁻")
+    others = np.ones(situation.radiance.shape)
+    others[MIDDLE, MIDDLE] = 0.0
+    both = expected(situation)[others > 0]
+    alone = expected(replace(situation, radiance=times(situation.radiance, others)))[others > 0]
+    return worst_of(both - alone, 1e-6 * alone + 1e-12, "e⁻")
 
 
 def _light_kept(situation: Situation) -> Margin:
-    """The lens moves light and loses none: the frame's sum for one letter is that of the lens without the term."""
+    """The lens moves light and loses none: the frame's sum behind one filter is that of the lens without the term."""
     sharp = replace(situation.sensor, lens=LensConfig(situation.sensor.lens.f_number), cfa=("W",))
     spread = replace(situation.sensor, cfa=("W",))
     with_term = expected(replace(situation, sensor=spread)).sum()
@@ -98,8 +99,7 @@ def _dark(situation: Situation) -> Margin:
 def _finer() -> SpectralRadiance:
     """The middle of the scene with the glint, every pixel as 4 x 4 samples."""
     half = cropped(with_glint(at_level(5e3), MIDDLE, MIDDLE), (MIDDLE, MIDDLE))
-    values = np.kron(np.moveaxis(half.values, -1, 0), np.ones((1, 4, 4), dtype=np.float32))
-    return SpectralRadiance(np.moveaxis(values, 0, -1), half.wavelength_nm, 0.0, half.width_nm)
+    return with_planes(half, np.kron(planes_of(half), np.ones((1, 4, 4), dtype=np.float32)))
 
 
 def _white_of_a_flat_field(situation: Situation) -> Margin:

@@ -5,6 +5,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from hard.case import Case, Margin, Situation, worst_of
+from hard.chain import expected
+from hard.light import at_level, cropped, even, scaled_to
 
 from render.radiance import SpectralRadiance
 from render.spectrum import flat
@@ -13,11 +16,8 @@ from sensor.config import LensConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.device import draw_device
 from sensor.presets import low_noise
-from studies.stress_case import Case, Margin, Situation, worst_of
-from studies.stress_chain import expected
-from studies.stress_light import at_level, cropped, even, scaled_to
 
-CHIP_SIDE = 1024  # a chip of a megapixel: means are known to a thousandth of their spread
+CHIP_SIDE = 1024  # a megapixel: its mean is known to a thousandth of the spread
 CHIP_SIGMAS = 5.0  # standard errors: a false alarm of 6e-7
 
 
@@ -70,7 +70,7 @@ def _double_bands_last() -> SpectralRadiance:
     source = at_level(10.0)
     wide = np.zeros((*source.shape, 2 * source.wavelength_nm.size))
     wide[..., ::2] = source.values
-    return SpectralRadiance(wide[..., ::2], source.wavelength_nm, 0.0, source.width_nm)
+    return replace(source, values=wide[..., ::2])
 
 
 DARK = {"dark_current_e_per_s": 0.1}

@@ -1,0 +1,61 @@
+"""Margins, transformed raw images and bias: closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hard.case import Margin, worse, worst_of
+from hard.invariants_raw import allowed_errors, bias
+from hard.invariants_symmetry import cut, mirrored
+
+from isp.processors.bayer import bilinear
+from sensor.cfa import letter_map
+from sensor.raw import RawImage
+
+
+def raw_image(shape, tile=("RG", "BW"), seed=0):
+    dn = np.random.default_rng(seed).integers(0, 900, shape).astype(np.uint16)
+    return RawImage(dn, tile, 10.0, 1000.0, 1.0, 1.0, 0.0, 0.0, 0.01, defects=np.array([[0, 1], [2, 0]]))
+
+
+def test_the_margin_is_taken_where_error_over_allowed_is_largest():
+    margin = worst_of([1.0, -3.0, 0.5], [1.0, 4.0, 0.25], "e⁻")
+    assert (margin.worst, margin.allowed, margin.share, margin.kept) == (0.5, 0.25, 2.0, False)
+    assert worst_of([0.0, 0.0], 0.0, "e⁻").share == 0.0
+    assert worst_of([[1e-9]], 0.0, "e⁻").share == np.inf
+    assert not worst_of([np.nan, 0.0], 1.0, "e⁻").kept
+    assert not worst_of([np.inf], np.inf, "e⁻").kept
+    assert Margin(1.0, 1.0, "e⁻").kept
+    assert worse(Margin(2.0, 4.0, "a"), Margin(1.0, 1.0, "b")).unit == "b"
+
+
+@pytest.mark.parametrize("tile", [("RG", "BW"), ("RG", "GB"), ("WGWR", "GWRW", "WBWG", "BWGW"), ("RGB",)])
+@pytest.mark.parametrize("shape", [(8, 12), (5, 7), (4, 9)])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_mirrored_frame_holds_each_sample_under_its_own_letter_and_each_defect_at_its_place(tile, shape, axis):
+    raw = raw_image(shape, tile)
+    turned = mirrored(raw, axis)
+    assert np.array_equal(turned.dn, np.flip(raw.dn, axis))
+    assert np.array_equal(letter_map(turned.cfa, shape), np.flip(letter_map(raw.cfa, shape), axis))
+    here, there = np.zeros(shape, bool), np.zeros(shape, bool)
+    here[tuple(raw.defects.T)] = there[tuple(turned.defects.T)] = True
+    assert np.array_equal(there, np.flip(here, axis))
+
+
+def test_a_cut_frame_begins_at_the_next_phase_of_the_mosaic():
+    raw = raw_image((6, 7))
+    part = cut(raw)
+    assert np.array_equal(letter_map(part.cfa, (5, 6)), letter_map(raw.cfa, (6, 7))[1:, 1:])
+    assert np.array_equal(part.dn, raw.dn[1:, 1:])
+    assert part.defects is None
+    bayer = replace(raw, cfa=("RG", "GB"), defects=None)
+    order = [("R", "G", "B").index(letter) for letter in ("R", "G", "B")]
+    assert bilinear(cut(bayer))[2:-2, 2:-2] == pytest.approx(bilinear(bayer)[3:-2, 3:-2][..., order], rel=1e-12)
+
+
+def test_bias_is_a_mean_in_its_own_standard_errors():
+    errors = np.array([1.0, 3.0])  # mean 2, standard error 1
+    assert bias(errors, 1.0) == Margin(2.0, allowed_errors(2), "standard errors")
+    assert allowed_errors(12) == pytest.approx(9.70, abs=0.01)  # Student's t of 11 degrees of freedom at 5e-7
+    assert bias(np.full(4, 1e-3), 1.0).unit == "e⁻"
+    assert not bias(np.full(4, 1e-3), 1.0).kept

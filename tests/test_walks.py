@@ -1,0 +1,91 @@
+"""How often a reader who follows one value has to change the module; counted over a call trace.
+
+At commit 35f5fbe `raw` made 56 stays (42 with LLVM, the others in the NumPy reference) and entered one module 12
+times; `radiance` made 18. Counted from the program's text, every branch included, they were 62, 12 and 18: the limits
+are half, a third and two thirds of these.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from walks import Stay, visits, walk
+
+MOST_OF_RAW = 31  # with both engines
+MOST_VISITS = 4  # of one module, with either engine
+MOST_OF_RADIANCE = 12
+
+
+def walks_of(**environment: str) -> dict[str, list[Stay]]:
+    """Walks in a process of its own: whatever else this one has traced, cached or patched stays out."""
+    done = subprocess.run(
+        [sys.executable, Path(__file__).with_name("walks.py")],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=240,
+    )
+    return {name: [tuple(stay) for stay in stays] for name, stays in json.loads(done.stdout).items()}
+
+
+@pytest.fixture(scope="module")
+def walked() -> dict[str, dict[str, list[Stay]]]:
+    return {"llvm": walks_of(), "numpy": walks_of(DRJIT_LIBLLVM_PATH="/nonexistent/libLLVM.so")}
+
+
+@pytest.mark.parametrize("engine", ["llvm", "numpy"])
+def test_the_walks_begin_where_they_say(walked, engine):
+    assert walked[engine]["raw"][0][1:] == ("isp.interleaved", "reconstruct")
+    assert walked[engine]["radiance"][0][1:] == ("sensor.capture", "capture")
+    assert len(walked[engine]["raw"]) > 5
+    assert len(walked[engine]["radiance"]) > 5
+
+
+def test_raw_makes_few_stays_on_its_way_through_reconstruct(walked):
+    stays = list(dict.fromkeys(walked["llvm"]["raw"] + walked["numpy"]["raw"]))
+    assert len(stays) <= MOST_OF_RAW, "\n".join(map(str, stays))
+
+
+@pytest.mark.parametrize("engine", ["llvm", "numpy"])
+def test_raw_enters_no_module_often(walked, engine):
+    counts = visits(walked[engine]["raw"])
+    assert max(counts.values()) <= MOST_VISITS, counts
+
+
+def test_radiance_makes_few_stays_on_its_way_through_capture(walked):
+    stays = walked["llvm"]["radiance"]
+    assert len(stays) <= MOST_OF_RADIANCE, "\n".join(map(str, stays))
+
+
+def test_a_stay_is_a_call_with_the_value_into_another_module():
+    """Three functions are given the mosaic, one of them in a loop; the fourth isn't."""
+    from sensor import cfa
+    from sensor.raw import RawImage
+
+    raw = RawImage(
+        dn=np.full((4, 4), 100, np.uint16),
+        cfa=cfa.RGBW,
+        black_dn=64,
+        white_dn=4095,
+        gain_e_per_dn=1.0,
+        read_noise_e=2.0,
+        dsnu_e=1.0,
+        prnu=0.01,
+        exposure_s=0.01,
+    )
+
+    def run() -> None:
+        for _ in range(3):
+            cfa.channels(raw.cfa)
+        cfa.check_covers(raw.cfa, (4, 4))
+        cfa.mask(raw.cfa, "W", raw.shape)
+        cfa.tile_of("bayer")
+
+    stays = walk(run, raw)
+    assert [name for _, _, name in stays] == ["channels", "check_covers", "mask"]
+    assert set(visits(stays)) == {"sensor.cfa"}
