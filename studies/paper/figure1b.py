@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from studies.pages.plots import picture_rows
-from studies.paper.checks import Check, Claim, at_least, near
+from studies.paper.checks import Claim, ClaimCheck, at_least, near
 from studies.paper.flat import channel_e, decibels, light_of, shot_noise_alone, snr
 from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, SWEEP, Setup, sensor_of, swept
@@ -51,7 +51,7 @@ def claims_1b(shot_db: float, all_db: Mapping[str, float], psnr_gain_db: float) 
     psnr_gain_db : float
         Of the developed pictures.
     """
-    checks: Sequence[Check] = (
+    checks: Sequence[ClaimCheck] = (
         near("shot noise alone", shot_db, CLAIMED_DB, MARGIN_DB, "dB"),
         *(near(f"{name}, all noise", value, CLAIMED_DB, MARGIN_DB, "dB") for name, value in all_db.items()),
     )

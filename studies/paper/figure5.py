@@ -14,7 +14,7 @@ from sensor.cfa import channels, mask
 from sensor.raw import RawImage
 from studies.pages.plots import picture_rows
 from studies.paper.camera import Image, View, develop, exposures, quality_db
-from studies.paper.checks import Check, Claim, at_least
+from studies.paper.checks import Claim, ClaimCheck, at_least
 from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, Setup, sensor_of, view
 from studies.sweep.cells import Coordinates
@@ -86,7 +86,7 @@ def claims_5(found: Mapping[str, Bright], gains_db: Mapping[str, float]) -> tupl
         Claim(
             "Figure 5",
             "At 200 cd/m², 66 ms and 3 µm W is partly saturated",
-            tuple(Check(name, one.white_full, *PARTLY, "of its pixels") for name, one in found.items()),
+            tuple(ClaimCheck(name, one.white_full, *PARTLY, "of its pixels") for name, one in found.items()),
             "still_life, f/2.8; the well in proportion to area.",
         ),
         Claim(

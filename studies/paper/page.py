@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from studies.pages import report_text as text
 from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import svg_text
-from studies.paper.checks import VERDICTS, Check, Claim
+from studies.paper.checks import VERDICTS, Claim, ClaimCheck
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class PaperFigure:
     drawing: Figure
 
 
-def range_text(check: Check) -> str:
+def range_text(check: ClaimCheck) -> str:
     """Where the claim holds, in words: ``at least 1``, ``9.04 to 10.04``, ``exactly 1``."""
     low, high = (text.significant(value, digits=4) for value in (check.low, check.high))
     if not isfinite(check.high):
@@ -32,7 +32,7 @@ def range_text(check: Check) -> str:
     return f"exactly {low}" if check.low == check.high else f"{low} to {high}"
 
 
-def value_text(check: Check) -> str:
+def value_text(check: ClaimCheck) -> str:
     """Number and unit, to as many digits as tell it from the end of its range that it is near to."""
     for digits in range(3, 7):
         shown = text.significant(check.value, digits=digits)
