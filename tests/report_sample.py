@@ -13,6 +13,7 @@ import numpy as np
 from PIL import Image
 from sweep_sample import row
 
+from sensor.presets import preset
 from studies.pages.report_cells import over_seeds
 from studies.pages.report_data import ReportData, ReportLevel, ReportRender, ReportScene, ReportSensor
 from studies.pages.report_text import group_names, view_names
@@ -27,11 +28,7 @@ LEVELS = (
     ("overcast", 800.0, 5000.0, "CIE overcast sky"),
     ("daylight", 5000.0, 31000.0, "sun and clear sky"),
 )
-COMMON = {"full_well_e": 15000.0, "prnu": 0.017, "pitch_um": 2.2, "f_number": 2.8, "bits": 14}
-SENSORS = (
-    ReportSensor(name="table1_output", read_noise_e=19.1, dsnu_e=25.1, **COMMON),
-    ReportSensor(name="low_noise", read_noise_e=1.5, dsnu_e=1.0, **COMMON),
-)
+SENSORS = (ReportSensor("table1_output", preset("table1_output")), ReportSensor("low_noise", preset("low_noise")))
 CAMERAS = ("interleaved", "bayer")
 RENDER = ReportRender("", 256, 40, 41.2, "llvm_ad_spectral", "path + specfilm", 16, "seconds", 0.031, 0.42)
 Change = Callable[[Row], Row | None]

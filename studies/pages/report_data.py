@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from sensor.config import SensorConfig
 from studies.sweep.row import Row
 
 
@@ -25,16 +26,10 @@ class ReportLevel:
 
 @dataclass(frozen=True)
 class ReportSensor:
-    """The numbers of a sensor that a reader wants; None for a sensor file that is no longer there."""
+    """A sensor by name, and its numbers; None for a sensor file that is no longer there."""
 
     name: str
-    read_noise_e: float | None = None
-    dsnu_e: float | None = None
-    full_well_e: float | None = None
-    prnu: float | None = None
-    pitch_um: float | None = None
-    f_number: float | None = None
-    bits: int | None = None
+    config: SensorConfig | None
 
 
 @dataclass(frozen=True)

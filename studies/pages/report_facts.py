@@ -12,7 +12,6 @@ from sensor.left_out import left_out
 from sensor.presets import preset
 from studies.pages.report_data import ReportLevel, ReportRender, ReportSensor
 from studies.pages.report_text import level_text
-from studies.pages.results import sensor_facts
 from studies.study.study import label
 from studies.sweep.provenance import made_by, told
 from studies.sweep.row import Row
@@ -58,11 +57,11 @@ def level_of(text: str) -> ReportLevel:
 
 
 def sensor_of(name: str) -> ReportSensor:
-    """Return the numbers of a sensor; unknown for a file that is no longer there."""
+    """Return a sensor's numbers; none of a file that is no longer there."""
     try:
-        return ReportSensor(**sensor_facts(name) | {"name": label(name)})
+        return ReportSensor(label(name), preset(name))
     except InputError:
-        return ReportSensor(label(name))
+        return ReportSensor(label(name), None)
 
 
 def environment_of(rows: Sequence[Row]) -> dict[str, str]:

@@ -113,7 +113,7 @@ def _poison(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _poison(item) for key, item in value.items()}
     if is_dataclass(value):
-        kept = ("balance", "mean_electrons", "figures", "intervals")
+        kept = ("balance", "mean_electrons", "figures", "intervals", "config")
         own = {field.name: getattr(value, field.name) for field in fields(value)}
         poisoned = {name: item if name in kept else _poison(item) for name, item in own.items()}
         return type(value)(**poisoned)

@@ -5,11 +5,13 @@ import re
 import shutil
 import sqlite3
 from contextlib import closing
+from dataclasses import replace
 from html import unescape
 from itertools import product
 from pathlib import Path
 
 import pytest
+import report_sample as REPORTS
 import sweep_sample as SAMPLE
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,7 +20,8 @@ from rodcone.errors import InputError
 from studies.commands.cli import main
 from studies.pages.report import render_report
 from studies.pages.report_choice import chosen_conditions
-from studies.pages.report_facts import fallbacks
+from studies.pages.report_data import ReportSensor
+from studies.pages.report_facts import fallbacks, sensor_of
 from studies.pages.report_sweep import ledger_results
 from studies.study.study import SceneChoice
 from studies.sweep.database import FILE
@@ -157,6 +160,15 @@ def test_a_machine_on_which_neither_llvm_nor_cuda_answered_is_told() -> None:
     assert fallbacks(made[:2]) == []
     (note,) = fallbacks(made)
     assert all(part in note for part in ("LLVM", "CUDA", "scalar_spectral", "captures", "reconstruction", "NumPy"))
+
+
+def test_a_sensor_whose_file_is_gone_is_said_to_be() -> None:
+    gone = sensor_of("gone.toml")
+    assert gone == ReportSensor("gone.toml", None)
+    report = REPORTS.sample_report(levels=1)
+    pictures = REPORTS.sample_pictures(report)
+    report = replace(report, sensors=(gone, *report.sensors[1:]))
+    assert "<p>Its file is no longer there.</p>" in render_report(report, pictures)
 
 
 def test_what_is_no_sweep_or_has_lost_a_picture_is_one_line(out: Path, tmp_path: Path) -> None:
