@@ -133,8 +133,8 @@ def _cells(run: LastRun, names: Sequence[str]) -> list[ReportCell]:
     for title, group in zip(titles, groups, strict=True):
         for level, camera in product(study["levels"], study["processors"]):
             of_seeds = [found.get((*group, level, camera, seed)) for seed in study["seeds"]]
-            seen = light.get((*group[:2], level), (None, None))
-            cells.append(over_seeds(of_seeds, title, study["levels"].index(level), camera, seen))
+            in_both_units = light.get((*group[:2], level), (None, None))
+            cells.append(over_seeds(of_seeds, title, study["levels"].index(level), camera, in_both_units))
     return cells
 
 

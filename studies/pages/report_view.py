@@ -102,10 +102,13 @@ def finding_rows(report: ReportData, cells: Sequence[ReportCell]) -> list[list[s
             best, lead = text.leader(metric, condition)
             by = text.fixed(lead, metric.digits, metric.unit)
             row.append(f"{text.camera_name(best.camera)}, by {by}" if best else text.MISSING)
-        swapped = [cell for cell in condition if cell.substitution]
-        fallen = [cell for cell in condition if "calibrated" in cell.balance.values()]
-        for found in (swapped, fallen):
-            row.append(", ".join(text.camera_name(cell.camera) for cell in found) or text.MISSING)
+        swapped = [
+            text.camera_name(cell.camera) + ("" if cell.substitution == 1 else " (some seeds)")
+            for cell in condition
+            if cell.substitution
+        ]
+        fallen = [text.camera_name(cell.camera) for cell in condition if "calibrated" in cell.balance.values()]
+        row += [", ".join(names) or text.MISSING for names in (swapped, fallen)]
         rows.append(row)
     return rows
 

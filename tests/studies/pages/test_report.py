@@ -254,6 +254,13 @@ def test_summary_states_wins_and_losses() -> None:
     assert rows[7] == ["daylight", "Bayer, by 2.5 dB", "—", "Bayer, by 1.5", "—", "—"]
 
 
+def test_luminance_substituted_for_some_seeds_is_said_to_be() -> None:
+    of = SAMPLE.sample_report(
+        lambda row: row if row.substitution is None else replace(row, substitution=row.seed), seeds=(0, 1), levels=1
+    )
+    assert page_of(of).count("<td>Interleaved (some seeds)</td>") == len(of.sensors)
+
+
 def test_the_largest_monte_carlo_share_is_judged_against_the_aim() -> None:
     low = SAMPLE.sample_report(lambda row: replace(row, mc_share=0.03))
     high = SAMPLE.sample_report(lambda row: replace(row, mc_share=0.052 if row.level == "office" else 0.03))
