@@ -25,11 +25,12 @@ from environment import print_environment
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from isp.colour.camera_colour import encode_srgb
 from isp.pipeline import picture_interleaved
 from isp.processors.catalogue import PROCESSORS
+from isp.settings import NEIGHBOURHOOD, Settings
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL, substitution_weight
 from render.engine import render
+from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
 from sensor.cfa import channels, mask
@@ -246,7 +247,7 @@ def settings(bench: Bench, levels: Sequence[float]) -> None:
         white_e = neutral[channels(camera.sensor.cfa).index("G")] * stage.white_cd_m2 * level
         for j, (patch, sigma_d, sigma_s) in enumerate(choices):
             picture = picture_interleaved(
-                raw, camera.colours, neutral=neutral, patch=patch, sigma_d=sigma_d, sigma_s=sigma_s
+                raw, camera.colours, neutral=neutral, settings=Settings(NEIGHBOURHOOD, patch, sigma_d, sigma_s)
             )
             quality = measure(encode_srgb(picture.rgb / white_e), stage.truth)
             row[j] = quality.psnr_db, quality.delta_e_median

@@ -1,9 +1,44 @@
-"""Back from units of noise to electrons without bias: the exact inverse of the generalised Anscombe transform."""
+"""The generalised Anscombe transform, from electrons to units of noise, and its exact inverse, which has no bias."""
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+# Under it PRNU adds less than 1 % to shot noise up to a million electrons, and ln(1 + p) runs out of digits.
+LEAST_PRNU = 1e-4
 _LEAST = 2.0 * np.sqrt(0.375)  # what stands for 0 electrons: the Anscombe transform of 0
+
+
+def stabilise(electrons: NDArray[Any], dark_noise_e: float, prnu: float) -> NDArray[Any]:
+    """Mosaic in units of its own noise: generalised Anscombe transform at unit gain, with PRNU.
+
+    The integral of 1 / sqrt(s^2 + e + 3/8 + (p e)^2), shot noise, dark noise s and PRNU p:
+
+        t = ln(1 + 2 p sqrt(v) + 2 p^2 e') / p,    e' = e + 3/8,    v = s^2 + e' + (p e')^2
+
+    which for p -> 0 is 2 sqrt(e + 3/8 + s^2) (Murtagh, Starck & Bijaoui 1995, eq. 7) less a constant. Its standard
+    deviation is 1 from a few electrons on. Where e' is under 0 PRNU is left out; under -s^2 t stays 0.
+
+    Parameters
+    ----------
+    electrons : (h, w) float32 or float64
+        Mosaic [e-].
+    dark_noise_e : float
+        s, as `RawImage.dark_noise_e` [e-].
+    prnu : float
+        p, as `RawImage.prnu`.
+
+    Returns
+    -------
+    (h, w) of the same type
+        Stabilised mosaic [standard deviations of a pixel's noise].
+    """
+    if prnu < LEAST_PRNU:
+        return np.asarray(2.0 * np.sqrt(np.maximum(electrons + (0.375 + dark_noise_e**2), 0.0)))
+    seen = np.maximum(electrons + 0.375, 0.0)
+    variance = np.maximum(electrons + (0.375 + dark_noise_e**2), 0.0) + (prnu * seen) ** 2
+    return np.asarray(np.log(1.0 + 2.0 * prnu * np.sqrt(variance) + 2.0 * prnu**2 * seen) / prnu)
 
 
 def unstabilise(stable: NDArray[np.floating], dark_noise_e: float) -> NDArray[np.float64]:
@@ -18,7 +53,7 @@ def unstabilise(stable: NDArray[np.floating], dark_noise_e: float) -> NDArray[np
     stable : array
         Denoised values [standard deviations of noise].
     dark_noise_e : float
-        The standard deviation that `isp.planes.stabilise` took, with no PRNU [e-].
+        The standard deviation that `stabilise` took, with no PRNU [e-].
 
     Returns
     -------

@@ -9,44 +9,37 @@ from numpy.typing import NDArray
 from sensor.cfa import letter_map
 from sensor.raw import RawImage
 
-_RINGS = 3  # tiles around a pixel that are searched for its letter before the whole frame's median serves
+_RINGS = 3  # tiles around a pixel that are searched for its channel before the whole frame's median serves
 
 
 def mend(raw: RawImage) -> RawImage:
-    """Replace each listed pixel by the median of the nearest sound samples of its letter; the list is gone then.
+    """Replace each listed pixel by the median of the nearest sound samples of its channel; the list is gone then.
 
     Nearest: all in a window of one tile's period to either side, which grows until it holds one. A median, since a
-    cluster may hold a defect that isn't listed.
+    cluster may hold a defect that isn't listed. Black stands where the channel has no sound sample at all.
     """
     if raw.defects is None:
         return raw
+    sound = np.ones(raw.shape, dtype=np.bool_)
+    sound[tuple(raw.defects.T)] = False
+    names = letter_map(raw.cfa, raw.shape)
+
+    def sound_dn(window: tuple[slice, ...], name: str) -> NDArray[np.uint16]:
+        return np.asarray(raw.dn[window][sound[window] & (names[window] == name)])
+
+    def median_dn(samples: NDArray[np.uint16]) -> float:
+        return float(np.rint(np.median(samples) if samples.size else raw.black_dn))
+
+    of_frame = cache(lambda name: median_dn(sound_dn((slice(None), slice(None)), name)))
+    down, across = len(raw.cfa), len(raw.cfa[0])
     dn = raw.dn.copy()
-    bad = np.zeros(raw.shape, dtype=np.bool_)
-    bad[tuple(raw.defects.T)] = True
-    letters = letter_map(raw.cfa, raw.shape)
-    of_frame = cache(lambda letter: _median_dn(raw, raw.dn[~bad & (letters == letter)]))
-    for row, column in raw.defects:
-        found = _neighbours(raw, bad, letters, int(row), int(column))
-        dn[row, column] = _median_dn(raw, found) if found.size else of_frame(str(letters[row, column]))
+    for row, column in raw.defects.tolist():
+        name = str(names[row, column])
+        for ring in range(1, _RINGS + 1):
+            rows = slice(max(row - ring * down, 0), row + ring * down + 1)
+            columns = slice(max(column - ring * across, 0), column + ring * across + 1)
+            found = sound_dn((rows, columns), name)
+            if found.size:
+                break
+        dn[row, column] = median_dn(found) if found.size else of_frame(name)
     return replace(raw, dn=dn, defects=None)
-
-
-def _neighbours(
-    raw: RawImage, bad: NDArray[np.bool_], letters: NDArray[np.str_], row: int, column: int
-) -> NDArray[np.uint16]:
-    """Sound samples of the pixel's letter in the smallest window that holds some [DN]; none where none does."""
-    found = np.empty(0, dtype=np.uint16)
-    for ring in range(1, _RINGS + 1):
-        window = tuple(
-            slice(max(at - ring * period, 0), at + ring * period + 1)
-            for at, period in ((row, len(raw.cfa)), (column, len(raw.cfa[0])))
-        )
-        found = np.asarray(raw.dn[window][~bad[window] & (letters[window] == letters[row, column])])
-        if found.size:
-            break
-    return found
-
-
-def _median_dn(raw: RawImage, samples: NDArray[np.uint16]) -> float:
-    """Median of samples, black where there are none."""
-    return float(np.rint(np.median(samples))) if samples.size else float(np.rint(raw.black_dn))

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from isp.colour.camera_colour import BalanceSource
 from isp.colour.colour_fit import ColourFit, relative_noise
-from isp.colour.white_balance import clip_highlights, white_balance
-from isp.substitution import matrix_without_white
+from isp.colour.highlights import clip_highlights
+from isp.colour.white_balance import BalanceSource, WhiteBalance
+from isp.substitution import COLOUR_ERROR
 from rodcone.errors import InputError
 from rodcone.jit import Backend
 from rodcone.notebook import html_of, preview_png
@@ -21,7 +21,7 @@ Image = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Picture:
-    """A developed picture, and what was decided on the way.
+    """A developed picture, and what was decided on the way; to NumPy it is its linear RGB.
 
     Attributes
     ----------
@@ -29,33 +29,46 @@ class Picture:
         Linear sRGB, not clipped to the display; a neutral reads the electrons of a green pixel.
     balance : mapping of str to str
         Where each channel's gain comes from: ``gray world``, ``calibrated`` or ``given``.
-    snr : float or None
-        Frame SNR of green, on which substitution is decided; None for the Bayer camera.
-    substituted : bool or None
-        Whether W gave most of the luminance; None for the Bayer camera.
     engine : "cuda", "llvm" or "numpy"
         What ran the reconstruction.
+    snr : float or None
+        Frame SNR of green, on which substitution is decided; None where W substitutes nothing, as in a Bayer camera.
     substitution : float or None
-        W's share of the luminance, 0 to 1; None for the Bayer camera.
+        W's share of the luminance, 0 to 1; None likewise.
     """
 
     rgb: Image
     balance: Mapping[str, BalanceSource]
-    snr: float | None
-    substituted: bool | None
-    engine: Backend
+    engine: Backend = "numpy"
+    snr: float | None = None
     substitution: float | None = None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of `rgb`."""
+        return self.rgb.shape
+
+    @property
+    def substituted(self) -> bool | None:
+        """Whether W gave most of the luminance; None where nothing is substituted."""
+        return None if self.substitution is None else self.substitution > 0.5
 
     @property
     def snr_db(self) -> float | None:
         """`snr` in decibels; None where there is none, or no signal."""
         return 20 * float(np.log10(self.snr)) if self.snr is not None and self.snr > 0 else None
 
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[np.floating]:
+        return np.array(self.rgb, dtype=dtype, copy=copy)
+
+    def __truediv__(self, scale: ArrayLike) -> Image:
+        return np.asarray(self.rgb / np.asarray(scale))
+
     def _repr_png_(self) -> bytes:
         return preview_png(self.rgb)
 
     def _repr_html_(self) -> str:
-        facts = {"white balance": ", ".join(f"{letter}: {source}" for letter, source in self.balance.items())}
+        facts = {"white balance": ", ".join(f"{channel}: {source}" for channel, source in self.balance.items())}
         if self.snr is not None:
             facts["frame SNR of green"] = f"{self.snr:.3g}, W's share of the luminance {self.substitution or 0:.2g}"
         return html_of("Picture", facts | {"engine": self.engine}, self._repr_png_())
@@ -67,7 +80,7 @@ def finish(
     matrix: ArrayLike | ColourFit,
     *,
     neutral: ArrayLike | None = None,
-    balance: ArrayLike | None = None,
+    balance: ArrayLike | WhiteBalance | None = None,
     engine: Backend = "numpy",
     noise_gain: NDArray[np.floating] | None = None,
 ) -> Picture:
@@ -80,33 +93,25 @@ def finish(
     planes : (h, w, 3) float64
         Demosaicked channels [e-].
     matrix, neutral, balance
-        As `isp.pipeline.develop_interleaved`.
+        As `isp.pipeline.picture_interleaved`.
     engine : "cuda", "llvm" or "numpy"
         What made the planes.
     noise_gain : (h, w, 3) array, optional
         Of `isp.interleaved.reconstruct_with_noise`: with a `ColourFit` as `matrix`, colours that know this noise.
     """
-    white = white_balance(raw, planes, neutral, balance)
-    if noise_gain is not None and isinstance(matrix, ColourFit):
-        matrix = matrix_without_white(matrix, relative_noise(raw, planes, noise_gain, white.gains, matrix))
-    rgb = clip_highlights(raw, planes * white.gains) @ checked_matrix(matrix).T
-    return Picture(rgb, dict(zip(channels(raw.cfa), white.sources, strict=True)), None, None, engine)
+    colours = ColourFit.of(matrix)
+    gains = WhiteBalance.of(raw, neutral, balance).gains(raw, planes)
+    noise = np.zeros(3)
+    if noise_gain is not None:
+        noise = relative_noise(raw, planes, noise_gain, gains.factors, colours)
+    rgb = clip_highlights(raw, planes * gains.factors) @ colours.matrix(noise=noise * COLOUR_ERROR).T
+    return Picture(rgb, gains.sources, engine)
 
 
 def require_letters(raw: RawImage, letters: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the mosaic's letters, or raise `InputError` where they are others."""
+    """Return the mosaic's channels, or raise `InputError` where they are others."""
     if channels(raw.cfa) != letters:
         raise InputError(
             f"raw: mosaic {raw.cfa} holds {channels(raw.cfa)}; allowed here: {letters}; use the other camera's pipeline"
         )
     return letters
-
-
-def checked_matrix(matrix: ArrayLike) -> Image:
-    """Return the matrix as an array, or raise `InputError` unless it is 3x3 and finite."""
-    array = np.asarray(matrix, dtype=np.float64)
-    if array.shape != (3, 3) or not np.all(np.isfinite(array)):
-        raise InputError(
-            f"matrix: shape {array.shape} is not allowed; give 3x3 finite numbers, as fit_matrix makes them"
-        )
-    return array

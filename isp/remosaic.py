@@ -23,8 +23,8 @@ def bayer_tile(tile: Tile) -> Tile:
     if not is_rgbw(tile):
         raise InputError(f"cfa: {tile} can't become Bayer; allowed: 2x2 with R, G, B and W; use its raw file as it is")
     row, column = divmod("".join(tile).index("R"), 2)
-    letters = {(row, column): "R", (1 - row, 1 - column): "B"}
-    return tuple("".join(letters.get((y, x), "G") for x in range(2)) for y in range(2))
+    colours = {(row, column): "R", (1 - row, 1 - column): "B"}
+    return tuple("".join(colours.get((y, x), "G") for x in range(2)) for y in range(2))
 
 
 def remosaic(raw: RawImage) -> RawImage:
@@ -39,11 +39,12 @@ def remosaic(raw: RawImage) -> RawImage:
     InputError
         Where the mosaic is not 2x2 RGBW.
     """
-    tile, raw = bayer_tile(raw.cfa), mend(raw)
+    tile = bayer_tile(raw.cfa)
+    raw = mend(raw)
     estimate_dn = np.asarray(reconstruct(raw), dtype=np.float64) / raw.gain_e_per_dn + raw.black_dn
     dn = raw.dn.copy()
-    for index, letter in enumerate(channels(raw.cfa)):
-        moved = mask(tile, letter, raw.shape) & ~mask(raw.cfa, letter, raw.shape)
+    for index, channel in enumerate(channels(raw.cfa)):
+        moved = mask(tile, channel, raw.shape) & ~mask(raw.cfa, channel, raw.shape)
         dn[moved] = np.rint(np.clip(estimate_dn[moved, index], 0.0, raw.white_dn)).astype(np.uint16)
-    kept = [channels(raw.cfa).index(letter) for letter in "RGB"]
+    kept = [channels(raw.cfa).index(channel) for channel in "RGB"]
     return replace(raw, dn=dn, cfa=tile, colour=None if raw.colour is None else raw.colour.part(kept))

@@ -6,10 +6,10 @@ fitted on surfaces (`isp.colour.colour_fit`), as far as the noise of the colours
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from isp.colour.camera_colour import luminance_of_srgb
 from isp.colour.colour_fit import ColourFit
+from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from sensor.cfa import channels
 from sensor.raw import RawImage
@@ -75,15 +75,15 @@ def substitution_weight(snr: float, threshold: float, octaves: float = OCTAVES) 
     return t * t * (3.0 - 2.0 * t)
 
 
-def matrix_with_white(matrix: ArrayLike | ColourFit, noise: ArrayLike, weight: float) -> NDArray[np.float64]:
+def matrix_with_white(fit: ColourFit, noise: NDArray[np.float64], weight: float) -> NDArray[np.float64]:
     """Matrix from balanced R, G, B and W to linear sRGB, with its luminance substituted by `weight`.
+
+    W joins the colours by weights that minimise the expected error at the noise; a plain matrix leaves it out of them,
+    and W as it is gives the luminance.
 
     Parameters
     ----------
-    matrix : (3, 3) array_like or ColourFit
-        With a fit W joins the colours, by weights that minimise the expected error at the noise; a plain matrix leaves
-        it out of them, and W as it is gives the luminance.
-    noise : (4,) array_like
+    noise : (4,) float64
         Variance of the balanced channels, as `isp.colour.colour_fit.relative_noise`.
     weight : float
         Of `substitution_weight`.
@@ -91,20 +91,8 @@ def matrix_with_white(matrix: ArrayLike | ColourFit, noise: ArrayLike, weight: f
     Returns
     -------
     (3, 4) float64
-        Rows sum to 1, where those of `matrix` do.
+        Rows sum to 1, where those of a plain matrix do.
     """
-    if isinstance(matrix, ColourFit):
-        errors = np.asarray(noise, dtype=np.float64)
-        colours = matrix.matrix("RGBW", errors * COLOUR_ERROR)
-        white = luminance_of_srgb(matrix.matrix("RGBW", errors * [*[LUMINANCE_ERROR] * 3, 1.0]).T)
-    else:
-        colours = np.hstack([np.asarray(matrix, dtype=np.float64), np.zeros((3, 1))])
-        white = np.array([0.0, 0.0, 0.0, 1.0])
+    colours = fit.matrix("RGBW", noise * COLOUR_ERROR)
+    white = fit.luminance(noise * [*[LUMINANCE_ERROR] * 3, 1.0])
     return np.asarray(colours + weight * (white - luminance_of_srgb(colours.T)))
-
-
-def matrix_without_white(matrix: ArrayLike | ColourFit, noise: ArrayLike) -> NDArray[np.float64]:
-    """As `matrix_with_white`, (3, 3), from balanced R, G and B: for pixels near which W is saturated."""
-    if isinstance(matrix, ColourFit):
-        return matrix.matrix("RGB", np.asarray(noise, dtype=np.float64)[:3] * COLOUR_ERROR)
-    return np.asarray(matrix, dtype=np.float64)

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from render.photometry import luminance, tristimulus
 from render.spectrum import Floats, band_widths
+from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.errors import InputError, require_range
-from rodcone.notebook import XYZ_TO_SRGB, html_of, preview_png
+from rodcone.notebook import html_of, preview_png
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class SpectralRadiance:
         return luminance(self.values, self.wavelength_nm, self.widths_nm)
 
     def _repr_png_(self) -> bytes:
-        return preview_png(tristimulus(self.values, self.wavelength_nm, self.widths_nm) @ XYZ_TO_SRGB.T)
+        return preview_png(tristimulus(self.values, self.wavelength_nm, self.widths_nm) @ XYZ_TO_SRGB_ROUNDED.T)
 
     def _repr_html_(self) -> str:
         first, last = (float(self.wavelength_nm[i] + way * self.widths_nm[i] / 2) for i, way in ((0, -1), (-1, 1)))

@@ -8,8 +8,8 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
-# XYZ to linear sRGB, IEC 61966-2-1, equation (F.8).
-XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+from rodcone.colour_spaces import encode_srgb
+
 WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # this percentile of a picture is shown at 90 % of white
 SIDE = 512  # most pixels of a shown picture's longer side
 
@@ -17,7 +17,7 @@ SIDE = 512  # most pixels of a shown picture's longer side
 def preview_png(linear: NDArray[np.floating]) -> bytes:
     """PNG of a linear picture, (h, w, 3) sRGB or (h, w) grey, in its own scale; large ones lose pixels.
 
-    A look, no measurement: `isp.colour.camera_colour` adapts and encodes pictures that are compared.
+    A look, no measurement: `rodcone.colour_spaces` adapts and encodes pictures that are compared.
     """
     from PIL import Image  # only here: most programs never show anything
 
@@ -26,9 +26,8 @@ def preview_png(linear: NDArray[np.floating]) -> bytes:
     luminance = small if small.ndim == 2 else small @ [0.2126, 0.7152, 0.0722]
     white = np.percentile(luminance, WHITE_PERCENTILE) / WHITE_AT
     shown = np.clip(small / white, 0.0, 1.0) if white > 0 else np.zeros_like(small)
-    encoded = np.where(shown <= 0.0031308, 12.92 * shown, 1.055 * shown ** (1 / 2.4) - 0.055)
     file = BytesIO()
-    Image.fromarray(np.rint(encoded * 255).astype(np.uint8)).save(file, "PNG")
+    Image.fromarray(np.rint(encode_srgb(shown) * 255).astype(np.uint8)).save(file, "PNG")
     return file.getvalue()
 
 

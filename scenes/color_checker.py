@@ -1,19 +1,19 @@
-"""The 24-patch ColorChecker on grey card, under an even sky; a chart of any other 24 reflectances in its place."""
+"""The 24-patch ColorChecker on grey card in a constant environment, or a chart of any other 24 reflectances."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from render.geometry import look_at, to_world, translate
-from render.illuminants import illuminant
-from render.scene import LightGroup, Node, Scene
+from render.geometry import look_at, translate
+from render.scene import Node, Scene
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import require_range
+from scenes.camera_and_sky import camera, under_sky
 from scenes.materials import matte, panel
 from scenes.reflectances import color_checker as patches
 from scenes.reflectances import grey, held
 
-SKY_LUMINANCE_CD_M2 = 100.0
 PATCH_M, GAP_M = 0.040, 0.005  # the classic chart's 40 mm patches
 COLUMNS, ROWS = 6, 4
 BOARD = 0.04  # reflectance of the board between the patches: the chart's black frame
@@ -39,36 +39,24 @@ def color_checker(light: str = "D65", surround: float = 0.2) -> Scene:
 
 
 def chart_scene(name: str, curves: Sequence[Spectrum], surround: Spectrum, light: str) -> Scene:
-    """Make a scene of a chart of 24 reflectances on a card, all on one grid, under an even sky."""
-    camera = {
-        "type": "perspective",
-        "fov": 20.0,
-        "fov_axis": "smaller",
-        "to_world": to_world(look_at((0, 0, 0.72), (0, 0, 0))),
-    }
-    geometry: Node = {
-        "type": "scene",
-        "sensor": camera,
-        "card": panel(FACING, 4.0, 4.0, matte(surround)),
-        "sky": {"type": "constant"},
-    }
-    groups = {"sky": LightGroup(("sky",), illuminant(light), SKY_LUMINANCE_CD_M2)}
+    """Make a scene of a chart of 24 reflectances on a card, all on one grid, in a constant environment."""
+    view = camera(20.0, (0, 0, 0.72), (0, 0, 0))
+    scene = under_sky(name, view, {"card": panel(FACING, 4.0, 4.0, matte(surround))}, light, reference_plane="card")
     board = Spectrum(surround.wavelength_nm, np.full(surround.values.shape, BOARD))
-    nodes = chart(translate(0, 0, 0.0002) @ FACING, curves, board)
-    return Scene(name, geometry | nodes, groups, reference_plane="card")
+    return replace(scene, geometry=scene.geometry | chart(translate(0, 0, 0.0002) @ FACING, curves, board))
 
 
-def color_checker_nodes(place: Floats) -> dict[str, Node]:
-    """Nodes of a ColorChecker centred on `place` and facing its +z, 380-780 nm."""
-    return chart(place, [curve for _, curve in patches()], grey(BOARD))
+def color_checker_nodes(pose: Floats) -> dict[str, Node]:
+    """Nodes of a ColorChecker centred on `pose` and facing its +z, 380-780 nm."""
+    return chart(pose, [curve for _, curve in patches()], grey(BOARD))
 
 
-def chart(place: Floats, curves: Sequence[Spectrum], board: Spectrum) -> dict[str, Node]:
-    """Nodes of a chart's board and 24 patches, row by row, centred on `place` and facing its +z."""
+def chart(pose: Floats, curves: Sequence[Spectrum], board: Spectrum) -> dict[str, Node]:
+    """Nodes of a chart's board and 24 patches, row by row, centred on `pose` and facing its +z."""
     step = PATCH_M + GAP_M
-    nodes = {"chart_board": panel(place, COLUMNS * step + GAP_M, ROWS * step + GAP_M, matte(board))}
+    nodes = {"chart_board": panel(pose, COLUMNS * step + GAP_M, ROWS * step + GAP_M, matte(board))}
     for index, reflectance in enumerate(curves):
         row, column = divmod(index, COLUMNS)
         x, y = (column - (COLUMNS - 1) / 2) * step, ((ROWS - 1) / 2 - row) * step
-        nodes[f"patch{index:02d}"] = panel(place @ translate(x, y, 0.0005), PATCH_M, PATCH_M, matte(reflectance))
+        nodes[f"patch{index:02d}"] = panel(pose @ translate(x, y, 0.0005), PATCH_M, PATCH_M, matte(reflectance))
     return nodes

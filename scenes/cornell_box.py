@@ -6,10 +6,11 @@ Source of geometry and spectra: Cornell University Program of Computer Graphics,
 
 import numpy as np
 
-from render.geometry import look_at, rotate, to_world, translate
+from render.geometry import look_at, rotate, translate
 from render.illuminants import illuminant, unit_luminance
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Spectrum
+from scenes.camera_and_sky import camera
 from scenes.materials import block, floor, matte, panel
 from scenes.reflectances import resampled
 
@@ -40,13 +41,8 @@ def cornell_box(light: str | None = None) -> Scene:
     light : str, optional
         Illuminant of the lamp; by default the measured lamp's, a warm one (400-700 nm: 0, 8, 15.6, 18.4).
     """
-    camera = {
-        "type": "perspective",
-        "fov": float(CAMERA_FOV_DEG),
-        "fov_axis": "smaller",
-        "to_world": to_world(look_at((0.278, 0.273, -0.8), (0.278, 0.273, 0.0))),
-    }
-    geometry: Node = {"type": "scene", "sensor": camera, **_walls(), **_blocks(), "lamp": _lamp()}
+    view = camera(float(CAMERA_FOV_DEG), (0.278, 0.273, -0.8), (0.278, 0.273, 0.0))
+    geometry: Node = {"type": "scene", "sensor": view, **_walls(), **_blocks(), "lamp": _lamp()}
     spectrum = illuminant(light) if light else lamp_spectrum()
     groups = {"lamp": LightGroup(("lamp/emitter",), spectrum, LAMP_LUMINANCE_CD_M2)}
     return Scene("cornell_box", geometry, groups, reference_plane="meter_card")
@@ -89,5 +85,5 @@ def _blocks() -> dict[str, Node]:
 
 
 def _lamp() -> Node:
-    place = translate(0.278, HEIGHT_M - 0.0005, 0.2795) @ rotate((1, 0, 0), 90)
-    return panel(place, 0.130, 0.105, matte(paint("white")), emitter={"type": "area"})
+    pose = translate(0.278, HEIGHT_M - 0.0005, 0.2795) @ rotate((1, 0, 0), 90)
+    return panel(pose, 0.130, 0.105, matte(paint("white")), emitter={"type": "area"})

@@ -1,13 +1,11 @@
-"""A grey wall under an even sky: every pixel has the same, known radiance."""
+"""A grey wall in a constant environment: every pixel has the same, known radiance."""
 
 from render.geometry import look_at, to_world
-from render.illuminants import illuminant
-from render.scene import LightGroup, Scene
+from render.scene import Scene
 from rodcone.errors import require_range
+from scenes.camera_and_sky import under_sky
 from scenes.materials import matte, panel
 from scenes.reflectances import grey
-
-SKY_LUMINANCE_CD_M2 = 100.0
 
 
 def flat_field(reflectance: float = 0.5, light: str = "D65") -> Scene:
@@ -21,12 +19,6 @@ def flat_field(reflectance: float = 0.5, light: str = "D65") -> Scene:
         Illuminant of the sky, whose luminance is 100 cd/m^2.
     """
     require_range("reflectance", reflectance, 0.0, 1.0, "give a fraction: 18 % is 0.18")
-    camera = {"type": "perspective", "fov": 30.0, "to_world": to_world(look_at((0, 0, 3), (0, 0, 0)))}
-    geometry = {
-        "type": "scene",
-        "sensor": camera,
-        "wall": panel(look_at((0, 0, 0), (0, 0, 1)), 20.0, 20.0, matte(grey(reflectance))),
-        "sky": {"type": "constant"},
-    }
-    groups = {"sky": LightGroup(("sky",), illuminant(light), SKY_LUMINANCE_CD_M2)}
-    return Scene("flat_field", geometry, groups, reference_plane="wall")
+    view = {"type": "perspective", "fov": 30.0, "to_world": to_world(look_at((0, 0, 3), (0, 0, 0)))}
+    wall = panel(look_at((0, 0, 0), (0, 0, 1)), 20.0, 20.0, matte(grey(reflectance)))
+    return under_sky("flat_field", view, {"wall": wall}, light, reference_plane="wall")

@@ -1,4 +1,4 @@
-"""White furnace: surfaces that absorb nothing, under a sky of radiance 1, can't be told from the sky."""
+"""White furnace: surfaces that absorb nothing, under a sky of radiance 1, look like the sky."""
 
 from render.geometry import look_at, rotate, scale, to_world, translate
 from render.scene import LightGroup, Scene

@@ -3,11 +3,12 @@
 After Figure 1a of Parmar and Wandell 2009: a photograph whose left part is scotopic and whose right part is well lit.
 """
 
-from render.geometry import look_at, rotate, to_world, translate
+from render.geometry import rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Floats
 from rodcone.errors import require_range
+from scenes.camera_and_sky import camera
 from scenes.color_checker import color_checker_nodes
 from scenes.materials import ball, block, checks, disk, floor, glossy, matte, metal, panel, rod, star
 from scenes.reflectances import band, edge, grey
@@ -34,13 +35,7 @@ def lit_and_shadowed(dark_cd_m2: float = DARK_CD_M2, lit_cd_m2: float = LIT_CD_M
     """
     for name, value in (("dark_cd_m2", dark_cd_m2), ("lit_cd_m2", lit_cd_m2)):
         require_range(name, value, 0.0, 1e9, "give the mean luminance of that half")
-    camera = {
-        "type": "perspective",
-        "fov": 26.0,
-        "fov_axis": "smaller",
-        "to_world": to_world(look_at((0, 0.58, 2.55), (0, 0.58, 0))),
-    }
-    geometry: Node = {"type": "scene", "sensor": camera}
+    geometry: Node = {"type": "scene", "sensor": camera(26.0, (0, 0.58, 2.55), (0, 0.58, 0))}
     for side, sign in (("left", -1), ("right", 1)):
         middle = translate(sign * (WIDTH_M + BOARD_M) / 2, 0, 0)
         nodes = _boards(middle) | _upper(middle) | _lower(middle)
@@ -119,14 +114,14 @@ def _lower(middle: Floats) -> dict[str, Node]:
     }
 
 
-def _ball(place: Floats, middle: tuple[float, float, float], radius_m: float, bsdf: Node) -> Node:
-    x, y, z = (place @ (*middle, 1.0))[:3].tolist()
+def _ball(pose: Floats, middle: tuple[float, float, float], radius_m: float, bsdf: Node) -> Node:
+    x, y, z = (pose @ (*middle, 1.0))[:3].tolist()
     return ball(x, y, z, radius_m, bsdf)
 
 
-def _cup(place: Floats, name: str, radius_m: float, height_m: float, bsdf: Node) -> dict[str, Node]:
-    """Open cylinder that stands on the origin of `place`, and its floor."""
-    x, y, z = place[:3, 3].tolist()
+def _cup(pose: Floats, name: str, radius_m: float, height_m: float, bsdf: Node) -> dict[str, Node]:
+    """Open cylinder that stands on the origin of `pose`, and its floor."""
+    x, y, z = pose[:3, 3].tolist()
     return {
         name: rod((x, y + 0.0005, z), (x, y + height_m, z), radius_m, bsdf),
         f"{name}_floor": disk(floor(x, y + 0.003, z), radius_m, bsdf),

@@ -1,11 +1,13 @@
-"""Mitsuba nodes for surfaces and flat shapes, so that each scene reads as a list of things."""
+"""Mitsuba nodes for surfaces and shapes, so that each scene reads as a list of things."""
 
-from render.geometry import rotate, scale, to_world, translate
+from math import radians, tan
+
+from render.geometry import look_at, rotate, scale, to_world, translate
 from render.optical_constants import optical_constant
 from render.scene import Node, spectrum_node
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError
-from scenes.reflectances import resampled
+from scenes.reflectances import grey, resampled
 
 
 def matte(reflectance: Spectrum) -> Node:
@@ -29,15 +31,13 @@ def metal(material: str, roughness: float) -> Node:
 
     On the common grid: named as Mitsuba's `material`, each metal has a grid of its own and takes 7 s more to compile.
     """
-    eta, k = (spectrum_node(_on_common_grid(material, part)) for part in ("eta", "k"))
-    return {"type": "twosided", "bsdf": {"type": "roughconductor", "eta": eta, "k": k, "alpha": roughness}}
-
-
-def _on_common_grid(material: str, part: str) -> Spectrum:
-    table = optical_constant(material, part)
-    if table is None:
-        raise InputError(f"metal: Mitsuba has no {material!r}; allowed: names such as Au, Cu, Al; correct it")
-    return resampled(table.wavelength_nm, table.values)
+    index: dict[str, Node] = {}
+    for part in ("eta", "k"):
+        table = optical_constant(material, part)
+        if table is None:
+            raise InputError(f"metal: Mitsuba has no {material!r}; allowed: names such as Au, Cu, Al; correct it")
+        index[part] = spectrum_node(resampled(table.wavelength_nm, table.values))
+    return {"type": "twosided", "bsdf": {"type": "roughconductor", **index, "alpha": roughness}}
 
 
 def checks(first: Spectrum, second: Spectrum, columns: float, rows: float) -> Node:
@@ -51,14 +51,10 @@ def checks(first: Spectrum, second: Spectrum, columns: float, rows: float) -> No
     return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": texture}}
 
 
-def panel(place: Floats, width_m: float, height_m: float, bsdf: Node, **more: Node) -> Node:
-    """Rectangle centred on the origin of `place`, facing its +z."""
-    return {
-        "type": "rectangle",
-        "to_world": to_world(place, scale(width_m / 2, height_m / 2, 1.0)),
-        "bsdf": bsdf,
-        **more,
-    }
+def panel(pose: Floats, width_m: float, height_m: float, bsdf: Node, **more: Node) -> Node:
+    """Rectangle centred on the origin of `pose`, facing its +z."""
+    size = scale(width_m / 2, height_m / 2, 1.0)
+    return {"type": "rectangle", "to_world": to_world(pose, size), "bsdf": bsdf, **more}
 
 
 def floor(x: float, y: float, z: float) -> Floats:
@@ -66,14 +62,21 @@ def floor(x: float, y: float, z: float) -> Floats:
     return translate(x, y, z) @ rotate((1, 0, 0), -90)
 
 
-def disk(place: Floats, radius_m: float, bsdf: Node, **more: Node) -> Node:
-    """Round plate centred on the origin of `place`, facing its +z."""
-    return {"type": "disk", "to_world": to_world(place, scale(radius_m, radius_m, 1.0)), "bsdf": bsdf, **more}
+def disk(pose: Floats, radius_m: float, bsdf: Node, **more: Node) -> Node:
+    """Round plate centred on the origin of `pose`, facing its +z."""
+    return {"type": "disk", "to_world": to_world(pose, scale(radius_m, radius_m, 1.0)), "bsdf": bsdf, **more}
 
 
-def star(place: Floats, radius_m: float, first: Spectrum, second: Spectrum, spokes: int) -> Node:
+def far_disk(towards: tuple[float, float, float], distance_m: float, radius_deg: float) -> Node:
+    """Emitting disk of an angular radius as seen from the origin, such as the sun; `towards` has length 1."""
+    pose = look_at(tuple(distance_m * x for x in towards), (0.0, 0.0, 0.0))
+    radius_m = distance_m * tan(radians(radius_deg))
+    return disk(pose, radius_m, matte(grey(0.02)), emitter={"type": "area"})
+
+
+def star(pose: Floats, radius_m: float, first: Spectrum, second: Spectrum, spokes: int) -> Node:
     """Disk of `spokes` sectors of each of two colours: its second texture coordinate is the angle."""
-    return disk(place, radius_m, checks(first, second, 0.4, spokes))  # 0.4: under half a check from middle to rim
+    return disk(pose, radius_m, checks(first, second, 0.4, spokes))  # 0.4: under half a check from middle to rim
 
 
 def ball(x: float, y: float, z: float, radius_m: float, bsdf: Node) -> Node:
@@ -81,21 +84,16 @@ def ball(x: float, y: float, z: float, radius_m: float, bsdf: Node) -> Node:
     return {"type": "sphere", "center": [x, y, z], "radius": radius_m, "bsdf": bsdf}
 
 
-def block(place: Floats, width_m: float, height_m: float, depth_m: float, bsdf: Node, **more: Node) -> Node:
-    """Cuboid that stands on the origin of `place`: x across, y up, z to the front."""
+def block(pose: Floats, width_m: float, height_m: float, depth_m: float, bsdf: Node, **more: Node) -> Node:
+    """Cuboid that stands on the origin of `pose`: x across, y up, z to the front."""
     half = scale(width_m / 2, height_m / 2, depth_m / 2)
-    return {"type": "cube", "to_world": to_world(place, translate(0, height_m / 2, 0), half), "bsdf": bsdf, **more}
+    return {"type": "cube", "to_world": to_world(pose, translate(0, height_m / 2, 0), half), "bsdf": bsdf, **more}
 
 
 def rod(start: tuple[float, float, float], end: tuple[float, float, float], radius_m: float, bsdf: Node) -> Node:
     """Open cylinder between two points."""
-    return {
-        "type": "cylinder",
-        "p0": [float(x) for x in start],
-        "p1": [float(x) for x in end],
-        "radius": radius_m,
-        "bsdf": bsdf,
-    }
+    ends = {"p0": [float(x) for x in start], "p1": [float(x) for x in end]}
+    return {"type": "cylinder", **ends, "radius": radius_m, "bsdf": bsdf}
 
 
 def glass() -> Node:

@@ -17,7 +17,7 @@ PAIRS = 12
 LOW, HIGH = 0.02, 0.95  # range of the made reflectances: soot to white paper
 SHARE = 0.5  # at most this much of a base's room is used, so that the curves stay like dyes'
 BUMP_NM = 30.0  # standard deviation of the bumps that a difference is made of: dyes' bands are no narrower
-# Bases by their place in the ColorChecker: muted ones, which leave room on both sides.
+# Bases by their index in the ColorChecker: muted colours, which leave room on both sides.
 _BASES = (0, 1, 2, 4, 5, 9, 19, 20, 21, 7, 3, 10)
 
 
@@ -57,8 +57,15 @@ def _black(nm: Floats) -> Floats:
     bumps = np.exp(-0.5 * ((nm[:, None] - np.arange(400.0, 721.0, 20.0)) / BUMP_NM) ** 2)
     # Colours of every bump at fine resolution and in the renderer's bands: a black of both, so that pairs are as equal
     # in a picture as they are on paper.
-    twin = np.vstack([_colours(nm, bumps, TWINS_UNDER, *bands) for bands in (_fine(), _rendered())])
-    other = _colours(nm, bumps, OTHER_LIGHT, *_fine())
+    fine_nm, one_nm = np.arange(380.5, 780.0), np.ones(400)
+    rendered_nm = band_widths(DEFAULT_WAVELENGTH_NM)
+    twin = np.vstack(
+        [
+            _colours(nm, bumps, TWINS_UNDER, fine_nm, one_nm),
+            _colours(nm, bumps, TWINS_UNDER, DEFAULT_WAVELENGTH_NM, rendered_nm),
+        ]
+    )
+    other = _colours(nm, bumps, OTHER_LIGHT, fine_nm, one_nm)
     free = np.linalg.svd(twin)[2][np.linalg.matrix_rank(twin) :].T  # weights of the bumps that leave no colour
     strongest = np.linalg.svd(other @ free)[2][0]
     black = bumps @ (free @ strongest)
@@ -70,12 +77,3 @@ def _colours(nm: Floats, curves: Floats, light: str, at_nm: Floats, width_nm: Fl
     # A signed curve is no `Spectrum`: take the matrix that averages a grid over the bands instead.
     averages = np.array([Spectrum(nm, row).band_average(at_nm, width_nm) for row in np.eye(nm.size)]).T
     return tristimulus((averages @ curves).T * illuminant(light).band_average(at_nm, width_nm), at_nm, width_nm).T
-
-
-def _fine() -> tuple[Floats, Floats]:
-    nm: Floats = np.arange(380.5, 780.0)
-    return nm, np.ones_like(nm)
-
-
-def _rendered() -> tuple[Floats, Floats]:
-    return DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM)

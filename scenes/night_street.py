@@ -1,12 +1,13 @@
 """A street by night: moon, sodium lamp, LED lamp and a lit window, seven decades of luminance in one picture."""
 
-from math import cos, pi, radians, sin, tan
+from math import cos, pi, radians, sin
 
-from render.geometry import look_at, rotate, to_world, translate
+from render.geometry import rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Floats, Spectrum
-from scenes.materials import block, disk, floor, glossy, matte, panel, rod
+from scenes.camera_and_sky import camera
+from scenes.materials import block, disk, far_disk, floor, glossy, matte, panel, rod
 from scenes.reflectances import band, edge, grey
 
 # Full moon high in a clear sky: 0.25 lux on a surface that faces it (Kyba, Mohar and Posch 2017, Astronomy &
@@ -25,16 +26,10 @@ DARK = grey(0.03)
 
 def night_street() -> Scene:
     """Street 5 m wide between house fronts; light groups ``moon``, ``sodium``, ``led`` and ``window``, all in view."""
-    camera = {
-        "type": "perspective",
-        "fov": 58.0,
-        "fov_axis": "smaller",
-        "to_world": to_world(look_at((-0.5, 1.65, 9.0), (0.1, 3.3, -9.0))),
-    }
     left, right = rotate((0, 1, 0), 90), rotate((0, 1, 0), -90)
     geometry: Node = {
         "type": "scene",
-        "sensor": camera,
+        "sensor": camera(58.0, (-0.5, 1.65, 9.0), (0.1, 3.3, -9.0)),
         **_ground(),
         **_house("left0", translate(-4, 0, -2) @ left, 8.2, edge(480, 60, 0.34, 0.52)),
         **_house("left1", translate(-4, 0, -14) @ left, 9.0, edge(560, 45, 0.18, 0.50)),
@@ -60,9 +55,7 @@ def night_street() -> Scene:
 def _moon() -> Node:
     height, bearing = radians(MOON_HEIGHT_DEG), radians(MOON_BEARING_DEG)
     towards = (sin(bearing) * cos(height), sin(height), -cos(bearing) * cos(height))
-    place = look_at(tuple(MOON_DISTANCE_M * x for x in towards), (0.0, 0.0, 0.0))
-    radius = MOON_DISTANCE_M * tan(radians(MOON_RADIUS_DEG))
-    return disk(place, radius, matte(grey(0.02)), emitter={"type": "area"})
+    return far_disk(towards, MOON_DISTANCE_M, MOON_RADIUS_DEG)
 
 
 def _ground() -> dict[str, Node]:
@@ -81,19 +74,19 @@ def _ground() -> dict[str, Node]:
     }
 
 
-def _house(name: str, place: Floats, height: float, front: Spectrum) -> dict[str, Node]:
-    """Front 12 m wide that faces the +z of `place`: windows with frames and sills in rows, a door, an eaves board."""
+def _house(name: str, pose: Floats, height: float, front: Spectrum) -> dict[str, Node]:
+    """Front 12 m wide that faces the +z of `pose`: windows with frames and sills in rows, a door, an eaves board."""
     frame, pane = matte(FRAME), glossy(DARK, 0.08)
     nodes = {
-        "body": block(place @ translate(0, 0, -4), 12.0, height, 8.0, matte(front)),
-        "plinth": block(place @ translate(0, 0, 0.02), 12.0, 0.6, 0.04, matte(KERB)),
-        "eaves": block(place @ translate(0, height, -3.8), 12.2, 0.25, 8.4, matte(DARK)),
-        "door": block(place @ translate(4.6, 0.12, 0.02), 1.1, 2.2, 0.06, matte(edge(600, 18, 0.05, 0.22))),
+        "body": block(pose @ translate(0, 0, -4), 12.0, height, 8.0, matte(front)),
+        "plinth": block(pose @ translate(0, 0, 0.02), 12.0, 0.6, 0.04, matte(KERB)),
+        "eaves": block(pose @ translate(0, height, -3.8), 12.2, 0.25, 8.4, matte(DARK)),
+        "door": block(pose @ translate(4.6, 0.12, 0.02), 1.1, 2.2, 0.06, matte(edge(600, 18, 0.05, 0.22))),
     }
     for row, sill in enumerate((1.3, 4.3)):
         for column in range(4 if row else 3):
             x = -4.4 + 2.9 * column
-            at = place @ translate(x, sill, 0)
+            at = pose @ translate(x, sill, 0)
             cell = f"{row}{column}"
             nodes[f"frame{cell}"] = block(at @ translate(0, -0.08, 0.01), 1.30, 1.71, 0.06, frame)
             nodes[f"sill{cell}"] = block(at @ translate(0, -0.14, 0.06), 1.45, 0.06, 0.16, matte(KERB))
@@ -116,19 +109,19 @@ def _lamp(name: str, x: float, z: float, towards: int) -> dict[str, Node]:
     }
 
 
-def _car(place: Floats) -> dict[str, Node]:
+def _car(pose: Floats) -> dict[str, Node]:
     """Parked car 4.1 m long, seen from behind: boxes, glazing, wheels, rear lamps, number plate."""
     paint, glazing, tyre = glossy(band(460, 40, 0.03, 0.30), 0.1), glossy(DARK, 0.08), matte(DARK)
     nodes = {
-        "body": block(place @ translate(0, 0.30, 0), 1.72, 0.55, 4.10, paint),
-        "cabin": block(place @ translate(0, 0.85, 0.30), 1.46, 0.52, 2.30, glazing),
-        "roof": block(place @ translate(0, 1.37, 0.30), 1.40, 0.05, 2.05, paint),
-        "bumper": block(place @ translate(0, 0.32, 2.05), 1.66, 0.18, 0.10, tyre),
-        "plate": block(place @ translate(0, 0.58, 2.05), 0.52, 0.11, 0.02, matte(grey(0.75))),
+        "body": block(pose @ translate(0, 0.30, 0), 1.72, 0.55, 4.10, paint),
+        "cabin": block(pose @ translate(0, 0.85, 0.30), 1.46, 0.52, 2.30, glazing),
+        "roof": block(pose @ translate(0, 1.37, 0.30), 1.40, 0.05, 2.05, paint),
+        "bumper": block(pose @ translate(0, 0.32, 2.05), 1.66, 0.18, 0.10, tyre),
+        "plate": block(pose @ translate(0, 0.58, 2.05), 0.52, 0.11, 0.02, matte(grey(0.75))),
     }
     for index, (x, z) in enumerate(((-0.80, 1.30), (0.80, 1.30), (-0.80, -1.30), (0.80, -1.30))):
-        outer = place @ translate(x + (0.07 if x > 0 else -0.07), 0.31, z)
-        inner = place @ translate(x - (0.10 if x > 0 else -0.10), 0.31, z)
+        outer = pose @ translate(x + (0.07 if x > 0 else -0.07), 0.31, z)
+        inner = pose @ translate(x - (0.10 if x > 0 else -0.10), 0.31, z)
         nodes[f"tyre{index}"] = rod(tuple(outer[:3, 3]), tuple(inner[:3, 3]), 0.31, tyre)
         for side, at in (("outer", outer), ("inner", inner)):
             nodes[f"{side}{index}"] = disk(at @ rotate((0, 1, 0), 90), 0.31, tyre)
@@ -136,5 +129,5 @@ def _car(place: Floats) -> dict[str, Node]:
         nodes[f"hub{index}"] = disk(hub, 0.19, matte(FRAME))
     for index, x in enumerate((-0.72, 0.72)):
         red = matte(edge(610, 10, 0.02, 0.45))
-        nodes[f"rear_lamp{index}"] = block(place @ translate(x, 0.60, 2.05), 0.20, 0.14, 0.02, red)
+        nodes[f"rear_lamp{index}"] = block(pose @ translate(x, 0.60, 2.05), 0.20, 0.14, 0.02, red)
     return {f"car_{key}": node for key, node in nodes.items()}

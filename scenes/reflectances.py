@@ -19,7 +19,7 @@ def color_checker() -> tuple[tuple[str, Spectrum], ...]:
 
 
 def held(curve: Spectrum) -> Spectrum:
-    """Curve that goes on to 1100 nm at its last value, in its own steps: an assumption where nothing was measured."""
+    """Curve continued to 1100 nm at its last value, in its own steps: an assumption where nothing was measured."""
     step = curve.wavelength_nm[-1] - curve.wavelength_nm[-2]
     beyond = np.arange(curve.wavelength_nm[-1] + step, LONGEST_NM + step / 2, step)
     values = np.concatenate([curve.values, np.full(beyond.shape, curve.values[-1])])

@@ -1,19 +1,18 @@
 """Slanted edge: the target from which ISO 12233 measures how sharp a camera is."""
 
-from render.geometry import look_at, rotate, to_world, translate
-from render.illuminants import illuminant
-from render.scene import LightGroup, Scene
+from render.geometry import look_at, rotate, translate
+from render.scene import Scene
 from rodcone.errors import require_range
+from scenes.camera_and_sky import camera, under_sky
 from scenes.materials import matte, panel
 from scenes.reflectances import grey
 
-SKY_LUMINANCE_CD_M2 = 100.0
 BRIGHT = 0.6
 SIDE_M = 2.0  # each half reaches far out of the picture, 0.5 m high
 
 
 def slanted_edge(contrast: float = 4.0, angle_deg: float = 5.0, light: str = "D65") -> Scene:
-    """Dark half and bright half that meet in an edge through the middle of the picture, under an even sky.
+    """Dark half and bright half that meet in an edge through the middle of the picture, in a constant environment.
 
     Parameters
     ----------
@@ -26,19 +25,10 @@ def slanted_edge(contrast: float = 4.0, angle_deg: float = 5.0, light: str = "D6
     """
     require_range("contrast", contrast, 1.0, 1e6, "give bright over dark: ISO 12233 takes 4")
     require_range("angle_deg", angle_deg, -45.0, 45.0, "give the lean from the vertical: ISO 12233 takes 5")
-    camera = {
-        "type": "perspective",
-        "fov": 20.0,
-        "fov_axis": "smaller",
-        "to_world": to_world(look_at((0, 0, 1.418), (0, 0, 0))),  # 0.5 m / 2 / tan(10 degrees)
-    }
     facing = rotate((0, 0, 1), angle_deg) @ look_at((0, 0, 0), (0, 0, 1))
-    geometry = {
-        "type": "scene",
-        "sensor": camera,
+    shapes = {
         "dark": panel(facing @ translate(-SIDE_M / 2, 0, 0), SIDE_M, 2 * SIDE_M, matte(grey(BRIGHT / contrast))),
         "bright": panel(facing @ translate(SIDE_M / 2, 0, 0), SIDE_M, 2 * SIDE_M, matte(grey(BRIGHT))),
-        "sky": {"type": "constant"},
     }
-    groups = {"sky": LightGroup(("sky",), illuminant(light), SKY_LUMINANCE_CD_M2)}
-    return Scene("slanted_edge", geometry, groups, reference_plane="bright")
+    view = camera(20.0, (0, 0, 1.418), (0, 0, 0))  # 0.5 m / 2 / tan(10 degrees)
+    return under_sky("slanted_edge", view, shapes, light, reference_plane="bright")

@@ -6,6 +6,7 @@ from render.geometry import look_at, rotate, scale, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Spectrum
+from scenes.camera_and_sky import camera
 from scenes.color_checker import color_checker_nodes
 from scenes.materials import ball, checks, floor, glass, glossy, matte, metal, panel, rod
 from scenes.reflectances import band, edge, grey
@@ -23,13 +24,8 @@ def still_life(light: str = "D65") -> Scene:
     light : str
         Illuminant of the softbox, the only light (group ``softbox``).
     """
-    camera = {
-        "type": "perspective",
-        "fov": 26.0,
-        "fov_axis": "smaller",
-        "to_world": to_world(look_at((0.0, 0.52, 2.05), (0.0, 0.21, 0.0))),
-    }
-    geometry: Node = {"type": "scene", "sensor": camera, **_room(), **_things(), **_lights()}
+    view = camera(26.0, (0.0, 0.52, 2.05), (0.0, 0.21, 0.0))
+    geometry: Node = {"type": "scene", "sensor": view, **_room(), **_things(), **_lights()}
     groups = {"softbox": LightGroup(("softbox/emitter",), illuminant(light), LIGHT_LUMINANCE_CD_M2)}
     return Scene("still_life", geometry, groups, reference_plane="meter_card")
 
@@ -62,26 +58,23 @@ def _things() -> dict[str, Node]:
 
 
 def _lights() -> dict[str, Node]:
-    place = look_at((-1.5, 1.75, 1.35), (0.05, 0.15, -0.05))
-    return {"softbox": panel(place, 1.7, 1.7, matte(BLACK), emitter={"type": "area"})}
+    pose = look_at((-1.5, 1.75, 1.35), (0.05, 0.15, -0.05))
+    return {"softbox": panel(pose, 1.7, 1.7, matte(BLACK), emitter={"type": "area"})}
 
 
 def _box(x: float, y: float, z: float, width: float, height: float, turn: float, bsdf: Node) -> Node:
-    place = to_world(translate(x, y, z), rotate((0, 1, 0), turn), scale(width / 2, height / 2, width / 2.6))
-    return {"type": "cube", "to_world": place, "bsdf": bsdf}
+    pose = to_world(translate(x, y, z), rotate((0, 1, 0), turn), scale(width / 2, height / 2, width / 2.6))
+    return {"type": "cube", "to_world": pose, "bsdf": bsdf}
 
 
 def _star(x: float, y: float, z: float, radius: float) -> dict[str, Node]:
     """Thin black spokes: every spatial frequency at once (a Siemens star)."""
     nodes: dict[str, Node] = {}
-    width = 2 * radius * sin(pi / (2 * SPOKES)) * 0.9
+    width, middle = 2 * radius * sin(pi / (2 * SPOKES)) * 0.9, 0.58 * radius
     for index in range(SPOKES):
         angle = 360.0 * index / SPOKES
-        middle = 0.58 * radius
-        place = translate(x + middle * cos(angle * pi / 180), y + middle * sin(angle * pi / 180), z) @ rotate(
-            (0, 0, 1), angle
-        )
-        nodes[f"spoke{index:02d}"] = panel(place, 0.84 * radius, width, matte(BLACK))
+        centre = translate(x + middle * cos(angle * pi / 180), y + middle * sin(angle * pi / 180), z)
+        nodes[f"spoke{index:02d}"] = panel(centre @ rotate((0, 0, 1), angle), 0.84 * radius, width, matte(BLACK))
     return nodes
 
 

@@ -1,11 +1,12 @@
 """Fruit, metal, glass and cloth on a garden table in front of a sunlit wall: sun and sky as two light groups."""
 
-from math import cos, pi, radians, sin, sqrt, tan
+from math import cos, pi, radians, sin, sqrt
 
-from render.geometry import look_at, rotate, to_world, translate
+from render.geometry import rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
-from scenes.materials import ball, block, checks, disk, floor, glass, glossy, matte, metal, panel, rod
+from scenes.camera_and_sky import camera
+from scenes.materials import ball, block, checks, disk, far_disk, floor, glass, glossy, matte, metal, panel, rod
 from scenes.reflectances import band, edge, grey
 
 # The sun 41.8 degrees high, where its light crosses 1.5 atmospheres. Its beam then brings 97.1 klx to a surface
@@ -28,15 +29,9 @@ def still_life_outdoor() -> Scene:
 
     The glass stands in the shade of the crate: sunlight focused by glass on its way to a surface can't be sampled.
     """
-    camera = {
-        "type": "perspective",
-        "fov": 26.0,
-        "fov_axis": "smaller",
-        "to_world": to_world(look_at((0.10, 0.62, 2.05), (0.0, 0.17, 0.0))),
-    }
     geometry: Node = {
         "type": "scene",
-        "sensor": camera,
+        "sensor": camera(26.0, (0.10, 0.62, 2.05), (0.0, 0.17, 0.0)),
         **_garden(),
         **_table(),
         **_fruit(),
@@ -55,9 +50,7 @@ def _sun() -> Node:
     """Black-backed disk of the sun's angular radius, seen from the middle of the table."""
     height, bearing = radians(SUN_HEIGHT_DEG), radians(SUN_BEARING_DEG)
     towards = (-sin(bearing) * cos(height), sin(height), cos(bearing) * cos(height))
-    radius = SUN_DISTANCE_M * tan(radians(SUN_RADIUS_DEG))
-    place = look_at(tuple(SUN_DISTANCE_M * x for x in towards), (0.0, 0.0, 0.0))
-    return disk(place, radius, matte(grey(0.02)), emitter={"type": "area"})
+    return far_disk(towards, SUN_DISTANCE_M, SUN_RADIUS_DEG)
 
 
 def _garden() -> dict[str, Node]:

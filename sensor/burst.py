@@ -16,9 +16,9 @@ from sensor.raw import RawImage
 # A frame counts where the merged rate fills the well to no more than 6 standard deviations under its end: its own
 # noise then clips once in 1e9 pixels.
 CLEAR_SIGMAS = 6.0
-_ROUNDS = 6  # of the weights: what a further one would change is under a thousandth of the merged noise
+_ROUNDS = 6  # of the weights: a further one changes less than a thousandth of the merged noise
 
-# What frames must share to be one camera's: all that turns DN into electrons, and the noise that weighs them.
+# Fields that all frames must share: what turns DN into electrons, and the noise that weighs them.
 _CALIBRATION = (
     *("cfa", "shape", "black_dn", "white_dn", "gain_e_per_dn"),
     *("read_noise_e", "dsnu_e", "prnu", "column_gain_spread"),
@@ -71,11 +71,11 @@ def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merg
 
     Weights and saturation both follow the merged rate itself, never one frame's own noisy value: among linear
     estimates, the best one is uncorrelated with the differences between the frames, so that what is decided from it
-    biases no frame against another. What remains is under 1 % of a pixel's merged noise, at any light.
+    biases no frame against another. The remaining bias is under 1 % of a pixel's merged noise, at any light.
 
-    In the dark the stated temporal variance is too large by the factor 1 + 0.4 / (temporal dark noise [e-]), since a
-    noisy pixel's light can't be told better. Fixed offsets are common to all frames, so that no weight averages them
-    away; where they exceed the temporal noise several times they disturb the weights, and are better taken off first.
+    In the dark the stated temporal variance is too large by the factor 1 + 0.4 / (temporal dark noise [e-]): a noisy
+    pixel's light isn't known better. Fixed offsets are common to all frames, and no weight averages them away; where
+    they exceed the temporal noise several times they disturb the weights, and are better subtracted first.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merg
 
 
 def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
-    """Frames by exposure time, longest first, once they are known to be one camera's."""
+    """Frames by exposure time, longest first; `InputError` unless they are of one camera."""
     if len(frames) == 0:
         raise InputError("frames: none were given; allowed: one or more raw images; take some")
     for index, frame in enumerate(frames):
@@ -142,14 +142,9 @@ def _weighted(
     whole_s = sum(group.count * group.exposure_s for group in groups)
     rate = np.asarray(sum(group.rate * (group.count * group.exposure_s / whole_s) for group in groups))
     for _ in range(_ROUNDS):
-        weights = [_weight(group, rate, temporal_e2) for group in groups]
+        noise_e2 = [np.maximum(rate, 0.0) * group.exposure_s + temporal_e2 for group in groups]
+        weights = [group.count * group.exposure_s**2 / noise for group, noise in zip(groups, noise_e2, strict=True)]
         total = np.asarray(sum(weights))
         rate = sum(w * group.rate for w, group in zip(weights, groups, strict=True)) / total
     per_s = np.asarray(sum(w / group.exposure_s for w, group in zip(weights, groups, strict=True))) / total
     return rate, 1 / total, per_s
-
-
-def _weight(group: _Group, rate: NDArray[np.float64], temporal_e2: float) -> NDArray[np.float64]:
-    """Inverse variance of a group's rate."""
-    noise_e2 = np.maximum(rate, 0.0) * group.exposure_s + temporal_e2
-    return np.asarray(group.count * group.exposure_s**2 / noise_e2)

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from rodcone.jit import backend
-from sensor.cfa import check_covers
 from sensor.config import SensorConfig
 from sensor.device import Device
-from sensor.kernel.run import expected_electrons_single, read_frame
+from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import camera_equation, falloff, form_image, spreads
 from sensor.random import draw_key
 from sensor.raw import RawImage
@@ -140,9 +139,9 @@ def _expected_single(
     strip: SpectralRadiance, sensor: SensorConfig, exposure_s: float, first_row: int
 ) -> NDArray[np.float32]:
     """Expected electrons of a strip but for the lens's falloff; the camera equation goes into the weights."""
-    check_covers(sensor.cfa, strip.shape)
+    irradiance_per_radiance = camera_equation(sensor.lens)
     weights = electrons_per_irradiance(sensor, strip.wavelength_nm, strip.widths_nm, exposure_s)
-    return expected_electrons_single(strip.values, weights * camera_equation(sensor.lens), sensor, first_row)
+    return expected_electrons_single(strip.values, weights * irradiance_per_radiance, sensor, first_row)
 
 
 def _expected_numpy(

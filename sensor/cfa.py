@@ -1,4 +1,4 @@
-"""Colour filter arrays: a tile of letters, repeated over the sensor."""
+"""Colour filter arrays: a tile of channels, each a letter, that repeats over the sensor."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -14,7 +14,7 @@ Tile: TypeAlias = tuple[str, ...]
 RGBW: Tile = ("RG", "BW")  # Parmar & Wandell 2009, Figure 2
 BAYER: Tile = ("RG", "GB")
 
-# Mosaics by name; any other tile of letters is as good, with a response for each letter.
+# Mosaics by name; any other tile of letters will do, with a response for each channel.
 MOSAICS: Mapping[str, Tile] = MappingProxyType(
     {
         "rgbw": RGBW,
@@ -34,7 +34,7 @@ MOSAICS: Mapping[str, Tile] = MappingProxyType(
 
 
 def tile_of(mosaic: str | Sequence[str]) -> Tile:
-    """Tile of a mosaic given by a name of `MOSAICS`, or by its rows of letters.
+    """Tile of a mosaic given by a name of `MOSAICS`, or by its rows of channels.
 
     Raises
     ------
@@ -59,25 +59,25 @@ def check_tile(tile: Sequence[str]) -> Tile:
 
 
 def channels(tile: Tile) -> tuple[str, ...]:
-    """Letters of a tile, each once: R, G, B, W first in this order, any others as they appear row by row."""
+    """Channels of a tile, each once: R, G, B, W first in this order, any others as they appear row by row."""
     present = dict.fromkeys("".join(tile))
-    return tuple(letter for letter in "RGBW" if letter in present) + tuple(x for x in present if x not in "RGBW")
+    return tuple(name for name in "RGBW" if name in present) + tuple(name for name in present if name not in "RGBW")
 
 
 def letter_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
-    """Letter of each pixel, shape `shape`."""
+    """Channel of each pixel, shape `shape`."""
     cells = np.array([list(row) for row in tile])
     repeats = (-(-shape[0] // cells.shape[0]), -(-shape[1] // cells.shape[1]))
     return np.tile(cells, repeats)[: shape[0], : shape[1]]
 
 
-def mask(tile: Tile, letter: str, shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Where the mosaic samples `letter`: S_i of eq. (1), shape `shape`."""
-    return np.asarray(letter_map(tile, shape) == letter)
+def mask(tile: Tile, channel: str, shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Where the mosaic samples `channel`: S_i of eq. (1), shape `shape`."""
+    return np.asarray(letter_map(tile, shape) == channel)
 
 
 def check_covers(tile: Tile, shape: tuple[int, ...]) -> None:
-    """Raise `InputError` unless a frame of `shape` is 2-D and holds every letter of the tile."""
+    """Raise `InputError` unless a frame of `shape` is 2-D and holds a whole tile."""
     height, width = len(tile), len(tile[0])
     if len(shape) != 2 or shape[0] < height or shape[1] < width:
         raise InputError(

@@ -1,4 +1,4 @@
-"""What a camera is: pixel, lens, mosaic, responses, converter. Zero switches a term off; there are no mode flags."""
+"""What a camera is: pixel, lens, mosaic, responses, converter. Zero switches a term off."""
 
 from dataclasses import dataclass, field
 from math import ceil, hypot
@@ -135,11 +135,6 @@ class LensConfig:
             require_range(name, getattr(self, name), low, high, fix)
 
 
-def _increasing(window_nm: tuple[float, float]) -> bool:
-    real = all(isinstance(nm, Real) for nm in window_nm)
-    return real and SHORTEST_NM <= window_nm[0] < window_nm[1] <= LONGEST_NM
-
-
 @dataclass(frozen=True)
 class SensorConfig:
     """A camera: pixel, lens, mosaic, responses and converter.
@@ -149,9 +144,9 @@ class SensorConfig:
     pixel : PixelConfig
     lens : LensConfig
     cfa : tuple of str
-        Tile of letters, such as ``("RG", "BW")``.
+        Tile of channels, such as ``("RG", "BW")``.
     responses : Responses
-        Electrons per photon of each letter.
+        Electrons per photon of each channel.
     bits : int
         Of the converter, 1 to 16.
     black_level_dn : int or None
@@ -173,9 +168,10 @@ class SensorConfig:
         require_whole("bits", self.bits, 1, 16, "give the converter's resolution")
         if self.black_level_dn is not None:
             require_whole("black_level_dn", self.black_level_dn, 0, self.white_dn - 1, "give DN under the white level")
-        if not (isinstance(self.window_nm, tuple | list) and len(self.window_nm) == 2 and _increasing(self.window_nm)):
+        pair = self.window_nm if isinstance(self.window_nm, tuple | list) and len(self.window_nm) == 2 else (0, 0)
+        if not (all(isinstance(nm, Real) for nm in pair) and SHORTEST_NM <= pair[0] < pair[1] <= LONGEST_NM):
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give (shortest, longest) in 100-20000 nm")
-        self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every letter has a curve
+        self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every channel needs a curve
 
     @property
     def white_dn(self) -> int:

@@ -24,7 +24,7 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     ----------
     path : str or Path
         TOML with the tables ``[pixel]`` and ``[lens]`` (fields of `PixelConfig` and `LensConfig`), optionally ``cfa``
-        (a name of `sensor.cfa.MOSAICS`, or rows of letters), ``bits``, ``black_level_dn``, ``window_nm``, and
+        (a name of `sensor.cfa.MOSAICS`, or rows of channels), ``bits``, ``black_level_dn``, ``window_nm``, and
         ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency`` ("included", a number, or a CSV) and
         ``ir_cut`` (nm, or a CSV). Names of CSV files are relative to the TOML's folder.
     cfa : str or sequence of str, optional
@@ -95,7 +95,7 @@ def _pair(name: str, value: Any) -> tuple[float, float]:
 
 
 def _responses(table: Mapping[str, Any], folder: Path) -> Responses:
-    """Curves of a CSV, with everything about them said in the file: what isn't said would be guessed."""
+    """Responses of a CSV; what the file doesn't say about them is refused, not guessed."""
     require_keys("responses key", table, _RESPONSE_KEYS)
     for key in ("csv", "range_nm", "quantum_efficiency"):
         if key not in table:
@@ -105,14 +105,12 @@ def _responses(table: Mapping[str, Any], folder: Path) -> Responses:
             )
     if not isinstance(table["csv"], str):
         raise InputError(f"csv: {table['csv']!r} is not a file's name; allowed: a name in quotes; write so")
-    efficiency = table["quantum_efficiency"]
+    efficiency = None if table["quantum_efficiency"] == "included" else table["quantum_efficiency"]
     return read_csv(
         folder / table["csv"],
         range_nm=_pair("range_nm", table["range_nm"]),
         ir_cut=_number_or_curve("ir_cut", table.get("ir_cut"), folder),
-        quantum_efficiency=None
-        if efficiency == "included"
-        else _number_or_curve("quantum_efficiency", efficiency, folder),
+        quantum_efficiency=_number_or_curve("quantum_efficiency", efficiency, folder),
     )
 
 

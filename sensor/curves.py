@@ -1,4 +1,4 @@
-"""Spectral responses of colour channels: electrons per photon at the pixel, quantum efficiency included."""
+"""Spectral responses of colour channels, in electrons per photon: the built-in ones, other filters, CSV files."""
 
 import csv
 import warnings
@@ -12,7 +12,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from render.spectrum import Floats, Spectrum
+from render.illuminants import illuminant
+from render.photometry import photons_per_joule
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
 from rodcone.errors import InputError, require_range, unknown
 
 # Smooth curves of the project's own: peak * exp(-|(nm - centre) / width|^power), another width and power on each side.
@@ -24,46 +26,47 @@ _RGBW_PARAMETERS = {  # peak, centre [nm], left width [nm], left power, right wi
     "B": (0.415, 476.0, 44.227, 1.846, 32.167, 1.348),
     "W": (1.000, 620.0, 225.131, 1.955, 225.536, 2.052),
 }
+_COMPLEMENTS = {"C": "GB", "M": "RB", "Y": "RG"}
 MOST_BYTES = 1 << 23  # of a file of curves: 100 columns at 0.1 nm over 300-1100 nm take 6 MB
 
 
 @dataclass(frozen=True)
 class Responses:
-    """Response of each channel letter.
+    """Response of each channel.
 
     Attributes
     ----------
     curves : mapping of str to Spectrum
-        Electrons per photon (0 to 1) over wavelength.
+        By channel: electrons per photon (0 to 1) over wavelength, quantum efficiency included.
     """
 
     curves: Mapping[str, Spectrum]
 
     def __post_init__(self) -> None:
-        for letter, curve in self.curves.items():
+        for channel, curve in self.curves.items():
             if curve.values.max() > 1.0:
                 raise InputError(
-                    f"responses: {letter} reaches {curve.values.max():g} electrons a photon; allowed: 0 to 1; "
+                    f"responses: {channel} reaches {curve.values.max():g} electrons a photon; allowed: 0 to 1; "
                     "divide per cent by 100"
                 )
         object.__setattr__(self, "curves", MappingProxyType(dict(self.curves)))
 
     def __reduce__(self) -> tuple[type["Responses"], tuple[dict[str, Spectrum]]]:
-        """Travel to other processes, which a mapping proxy doesn't by itself."""
+        """Pickle the mapping as a dict: a mapping proxy can't be pickled."""
         return Responses, (dict(self.curves),)
 
-    def band_average(self, letters: tuple[str, ...], wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
-        """Mean response in each band, shape (letter, band).
+    def band_average(self, channels: tuple[str, ...], wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
+        """Mean response in each band, shape (channel, band).
 
         Raises
         ------
         InputError
-            Where a letter has no curve.
+            Where a channel has no curve.
         """
-        for letter in letters:
-            if letter not in self.curves:
-                raise unknown("responses: letter", letter, self.curves)
-        return np.array([self.curves[letter].band_average(wavelength_nm, width_nm) for letter in letters])
+        for channel in channels:
+            if channel not in self.curves:
+                raise unknown("responses: channel", channel, self.curves)
+        return np.array([self.curves[channel].band_average(wavelength_nm, width_nm) for channel in channels])
 
 
 @cache
@@ -71,10 +74,10 @@ def rgbw() -> Responses:
     """Response of R, G, B and W over 380-1068 nm, the project's own curves (Parmar & Wandell 2009, Figure 2)."""
     nm = np.arange(380.0, 1069.0)
     curves = {}
-    for letter, (peak, centre, left, left_power, right, right_power) in _RGBW_PARAMETERS.items():
+    for channel, (peak, centre, left, left_power, right, right_power) in _RGBW_PARAMETERS.items():
         distance = np.abs(nm - centre)
         falls = np.where(nm < centre, (distance / left) ** left_power, (distance / right) ** right_power)
-        curves[letter] = Spectrum(nm, peak * np.exp(-falls))
+        curves[channel] = Spectrum(nm, peak * np.exp(-falls))
     return Responses(curves)
 
 
@@ -82,6 +85,62 @@ def rgbw() -> Responses:
 def built_in() -> Responses:
     """`rgbw`'s curves, and W's once more as C: the clear pixel of RCCC mosaics."""
     return Responses({**rgbw().curves, "C": rgbw().curves["W"]})
+
+
+def complementary(responses: Responses) -> Responses:
+    """Responses of C, M and Y, and of W where `responses` has it.
+
+    Each filter is assumed to pass what two of the primary filters pass together: C = G + B, M = R + B, Y = R + G. A
+    matrix then takes C, M and Y exactly back to R, G and B.
+
+    Raises
+    ------
+    InputError
+        Where R, G or B is missing, or two of them add up to more than one electron a photon.
+    """
+    _require_channels(responses, "RGB")
+    curves = {}
+    for channel, pair in _COMPLEMENTS.items():
+        parts = [responses.curves[primary] for primary in pair]
+        nm = np.union1d(parts[0].wavelength_nm, parts[1].wavelength_nm)
+        values = [np.interp(nm, part.wavelength_nm, part.values, left=0.0, right=0.0) for part in parts]
+        curves[channel] = Spectrum(nm, values[0] + values[1])
+    if "W" in responses.curves:
+        curves["W"] = responses.curves["W"]
+    return Responses(curves)
+
+
+def matched_transmittance(responses: Responses) -> float:
+    """Transmittance of the neutral density with which W collects what G does from a neutral surface under D65.
+
+    The density is assumed to pass the same share of every wavelength.
+
+    Raises
+    ------
+    InputError
+        Where G or W is missing, or W collects less than G.
+    """
+    _require_channels(responses, "GW")
+    nm = DEFAULT_WAVELENGTH_NM
+    width = band_widths(nm)
+    photons = illuminant("D65").band_average(nm, width) * photons_per_joule(nm) * width
+    green, white = responses.band_average(("G", "W"), nm, width) @ photons
+    if not 0 < green <= white:
+        raise InputError(
+            f"responses: W collects {white:g} where G does {green:g}; allowed: W more than G; correct a curve"
+        )
+    return float(green / white)
+
+
+def neutral_density(responses: Responses) -> Responses:
+    """Responses with W behind the neutral density of `matched_transmittance`."""
+    return Responses({**responses.curves, "W": responses.curves["W"] * matched_transmittance(responses)})
+
+
+def _require_channels(responses: Responses, channels: str) -> None:
+    missing = [channel for channel in channels if channel not in responses.curves]
+    if missing:
+        raise InputError(f"responses: no curve of {', '.join(missing)}; allowed: R, G, B and W; add it")
 
 
 class QuantumEfficiencyWarning(UserWarning):
@@ -119,12 +178,12 @@ def read_csv(
     QuantumEfficiencyWarning
         Where a quantum efficiency is given for curves that seem to hold one.
     """
-    letters, nm, columns = _table(path)
-    curves = {letter: Spectrum(nm, column) for letter, column in zip(letters, columns, strict=True)}
+    curves = _table(path)
+    nm = next(iter(curves.values())).wavelength_nm
     if range_nm is not None:
-        curves = {letter: _within(curve, range_nm, str(path)) for letter, curve in curves.items()}
+        curves = {channel: _within(curve, range_nm, str(path)) for channel, curve in curves.items()}
     if quantum_efficiency is not None:
-        Responses(curves)  # a transmittance over 1 is told before the product hides it
+        Responses(curves)  # refuses a transmittance over 1 before the product hides it
         reason = _holds_quantum_efficiency(curves)
         if reason:
             warnings.warn(
@@ -135,11 +194,11 @@ def read_csv(
             )
     for factor in (ir_cut if isinstance(ir_cut, Spectrum) else None, quantum_efficiency):
         if factor is not None:
-            curves = {letter: _times(curve, factor) for letter, curve in curves.items()}
+            curves = {channel: _times(curve, factor) for channel, curve in curves.items()}
     if isinstance(ir_cut, int | float):
         require_range("ir_cut", ir_cut, nm[0] + 1e-9, 1e5, "give nm within the file's wavelengths, or a curve")
         last = min(float(ir_cut), float(nm[-1]) if range_nm is None else range_nm[1])
-        curves = {letter: _within(curve, (float(curve.wavelength_nm[0]), last), "") for letter, curve in curves.items()}
+        curves = {name: _within(curve, (float(curve.wavelength_nm[0]), last), "") for name, curve in curves.items()}
     return Responses(curves)
 
 
@@ -151,14 +210,14 @@ def read_curve(path: str | Path) -> Spectrum:
     InputError
         As `read_csv` does, and for more columns than two.
     """
-    names, nm, columns = _table(path)
-    if len(names) != 1:
-        raise InputError(f"curve: {str(path)!r} has {len(names)} columns beside wavelength_nm; allowed: 1; keep one")
-    return Responses({names[0]: Spectrum(nm, columns[0])}).curves[names[0]]
+    curves = Responses(_table(path)).curves
+    if len(curves) != 1:
+        raise InputError(f"curve: {str(path)!r} has {len(curves)} columns beside wavelength_nm; allowed: 1; keep one")
+    return next(iter(curves.values()))
 
 
-def _table(path: str | Path) -> tuple[list[str], Floats, list[Floats]]:
-    """Names, wavelengths and columns of a CSV."""
+def _table(path: str | Path) -> dict[str, Spectrum]:
+    """Columns of a CSV by their names."""
     try:
         if Path(path).exists() and not Path(path).is_file():  # a pipe or a device may never end
             raise ValueError("it is a folder or a device")
@@ -173,17 +232,12 @@ def _table(path: str | Path) -> tuple[list[str], Floats, list[Floats]]:
             f"responses: {str(path)!r} can't be read ({error}); give a CSV of numbers with a header"
         ) from error
     names = [name.strip() for name in header]
-    if (
-        names[0] != "wavelength_nm"
-        or table.ndim != 2
-        or table.shape[1] != len(names)
-        or len(names) < 2
-        or len(set(names)) != len(names)
-    ):
+    fits = table.ndim == 2 and table.shape[1] == len(names) == len(set(names))
+    if not fits or names[0] != "wavelength_nm" or len(names) < 2:
         raise InputError(
-            f"responses: {str(path)!r} has header {names}; allowed: wavelength_nm and one letter a column; add it"
+            f"responses: {str(path)!r} has header {names}; allowed: wavelength_nm and one channel a column; add it"
         )
-    return names[1:], table[:, 0], [table[:, i] for i in range(1, len(names))]
+    return {name: Spectrum(table[:, 0], column) for name, column in zip(names[1:], table.T[1:], strict=True)}
 
 
 def _within(curve: Spectrum, range_nm: tuple[float, float], path: str) -> Spectrum:
@@ -200,7 +254,7 @@ def _within(curve: Spectrum, range_nm: tuple[float, float], path: str) -> Spectr
 
 
 def _times(curve: Spectrum, factor: float | Spectrum) -> Spectrum:
-    """Product, on the points of both: exact there, linear between; zero where either ends."""
+    """Product at the points of both curves; zero where either ends."""
     if not isinstance(factor, Spectrum):
         require_range("quantum_efficiency", factor, 0.0, 1.0, "give electrons per photon")
         return curve * float(factor)
@@ -218,7 +272,7 @@ def _times(curve: Spectrum, factor: float | Spectrum) -> Spectrum:
 
 
 def _holds_quantum_efficiency(curves: Mapping[str, Spectrum]) -> str:
-    """Say why curves look as if a quantum efficiency were in them, or nothing.
+    """Why curves look as if a quantum efficiency were in them; an empty text where they don't.
 
     Colour filters pass 0.8 or more at their peaks and clear ones the same everywhere, while front-lit silicon with its
     filters stays under 0.7, and a clear pixel (W, C) follows silicon's rise from blue to red (so do ISETCam's sensors).
@@ -228,11 +282,9 @@ def _holds_quantum_efficiency(curves: Mapping[str, Spectrum]) -> str:
     if most < 0.7:
         return f"no curve exceeds {most:.2f}, where filters alone pass 0.8 or more at their peak"
     nm = np.arange(450.0, 651.0, 5.0)
-    for letter, curve in curves.items():
-        if letter not in ("W", "C"):
-            continue
-        values = np.interp(nm, curve.wavelength_nm, curve.values, left=0.0, right=0.0)
+    for channel in [name for name in ("W", "C") if name in curves]:
+        values = np.interp(nm, curves[channel].wavelength_nm, curves[channel].values, left=0.0, right=0.0)
         low = float(values.min() / values.max()) if values.max() else 0.0
         if 0.3 < low < 0.8:  # passes all of 450-650 nm, and not evenly
-            return f"{letter} passes all of 450-650 nm but falls to {low:.2f} of its peak there, as silicon does"
+            return f"{channel} passes all of 450-650 nm but falls to {low:.2f} of its peak there, as silicon does"
     return ""

@@ -8,7 +8,7 @@ from scipy.special import ndtri
 
 from sensor.cfa import check_covers
 from sensor.config import SensorConfig
-from sensor.random import Term, draw_key, normals
+from sensor.random import NoiseTerm, draw_key, normals
 
 
 @dataclass(frozen=True)
@@ -48,13 +48,13 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
     """
     check_covers(sensor.cfa, tuple(shape))
     key, pixel, one_row = draw_key(rng), sensor.pixel, (1, shape[1])
-    response = np.maximum(1.0 + pixel.prnu * normals(key, Term.PRNU, shape), 0.0)
-    offset_e = pixel.dsnu_e * normals(key, Term.DSNU, shape)
+    response = np.maximum(1.0 + pixel.prnu * normals(key, NoiseTerm.PRNU, shape), 0.0)
+    offset_e = pixel.dsnu_e * normals(key, NoiseTerm.DSNU, shape)
     column_gain = hot = None
     if pixel.column_offset_e:
-        offset_e += pixel.column_offset_e * normals(key, Term.COLUMN_OFFSET, one_row)
+        offset_e += pixel.column_offset_e * normals(key, NoiseTerm.COLUMN_OFFSET, one_row)
     if pixel.column_gain_spread:
-        column_gain = np.maximum(1.0 + pixel.column_gain_spread * normals(key, Term.COLUMN_GAIN, one_row)[0], 0.0)
+        column_gain = np.maximum(1.0 + pixel.column_gain_spread * normals(key, NoiseTerm.COLUMN_GAIN, one_row)[0], 0.0)
     if pixel.hot_pixel_share:
-        hot = normals(key, Term.HOT, shape) < ndtri(pixel.hot_pixel_share)
+        hot = normals(key, NoiseTerm.HOT, shape) < ndtri(pixel.hot_pixel_share)
     return Device(response, offset_e, column_gain, hot)

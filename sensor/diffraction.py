@@ -1,7 +1,7 @@
 """Light that a lens spreads: diffraction, defocus and veiling glare, band by band.
 
-The picture is transformed by cosines (DCT-II), which see it continued as its own mirror image: no border darkens, and
-light stays light to rounding. A band is worked on in double precision, several on threads.
+The picture is transformed by cosines (DCT-II), which continue it as its own mirror image: no border darkens, and
+the sum of the light is kept to rounding. Bands are transformed in double precision, several at once on threads.
 """
 
 import os
@@ -45,11 +45,6 @@ def defocus_otf(frequency_per_um: Floats, diameter_um: float) -> Floats:
     return np.asarray(np.divide(2 * j1(x), x, out=np.ones_like(x), where=x > 1e-9))
 
 
-def lens_otf(frequency_per_um: Floats, wavelength_nm: float, lens: LensConfig) -> Floats:
-    """Both together."""
-    return diffraction_otf(frequency_per_um, wavelength_nm, lens) * defocus_otf(frequency_per_um, lens.defocus_um)
-
-
 def sampled_otf(
     shape: tuple[int, int], step_um: float, wavelength_nm: float, lens: LensConfig, folded: bool
 ) -> NDArray[np.float64]:
@@ -63,14 +58,17 @@ def sampled_otf(
         negative, and below the pixels' Nyquist frequency the same wherever the lens's limit lies under the sampling
         frequency less that.
     """
+
+    def lens_otf(frequency_per_um: Floats) -> Floats:
+        return diffraction_otf(frequency_per_um, wavelength_nm, lens) * defocus_otf(frequency_per_um, lens.defocus_um)
+
     rows, columns = (np.arange(size) / (2 * size * step_um) for size in shape)
     limit = limit_per_um(wavelength_nm, lens)
-    total = lens_otf(np.hypot(rows[:, None], columns), wavelength_nm, lens)
+    total = lens_otf(np.hypot(rows[:, None], columns))
     for down, across in ((-1, 0), (0, -1), (-1, -1)) if folded else ():
         nearest = np.hypot(rows[-1] * bool(down), columns[-1] * bool(across))  # where a copy comes closest to 0
         if nearest < limit < inf:
-            shifted = np.hypot(rows[:, None] + down / step_um, columns + across / step_um)
-            total += lens_otf(shifted, wavelength_nm, lens)
+            total += lens_otf(np.hypot(rows[:, None] + down / step_um, columns + across / step_um))
     return total
 
 
@@ -96,7 +94,10 @@ def spread_light(
     def one_band(band: int) -> None:
         light = radiance.values[..., band] * scale
         if lens.diffraction or lens.defocus_um:
-            light = _blur(light, pitch_um / samples, float(radiance.wavelength_nm[band]), lens, folded=samples > 1)
+            nm, step_um = float(radiance.wavelength_nm[band]), pitch_um / samples
+            spectrum = dctn(light, type=2)
+            spectrum *= sampled_otf(radiance.shape, step_um, nm, lens, folded=samples > 1)
+            light = idctn(spectrum, type=2, overwrite_x=True)
             light = light if radiance.signed else _without_undershoot(light)
         light = light.reshape(height, samples, width, samples).mean(axis=(1, 3))
         planes[band] = (1 - lens.veiling_glare) * light + lens.veiling_glare * light.mean()
@@ -106,18 +107,8 @@ def spread_light(
     return np.moveaxis(planes, 0, -1)
 
 
-def _blur(
-    light: NDArray[np.float64], step_um: float, wavelength_nm: float, lens: LensConfig, folded: bool
-) -> NDArray[np.float64]:
-    """One band behind the lens."""
-    shape = (light.shape[0], light.shape[1])
-    spectrum = dctn(light, type=2)
-    spectrum *= sampled_otf(shape, step_um, wavelength_nm, lens, folded)
-    return np.asarray(idctn(spectrum, type=2, overwrite_x=True))
-
-
 def _without_undershoot(light: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Light with 0 where it would fall under 0; the rest gives that light back."""
+    """Light with its negative values set to 0, and scaled to the same sum."""
     if light.min() >= 0:
         return light
     total, kept = light.sum(), np.maximum(light, 0.0)

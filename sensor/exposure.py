@@ -1,4 +1,4 @@
-"""Exposure times: chosen from the expected signal, never from a noisy picture, or laid around a given one."""
+"""Exposure times: auto exposure from the expected signal, and brackets around a given time."""
 
 from collections.abc import Sequence
 
@@ -10,9 +10,6 @@ from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.response import channel_electrons
 
-CHANNEL = "G"
-PERCENTILE = 99.0
-WELL_SHARE = 0.8
 LONGEST_S = 0.066  # Parmar & Wandell 2009, Figure 5: 66 ms
 RULE = "the 99th percentile of expected G at 80 % of the well, never longer than {longest:g} ms"
 
@@ -22,9 +19,9 @@ def auto_exposure_s(
     sensor: SensorConfig,
     longest_s: float = LONGEST_S,
     *,
-    channel: str = CHANNEL,
-    percentile: float = PERCENTILE,
-    well_share: float = WELL_SHARE,
+    channel: str = "G",
+    percentile: float = 99.0,
+    well_share: float = 0.8,
 ) -> float:
     """Exposure that puts a percentile of one channel's expected electrons at a share of the well [s].
 
@@ -35,18 +32,18 @@ def auto_exposure_s(
     irradiance : SpectralIrradiance
     sensor : SensorConfig
     longest_s : float
-        What it never exceeds, and the answer where there is no light [s].
+        Longest exposure allowed; returned where there is no light [s].
     channel : str
-        Letter of the mosaic.
+        A channel of the mosaic.
     percentile : float
-        0 to 100, over all pixels as if each carried the letter.
+        0 to 100, over all pixels as if each had the channel's filter.
     well_share : float
         Above 0, up to 1.
 
     Raises
     ------
     InputError
-        For a number out of range, or a letter that the mosaic doesn't have.
+        For a number out of range, or a channel that the mosaic doesn't have.
     """
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     require_range("percentile", percentile, 0.0, 100.0, "give per cent of the pixels")

@@ -1,17 +1,26 @@
-"""From scene radiance to irradiance on the sensor."""
+"""From scene radiance to irradiance on the sensor, and what that leaves out for a lens."""
 
 from dataclasses import dataclass
 from math import pi, radians, tan
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import dctn, idctn
 
 from render.photometry import luminance, photons_per_joule
 from render.radiance import SpectralRadiance, check_values
 from render.spectrum import Floats, band_widths
 from rodcone.errors import InputError, require_whole
 from sensor.config import LensConfig, SensorConfig
-from sensor.diffraction import spread_light
+from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf, spread_light
+
+# For the costs that `left_out` states.
+WAVELENGTH_NM = 550.0
+VIEW_DEG = 40.0  # angle of view for the falloff
+DIAGONAL = 1.25  # over the width of a picture of 4:3
+APERTURE_AT_NYQUIST = 2 / pi  # transfer of a square pixel there, sin(pi / 2) / (pi / 2)
+AIRY_DIAMETER = 2.44  # of the first dark ring, in wavelengths x f-number
+_LEAST_SHARE = 5e-4  # of a point's light: a smaller share in the negative lobes isn't stated
 
 
 @dataclass(frozen=True)
@@ -72,7 +81,7 @@ def falloff(lens: LensConfig, shape: tuple[int, int]) -> NDArray[np.float64]:
 
 
 def spreads(lens: LensConfig) -> bool:
-    """Whether light of one point reaches other pixels, so that a picture can't be imaged in parts."""
+    """Whether light of one point reaches other pixels: a picture then can't be imaged in parts."""
     return lens.diffraction > 0 or lens.defocus_um > 0 or lens.veiling_glare > 0
 
 
@@ -85,7 +94,7 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
         Box-filtered samples. One a pixel already holds the pixel's aperture, and the optical transfer function is all
         that it lacks; detail finer than a pixel has aliased by then.
     sensor : SensorConfig
-        A term of its lens that is 0 costs nothing; `sensor.left_out` says what that leaves out.
+        A term of its lens that is 0 costs nothing; `left_out` says what that leaves out.
     samples_per_pixel : int
         Samples of `radiance` along each side of a pixel, 1 to 64; more than one are averaged behind the lens. 4 image
         detail finer than a pixel as the lens does, at 16 times the cost.
@@ -115,4 +124,58 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
         values = spread_light(radiance, plane, lens, sensor.pixel.pitch_um, samples)
     return SpectralIrradiance(
         values, radiance.wavelength_nm, sensor.pixel.pitch_um, radiance.widths_nm, radiance.signed
+    )
+
+
+def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...]:
+    """One line for each effect of a lens that `form_image` leaves out or approximates, with its cost.
+
+    MTFs are those of lens and pixel aperture together, at 550 nm, for the camera's own pixel and f-number.
+    """
+    lens, nyquist = sensor.lens, np.array(0.5 / sensor.pixel.pitch_um)
+    lines = []
+    if not lens.diffraction:
+        ideal = LensConfig(lens.f_number, magnification=lens.magnification, diffraction=1.0)
+        lines.append(f"diffraction: {_at_nyquist(float(diffraction_otf(nyquist, WAVELENGTH_NM, ideal)))}")
+    if samples_per_pixel == 1 and (share := negative_lobe_share(sensor)) >= _LEAST_SHARE:
+        lines.append(
+            f"detail finer than a pixel: {share:.1%} of a point's light is taken from around it, to 0 at "
+            "most, and given to its own pixel; 4 samples a pixel are free of that"
+        )
+    if samples_per_pixel > 1 and lens.diffraction:
+        # What the nearest copy adds at the pixels' Nyquist frequency (`sensor.diffraction.sampled_otf`).
+        copy_per_um = np.array((samples_per_pixel - 0.5) / sensor.pixel.pitch_um)
+        excess = float(diffraction_otf(copy_per_um, WAVELENGTH_NM, lens))
+        if excess > 0:
+            lines.append(
+                f"detail finer than a sample: it lifts the MTF at Nyquist by {APERTURE_AT_NYQUIST * excess:.3f}; "
+                "more samples a pixel don't"
+            )
+    if not lens.horizontal_view_deg:
+        corner = (1 + (tan(radians(VIEW_DEG / 2)) * DIAGONAL) ** 2) ** -2
+        lines.append(
+            f"cos^4 falloff: a picture of 4:3, {VIEW_DEG:g} degrees wide, would lose {1 - corner:.0%} in its corners"
+        )
+    if not lens.veiling_glare:
+        lines.append("veiling glare: each per cent would add 1 % of the picture's mean irradiance to every pixel")
+    if not lens.defocus_um:
+        disc = float(defocus_otf(nyquist, sensor.pixel.pitch_um))
+        lines.append(f"defocus: a disc as wide as a pixel: {_at_nyquist(disc)}")
+    elif lens.diffraction and lens.defocus_um < AIRY_DIAMETER / limit_per_um(WAVELENGTH_NM, lens):
+        lines.append("defocus: its disc is within the Airy disc, where the product of both transfers is a rough guess")
+    return (*lines, "aberrations, distortion, flare, polarisation: not modelled, their cost isn't estimated")
+
+
+def negative_lobe_share(sensor: SensorConfig) -> float:
+    """Share of a point's light in the negative lobes of its image, at one sample a pixel and within 32 pixels."""
+    point = np.zeros((64, 64))
+    point[32, 32] = 1.0
+    transfer = sampled_otf((64, 64), sensor.pixel.pitch_um, WAVELENGTH_NM, sensor.lens, folded=False)
+    image = idctn(dctn(point) * transfer)
+    return float(-image[image < 0].sum())
+
+
+def _at_nyquist(transfer: float) -> str:
+    return (
+        f"it would take the MTF at Nyquist from {APERTURE_AT_NYQUIST:.2f} to {APERTURE_AT_NYQUIST * abs(transfer):.2f}"
     )

@@ -8,14 +8,7 @@ from sensor.config import SensorConfig
 from sensor.config_file import read_sensor
 
 _FOLDER = Path(__file__).parent / "data"
-_NAMES = (
-    "table1_pixel",
-    "table1_output",
-    "low_noise",
-    "table1_output_6um",
-    "table1_output_3um",
-    "table1_output_2um",
-)
+_NAMES = ("table1_pixel", "table1_output", "low_noise", "table1_output_6um", "table1_output_3um", "table1_output_2um")
 
 
 def names() -> tuple[str, ...]:
@@ -44,7 +37,7 @@ def preset(name: str | Path, cfa: str | Sequence[str] | None = None) -> SensorCo
     name : str or Path
         One of `names`, or a path that ends in ``.toml``.
     cfa : str or sequence of str, optional
-        Mosaic: a name of `sensor.cfa.MOSAICS`, or rows of letters. None takes the file's own, RGBW in every preset.
+        Mosaic: a name of `sensor.cfa.MOSAICS`, or rows of channels. None takes the file's own, RGBW in every preset.
 
     Raises
     ------

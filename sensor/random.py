@@ -1,4 +1,4 @@
-"""Random numbers by coordinates: key, row, column and term decide a draw, so tiling and threads don't.
+"""Random numbers by coordinates: a draw depends on key, row, column and term, not on threads or order.
 
 Philox4x32-10 is the counter-based generator of Salmon et al., "Parallel random numbers: as easy as 1, 2, 3" (SC 2011).
 """
@@ -14,11 +14,11 @@ _U32 = np.uint64(0xFFFFFFFF)
 MULTIPLIERS = (np.uint64(0xD2511F53), np.uint64(0xCD9E8D57))
 WEYL = (0x9E3779B9, 0xBB67AE85)
 ROUNDS = 10
-_PIXELS_AT_ONCE = 1 << 18  # the words of a draw take ten times its memory
+_PIXELS_AT_ONCE = 1 << 18  # a draw's random words take ten times its own memory
 
 
-class Term(IntEnum):
-    """Noise term of a draw: one independent stream each."""
+class NoiseTerm(IntEnum):
+    """Noise term: each has an independent stream."""
 
     PRNU = 1
     DSNU = 2
@@ -53,7 +53,7 @@ def philox(counter: tuple[NDArray[np.uint64], ...], key: int) -> tuple[NDArray[n
     return c0, c1, c2, c3
 
 
-def normals(key: int, term: Term, shape: tuple[int, int]) -> NDArray[np.float64]:
+def normals(key: int, term: NoiseTerm, shape: tuple[int, int]) -> NDArray[np.float64]:
     """Standard normal draw for each pixel, shape `shape` (Box-Muller on two 53-bit uniforms)."""
     draws = np.empty(shape)
     columns = np.arange(shape[1], dtype=np.uint64)[None, :]
@@ -72,7 +72,7 @@ def _box_muller(words: tuple[NDArray[np.uint64], ...]) -> NDArray[np.float64]:
     return np.asarray(np.sqrt(-2.0 * np.log1p(-first)) * np.cos(2.0 * np.pi * second))
 
 
-def poisson(key: int, term: Term, mean: NDArray[np.float64]) -> NDArray[np.int64]:
+def poisson(key: int, term: NoiseTerm, mean: NDArray[np.float64]) -> NDArray[np.int64]:
     """Exact Poisson draw for each pixel of `mean` (h, w); one stream a row."""
     draws = np.empty(mean.shape, dtype=np.int64)
     words = np.array([key, 0], dtype=np.uint64)  # a plain list with a large integer would go through float64

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from math import hypot
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +25,7 @@ class RawImage:
     dn : (h, w) uint16
         Mosaic in digital numbers; other whole numbers, or finite floats, are taken as they are.
     cfa : tuple of str
-        Tile of letters, row 0 first.
+        Tile of channels, row 0 first.
     black_dn, white_dn : float
         Reading of no light, and of a full well.
     gain_e_per_dn : float
@@ -80,6 +81,8 @@ class RawImage:
         if self.defects is not None:
             object.__setattr__(self, "defects", _checked_defects(self.defects, self.shape))
         limits = {
+            "black_dn": (-65_535.0, 65_535.0, "give digital numbers of 16 bits"),
+            "white_dn": (-65_535.0, 65_535.0, "give digital numbers of 16 bits"),
             "gain_e_per_dn": (1e-12, 1e12, "give electrons per digital number"),
             "read_noise_e": (0.0, 1e9, "give electrons, 0 for none"),
             "dsnu_e": (0.0, 1e9, "give electrons, 0 for none"),
@@ -90,24 +93,21 @@ class RawImage:
             "column_gain_spread": (0.0, 1.0, "give a fraction, 0 for none"),
         }
         for name, (low, high, fix) in limits.items():
-            if getattr(self, name) is not None:
-                require_range(name, getattr(self, name), low, high, fix)
-        self._check_levels()
-        if not (isinstance(self.camera, str) and self.camera.isascii() and self.camera.isprintable() and self.camera):
-            raise InputError(f"camera: {self.camera!r} is not allowed; give a name in printable ASCII")
+            value = getattr(self, name)
+            if value is not None or name not in ("f_number", "iso"):
+                require_range(name, value, low, high, fix)
+        if not self.black_dn < self.white_dn:
+            raise InputError(
+                f"black_dn: {self.black_dn!r} is not under white_dn {self.white_dn!r}; swap or correct them"
+            )
+        for name, text in (("camera", self.camera), ("engine", self.engine)):
+            if not (isinstance(text, str) and text.isascii() and text.isprintable() and (text or name == "engine")):
+                raise InputError(f"{name}: {text!r} is not allowed; give a name in printable ASCII")
         if self.colour is not None and self.colour.neutral.size != len(channels(self.cfa)):
             raise InputError(
                 f"colour: {self.colour.neutral.size} channels don't fit the mosaic's {channels(self.cfa)}; "
                 "calibrate this camera"
             )
-
-    def _check_levels(self) -> None:
-        if not self.black_dn < self.white_dn:
-            raise InputError(
-                f"black_dn: {self.black_dn!r} is not under white_dn {self.white_dn!r}; swap or correct them"
-            )
-        for name in ("black_dn", "white_dn"):
-            require_range(name, getattr(self, name), -65_535.0, 65_535.0, "give digital numbers of 16 bits")
 
     def _repr_png_(self) -> bytes:
         return preview_png(np.maximum(self.electrons, 0.0))
@@ -150,12 +150,17 @@ class RawImage:
         return self.electrons >= self.saturation_e
 
 
-def _checked_dn(dn: ArrayLike) -> NDArray[np.uint16]:
-    """Samples as an array, or `InputError`: what isn't a finite real number would come out as a picture."""
+def _as_array(values: ArrayLike) -> NDArray[Any]:
+    """Array of any type; an empty one of objects for lists of unequal length or numbers beyond 64 bits."""
     try:
-        samples = np.asarray(dn)
-    except (ValueError, OverflowError):  # lists of unequal length
-        samples = np.empty(0, dtype=np.object_)
+        return np.asarray(values)
+    except (ValueError, OverflowError):
+        return np.empty(0, dtype=np.object_)
+
+
+def _checked_dn(dn: ArrayLike) -> NDArray[np.uint16]:
+    """Samples as an array, or `InputError` where one is no finite real number."""
+    samples = _as_array(dn)
     if samples.dtype.kind not in "uif":
         raise InputError(f"dn: samples of type {samples.dtype} are not allowed; give whole numbers or finite floats")
     if samples.dtype.kind == "f" and not np.isfinite(samples).all():
@@ -166,18 +171,15 @@ def _checked_dn(dn: ArrayLike) -> NDArray[np.uint16]:
     return samples
 
 
-def _checked_defects(defects: NDArray[np.intp], shape: tuple[int, int]) -> NDArray[np.intp] | None:
-    """Rows and columns in the frame's order, each once; None where there is none."""
-    try:
-        places = np.asarray(defects)
-    except (ValueError, OverflowError):  # lists of unequal length
-        places = np.empty(0, dtype=np.object_)
-    if places.size == 0 and places.dtype != np.object_:
+def _checked_defects(defects: ArrayLike, shape: tuple[int, int]) -> NDArray[np.intp] | None:
+    """Rows and columns in the frame's order, each pixel once; None where there is none."""
+    pixels = _as_array(defects)
+    if pixels.size == 0 and pixels.dtype != np.object_:
         return None
-    fits = places.ndim == 2 and places.shape[1] == 2 and places.dtype.kind in "iu"
-    if not fits or np.any((places < 0) | (places >= np.array(shape))):
+    fits = pixels.ndim == 2 and pixels.shape[1] == 2 and pixels.dtype.kind in "iu"
+    if not fits or np.any((pixels < 0) | (pixels >= np.array(shape))):
         raise InputError(
-            f"defects: an array of shape {places.shape} is not allowed; give rows and columns inside {shape} as (n, 2) "
+            f"defects: an array of shape {pixels.shape} is not allowed; give rows and columns inside {shape} as (n, 2) "
             "whole numbers"
         )
-    return np.unique(places.astype(np.intp), axis=0)
+    return np.unique(pixels.astype(np.intp), axis=0)

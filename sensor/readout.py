@@ -1,13 +1,12 @@
-"""From expected photo-electrons to digital numbers: every noise source, in physical order."""
+"""From expected photo-electrons to digital numbers: every noise source in physical order, and their variance."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError, require_range
 from sensor.config import SensorConfig
-from sensor.crosstalk import spread_charge
 from sensor.device import Device
-from sensor.random import Term, draw_key, normals, poisson
+from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
 
 
@@ -53,16 +52,65 @@ def read_out(
     if device.hot is not None:
         mean_e[device.hot] += pixel.hot_pixel_dark_current_e_per_s * exposure_s
     # Poisson far above the well is the well with certainty; the bound keeps the draw inside 64-bit integers.
-    collected_e = poisson(key, Term.SHOT, np.minimum(mean_e, 2 * pixel.full_well_e + 1e4)).astype(np.float64)
+    collected_e = poisson(key, NoiseTerm.SHOT, np.minimum(mean_e, 2 * pixel.full_well_e + 1e4)).astype(np.float64)
     np.minimum(collected_e, pixel.full_well_e, out=collected_e)
     if device.column_gain is not None:
         collected_e *= device.column_gain
     collected_e += device.dark_offset_e
     if pixel.read_noise_e:
-        collected_e += pixel.read_noise_e * normals(key, Term.READ, expected.shape)
+        collected_e += pixel.read_noise_e * normals(key, NoiseTerm.READ, expected.shape)
     dn = np.rint(collected_e / sensor.gain_e_per_dn + sensor.black_dn)
     dn = np.clip(dn, 0, sensor.white_dn).astype(np.uint16)
     return as_raw(dn, sensor, exposure_s, engine="numpy", hot=device.hot)
+
+
+def spread_charge(expected_e: NDArray[np.float64], crosstalk: float) -> NDArray[np.float64]:
+    """Expected photo-electrons after each pixel gave `crosstalk` of its own to each of its four neighbours.
+
+    It belongs before the Poisson draw: electrons that go separate ways are thinned, and thinned Poisson counts are
+    Poisson and independent again. At the frame's edge the charge stays, so the total is kept. Charge beyond a full
+    well is lost, not handed on: blooming isn't modelled.
+
+    Parameters
+    ----------
+    expected_e : (h, w) float64
+    crosstalk : float
+        0 to 0.25; 0 returns the frame as it is.
+
+    Returns
+    -------
+    (h, w) float64
+    """
+    if crosstalk == 0:
+        return expected_e
+    around = np.pad(expected_e, 1, mode="edge")
+    neighbours = around[:-2, 1:-1] + around[2:, 1:-1] + around[1:-1, :-2] + around[1:-1, 2:]
+    return np.asarray((1 - 4 * crosstalk) * expected_e + crosstalk * neighbours)
+
+
+def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
+    """Variance of one pixel of one chip drawn at random [e-^2], shape of `expected_e`; clipping left out.
+
+    Shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was collected, DSNU
+    and column offsets, read noise and quantisation (gain^2 / 12).
+
+    Parameters
+    ----------
+    expected_e : (h, w) float64
+        Expected photo-electrons as `read_out` takes them: before crosstalk.
+    sensor : SensorConfig
+    exposure_s : float
+        For the dark current [s].
+    """
+    pixel = sensor.pixel
+    signal = spread_charge(np.asarray(expected_e, dtype=np.float64), pixel.crosstalk)
+    hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
+    collected = signal + pixel.dark_current_e_per_s * exposure_s + hot_share * hot_e
+    variance = collected + (pixel.prnu * signal) ** 2 + hot_share * (1 - hot_share) * hot_e**2
+    # a product of independent factors: E[gain^2] E[collected^2] - E[collected]^2
+    variance = variance + pixel.column_gain_spread**2 * (variance + collected**2)
+    dark = pixel.read_noise_e**2 + pixel.fixed_dark_e**2 + sensor.gain_e_per_dn**2 / 12
+    return np.asarray(variance + dark)
 
 
 def as_raw(

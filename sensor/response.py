@@ -1,15 +1,20 @@
-"""From irradiance to the expected number of photo-electrons."""
+"""From irradiance to expected photo-electrons: the channels' responses, the exposure and the camera's window."""
+
+import warnings
 
 import numpy as np
 from numpy.typing import NDArray
 
 from render.photometry import photons_per_joule
-from render.spectrum import Floats
-from rodcone.errors import require_range
+from render.spectrum import VISIBLE_NM, Floats
+from rodcone.errors import InputError, require_range
 from sensor.cfa import channels, check_covers, mask
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
-from sensor.window import check_covered, check_window, inside_nm
+
+MOST_LOST = 0.5  # of a channel's response: a picture of less than half of it is none of that channel
+LEAST_TOLD = 5e-3  # of a channel's response
+_STEP_NM = 1.0  # of the wavelength grid on which shares are summed
 
 
 def electrons_per_irradiance(
@@ -32,8 +37,8 @@ def electrons_per_irradiance(
     """
     require_range("exposure_s", exposure_s, 0.0, 1e7, "give seconds, 0 or more")
     check_window(sensor.window_nm, wavelength_nm, width_nm)
-    check_covered(sensor, wavelength_nm, width_nm)
-    seen_nm = inside_nm(sensor.window_nm, wavelength_nm, width_nm)
+    _check_covered(sensor, wavelength_nm, width_nm)
+    seen_nm = _inside_nm(sensor.window_nm, wavelength_nm, width_nm)
     response = sensor.responses.band_average(channels(sensor.cfa), wavelength_nm, width_nm)
     area_m2 = (sensor.pixel.pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
     return np.asarray(response * photons_per_joule(wavelength_nm) * seen_nm * area_m2 * exposure_s)
@@ -54,7 +59,7 @@ def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exp
     Parameters
     ----------
     irradiance : SpectralIrradiance
-        Bands that it lacks count as dark, which is told, and refused where a channel loses more than half.
+        Bands that it lacks count as dark: a warning says so, and a channel that loses more than half is refused.
     sensor : SensorConfig
     exposure_s : float
         0 or more [s].
@@ -68,7 +73,80 @@ def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exp
     shape = (electrons.shape[0], electrons.shape[1])
     check_covers(sensor.cfa, shape)
     result = np.empty(shape)
-    for index, letter in enumerate(channels(sensor.cfa)):
-        here = mask(sensor.cfa, letter, shape)
-        result[here] = electrons[here, index]
+    for index, channel in enumerate(channels(sensor.cfa)):
+        sampled = mask(sensor.cfa, channel, shape)
+        result[sampled] = electrons[sampled, index]
     return result
+
+
+def check_window(window_nm: tuple[float, float], wavelength_nm: Floats, width_nm: Floats) -> None:
+    """Raise `InputError` where a camera's window opens beyond 380-780 nm and the bands don't reach there.
+
+    Bands that are absent count as dark. Within 380-780 nm that is a choice of the scene; beyond, it would hide that a
+    W pixel may collect 16-35 % of its electrons there. Less than one more band may be missing.
+    """
+    low, high = window_nm
+    beyond = ((low, min(VISIBLE_NM[0], high), width_nm[0]), (max(VISIBLE_NM[1], low), high, width_nm[-1]))
+    for first, last, band_nm in beyond:
+        seen = _inside_nm((first, last), wavelength_nm, width_nm).sum()
+        if last - first - seen >= band_nm:
+            raise InputError(
+                f"window_nm: {window_nm!r} asks for light at {first:g} to {last:g} nm and the scene's bands, "
+                f"{_reach(wavelength_nm, width_nm)}, hold {seen:g} nm of it; narrow the window or render those bands"
+            )
+
+
+def lost_shares(sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats) -> dict[str, float]:
+    """Share of each channel's electrons that absent bands leave out, of light of equal energy in the camera's window.
+
+    Parameters
+    ----------
+    sensor : SensorConfig
+    wavelength_nm, width_nm : (band,) float64
+        Of the scene.
+
+    Returns
+    -------
+    dict of str to float
+        0 to 1 by channel.
+    """
+    low, high = sensor.window_nm
+    edges = np.linspace(low, high, max(2, round((high - low) / _STEP_NM) + 1))
+    nm, step = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    first, last = wavelength_nm - width_nm / 2, wavelength_nm + width_nm / 2
+    held_nm = np.clip(np.minimum(last, edges[1:, None]) - np.maximum(first, edges[:-1, None]), 0.0, None).sum(axis=1)
+    names = channels(sensor.cfa)
+    electrons = sensor.responses.band_average(names, nm, step) * photons_per_joule(nm) * step
+    lost = electrons @ np.clip(1 - held_nm / step, 0.0, 1.0)
+    total = electrons.sum(axis=1)
+    return {name: float(a / b) if b else 0.0 for name, a, b in zip(names, lost, total, strict=True)}
+
+
+def _check_covered(sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats) -> None:
+    """Warn where the bands don't fill the camera's window; refuse them where a channel loses more than half."""
+    low, high = sensor.window_nm
+    if _inside_nm(sensor.window_nm, wavelength_nm, width_nm).sum() >= (1 - 1e-9) * (high - low):
+        return
+    shares = lost_shares(sensor, wavelength_nm, width_nm)
+    most = max(shares.values())
+    if most <= LEAST_TOLD:
+        return
+    message = (
+        f"radiance: its bands, {_reach(wavelength_nm, width_nm)}, don't fill the camera's window, {low:g} to "
+        f"{high:g} nm; of light of equal energy there, they leave out "
+        f"{', '.join(f'{share:.1%} of {channel}' for channel, share in shares.items())}"
+    )
+    if most > MOST_LOST:
+        raise InputError(f"{message}; allowed: half; give those bands, or narrow the camera's window_nm")
+    warnings.warn(f"{message}; give those bands, or narrow the camera's window_nm", UserWarning, stacklevel=2)
+
+
+def _inside_nm(window_nm: tuple[float, float], wavelength_nm: Floats, width_nm: Floats) -> Floats:
+    """Width of each band's part inside the window, shape (band,)."""
+    low, high = window_nm
+    first, last = wavelength_nm - width_nm / 2, wavelength_nm + width_nm / 2
+    return np.asarray(np.clip(np.minimum(last, high) - np.maximum(first, low), 0.0, None))
+
+
+def _reach(wavelength_nm: Floats, width_nm: Floats) -> str:
+    return f"{(wavelength_nm - width_nm / 2).min():g} to {(wavelength_nm + width_nm / 2).max():g} nm"

@@ -7,12 +7,11 @@ from types import MappingProxyType
 from rodcone.errors import unknown
 from sensor.cfa import MOSAICS, RGBW, Tile
 from sensor.config import SensorConfig
-from sensor.curves import Responses, built_in
-from sensor.filters import complementary, neutral_density
+from sensor.curves import Responses, built_in, complementary, neutral_density
 
-CMYW: Tile = ("CM", "YW")  # RGBW's places, each primary in its complement's
+CMYW: Tile = ("CM", "YW")  # RGBW with each primary's complement in its place
 
-# Mosaics that need curves of their own, made from the camera's.
+# Mosaics with filters of their own: their tile, and what makes their responses from the camera's.
 VARIATIONS: Mapping[str, tuple[Tile, Callable[[Responses], Responses]]] = MappingProxyType(
     {"rgbw_nd": (RGBW, neutral_density), "cmyw": (CMYW, complementary)}
 )
@@ -27,7 +26,7 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
         With curves of R, G, B and W.
     mosaic : str
         A name of `sensor.cfa.MOSAICS`, or ``rgbw_nd`` (W behind a neutral density that gives it G's sensitivity) or
-        ``cmyw`` (cyan, magenta, yellow and W), of `sensor.filters`.
+        ``cmyw`` (cyan, magenta, yellow and W); `sensor.curves` states what is assumed of these filters.
 
     Raises
     ------

@@ -88,7 +88,7 @@ def test_no_module_binds_a_packages_bare_name() -> None:
     ]
     assert not wrong, (
         f"{wrong} bind a package's bare name, which a local variable such as `sensor` would shadow; "
-        "write `from sensor.noise import ...`"
+        "write `from sensor.readout import ...`"
     )
 
 

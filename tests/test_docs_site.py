@@ -14,7 +14,7 @@ import report_browser as CHROME
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 PACKAGES = ("rodcone", "render", "scenes", "sensor", "isp", "studies")
-# Pages that name modules and functions in backticks, `sensor.noise.noise_variance`, all of which have to exist.
+# Pages that name modules and functions in backticks, `sensor.readout.noise_variance`, all of which have to exist.
 PAGES = sorted([DOCS / "index.md", DOCS / "model.md", *DOCS.glob("tutorial/*.md"), *DOCS.glob("how_to/*.md")])
 RUN = [page for page in PAGES if page.parent != DOCS]
 NAME = re.compile(rf"`((?:{'|'.join(PACKAGES)})(?:\.\w+)+)`")
@@ -126,9 +126,9 @@ def test_a_processor_added_as_its_page_says_is_one_of_rodcones(tmp_path: Path) -
     for hunk in change.split("@@\n")[1:]:
         lines = hunk.splitlines(keepends=True)
         before, after = ("".join(line[1:] for line in lines if line[0] in signs) for signs in (" -", " +"))
-        source = (tmp_path / "isp" / "processors.py").read_text("utf-8")
+        source = (tmp_path / "isp" / "processors" / "catalogue.py").read_text("utf-8")
         assert source.count(before) == 1, before
-        (tmp_path / "isp" / "processors.py").write_text(source.replace(before, after), "utf-8")
+        (tmp_path / "isp" / "processors" / "catalogue.py").write_text(source.replace(before, after), "utf-8")
     program = (
         "from studies.commands.cli import main\n"
         "for words in ['capture flat_field --cfa bayer --size 32 --spp 4 --level 5cd/m2 -o flat.dng',"
@@ -180,8 +180,8 @@ def test_the_site_has_a_page_for_every_module_and_command_and_formulas_that_brow
     assert model.count("<math") > 50
     assert "arithmatex" not in model
     assert not re.findall(r"<m\w+>[^<]*\\[^<]*<", model), "a command that the converter doesn't know stays as it is"
-    assert 'href="api/sensor/noise.html#sensor.noise.noise_variance"' in model
-    assert 'id="sensor.noise.noise_variance"' in (site / "api" / "sensor" / "noise.html").read_text("utf-8")
+    assert 'href="api/sensor/readout.html#sensor.readout.noise_variance"' in model
+    assert 'id="sensor.readout.noise_variance"' in (site / "api" / "sensor" / "readout.html").read_text("utf-8")
     assert 'id="rodcone-sweep"' in (site / "api" / "commands.html").read_text("utf-8")
 
 
@@ -204,7 +204,7 @@ def test_the_search_finds_a_page_where_the_site_was_opened_as_a_file(site: Path,
     browser = CHROME.Browser(tmp_path)
     page = CHROME.Page(browser, site / "index.html")
     found = page.value(SEARCH)
-    assert any("sensor/noise.html" in address for address in found), found
+    assert any("sensor/readout.html" in address for address in found), found
     assert page.complaints() == []
     browser.close()
 
@@ -217,7 +217,7 @@ def test_a_browser_shows_the_pages_at_two_widths_in_light_and_dark_without_a_com
 ) -> None:
     for number, (width, dark) in enumerate(VIEWS):
         browser = CHROME.Browser(tmp_path / str(number))  # a profile each: the scheme is remembered
-        for name in ("index", "model", "tutorial/first_picture", "api/commands", "api/sensor/noise"):
+        for name in ("index", "model", "tutorial/first_picture", "api/commands", "api/sensor/readout"):
             page = CHROME.Page(browser, site / f"{name}.html", width=width, dark=dark)
             assert page.complaints() == []
             assert all(address.startswith("file:") for address in page.requests()), page.requests()

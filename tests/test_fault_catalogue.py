@@ -34,7 +34,7 @@ def test_a_fault_changes_the_code_and_what_it_leaves_is_still_python(fault: Faul
 
 
 def test_a_fault_whose_text_is_gone_is_told() -> None:
-    gone = Fault("gone", "sensor/noise.py", (("not there", "at all"),), ())
+    gone = Fault("gone", "sensor/readout.py", (("not there", "at all"),), ())
     with pytest.raises(SystemExit, match="stands 0 times"):
         faults.planted(gone, "x = 1\n")
 

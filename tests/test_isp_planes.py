@@ -5,7 +5,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from isp.planes import LEAST_PRNU, fill, stabilise, tent_radius, tent_weights
+from isp.anscombe import LEAST_PRNU, stabilise
+from isp.planes import fill, tent_radius, tent_weights
 from sensor.cfa import BAYER, RGBW, channels, mask
 
 RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")

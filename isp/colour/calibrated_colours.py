@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import adapt_to_d65, xyz_from_xy, xyz_to_srgb
 from isp.colour.colour_fit import ColourFit
 from render.spectrum import Floats
+from rodcone.colour_spaces import A_XY, D65_XY, adapt_to_d65, xyz_from_xy, xyz_to_srgb
 from sensor.calibration import ColourCalibration
 
 # Mean and mean product of the ColorChecker's 24 patches in linear sRGB under D65 (`scenes.reflectances`).
@@ -14,33 +14,31 @@ MOMENTS_SRGB = np.array([[0.1875, 0.1203, 0.0822], [0.1203, 0.1140, 0.0838], [0.
 # What three colours can't tell of W, as a share of white: our curve on the ColorChecker leaves 0.043 under D65,
 # 0.046 under F11 and 0.066 under A. Without it the fit would trust W where it has no noise.
 UNTOLD = 0.05
-# CIE 15:2018: chromaticities of illuminant A and of D65.
-_WHITES_XY = {"a": np.array([0.44758, 0.40745]), "d65": np.array([0.3127, 0.3290])}
 
 
-def fit_of_calibration(colour: ColourCalibration, letters: tuple[str, ...]) -> ColourFit:
+def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> ColourFit:
     """Colours of a camera that is known by matrices alone.
 
-    R, G and B answer to linear sRGB by the inverse of `colour.to_srgb`; any other letter by its row of the matrix from
+    R, G and B answer to linear sRGB by the inverse of `colour.to_srgb`; any other channel by its row of the matrix from
     XYZ, under the one of A and D65 whose neutral is nearer to the exposure's. What a channel sees beyond three colours
     is lost; `UNTOLD` stands for it.
 
     Parameters
     ----------
-    letters : tuple of str
-        Of `sensor.cfa.channels`: R, G and B first.
+    names : tuple of str
+        The channels, as `sensor.cfa.channels` gives them: R, G and B first.
     """
     rows = np.linalg.inv(colour.to_srgb)
-    if len(letters) > 3:
+    if len(names) > 3:
         rows = np.vstack([rows, _from_srgb(colour)[3:]])
-    untold = np.diag([0.0 if letter in "RGB" else UNTOLD**2 for letter in letters])
-    return ColourFit(letters, rows @ MEAN_SRGB, rows @ MOMENTS_SRGB @ rows.T + untold, rows @ MOMENTS_SRGB)
+    untold = np.diag([0.0 if name in "RGB" else UNTOLD**2 for name in names])
+    return ColourFit(names, rows @ MEAN_SRGB, rows @ MOMENTS_SRGB @ rows.T + untold, rows @ MOMENTS_SRGB)
 
 
 def _from_srgb(colour: ColourCalibration) -> NDArray[np.float64]:
     """Balanced channels of linear sRGB under the nearer illuminant, (channel, 3), rows sum to 1."""
     found = []
-    for name, xy in _WHITES_XY.items():
+    for name, xy in (("a", A_XY), ("d65", D65_XY)):
         from_xyz, white = getattr(colour, f"xyz_to_camera_{name}"), xyz_from_xy(xy)
         neutral = from_xyz @ white
         to_xyz = np.linalg.inv(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)

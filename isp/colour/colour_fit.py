@@ -1,10 +1,12 @@
-"""Camera channels to colour at a known noise: the more noise, the more W decides.
+"""Camera channels to colour: the least-squares matrix, and the fit that knows the noise of a frame.
 
-A matrix fitted without noise takes differences of channels to show saturated colours, and so amplifies noise. The one
-fitted here minimises the expected squared error of surface and noise together (Wiener 1949): where the colours carry
+A matrix fitted without noise takes differences of channels to show saturated colours, and so amplifies noise.
+`ColourFit` minimises the expected squared error of surface and noise together (Wiener 1949): where the colours carry
 little noise it is the least-squares matrix over all channels; the noisier they are, the more it takes from the channel
 with the least noise, W, and the paler the colours get.
 """
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.colour.camera_colour import training
+from render.photometry import photons_per_joule, tristimulus
+from render.spectrum import Floats, band_widths
+from rodcone.colour_spaces import adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from rodcone.errors import InputError
 from sensor.cfa import channels
 from sensor.raw import RawImage
@@ -29,28 +33,50 @@ class ColourFit:
 
     Attributes
     ----------
-    letters : tuple of str
-        Channels; the three colours first.
+    channels : tuple of str
+        The three colours first.
     mean : (channel,) float64
         Mean balanced signal; a surface that reflects all light reads 1.
     moments : (channel, channel) float64
         Mean product of two signals.
     cross : (channel, 3) float64
         Mean product of a signal and linear sRGB under the light, adapted to D65.
+    plain : (3, 3) float64 or None
+        A matrix of the three colours that stands in place of the moments: it knows nothing of noise, and takes W as it
+        is for luminance.
     """
 
-    letters: tuple[str, ...]
-    mean: NDArray[np.float64]
-    moments: NDArray[np.float64]
-    cross: NDArray[np.float64]
+    channels: tuple[str, ...]
+    mean: Floats
+    moments: Floats
+    cross: Floats
+    plain: Floats | None = None
 
-    def matrix(self, letters: Sequence[str] = ("R", "G", "B"), noise: ArrayLike = 0.0) -> NDArray[np.float64]:
+    @classmethod
+    def of(cls, matrix: ArrayLike | ColourFit) -> ColourFit:
+        """Make the value from what a pipeline is given; a `ColourFit` is taken as it is.
+
+        Raises
+        ------
+        InputError
+            For a matrix that isn't 3x3 and finite.
+        """
+        if isinstance(matrix, ColourFit):
+            return matrix
+        plain = np.asarray(matrix, dtype=np.float64)
+        if plain.shape != (3, 3) or not np.all(np.isfinite(plain)):
+            raise InputError(
+                f"matrix: shape {plain.shape} is not allowed; give 3x3 finite numbers, as fit_matrix makes them"
+            )
+        return cls(("R", "G", "B", "W"), mean=np.ones(4), moments=np.eye(4), cross=np.eye(4, 3), plain=plain)
+
+    def matrix(self, names: Sequence[str] = (), noise: ArrayLike = 0.0) -> Floats:
         """Matrix from balanced channels to linear sRGB with the least expected squared error.
 
         Parameters
         ----------
-        letters : sequence of str
-            Channels to use, some of `letters`.
+        names : sequence of str
+            Channels to use, some of `channels`; the three colours where left out.
         noise : (channel,) array_like
             Noise variance of each [(signal of a surface that reflects all light)^2].
 
@@ -62,13 +88,14 @@ class ColourFit:
         Raises
         ------
         InputError
-            For a letter that wasn't fitted.
+            For a channel that wasn't fitted.
         """
-        if not set(letters) <= set(self.letters):
-            raise InputError(
-                f"letters: {tuple(letters)} are not allowed; fitted were {self.letters}; fit these channels"
-            )
-        index = [self.letters.index(letter) for letter in letters]
+        used = tuple(names) or self.channels[:3]
+        if not set(used) <= set(self.channels):
+            raise InputError(f"channels: {used} are not allowed; fitted were {self.channels}; fit these channels")
+        if self.plain is not None:
+            return np.hstack([self.plain, np.zeros((3, len(used) - 3))])
+        index = [self.channels.index(name) for name in used]
         moments = self.moments[np.ix_(index, index)] + np.diag(np.broadcast_to(noise, len(index)) + LEAST_NOISE)
         # Rows sum to 1: the last coefficient is 1 minus the others, so fit differences from the last channel.
         difference = np.hstack([np.eye(len(index) - 1), -np.ones((len(index) - 1, 1))])
@@ -76,42 +103,122 @@ class ColourFit:
         free = np.linalg.solve(difference @ moments @ difference.T, target)
         return np.concatenate([free, 1.0 - free.sum(axis=0, keepdims=True)]).T
 
-    def __array__(self, dtype: object = None, copy: bool | None = None) -> NDArray[np.float64]:
-        """Matrix of the first three letters without noise, (3, 3): for pipelines that don't ask for the noise."""
-        return self.matrix(self.letters[:3])
+    def luminance(self, noise: ArrayLike = 0.0) -> Floats:
+        """Weights of balanced R, G, B and W in the luminance, shape (4,), as `matrix` has them at this noise."""
+        if self.plain is not None:
+            return np.array([0.0, 0.0, 0.0, 1.0])
+        return luminance_of_srgb(self.matrix("RGBW", noise).T)
 
 
 def fit_colours(
-    letters: Sequence[str],
+    names: Sequence[str],
     responses: ArrayLike,
     wavelength_nm: ArrayLike,
     illuminant_spd: ArrayLike,
     reflectances: ArrayLike,
     width_nm: ArrayLike | None = None,
 ) -> ColourFit:
-    """Fit a camera's colours under a light; parameters as `camera_colour.fit_matrix`, the responses of `letters`.
+    """Fit a camera's colours under a light; parameters as `fit_matrix`, the responses those of the channels `names`.
 
     Raises
     ------
     InputError
-        As `isp.colour.camera_colour.fit_matrix`.
+        As `fit_matrix`.
     """
     signals, target = training(responses, wavelength_nm, illuminant_spd, reflectances, width_nm)
-    if signals.shape[1] != len(letters):
-        raise InputError(
-            f"responses: {signals.shape[1]} channels don't fit the letters {tuple(letters)}; give one each"
-        )
+    if signals.shape[1] != len(names):
+        raise InputError(f"responses: {signals.shape[1]} channels don't fit the names {tuple(names)}; give one each")
     count = len(signals)
-    return ColourFit(tuple(letters), signals.mean(axis=0), signals.T @ signals / count, signals.T @ target / count)
+    return ColourFit(tuple(names), signals.mean(axis=0), signals.T @ signals / count, signals.T @ target / count)
+
+
+def fit_matrix(
+    responses: ArrayLike,
+    wavelength_nm: ArrayLike,
+    illuminant_spd: ArrayLike,
+    reflectances: ArrayLike,
+    width_nm: ArrayLike | None = None,
+) -> Floats:
+    """Matrix from white-balanced camera channels to linear sRGB, least squares over reflectances.
+
+    Responses are balanced so that a spectrally flat surface gives equal channels: what Gray World does to a scene
+    whose mean is grey. The fit keeps that neutral exactly neutral. The target is XYZ under the light, adapted to D65.
+
+    Parameters
+    ----------
+    responses : (channel, band) array_like
+        Electrons per photon; three channels, or four with W.
+    wavelength_nm : (band,) array_like
+        Centres; evenly spaced where `width_nm` is left out.
+    illuminant_spd : (band,) array_like
+        Spectral power of the light, any scale.
+    reflectances : (patch, band) array_like
+        Training surfaces, such as the ColorChecker's. This and `responses` may also come transposed.
+    width_nm : (band,) array_like, optional
+        Widths of bands that aren't evenly spaced.
+
+    Returns
+    -------
+    (3, channel) float64
+        Rows sum to 1.
+
+    Raises
+    ------
+    InputError
+        Where a shape doesn't fit the wavelengths, or there are too few surfaces.
+    """
+    signals, target = training(responses, wavelength_nm, illuminant_spd, reflectances, width_nm)
+    return fit_through_neutral(signals, target)
+
+
+def fit_through_neutral(signals: Floats, target: Floats) -> Floats:
+    """Least-squares matrix (output, channel) from signals (patch, channel) to targets (patch, output); rows sum to 1.
+
+    So a neutral stays neutral. The last coefficient is 1 minus the others: differences from the last one are fitted.
+    """
+    free, *_ = np.linalg.lstsq(signals[:, :-1] - signals[:, -1:], target - signals[:, -1:], rcond=None)
+    return np.concatenate([free, 1.0 - free.sum(axis=0, keepdims=True)]).T
+
+
+def training(
+    responses: ArrayLike,
+    wavelength_nm: ArrayLike,
+    illuminant_spd: ArrayLike,
+    reflectances: ArrayLike,
+    width_nm: ArrayLike | None = None,
+) -> tuple[Floats, Floats]:
+    """Balanced signals (patch, channel) and linear sRGB (patch, 3) of training surfaces; as `fit_matrix` takes them."""
+    nm = np.asarray(wavelength_nm, dtype=np.float64)
+    width = band_widths(nm, width_nm)
+    camera, surfaces = _band_last("responses", responses, nm.size), _band_last("reflectances", reflectances, nm.size)
+    light = _band_last("illuminant_spd", illuminant_spd, nm.size)[0]
+    if surfaces.shape[0] < camera.shape[0]:
+        raise InputError(f"reflectances: {surfaces.shape[0]} surfaces can't fit {camera.shape[0]} channels; give more")
+    photons = light * photons_per_joule(nm) * width
+    signals = (surfaces * photons) @ camera.T / (photons @ camera.T)
+    white = tristimulus(light, nm, width)
+    return signals, xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light, nm, width) / white[1], white))
+
+
+def _band_last(name: str, values: ArrayLike, bands: int) -> Floats:
+    """Two-dimensional array with the band on the last axis, transposed if it came on the first."""
+    array = np.atleast_2d(np.asarray(values, dtype=np.float64))
+    if array.ndim == 2 and array.shape[1] == bands:
+        return array
+    if array.ndim == 2 and array.shape[0] == bands:
+        return array.T
+    raise InputError(
+        f"{name}: shape {array.shape} doesn't fit {bands} wavelengths; give (n, {bands}), one column a band"
+    )
 
 
 def relative_noise(
     raw: RawImage,
     estimate: NDArray[np.floating],
     noise_gain: NDArray[np.floating],
-    gains: NDArray[np.float64],
+    gains: Floats,
     fit: ColourFit,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Noise variance of a frame's balanced channels, as `ColourFit.matrix` takes it.
 
     One number a channel and frame: a matrix per pixel would flicker. Noise at the frame's mean, over the signal of a
@@ -128,11 +235,10 @@ def relative_noise(
     -------
     (channel,) float64
     """
-    letters = channels(raw.cfa)
+    green = channels(raw.cfa).index("G")
     kept = ~raw.saturated if not raw.saturated.all() else np.ones(raw.shape, dtype=bool)
     mean = np.maximum(np.asarray(estimate[kept], dtype=np.float64).mean(axis=0), 0.0)
     variance = (mean + raw.dark_noise_e**2) * np.median(noise_gain[kept], axis=0) * gains**2
-    green = letters.index("G")
-    white = mean[green] * gains[green] / fit.mean[fit.letters.index("G")]
+    white = mean[green] * gains[green] / fit.mean[fit.channels.index("G")]
     # A frame without any signal is all noise: there W alone decides, whatever the ratio.
     return np.asarray(variance / max(white**2, LEAST_SIGNAL**2 * float(variance.max())))

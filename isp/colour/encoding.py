@@ -7,8 +7,13 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import SRGB_PRIMARIES_XY, encode_srgb, rgb_to_xyz
-from render.spectrum import Floats
+from rodcone.colour_spaces import (
+    DISPLAY_P3_PRIMARIES_XY,
+    SRGB_PRIMARIES_XY,
+    SRGB_TO_XYZ,
+    encode_srgb,
+    rgb_to_xyz,
+)
 from rodcone.errors import unknown
 
 
@@ -25,15 +30,11 @@ class Encoding:
     """
 
     title: str
-    primaries_xy: Floats
+    primaries_xy: NDArray[np.float64]
 
 
-# Display P3: primaries of SMPTE EG 432-1 (DCI-P3) with D65 and the curve of sRGB, as CSS Color 4, section 10.4, has it.
 ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
-    {
-        "srgb": Encoding("sRGB", SRGB_PRIMARIES_XY),
-        "display-p3": Encoding("Display P3", np.array([[0.680, 0.320], [0.265, 0.690], [0.150, 0.060]])),
-    }
+    {"srgb": Encoding("sRGB", SRGB_PRIMARIES_XY), "display-p3": Encoding("Display P3", DISPLAY_P3_PRIMARIES_XY)}
 )
 
 
@@ -49,5 +50,5 @@ def encode(linear_srgb: NDArray[np.floating], encoding: str) -> NDArray[np.float
         raise unknown("encoding", encoding, ENCODINGS)
     if encoding == "srgb":
         return encode_srgb(linear_srgb)
-    to_xyz = rgb_to_xyz(SRGB_PRIMARIES_XY)
-    return encode_srgb(linear_srgb @ (np.linalg.inv(rgb_to_xyz(ENCODINGS[encoding].primaries_xy)) @ to_xyz).T)
+    from_srgb = np.linalg.inv(rgb_to_xyz(ENCODINGS[encoding].primaries_xy)) @ SRGB_TO_XYZ
+    return encode_srgb(linear_srgb @ from_srgb.T)

@@ -1,89 +1,124 @@
-"""White balance of a developed frame, and highlights: what every pipeline shares between planes and matrix."""
+"""White balance of a developed frame: Gray World, the calibrated neutral where it is too dark for that, or as given."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import maximum_filter
 
-from isp.colour.camera_colour import Balance, gray_world, neutral_response
+from isp.colour.gray_world import gray_world
+from isp.colour.highlights import saturated_nearby
+from render.illuminants import illuminant
+from render.photometry import photons_per_joule
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from rodcone.errors import InputError
 from sensor.cfa import channels, letter_map
+from sensor.curves import Responses, rgbw
 from sensor.raw import RawImage
 
-Image = NDArray[np.float64]
+BalanceSource = Literal["gray world", "calibrated", "given"]
 
 
-def white_balance(raw: RawImage, planes: Image, neutral: ArrayLike | None, given: ArrayLike | None) -> Balance:
-    """White balance as given, or else by Gray World.
+@dataclass(frozen=True)
+class ChannelGains:
+    """White balance gains of a frame.
 
-    Parameters
+    Attributes
     ----------
-    planes : (h, w, channel) float64
-        The pipeline's own linear planes [e-], channels in the order of `sensor.cfa.channels`.
-    neutral : (channel,) array_like or None
-        Calibrated response to a neutral, for pictures too dark for Gray World; None: the project's curves under D65.
-    given : (channel,) array_like or None
+    factors : (channel,) float64
+        Factor on each channel, in the order of `sensor.cfa.channels`; green's is 1.
+    sources : mapping of str to str
+        Where each channel's factor comes from: ``gray world``, ``calibrated`` where the picture was too dark to tell,
+        or ``given``.
+    """
+
+    factors: Floats
+    sources: Mapping[str, BalanceSource]
+
+
+@dataclass(frozen=True)
+class WhiteBalance:
+    """What a frame is balanced by: the calibrated neutral beside Gray World, or a response in its place.
+
+    Attributes
+    ----------
+    neutral : (channel,) float64 or None
+        Calibrated response to a neutral, in the order of `sensor.cfa.channels`, for pictures too dark for Gray World;
+        None: the project's own curves under D65.
+    given : (channel,) float64 or None
         Response to what shall come out neutral, in place of Gray World's means.
-
-    Raises
-    ------
-    InputError
-        For a response that is not one positive number a channel.
-
-    Notes
-    -----
-    Gray World takes colours over the pixels without a saturated colour sample nearby, W over those it leaves as well.
-    W saturates first; taking its pixels out of the colours' means too would leave them the dark part of the scene.
     """
-    letters = channels(raw.cfa)
-    if given is not None:
-        response = _response("balance", given, letters)
-        return Balance(response[letters.index("G")] / response, tuple("given" for _ in letters))
-    calibrated = neutral_response(letters) if neutral is None else _response("neutral", neutral, letters)
-    colours = ~saturated_nearby(raw, "RGB")
-    balance = _gray_world(raw, planes, calibrated, "RGB", colours)
-    if "W" not in letters:
-        return balance
-    white = _gray_world(raw, planes, calibrated, "GW", colours & ~saturated_nearby(raw, "W"))
-    return Balance(np.append(balance.gains, white.gains[1]), (*balance.sources, white.sources[1]))
+
+    neutral: Floats | None = None
+    given: Floats | None = None
+
+    @classmethod
+    def of(
+        cls, raw: RawImage, neutral: ArrayLike | None, balance: ArrayLike | WhiteBalance | None = None
+    ) -> WhiteBalance:
+        """Make the value from a pipeline's keywords; a `WhiteBalance` as `balance` is taken as it is.
+
+        Raises
+        ------
+        InputError
+            For a response that is not one positive number a channel of the mosaic.
+        """
+        if isinstance(balance, WhiteBalance):
+            return balance
+        return cls(_response("neutral", neutral, raw), _response("balance", balance, raw))
+
+    def gains(self, raw: RawImage, planes: NDArray[np.float64]) -> ChannelGains:
+        """Gains of a frame.
+
+        Parameters
+        ----------
+        planes : (h, w, channel) float64
+            The pipeline's own linear planes [e-], channels in the order of `sensor.cfa.channels`.
+
+        Notes
+        -----
+        Gray World takes colours over the pixels without a saturated colour sample nearby, W over those it leaves as
+        well. W saturates first; taking its pixels out of the colours' means too would leave them the dark part of the
+        scene.
+        """
+        names = channels(raw.cfa)
+        if self.given is not None:
+            return ChannelGains(self.given[names.index("G")] / self.given, dict.fromkeys(names, "given"))
+        neutral = neutral_response(names) if self.neutral is None else self.neutral
+        usable = ~saturated_nearby(raw, "RGB")
+        groups = {"RGB": usable}
+        if "W" in names:  # before the colours, which then say where green's gain comes from
+            groups = {"GW": usable & ~saturated_nearby(raw, "W"), "RGB": usable}
+        sites = letter_map(raw.cfa, raw.shape)
+        factors = np.ones(len(names))
+        sources: dict[str, BalanceSource] = dict.fromkeys(names, "calibrated")
+        for group, pixels in groups.items():
+            index = [names.index(channel) for channel in group]
+            samples = np.array([max((pixels & (sites == channel)).sum(), 1) for channel in group])
+            means = planes[..., index][pixels].mean(axis=0) if pixels.any() else np.zeros(len(group))
+            errors = np.sqrt((np.maximum(means, 0.0) + raw.dark_noise_e**2) / samples)
+            factors[index], certain = gray_world(means, errors, neutral[index], green=group.index("G"))
+            for channel, sure in zip(group, certain, strict=True):
+                sources[channel] = "gray world" if sure else "calibrated"
+        return ChannelGains(factors, sources)
 
 
-def _response(name: str, values: ArrayLike, letters: tuple[str, ...]) -> Image:
+def neutral_response(names: Sequence[str], responses: Responses | None = None) -> Floats:
+    """Relative electrons of curves, the project's own by default, from a neutral under D65, shape (channel,)."""
+    nm = DEFAULT_WAVELENGTH_NM
+    width = band_widths(nm)
+    light = illuminant("D65").band_average(nm, width) * photons_per_joule(nm)
+    return np.asarray((responses or rgbw()).band_average(tuple(names), nm, width) @ light)
+
+
+def _response(name: str, values: ArrayLike | None, raw: RawImage) -> Floats | None:
+    if values is None:
+        return None
     response = np.asarray(values, dtype=np.float64)
-    if response.shape != (len(letters),) or not np.all((response > 0) & np.isfinite(response)):
-        raise InputError(
-            f"{name}: {response.tolist()!r} is not allowed; give a positive response for each of {letters}"
-        )
+    names = channels(raw.cfa)
+    if response.shape != (len(names),) or not np.all((response > 0) & np.isfinite(response)):
+        raise InputError(f"{name}: {response.tolist()!r} is not allowed; give a positive response for each of {names}")
     return response
-
-
-def _gray_world(raw: RawImage, planes: Image, calibrated: Image, letters: str, usable: NDArray[np.bool_]) -> Balance:
-    """Gray World among some of the channels."""
-    index = [channels(raw.cfa).index(letter) for letter in letters]
-    sites = letter_map(raw.cfa, raw.shape)
-    samples = np.array([max((usable & (sites == letter)).sum(), 1) for letter in letters])
-    means = planes[usable].mean(axis=0) if usable.any() else np.zeros(planes.shape[-1])
-    errors = np.sqrt((np.maximum(means[index], 0.0) + raw.dark_noise_e**2) / samples)
-    return gray_world(planes[..., index], usable, errors, calibrated[index], letters.index("G"))
-
-
-def saturated_nearby(raw: RawImage, letters: str, reach: int | None = None) -> NDArray[np.bool_]:
-    """Pixels with a saturated sample of one of `letters` within `reach` pixels along either axis, shape (h, w).
-
-    Left out, the reach is one tile.
-    """
-    hit = raw.saturated & np.isin(letter_map(raw.cfa, raw.shape), list(letters))
-    return np.asarray(maximum_filter(hit, size=2 * (len(raw.cfa) - 1 if reach is None else reach) + 1))
-
-
-def full_e(raw: RawImage) -> float:
-    """Electrons of a full well."""
-    return float((raw.white_dn - raw.black_dn) * raw.gain_e_per_dn)
-
-
-def clip_highlights(raw: RawImage, balanced: Image, reach: int | None = None) -> Image:
-    """Hold every balanced colour at green's full well near a saturated colour sample: highlights stay neutral.
-
-    `reach` as in `saturated_nearby`: that of the filter which made the planes.
-    """
-    clipped = saturated_nearby(raw, "RGB", reach)
-    return np.where(clipped[..., None], np.minimum(balanced, full_e(raw)), balanced)

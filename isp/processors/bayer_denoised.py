@@ -10,14 +10,14 @@ A mosaic becomes four pictures of half the size, one for each site of the tile, 
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from isp.anscombe import unstabilise
+from isp.anscombe import stabilise, unstabilise
+from isp.colour.colour_fit import ColourFit
+from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish
-from isp.planes import Plane, stabilise
-from isp.processors.demosaic import MALVAR_REACH, menon, require_bayer
-from isp.processors.mosaic import as_picture, balance_mosaic, to_rgb
+from isp.planes import Plane
+from isp.processors.demosaic import menon, picture_demosaicked, require_bayer
 from rodcone.optional import optional_library
 from sensor.raw import RawImage
 
@@ -27,35 +27,21 @@ _MIX = np.array([[1, 1, 1, 1], [1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) 
 _SMALLEST = 32  # pixels of a picture of half the size: the library fails on ones not much larger than its 8x8 blocks
 
 
-def picture_bayer_nlm(
-    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
-) -> Picture:
-    """Develop a Bayer raw image with `isp.interleaved.reconstruct`, each colour judged by itself.
+def picture_bayer_nlm(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
+    """Develop a Bayer raw image with `isp.interleaved.reconstruct`, each channel its own guide.
 
-    With a `ColourFit` the colours know their noise, as the interleaved camera's do.
+    The colours know their noise, as the interleaved camera's do.
     """
     require_bayer(raw.cfa)
     result = reconstruct_with_noise(raw)
     planes = np.asarray(result.estimate, dtype=np.float64)
-    return finish(
-        raw,
-        planes,
-        matrix,
-        neutral=neutral,
-        balance=balance,
-        engine=result.engine,
-        noise_gain=result.noise_gain,
-    )
+    return finish(raw, planes, colours, balance=balance, engine=result.engine, noise_gain=result.noise_gain)
 
 
-def picture_bayer_bm3d(
-    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
-) -> Picture:
+def picture_bayer_bm3d(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop a Bayer raw image with BM3D on the mosaic, then Menon's demosaicking."""
     require_bayer(raw.cfa)
-    mosaic = balance_mosaic(raw, bm3d_mosaic(raw), neutral, balance)
-    rgb = to_rgb(raw, menon(mosaic.values, raw.cfa), matrix, MALVAR_REACH)
-    return as_picture(raw, rgb, mosaic.balance)
+    return picture_demosaicked(raw, colours, balance=balance, demosaic=menon, electrons=bm3d_mosaic(raw))
 
 
 def bm3d_mosaic(raw: RawImage) -> Plane:

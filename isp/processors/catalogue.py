@@ -1,28 +1,28 @@
 """Every way to make a picture from a raw file, by name: the interleaved camera and its opponents."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import wraps
+from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any
 
 from numpy.typing import ArrayLike
 
+from isp.colour.colour_fit import ColourFit
+from isp.colour.white_balance import WhiteBalance
 from isp.defects import mend
 from isp.picture import Picture
 from isp.pipeline import picture_bayer, picture_interleaved
 from isp.processors.bayer_denoised import EXTRA as BM3D
 from isp.processors.bayer_denoised import picture_bayer_bm3d, picture_bayer_nlm
-from isp.processors.complementary import picture_complementary
 from isp.processors.demosaic import EXTRA as DEMOSAICKING
-from isp.processors.demosaic import picture_malvar, picture_menon
-from isp.processors.fusion import picture_kijima, picture_sato, picture_yamagami
+from isp.processors.demosaic import malvar, menon, picture_demosaicked
+from isp.processors.fusion import picture_complementary, picture_kijima, picture_sato, picture_yamagami
 from isp.processors.gindele import picture_gindele
 from rodcone.errors import InputError
 from sensor.raw import RawImage
 
-Develop = Callable[..., Picture]
 _LIBRARIES = {DEMOSAICKING: ("colour_demosaicing",), BM3D: ("bm3d", "colour_demosaicing")}  # what an extra brings
 
 
@@ -34,63 +34,76 @@ class Processor:
     ----------
     mosaic : str
         Name that `sensor.variations.vary` takes: one of `sensor.cfa.MOSAICS`, or a variation with curves of its own.
-    develop : callable
-        ``develop(raw, matrix, *, neutral=None, balance=None) -> Picture``, as `isp.pipeline.picture_bayer`.
+    picture : callable
+        ``picture(raw, colours, *, balance) -> Picture`` with a `ColourFit` and a `WhiteBalance`; `develop` calls it.
     source : str
         Where it is published.
     extra : str or None
         What ``pip install rodcone[...]`` has to bring; None: nothing.
     colours : tuple of str
-        Letters whose balanced planes `matrix` takes to linear sRGB.
+        Channels whose balanced planes the matrix takes to linear sRGB.
     unit : str
-        Letter whose electrons a neutral reads in the developed picture.
+        Channel whose electrons a neutral reads in the developed picture.
     on_backend : bool
         Whether it runs in Dr.Jit where there is a backend; NumPy else.
     """
 
     mosaic: str
-    develop: Develop
+    picture: Callable[..., Picture]
     source: str
     extra: str | None = None
     colours: tuple[str, ...] = ("R", "G", "B")
     unit: str = "G"
     on_backend: bool = False
 
+    def develop(
+        self,
+        raw: RawImage,
+        matrix: ArrayLike | ColourFit,
+        *,
+        neutral: ArrayLike | None = None,
+        balance: ArrayLike | None = None,
+        **options: Any,
+    ) -> Picture:
+        """Develop a raw image; no processor sees defective pixels: they are replaced first.
 
-def _mended(develop: Develop) -> Develop:
-    """Develop with the defective pixels replaced first: no way of developing should see them."""
+        Parameters
+        ----------
+        raw, neutral, balance
+            As `isp.pipeline.picture_interleaved`.
+        matrix : (3, 3) array_like or ColourFit
+            From the balanced channels `colours` to linear sRGB.
+        **options
+            The processor's own, such as `substitution_snr`.
+        """
+        raw = mend(raw)
+        white_balance = WhiteBalance.of(raw, neutral, balance)
+        return self.picture(raw, ColourFit.of(matrix), balance=white_balance, **options)
 
-    @wraps(develop)
-    def mend_and_develop(raw: RawImage, matrix: ArrayLike, **options: Any) -> Picture:
-        return develop(mend(raw), matrix, **options)
 
-    return mend_and_develop
-
-
-def _processors() -> dict[str, Processor]:
-    """Every processor; the first two are the paper's."""
-    early = "W as luminance by early fusion"
-    processors = {
+_MALVAR = partial(picture_demosaicked, demosaic=malvar)
+_MENON = partial(picture_demosaicked, demosaic=menon)
+_EARLY = "W as luminance by early fusion"
+# The first two are the paper's.
+PROCESSORS: Mapping[str, Processor] = MappingProxyType(
+    {
         "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)", on_backend=True),
         "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
-        "bayer_malvar": Processor("bayer", picture_malvar, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
-        "bayer_menon": Processor("bayer", picture_menon, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
+        "bayer_malvar": Processor("bayer", _MALVAR, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
+        "bayer_menon": Processor("bayer", _MENON, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
         "bayer_nlm": Processor(
             "bayer", picture_bayer_nlm, "the interleaved camera's non-local means on Bayer", on_backend=True
         ),
         "bayer_bm3d": Processor("bayer", picture_bayer_bm3d, "BM3D, Dabov et al. 2007, then Menon", extra=BM3D),
-        "rgbw_sato": Processor("rgbw", picture_sato, f"{early}: Sato 1983"),
-        "rgbw_kijima": Processor("rgbw", picture_kijima, f"{early}: Kijima 2007"),
+        "rgbw_sato": Processor("rgbw", picture_sato, f"{_EARLY}: Sato 1983"),
+        "rgbw_kijima": Processor("rgbw", picture_kijima, f"{_EARLY}: Kijima 2007"),
         "rgbw_yamagami": Processor("rgbw_nd", picture_yamagami, "neutral density on W: Yamagami 1994"),
         "cmyw_yamagami": Processor(
             "cmyw", picture_complementary, "complementary colours: Yamagami 1994", colours=("C", "Y", "M"), unit="Y"
         ),
         "rgbw_gindele": Processor("rgbw", picture_gindele, "colours alone where W is full: Gindele & Gallagher 2002"),
     }
-    return {name: replace(one, develop=_mended(one.develop)) for name, one in processors.items()}
-
-
-PROCESSORS: Mapping[str, Processor] = MappingProxyType(_processors())
+)
 
 
 def libraries(name: str) -> tuple[str, ...]:

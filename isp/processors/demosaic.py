@@ -10,12 +10,15 @@ pixels, which keeps the phase of the tile. The library's own border repeats the 
 where another belongs.
 """
 
-import numpy as np
-from numpy.typing import ArrayLike
+from collections.abc import Callable
 
+import numpy as np
+
+from isp.colour.colour_fit import ColourFit
+from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
 from isp.planes import Plane
-from isp.processors.mosaic import Image, as_picture, balance_mosaic, to_rgb
+from isp.processors.mosaic import Image, balance_mosaic, to_rgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
 from sensor.cfa import Tile
@@ -49,24 +52,18 @@ def menon(mosaic: Plane, cfa: Tile) -> Image:
     return _demosaic("demosaicing_CFA_Bayer_Menon2007", mosaic, cfa, MENON_REACH)
 
 
-def picture_malvar(
-    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
+def picture_demosaicked(
+    raw: RawImage,
+    colours: ColourFit,
+    *,
+    balance: WhiteBalance,
+    demosaic: Callable[[Plane, Tile], Image],
+    electrons: Plane | None = None,
 ) -> Picture:
-    """Develop a Bayer raw image with Malvar's demosaicking; parameters as `isp.pipeline.develop_bayer`."""
+    """Develop a Bayer raw image with `malvar` or `menon`: its mosaic, or a denoised one [e-], is balanced first."""
     require_bayer(raw.cfa)
-    mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
-    rgb = to_rgb(raw, malvar(mosaic.values, raw.cfa), matrix, MALVAR_REACH)
-    return as_picture(raw, rgb, mosaic.balance)
-
-
-def picture_menon(
-    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
-) -> Picture:
-    """Develop a Bayer raw image with Menon's demosaicking; parameters as `isp.pipeline.develop_bayer`."""
-    require_bayer(raw.cfa)
-    mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
-    rgb = to_rgb(raw, menon(mosaic.values, raw.cfa), matrix, MALVAR_REACH)
-    return as_picture(raw, rgb, mosaic.balance)
+    mosaic, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
+    return Picture(to_rgb(raw, demosaic(mosaic, raw.cfa), colours, MALVAR_REACH), sources)
 
 
 def require_bayer(cfa: Tile) -> None:

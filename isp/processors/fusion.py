@@ -6,7 +6,7 @@ the other elements.
 
 Yamagami: T. Yamagami et al., 1994, as Parmar & Wandell 2009 cite it (US patent 5 323 233 to our knowledge; its text
 could not be consulted). Taken from their account: luminance and colour differences, with the sensitivities matched by a
-neutral density in front of W or by complementary filters (`sensor.filters`), so that W doesn't saturate first.
+neutral density in front of W or by complementary filters (`sensor.curves`), so that W doesn't saturate first.
 
 Kijima: T. Kijima et al., "Image sensor with improved light sensitivity", US patent application 11/341 210, 2006
 (published 2007). Taken: a picture of W in full resolution and one of the colours in less, colour samples of one kind
@@ -16,67 +16,84 @@ Ours in all of them: white balance before, interpolation by normalised convoluti
 what happens to highlights. None of the three has an answer to a saturated W: luminance ends where W's well does.
 """
 
+from dataclasses import replace
+
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
-from isp.colour.camera_colour import luminance_of_srgb, neutral_response
-from isp.colour.white_balance import saturated_nearby
+from isp.bilinear import fill_channels
+from isp.colour.colour_fit import ColourFit
+from isp.colour.highlights import saturated_nearby
+from isp.colour.white_balance import WhiteBalance, neutral_response
 from isp.picture import Picture, require_letters
 from isp.planes import Plane, fill, tent
-from isp.processors.mosaic import Image, as_picture, balance_mosaic, to_rgb
-from sensor.cfa import Tile, mask
-from sensor.curves import rgbw
-from sensor.filters import matched_transmittance
+from isp.processors.mosaic import Image, balance_mosaic, to_rgb
+from rodcone.colour_spaces import luminance_of_srgb
+from rodcone.errors import InputError
+from sensor.cfa import Tile, channels, mask
+from sensor.curves import complementary, matched_transmittance, rgbw
 from sensor.raw import RawImage
 
 # A tent of 7 over samples 2 apart averages like (8^2 / 24)^2 = 7.1 of them: W gathers 6 to 10 times a colour's light.
 MATCHED_RADIUS = 3
-LETTERS = ("R", "G", "B", "W")
+CHANNELS = ("R", "G", "B", "W")
+# Channels that stand for the complementary ones: yellow, the brightest, for green, the unit of the picture.
+_STANDS_FOR = {"C": "R", "Y": "G", "M": "B", "W": "W"}
 
 
-def picture_sato(
-    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
-) -> Picture:
-    """Develop an RGBW raw image with W as the luminance of bilinear colours; parameters as `develop_interleaved`."""
-    require_letters(raw, LETTERS)
-    mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
-    colours = np.stack([fill(mosaic.values, raw.cfa, letter) for letter in "RGB"], axis=-1)
-    rgb = _fused(raw, to_rgb(raw, colours, matrix, 1), fill(mosaic.values, raw.cfa, "W"))
-    return as_picture(raw, rgb, mosaic.balance)
+def picture_sato(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
+    """Develop an RGBW raw image with W as the luminance of bilinear colours."""
+    require_letters(raw, CHANNELS)
+    mosaic, sources = balance_mosaic(raw, raw.electrons, balance)
+    rgb = to_rgb(raw, fill_channels(mosaic, raw.cfa, "RGB"), colours, 1)
+    return Picture(_fused(raw, rgb, fill(mosaic, raw.cfa, "W")), sources)
 
 
-def picture_yamagami(
-    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
-) -> Picture:
+def picture_yamagami(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop an RGBW raw image whose W is behind a neutral density: W's luminance, low-passed colour differences.
 
-    Parameters as `isp.pipeline.develop_interleaved`; the default `neutral` knows the density of `sensor.filters`.
+    The default neutral knows the density of `sensor.curves`.
     """
-    require_letters(raw, LETTERS)
-    if neutral is None:
-        neutral = neutral_response(LETTERS) * np.array([1.0, 1.0, 1.0, matched_transmittance(rgbw())])
-    mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
-    colours = np.stack([combine(mosaic.values, raw.cfa, letter) for letter in "RGB"], axis=-1)
-    rgb = _fused(raw, to_rgb(raw, colours, matrix, MATCHED_RADIUS), fill(mosaic.values, raw.cfa, "W"))
-    return as_picture(raw, rgb, mosaic.balance)
+    require_letters(raw, CHANNELS)
+    if balance.neutral is None:
+        behind_density = np.array([1.0, 1.0, 1.0, matched_transmittance(rgbw())])
+        balance = replace(balance, neutral=neutral_response(CHANNELS) * behind_density)
+    mosaic, sources = balance_mosaic(raw, raw.electrons, balance)
+    planes = np.stack([combine(mosaic, raw.cfa, channel) for channel in "RGB"], axis=-1)
+    rgb = to_rgb(raw, planes, colours, MATCHED_RADIUS)
+    return Picture(_fused(raw, rgb, fill(mosaic, raw.cfa, "W")), sources)
 
 
-def picture_kijima(
-    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
-) -> Picture:
+def picture_complementary(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
+    """Develop a CMYW raw image as `picture_yamagami`: W's luminance, differences of the complementary colours.
+
+    `colours` takes balanced C, Y, M, in this order, to linear sRGB. A neutral reads the electrons of a yellow pixel.
+    """
+    names = channels(raw.cfa)
+    if set(names) != set(_STANDS_FOR):
+        raise InputError(f"raw: mosaic {raw.cfa} is not C, M, Y and W; allowed here: these four; use another isp")
+    tile = tuple("".join(_STANDS_FOR[channel] for channel in row) for row in raw.cfa)
+    true = {stand_in: channel for channel, stand_in in _STANDS_FOR.items()}
+    order = [names.index(true[stand_in]) for stand_in in channels(tile)]
+    neutral = neutral_response(names, complementary(rgbw())) if balance.neutral is None else balance.neutral
+    reordered = WhiteBalance(neutral[order], None if balance.given is None else balance.given[order])
+    picture = picture_yamagami(replace(raw, cfa=tile, colour=None), colours, balance=reordered)
+    return replace(picture, balance={true[stand_in]: source for stand_in, source in picture.balance.items()})
+
+
+def picture_kijima(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop an RGBW raw image by early fusion: combined differences of each colour from W, added to W."""
-    require_letters(raw, LETTERS)
-    mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
-    white = fill(mosaic.values, raw.cfa, "W")
-    differences = mosaic.values - white
-    colours = [white + combine(differences, raw.cfa, letter) for letter in "RGB"]
-    rgb = to_rgb(raw, np.stack(colours, axis=-1), matrix, MATCHED_RADIUS)
-    return as_picture(raw, rgb, mosaic.balance)
+    require_letters(raw, CHANNELS)
+    mosaic, sources = balance_mosaic(raw, raw.electrons, balance)
+    white = fill(mosaic, raw.cfa, "W")
+    differences = mosaic - white
+    planes = np.stack([white + combine(differences, raw.cfa, channel) for channel in "RGB"], axis=-1)
+    return Picture(to_rgb(raw, planes, colours, MATCHED_RADIUS), sources)
 
 
-def combine(values: Plane, cfa: Tile, letter: str, radius: int = MATCHED_RADIUS) -> Plane:
-    """Plane of tent-weighted means of one letter's samples, at its own sites too, shape (h, w).
+def combine(values: Plane, cfa: Tile, channel: str, radius: int = MATCHED_RADIUS) -> Plane:
+    """Plane of tent-weighted means of one channel's samples, at its own sites too, shape (h, w).
 
     Parameters
     ----------
@@ -85,8 +102,9 @@ def combine(values: Plane, cfa: Tile, letter: str, radius: int = MATCHED_RADIUS)
     radius : int
         The tent reaches this many pixels; at least one sample has to be in reach everywhere.
     """
-    total: NDArray[np.float64] = np.where(mask(cfa, letter, (values.shape[0], values.shape[1])), values, 0.0)
-    weight = mask(cfa, letter, (values.shape[0], values.shape[1])).astype(np.float64)
+    sampled = mask(cfa, channel, (values.shape[0], values.shape[1]))
+    total: NDArray[np.float64] = np.where(sampled, values, 0.0)
+    weight = sampled.astype(np.float64)
     for axis in (0, 1):
         total = convolve1d(total, tent(radius), axis, mode="constant")
         weight = convolve1d(weight, tent(radius), axis, mode="constant")

@@ -12,13 +12,15 @@ interpolation by normalised convolution as the second.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from isp.colour.white_balance import saturated_nearby
+from isp.bilinear import fill_channels
+from isp.colour.colour_fit import ColourFit
+from isp.colour.highlights import saturated_nearby
+from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture, require_letters
-from isp.planes import Plane, fill
-from isp.processors.fusion import LETTERS
-from isp.processors.mosaic import Image, as_picture, balance_mosaic, to_rgb
+from isp.planes import Plane
+from isp.processors.fusion import CHANNELS
+from isp.processors.mosaic import Image, balance_mosaic, to_rgb
 from rodcone.errors import InputError
 from sensor.cfa import Tile, mask
 from sensor.raw import RawImage
@@ -30,15 +32,13 @@ _DIAGONALS = ((1, 1), (1, -1))
 _AXES = ((0, 1), (1, 0))
 
 
-def picture_gindele(
-    raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
-) -> Picture:
-    """Develop a 2x2 RGBW raw image; parameters as `isp.pipeline.develop_interleaved`."""
-    require_letters(raw, LETTERS)
-    mosaic = balance_mosaic(raw, raw.electrons, neutral, balance)
+def picture_gindele(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
+    """Develop a 2x2 RGBW raw image."""
+    require_letters(raw, CHANNELS)
+    mosaic, sources = balance_mosaic(raw, raw.electrons, balance)
     clipped = saturated_nearby(raw, "W", REACH)[..., None]
-    planes = np.where(clipped, _alone(mosaic.values, raw.cfa), adams_planes(mosaic.values, raw.cfa))
-    return as_picture(raw, to_rgb(raw, planes, matrix, REACH), mosaic.balance)
+    planes = np.where(clipped, fill_channels(mosaic, raw.cfa, "RGB"), adams_planes(mosaic, raw.cfa))
+    return Picture(to_rgb(raw, planes, colours, REACH), sources)
 
 
 def adams_planes(mosaic: Plane, cfa: Tile) -> Image:
@@ -50,7 +50,7 @@ def adams_planes(mosaic: Plane, cfa: Tile) -> Image:
         Where the tile isn't 2x2 with R, G, B and W once each.
     """
     white = luminance_plane(mosaic, cfa)
-    return np.stack([white + fill(mosaic - white, cfa, letter) for letter in "RGB"], axis=-1)
+    return white[..., None] + fill_channels(mosaic - white, cfa, "RGB")
 
 
 def luminance_plane(mosaic: Plane, cfa: Tile) -> Plane:
@@ -80,8 +80,3 @@ def _along_smaller_gradient(white: Plane, own: Plane, directions: tuple[tuple[in
     first, second = estimates
     smaller = np.where(classifiers[0] < classifiers[1], first, second)
     return np.where(classifiers[0] == classifiers[1], (first + second) / 2, smaller)
-
-
-def _alone(mosaic: Plane, cfa: Tile) -> Image:
-    """Second interpolation: each colour from its own samples."""
-    return np.stack([fill(mosaic, cfa, letter) for letter in "RGB"], axis=-1)

@@ -1,4 +1,4 @@
-"""What an EMVA 1288 laboratory reports of a chip, beside what was configured."""
+"""What an EMVA 1288 laboratory reports of a chip, beside the configured values."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +17,8 @@ LEAST_VARIANCE_DN2 = 0.24
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What to expose: levels of light [e-], their exposure time, frames of a stack, times of the dark series [s]."""
+class ExposurePlan:
+    """What to expose: levels of light [e-], exposure time [s], frames of a stack, times of the dark series [s]."""
 
     light_e: Floats
     exposure_s: float
@@ -27,10 +27,10 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Figure:
-    """One result: its name and unit, what was configured, what was measured, and the measurement's standard error.
+class FigureOfMerit:
+    """One result: name, unit, configured and measured value, and the measurement's standard error.
 
-    An error of 0 marks what is no estimate of a configured number, but derived from others.
+    The error is 0 for a figure that is derived from others.
     """
 
     name: str
@@ -46,17 +46,17 @@ class Characterisation:
 
     Attributes
     ----------
-    figures : tuple of Figure
+    figures : tuple of FigureOfMerit
     transfer : Transfer
     dark_mean_dn, dark_variance_dn2, gain_dn_per_e, saturation_e : float
         What the photon-transfer line rests on.
     linearity_share : (level,) float64
         Relative deviation of the mean from the fitted line; NaN beyond 5-95 % of saturation.
     notes : tuple of str
-        What a reader has to know about the figures.
+        How to read the figures.
     """
 
-    figures: tuple[Figure, ...]
+    figures: tuple[FigureOfMerit, ...]
     transfer: Transfer
     dark_mean_dn: float
     dark_variance_dn2: float
@@ -71,7 +71,7 @@ class Characterisation:
         noise = np.sqrt(np.where(self.transfer.variance_dn2 > 0, self.transfer.variance_dn2, np.nan))
         return np.asarray((self.transfer.mean_dn - self.dark_mean_dn) / noise)
 
-    def figure(self, name: str) -> Figure:
+    def figure(self, name: str) -> FigureOfMerit:
         """Result by name."""
         return next(figure for figure in self.figures if figure.name == name)
 
@@ -98,7 +98,7 @@ def characterise(
     return replace(result, notes=(*result.notes, f"frames were drawn by {engine(exact)}"))
 
 
-def plan_for(sensor: SensorConfig, exposure_s: float = 0.01, levels: int = 55, frames: int = 32) -> Plan:
+def plan_for(sensor: SensorConfig, exposure_s: float = 0.01, levels: int = 55, frames: int = 32) -> ExposurePlan:
     """Even levels up to 1.1 times the well and a few dim ones; dark times that fill the quickest pixels to a third."""
     pixel = sensor.pixel
     current = pixel.dark_current_e_per_s + pixel.hot_pixel_dark_current_e_per_s
@@ -106,10 +106,10 @@ def plan_for(sensor: SensorConfig, exposure_s: float = 0.01, levels: int = 55, f
     even = np.linspace(0, 1.1 * pixel.full_well_e, levels + 1)[1:]
     dim = np.geomspace(1e-4 * pixel.full_well_e, even[0], 8)[:-1]  # too dim to weigh in a fit: the plot's foot
     light_e = np.concatenate([dim, even])
-    return Plan(light_e, exposure_s, frames, tuple(np.linspace(0, longest_s, 6)))
+    return ExposurePlan(light_e, exposure_s, frames, tuple(np.linspace(0, longest_s, 6)))
 
 
-def measure(expose: Expose, plan: Plan, sensor: SensorConfig) -> Characterisation:
+def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Characterisation:
     """Run the procedure on any chip; `sensor` gives the well to aim at and the values to compare with."""
     dark = take_stack(expose, 0.0, plan.exposure_s, plan.frames)
     bright = take_stack(expose, 0.5 * sensor.pixel.full_well_e, plan.exposure_s, plan.frames)
@@ -124,53 +124,40 @@ def measure(expose: Expose, plan: Plan, sensor: SensorConfig) -> Characterisatio
     current, hot_share, hot_current = emva.dark_current(slopes, gain)
     column_gain = emva.column_gain(dark, bright)
     dark_e = plan.exposure_s * (current[0] + hot_share[0] * hot_current[0])
-    threshold_e = (
-        sqrt(max(dark.variance_dn2, 0.0)) / gain[0] + 0.5
-    )  # light that equals the noise, in the standard's form
-    measured = {
-        "gain": gain,
-        "dark noise": emva.dark_noise(dark, gain),
-        "DSNU": emva.dsnu(dark, gain),
-        "PRNU": emva.prnu(dark, bright),
-        "column offsets": emva.column_offset(dark, gain),
-        "column gains": column_gain,
-        "dark current": current,
-        "hot pixels": hot_share,
-        "their dark current": hot_current,
-        "full well": emva.well(full, dark, gain, column_gain[0], dark_e),
-        "saturation": (saturation_e, 0.0),
-        "threshold": (threshold_e, 0.0),
-        "dynamic range": (_decibels(saturation_e / threshold_e), 0.0),
-        "greatest SNR": (_decibels(sqrt(saturation_e)), 0.0),
-        "linearity error": (linear_error, 0.0),
-    }
-    truth = configured(sensor, plan.exposure_s)
-    figures = tuple(Figure(name, UNITS[name], truth[name], *measured[name]) for name in UNITS)
-    notes = _notes(dark.variance_dn2, gain[0])
-    return Characterisation(figures, transfer, dark_mean_dn, dark.variance_dn2, gain[0], saturation_e, linear, notes)
-
-
-UNITS = {
-    "gain": "DN/e-",
-    "dark noise": "e-",
-    "DSNU": "e-",
-    "PRNU": "1",
-    "column offsets": "e-",
-    "column gains": "1",
-    "dark current": "e-/s",
-    "hot pixels": "1",
-    "their dark current": "e-/s",
-    "full well": "e-",
-    "saturation": "e-",
-    "threshold": "e-",
-    "dynamic range": "dB",
-    "greatest SNR": "dB",
-    "linearity error": "1",
-}
+    # Light that equals the noise, in the standard's form.
+    threshold_e = sqrt(max(dark.variance_dn2, 0.0)) / gain[0] + 0.5
+    expected = configured(sensor, plan.exposure_s)
+    estimates = (
+        ("gain", "DN/e-", gain),
+        ("dark noise", "e-", emva.dark_noise(dark, gain)),
+        ("DSNU", "e-", emva.dsnu(dark, gain)),
+        ("PRNU", "1", emva.prnu(dark, bright)),
+        ("column offsets", "e-", emva.column_offset(dark, gain)),
+        ("column gains", "1", column_gain),
+        ("dark current", "e-/s", current),
+        ("hot pixels", "1", hot_share),
+        ("their dark current", "e-/s", hot_current),
+        ("full well", "e-", emva.well(full, dark, gain, column_gain[0], dark_e)),
+        ("saturation", "e-", (saturation_e, 0.0)),
+        ("threshold", "e-", (threshold_e, 0.0)),
+        ("dynamic range", "dB", (_decibels(saturation_e / threshold_e), 0.0)),
+        ("greatest SNR", "dB", (_decibels(sqrt(saturation_e)), 0.0)),
+        ("linearity error", "1", (linear_error, 0.0)),
+    )
+    return Characterisation(
+        figures=tuple(FigureOfMerit(name, unit, expected[name], *estimate) for name, unit, estimate in estimates),
+        transfer=transfer,
+        dark_mean_dn=dark_mean_dn,
+        dark_variance_dn2=dark.variance_dn2,
+        gain_dn_per_e=gain[0],
+        saturation_e=saturation_e,
+        linearity_share=linear,
+        notes=_notes(dark.variance_dn2, gain[0]),
+    )
 
 
 def configured(sensor: SensorConfig, exposure_s: float) -> dict[str, float]:
-    """What each figure would be without a measurement's error; saturation is the well's, where pixels clip at once."""
+    """Each figure without measurement error; saturation is the well's, as if all pixels clipped at once."""
     pixel, share = sensor.pixel, sensor.pixel.hot_pixel_share
     hot_e = pixel.hot_pixel_dark_current_e_per_s * exposure_s
     dark_e = pixel.dark_current_e_per_s * exposure_s + share * hot_e

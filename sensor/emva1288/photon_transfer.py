@@ -11,7 +11,7 @@ from render.spectrum import Floats
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import draw_device
-from sensor.kernel.run import read_frame
+from sensor.kernel.kernel import read_frame
 from sensor.random import draw_key
 from sensor.readout import read_out
 
@@ -20,15 +20,14 @@ Expose: TypeAlias = Callable[[float, float], NDArray[np.uint16]]
 
 
 def engine(exact: bool = False) -> str:
-    """What draws a bench's frames, as `sensor.capture` names it: ``numpy``, ``llvm`` or ``cuda``."""
+    """Engine that draws a bench's frames, as in `RawImage.engine`: ``numpy``, ``llvm`` or ``cuda``."""
     return "numpy" if exact else backend()
 
 
 def bench(sensor: SensorConfig, shape: tuple[int, int], seed: int, exact: bool = False) -> Expose:
-    """Put one chip under even light that is set in electrons, so that the quantum efficiency is 1 by construction.
+    """Put one chip under even light that is set in electrons: the quantum efficiency is 1 by construction.
 
-    Its frames are drawn as `sensor.capture.capture` draws them: by Dr.Jit where it runs, else, and with `exact`, by
-    `read_out`.
+    Frames are drawn as by `sensor.capture.capture`: by Dr.Jit, or with `exact` and where it doesn't run by `read_out`.
     """
     device = draw_device(sensor, shape, np.random.default_rng([seed, 0]))
     rng = np.random.default_rng([seed, 1])

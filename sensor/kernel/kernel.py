@@ -1,17 +1,29 @@
-"""Expected electrons and the readout in Dr.Jit, a pixel a lane: one source for LLVM and CUDA.
+"""Expected electrons and the readout in Dr.Jit, one thread a pixel: one source for LLVM and CUDA.
 
 Every number that changes between calls is an evaluated array of one value or more, so that one compiled kernel serves
-all cameras, keys and frame sizes (of one number of bands and letters). Draws depend on key, row, column and term alone.
+all cameras, keys and frame sizes (of one number of bands and channels). Draws depend on key, row, column and term
+alone.
 """
 
 from dataclasses import dataclass
 from math import pi
 from typing import Any
 
-from rodcone.jit import arrays, dr
-from sensor.kernel.poisson import poisson
-from sensor.random import MULTIPLIERS, ROUNDS, WEYL, Term
+import numpy as np
+from numpy.typing import NDArray
 
+from rodcone.jit import arrays, dr
+from sensor.cfa import channels, check_covers, letter_map
+from sensor.config import SensorConfig
+from sensor.device import Device
+from sensor.kernel.poisson import alias_table, poisson
+from sensor.random import MULTIPLIERS, ROUNDS, WEYL, NoiseTerm
+from sensor.readout import spread_charge
+
+BANDS_AT_ONCE = 8  # a CPU reads ahead in some dozen places; 40 at once take a third longer, and fight for its cache
+LARGEST = np.finfo(np.float32).max
+ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel, and a slower one, for memory that isn't aligned
+COPY_UNDER = 1 << 20  # bytes; large memory of NumPy's lies alike, which makes one more kernel and not one a pattern
 _FINITE_E = 1e30  # over any well; times any response in single precision's range
 
 
@@ -23,65 +35,66 @@ class Divisor:
     inverse: Any
 
 
-@dataclass(frozen=True)
-class Frame:
-    """Where the lanes' pixels lie.
+# Expected electrons
 
-    Attributes
+
+def expected_electrons_single(
+    values: NDArray[np.floating],
+    weights: NDArray[np.float64],
+    sensor: SensorConfig,
+    first_row: int = 0,
+) -> NDArray[np.float32]:
+    """Expected photo-electrons behind each pixel's own filter, in single precision.
+
+    Parameters
     ----------
-    first : UInt
-        Number of the first pixel, counted row by row from the frame's corner.
-    width : Divisor
-        Columns of the frame.
+    values : (h, w, band) floating
+        Irradiance, or radiance where the weights hold the lens; not copied if it is float32 and band-planar.
+    weights : (channel, band) float64
+        Electrons per unit of `values`, as `sensor.response.electrons_per_irradiance` gives them.
+    sensor : SensorConfig
+    first_row : int
+        Row of the frame that `values` starts with.
+
+    Returns
+    -------
+    (h, w) float32
+        May be infinite where single precision ends, at 3e38.
+
+    Raises
+    ------
+    InputError
+        For a frame smaller than the mosaic's tile.
     """
-
-    first: Any
-    width: Divisor
-
-
-@dataclass(frozen=True)
-class Chip:
-    """What reading needs to know of camera, chip and exposure.
-
-    Attributes
-    ----------
-    key : pair of UInt
-        Lower and upper half.
-    photo_response, dark_offset_e : Float64
-        A value a pixel.
-    column_gain : Float64 or None
-        A value a column, None where all are 1.
-    dark_e : Float
-        Expected dark electrons: one value, or one a pixel.
-    most_e, full_well_e : Float
-        Bound of the mean, and the well.
-    read_noise_e, gain_e_per_dn, black_dn, white_dn : Float64
-    table : UInt
-        `sensor.kernel.poisson.alias_table`, flat.
-    """
-
-    key: tuple[Any, Any]
-    photo_response: Any
-    dark_offset_e: Any
-    column_gain: Any
-    dark_e: Any
-    most_e: Any
-    full_well_e: Any
-    read_noise_e: Any
-    gain_e_per_dn: Any
-    black_dn: Any
-    white_dn: Any
-    table: Any
+    jit = arrays()
+    height, width, bands = values.shape
+    check_covers(sensor.cfa, (height, width))
+    planes = _single(np.moveaxis(values, -1, 0).reshape(bands, -1))
+    scalars = [[dr.opaque(jit.Float, float(weight)) for weight in row] for row in weights]
+    tile = letter_map(sensor.cfa, (len(sensor.cfa), len(sensor.cfa[0])))
+    tile_channels = _upload(np.vectorize(channels(sensor.cfa).index)(tile).astype(np.uint32), jit.UInt)
+    tile_height, tile_width = _divisor(tile.shape[0]), _divisor(tile.shape[1])
+    result = np.empty(planes.shape[1], dtype=np.float32)
+    for start, piece in _pieces(planes):
+        pixel = dr.arange(jit.UInt, piece.shape[1]) + dr.opaque(jit.UInt, first_row * width + start)
+        row, column = position(pixel, _divisor(width))
+        channel = tile_channel(tile_channels, tile_height, tile_width, row, column)
+        electrons = dr.zeros(jit.Float, piece.shape[1])
+        for first in range(0, bands, BANDS_AT_ONCE):
+            some = np.s_[first : first + BANDS_AT_ONCE]
+            electrons += weighted_sum([jit.Float(plane) for plane in piece[some]], [r[some] for r in scalars], channel)
+            dr.eval(electrons, channel)
+        result[start : start + piece.shape[1]] = electrons.numpy()
+    return result.reshape(height, width)
 
 
-def letter_lanes(cells: Any, height: Divisor, width: Divisor, frame: Frame, count: int) -> Any:
-    """Number of each pixel's letter, UInt: `cells` holds those of the tile's `height` x `width` cells."""
-    row, column = _place(frame, count)
+def tile_channel(tile_channels: Any, height: Divisor, width: Divisor, row: Any, column: Any) -> Any:
+    """Number of each pixel's channel, UInt; `tile_channels` holds those of the tile's `height` x `width` pixels."""
     cell = _modulo(row, height) * width.number + _modulo(column, width)
-    return dr.gather(arrays().UInt, cells, cell)
+    return dr.gather(arrays().UInt, tile_channels, cell)
 
 
-def expected_lanes(planes: list[Any], weights: list[list[Any]], letter: Any) -> Any:
+def weighted_sum(planes: list[Any], weights: list[list[Any]], channel: Any) -> Any:
     """Sum over bands behind each pixel's own filter.
 
     Parameters
@@ -89,32 +102,73 @@ def expected_lanes(planes: list[Any], weights: list[list[Any]], letter: Any) -> 
     planes : list of Float
         Each band's pixels.
     weights : list of lists of Float
-        One value for each letter and band.
-    letter : UInt
-        As `letter_lanes` gives it.
+        One value for each channel and band.
+    channel : UInt
+        As `tile_channel` gives it.
     """
-    # All letters are summed, then one is chosen: the bands' memory takes longer than the arithmetic.
-    chosen = _weighted_sum(planes, weights[0])
-    for number, own in enumerate(weights[1:], 1):
-        chosen = dr.select(letter == number, _weighted_sum(planes, own), chosen)
+    # The sums of all channels are taken, then one is chosen: reading the bands takes longer than the arithmetic.
+    sums = []
+    for row in weights:
+        total = planes[0] * row[0]
+        for plane, weight in zip(planes[1:], row[1:], strict=True):
+            total = dr.fma(plane, weight, total)
+        sums.append(total)
+    chosen = sums[0]
+    for number, total in enumerate(sums[1:], 1):
+        chosen = dr.select(channel == number, total, chosen)
     return chosen
 
 
-def read_lanes(expected_e: Any, chip: Chip, frame: Frame) -> Any:
-    """DN of each pixel, Int: the order of `sensor.readout.read_out`."""
-    jit = arrays()
-    row, column = _place(frame, len(expected_e))
-    words = philox((column, row, jit.UInt(int(Term.EXPOSURE)), jit.UInt(0)), chip.key)
+def _pieces(planes: NDArray[np.float32]) -> list[tuple[int, NDArray[np.float32]]]:
+    """First pixel and aligned band planes of the parts that `planes` is read in.
+
+    NumPy's memory starts 16 bytes after a multiple of 64. Read from there, the cache lines that 40 planes share with
+    their neighbours evict each other where planes lie a power of two apart: half the speed. So the first few pixels are
+    copied, and the rest is read in place from the first aligned one on.
+    """
+    skip = (-planes.ctypes.data % ALIGNMENT) // planes.itemsize
+    in_place = planes.strides[0] % ALIGNMENT == 0 and planes.ctypes.data % planes.itemsize == 0
+    if not in_place or skip >= planes.shape[1]:
+        return [(0, _aligned_rows(planes))]
+    head = [(0, _aligned_rows(planes[:, :skip]))] if skip else []
+    return [*head, (skip, planes[:, skip:])]
+
+
+# Readout
+
+
+def read_frame(
+    expected_e: NDArray[np.float32], sensor: SensorConfig, device: Device, exposure_s: float, key: int
+) -> NDArray[np.uint16]:
+    """Digital numbers of one exposure, shape (h, w): what `sensor.readout.read_out` does, with other draws."""
+    jit, pixel = arrays(), sensor.pixel
+    if pixel.crosstalk:
+        expected_e = _single(spread_charge(np.minimum(expected_e, np.float64(LARGEST)), pixel.crosstalk))
+    row, column = position(dr.arange(jit.UInt, expected_e.size), _divisor(expected_e.shape[1]))
+    halves = dr.opaque(jit.UInt, key & 0xFFFFFFFF), dr.opaque(jit.UInt, key >> 32)
+    words = philox((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), jit.UInt(0)), halves)
     shot, read = normal_pair(words[0], words[1])
-    finite_e = dr.minimum(expected_e, _FINITE_E)  # an infinite sum times a pixel that doesn't answer is no number
-    mean_e = dr.fma(finite_e, jit.Float(chip.photo_response), chip.dark_e)
-    collected_e = poisson(dr.minimum(mean_e, chip.most_e), shot, words[2:], chip.table)
-    read_e = jit.Float64(dr.minimum(collected_e, chip.full_well_e))
-    if chip.column_gain is not None:
-        read_e *= dr.gather(jit.Float64, chip.column_gain, column)
-    read_e += chip.dark_offset_e + chip.read_noise_e * jit.Float64(read)
-    # Double precision here: whole electrons lie on the same DN as in the NumPy form.
-    return jit.Int(dr.clip(dr.round(read_e / chip.gain_e_per_dn + chip.black_dn), 0.0, chip.white_dn))
+
+    # The Poisson mean, PRNU on the light alone. Far above the well the draw is the well with certainty: the bound of
+    # the mean, as in `read_out`. An infinite sum times a response of 0 would be NaN: the bound of the light.
+    dark_e = dr.opaque(jit.Float, pixel.dark_current_e_per_s * exposure_s)
+    if device.hot is not None:
+        hot_e = pixel.hot_pixel_dark_current_e_per_s * exposure_s
+        dark_e = dark_e + _upload(np.float32(hot_e) * device.hot, jit.Float)
+    light_e = dr.minimum(_upload(expected_e, jit.Float), _FINITE_E)
+    mean_e = dr.fma(light_e, jit.Float(_upload(device.photo_response, jit.Float64)), dark_e)
+    most_e = dr.opaque(jit.Float, 2 * pixel.full_well_e + 1e4)
+    collected_e = poisson(dr.minimum(mean_e, most_e), shot, words[2:], _upload(alias_table(), jit.UInt))
+
+    # Double precision behind the well: whole electrons lie on the same DN as in the NumPy form.
+    read_e = jit.Float64(dr.minimum(collected_e, dr.opaque(jit.Float, pixel.full_well_e)))
+    if device.column_gain is not None:
+        read_e *= dr.gather(jit.Float64, _upload(device.column_gain, jit.Float64), column)
+    read_noise_e = dr.opaque(jit.Float64, pixel.read_noise_e) * jit.Float64(read)
+    read_e += _upload(device.dark_offset_e, jit.Float64) + read_noise_e
+    dn = read_e / dr.opaque(jit.Float64, sensor.gain_e_per_dn) + dr.opaque(jit.Float64, sensor.black_dn)
+    dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(sensor.white_dn))))
+    return np.asarray(dn.numpy().astype(np.uint16).reshape(expected_e.shape))
 
 
 def philox(counter: tuple[Any, ...], key: tuple[Any, Any]) -> tuple[Any, ...]:
@@ -140,18 +194,18 @@ def normal_pair(first: Any, second: Any) -> tuple[Any, Any]:
     return radius * sine, radius * cosine
 
 
-def _weighted_sum(planes: list[Any], weights: list[Any]) -> Any:
-    total = planes[0] * weights[0]
-    for plane, weight in zip(planes[1:], weights[1:], strict=True):
-        total = dr.fma(plane, weight, total)
-    return total
+# Arrays and whole numbers on the device
 
 
-def _place(frame: Frame, count: int) -> tuple[Any, Any]:
-    """Row and column of each lane's pixel."""
-    index = dr.arange(arrays().UInt, count) + frame.first
-    row = _quotient(index, frame.width)
-    return row, index - row * frame.width.number
+def position(pixel: Any, width: Divisor) -> tuple[Any, Any]:
+    """Row and column of pixels that are numbered row by row from the frame's corner."""
+    row = _quotient(pixel, width)
+    return row, pixel - row * width.number
+
+
+def _divisor(number: int) -> Divisor:
+    jit = arrays()
+    return Divisor(dr.opaque(jit.UInt, number), dr.opaque(jit.Float64, 1 / number))
 
 
 def _quotient(number: Any, divisor: Divisor) -> Any:
@@ -162,3 +216,36 @@ def _quotient(number: Any, divisor: Divisor) -> Any:
 
 def _modulo(number: Any, divisor: Divisor) -> Any:
     return number - _quotient(number, divisor) * divisor.number
+
+
+def _single(values: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Values in single precision, bounded by its largest number."""
+    if values.dtype == np.float32:
+        return values
+    return np.asarray(np.minimum(values, np.float64(LARGEST)), dtype=np.float32)
+
+
+def _aligned_rows(planes: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Copy whose rows all start at a multiple of `ALIGNMENT`."""
+    step = ALIGNMENT // planes.itemsize
+    padded = _aligned_empty((planes.shape[0], -(-planes.shape[1] // step) * step), planes.dtype)
+    copy = padded[:, : planes.shape[1]]
+    copy[:] = planes
+    return copy
+
+
+def _aligned_empty(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+    memory = np.empty(size + ALIGNMENT, dtype=np.uint8)
+    start = -memory.ctypes.data % ALIGNMENT
+    return np.asarray(memory[start : start + size].view(dtype).reshape(shape))
+
+
+def _upload(values: NDArray[Any], kind: Any) -> Any:
+    """Dr.Jit array over the values themselves where they are large or aligned, else over an aligned copy."""
+    flat = values.ravel()
+    if flat.ctypes.data % ALIGNMENT and flat.nbytes < COPY_UNDER:
+        copy = _aligned_empty(flat.shape, flat.dtype)
+        copy[:] = flat
+        flat = copy
+    return kind(flat)

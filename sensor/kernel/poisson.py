@@ -1,8 +1,8 @@
-"""Poisson draws in Dr.Jit, one source for LLVM and CUDA: by table for small means, by quantile for large ones.
+"""Poisson draws in Dr.Jit, one source for LLVM and CUDA: a table for small means, a quantile for large ones.
 
 Under `EXACT_BELOW_E` a draw is the sum of two independent ones that are Poisson themselves: the mean's whole part from
 an alias table (Walker, "An efficient method for generating discrete random variables", ACM TOMS 3, 1977), the rest by
-inversion, term by term in double precision. Only the 32-bit words limit it: `TABLE_ERROR`.
+inversion, term by term in double precision. Its only error is that of 32-bit words: `TABLE_ERROR`.
 
 From there on it is the quantile of a normal draw by the asymptotic series of Giles, "Algorithm 955: approximation of
 the inverse Poisson cumulative distribution function", ACM TOMS 42 (2016), Q_N2. Its largest error is at the foot of its
@@ -40,7 +40,7 @@ def alias_table() -> NDArray[np.uint32]:
 
 
 def _alias(heights: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
-    """Cut columns of mean height 1 into columns of height 1 with two owners each: own share, and the other owner."""
+    """Cut columns of mean height 1 into columns of height 1 that two numbers own: the first's share, and the second."""
     share, other = np.ones(heights.size), np.arange(heights.size, dtype=np.uint32)
     heights = heights.copy()
     low, high = list(np.flatnonzero(heights < 1)), list(np.flatnonzero(heights >= 1))
@@ -54,7 +54,7 @@ def _alias(heights: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
 
 
 def poisson(mean_e: Any, normal: Any, words: tuple[Any, Any], table: Any) -> Any:
-    """Poisson draw of each lane, whole numbers in Float.
+    """Poisson draw of each thread, whole numbers in Float.
 
     Parameters
     ----------
@@ -74,18 +74,14 @@ def _by_table(mean_e: Any, words: tuple[Any, Any], table: Any) -> Any:
     jit = arrays()
     whole = dr.minimum(dr.floor(mean_e), EXACT_BELOW_E - 1)
     first, second = words
-    place = first >> _SHARE_BITS
-    entry = dr.gather(jit.UInt, table, jit.UInt(jit.Int(whole)) * _BINS + place)
-    own = (first & (2**_SHARE_BITS - 1)) < (entry >> 7)
-    rest = _by_inversion(jit.Float64(mean_e - whole), uniform64(second, first), mean_e < EXACT_BELOW_E)
-    return jit.Float(jit.Int(dr.select(own, place, entry & (_BINS - 1)))) + rest
-
-
-def uniform64(high: Any, low: Any) -> Any:
-    """Uniform number in (0, 1), Float64, with steps of 2^-62 near 0: one photon in 10^9 pixels is not lost."""
-    jit = arrays()
-    upper, lower = (jit.Float64(jit.Int(word >> 1)) for word in (high, low))  # signed: native on every CPU
-    return (upper + (lower + 0.5) * 2.0**-31) * 2.0**-31
+    bin_number = first >> _SHARE_BITS
+    entry = dr.gather(jit.UInt, table, jit.UInt(jit.Int(whole)) * _BINS + bin_number)
+    is_first = (first & (2**_SHARE_BITS - 1)) < (entry >> 7)
+    # Uniform in (0, 1) with steps of 2^-62 near 0: one photon in 10^9 pixels is not lost.
+    upper, lower = (jit.Float64(jit.Int(word >> 1)) for word in (second, first))  # signed: native on every CPU
+    uniform = (upper + (lower + 0.5) * 2.0**-31) * 2.0**-31
+    rest = _by_inversion(jit.Float64(mean_e - whole), uniform, mean_e < EXACT_BELOW_E)
+    return jit.Float(jit.Int(dr.select(is_first, bin_number, entry & (_BINS - 1)))) + rest
 
 
 def _by_inversion(mean: Any, uniform: Any, active: Any) -> Any:

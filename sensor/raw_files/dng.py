@@ -1,8 +1,8 @@
 """A Bayer or 2x2 RGBW mosaic as a digital negative: DNG 1.4, uncompressed, one 16-bit CFA image.
 
 Tags and their meaning: Adobe, "Digital Negative (DNG) Specification", version 1.4.0.0, 2012. What they can't hold
-exactly (most have rationals of 32 bits) stands once more in DNGPrivateData, as JSON behind ``rodcone`` and a zero byte;
-reading takes the calibration from there, and refuses a file whose public levels and mosaic say something else.
+exactly (most have rationals of 32 bits) is repeated in DNGPrivateData, as JSON behind ``rodcone`` and a zero byte.
+Reading takes the calibration from there, and refuses a file whose public levels and mosaic disagree with it.
 """
 
 import struct
@@ -18,11 +18,11 @@ from sensor.calibration import ColourCalibration
 from sensor.cfa import Tile, channels
 from sensor.raw import RawImage
 from sensor.raw_files.raw_json import parse_json, raw_image, to_json
-from sensor.raw_files.tiff import CFA, EXIF, MAKER, Tags, Values, read_make, read_mosaic, text, write_mosaic
+from sensor.raw_files.tiff import CFA, EXIF, Tags, Values, read_mosaic, read_tags, text, write_mosaic
 
 PRIVATE = b"rodcone\0"
 PRIVATE_DATA = 50740
-MAKE = "rodcone"
+MAKER, MAKE = 271, "rodcone"
 CFA_REPEAT, CFA_PATTERN, BLACK_LEVEL, WHITE_LEVEL = 33421, 33422, 50714, 50717
 OPCODES = 51008  # OpcodeList1: what is done to the samples as read
 EXPOSURE_TIME, F_NUMBER, ISO = 33434, 33437, 34855
@@ -69,8 +69,8 @@ def write_dng(raw: RawImage, path: Path) -> Path:
             "DN; write a .tif instead"
         )
     tags = dng_tags(raw)
-    with replacing(path) as (place,):
-        write_mosaic(place, raw.dn, CFA, tags, exif_tags(raw))
+    with replacing(path) as (part,):
+        write_mosaic(part, raw.dn, CFA, tags, exif_tags(raw))
     return path
 
 
@@ -83,37 +83,40 @@ def read_dng(path: Path) -> RawImage:
         For a file that is missing, damaged, of another camera, or was changed since.
     """
     dn, tags = read_mosaic(path, CFA, (PRIVATE_DATA, EXIF, *_COMPARED))
-    kind, private = tags.get(PRIVATE_DATA, ("", ()))
-    content = bytes(int(value) for value in private) if kind == "B" else b""
-    if not content.startswith(PRIVATE):
+    _, content = tags.get(PRIVATE_DATA, ("B", b""))
+    if not isinstance(content, bytes) or not content.startswith(PRIVATE):
         raise InputError(
             f"{path}: its DNGPrivateData holds no calibration in electrons; allowed: files that `rodcone capture` wrote"
         )
     raw = raw_image(parse_json(content[len(PRIVATE) :], str(path)), dn, str(path))
     expected = {**dng_tags(raw), **exif_tags(raw)}
     for code, name in _COMPARED.items():
-        (_, held), (_, meant) = (found.get(code, ("", "missing")) for found in (tags, expected))
+        held, meant = (some[code][1] if code in some else None for some in (tags, expected))
         if held != meant:
+            found, right = ("missing" if values is None else tuple(values[:8]) for values in (held, meant))
             raise InputError(
-                f"{path}: {name} is {held[:8]}, the calibration says {meant}; allowed: an unchanged file; write it anew"
+                f"{path}: {name} is {found}, the calibration says {right}; allowed: an unchanged file; write it anew"
             )
     return raw
 
 
 def is_own(path: Path) -> bool:
-    """Whether a file says that `write_dng` wrote it; what doesn't is some camera's or program's."""
-    return read_make(path) == MAKE
+    """Whether a file says that `write_dng` wrote it, and not a camera or another program."""
+    try:
+        with path.open("rb") as file:
+            return read_tags(file, (MAKER,), str(path)).get(MAKER) == text(MAKE)
+    except (InputError, OSError):
+        return False
 
 
 def dng_tags(raw: RawImage) -> Tags:
     """Tags of the first directory, without those that describe the TIFF itself.
 
     NoiseProfile is N(x)^2 = S x + O for x from black (0) to white (1), the same for all channels: S is the shot noise,
-    1 / full scale in electrons, O the dark noise; PRNU grows with x^2 and has no place there. LinearResponseLimit is
+    1 / full scale in electrons, O the dark noise; PRNU grows with x^2 and doesn't fit the form. LinearResponseLimit is
     where the well begins to clip (`RawImage.saturation_e`).
     """
     colour = _require(raw)
-    letters = channels(raw.cfa)
     full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
     height, width = raw.shape
     tags: dict[int, tuple[str, Values]] = {
@@ -122,28 +125,35 @@ def dng_tags(raw: RawImage) -> Tags:
         272: text(raw.camera),
         274: ("H", (1,)),  # Orientation: upright
         CFA_REPEAT: ("H", (2, 2)),
-        CFA_PATTERN: ("B", tuple(_COLOURS[letter] for row in raw.cfa for letter in row)),
-        50706: ("B", (1, 4, 0, 0)),  # DNGVersion
-        50707: ("B", (1, 1, 0, 0)),  # DNGBackwardVersion: all that is newer may be skipped
+        CFA_PATTERN: ("B", bytes(_COLOURS[channel] for row in raw.cfa for channel in row)),
+        50706: ("B", bytes((1, 4, 0, 0))),  # DNGVersion
+        50707: ("B", bytes((1, 1, 0, 0))),  # DNGBackwardVersion: all that is newer may be skipped
         50708: text(f"rodcone {raw.camera}"),  # UniqueCameraModel
-        50710: ("B", tuple(_COLOURS[letter] for letter in letters)),  # CFAPlaneColor
+        50710: ("B", bytes(_COLOURS[channel] for channel in channels(raw.cfa))),  # CFAPlaneColor
         50711: ("H", (1,)),  # CFALayout: a rectangle
         BLACK_LEVEL: ("2I", rational(raw.black_dn)),
         WHITE_LEVEL: ("I", (int(raw.white_dn),)),
         50728: ("2I", rational(colour.neutral / colour.neutral.max())),  # AsShotNeutral
+        50721: ("2i", rational(colour.xyz_to_camera_a)),  # ColorMatrix1, for illuminant A
+        50722: ("2i", rational(colour.xyz_to_camera_d65)),  # ColorMatrix2, for D65
+        50778: ("H", (_ILLUMINANT_A,)),  # CalibrationIlluminant1
+        50779: ("H", (_ILLUMINANT_D65,)),  # CalibrationIlluminant2
+        50964: ("2i", rational(colour.camera_to_xyz_a)),  # ForwardMatrix1
+        50965: ("2i", rational(colour.camera_to_xyz_d65)),  # ForwardMatrix2
         50734: ("2I", rational(min(max(raw.saturation_e / full_e, 0.0), 1.0))),  # LinearResponseLimit
         50829: ("I", (0, 0, height, width)),  # ActiveArea
         51041: ("d", (1 / full_e, (raw.dark_noise_e / full_e) ** 2)),  # NoiseProfile
     }
-    tags |= _colour_tags(colour)
+    if colour.neutral.size == 4:  # a fourth plane asks for a way back to three: W carries no colour here
+        tags |= dict.fromkeys((50725, 50726), ("2i", rational(np.eye(3, 4))))  # ReductionMatrix1, 2
     if raw.defects is not None and is_bayer(raw.cfa):
-        tags[OPCODES] = ("U", tuple(_bad_pixels(raw.cfa, raw.defects)))
-    tags[PRIVATE_DATA] = ("B", tuple(PRIVATE + to_json(raw).encode("ascii")))
+        tags[OPCODES] = ("U", _bad_pixels(raw.cfa, raw.defects))
+    tags[PRIVATE_DATA] = ("B", PRIVATE + to_json(raw).encode("ascii"))
     return dict(sorted(tags.items()))
 
 
 def _bad_pixels(tile: Tile, defects: NDArray[np.intp]) -> bytes:
-    """Opcode FixBadPixelsList of DNG 1.3, chapter 6: big-endian, to be skipped by who doesn't know it; Bayer alone."""
+    """Opcode FixBadPixelsList of DNG 1.3, chapter 6: big-endian, optional for readers; for Bayer only."""
     phase = ("RG", "GR", "GB", "BG").index(tile[0])
     parameters = struct.pack(">3I", phase, len(defects), 0) + defects.astype(">u4").tobytes()
     return struct.pack(">IIIII", 1, 5, 0x01030000, 1, len(parameters)) + parameters
@@ -153,27 +163,12 @@ def exif_tags(raw: RawImage) -> Tags:
     """Tags of the exposure (Exif 2.3, CIPA DC-008)."""
     tags: dict[int, tuple[str, Values]] = {
         EXPOSURE_TIME: ("2I", rational(raw.exposure_s)),
-        36864: ("B", tuple(b"0230")),  # ExifVersion
+        36864: ("U", b"0230"),  # ExifVersion
     }
     if raw.f_number is not None:
         tags[F_NUMBER] = ("2I", rational(raw.f_number))
     if raw.iso is not None:
         tags[ISO] = ("H", (min(max(round(raw.iso), 1), 65_535),))
-    return tags
-
-
-def _colour_tags(colour: ColourCalibration) -> dict[int, tuple[str, Values]]:
-    """Matrices for illuminants A and D65."""
-    tags: dict[int, tuple[str, Values]] = {
-        50721: ("2i", rational(colour.xyz_to_camera_a)),  # ColorMatrix1, 2
-        50722: ("2i", rational(colour.xyz_to_camera_d65)),
-        50778: ("H", (_ILLUMINANT_A,)),  # CalibrationIlluminant1, 2
-        50779: ("H", (_ILLUMINANT_D65,)),
-        50964: ("2i", rational(colour.camera_to_xyz_a)),  # ForwardMatrix1, 2
-        50965: ("2i", rational(colour.camera_to_xyz_d65)),
-    }
-    if colour.neutral.size == 4:  # a fourth plane asks for a way back to three: W carries no colour here
-        tags |= dict.fromkeys((50725, 50726), ("2i", rational(np.eye(3, 4))))  # ReductionMatrix1, 2
     return tags
 
 

@@ -26,11 +26,11 @@ def estimate_noise(above_black_dn: NDArray[np.float64], full_dn: float) -> Noise
     """Fit variance = mean / gain + dark variance to a Bayer frame; None where it doesn't hold enough.
 
     In each of the four pictures of one site, blocks of 2x2 give a mean and a diagonal difference. Bins of the mean use
-    the fifth of their blocks whose surroundings show least structure, judged by other differences, on which the block's
-    own diagonal noise doesn't depend. There the median of the difference's size gives the variance; the line is fitted
-    with a loss that gives single bins little weight. It is the photon transfer of one picture, in a simpler form than
-    A. Foi et al., "Practical Poissonian-Gaussian noise modeling and fitting for single-image raw-data", IEEE Trans.
-    Image Process. 17(10), 2008. Fine texture all over the frame passes for noise.
+    the fifth of their blocks with the least structure around them, which is measured by other differences than the
+    block's own diagonal one. There the median of the difference's size gives the variance; the line is fitted with
+    a loss that gives single bins little weight. It is the photon transfer of one picture, in a simpler form than A. Foi
+    et al., "Practical Poissonian-Gaussian noise modeling and fitting for single-image raw-data", IEEE Trans. Image
+    Process. 17(10), 2008. Fine texture all over the frame passes for noise.
 
     Parameters
     ----------
@@ -43,18 +43,16 @@ def estimate_noise(above_black_dn: NDArray[np.float64], full_dn: float) -> Noise
     bins = min(_BINS, int(means.size * _SMOOTHEST) // _LEAST_BLOCKS)
     if bins < _LEAST_BINS:
         return None
-    parts = [_smoothest(part, structure) for part in np.array_split(np.argsort(means), bins)]
+    parts = []
+    for part in np.array_split(np.argsort(means), bins):
+        count = int(part.size * _SMOOTHEST)
+        parts.append(part[np.argpartition(structure[part], count)[:count]])
     level = np.array([means[part].mean() for part in parts])
     variance = np.array([(_MAD_TO_SIGMA * np.median(np.abs(differences[part]))) ** 2 for part in parts])
     kept = variance > 0
     if kept.sum() < _LEAST_BINS or level[kept].max() < 1.5 * level[kept].min():
         return None  # no line through one level
     return _fit(level[kept], variance[kept])
-
-
-def _smoothest(part: NDArray[np.intp], structure: NDArray[np.float64]) -> NDArray[np.intp]:
-    count = int(part.size * _SMOOTHEST)
-    return part[np.argpartition(structure[part], count)[:count]]
 
 
 def _blocks(
@@ -66,7 +64,7 @@ def _blocks(
     """
     height, width = (size // 4 * 4 for size in above_black_dn.shape)
     sites = above_black_dn[:height, :width].reshape(height // 4, 2, 2, width // 4, 2, 2)
-    sites = sites.transpose(2, 5, 1, 4, 0, 3).reshape(4, 4, height // 4, width // 4)  # site, place in the block
+    sites = sites.transpose(2, 5, 1, 4, 0, 3).reshape(4, 4, height // 4, width // 4)  # site, position in the block
     a, b, c, d = sites.swapaxes(0, 1)
     diagonal = (a - b - c + d) / 2
     around = np.full((1, 3, 3), 1.0)

@@ -1,7 +1,7 @@
-"""Photographs of real cameras as raw images: whatever Bayer raw LibRaw reads (extra `photographs`, library `rawpy`).
+"""Photographs of real cameras as raw images: any Bayer raw that LibRaw reads (extra `photographs`, library `rawpy`).
 
-A raw image has one black level, one white level and a noise model in electrons; a camera's file has a black level a
-channel and, but for some digital negatives, no word on noise. What is made of that stands in the facts.
+A raw image has one black level, one white level and a noise model in electrons; a camera's file has a black level for
+each channel and, but for some digital negatives, says nothing about noise.
 """
 
 from pathlib import Path
@@ -15,7 +15,7 @@ from render.spectrum import Floats
 from rodcone.errors import InputError, one_line
 from rodcone.optional import optional_library
 from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile
+from sensor.cfa import Tile, letter_map
 from sensor.raw import RawImage
 from sensor.raw_files.dng import is_bayer
 from sensor.raw_files.noise_estimate import NoiseEstimate, estimate_noise
@@ -62,9 +62,9 @@ def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
         raise InputError(
             f"{path}: LibRaw can't read it ({reason}); allowed: raw files of cameras that LibRaw knows, or of rodcone"
         ) from None
+    except InputError:
+        raise
     except (ValueError, TypeError, IndexError, OverflowError, NotImplementedError, np.linalg.LinAlgError) as error:
-        if isinstance(error, InputError):
-            raise
         raise InputError(
             f"{path}: what LibRaw reads of it is no photograph ({one_line(error)}); it is damaged, copy it again"
         ) from error
@@ -78,13 +78,15 @@ def _check_extent(sizes: Any, file_bytes: int, path: Path) -> None:
 
 
 def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str, Any]]:
-    letters = _letters(opened, path)
-    black, white = _black(opened), int(opened.white_level)
+    mosaic = _channels(opened, path)
+    black_levels = np.array(opened.black_level_per_channel, dtype=np.intp)
+    black = black_levels[np.asarray(opened.raw_colors_visible)]  # of each pixel [DN]
+    white = int(opened.white_level)
     if not black.max() < white:
         raise InputError(f"{path}: black {black.max():g} is not under white {white:g}; it is damaged or no photograph")
     dn = np.minimum(opened.raw_image_visible + (black.max() - black), white)
     upright = _turned(dn.astype(np.uint16), opened.sizes.flip)
-    tile = _tile(_turned(letters, opened.sizes.flip), path)
+    tile = _tile(_turned(mosaic, opened.sizes.flip), path)
     noise, source = _noise(path, upright.astype(np.float64) - black.max(), float(white - black.max()))
     colour, facts = _colour(opened)
     raw = RawImage(
@@ -102,12 +104,12 @@ def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str
         iso=_positive(opened.other.iso_speed, 1.0),
         colour=colour,
     )
-    told = {"noise": source, "gain_e_per_dn": noise.gain_e_per_dn, "dark_noise_e": raw.dark_noise_e}
-    return raw, {"reader": reader, **told, **facts}
+    levels = {"noise": source, "gain_e_per_dn": noise.gain_e_per_dn, "dark_noise_e": raw.dark_noise_e}
+    return raw, {"reader": reader, **levels, **facts}
 
 
-def _letters(opened: Any, path: Path) -> NDArray[np.str_]:
-    """Letter of each pixel of the picture, (h, w)."""
+def _channels(opened: Any, path: Path) -> NDArray[np.str_]:
+    """Channel of each pixel of the picture, (h, w)."""
     if opened.raw_image is None or opened.raw_image_visible.ndim != 2:
         raise InputError(f"{path}: it holds no mosaic, but whole pixels; allowed: Bayer raw files; take another file")
     names = opened.color_desc.decode("ascii", "replace")
@@ -117,22 +119,14 @@ def _letters(opened: Any, path: Path) -> NDArray[np.str_]:
     return np.asarray(np.array(list(names))[indices])
 
 
-def _tile(letters: NDArray[np.str_], path: Path) -> Tile:
-    tile = tuple("".join(row[:2]) for row in letters[:2])
-    if not is_bayer(tile) or any(
-        np.any(letters[row::2, column::2] != tile[row][column]) for row in (0, 1) for column in (0, 1)
-    ):
+def _tile(mosaic: NDArray[np.str_], path: Path) -> Tile:
+    tile = tuple("".join(row[:2]) for row in mosaic[:2])
+    if not is_bayer(tile) or np.any(letter_map(tile, (mosaic.shape[0], mosaic.shape[1])) != mosaic):
         raise InputError(
-            f"{path}: its mosaic begins with {tuple(''.join(row[:6]) for row in letters[:2])} and is not Bayer's; "
+            f"{path}: its mosaic begins with {tuple(''.join(row[:6]) for row in mosaic[:2])} and is not Bayer's; "
             "allowed: Bayer raw files, no X-Trans; take another file"
         )
     return tile
-
-
-def _black(opened: Any) -> NDArray[np.intp]:
-    """Black level of each pixel [DN]."""
-    levels = np.array(opened.black_level_per_channel, dtype=np.intp)
-    return np.asarray(levels[np.asarray(opened.raw_colors_visible)])
 
 
 def _turned(frame: NDArray[Any], flip: int) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""Raw files: our digital negatives and 16-bit TIFF with a sidecar, by the ending of their name, and real cameras'."""
+"""Raw files by the ending of their name: own digital negatives, TIFF with a sidecar, and other cameras' files."""
 
 from pathlib import Path
 from typing import Any
@@ -34,9 +34,9 @@ def write_raw(raw: RawImage, path: str | Path) -> tuple[Path, ...]:
     OSError
         Where the folder is missing or can't be written.
     """
-    place = Path(path)
-    check_ending(place, raw.cfa)
-    return (write_dng(raw, place),) if place.suffix.lower() == ".dng" else write_tiff(raw, place)
+    path = Path(path)
+    check_ending(path, raw.cfa)
+    return (write_dng(raw, path),) if path.suffix.lower() == ".dng" else write_tiff(raw, path)
 
 
 def read_raw(path: str | Path) -> RawImage:
@@ -58,11 +58,11 @@ def open_raw(path: str | Path) -> tuple[RawImage, dict[str, Any]]:
     InputError
         For a file that is missing, damaged, changed, or that LibRaw doesn't read as a Bayer mosaic.
     """
-    place = Path(path)
-    if not place.is_file():
-        raise InputError(f"{place}: there is no such file; give the path of a raw file")
-    if place.suffix.lower() in ENDINGS[1:]:
-        return read_tiff(place), {}
-    if place.suffix.lower() == ENDINGS[0] and is_own(place):
-        return read_dng(place), {}
-    return read_photograph(place)
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; give the path of a raw file")
+    if path.suffix.lower() in ENDINGS[1:]:
+        return read_tiff(path), {}
+    if path.suffix.lower() == ENDINGS[0] and is_own(path):
+        return read_dng(path), {}
+    return read_photograph(path)

@@ -8,8 +8,8 @@ from render.radiance import SpectralRadiance
 from render.transport import Transport
 from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
-from sensor.noise import noise_variance
 from sensor.optics import camera_equation, form_image
+from sensor.readout import noise_variance
 from sensor.response import channel_electrons, electrons_per_irradiance, expected_electrons
 
 # What Monte Carlo noise may add to the sensor's own noise variance before it counts as part of the result, and for how

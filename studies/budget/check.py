@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.transport import Transport
-from sensor.kernel.run import expected_electrons_single
+from sensor.kernel.kernel import expected_electrons_single
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import electrons_per_irradiance, expected_electrons

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensor.config import SensorConfig
-from sensor.noise import noise_variance
+from sensor.readout import noise_variance
 from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
 from studies.study.study import Condition
 

@@ -19,8 +19,7 @@ from rodcone.files import replacing
 from scenes.catalog import load
 from scenes.levels import DEMO_LEVELS, LightLevel
 from sensor.exposure import LONGEST_S, RULE, auto_exposure_s
-from sensor.left_out import left_out
-from sensor.optics import form_image
+from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.response import expected_electrons
 from studies.budget.budget import monte_carlo_share, pixel_share

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.color import deltaE_cie76, rgb2lab
 
-from isp.colour.camera_colour import encode_srgb, luminance_of_srgb
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from studies.metrics.flip import flip
 from studies.metrics.pu21 import pu21_psnr_db
 from studies.metrics.quality import require_finite

@@ -6,22 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.color import deltaE_ciede2000, xyz2lab
 
-from isp.colour.camera_colour import SRGB_PRIMARIES_XY, adapt_to_d65, luminance_of_srgb, rgb_to_xyz, xyz_to_srgb
 from render.illuminants import illuminant
 from render.photometry import tristimulus
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from rodcone.colour_spaces import SRGB_TO_XYZ, adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from scenes.metamers import pairs
 from scenes.reflectances import color_checker
 from studies.metrics.patches import Masks, patch_means
 from studies.metrics.truth import WHITE_AT
 
 WHITE_PATCH = 18  # of the ColorChecker's 24: its 99th percentile of luminance, which pictures show at `WHITE_AT`
-
-
-def decode_srgb(encoded: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Linear sRGB of encoded values in 0..1 (IEC 61966-2-1)."""
-    low = encoded / 12.92
-    return np.asarray(np.where(encoded <= 0.04045, low, ((encoded + 0.055) / 1.055) ** 2.4), dtype=np.float64)
 
 
 def pair_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
@@ -74,4 +68,4 @@ def daylight_srgb() -> NDArray[np.float64]:
 
 
 def _lab(linear: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(xyz2lab(linear @ rgb_to_xyz(SRGB_PRIMARIES_XY).T))
+    return np.asarray(xyz2lab(linear @ SRGB_TO_XYZ.T))

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.color import deltaE_ciede2000, xyz2lab
 
-from isp.colour.camera_colour import SRGB_PRIMARIES_XY, rgb_to_xyz
 from render.scene import Scene
+from rodcone.colour_spaces import SRGB_TO_XYZ
 from rodcone.errors import InputError, require_range
 
 Masks = NDArray[np.bool_]
@@ -90,6 +90,6 @@ def patch_colour_errors(picture: NDArray[np.float64], truth: NDArray[np.float64]
         left; clipping or encoding first would turn noise into a shift.
     masks : (patch, h, w) bool
     """
-    matrix = rgb_to_xyz(SRGB_PRIMARIES_XY).T
+    matrix = SRGB_TO_XYZ.T
     labs = [xyz2lab(patch_means(linear, masks) @ matrix) for linear in (picture, truth)]
     return np.asarray(deltaE_ciede2000(*labs))

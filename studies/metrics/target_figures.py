@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import luminance_of_srgb
+from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
 from studies.metrics.mtf import edge_response

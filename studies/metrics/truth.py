@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import adapt_to_d65, xyz_to_srgb
 from render.photometry import tristimulus
 from render.radiance import SpectralRadiance
 from render.spectrum import Floats, Spectrum
 from render.transport import Transport
+from rodcone.colour_spaces import adapt_to_d65, xyz_to_srgb
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation

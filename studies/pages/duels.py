@@ -162,13 +162,13 @@ def is_ranked(contest: Contest, camera: str) -> bool:
     return isnan(snr) or snr >= 0
 
 
-def snr_db(contest: Contest, camera: str, letter: str) -> float:
-    """SNR of a letter's mean expected electrons [dB], shot and dark noise; NaN where letter or noise isn't known.
+def snr_db(contest: Contest, camera: str, channel: str) -> float:
+    """SNR of a channel's mean expected electrons [dB], shot and dark noise; NaN where channel or noise isn't known.
 
     A sensor of the user's own file is known to the results database by its name alone.
     """
     row = contest.rows[camera][0]
-    electrons = json.loads(row.mean_electrons).get(letter)
+    electrons = json.loads(row.mean_electrons).get(channel)
     if electrons is None or electrons <= 0 or row.sensor not in names():
         return nan
     sensor = vary(preset(row.sensor), PROCESSORS[camera].mosaic)

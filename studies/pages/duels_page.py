@@ -165,8 +165,8 @@ def lead_table(metric: Metric, of_group: Sequence[Contest], camera: str) -> str:
 def level_table(of_group: Sequence[Contest], camera: str) -> str:
     """Return a table of one group: processors down, light across, PSNR and CIEDE2000; the best of each in bold."""
     rows = [[code(name), *(_both(contest, name) for contest in of_group)] for name in of_group[0].rows]
-    for letter, words in (("G", "SNR of mean green [dB]"), ("W", "SNR of mean W [dB]")):
-        values = [snr_db(contest, camera, letter) for contest in of_group]
+    for channel, words in (("G", "SNR of mean green [dB]"), ("W", "SNR of mean W [dB]")):
+        values = [snr_db(contest, camera, channel) for contest in of_group]
         if not all(isnan(value) for value in values):
             # whole decibels, 0 without a sign
             rows.append([f"*{words}*", *(fixed(value if isnan(value) else round(value), 0) for value in values)])

@@ -69,7 +69,7 @@ def page_view(report: ReportData, pictures: Mapping[str, bytes]) -> dict[str, An
         "share_charts": group_charts(report, SHARE),
         "speed": speed,
         "speed_charts": speed_charts(speed),
-        # Effect and cost, as `sensor.left_out.left_out` parts them.
+        # Effect and cost, as `sensor.optics.left_out` parts them.
         "left_out": [line.partition(": ")[::2] for line in report.left_out],
         "text": text,
     }

@@ -8,7 +8,7 @@ from typing import Any
 from rodcone.errors import InputError
 from scenes.levels import DEMO_LEVELS
 from sensor.config import LensConfig
-from sensor.left_out import left_out
+from sensor.optics import left_out
 from sensor.presets import preset
 from studies.pages.report_data import ReportLevel, ReportRender, ReportSensor
 from studies.pages.report_text import level_text

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import encode_srgb, luminance_of_srgb
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
 from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum
 from render.transport import Transport
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -92,11 +92,6 @@ def develop(
     picture = used.develop(raw, colours, neutral=neutral, **options)
     unit_e = neutral[channels(sensor.cfa).index(used.unit)]
     return picture.rgb / (unit_e * view.white_cd_m2), picture
-
-
-def decode_srgb(encoded: Image) -> Image:
-    """Linear values of encoded sRGB (IEC 61966-2-1)."""
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
 def noise(pictures: Sequence[Image]) -> float:

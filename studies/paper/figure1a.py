@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from isp.colour.camera_colour import encode_srgb
 from render.radiance import SpectralRadiance
+from rodcone.colour_spaces import encode_srgb
 from scenes.lit_and_shadowed import DARK_CD_M2, LIT_CD_M2
 from sensor.exposure import LONGEST_S
 from sensor.optics import form_image

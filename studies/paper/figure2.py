@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from render.spectrum import Floats
 from sensor.curves import rgbw
-from sensor.noise import noise_variance
+from sensor.readout import noise_variance
 from studies.pages.plots import BLUE, CHART, COLOURS, GREEN, INK, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks
 from studies.paper.checks import Claim, about, at_least
 from studies.paper.flat import channel_e, light_of, snr, without_prnu

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from isp.colour.camera_colour import encode_srgb
-from isp.processors.bayer import bilinear
+from isp.bilinear import bilinear
 from isp.processors.catalogue import PROCESSORS
+from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.raw import RawImage

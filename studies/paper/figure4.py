@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import encode_srgb
 from isp.planes import planes
+from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import channels
 from sensor.raw import RawImage
 from studies.pages.plots import ORANGE, SIDE, STYLE, blank, show_picture

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import encode_srgb, luminance_of_srgb
-from isp.colour.white_balance import saturated_nearby
-from isp.processors.bayer import bilinear
+from isp.bilinear import bilinear
+from isp.colour.highlights import saturated_nearby
 from isp.processors.catalogue import PROCESSORS
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from sensor.cfa import channels, mask
 from sensor.raw import RawImage
 from studies.pages.plots import picture_rows

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from skimage.color import deltaE_ciede2000, rgb2lab
 
-from isp.colour.camera_colour import encode_srgb
 from isp.processors.catalogue import PROCESSORS
 from isp.substitution import SUBSTITUTION_SNR
+from rodcone.colour_spaces import decode_srgb, encode_srgb
 from sensor.raw import RawImage
 from studies.pages.plots import picture_rows
-from studies.paper.camera import Image, View, decode_srgb, develop, exposures, noise, quality_db
+from studies.paper.camera import Image, View, develop, exposures, noise, quality_db
 from studies.paper.checks import Claim, at_least, at_most, near
 from studies.paper.figure1b import shown
 from studies.paper.page import PaperFigure

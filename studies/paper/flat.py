@@ -8,8 +8,8 @@ from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import VISIBLE_NM, Floats
 from sensor.config import SensorConfig
-from sensor.noise import noise_variance
 from sensor.optics import camera_equation
+from sensor.readout import noise_variance
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons
 
 

@@ -3,10 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import adapt_to_d65, fit_matrix, xyz_to_srgb
+from isp.colour.colour_fit import fit_matrix, fit_through_neutral
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule, tristimulus
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
+from rodcone.colour_spaces import D50_XYZ, adapt_to_d65, xyz_to_srgb
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker
 from sensor.calibration import ColourCalibration
@@ -83,27 +84,14 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     from_xyz = _srgb_of_xyz(white)
     target = xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light.spectrum, nm, width), white))
     balanced = (surfaces * light.spectrum) @ electrons.T / collected
-    from_srgb = _through_neutral(target, balanced)
+    from_srgb = fit_through_neutral(target, balanced)
     from_srgb[rgb] = np.linalg.inv(to_srgb)
     neutral = collected / collected[letters.index("G")]
     to_xyz = np.zeros((3, len(letters)))
-    to_xyz[:, rgb] = _d50_of_srgb() @ to_srgb
+    to_xyz[:, rgb] = np.linalg.inv(_srgb_of_xyz(D50_XYZ)) @ to_srgb  # D50: the connection space of DNG's ForwardMatrix
     return neutral, to_srgb, neutral[:, None] * from_srgb @ from_xyz, to_xyz
-
-
-def _through_neutral(source: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Least-squares matrix (target channel, 3) whose rows sum to 1, so that white stays white."""
-    last = source[:, -1:]
-    free, *_ = np.linalg.lstsq(source[:, :-1] - last, target - last, rcond=None)
-    return np.concatenate([free, 1.0 - free.sum(axis=0, keepdims=True)]).T
 
 
 def _srgb_of_xyz(white: Floats) -> NDArray[np.float64]:
     """Matrix from XYZ under a light to linear sRGB, adapted to D65."""
     return np.asarray(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)
-
-
-def _d50_of_srgb() -> NDArray[np.float64]:
-    """Matrix from linear sRGB to XYZ adapted to D50, the connection space of DNG's ForwardMatrix (ICC.1:2010)."""
-    d50 = np.array([0.9642, 1.0, 0.8249])
-    return np.asarray(np.linalg.inv(_srgb_of_xyz(d50)))

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import encode_srgb
 from isp.colour.colour_fit import ColourFit, fit_colours
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS, Processor
+from rodcone.colour_spaces import encode_srgb
 from scenes.reflectances import color_checker, held
 from sensor.cfa import channels, mask
 from sensor.config import SensorConfig

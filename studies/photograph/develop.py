@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.calibrated_colours import fit_of_calibration
-from isp.colour.camera_colour import luminance_of_srgb
 from isp.colour.encoding import ENCODINGS, encode
 from isp.processors.catalogue import PROCESSORS
+from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError, require_range, unknown
 from sensor.cfa import channels
 from sensor.raw_files.dng import is_bayer

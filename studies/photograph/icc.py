@@ -4,10 +4,9 @@ import struct
 
 import numpy as np
 
-from isp.colour.camera_colour import adapt_to_d65, rgb_to_xyz
 from isp.colour.encoding import Encoding
+from rodcone.colour_spaces import D50_XYZ, adapt_to_d65, rgb_to_xyz
 
-_D50 = np.array([0.9642, 1.0, 0.8249])  # ICC.1:2022, 7.2.16: the connection space's white
 # Curve of IEC 61966-2-1 as the parameters g, a, b, c, d of ICC's function type 3: linear under d.
 _CURVE = (2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045)
 _HEADER = 128
@@ -15,13 +14,13 @@ _HEADER = 128
 
 def icc_profile(encoding: Encoding) -> bytes:
     """Display profile of three primaries and one curve."""
-    to_d50 = np.linalg.inv(adapt_to_d65(np.eye(3), _D50).T)
+    to_d50 = np.linalg.inv(adapt_to_d65(np.eye(3), D50_XYZ).T)
     columns = (to_d50 @ rgb_to_xyz(encoding.primaries_xy)).T
     curve = b"para" + bytes(4) + struct.pack(">HH", 3, 0) + _fixed(*_CURVE)
     content = {
         b"desc": _text(encoding.title),
         b"cprt": _text("CC0"),
-        b"wtpt": _xyz(*_D50),
+        b"wtpt": _xyz(*D50_XYZ),
         b"chad": b"sf32" + bytes(4) + _fixed(*to_d50.ravel()),
         **{name + b"XYZ": _xyz(*column) for name, column in zip((b"r", b"g", b"b"), columns, strict=True)},
         **{name + b"TRC": curve for name in (b"r", b"g", b"b")},
@@ -34,7 +33,7 @@ def icc_profile(encoding: Encoding) -> bytes:
     size = _HEADER + len(table) + len(body)
     header = struct.pack(">I4sI4s4s4s", size, bytes(4), 0x04400000, b"mntr", b"RGB ", b"XYZ ")
     header += struct.pack(">6H", 2026, 1, 1, 0, 0, 0) + b"acsp"
-    return (header.ljust(68, b"\0") + _fixed(*_D50)).ljust(_HEADER, b"\0") + table + body
+    return (header.ljust(68, b"\0") + _fixed(*D50_XYZ)).ljust(_HEADER, b"\0") + table + body
 
 
 def _fixed(*values: float) -> bytes:

@@ -25,8 +25,7 @@ from sensor.cfa import channels, check_covers
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
-from sensor.left_out import left_out
-from sensor.optics import form_image
+from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files.dng import is_rgbw

@@ -9,9 +9,9 @@ from render.transport import Transport
 from scenes.catalog import load
 from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
-from sensor.noise import noise_variance
 from sensor.optics import form_image
 from sensor.presets import preset
+from sensor.readout import noise_variance
 from sensor.response import expected_electrons
 
 MOST_BANDS = 40

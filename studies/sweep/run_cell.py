@@ -11,19 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import encode_srgb
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
+from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.cfa import channels
 from sensor.device import Device, draw_device
-from sensor.kernel.run import read_frame
-from sensor.noise import noise_variance
+from sensor.kernel.kernel import read_frame
 from sensor.optics import falloff
 from sensor.random import draw_key
 from sensor.raw import RawImage
-from sensor.readout import as_raw, read_out
+from sensor.readout import as_raw, noise_variance, read_out
 from studies.metrics.appearance import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure
 from studies.metrics.target_figures import target_figures

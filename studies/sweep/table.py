@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from rodcone.colour_spaces import decode_srgb
 from rodcone.errors import InputError, unknown
 from scenes.catalog import load, names
 from scenes.metamers import TWINS_UNDER
-from studies.metrics.chart_colours import daylight_delta_e, decode_srgb, pair_delta_e, true_pair_delta_e
+from studies.metrics.chart_colours import daylight_delta_e, pair_delta_e, true_pair_delta_e
 from studies.metrics.confidence import mean_with_confidence
 from studies.metrics.patches import patch_masks
 from studies.study.study import OWN

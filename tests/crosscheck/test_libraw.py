@@ -15,12 +15,12 @@ import pytest
 import tifffile
 from numpy.typing import NDArray
 
-from isp.colour.camera_colour import adapt_to_d65, xyz_to_srgb
-from isp.processors.bayer import bilinear
+from isp.bilinear import bilinear
 from isp.remosaic import remosaic
 from render.illuminants import illuminant
 from render.photometry import tristimulus
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from rodcone.colour_spaces import adapt_to_d65, xyz_to_srgb
 from scenes.reflectances import color_checker
 from sensor.cfa import channels, mask
 from sensor.device import draw_device

@@ -4,13 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from hard.case import Image, Situation
 
-from isp.colour.camera_colour import neutral_response
 from isp.colour.colour_fit import ColourFit
+from isp.colour.white_balance import neutral_response
 from isp.picture import Picture
+from isp.pipeline import SETTINGS
 from isp.processors.catalogue import PROCESSORS
 from isp.substitution import matrix_with_white
 from render.illuminants import illuminant
@@ -19,7 +21,7 @@ from rodcone.jit import backend
 from sensor.capture import capture
 from sensor.cfa import Tile, channels
 from sensor.device import draw_device
-from sensor.kernel.run import expected_electrons_single
+from sensor.kernel.kernel import expected_electrons_single
 from sensor.optics import camera_equation, falloff, form_image, spreads
 from sensor.presets import low_noise
 from sensor.raw import RawImage
@@ -73,10 +75,18 @@ def shoot(situation: Situation, name: str, seed: int = 0) -> RawImage:
     return capture(of.radiance, of.sensor, of.exposure_s, device, rng, samples_per_pixel=of.samples_per_pixel)
 
 
+def keywords(develop: Mapping[str, Any]) -> dict[str, Any]:
+    """Keywords of `picture_interleaved`: the fields of `Settings` among them as one value."""
+    of_settings = {name: value for name, value in develop.items() if hasattr(SETTINGS, name)}
+    return {name: value for name, value in develop.items() if name not in of_settings} | {
+        "settings": replace(SETTINGS, **of_settings)
+    }
+
+
 def develop_fixed(raw: RawImage, situation: Situation) -> Image:
     """Picture at the white balance of D65, linear in the reconstructed channels, (h, w, 3) [e-]."""
     name = camera_of(raw)
-    options = {**FIXED, **situation.develop} if name == "interleaved" else {}
+    options = keywords({**FIXED, **situation.develop}) if name == "interleaved" else {}
     balance = options.pop("balance", neutral_response(channels(raw.cfa)))
     return PROCESSORS[name].develop(raw, plain_matrix(), balance=balance, **options).rgb
 
@@ -84,7 +94,7 @@ def develop_fixed(raw: RawImage, situation: Situation) -> Image:
 def develop(raw: RawImage, situation: Situation) -> Developed:
     """Both ways to develop one raw image."""
     name = camera_of(raw)
-    options = situation.develop if name == "interleaved" else {}
+    options = keywords(situation.develop) if name == "interleaved" else {}
     automatic = PROCESSORS[name].develop(raw, colours(name), **options)
     return Developed(raw, develop_fixed(raw, situation), automatic)
 
@@ -99,7 +109,7 @@ def to_picture(cfa: Tile, develop: Mapping[str, float]) -> Image:
     letters = channels(cfa)
     with_white = "W" in letters
     balance = np.asarray(develop.get("balance", neutral_response(letters)) if with_white else neutral_response("RGB"))
-    matrix = matrix_with_white(plain_matrix(), 0.0, 1.0) if with_white else plain_matrix()
+    matrix = matrix_with_white(ColourFit.of(plain_matrix()), np.zeros(4), 1.0) if with_white else plain_matrix()
     return np.asarray(matrix * (balance[letters.index("G")] / balance))
 
 

@@ -9,12 +9,12 @@ from hard.chain import CAMERAS, behind, develop, develop_fixed, expected, plain_
 from numpy.typing import NDArray
 from scipy.stats import t
 
-from isp.colour.camera_colour import encode_srgb, neutral_response
+from isp.colour.white_balance import neutral_response
+from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import channels, letter_map
 from sensor.config import BLACK_SIGMAS, SensorConfig
-from sensor.crosstalk import spread_charge
-from sensor.noise import noise_variance
 from sensor.raw import SATURATION_SIGMAS, RawImage
+from sensor.readout import noise_variance, spread_charge
 
 ROUNDING = 1e-5  # a weighted mean in single precision leaves the range of its samples by less
 RAW_FRAMES, PICTURES = 32, 12  # each with a chip and noise of its own; a picture takes five times as long

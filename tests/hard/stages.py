@@ -15,20 +15,21 @@ from hard.precision import Found, Parameters, Stage, beside_noise
 from numpy.typing import NDArray
 from scipy.stats import poisson
 
-from isp.colour.camera_colour import encode_srgb
+from isp.anscombe import LEAST_PRNU, stabilise
 from isp.interleaved import reconstruct
-from isp.planes import LEAST_PRNU, fill, stabilise
+from isp.planes import fill
 from isp.reference import sum_weights
 from isp.settings import SIGMA_S, Settings
 from render.spectrum import band_widths
 from render.transport import emission
+from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import RGBW, channels, letter_map
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device
-from sensor.kernel.run import expected_electrons_single, read_frame
+from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import camera_equation, form_image
 from sensor.presets import low_noise
-from sensor.random import Term, philox
+from sensor.random import NoiseTerm, philox
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance, expected_electrons
 
@@ -145,9 +146,9 @@ def _read(at: Parameters) -> Found:
 
 
 def _drawn(mean: Image, key: int, read_noise_e: float) -> Image:
-    """`sensor.kernel.kernel.read_lanes` in double precision: Box-Muller, and Giles's quantile Q_N2."""
+    """`sensor.kernel.kernel.read_pixels` in double precision: Box-Muller, and Giles's quantile Q_N2."""
     rows, columns = (np.asarray(index, dtype=np.uint64) for index in np.indices(mean.shape))
-    words = philox((columns, rows, np.full_like(rows, int(Term.EXPOSURE)), np.zeros_like(rows)), key)
+    words = philox((columns, rows, np.full_like(rows, int(NoiseTerm.EXPOSURE)), np.zeros_like(rows)), key)
     radius = np.sqrt(-2.0 * np.log((words[0] >> np.uint64(1)).astype(np.float64) * 2.0**-31 + 2.0**-32))
     angle = (words[1] >> np.uint64(1)).astype(np.float64) * (2.0 * np.pi * 2.0**-31)
     z, root = radius * np.sin(angle), np.sqrt(mean)

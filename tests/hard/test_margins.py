@@ -8,7 +8,7 @@ from hard.case import Margin, worse, worst_of
 from hard.invariants_raw import allowed_errors, bias
 from hard.invariants_symmetry import cut, mirrored
 
-from isp.processors.bayer import bilinear
+from isp.bilinear import bilinear
 from sensor.cfa import letter_map
 from sensor.raw import RawImage
 

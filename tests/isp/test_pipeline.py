@@ -6,8 +6,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from isp.colour.camera_colour import luminance_of_srgb
-from isp.pipeline import develop_bayer, develop_interleaved, picture_bayer, picture_interleaved
+from isp.pipeline import SETTINGS, develop_bayer, develop_interleaved, picture_bayer, picture_interleaved
+from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend
 from sensor.cfa import Tile, channels, mask
@@ -31,13 +31,13 @@ def raw(cfa: Tile, levels_e: dict[str, float], shape: tuple[int, int] = (32, 32)
 @pytest.mark.parametrize(("cfa", "shape"), list(product(RGBW_PHASES, [(30, 33), (32, 32)])))
 def test_interleaved_flat_field_stays_flat_to_the_border(cfa: Tile, shape: tuple[int, int]) -> None:
     picture = develop_interleaved(raw(cfa, {"R": 500, "G": 1000, "B": 400, "W": 5000}, shape), IDENTITY)
-    assert picture == pytest.approx(np.full((*shape, 3), 1000.0), rel=1e-5)
+    assert picture.rgb == pytest.approx(np.full((*shape, 3), 1000.0), rel=1e-5)
 
 
 @pytest.mark.parametrize(("cfa", "shape"), list(product(BAYER_PHASES, [(30, 33), (32, 32)])))
 def test_bayer_flat_field_stays_flat_to_the_border(cfa: Tile, shape: tuple[int, int]) -> None:
     picture = develop_bayer(raw(cfa, {"R": 500, "G": 1000, "B": 400}, shape), IDENTITY)
-    assert picture == pytest.approx(np.full((*shape, 3), 1000.0), rel=1e-9)
+    assert picture.rgb == pytest.approx(np.full((*shape, 3), 1000.0), rel=1e-9)
 
 
 def test_both_pipelines_agree_on_a_flat_field() -> None:
@@ -45,7 +45,7 @@ def test_both_pipelines_agree_on_a_flat_field() -> None:
     matrix = np.array([[1.6, -0.5, -0.1], [-0.2, 1.4, -0.2], [0.0, -0.5, 1.5]])
     ours = develop_interleaved(raw(("RG", "BW"), levels), matrix)
     theirs = develop_bayer(raw(("RG", "GB"), levels), matrix)
-    assert ours.mean(axis=(0, 1)) == pytest.approx(theirs.mean(axis=(0, 1)), rel=1e-5)
+    assert ours.rgb.mean(axis=(0, 1)) == pytest.approx(theirs.rgb.mean(axis=(0, 1)), rel=1e-5)
 
 
 def test_interleaved_says_which_engine_ran() -> None:
@@ -65,8 +65,9 @@ def test_substitution_follows_its_threshold() -> None:
 
 def test_substitution_lowers_luminance_noise_a_lot() -> None:
     image = raw(("RG", "BW"), {"R": 10, "G": 20, "B": 8, "W": 100}, (96, 96), noise_e=20.0)
-    noisy = luminance_of_srgb(develop_interleaved(image, IDENTITY, substitution_snr=0.0, neighbourhood=5)).std()
-    clean = luminance_of_srgb(develop_interleaved(image, IDENTITY, neighbourhood=5)).std()
+    small = replace(SETTINGS, neighbourhood=5)
+    noisy = luminance_of_srgb(picture_interleaved(image, IDENTITY, substitution_snr=0.0, settings=small).rgb).std()
+    clean = luminance_of_srgb(picture_interleaved(image, IDENTITY, settings=small).rgb).std()
     assert clean < noisy / 3  # W has five times green's signal at the same noise
 
 
@@ -80,7 +81,7 @@ def test_dark_frame_is_balanced_by_calibration_and_says_so() -> None:
 def test_clipped_highlight_stays_neutral() -> None:
     image = raw(("RG", "GB"), {"R": 500, "G": 1000, "B": 400})
     image.dn[8:16, 8:16] = 15_100
-    patch = develop_bayer(image, IDENTITY)[10:14, 10:14]
+    patch = develop_bayer(image, IDENTITY).rgb[10:14, 10:14]
     assert patch == pytest.approx(np.full((4, 4, 3), 15_000.0), rel=1e-9)
 
 
@@ -112,8 +113,16 @@ def test_a_given_balance_takes_the_place_of_gray_world() -> None:
     ):
         assert picture.rgb == pytest.approx(np.full((32, 32, 3), expected), rel=1e-5)
         assert picture.balance == dict.fromkeys(letters, "given")
-    assert develop_bayer(three, matrix, balance=[1, 2, 1]) == pytest.approx(np.full((32, 32, 3), expected))
-    assert develop_interleaved(four, matrix, balance=[1, 2, 1, 4])[0, 0] == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_picture_is_its_linear_rgb_to_numpy() -> None:
+    linear = develop_bayer(raw(("RG", "GB"), {"R": 500, "G": 1000, "B": 400}, (16, 18)), IDENTITY)
+    assert linear.shape == (16, 18, 3)
+    assert np.asarray(linear) is linear.rgb
+    assert np.asarray(linear, dtype=np.float32).dtype == np.float32
+    assert np.percentile(linear, 99) == pytest.approx(1000.0)
+    for scale in (1000.0, np.float64(1000.0), np.full(3, 1000.0)):
+        np.testing.assert_array_equal(linear / scale, linear.rgb / scale)
 
 
 def test_wrong_matrix_or_neutral_is_refused() -> None:

@@ -63,7 +63,7 @@ def test_a_raw_image_shows_electrons_above_black() -> None:
 
 
 def test_a_developed_picture_says_what_was_decided() -> None:
-    picture = Picture(np.ones((4, 4, 3)), {"R": "gray world"}, 2.5, True, "numpy", 0.75)
+    picture = Picture(np.ones((4, 4, 3)), {"R": "gray world"}, snr=2.5, substitution=0.75)
     page = picture._repr_html_()
     assert "R: gray world" in page
     assert "2.5" in page

@@ -13,8 +13,7 @@ from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.optics import form_image
 from sensor.presets import low_noise, names, preset, table1_output, table1_pixel
-from sensor.response import expected_electrons
-from sensor.window import check_window
+from sensor.response import check_window, expected_electrons
 
 PIXEL = PixelConfig(pitch_um=2.2, fill_factor=0.9, full_well_e=15_000.0, read_noise_e=3.0, dsnu_e=4.0, prnu=0.01)
 LENS = LensConfig(f_number=2.8)
@@ -167,7 +166,7 @@ def test_a_lens_out_of_range_is_refused_by_name_and_value(field, value):
         ({"window_nm": (0.38, 0.78)}, ("window_nm: (0.38, 0.78)", "in 100-20000 nm")),
         ({"cfa": ("RG", "B")}, ("cfa", "rectangle")),
         ({"cfa": "RGBW"}, ("cfa: 'RGBW'", "tuple of rows")),
-        ({"cfa": ("RG", "XW")}, ("responses: letter: 'X'", "allowed: B, G, R, W")),
+        ({"cfa": ("RG", "XW")}, ("responses: channel: 'X'", "allowed: B, G, R, W")),
         ({"responses": Responses({"R": flat(0.5), "G": flat(0.5), "B": flat(0.5)})}, ("'W'", "allowed: B, G, R")),
     ],
 )

@@ -90,8 +90,8 @@ def test_a_csv_gives_the_curves_that_it_holds(tmp_path):
 @pytest.mark.parametrize(
     ("text", "parts"),
     [
-        ("nm,R\n400,0.1\n500,0.2\n", ("['nm', 'R']", "wavelength_nm and one letter a column")),
-        ("wavelength_nm\n400\n500\n", ("['wavelength_nm']", "one letter a column")),
+        ("nm,R\n400,0.1\n500,0.2\n", ("['nm', 'R']", "wavelength_nm and one channel a column")),
+        ("wavelength_nm\n400\n500\n", ("['wavelength_nm']", "one channel a column")),
         ("wavelength_nm,R,G\n400,0.1\n500,0.2\n", ("['wavelength_nm', 'R', 'G']",)),
         ("wavelength_nm,R\n", ("wavelength_nm", "header")),
         ("", ("can't be read", "CSV of numbers with a header")),

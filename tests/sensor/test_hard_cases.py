@@ -14,9 +14,9 @@ from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.device import Device, draw_device
 from sensor.exposure import LONGEST_S, auto_exposure_s
-from sensor.noise import noise_variance
 from sensor.optics import form_image
 from sensor.presets import names, preset
+from sensor.readout import noise_variance
 from sensor.response import expected_electrons
 
 NM = np.arange(390.0, 780.0, 20.0)

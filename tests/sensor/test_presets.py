@@ -115,7 +115,7 @@ def test_the_least_file_leaves_the_rest_at_its_defaults(tmp_path):
         ('cfa = "bayr"\n' + LEAST + LENS, ("cfa: 'bayr'", "did you mean 'bayer'?")),
         ('cfa = ["RG", "B"]\n' + LEAST + LENS, ("cfa", "differ in length")),
         ("cfa = 3\n" + LEAST + LENS, ("cfa: 3",)),
-        ('cfa = ["RQ"]\n' + LEAST + LENS, ("responses: letter: 'Q'",)),
+        ('cfa = ["RQ"]\n' + LEAST + LENS, ("responses: channel: 'Q'",)),
         ("[pixel\n", ("can't be read", "rodcone new preset")),
         ("\0", ("can't be read",)),
     ],

@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from rodcone.errors import InputError
-from sensor.random import Term, draw_key, normals, philox, poisson
+from sensor.random import NoiseTerm, draw_key, normals, philox, poisson
 
 KEY = 0x0123456789ABCDEF
 ALL_ONES = 0xFFFFFFFF
@@ -32,9 +32,9 @@ def test_philox_gives_the_known_answers(counter, key_words, answer):
 
 
 def test_normals_are_box_muller_of_philox_at_column_row_and_term():
-    draws = normals(KEY, Term.READ, (3, 5))
+    draws = normals(KEY, NoiseTerm.READ, (3, 5))
     for row, column in np.ndindex(3, 5):
-        words = philox(tuple(np.array([word], np.uint64) for word in (column, row, int(Term.READ), 0)), KEY)
+        words = philox(tuple(np.array([word], np.uint64) for word in (column, row, int(NoiseTerm.READ), 0)), KEY)
         a, b, c, d = (int(word[0]) for word in words)
         first, second = (a << 32 | b) / 2**64, (c << 32 | d) / 2**64
         expected = np.sqrt(-2 * np.log(1 - first)) * np.cos(2 * np.pi * second)
@@ -42,14 +42,14 @@ def test_normals_are_box_muller_of_philox_at_column_row_and_term():
 
 
 def test_normals_have_the_moments_of_a_standard_normal():
-    draws = normals(KEY, Term.READ, (1024, 1024)).ravel()
+    draws = normals(KEY, NoiseTerm.READ, (1024, 1024)).ravel()
     # Squared standard errors of the first four moments: 1, 2, 15 and 96 over n. Four comparisons within 4 of them:
     # false-alarm rate 2.5e-4.
     for power, moment, spread in ((1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)):
         assert abs(np.mean(draws**power) - moment) < 4 * np.sqrt(spread / draws.size), power
 
 
-@pytest.mark.parametrize("term", [Term.PRNU, Term.DSNU, Term.READ])
+@pytest.mark.parametrize("term", [NoiseTerm.PRNU, NoiseTerm.DSNU, NoiseTerm.READ])
 @pytest.mark.parametrize("key", [0, KEY, 2**64 - 1])
 def test_normals_pass_kolmogorov_and_smirnov(term, key):
     # false-alarm rate 1e-4 each, 9e-4 together
@@ -57,7 +57,7 @@ def test_normals_pass_kolmogorov_and_smirnov(term, key):
 
 
 def test_tails_reach_as_far_as_a_normal_s():
-    draws = normals(KEY, Term.READ, (1024, 1024)).ravel()
+    draws = normals(KEY, NoiseTerm.READ, (1024, 1024)).ravel()
     for sigmas in (-4.0, -3.0, 3.0, 4.0):
         share = stats.norm.sf(abs(sigmas))
         count = np.count_nonzero(draws * np.sign(sigmas) > abs(sigmas))
@@ -72,12 +72,12 @@ def correlation(first, second):
 
 
 def test_terms_keys_rows_and_columns_are_uncorrelated():
-    base = normals(KEY, Term.READ, (512, 512))
+    base = normals(KEY, NoiseTerm.READ, (512, 512))
     others = {
-        "PRNU": normals(KEY, Term.PRNU, base.shape),
-        "DSNU": normals(KEY, Term.DSNU, base.shape),
-        "next key": normals(KEY + 1, Term.READ, base.shape),
-        "key with another upper half": normals(KEY ^ 1 << 32, Term.READ, base.shape),
+        "PRNU": normals(KEY, NoiseTerm.PRNU, base.shape),
+        "DSNU": normals(KEY, NoiseTerm.DSNU, base.shape),
+        "next key": normals(KEY + 1, NoiseTerm.READ, base.shape),
+        "key with another upper half": normals(KEY ^ 1 << 32, NoiseTerm.READ, base.shape),
         "next row": np.roll(base, 1, axis=0),
         "next column": np.roll(base, 1, axis=1),
         "transposed": base.T - np.diag(np.diag(base)),
@@ -92,23 +92,23 @@ def test_terms_keys_rows_and_columns_are_uncorrelated():
 @pytest.mark.parametrize("shape", [(1, 1), (2, 3), (17, 9), (40, 2)])
 def test_a_crop_s_draws_are_the_full_frame_s(shape):
     crop = np.s_[: shape[0], : shape[1]]
-    np.testing.assert_array_equal(normals(KEY, Term.DSNU, shape), normals(KEY, Term.DSNU, (40, 40))[crop])
+    np.testing.assert_array_equal(normals(KEY, NoiseTerm.DSNU, shape), normals(KEY, NoiseTerm.DSNU, (40, 40))[crop])
     mean = np.random.default_rng(0).uniform(0, 100, (40, 40))
-    np.testing.assert_array_equal(poisson(KEY, Term.SHOT, mean[crop]), poisson(KEY, Term.SHOT, mean)[crop])
+    np.testing.assert_array_equal(poisson(KEY, NoiseTerm.SHOT, mean[crop]), poisson(KEY, NoiseTerm.SHOT, mean)[crop])
 
 
 def test_a_row_s_poisson_draws_do_not_depend_on_the_other_rows():
     mean = np.full((6, 50), 7.0)
     changed = mean.copy()
     changed[[0, 1, 3, 5]] = 1e5
-    first, second = poisson(KEY, Term.SHOT, mean), poisson(KEY, Term.SHOT, changed)
+    first, second = poisson(KEY, NoiseTerm.SHOT, mean), poisson(KEY, NoiseTerm.SHOT, changed)
     np.testing.assert_array_equal(first[[2, 4]], second[[2, 4]])
     assert not np.array_equal(first[2], first[4])
 
 
 @pytest.mark.parametrize("mean", [0.3, 1.0, 9.9, 10.1, 24.0, 26.0, 1000.0])
 def test_poisson_draws_follow_the_exact_probabilities(mean):
-    draws = poisson(KEY, Term.SHOT, np.full((256, 512), mean)).ravel()
+    draws = poisson(KEY, NoiseTerm.SHOT, np.full((256, 512), mean)).ravel()
     low, high = int(stats.poisson.ppf(1e-4, mean)), int(stats.poisson.isf(1e-4, mean))
     inner = np.bincount(np.clip(draws, low, high), minlength=high + 1)[low:]
     share = stats.poisson.pmf(np.arange(low, high + 1), mean)
@@ -118,22 +118,22 @@ def test_poisson_draws_follow_the_exact_probabilities(mean):
 
 
 def test_poisson_of_zero_is_zero():
-    np.testing.assert_array_equal(poisson(KEY, Term.SHOT, np.zeros((4, 4))), 0)
+    np.testing.assert_array_equal(poisson(KEY, NoiseTerm.SHOT, np.zeros((4, 4))), 0)
 
 
 def test_neighbouring_keys_and_rows_give_unrelated_poisson_draws():
     mean = np.full((256, 256), 20.0)
-    first = poisson(2**64 - 2, Term.SHOT, mean).astype(float)
+    first = poisson(2**64 - 2, NoiseTerm.SHOT, mean).astype(float)
     # three correlations within 4.5 standard errors: false-alarm rate 2e-5
-    for other in (poisson(2**64 - 1, Term.SHOT, mean), np.roll(first, 1, axis=0), np.roll(first, 1, axis=1)):
+    for other in (poisson(2**64 - 1, NoiseTerm.SHOT, mean), np.roll(first, 1, axis=0), np.roll(first, 1, axis=1)):
         assert abs(correlation(first, other)) < 4.5
 
 
 @pytest.mark.parametrize("key", [5, 2**53, 2**63, 2**64 - 4096])
 def test_every_bit_of_the_key_counts(key):
     mean = np.full((8, 64), 1e6)  # equal draws are rare: 500 pixels agree by chance with a probability under 1e-1000
-    assert not np.array_equal(poisson(key, Term.SHOT, mean), poisson(key + 1, Term.SHOT, mean))
-    assert not np.array_equal(normals(key, Term.READ, (8, 64)), normals(key + 1, Term.READ, (8, 64)))
+    assert not np.array_equal(poisson(key, NoiseTerm.SHOT, mean), poisson(key + 1, NoiseTerm.SHOT, mean))
+    assert not np.array_equal(normals(key, NoiseTerm.READ, (8, 64)), normals(key + 1, NoiseTerm.READ, (8, 64)))
 
 
 def test_one_draw_from_the_generator_gives_a_key_of_64_bits():

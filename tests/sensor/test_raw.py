@@ -87,7 +87,7 @@ def test_whole_numbers_and_finite_floats_are_taken_as_they_are(dtype):
     ("changes", "message"),
     [
         ({"black_dn": 1100.0}, r"black_dn: 1100\.0 is not under white_dn 1100\.0; swap or correct"),
-        ({"black_dn": np.nan}, r"black_dn: nan is not under white_dn"),
+        ({"black_dn": np.nan}, r"black_dn: nan is outside"),
         ({"gain_e_per_dn": 0.0}, r"gain_e_per_dn: 0\.0 is outside .*give electrons per digital number"),
         ({"read_noise_e": -1.0}, r"read_noise_e: -1\.0 is outside .*give electrons, 0 for none"),
         ({"dsnu_e": np.inf}, r"dsnu_e: inf is outside .*give electrons, 0 for none"),

@@ -143,7 +143,7 @@ def test_a_camera_is_calibrated_with_the_infrared_that_it_sees() -> None:
     share = (photons * curve)[nm > 780].sum() / (photons * curve).sum()
     assert 0.2 < share < 0.6
     seen = colours_under(replace(camera, window_nm=VISIBLE_NM), PROCESSORS["interleaved"], illuminant("2856K"))
-    white = fit.letters.index("W")
+    white = fit.channels.index("W")
     beyond = np.mean([each.values[-1] for _, each in color_checker()])
     mixed = (1 - share) * seen.mean[white] + share * beyond
     assert fit.mean[white] == pytest.approx(mixed, rel=2e-3)

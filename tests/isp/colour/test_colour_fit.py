@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from isp.colour.camera_colour import fit_matrix, training
-from isp.colour.colour_fit import LEAST_SIGNAL, ColourFit, fit_colours, relative_noise
+from isp.colour.colour_fit import LEAST_SIGNAL, ColourFit, fit_colours, fit_matrix, relative_noise, training
 from render.illuminants import illuminant
+from render.photometry import colour_matching_functions, photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from rodcone.colour_spaces import adapt_to_d65, xyz_to_srgb
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker
 from sensor.curves import rgbw
@@ -16,20 +17,20 @@ NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
 LIGHT = illuminant("D65").band_average(NM, WIDTH)
 SURFACES = np.array([reflectance.band_average(NM, WIDTH) for _, reflectance in color_checker()])
-LETTERS = ("R", "G", "B", "W")
-RESPONSES = rgbw().band_average(LETTERS, NM, WIDTH)
+CHANNELS = ("R", "G", "B", "W")
+RESPONSES = rgbw().band_average(CHANNELS, NM, WIDTH)
 
 
 @pytest.fixture(scope="module")
 def fit() -> ColourFit:
-    return fit_colours(LETTERS, RESPONSES, NM, LIGHT, SURFACES)
+    return fit_colours(CHANNELS, RESPONSES, NM, LIGHT, SURFACES)
 
 
-@pytest.mark.parametrize("letters", [("R", "G", "B"), LETTERS])
-def test_without_noise_it_is_the_least_squares_matrix(fit: ColourFit, letters: tuple[str, ...]) -> None:
-    expected = fit_matrix(RESPONSES[: len(letters)], NM, LIGHT, SURFACES)
-    assert fit.matrix(letters) == pytest.approx(expected, abs=1e-8)
-    assert np.asarray(fit) == pytest.approx(fit_matrix(RESPONSES[:3], NM, LIGHT, SURFACES), abs=1e-8)
+@pytest.mark.parametrize("names", [("R", "G", "B"), CHANNELS])
+def test_without_noise_it_is_the_least_squares_matrix(fit: ColourFit, names: tuple[str, ...]) -> None:
+    expected = fit_matrix(RESPONSES[: len(names)], NM, LIGHT, SURFACES)
+    assert fit.matrix(names) == pytest.approx(expected, abs=1e-8)
+    assert fit.matrix() == pytest.approx(fit_matrix(RESPONSES[:3], NM, LIGHT, SURFACES), abs=1e-8)
 
 
 @pytest.mark.parametrize("noise", [[1e-6, 1e-6, 1e-6, 1e-8], [1e-2, 4e-3, 2e-2, 1e-4], [3.0, 1.0, 2.0, 0.5]])
@@ -39,7 +40,7 @@ def test_no_matrix_with_rows_of_1_has_a_smaller_expected_error(fit: ColourFit, n
     def error(matrix: np.ndarray) -> float:  # of surface and white noise together, summed over sRGB
         return float(np.mean((signals @ matrix.T - target) ** 2) * 3 + (matrix**2 @ noise).sum())
 
-    best = fit.matrix(LETTERS, noise)
+    best = fit.matrix(CHANNELS, noise)
     assert best.sum(axis=1) == pytest.approx(1.0, abs=1e-9)
     rng = np.random.default_rng(0)
     for size in (1e-4, 1e-2, 1.0):
@@ -51,7 +52,7 @@ def test_no_matrix_with_rows_of_1_has_a_smaller_expected_error(fit: ColourFit, n
 def test_the_expected_error_is_what_noise_drawn_at_random_makes(fit: ColourFit) -> None:
     signals, target = training(RESPONSES, NM, LIGHT, SURFACES)
     noise = np.array([1e-2, 4e-3, 2e-2, 1e-3])
-    matrix, draws = fit.matrix(LETTERS, noise), 4000
+    matrix, draws = fit.matrix(CHANNELS, noise), 4000
     noisy = signals + np.sqrt(noise) * np.random.default_rng(0).normal(size=(draws, *signals.shape))
     errors = ((noisy @ matrix.T - target) ** 2).sum(axis=(1, 2))
     expected = ((signals @ matrix.T - target) ** 2).sum() + len(signals) * (matrix**2 @ noise).sum()
@@ -61,7 +62,7 @@ def test_the_expected_error_is_what_noise_drawn_at_random_makes(fit: ColourFit) 
 
 def test_the_noisier_the_colours_the_more_w_decides(fit: ColourFit) -> None:
     shares = [
-        fit.matrix(LETTERS, np.array([1.0, 0.5, 1.1, 0.02]) * scale)[:, 3].mean() for scale in (1e-6, 1e-3, 1, 1e6)
+        fit.matrix(CHANNELS, np.array([1.0, 0.5, 1.1, 0.02]) * scale)[:, 3].mean() for scale in (1e-6, 1e-3, 1, 1e6)
     ]
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0, abs=0.1)
@@ -85,21 +86,97 @@ def test_a_frame_of_noise_alone_stays_finite_and_leaves_colour_to_w(fit: ColourF
     estimate, gain = np.full((16, 16, 4), -0.5), np.full((16, 16, 4), 0.02)
     noise = relative_noise(frame(0), estimate, gain, np.array([2.5, 1.0, 2.0, 1 / 6]), fit)
     assert noise.max() == pytest.approx(LEAST_SIGNAL**-2, rel=1e-9)
-    matrix = fit.matrix(LETTERS, noise)
+    matrix = fit.matrix(CHANNELS, noise)
     assert matrix.sum(axis=1) == pytest.approx(1.0, abs=1e-6)
     assert np.all(matrix[:, 3] > 0.9)
 
 
-def test_letters_that_do_not_fit_are_refused(fit: ColourFit) -> None:
-    with pytest.raises(InputError, match=r"^letters: \('C',\) are not allowed; fitted were"):
+def test_channels_that_do_not_fit_are_refused(fit: ColourFit) -> None:
+    with pytest.raises(InputError, match=r"^channels: \('C',\) are not allowed; fitted were"):
         fit.matrix(("C",))
-    with pytest.raises(InputError, match=r"^responses: 4 channels don't fit the letters \('R', 'G', 'B'\)"):
+    with pytest.raises(InputError, match=r"^responses: 4 channels don't fit the names \('R', 'G', 'B'\)"):
         fit_colours("RGB", RESPONSES, NM, LIGHT, SURFACES)
 
 
 def test_under_one_wavelength_all_channels_count_alike_and_neutrals_stay_neutral() -> None:
     light = np.where(np.arange(NM.size) == 20, 1.0, 0.0)
-    alone = fit_colours(LETTERS, RESPONSES, NM, light, SURFACES)
+    alone = fit_colours(CHANNELS, RESPONSES, NM, light, SURFACES)
     # the sums cancel to some 1e-17 beside a least noise of 1e-13
-    assert np.asarray(alone) == pytest.approx(np.full((3, 3), 1 / 3), abs=1e-3)
-    assert np.asarray(alone).sum(axis=1) == pytest.approx(np.ones(3), abs=1e-12)
+    assert alone.matrix() == pytest.approx(np.full((3, 3), 1 / 3), abs=1e-3)
+    assert alone.matrix().sum(axis=1) == pytest.approx(np.ones(3), abs=1e-12)
+
+
+def test_a_plain_matrix_stands_at_any_noise_and_takes_w_as_it_is_for_luminance() -> None:
+    matrix = np.array([[1.6, -0.5, -0.1], [-0.2, 1.4, -0.2], [0.0, -0.5, 1.5]])
+    plain = ColourFit.of(matrix.tolist())
+    assert ColourFit.of(plain) is plain
+    for noise in (0.0, 1e-3, 10.0):
+        np.testing.assert_array_equal(plain.matrix(noise=noise), matrix)
+        np.testing.assert_array_equal(plain.matrix("RGBW", noise), np.hstack([matrix, np.zeros((3, 1))]))
+        assert plain.luminance(noise).tolist() == [0.0, 0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("matrix", [np.ones((2, 3)), np.full((3, 3), np.nan), np.ones(9)])
+def test_what_is_no_matrix_is_refused(matrix: np.ndarray) -> None:
+    with pytest.raises(InputError, match=r"^matrix: shape .* is not allowed; give 3x3 finite numbers"):
+        ColourFit.of(matrix)
+
+
+def test_matrix_keeps_neutral_neutral_for_any_light() -> None:
+    for light in ("D65", "A", "F11"):
+        spd = illuminant(light).band_average(NM, WIDTH)
+        matrix = fit_matrix(rgbw().band_average(("R", "G", "B"), NM, WIDTH), NM, spd, SURFACES)
+        assert matrix @ np.ones(3) == pytest.approx([1.0, 1.0, 1.0], abs=1e-12)
+
+
+def test_matrix_is_exact_for_a_camera_that_sees_as_the_observer_does() -> None:
+    # Luther: with responses proportional to x, y, z per photon, a matrix maps every surface to its true colour.
+    curves = np.array([curve.band_average(NM, WIDTH) for curve in colour_matching_functions()])
+    spd = illuminant("D65").band_average(NM, WIDTH)
+    responses = curves / photons_per_joule(NM) * 1e17
+    matrix = fit_matrix(responses, NM, spd, SURFACES)
+    xyz = (SURFACES * spd) @ curves.T
+    white = curves @ spd
+    target = xyz_to_srgb(adapt_to_d65(xyz / white[1], white))
+    assert (xyz / white) @ matrix.T == pytest.approx(target, abs=1e-9)
+
+
+def test_four_channels_fit_at_least_as_well_as_three() -> None:
+    spd = illuminant("D65").band_average(NM, WIDTH)
+    assert fit_matrix(rgbw().band_average(("R", "G", "B", "W"), NM, WIDTH), NM, spd, SURFACES).shape == (3, 4)
+
+
+def test_fit_takes_transposed_tables_alike() -> None:
+    spd = illuminant("D65").band_average(NM, WIDTH)
+    responses = rgbw().band_average(("R", "G", "B"), NM, WIDTH)
+    assert np.array_equal(fit_matrix(responses, NM, spd, SURFACES), fit_matrix(responses.T, NM, spd, SURFACES.T))
+
+
+@pytest.mark.parametrize(
+    ("responses", "surfaces", "name"),
+    [(np.ones((3, 7)), SURFACES, "responses"), (np.ones((3, 40)), np.ones((2, 40)), "reflectances")],
+)
+def test_shapes_that_do_not_fit_are_refused(responses: np.ndarray, surfaces: np.ndarray, name: str) -> None:
+    with pytest.raises(InputError, match=f"^{name}: .*; give"):
+        fit_matrix(responses, NM, np.ones(40), surfaces)
+
+
+def test_matrix_takes_bands_of_uneven_widths() -> None:
+    # the first two bands as one of 20 nm, then every band as two, the first of them 2 and 8 nm wide
+    spd = illuminant("D65").band_average(NM, WIDTH)
+    curves = rgbw().band_average(("R", "G", "B"), NM, WIDTH)
+    even = fit_matrix(curves, NM, spd, SURFACES)
+    nm = np.concatenate([[NM[:2].mean()], NM[2:]])
+    width = np.concatenate([[20.0], WIDTH[2:]])
+    merged = [
+        np.concatenate([values[..., :2].mean(-1, keepdims=True), values[..., 2:]], -1) for values in (curves, SURFACES)
+    ]
+    uneven = fit_matrix(merged[0], nm, np.concatenate([[spd[:2].mean()], spd[2:]]), merged[1], width)
+    assert uneven == pytest.approx(even, abs=2e-3)  # 380-400 nm: a hundredth of B's light, in which curves bend
+    split = [np.repeat(values, 2, axis=-1) for values in (curves, SURFACES, spd)]
+    halves = np.ravel(np.stack([NM - 2.5, NM + 2.5], axis=1))
+    widths = np.full(halves.shape, 5.0)
+    widths[:2], halves[:2] = (2.0, 8.0), (NM[0] - 4.0, NM[0] + 1.0)  # the first band in two of 2 and 8 nm
+    assert fit_matrix(split[0], halves, split[2], split[1], widths) == pytest.approx(even, abs=2e-3)
+    with pytest.raises(InputError, match="width_nm"):
+        fit_matrix(merged[0], nm, np.ones(nm.size), merged[1])

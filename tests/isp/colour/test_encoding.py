@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from isp.colour.camera_colour import encode_srgb
 from isp.colour.encoding import ENCODINGS, encode
+from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from rodcone.tables import colour_science
 

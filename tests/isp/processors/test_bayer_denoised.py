@@ -7,7 +7,8 @@ import pytest
 
 from isp.interleaved import reconstruct
 from isp.processors import bayer_denoised
-from isp.processors.bayer_denoised import bm3d_mosaic, picture_bayer_bm3d, picture_bayer_nlm
+from isp.processors.bayer_denoised import bm3d_mosaic
+from isp.processors.catalogue import PROCESSORS
 from sensor.cfa import Tile, mask
 from sensor.raw import RawImage
 
@@ -27,7 +28,7 @@ def raw(cfa: Tile, shape: tuple[int, int] = (33, 38), level_e: float = 400.0, se
 def test_non_local_means_are_those_of_the_interleaved_camera() -> None:
     image = raw(("RG", "GB"))
     planes = np.asarray(reconstruct(image), dtype=np.float64)
-    picture = picture_bayer_nlm(image, np.eye(3), balance=[0.5, 1.0, 0.4])
+    picture = PROCESSORS["bayer_nlm"].develop(image, np.eye(3), balance=[0.5, 1.0, 0.4])
     assert picture.rgb == pytest.approx(planes / [0.5, 1.0, 0.4], rel=1e-12)
 
 
@@ -59,7 +60,7 @@ def test_bm3d_takes_most_of_the_noise_of_a_flat_field_and_no_light() -> None:
     pytest.importorskip("bm3d", reason="rodcone[bm3d], whose licence excludes commercial use, is not installed")
     pytest.importorskip("colour_demosaicing", reason="rodcone[opponents] is not installed")
     image = raw(("GB", "RG"), (64, 64))
-    picture = picture_bayer_bm3d(image, np.eye(3), balance=[0.5, 1.0, 0.4])
+    picture = PROCESSORS["bayer_bm3d"].develop(image, np.eye(3), balance=[0.5, 1.0, 0.4])
     # 4096 samples: the mean of each colour is known to sigma / sqrt(n), and 5 of these allow 1 false alarm in 6e5
     for index, (share, count) in enumerate(((0.5, 1024), (1.0, 2048), (0.4, 1024))):
         sigma = np.sqrt(share * 400.0 + image.dark_noise_e**2) / share

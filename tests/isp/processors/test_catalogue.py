@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import pytest
 
-from isp.colour.camera_colour import luminance_of_srgb
 from isp.processors.catalogue import PROCESSORS
+from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
 from sensor.cfa import MOSAICS, RGBW, Tile, channels, letter_map

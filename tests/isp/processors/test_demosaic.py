@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from isp.colour.white_balance import WhiteBalance
 from isp.processors.demosaic import malvar, menon
 from isp.processors.mosaic import balance_mosaic
 from rodcone.errors import InputError
@@ -63,14 +64,16 @@ def test_a_mosaic_is_balanced_to_greens_unit_and_held_beside_a_full_colour() -> 
     dn[4, 5] = 15_100  # a green; beside it a red that reads 1.5 full wells when balanced
     dn[4, 4] = 100 + 11_250
     raw = RawImage(dn, ("RG", "GB"), 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
-    mosaic = balance_mosaic(raw, raw.electrons, balance=[0.5, 1.0, 0.4])
+    mosaic, sources = balance_mosaic(raw, raw.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
+    assert sources == dict.fromkeys("RGB", "given")
     expected = np.full((8, 8), 1000.0)
     expected[4, 4:6] = 15_000.0
-    assert mosaic.values == pytest.approx(expected)
+    assert mosaic == pytest.approx(expected)
     far = raw.dn.copy()
     far[4, 4], far[0, 0] = 600, 11_350  # as bright a red, with no full sample beside it, is a red lamp and stays one
     lamp = RawImage(far, ("RG", "GB"), 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
-    assert balance_mosaic(lamp, lamp.electrons, balance=[0.5, 1.0, 0.4]).values[0, 0] == pytest.approx(22_500.0)
+    mosaic, _ = balance_mosaic(lamp, lamp.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
+    assert mosaic[0, 0] == pytest.approx(22_500.0)
 
 
 def test_other_tiles_are_refused() -> None:

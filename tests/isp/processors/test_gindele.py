@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from isp.planes import fill
-from isp.processors.gindele import REACH, adams_planes, luminance_plane, picture_gindele
+from isp.processors.catalogue import PROCESSORS
+from isp.processors.gindele import REACH, adams_planes, luminance_plane
 from rodcone.errors import InputError
 from sensor.cfa import Tile, mask
 from sensor.raw import RawImage
@@ -22,7 +23,7 @@ def raw(values: np.ndarray, cfa: Tile = ("RG", "BW")) -> RawImage:
 @pytest.mark.parametrize("cfa", PHASES)
 def test_where_nothing_saturates_it_is_the_first_interpolation(cfa: Tile) -> None:
     values = np.rint(np.random.default_rng(0).uniform(100, 10_000, (21, 24)))
-    picture = picture_gindele(raw(values, cfa), np.eye(3), balance=ONES)
+    picture = PROCESSORS["rgbw_gindele"].develop(raw(values, cfa), np.eye(3), balance=ONES)
     np.testing.assert_allclose(picture.rgb, adams_planes(values, cfa), rtol=1e-12)
 
 
@@ -30,7 +31,7 @@ def test_where_nothing_saturates_it_is_the_first_interpolation(cfa: Tile) -> Non
 def test_where_w_is_full_the_colours_stand_alone(cfa: Tile) -> None:
     values = np.rint(np.random.default_rng(1).uniform(100, 10_000, (24, 40)))
     values[:, :20][mask(cfa, "W", (24, 40))[:, :20]] = 15_000
-    rgb = picture_gindele(raw(values, cfa), np.eye(3), balance=ONES).rgb
+    rgb = PROCESSORS["rgbw_gindele"].develop(raw(values, cfa), np.eye(3), balance=ONES).rgb
     alone = np.stack([fill(values, cfa, letter) for letter in "RGB"], axis=-1)
     np.testing.assert_allclose(rgb[:, : 19 + REACH - 1], alone[:, : 19 + REACH - 1], rtol=1e-12)
     np.testing.assert_allclose(rgb[:, 21 + REACH :], adams_planes(values, cfa)[:, 21 + REACH :], rtol=1e-12)

@@ -8,9 +8,9 @@ import pytest
 from rodcone.errors import InputError
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.device import draw_device
-from sensor.emva1288.characterise import Plan, characterise, configured, measure, plan_for
+from sensor.emva1288.characterise import ExposurePlan, characterise, configured, measure, plan_for
 from sensor.emva1288.photon_transfer import bench
-from sensor.kernel.run import read_frame
+from sensor.kernel.kernel import read_frame
 from sensor.random import draw_key
 from sensor.readout import as_raw, read_out
 
@@ -130,7 +130,7 @@ SEEDS = 20
 
 def run(sensor, seed):
     """Characterise a chip of `sensor`, with CHIP's numbers as those that should be there."""
-    plan = Plan(np.linspace(0, 1.1 * STRONG.full_well_e, 13)[1:], 0.001, 8, plan_for(CHIP).dark_times_s)
+    plan = ExposurePlan(np.linspace(0, 1.1 * STRONG.full_well_e, 13)[1:], 0.001, 8, plan_for(CHIP).dark_times_s)
     return measure(bench(sensor, WIDE, seed), plan, CHIP)
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from rodcone.jit import arrays, backend, dr
-from sensor.kernel.kernel import Divisor, Frame, expected_lanes, letter_lanes, normal_pair, philox
+from sensor.kernel.kernel import Divisor, normal_pair, philox, position, tile_channel, weighted_sum
 from sensor.random import philox as philox_numpy
 
 pytestmark = pytest.mark.skipif(backend() == "numpy", reason="Dr.Jit has neither LLVM nor CUDA here")
@@ -53,9 +53,10 @@ def test_each_pixel_takes_the_weights_of_its_own_cell(width, first):
     weights = np.random.default_rng(4).random((4, 5))
     opaque = [[dr.opaque(jit.Float, float(w)) for w in row] for row in weights]
     divisors = [Divisor(dr.opaque(jit.UInt, n), dr.opaque(jit.Float64, 1 / n)) for n in (2, tile_width, width)]
-    own = letter_lanes(words(cells), *divisors[:2], Frame(dr.opaque(jit.UInt, first), divisors[2]), count)
-    made = expected_lanes([jit.Float(plane) for plane in planes], opaque, own).numpy()
+    pixel = dr.arange(jit.UInt, count) + dr.opaque(jit.UInt, first)
+    own = tile_channel(words(cells), *divisors[:2], *position(pixel, divisors[2]))
+    made = weighted_sum([jit.Float(plane) for plane in planes], opaque, own).numpy()
     row, column = np.divmod(first + np.arange(count), width)
-    letter = cells[(row % 2) * tile_width + column % tile_width]
-    np.testing.assert_array_equal(own.numpy(), letter)
-    np.testing.assert_allclose(made, np.einsum("bn,nb->n", planes.astype(np.float64), weights[letter]), rtol=1e-6)
+    channel = cells[(row % 2) * tile_width + column % tile_width]
+    np.testing.assert_array_equal(own.numpy(), channel)
+    np.testing.assert_allclose(made, np.einsum("bn,nb->n", planes.astype(np.float64), weights[channel]), rtol=1e-6)

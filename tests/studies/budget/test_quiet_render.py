@@ -10,8 +10,8 @@ from render.engine import render
 from render.illuminants import illuminant
 from render.scene import LightGroup
 from scenes.catalog import load
-from sensor.noise import noise_variance
 from sensor.presets import low_noise, table1_output
+from sensor.readout import noise_variance
 from studies.budget import quiet_render
 from studies.budget.budget import MOST_SHARE, OF_PIXELS, pixel_share
 from studies.budget.quiet_render import render_quietly

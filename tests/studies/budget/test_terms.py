@@ -12,10 +12,10 @@ from render.scene import LightGroup
 from render.spectrum import Spectrum, flat, line_spectrum
 from render.transport import Transport
 from rodcone.jit import backend
-from sensor.kernel.run import expected_electrons_single
-from sensor.noise import noise_variance
+from sensor.kernel.kernel import expected_electrons_single
 from sensor.optics import camera_equation, falloff, form_image
 from sensor.presets import low_noise
+from sensor.readout import noise_variance
 from sensor.response import electrons_per_irradiance, expected_electrons
 from studies.budget.bands import COUNTS, emission_lines_nm, fine_bands, groups_of, merge_radiance, merge_transport
 from studies.budget.choice import choose, image_ns, render_ns

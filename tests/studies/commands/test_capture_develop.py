@@ -9,16 +9,15 @@ import pytest
 import tifffile
 from PIL import Image
 
-from isp.colour.camera_colour import encode_srgb
 from isp.colour.encoding import encode
 from render.illuminants import illuminant
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import BAYER, RGBW, mask
-from sensor.left_out import left_out
-from sensor.optics import form_image
+from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import read_raw, write_raw

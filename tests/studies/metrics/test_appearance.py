@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isp.colour.camera_colour import encode_srgb, luminance_of_srgb
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from studies.metrics.appearance import appearance, true_picture
 from studies.metrics.flip import flip
 from studies.metrics.pu21 import pu21_psnr_db

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from isp.colour.camera_colour import encode_srgb, luminance_of_srgb
+from rodcone.colour_spaces import decode_srgb, encode_srgb, luminance_of_srgb
 from studies.metrics.chart_colours import (
     WHITE_PATCH,
     daylight_delta_e,
     daylight_srgb,
-    decode_srgb,
     pair_delta_e,
     true_pair_delta_e,
 )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isp.colour.camera_colour import luminance_of_srgb
+from rodcone.colour_spaces import luminance_of_srgb
 from scenes.catalog import load
 from studies.metrics.mtf import edge_response
 from studies.metrics.patches import patch_masks

@@ -10,9 +10,9 @@ import pytest
 import report_browser as CHROME
 from PIL import Image
 
-from isp.colour.camera_colour import encode_srgb
+from rodcone.colour_spaces import decode_srgb, encode_srgb
 from studies.commands.cli import main
-from studies.paper.camera import decode_srgb, noise
+from studies.paper.camera import noise
 from studies.paper.checks import ClaimCheck, at_least, at_most
 from studies.paper.figure1b import gain_db
 from studies.paper.figure4 import edge_columns

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isp.colour.camera_colour import fit_matrix, neutral_response
+from isp.colour.colour_fit import fit_matrix
+from isp.colour.white_balance import neutral_response
 from render.illuminants import illuminant
 from render.photometry import colour_matching_functions, tristimulus
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, flat

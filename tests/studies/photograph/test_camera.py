@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from isp.colour.camera_colour import encode_srgb
 from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from rodcone.colour_spaces import encode_srgb
 from scenes.reflectances import color_checker
 from sensor.optics import form_image
 from sensor.response import expected_electrons

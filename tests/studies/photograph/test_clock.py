@@ -54,7 +54,7 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Work:
     made = Work()
     monkeypatch.setattr(clock, "time", SimpleNamespace(perf_counter=made.now))
     monkeypatch.setattr(clock, "_CALLED", set())
-    slow = {name: replace(one, develop=made.taking(name, 10.0, one.develop)) for name, one in PROCESSORS.items()}
+    slow = {name: replace(one, picture=made.taking(name, 10.0, one.picture)) for name, one in PROCESSORS.items()}
     for module in (cell_run, camera):
         monkeypatch.setattr(module, "PROCESSORS", slow)
         monkeypatch.setattr(module, "read_out", made.taking("capture", 1.0, module.read_out))

@@ -13,12 +13,12 @@ import pytest
 import sweep_sample as SAMPLE
 from PIL import Image
 
-from isp.colour.camera_colour import encode_srgb
 from isp.colour.colour_fit import fit_colours
 from isp.pipeline import picture_bayer
 from render.illuminants import illuminant
 from render.radiance_files.radiance_source import as_transport, load_radiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker
 from sensor.device import draw_device

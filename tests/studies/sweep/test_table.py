@@ -8,7 +8,7 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 
-from isp.colour.camera_colour import encode_srgb
+from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
 from studies.metrics.chart_colours import daylight_srgb

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sensor.crosstalk import spread_charge
+from sensor.readout import spread_charge
 
 
 def test_an_impulse_keeps_its_rest_and_gives_its_share_to_each_of_four_neighbours():

@@ -10,10 +10,10 @@ from rodcone.jit import backend, dr
 from sensor.cfa import MOSAICS
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.device import Device, draw_device
-from sensor.kernel.run import expected_electrons_single, read_frame
+from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import SpectralIrradiance
 from sensor.presets import preset
-from sensor.random import Term, philox
+from sensor.random import NoiseTerm, philox
 from sensor.readout import read_out
 from sensor.response import electrons_per_irradiance, expected_electrons
 
@@ -187,7 +187,7 @@ def test_read_noise_is_that_of_the_pixel_s_own_counter():
     sensor = replace(COUNTS, pixel=replace(COUNTS.pixel, read_noise_e=100.0), black_level_dn=1000.0)
     dn, key = read(0.0, sensor, (5, 7), key=2**40 + 3), 2**40 + 3
     for row, column in np.ndindex(5, 7):
-        counter = tuple(np.array([word], np.uint64) for word in (column, row, int(Term.EXPOSURE), 0))
+        counter = tuple(np.array([word], np.uint64) for word in (column, row, int(NoiseTerm.EXPOSURE), 0))
         first, second = (int(word[0]) >> 1 for word in philox(counter, key)[:2])
         noise_e = 100 * np.sqrt(-2 * np.log((first + 0.5) / 2**31)) * np.cos(2 * np.pi * second / 2**31)
         assert abs(dn[row, column] - (1000 + noise_e / sensor.gain_e_per_dn)) < 0.51

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from sensor.config import LensConfig, PixelConfig, SensorConfig
-from sensor.crosstalk import spread_charge
 from sensor.device import draw_device
-from sensor.noise import noise_variance
-from sensor.readout import read_out
+from sensor.readout import noise_variance, read_out, spread_charge
 
 QUIET = PixelConfig(2.2, 0.9, full_well_e=60_000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
 

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from isp.processors.bayer import bilinear
+from isp.bilinear import bilinear
 from sensor.raw import RawImage
 
 PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]

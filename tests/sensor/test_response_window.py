@@ -14,8 +14,7 @@ from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import low_noise
-from sensor.response import expected_electrons
-from sensor.window import lost_shares
+from sensor.response import expected_electrons, lost_shares
 
 SENSOR = low_noise()
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from render.radiance import SpectralRadiance
-from sensor.left_out import left_out, under_zero
-from sensor.optics import camera_equation, falloff, form_image
+from sensor.optics import camera_equation, falloff, form_image, left_out, negative_lobe_share
 from sensor.presets import names, preset
 
 
@@ -63,7 +62,7 @@ def test_the_falloff_stated_is_that_of_a_picture_s_corners():
 def test_the_light_taken_from_around_a_point_is_what_form_image_takes(f_number):
     sensor = camera(diffraction=1.0, f_number=f_number)
     stated = float(re.search(r"([\d.]+)%", line(sensor, "detail finer than a pixel"))[1]) / 100
-    assert stated == pytest.approx(under_zero(sensor), abs=6e-4)
+    assert stated == pytest.approx(negative_lobe_share(sensor), abs=6e-4)
     point, even = np.zeros((64, 64, 1)), np.ones((64, 64, 1))
     point[32, 32] = 1.0
     nm, width = np.array([550.0]), np.array([10.0])

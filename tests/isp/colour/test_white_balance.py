@@ -1,0 +1,52 @@
+"""White balance: the default neutral, a given response, W in a group of its own, and what is refused."""
+
+import numpy as np
+import pytest
+
+from isp.colour.white_balance import WhiteBalance, neutral_response
+from rodcone.errors import InputError
+from sensor.raw import RawImage
+
+
+def raw(dn: np.ndarray) -> RawImage:
+    return RawImage(dn.astype(np.uint16), ("RG", "BW"), 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
+
+
+def test_neutral_response_has_the_published_electron_ratios() -> None:
+    red, green, blue, white = neutral_response(("R", "G", "B", "W"))
+    assert [white / red, white / green, white / blue] == pytest.approx([9.80, 4.88, 10.84], rel=0.03)
+
+
+def test_pixels_near_a_full_colour_do_not_count_and_none_left_means_calibrated_gains() -> None:
+    dn, planes = np.tile([[600, 1100], [500, 5100]], (8, 8)), np.empty((16, 16, 4))
+    planes[:] = [500.0, 1000.0, 400.0, 5000.0]
+    dn[0, 0] = dn[15, 0] = 15_100  # red sites and blue ones: the tile's reach is one pixel
+    planes[:2, :2] = planes[14:, :2] = 1e6
+    balance = WhiteBalance(neutral=np.array([1.0, 2.0, 1.0, 8.0]))
+    assert balance.gains(raw(dn), planes).factors == pytest.approx([2.0, 1.0, 2.5, 0.2], rel=1e-12)
+    gains = balance.gains(raw(np.full((16, 16), 15_100)), planes)
+    assert gains.factors == pytest.approx([2.0, 1.0, 2.0, 0.25], rel=1e-12)
+    assert gains.sources == dict.fromkeys("RGBW", "calibrated")
+
+
+def test_w_that_is_full_everywhere_takes_the_calibrated_gain_and_leaves_the_colours_alone() -> None:
+    dn = np.tile([[600, 1100], [500, 15_100]], (8, 8))
+    planes = np.broadcast_to([500.0, 1000.0, 400.0, 15_000.0], (16, 16, 4))
+    gains = WhiteBalance(neutral=np.array([1.0, 2.0, 1.0, 8.0])).gains(raw(dn), planes)
+    assert gains.factors == pytest.approx([2.0, 1.0, 2.5, 0.25], rel=1e-12)
+    assert gains.sources == {**dict.fromkeys("RGB", "gray world"), "W": "calibrated"}
+
+
+def test_a_given_response_decides_alone() -> None:
+    image = raw(np.full((8, 8), 1100))
+    gains = WhiteBalance.of(image, [7, 7, 7, 7], [1, 2, 1, 4]).gains(image, np.ones((8, 8, 4)))
+    assert gains.factors.tolist() == [2.0, 1.0, 2.0, 0.5]
+    assert gains.sources == dict.fromkeys("RGBW", "given")
+
+
+def test_a_value_is_taken_as_it_is_and_a_wrong_response_refused() -> None:
+    image, value = raw(np.full((8, 8), 1100)), WhiteBalance()
+    assert WhiteBalance.of(image, None, value) is value
+    for name, pair in (("neutral", ([1, 2, 3], None)), ("balance", (None, [1, 2, 3, -1]))):
+        with pytest.raises(InputError, match=rf"^{name}: .* is not allowed; give a positive response for each of"):
+            WhiteBalance.of(image, *pair)
