@@ -25,7 +25,8 @@ from environment import print_environment
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from isp.pipeline import picture_interleaved
+from isp.colour.colour_fit import ColourFit
+from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
 from isp.settings import NEIGHBOURHOOD, Settings
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL, substitution_weight
@@ -33,18 +34,23 @@ from render.engine import render
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
-from sensor.cfa import channels, mask
+from sensor.capture import expose
+from sensor.cfa import mask
+from sensor.config import SensorConfig
+from sensor.device import Device, draw_device
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
-from sensor.readout import read_out
+from sensor.presets import preset
+from sensor.raw import RawImage
 from sensor.response import expected_electrons
-from studies.commands.demo import WAVELENGTH_NM
+from sensor.variations import vary
 from studies.metrics.confidence import SeedMean, mean_with_confidence
 from studies.metrics.quality import Quality, measure
-from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
-from studies.photograph.camera import Camera, build_camera, photograph
+from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
+from studies.photograph.camera import colour_fit, develop_to_scale
 
 SIZE = 160
+WAVELENGTH_NM = np.arange(390.0, 780.0, 20.0)
 FIXED_S, LONGEST_S = 0.020, 0.066
 DAYLIGHT_CD_M2 = 1000.0
 OUT = Path("out/bench_quality")
@@ -63,6 +69,25 @@ class RenderedScene:
     light: Light
     white_cd_m2: float
     truth: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ProcessorCamera:
+    """A processor's camera with one chip; colours fitted under the stage's light."""
+
+    name: str
+    sensor: SensorConfig
+    device: Device
+    colours: ColourFit
+
+
+@dataclass(frozen=True)
+class MeasuredShot:
+    """A photograph, its picture and its quality."""
+
+    raw: RawImage
+    picture: Picture
+    quality: Quality
 
 
 def open_stage(name: str, max_spp: int) -> RenderedScene:
@@ -87,13 +112,15 @@ class SceneAndSensor:
     def __init__(self, stage: RenderedScene, sensor: str) -> None:
         self.stage, self.sensor, self._images = stage, sensor, {}
 
-    def camera(self, name: str, seed: int) -> Camera:
-        """Camera with the chip of a seed."""
-        return build_camera(
-            name, self.sensor, self.stage.light, self.stage.truth.shape[:2], np.random.default_rng([seed, 0])
-        )
+    def camera(self, name: str, seed: int) -> ProcessorCamera:
+        """ProcessorCamera with the chip of a seed."""
+        sensor = vary(preset(self.sensor), PROCESSORS[name].mosaic)
+        device = draw_device(sensor, self.stage.truth.shape[:2], np.random.default_rng([seed, 0]))
+        return ProcessorCamera(name, sensor, device, colour_fit(sensor, PROCESSORS[name], self.stage.light))
 
-    def exposed(self, camera: Camera, level: float, exposure: float | str) -> tuple[NDArray[np.float64], float]:
+    def exposed(
+        self, camera: ProcessorCamera, level: float, exposure: float | str
+    ) -> tuple[NDArray[np.float64], float]:
         """Expected electrons, and the exposure [s]; a letter: auto exposure by this channel."""
         if camera.name not in self._images:
             self._images[camera.name] = form_image(self.stage.radiance, camera.sensor)
@@ -103,19 +130,23 @@ class SceneAndSensor:
             exposure = auto_exposure_s(lit, camera.sensor, LONGEST_S, channel=exposure)
         return expected_electrons(lit, camera.sensor, exposure), exposure
 
-    def shot(self, camera: Camera, level: float, exposure: float | str, seed: int) -> Any:
-        """One photograph, developed and measured."""
+    def shot(
+        self, camera: ProcessorCamera, level: float, exposure: float | str, seed: int, **options: Any
+    ) -> MeasuredShot:
+        """One photograph, developed and measured; `options` are the processor's."""
+        stage, processor = self.stage, PROCESSORS[camera.name]
         electrons, seconds = self.exposed(camera, level, exposure)
-        rng = np.random.default_rng([seed, 1])
-        white = self.stage.white_cd_m2 * level
-        return photograph(camera, electrons, self.stage.truth, self.stage.light, white, seconds, rng)
+        raw = expose(electrons, camera.sensor, seconds, camera.device, np.random.default_rng([seed, 1]), exact=True)
+        white = stage.white_cd_m2 * level
+        linear, picture = develop_to_scale(raw, processor, camera.colours, camera.sensor, stage.light, white, **options)
+        return MeasuredShot(raw, picture, measure(encode_srgb(linear), stage.truth))
 
     def snr_db(self, name: str, letter: str, level: float, seconds: float) -> float:
         """Median SNR of a letter's pixels, in expectation: shot noise and dark noise."""
         camera = self.camera(name, 0)
         electrons, _ = self.exposed(camera, level, seconds)
         signal = electrons[mask(camera.sensor.cfa, letter, electrons.shape)]
-        raw = read_out(electrons, camera.sensor, camera.device, seconds, np.random.default_rng(0))
+        raw = expose(electrons, camera.sensor, seconds, camera.device, np.random.default_rng(0), exact=True)
         return float(20 * np.log10(np.median(signal / np.sqrt(signal + raw.dark_noise_e**2))))
 
     def level_of_snr(self, snr_db: float, seconds: float) -> float:
@@ -238,18 +269,12 @@ def substitution(bench: SceneAndSensor) -> None:
 def settings(bench: SceneAndSensor, levels: Sequence[float]) -> None:
     """Mean loss of PSNR against the best of the sweep at each level, and mean ratio of dE2000 to its best."""
     choices = [(p, d, s) for p in (1, 3, 5) for d in (3.0, 6.0, 10.0) for s in (2.0, 3.0, 4.0, 8.0, 16.0)]
-    camera, stage = bench.camera("interleaved", 0), bench.stage
+    camera = bench.camera("interleaved", 0)
     found = np.zeros((len(levels), len(choices), 2))
     for level, row in zip(levels, found, strict=True):
-        electrons, seconds = bench.exposed(camera, level, FIXED_S)
-        raw = read_out(electrons, camera.sensor, camera.device, seconds, np.random.default_rng([0, 1]))
-        neutral = neutral_electrons(camera.sensor, stage.light, seconds)
-        white_e = neutral[channels(camera.sensor.cfa).index("G")] * stage.white_cd_m2 * level
         for j, (patch, sigma_d, sigma_s) in enumerate(choices):
-            picture = picture_interleaved(
-                raw, camera.colours, neutral=neutral, settings=Settings(NEIGHBOURHOOD, patch, sigma_d, sigma_s)
-            )
-            quality = measure(encode_srgb(picture.rgb / white_e), stage.truth)
+            chosen = Settings(NEIGHBOURHOOD, patch, sigma_d, sigma_s)
+            quality = bench.shot(camera, level, FIXED_S, 0, settings=chosen).quality
             row[j] = quality.psnr_db, quality.delta_e_median
     loss = (found[..., 0].max(axis=1, keepdims=True) - found[..., 0]).mean(axis=0)
     ratio = (found[..., 1] / found[..., 1].min(axis=1, keepdims=True)).mean(axis=0)

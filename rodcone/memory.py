@@ -14,7 +14,6 @@ _TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by g
 _VIEW_ARRAYS = 7  # one pass's planes and their copies; later relit radiance, its halves, and an image forming
 _RENDER_BYTES = 120  # whatever the bands: the render's marks, a preview
 _CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
-_PICTURE_BYTES = 50  # of each picture kept until the report: floats, its place on the overview, its file
 PROCESS_BYTES = 350e6  # libraries and compiled kernels
 _FILE_BANDS = 40  # of a picture file
 _FILE_PACKING = 1.5  # its bytes of float32 over those on disk: 1.2 with the noise of a render, more without
@@ -46,7 +45,7 @@ class Limit:
     each: bool = False
 
 
-def memory(pixels: int, bands: int, groups: int, workers: int = 0, pictures: int = 0) -> Memory:
+def memory(pixels: int, bands: int, groups: int, workers: int = 0) -> Memory:
     """Memory that a render of so many light groups needs, and what comes after it.
 
     Parameters
@@ -55,11 +54,9 @@ def memory(pixels: int, bands: int, groups: int, workers: int = 0, pictures: int
         No groups for a picture file, which needs no render.
     workers : int
         Processes that develop cells; 1: the process that renders does, 0: no cells are made here.
-    pictures : int
-        Kept until all are made.
     """
     arrays = _TRANSPORT_ARRAYS * groups + _VIEW_ARRAYS
-    rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + _RENDER_BYTES + _PICTURE_BYTES * pictures)
+    rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + _RENDER_BYTES)
     if workers <= 1:
         own = rendering + workers * _CELL_BYTES * pixels
         return Memory(own, own)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
-from rodcone.errors import InputError
+from rodcone.errors import InputError, require_range
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import Device
@@ -15,7 +15,7 @@ from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import camera_equation, falloff, form_image, spreads
 from sensor.random import draw_key
 from sensor.raw import RawImage
-from sensor.readout import as_raw, read_out
+from sensor.readout import as_raw, check_expected, read_out
 from sensor.response import electrons_per_irradiance, expected_electrons
 
 
@@ -68,10 +68,9 @@ def capture(
     image = form_image(radiance, sensor, samples_per_pixel)
     _check_frame(image.values.shape[0], image.values.shape[1], device)
     if _numpy_runs(exact):
-        return read_out(expected_electrons(image, sensor, exposure_s), sensor, device, exposure_s, rng)
+        return expose(expected_electrons(image, sensor, exposure_s), sensor, exposure_s, device, rng, exact=exact)
     weights = electrons_per_irradiance(sensor, image.wavelength_nm, image.widths_nm, exposure_s)
-    expected_e = expected_electrons_single(image.values, weights, sensor)
-    return _read_single(expected_e, sensor, device, exposure_s, rng)
+    return expose(expected_electrons_single(image.values, weights, sensor), sensor, exposure_s, device, rng)
 
 
 def capture_strips(
@@ -118,9 +117,42 @@ def capture_strips(
     _check_frame(row, device.shape[1], device)
     if sensor.lens.horizontal_view_deg:
         expected_e *= falloff(sensor.lens, device.shape).astype(expected_e.dtype)
-    if in_numpy:
+    return expose(expected_e, sensor, exposure_s, device, rng, exact=exact)
+
+
+def expose(
+    expected_e: NDArray[np.floating],
+    sensor: SensorConfig,
+    exposure_s: float,
+    device: Device,
+    rng: np.random.Generator,
+    *,
+    exact: bool = False,
+) -> RawImage:
+    """Expose and read the chip once, from expected electrons: the second half of `capture`.
+
+    Dr.Jit draws the frame on LLVM or CUDA, in single precision; NumPy's `read_out` does otherwise, and with `exact`.
+
+    Parameters
+    ----------
+    expected_e : (h, w) array
+        Expected photo-electrons of each pixel in `exposure_s`, without dark current.
+    sensor, exposure_s, device, rng, exact
+        As `capture` takes them.
+
+    Raises
+    ------
+    InputError
+        For a frame that isn't the device's size, negative or non-finite electrons, a negative exposure, or no
+        Generator.
+    """
+    if _numpy_runs(exact):
         return read_out(expected_e, sensor, device, exposure_s, rng)
-    return _read_single(expected_e, sensor, device, exposure_s, rng)
+    require_range("exposure_s", exposure_s, 0.0, 1e7, "give seconds, 0 or more")
+    check_expected(expected_e, device)
+    single = np.asarray(expected_e, dtype=np.float32)
+    dn = read_frame(single, sensor, device, exposure_s, draw_key(rng))
+    return as_raw(dn, sensor, exposure_s, engine=backend(), hot=device.hot)
 
 
 def _check_frame(height: int, width: int, device: Device) -> None:
@@ -152,10 +184,3 @@ def _expected_numpy(
     lens = replace(sensor.lens, horizontal_view_deg=0.0)
     turned = replace(sensor, cfa=sensor.cfa[turn:] + sensor.cfa[:turn], lens=lens)
     return expected_electrons(form_image(strip, turned), turned, exposure_s)
-
-
-def _read_single(
-    expected_e: NDArray[np.float32], sensor: SensorConfig, device: Device, exposure_s: float, rng: np.random.Generator
-) -> RawImage:
-    dn = read_frame(expected_e, sensor, device, exposure_s, draw_key(rng))
-    return as_raw(dn, sensor, exposure_s, engine=backend(), hot=device.hot)

@@ -145,9 +145,8 @@ def check_expected(expected: NDArray[np.floating], device: Device) -> None:
             f"expected_e: shape {expected.shape} is not the device's {device.shape}; "
             "draw the device with the frame's shape"
         )
-    bad = ~(np.isfinite(expected) & (expected >= 0))
-    if bad.any():
-        row, column = (int(i) for i in np.argwhere(bad)[0])
+    if not (expected.min() >= 0 and expected.max() < np.inf):  # false for NaN too
+        row, column = (int(i) for i in np.argwhere(~(np.isfinite(expected) & (expected >= 0)))[0])
         raise InputError(
             f"expected_e: {expected[row, column]} at row {row}, column {column}; "
             "allowed: finite numbers >= 0; repair the radiance"

@@ -20,6 +20,11 @@ from studies.sweep.row import TIME_AND_HOST, Row
 from studies.sweep.run_sweep import Runner, Swept, sweep
 from studies.sweep.workers import InThisProcess, run
 
+RENDER = (
+    '{"integrator": "file", "passes": 8, "stopped_by": "samples", "relative_mc_error": 0.01, '
+    '"relative_level_error": null, "first_nm": 390.0, "last_nm": 770.0, "width_nm": 20.0, "brightest_share": null, '
+    '"notes": []}'
+)
 ROW = Row(
     key="00ff",
     scene="desk, lit.exr",
@@ -34,6 +39,7 @@ ROW = Row(
     exposure_s=0.1 + 0.2,
     spp=0,
     bands=10,
+    render=RENDER,
     lens='{"f_number": 2.8}',
     budget_share=None,
     psnr_db=float("inf"),
@@ -133,7 +139,14 @@ def row(processor: str, seed: int, **values: Any) -> Row:
     """A row in which all that is not given is empty."""
     hints = get_type_hints(Row)
     plain = {field.name: EMPTY.get(hints[field.name]) for field in fields(Row)}
-    place = {"scene": "desk", "spectrum": "own", "level": "1cd/m2", "exposure": "auto", "sensor": "mine.toml"}
+    place = {
+        "render": RENDER,
+        "scene": "desk",
+        "spectrum": "own",
+        "level": "1cd/m2",
+        "exposure": "auto",
+        "sensor": "mine.toml",
+    }
     return Row(
         **plain
         | place

@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 
 from render.spectrum import Floats
 from rodcone.jit import backend
+from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
-from sensor.kernel.kernel import read_frame
-from sensor.random import draw_key
-from sensor.readout import read_out
 
 # Expected photo-electrons of every pixel and the exposure time [s] in, one frame [DN] out.
 Expose: TypeAlias = Callable[[float, float], NDArray[np.uint16]]
@@ -27,17 +25,15 @@ def engine(exact: bool = False) -> str:
 def bench(sensor: SensorConfig, shape: tuple[int, int], seed: int, exact: bool = False) -> Expose:
     """Put one chip under even light that is set in electrons: the quantum efficiency is 1 by construction.
 
-    Frames are drawn as by `sensor.capture.capture`: by Dr.Jit, or with `exact` and where it doesn't run by `read_out`.
+    Its frames are drawn as `sensor.capture.expose` draws them.
     """
     device = draw_device(sensor, shape, np.random.default_rng([seed, 0]))
     rng = np.random.default_rng([seed, 1])
 
-    def expose(light_e: float, exposure_s: float) -> NDArray[np.uint16]:
-        if engine(exact) == "numpy":
-            return read_out(np.full(shape, light_e), sensor, device, exposure_s, rng).dn
-        return read_frame(np.full(shape, light_e, dtype=np.float32), sensor, device, exposure_s, draw_key(rng))
+    def frame(light_e: float, exposure_s: float) -> NDArray[np.uint16]:
+        return expose(np.full(shape, light_e), sensor, exposure_s, device, rng, exact=exact).dn
 
-    return expose
+    return frame
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def check_plan(
         made = []
         for which, (model, of) in enumerate(((planned, study), (reference, other))):
             step(f"{choice.source}, {('planned', 'reference')[which]}", len(rows) / len(planned.ledgers))
-            transport = make_transport(opened, of, model.renders.get(choice), cache, lambda share, error: None)
+            transport, _ = make_transport(opened, of, model.renders.get(choice), cache, lambda share, error: None)
             seconds[which] += transport.seconds
             made.append(transport)
         rows += _compare(choice, planned, reference, made[0], made[1])

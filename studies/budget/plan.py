@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 from render.engine import render
 from render.spectrum import Spectrum
 from render.transport import Transport
-from sensor.config import LensConfig, SensorConfig
-from sensor.exposure import auto_exposure_s
-from sensor.optics import form_image
+from sensor.config import LensConfig
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.budget.bands import counts, fine_bands, groups_of, wide_bands
@@ -21,7 +19,7 @@ from studies.budget.ledger import KERNEL, Ledger, PilotNoise, Weighed, ledger, w
 from studies.budget.model_plan import Plan
 from studies.budget.terms import LENS_TERMS, effects, horizontal_view_deg
 from studies.study.lit_scene import OpenedScene, level_luminance, open_all, under, white_spectrum
-from studies.study.model import ImageModel, RenderModel
+from studies.study.model import ImageModel, RenderModel, unit_exposure_s
 from studies.study.radiance_file import open_radiance_file
 from studies.study.study import OWN, Condition, Study, conditions, mosaics, parse_exposure
 
@@ -29,7 +27,6 @@ PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels a picture is
 PILOT_SEED = 1 << 32  # added to the study's seed: the pilot is no part of a render, and the cache keeps them apart
 FULL_PASSES_SPP = 128  # from which on a render's passes have 16 samples
 REFERENCE_SAMPLES = 4  # times what the study allows: the reference's noise is then at most half of the plan's
-_FOREVER_S = 1e7
 
 Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 Groups = Mapping[int, Sequence[NDArray[np.intp]]]
@@ -156,7 +153,7 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
         lux = lit.illuminance_lux(1.0)
         noise = _pilot_noise(pilot, lit)
         for name in study.sensors:
-            auto_s = _auto_s(lit, preset(name))
+            auto_s = unit_exposure_s(lit.relight(luminance_cd_m2=1.0), preset(name))
             for mosaic in mosaics(study):
                 sensor = vary(preset(name), mosaic)
                 found = effects(lit, sensor, full_lens(study, sensor.lens, pilot.view_deg), pilot.groups, rng)
@@ -176,13 +173,6 @@ def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:
     fewer = lit.coverage.size / (pilot.opened.size[0] * pilot.opened.size[1])
     error = lit.level().relative_error or 0.0
     return PilotNoise(spp=lit.spp, pass_spp=lit.spp // lit.passes, level=error**2 * lit.spp * fewer)
-
-
-def _auto_s(transport: Transport, sensor: SensorConfig) -> float:
-    """Time that auto exposure chooses at 1 cd/m^2, behind a plain lens, as a sweep does."""
-    bare = replace(sensor.lens, diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0, defocus_um=0.0)
-    plain = replace(sensor, lens=bare)
-    return auto_exposure_s(form_image(transport.relight(luminance_cd_m2=1.0), plain), plain, _FOREVER_S)
 
 
 def _worst(ledgers: Sequence[Ledger]) -> dict[Condition, float]:

@@ -4,10 +4,9 @@ import sys
 import warnings
 from functools import cache
 from importlib import metadata
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError
 
 from rodcone.errors import InputError
 from studies.commands.console import INTERRUPTED, say
@@ -23,80 +22,10 @@ app = App(
 )
 
 
-@app.command
-def demo(
-    *,
-    out: Annotated[Path, Parameter(name=["--out", "-o"])] = Path("out/demo"),
-    scene: str = "still_life",
-    size: int = 256,
-    sensor: Annotated[list[str] | None, Parameter(negative_iterable=())] = None,
-    level: Annotated[list[str] | None, Parameter(negative_iterable=())] = None,
-    longest_exposure_s: float = 0.066,
-    spp: int = 512,
-    max_seconds: float = 65.0,
-    seed: int = 0,
-    light: str | None = None,
-    force: Annotated[bool, Parameter(negative="")] = False,
-) -> None:
-    """Photograph one scene from moonlight to daylight with both cameras and write a report.
-
-    Parameters
-    ----------
-    out
-        Folder for report.html, results.json and overview.png.
-    scene
-        Scene by name, such as still_life, still_life_outdoor, night_street or cornell_box. Or a file of spectral
-        radiance: OpenEXR (.exr) or an ISETCam scene (.mat).
-    size
-        Side of the picture in pixels; a file has its own.
-    sensor
-        Sensor preset; may be given several times (low_noise and table1_output by default).
-    level
-        Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); may be given
-        several times (seven levels from moonlight to daylight by default).
-    longest_exposure_s
-        Longest exposure time in seconds.
-    spp
-        Samples a pixel of the render, at most.
-    max_seconds
-        Time for the render, at most.
-    seed
-        Seed of the render, the chips and the exposures.
-    light
-        Light of the scene by name, such as A; for a file the light that its colours are judged under (D65 by default).
-    force
-        Go on where more memory is needed than is free.
-    """
-    from rodcone.memory import require_memory
-    from rodcone.progress import progress
-    from studies.commands import demo as job
-    from studies.commands.estimate import demo_memory
-
-    defaults = job.Demo()
-    task = job.Demo(
-        scene=scene,
-        size=size,
-        sensors=tuple(sensor) if sensor else defaults.sensors,
-        levels=tuple(level) if level else None,
-        longest_s=longest_exposure_s,
-        seed=seed,
-        spp=spp,
-        max_seconds=max_seconds,
-        light=light,
-    )
-    job.check(task)
-    require_memory(demo_memory(task), force)
-    out.mkdir(parents=True, exist_ok=True)  # a place that can't be written is told before the render, not after
-    with progress(sys.stderr) as step:
-        outcome = job.run(task, step)
-    for note in outcome.results["notes"]:
-        print(f"rodcone: {note}", file=sys.stderr)
-    print(job.write(outcome, out))
-
-
 app.command("studies.commands.bench:bench", name="bench", help="Measure speed against error, stage by stage.")
 app.command("studies.commands.capture:capture", name="capture", help="Photograph a scene into raw files.")
 app.command("studies.commands.characterise:characterise", name="characterise", help="Measure a chip after EMVA 1288.")
+app.command("studies.commands.demo:demo", name="demo", help="Photograph a scene from moonlight to daylight.")
 app.command("studies.commands.develop:develop", name="develop", help="Develop a raw file into a PNG.")
 app.command("studies.commands.doctor:doctor", name="doctor", help="Print versions, and what is wrong.")
 app.command("studies.commands.new:app", name="new", help="Write files to start from: preset, study, cluster.")

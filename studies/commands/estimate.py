@@ -4,13 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from render.radiance_files.radiance_source import is_radiance_file
-from rodcone.memory import Memory, file_extent, memory
-from scenes.catalog import load
-from scenes.levels import DEMO_LEVELS
+from rodcone.memory import file_extent, memory
 from studies.budget.model_plan import Plan
-from studies.commands.demo import WAVELENGTH_NM, Demo
-from studies.photograph.camera import CAMERAS
 from studies.study.lit_scene import OpenedScene
 from studies.study.study import SceneChoice, Study, conditions
 
@@ -44,16 +39,6 @@ class Estimate:
     seconds: float
     bytes: float
     largest_bytes: float
-
-
-def demo_memory(demo: Demo) -> Memory:
-    """Memory that a demo needs."""
-    if is_radiance_file(demo.scene):
-        pixels, bands, groups = file_extent(demo.scene)
-    else:
-        pixels, bands, groups = demo.size**2, len(WAVELENGTH_NM), len(load(demo.scene).groups)
-    levels = len(DEMO_LEVELS if demo.levels is None else demo.levels)
-    return memory(pixels, bands, groups, workers=1, pictures=levels * len(demo.sensors) * len(CAMERAS))
 
 
 def estimate(study: Study, plan: Plan, scenes: Mapping[SceneChoice, OpenedScene], workers: int, kept: int) -> Estimate:

@@ -18,7 +18,7 @@ def opponents(
 ) -> None:
     """Write a page on one camera beside the other processors of a sweep, its losses included; prints its path.
 
-    Every number and sentence is computed from the ledger; the figure is an SVG file of the page's name.
+    Every number is computed from the results database; the figure is an SVG file of the page's name.
 
     Parameters
     ----------

@@ -20,8 +20,7 @@ from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import progress
 from studies.commands.console import INTERRUPTED, Flag, Out, Several, print_result, require_ending, say
-from studies.pages.results import render_facts
-from studies.study.lit_scene import spectral_luminance
+from studies.study.lit_scene import render_facts, spectral_luminance
 from studies.study.scene_source import asked_level, open_scene
 
 MOST_BANDS = 1000
@@ -183,9 +182,7 @@ def _facts(opened: SceneFile, transport: Transport, radiance: SpectralRadiance) 
     return {
         "scene": opened.scene.name,
         "size": list(radiance.shape[:2]),
-        **render_facts(transport),
-        "relative_mc_error": radiance.relative_mc_error,
-        "relative_level_error": radiance.relative_level_error,
+        **vars(render_facts(transport, radiance)),
         "largest_band_error": None if radiance.band_error is None else float(np.max(radiance.band_error)),
         "mean_luminance_cd_m2": float(radiance.luminance().mean()),
         "groups": groups,

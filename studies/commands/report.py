@@ -7,8 +7,9 @@ from rodcone.files import replacing
 from studies.commands.console import OutOrNone
 from studies.pages.report import render_report
 from studies.pages.report_sweep import ledger_results
+from studies.sweep.results import overview, results_json
 
-FILE = "report.html"
+FILE, RESULTS, OVERVIEW = "report.html", "results.json", "overview.png"
 
 
 def report(
@@ -32,6 +33,24 @@ def report(
     if pictures is not None:
         require_whole("pictures", pictures, 1, 100_000, "give a number of pictures")
     print(write_report(folder, out or folder / FILE, pictures))
+
+
+def write_results(folder: Path) -> Path:
+    """Write a sweep's report, its results as JSON and an overview of its pictures into its folder; gives the report.
+
+    All of the three appear or none.
+
+    Raises
+    ------
+    InputError, OSError
+        As `write_report`.
+    """
+    page = render_report(*ledger_results(folder)).encode()
+    files = {FILE: page, RESULTS: results_json(folder), OVERVIEW: overview(folder)}
+    with replacing(*(folder / name for name in files)) as places:
+        for place, content in zip(places, files.values(), strict=True):
+            place.write_bytes(content)
+    return folder / FILE
 
 
 def write_report(folder: Path, path: Path, pictures: int | None = None) -> Path:

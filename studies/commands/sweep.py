@@ -3,8 +3,8 @@
 import errno
 import json as notation
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -21,8 +21,7 @@ from studies.budget.plan import plan as plan_study
 from studies.budget.plan import reference_plan
 from studies.commands.console import INTERRUPTED, Flag, Out, Several, say
 from studies.commands.estimate import Estimate, as_facts, estimate
-from studies.commands.report import FILE as REPORT
-from studies.commands.report import write_report
+from studies.commands.report import write_results
 from studies.photograph.clock import Clock
 from studies.study.lit_scene import open_all
 from studies.study.study import Study
@@ -95,22 +94,59 @@ def sweep(
         found = _estimated(task, out, reference, workers or cores())
         print(notation.dumps(as_facts(found)) if json else _words(found))
         return 0
-    for name in task.processors:
-        require_libraries(name)
-    found = _estimated(task, out, reference, 0 if cluster else workers or cores())
-    require_memory(Memory(found.bytes, found.largest_bytes), force)
-    out.mkdir(parents=True, exist_ok=True)  # a place that can't be written is told before anything is rendered
-    with _kept_told(out), ExitStack() as held:
-        runner: Runner = _local(workers) if cluster is None else held.enter_context(on_cluster(cluster))
-        step = held.enter_context(progress(sys.stderr))
-        with clock.stage("plan"):
-            plan = _plan(task, out, reference, as_stated, step)
-        swept = run_sweep(task, out, plan, runner, step, keep_old=keep_old, clock=clock)
-    say(*swept.notes)
-    report = write_report(out, out / REPORT)
+    check_memory(task, out, reference=reference, workers=0 if cluster else workers or cores(), force=force)
+    with _saying_what_is_kept(out), nullcontext(_local(workers)) if cluster is None else on_cluster(cluster) as runner:
+        swept, report = make_all(
+            task,
+            out,
+            lambda step: _plan(task, out, reference, as_stated, step),
+            runner,
+            keep_old=keep_old,
+            clock=clock,
+        )
     say(f"its report is {report}")
     print(notation.dumps(_facts(swept) | {"report": str(report)}) if json else swept.out / FILE)
     return 0
+
+
+def check_memory(study: Study, out: Path, *, reference: bool, workers: int, force: bool) -> None:
+    """Raise `InputError` where a study's processors lack a library, or more memory is needed than is free."""
+    for name in study.processors:
+        require_libraries(name)
+    found = _estimated(study, out, reference, workers)
+    require_memory(Memory(found.bytes, found.largest_bytes), force)
+
+
+def make_all(
+    study: Study,
+    out: Path,
+    planned: Callable[[Step], Plan],
+    runner: Runner,
+    *,
+    keep_old: bool = False,
+    clock: Clock,
+) -> tuple[Swept, Path]:
+    """Sweep a study into a folder and write its report there; says on stderr how far it is and what it had to assume.
+
+    Parameters
+    ----------
+    planned : callable
+        Makes the plan; its progress goes to what it is given.
+    clock : Clock
+        Whose start is the run's.
+
+    Returns
+    -------
+    Swept, Path
+        What was made, and the report.
+    """
+    out.mkdir(parents=True, exist_ok=True)  # a folder that can't be written fails before anything is rendered
+    with _saying_what_is_kept(out), progress(sys.stderr) as step:
+        with clock.stage("plan"):
+            plan = planned(step)
+        swept = run_sweep(study, out, plan, runner, step, keep_old=keep_old, clock=clock)
+    say(*swept.notes)
+    return swept, write_results(out)
 
 
 def export(
@@ -120,7 +156,7 @@ def export(
     out: Out,
     everything: Annotated[bool, Parameter(name="--all", negative="")] = False,
 ) -> None:
-    """Write the ledger of a sweep as a table, a row a cell; prints its path.
+    """Write the cells of a sweep as a table, a row a cell; prints its path.
 
     Parameters
     ----------
@@ -158,7 +194,7 @@ def _words(found: Estimate) -> str:
     return (
         f"{found.cells} cells, {found.kept} in the ledger from the last run; {found.renders} renders\n"
         f"about {duration(found.seconds)} with {found.workers} workers, at most {found.bytes / 1e9:.1f} GB of memory; "
-        "renders and cells that are there already are not taken off"
+        "renders and cells that exist already are counted too"
     )
 
 
@@ -167,7 +203,7 @@ def _facts(swept: Swept) -> dict[str, object]:
 
 
 @contextmanager
-def _kept_told(out: Path) -> Iterator[None]:
+def _saying_what_is_kept(out: Path) -> Iterator[None]:
     """Say what is kept where Ctrl-C or a full disk ends the sweep."""
     try:
         yield

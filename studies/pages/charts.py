@@ -21,7 +21,7 @@ class Tick:
 
 
 @dataclass(frozen=True)
-class Point:
+class ChartPoint:
     """A mark in SVG units, with the words that a pointer brings up."""
 
     x: float
@@ -30,7 +30,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Line:
+class ChartLine:
     """What is to be drawn: a name, one value (or None) for each position, and where known the interval around it."""
 
     name: str
@@ -47,7 +47,7 @@ class Series:
     label: str
     slot: int
     path: str
-    points: tuple[Point, ...]
+    points: tuple[ChartPoint, ...]
     label_y: float
     band: str = ""
 
@@ -121,7 +121,7 @@ def log_ticks(low: float, high: float) -> list[float]:
     return [value for value in finer if low <= value <= high]
 
 
-def line_path(points: Sequence[Point | None]) -> str:
+def line_path(points: Sequence[ChartPoint | None]) -> str:
     """Join points with straight lines; a missing one leaves a gap."""
     parts: list[str] = []
     pen = "M"
@@ -176,13 +176,13 @@ def _value_axis(values: Sequence[float], log: bool) -> tuple[Scale, list[float]]
     return Scale(low, high, start, stop, log=True), decades(low, high)
 
 
-def _series(slot: int, line: Line, order: Sequence[int], xs: Sequence[float], scale: Scale) -> Series:
+def _series(slot: int, line: ChartLine, order: Sequence[int], xs: Sequence[float], scale: Scale) -> Series:
     """Place one line's points, from left to right."""
-    placed: list[Point | None] = []
+    placed: list[ChartPoint | None] = []
     for index in order:
         value = line.values[index]
         known = value is not None and isfinite(value)
-        placed.append(Point(xs[index], scale.at(value or 0.0), line.texts[index]) if known else None)
+        placed.append(ChartPoint(xs[index], scale.at(value or 0.0), line.texts[index]) if known else None)
     points = tuple(point for point in placed if point is not None)
     label = line.name if len(line.name) <= LABEL_LENGTH else line.name[: LABEL_LENGTH - 1] + "…"
     band = band_path([xs[i] for i in order], [line.intervals[i] for i in order], scale) if line.intervals else ""
@@ -193,7 +193,7 @@ def line_chart(
     title: str,
     description: str,
     x: Sequence[float],
-    lines: Sequence[Line],
+    lines: Sequence[ChartLine],
     *,
     log_y: bool = False,
     percent: bool = False,
@@ -209,7 +209,7 @@ def line_chart(
         What a screen reader says instead of the picture.
     x : sequence of float
         Positive positions, such as luminance in cd/m², one for each value of every line.
-    lines : sequence of Line
+    lines : sequence of ChartLine
         What to draw; None and values that are not finite leave a gap.
     log_y, percent : bool
         Logarithmic value axis; ticks written as per cent.

@@ -34,7 +34,7 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Case:
+class Contest:
     """One condition of a sweep: rows by processor, each in the order of the seeds, the same for all.
 
     Attributes
@@ -62,13 +62,13 @@ class Duel:
 
     Attributes
     ----------
-    case : Case
+    contest : Contest
     opponent : str
     lead : SeedMean
         Over pairs of pictures of the same seed.
     """
 
-    case: Case
+    contest: Contest
     opponent: str
     lead: SeedMean
 
@@ -78,8 +78,8 @@ class Duel:
         return AHEAD if self.lead.low > 0 else BEHIND if self.lead.high < 0 else LEVEL
 
 
-def cases_of(rows: Sequence[Row]) -> list[Case]:
-    """Sort a ledger's rows by condition; within a group by luminance.
+def contests_of(rows: Sequence[Row]) -> list[Contest]:
+    """Sort a sweep's rows by condition; within a group by luminance.
 
     Raises
     ------
@@ -102,15 +102,29 @@ def cases_of(rows: Sequence[Row]) -> list[Case]:
                     f"cells: {name} on {group.scene} at {level} lacks seeds that others have; allowed: a whole sweep; "
                     "run the same rodcone sweep again, which makes what is missing"
                 )
-    cases = []
+    contests = []
     for (group, level), by_processor in found.items():
         in_order = {name: tuple(by_processor[name][seed] for seed in seeds) for name in processors}
-        cases.append(Case(group, level, next(iter(in_order.values()))[0].luminance_cd_m2, in_order))
-    groups = list(dict.fromkeys(case.group for case in cases))
-    return sorted(cases, key=lambda case: (groups.index(case.group), case.luminance_cd_m2))
+        contests.append(Contest(group, level, next(iter(in_order.values()))[0].luminance_cd_m2, in_order))
+    groups = list(dict.fromkeys(contest.group for contest in contests))
+    return sorted(contests, key=lambda contest: (groups.index(contest.group), contest.luminance_cd_m2))
 
 
-def opponents_of(cases: Sequence[Case], camera: str) -> list[str]:
+def groups_of(contests: Sequence[Contest]) -> list[Group]:
+    """Return the groups, each once, in the order in which they come."""
+    return list(dict.fromkeys(contest.group for contest in contests))
+
+
+def group_name(group: Group, groups: Sequence[Group]) -> str:
+    """Name what tells a group from the others; the scene in any case."""
+    parts = [group.scene]
+    for name, before in (("spectrum", ""), ("exposure", "exposure "), ("sensor", "")):
+        if len({getattr(other, name) for other in groups}) > 1:
+            parts.append(before + getattr(group, name))
+    return ", ".join(parts)
+
+
+def opponents_of(contests: Sequence[Contest], camera: str) -> list[str]:
     """Every other processor of the sweep.
 
     Raises
@@ -118,7 +132,7 @@ def opponents_of(cases: Sequence[Case], camera: str) -> list[str]:
     InputError
         Where the camera isn't in the sweep, or is alone in it.
     """
-    there = list(cases[0].rows) if cases else []
+    there = list(contests[0].rows) if contests else []
     if camera not in there:
         raise unknown("camera", camera, there)
     if len(there) == 1:
@@ -126,33 +140,35 @@ def opponents_of(cases: Sequence[Case], camera: str) -> list[str]:
     return [name for name in there if name != camera]
 
 
-def duels(cases: Sequence[Case], camera: str, opponent: str, metric: Metric) -> list[Duel]:
+def duels(contests: Sequence[Contest], camera: str, opponent: str, metric: Metric) -> list[Duel]:
     """Lead of a camera over one opponent in each condition that is ranked."""
     return [
-        Duel(case, opponent, lead_over(case, camera, opponent, metric)) for case in cases if is_ranked(case, camera)
+        Duel(contest, opponent, lead_over(contest, camera, opponent, metric))
+        for contest in contests
+        if is_ranked(contest, camera)
     ]
 
 
-def lead_over(case: Case, camera: str, opponent: str, metric: Metric) -> SeedMean:
+def lead_over(contest: Contest, camera: str, opponent: str, metric: Metric) -> SeedMean:
     """How much better a camera is than another: mean over the seeds' pairs, with its 95 % interval."""
     sign = 1 if metric.higher else -1
-    pairs = zip(case.rows[camera], case.rows[opponent], strict=True)
+    pairs = zip(contest.rows[camera], contest.rows[opponent], strict=True)
     return mean_with_confidence([sign * (getattr(a, metric.key) - getattr(b, metric.key)) for a, b in pairs])
 
 
-def is_ranked(case: Case, camera: str) -> bool:
+def is_ranked(contest: Contest, camera: str) -> bool:
     """Whether the camera has a signal to rank: W's SNR is 1 or more, or it has no W, or its noise isn't known here."""
-    snr = snr_db(case, camera, "W")
+    snr = snr_db(contest, camera, "W")
     return isnan(snr) or snr >= 0
 
 
-def snr_db(case: Case, camera: str, letter: str) -> float:
-    """SNR of a letter's mean expected electrons [dB], shot and dark noise; NaN where letter or noise isn't known.
+def snr_db(contest: Contest, camera: str, channel: str) -> float:
+    """SNR of a channel's mean expected electrons [dB], shot and dark noise; NaN where channel or noise isn't known.
 
-    A sensor of the user's own file is known to the ledger by its name alone.
+    A sensor of the user's own file is known to the results database by its name alone.
     """
-    row = case.rows[camera][0]
-    electrons = json.loads(row.mean_electrons).get(letter)
+    row = contest.rows[camera][0]
+    electrons = json.loads(row.mean_electrons).get(channel)
     if electrons is None or electrons <= 0 or row.sensor not in names():
         return nan
     sensor = vary(preset(row.sensor), PROCESSORS[camera].mosaic)

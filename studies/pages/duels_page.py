@@ -1,16 +1,30 @@
-"""The page of a camera beside its opponents: Markdown, with the figure as SVG in a file of its own."""
+"""The page of a camera beside its opponents: tables in Markdown, with the figure as SVG in a file of its own."""
 
 import json
 from collections.abc import Mapping, Sequence
+from math import isnan
 from pathlib import Path
 from typing import Any
 
 from rodcone.files import replacing
-from studies.pages import duels_text as text
-from studies.pages.drawing import to_svg
-from studies.pages.duels import Case, cases_of, is_ranked, opponents_of
+from studies.pages.duels import (
+    AHEAD,
+    BEHIND,
+    LEVEL,
+    METRICS,
+    Contest,
+    Group,
+    contests_of,
+    duels,
+    group_name,
+    groups_of,
+    is_ranked,
+    opponents_of,
+    snr_db,
+)
 from studies.pages.duels_figure import description, figure_of
-from studies.pages.report_text import percent
+from studies.pages.plots import svg_text
+from studies.pages.report_text import DELTA_E, MISSING, NBSP, PSNR, Metric, fixed, level_text, percent, significant
 from studies.sweep.row import Row
 
 
@@ -21,7 +35,7 @@ def write_page(rows: Sequence[Row], study: Mapping[str, Any], folder: Path, out:
     ----------
     rows : sequence of Row
     study : mapping
-        The study as the ledger's last run notes it.
+        The study as the results database notes it of the last run.
     folder : Path
         Of the sweep, for the page's own command.
     out : Path
@@ -36,81 +50,160 @@ def write_page(rows: Sequence[Row], study: Mapping[str, Any], folder: Path, out:
     OSError
         Where the files can't be written.
     """
-    cases = cases_of(rows)
+    contests = contests_of(rows)
     figure = out.with_suffix(".svg")
-    drawing = figure_of(cases, camera)
-    page = page_of(cases, study, folder, out, camera, figure.name if drawing else None)
+    drawing = figure_of(contests, camera)
+    page = page_of(contests, study, folder, out, camera, figure.name if drawing else None)
     with replacing(*([out, figure] if drawing else [out])) as places:
         places[0].write_text(page, "utf-8")
         if drawing:
-            places[1].write_text(to_svg(drawing), "utf-8")
+            places[1].write_text(svg_text(drawing), "utf-8")
 
 
 def page_of(
-    cases: Sequence[Case], study: Mapping[str, Any], folder: Path, out: Path, camera: str, figure: str | None
+    contests: Sequence[Contest], study: Mapping[str, Any], folder: Path, out: Path, camera: str, figure: str | None
 ) -> str:
-    """Markdown of the page; parameters as `write_page`."""
-    groups, short = text.groups_of(cases), text.in_short(cases, camera)
-    others = opponents_of(cases, camera)[1:]
-    ranked = any(is_ranked(case, camera) for case in cases)
-    nowhere = "Nowhere, beyond the scatter over seeds." if ranked else "Nothing is ranked."
-    lost = text.loss_table(cases, camera)
-    told = [
-        f"# {text.code(camera)} beside its opponents",
-        f"    rodcone sweep STUDY.toml -o {folder} --as-stated\n    rodcone opponents {folder} -o {out.name}",
-        facts_sentence(cases, study),
-        "## In short",
-        "\n".join(f"- {sentence}" for sentence in short),
-        f"![{description(cases, camera)}]({figure})" if figure else "",
-        "## Won, level and lost",
-        "\n".join(text.duel_table(cases, camera)),
-        f"Conditions by the outcome of the 95 % interval over seeds. {text.scatter_sentence(cases, camera)} Times are "
-        f"medians over all pictures, in units of {text.code(camera)}'s, on the machine of the sweep.",
-        "## Who is best at which light",
-        "\n".join(f"- {sentence}" for sentence in text.best_lines(cases, camera)),
-        f"## {text.code(camera)} beside each of the others" if others else "",
-        "\n".join(f"- {text.beside(cases, camera, name)}" for name in others),
-        f"## Where {text.code(camera)} loses",
-        "\n".join(lost) if lost else nowhere,
-        "## Every condition",
-        *(
-            f"### {text.group_text(group, groups)}\n\n"
-            + "\n".join(text.level_table([case for case in cases if case.group == group], camera))
-            for group in groups
-        ),
-        f"Means over seeds; the best of each column in bold. {monte_carlo_sentence(cases)}",
-    ]
-    return "\n\n".join(part for part in told if part) + "\n"
-
-
-def facts_sentence(cases: Sequence[Case], study: Mapping[str, Any]) -> str:
-    """Say what the numbers come from."""
-    rows = next(iter(cases[0].rows.values()))
-    size = study.get("render", {}).get("size")
-    of_size = f", {size} pixels on the longer side" if size else ""
-    groups = text.groups_of(cases)
+    """Return the page's Markdown; parameters as `write_page`."""
+    groups = groups_of(contests)
+    ranked = sum(is_ranked(contest, camera) for contest in contests)
+    worst = max((row.mc_share, contest.level) for contest in contests for rows in contest.rows.values() for row in rows)
     parts = [
-        f"{name}{'' if len(set(values)) == 1 else 's'} {', '.join(text.code(value) for value in dict.fromkeys(values))}"
-        for name, values in (
-            ("scene", [group.scene for group in groups]),
-            ("spectrum", [group.spectrum for group in groups]) if {g.spectrum for g in groups} != {"own"} else ("", []),
-            ("sensor", [group.sensor for group in groups]),
-            ("exposure", [group.exposure for group in groups]),
-        )
-        if values
+        f"# {code(camera)} beside its opponents",
+        f"    rodcone sweep STUDY.toml -o {folder} --as-stated\n    rodcone opponents {folder} -o {out.name}",
+        facts_table(contests, study),
+        f"{ranked} of {len(contests)} conditions are ranked: those in which W's SNR under {code(camera)} is 1 or more, "
+        "or not known. Pictures are measured against the noise-free truth at the known exposure scale.",
+        f"![{description(contests, camera)}]({figure})" if figure else "",
+        "## Won, level and lost",
+        duel_table(contests, camera),
+        "Conditions by the outcome of the 95 % interval over seeds, and the leads' range: below 0 "
+        f"{code(camera)} is behind. Times are medians over all pictures, in units of {code(camera)}'s, on the machine "
+        f"of the sweep. {scatter(contests, camera)}",
+        "## Lead in every condition",
+        f"Positive: {code(camera)} is better. **Bold**: it is behind, and the whole interval is below 0. In brackets: "
+        f"the interval holds 0. {MISSING}: not ranked.",
     ]
-    seeds = ", ".join(str(row.seed) for row in rows)
-    code = text.code(json.loads(rows[0].versions)["rodcone"])
-    return (
-        f"Study {text.code(str(study.get('name', 'study')))}: {'; '.join(parts)}; seeds {seeds}{of_size}; rodcone "
-        f"{code}. Pictures are measured against the noise-free truth at the known exposure scale."
+    for group in groups:
+        of_group = [contest for contest in contests if contest.group == group]
+        parts += [f"### {group_text(group, groups)}", *(lead_table(metric, of_group, camera) for metric in METRICS)]
+    parts.append("## Every condition")
+    for group in groups:
+        of_group = [contest for contest in contests if contest.group == group]
+        parts += [f"### {group_text(group, groups)}: figures", level_table(of_group, camera)]
+    parts.append(
+        "Means over seeds; the best of each column in bold. The render's own noise, which counts as texture, has at "
+        f"most {percent(worst[0])} of the sensor's variance (at {level_text(worst[1])})."
+    )
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def code(text: str) -> str:
+    """Write a name as Markdown's code, whatever is in it: in code no sign has a meaning but the backtick and |."""
+    return "`" + " ".join(text.split()).replace("`", "'").replace("|", "\\|") + "`"
+
+
+def group_text(group: Group, groups: Sequence[Group]) -> str:
+    """Name a group as Markdown's code."""
+    return code(group_name(group, groups))
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))
+
+
+def facts_table(contests: Sequence[Contest], study: Mapping[str, Any]) -> str:
+    """Return a table of what the numbers come from."""
+    rows = next(iter(contests[0].rows.values()))
+    groups = groups_of(contests)
+    facts = {
+        "study": [str(study.get("name", "study"))],
+        **{name: [getattr(group, name) for group in groups] for name in ("scene", "spectrum", "sensor", "exposure")},
+        "seeds": [str(row.seed) for row in rows],
+        "pixels on the longer side": [str(study.get("render", {}).get("size") or MISSING)],
+        "rodcone": [json.loads(rows[0].versions)["rodcone"]],
+    }
+    return table(
+        ["source", "value"],
+        [[name, ", ".join(code(value) for value in dict.fromkeys(of))] for name, of in facts.items()],
     )
 
 
-def monte_carlo_sentence(cases: Sequence[Case]) -> str:
-    """Say how much noise of the render the truth may hold."""
-    worst = max((row.mc_share, case.level) for case in cases for rows in case.rows.values() for row in rows)
-    return (
-        f"The render's own noise, which counts as texture, has at most {percent(worst[0])} of the sensor's variance "
-        f"(at {text.level_text(worst[1])})."
-    )
+def duel_table(contests: Sequence[Contest], camera: str) -> str:
+    """Return a table of the camera's leads over each opponent: how often ahead, level, behind, from where to where."""
+    own_s = _develop_s(contests, camera)
+    rows = []
+    for name in opponents_of(contests, camera):
+        cells = [code(name)]
+        for metric in METRICS:
+            found = duels(contests, camera, name, metric)
+            outcomes = [duel.outcome for duel in found]
+            counts = " / ".join(str(outcomes.count(outcome)) for outcome in (AHEAD, LEVEL, BEHIND))
+            leads = [duel.lead.mean for duel in found]
+            span = f"{_signed(metric, min(leads))} to {_signed(metric, max(leads))}" if leads else MISSING
+            cells += [counts, span]
+        rows.append([*cells, f"× {significant(_develop_s(contests, name) / own_s, digits=2)}"])
+    heads = [head for metric in METRICS for head in (f"{metric.name}: ahead / level / behind", _lead_head(metric))]
+    return table(["opponent", *heads, "time to develop"], rows)
+
+
+def lead_table(metric: Metric, of_group: Sequence[Contest], camera: str) -> str:
+    """Return a table of the camera's leads in one group: opponents down, light across."""
+    rows = []
+    for name in opponents_of(of_group, camera):
+        leads = {duel.contest.level: duel for duel in duels(of_group, camera, name, metric)}
+        cells = []
+        for contest in of_group:
+            duel = leads.get(contest.level)
+            shown = _signed(metric, duel.lead.mean) if duel else MISSING
+            way = {BEHIND: f"**{shown}**", LEVEL: f"({shown})"}
+            cells.append(way.get(duel.outcome, shown) if duel else shown)
+        rows.append([code(name), *cells])
+    return table([_lead_head(metric), *(level_text(contest.level) for contest in of_group)], rows)
+
+
+def level_table(of_group: Sequence[Contest], camera: str) -> str:
+    """Return a table of one group: processors down, light across, PSNR and CIEDE2000; the best of each in bold."""
+    rows = [[code(name), *(_both(contest, name) for contest in of_group)] for name in of_group[0].rows]
+    for channel, words in (("G", "SNR of mean green [dB]"), ("W", "SNR of mean W [dB]")):
+        values = [snr_db(contest, camera, channel) for contest in of_group]
+        if not all(isnan(value) for value in values):
+            # whole decibels, 0 without a sign
+            rows.append([f"*{words}*", *(fixed(value if isnan(value) else round(value), 0) for value in values)])
+    return table(["PSNR [dB], ΔE2000", *(level_text(contest.level) for contest in of_group)], rows)
+
+
+def scatter(contests: Sequence[Contest], camera: str) -> str:
+    """Say how wide the leads' intervals are; empty where nothing is ranked."""
+    parts = []
+    for metric in METRICS:
+        found = [duel for name in opponents_of(contests, camera) for duel in duels(contests, camera, name, metric)]
+        halves = sorted((duel.lead.high - duel.lead.low) / 2 for duel in found)
+        if halves:
+            middle, most = (significant(half, digits=2) for half in (halves[len(halves) // 2], halves[-1]))
+            parts.append(f"{metric.name} ±{NBSP}{middle} (at most {most})")
+    return f"Half the interval of a lead, in the median: {'; '.join(parts)}." if parts else ""
+
+
+def _lead_head(metric: Metric) -> str:
+    return f"lead in {metric.name}" + (f" [{metric.unit}]" if metric.unit else "")
+
+
+def _signed(metric: Metric, value: float) -> str:
+    shown = fixed(value, metric.digits)
+    return shown if value < 0 else f"+{shown}"
+
+
+def _both(contest: Contest, name: str) -> str:
+    shown = []
+    for metric in (PSNR, DELTA_E):
+        means = {other: fixed(contest.mean(other, metric), metric.digits) for other in contest.rows}
+        sign = 1 if metric.higher else -1
+        best = max(contest.rows, key=lambda other: sign * contest.mean(other, metric))
+        shown.append(f"**{means[name]}**" if means[name] == means[best] else means[name])
+    return ", ".join(shown)
+
+
+def _develop_s(contests: Sequence[Contest], name: str) -> float:
+    times = sorted(row.develop_s for contest in contests for row in contest.rows[name])
+    return times[len(times) // 2]

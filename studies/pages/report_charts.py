@@ -1,133 +1,143 @@
 """The report's charts: quality over light, Monte Carlo share, and quality over the seconds that it costs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from math import isfinite
-from typing import Any
 
-from rodcone.errors import require_range
+from studies.budget.budget import MOST_SHARE
 from studies.pages import report_text as text
-from studies.pages.charts import Chart, Line, line_chart
-from studies.pages.report_cells import groups
+from studies.pages.charts import Chart, ChartLine, line_chart
+from studies.pages.report_data import ReportCell, ReportData
 
-Cells = Sequence[Mapping[str, Any]]
 LEAST_S = 1e-4  # a step that takes less is drawn here: clocks tell no finer
+SHARE = text.Metric("mc_share", "Monte Carlo share", 1, "", higher=False)
 
 
-def shown_metrics(cells: Cells) -> list[text.Metric]:
+@dataclass(frozen=True)
+class SpeedRow:
+    """Mean seconds of a camera's steps for one sensor, its mean PSNR, and its lead over the fastest camera.
+
+    `judged` is the number of conditions that the means are over.
+    """
+
+    sensor: str
+    camera: str
+    capture_s: float | None
+    develop_s: float | None
+    psnr_db: float | None
+    gain_db: float | None
+    judged: int
+
+
+def shown_metrics(cells: Sequence[ReportCell]) -> list[text.Metric]:
     """Return the metrics that are known for some cell: those of targets are so on their own scene alone."""
-    return [metric for metric in text.METRICS if any(cell[metric.key] is not None for cell in cells)]
+    return [metric for metric in text.METRICS if any(cell.figures[metric.key] is not None for cell in cells)]
 
 
-def by_group(results: Mapping[str, Any], cells: Cells) -> list[Cells]:
-    """Part the cells, which come in order, into one list for each group."""
-    count = len(results["levels"]) * len(results["cameras"])
-    return [cells[start : start + count] for start in range(0, len(cells), count)]
-
-
-def group_charts(results: Mapping[str, Any], cells: Cells, metric: text.Metric, **options: Any) -> list[Chart]:
+def group_charts(report: ReportData, metric: text.Metric) -> list[Chart]:
     """Return `metric` over luminance, one chart a group, all on one scale."""
-    ends = [end for cell in cells for end in cell["intervals"].get(metric.key, ())]
+    ends = [end for cell in report.cells for end in cell.intervals.get(metric.key, ())]
+    share = metric is SHARE
     charts = []
-    for group, own in zip(groups(results), by_group(results, cells), strict=True):
-        known = [cell["luminance_cd_m2"] for cell in own[:: len(results["cameras"])]]
+    for own in report.by_group:
+        known = [cell.luminance_cd_m2 for cell in own[:: len(report.cameras)]]
         stand_in = next((value for value in known if value is not None), 1.0)  # nothing is drawn at an unknown one
-        luminance = [stand_in if value is None else value for value in known]
-        for value in luminance:
-            require_range("luminance_cd_m2", value, 1e-12, 1e12, "the axis is logarithmic: give a positive luminance")
-        lines = [_line(results, own, camera, metric, options.get("percent", False)) for camera in results["cameras"]]
+        names = [text.camera_name(camera) for camera in report.cameras]
         charts.append(
             line_chart(
-                f"{metric.name}, {group}",
-                f"{metric.name} over scene luminance for {text.join([line.name for line in lines])}. "
-                "The table of all pictures holds the numbers.",
-                luminance,
-                lines,
-                shared=[*(cell[metric.key] for cell in cells), *ends],
-                **options,
+                f"{metric.name}, {own[0].group}",
+                f"{metric.name} over scene luminance for {', '.join(names)}. The table of all pictures holds the "
+                "numbers.",
+                [stand_in if value is None else value for value in known],
+                [_line(report, own[slot :: len(names)], metric) for slot in range(len(names))],
+                shared=[*(cell.figures[metric.key] for cell in report.cells), *ends],
+                log_y=share,
+                percent=share,
+                rule=(MOST_SHARE, f"aim {text.percent(MOST_SHARE)}") if share else None,
             )
         )
     return charts
 
 
-def _line(results: Mapping[str, Any], cells: Cells, camera: str, metric: text.Metric, percent: bool) -> Line:
+def _line(report: ReportData, cells: Sequence[ReportCell], metric: text.Metric) -> ChartLine:
     """Return one camera's values over the levels, in words too."""
-    own = [cell for cell in cells if cell["camera"] == camera]
-    name = text.camera_name(camera)
-    written = [text.percent(cell[metric.key]) if percent else text.metric_text(metric, cell) for cell in own]
-    words = [f"{name}, {level['name']}: {value}" for level, value in zip(results["levels"], written, strict=True)]
-    known = [cell["intervals"].get(metric.key) for cell in own]
-    return Line(name, [cell[metric.key] for cell in own], words, known if any(known) else ())
+    name = text.camera_name(cells[0].camera)
+    values = [cell.figures[metric.key] for cell in cells]
+    written = [text.percent(value) for value in values]
+    if metric is not SHARE:
+        written = [text.metric_text(metric, cell) for cell in cells]
+    words = [f"{name}, {level.name}: {value}" for level, value in zip(report.levels, written, strict=True)]
+    known = [cell.intervals.get(metric.key) for cell in cells]
+    return ChartLine(name, values, words, known if any(known) else ())
 
 
-def speed_rows(results: Mapping[str, Any], cells: Cells) -> list[dict[str, Any]]:
-    """Return for each sensor and camera the mean seconds of a picture's steps and its mean PSNR, as numbers.
+def speed_rows(report: ReportData) -> list[SpeedRow]:
+    """Return for each sensor and camera the mean seconds of a picture's steps and its mean PSNR.
 
     PSNR is a mean over the conditions in which it is known for every camera of the sensor, so that all are judged on
-    the same ones; ``gain_db`` is its lead over the camera that develops fastest. Conditions that other variants or
-    engines rendered or captured have rows of their own, whose sensor's name says so.
+    the same ones. Conditions that other variants or engines rendered or captured have rows of their own, whose sensor's
+    name says so.
     """
+    per_sensor = len(report.exposures) * len(report.levels)
     rows = []
-    for sensor in results["sensors"]:
-        own = [[x for x in cells if (x["sensor"], x["camera"]) == (sensor["name"], c)] for c in results["cameras"]]
-        parts: dict[str, list[Cells]] = {}
-        for same in zip(*own, strict=True):
-            parts.setdefault(_made_with(same), []).append(same)
+    for slot, sensor in enumerate(report.sensors):
+        parts: dict[str, list[Sequence[ReportCell]]] = {}
+        for index, condition in enumerate(report.conditions):
+            if index // per_sensor % len(report.sensors) == slot:
+                parts.setdefault(_made_with(condition), []).append(condition)
         for way, conditions in parts.items():
-            rows += _speed_of(sensor["name"] + (f", {way}" if len(parts) > 1 else ""), conditions)
+            rows += _speed_of(sensor.name + (f", {way}" if len(parts) > 1 else ""), conditions)
     return rows
 
 
-def _made_with(condition: Cells) -> str:
-    """Engines of a condition's cells before development, in words."""
-    known: dict[str, str] = next((cell["engines"] for cell in condition if cell.get("engines")), {})
-    return ", ".join(f"{step} {known[step]}" for step in ("render", "capture") if step in known) or "not made yet"
+def _made_with(condition: Sequence[ReportCell]) -> str:
+    """Variant and engine of a condition's cells before development, in words."""
+    first = next((cell.first for cell in condition if cell.first), None)
+    return f"render {first.variant}, capture {first.readout_engine}" if first else "not made yet"
 
 
-def _speed_of(sensor: str, conditions: Sequence[Cells]) -> list[dict[str, Any]]:
+def _speed_of(sensor: str, conditions: Sequence[Sequence[ReportCell]]) -> list[SpeedRow]:
     """Rows of `speed_rows` for conditions with one cell of each camera."""
-    judged = [c for c in conditions if all(x["psnr_db"] is not None and isfinite(x["psnr_db"]) for x in c)]
+    psnrs = [[cell.figures["psnr_db"] for cell in condition] for condition in conditions]
+    judged = [values for values in psnrs if all(value is not None and isfinite(value) for value in values)]
     made = []
-    for slot, first in enumerate(conditions[0]):
-        seconds = [condition[slot]["seconds"] or {} for condition in conditions]
-        steps = {step: _mean([one.get(step) for one in seconds]) for step in ("capture", "develop")}
-        psnr = _mean([condition[slot]["psnr_db"] for condition in judged])
-        made.append({"sensor": sensor, "camera": first["camera"], "psnr_db": psnr, "judged": len(judged), **steps})
-    fastest = min(made, key=lambda row: row["develop"] if row["develop"] is not None else float("inf"))
-    known = fastest["psnr_db"]
-    return [{**row, "gain_db": None if known is None else row["psnr_db"] - known} for row in made]
+    for slot, cell in enumerate(conditions[0]):
+        firsts = [condition[slot].first for condition in conditions]
+        capture_s = _mean([first.capture_s if first else None for first in firsts])
+        develop_s = _mean([first.develop_s if first else None for first in firsts])
+        made.append((cell.camera, capture_s, develop_s, _mean([values[slot] for values in judged])))
+    fastest_db = min(made, key=lambda row: float("inf") if row[2] is None else row[2])[3]
+    gains = [None if psnr_db is None or fastest_db is None else psnr_db - fastest_db for *_, psnr_db in made]
+    return [SpeedRow(sensor, *row, gain, len(judged)) for row, gain in zip(made, gains, strict=True)]
 
 
-def speed_charts(rows: Sequence[Mapping[str, Any]]) -> list[Chart]:
+def speed_charts(rows: Sequence[SpeedRow]) -> list[Chart]:
     """Return mean PSNR over the seconds of development, a chart a sensor, a mark a camera; none where unknown."""
     charts = []
-    for sensor in dict.fromkeys(row["sensor"] for row in rows):
-        own = [row for row in rows if row["sensor"] == sensor and None not in (row["develop"], row["psnr_db"])]
-        if not own:
+    for sensor in dict.fromkeys(row.sensor for row in rows):
+        own = [(row, row.develop_s) for row in rows if row.sensor == sensor and row.psnr_db is not None]
+        known = [(row, seconds) for row, seconds in own if seconds is not None]
+        if not known:
             continue
-        lines = [
-            Line(
-                text.camera_name(row["camera"]),
-                [row["psnr_db"] if place == at else None for at in range(len(own))],
-                [_speed_words(row)] * len(own),
-            )
-            for place, row in enumerate(own)
+        words = [
+            f"{text.camera_name(row.camera)}: {text.fixed(row.psnr_db, 1, 'dB')} in {text.duration(seconds)}"
+            for row, seconds in known
         ]
+        lines = []
+        for place, (row, _) in enumerate(known):
+            values = [row.psnr_db if place == index else None for index in range(len(known))]
+            lines.append(ChartLine(text.camera_name(row.camera), values, [words[place]] * len(known)))
         charts.append(
             line_chart(
                 f"PSNR over development time, {sensor}",
-                f"Mean PSNR over the seconds that a picture's development takes: {'; '.join(map(_speed_words, own))}.",
-                [max(row["develop"], LEAST_S) for row in own],
+                f"Mean PSNR over the seconds that a picture's development takes: {'; '.join(words)}.",
+                [max(seconds, LEAST_S) for _, seconds in known],
                 lines,
-                shared=[row["psnr_db"] for row in rows],
+                shared=[row.psnr_db for row in rows],
                 x_label="seconds to develop a picture",
             )
         )
     return charts
-
-
-def _speed_words(row: Mapping[str, Any]) -> str:
-    camera, psnr = text.camera_name(row["camera"]), text.fixed(row["psnr_db"], 1, "dB")
-    return f"{camera}: {psnr} in {text.duration(row['develop'])}"
 
 
 def _mean(values: Sequence[float | None]) -> float | None:

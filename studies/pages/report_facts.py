@@ -1,51 +1,67 @@
-"""What a ledger's rows and its study tell of renders, levels, sensors and time: parts of a report's results."""
+"""What a sweep's rows and its study tell of renders, levels, sensors and engines: parts of a report."""
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from rodcone.errors import InputError
+from scenes.levels import DEMO_LEVELS
 from sensor.config import LensConfig
 from sensor.optics import left_out
 from sensor.presets import preset
-from studies.pages.report_text import significant
-from studies.pages.results import sensor_facts
-from studies.study.levels import parse_level
+from studies.pages.report_data import ReportLevel, ReportRender, ReportSensor
+from studies.pages.report_text import level_text
 from studies.study.study import label
 from studies.sweep.provenance import made_by, told
 from studies.sweep.row import Row
 
+NAMED = {level.name: ReportLevel(level.name, level.source) for level in DEMO_LEVELS}
 
-def render_of(rows: Sequence[Row], scene: str) -> dict[str, Any]:
-    """Return samples, bands and seconds of a scene's render; unknown where no cell of it is made yet."""
+
+def render_of(rows: Sequence[Row], scene: str) -> ReportRender:
+    """Return how a scene was rendered; unknown where no cell of it is made yet."""
     first = next((row for row in rows if row.scene == scene), None)
-    return {
-        "scene": scene,
-        "spp": first and first.spp,
-        "bands": first and first.bands,
-        "seconds": first and first.render_s,
-    }
+    if first is None:
+        return ReportRender(scene)
+    names = {field.name for field in fields(ReportRender)}
+    further = {name: fact for name, fact in _further(first).items() if name in names}
+    return ReportRender(scene, first.spp, first.bands, first.render_s, first.variant, **further)
 
 
-def level_of(text: str) -> dict[str, Any]:
-    """Return a level as the study asks for it; what it is in the other unit depends on the scene."""
-    value, unit = parse_level(text)
-    return {
-        "name": significant(value, unit.replace("2", "²")),
-        "luminance_cd_m2": value if unit == "cd/m2" else None,
-        "illuminance_lux": value if unit == "lux" else None,
-        "source": "asked for by the study",
-    }
+def render_notes(rows: Sequence[Row]) -> list[str]:
+    """Return what had to be assumed of the renders, each once."""
+    return list(dict.fromkeys(note for row in rows for note in _further(row).get("notes", ())))
 
 
-def sensor_of(name: str) -> dict[str, Any]:
-    """Return the numbers of a sensor; unknown for a file that is no longer there."""
+def _further(row: Row) -> dict[str, Any]:
+    """Facts of the render beside those with columns of their own."""
+    facts: dict[str, Any] = json.loads(row.render)
+    return facts
+
+
+def fallbacks(rows: Sequence[Row]) -> list[str]:
+    """Say where neither LLVM nor CUDA answered; versions name the one that did."""
+    versions = [json.loads(row.versions) for row in rows]
+    if all(one.get("llvm") != "none" or "cuda" in one for one in versions):
+        return []
+    return [
+        "Neither LLVM nor CUDA answered: scenes were rendered in scalar_spectral, and captures and reconstruction ran "
+        "in NumPy."
+    ]
+
+
+def level_of(text: str) -> ReportLevel:
+    """Return a level as the study asks for it."""
+    return NAMED.get(text) or ReportLevel(level_text(text), "asked for by the study")
+
+
+def sensor_of(name: str) -> ReportSensor:
+    """Return a sensor's numbers; none of a file that is no longer there."""
     try:
-        return sensor_facts(name) | {"name": label(name)}
+        return ReportSensor(label(name), preset(name))
     except InputError:
-        keys = ("read_noise_e", "dsnu_e", "full_well_e", "prnu", "pitch_um", "f_number", "bits")
-        return {"name": label(name), **dict.fromkeys(keys)}
+        return ReportSensor(label(name), None)
 
 
 def environment_of(rows: Sequence[Row]) -> dict[str, str]:
@@ -57,7 +73,7 @@ def environment_of(rows: Sequence[Row]) -> dict[str, str]:
     return {name: "; ".join(values) for name, values in found.items()}
 
 
-def lenses_left_out(rows: Sequence[Row], sensors: Sequence[str]) -> list[str]:
+def lenses_left_out(rows: Sequence[Row], sensors: Sequence[str]) -> tuple[str, ...]:
     """Return what the lenses, as they were modelled, leave out, each once; of a sensor file that is gone nothing."""
     lines: list[str] = []
     for name, lens in dict.fromkeys((row.sensor, row.lens) for row in rows):
@@ -66,7 +82,7 @@ def lenses_left_out(rows: Sequence[Row], sensors: Sequence[str]) -> list[str]:
         except InputError:
             continue
         lines += left_out(replace(sensor, lens=LensConfig(**json.loads(lens))))
-    return list(dict.fromkeys(lines))
+    return tuple(dict.fromkeys(lines))
 
 
 def configuration(study: Mapping[str, Any]) -> dict[str, str]:

@@ -1,20 +1,31 @@
-"""The report of a sweep: its ledger's rows as the results that `report` takes, and the pictures to show."""
+"""The report of a sweep: its rows as the values that `report` shows, and the pictures."""
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from importlib import metadata
 from io import BytesIO
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from PIL import Image
 
 from rodcone.errors import InputError
 from sensor.exposure import RULE
-from studies.pages.report_cells import SCATTERED
+from studies.pages.report_cells import over_seeds
 from studies.pages.report_choice import chosen_conditions
-from studies.pages.report_facts import configuration, environment_of, lenses_left_out, level_of, render_of, sensor_of
+from studies.pages.report_data import ReportCell, ReportData, ReportScene
+from studies.pages.report_facts import (
+    configuration,
+    environment_of,
+    fallbacks,
+    lenses_left_out,
+    level_of,
+    render_notes,
+    render_of,
+    sensor_of,
+)
+from studies.pages.report_text import group_names, view_names
 from studies.pages.results import DISPLAY_WHITE
 from studies.study.study import label
 from studies.sweep.database import FILE, last_study, read_ledger, rows
@@ -24,26 +35,26 @@ from studies.sweep.row import Row
 from studies.sweep.stored import read_whole
 
 SHOWN_BYTES = 8e6  # of pictures in a page, where their number isn't given: some 11 MB of HTML, which any browser takes
-_UNKNOWN = ("engines", "exposure_s", "balance", "mean_electrons", "seconds", "substitution", "budget_share", *SCATTERED)
 
 
-class Ledger(NamedTuple):
-    """What the last run of a sweep asked for, what there is of it, and the seconds by stage of all its runs."""
+@dataclass(frozen=True)
+class LastRun:
+    """What the last run of a sweep asked for, how many cells that is, what is made of it, and the seconds by stage."""
 
-    study: dict[str, Any]
-    stages: dict[str, float]
+    study: Mapping[str, Any]
+    stages: Mapping[str, float]
     wanted: int
-    rows: list[Row]
+    rows: tuple[Row, ...]
 
 
-def read_run(folder: Path) -> Ledger:
+def read_run(folder: Path) -> LastRun:
     """Read the last run of a sweep.
 
     Raises
     ------
     InputError
-        Where there is no ledger, one of another version, or none of its cells is made yet, or they were made by
-        different versions, variants or engines.
+        Where there is no results database, one of another version, or none of its cells is made yet, or they were made
+        by different versions, variants or engines.
     """
     if not (folder / FILE).is_file():
         raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
@@ -53,11 +64,11 @@ def read_run(folder: Path) -> Ledger:
     if not found or run is None:
         raise InputError(f"{folder}: its last run has made no cell yet; run rodcone sweep, which goes on")
     require_alike(found)
-    return Ledger(*run, wanted, found)
+    return LastRun(*run, wanted, tuple(found))
 
 
-def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """Results and pictures of a sweep, as `studies.pages.report.render_report` takes them.
+def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[ReportData, dict[str, bytes]]:
+    """Values and pictures of a sweep, as `studies.pages.report.render_report` takes them.
 
     Parameters
     ----------
@@ -71,133 +82,85 @@ def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[dict
     InputError
         As `read_run`, and for a picture that is gone.
     """
-    ledger = read_run(folder)
-    study, cells = ledger.study, list(_cells(ledger))
+    run = read_run(folder)
+    study = run.study
     names = [label(choice["source"]) for choice in study["scenes"]]
-    truths = _truths(ledger, names)
-    pictures = {name: read_whole(folder / PICTURES, name) for name in truths if name is not None}
-    sizes = {name: _size(pictures, truths[place * len(study["spectra"])]) for place, name in enumerate(names)}
-    missing = ledger.wanted - len(ledger.rows)
-    left = _choose(folder, cells, study, most_pictures)
-    pictures |= {cell["picture"]: read_whole(folder / PICTURES, cell["picture"]) for cell in cells if cell["picture"]}
-    results = {
-        "rodcone": metadata.version("rodcone"),
-        "name": study["name"],
-        "seed": study["seeds"][0],
-        "scene": names[0] if len(names) == 1 else f"{len(names)} scenes",
-        "size": sizes[names[0]],
-        "scenes": [{"name": name, "size": sizes[name]} for name in names],
-        "spectra": study["spectra"],
-        "exposures": study["exposures"],
-        "truths": truths,
-        "environment": environment_of(ledger.rows),
-        "render": None,
-        "renders": [render_of(ledger.rows, name) for name in names],
-        "exposure_rule": RULE.format(longest=study["longest_exposure_s"] * 1e3),
-        "display_white": DISPLAY_WHITE,
-        "levels": [level_of(level) for level in study["levels"]],
-        "sensors": [sensor_of(name) for name in study["sensors"]],
-        "cameras": study["processors"],
-        "cells": cells,
-        "stages": [{"name": name, "seconds": seconds} for name, seconds in ledger.stages.items()],
-        "left_out": lenses_left_out(ledger.rows, study["sensors"]),
-        "notes": []
-        if missing == 0
-        else [f"{missing} of {ledger.wanted} cells are not made yet: rodcone sweep goes on with them."],
-        "pictures_left_out": left,
-        "configuration": configuration(study),
-    }
-    return results, pictures
+    of_views = {(row.scene, row.spectrum): row.truth for row in run.rows}
+    truths = [of_views.get(view) for view in product(names, study["spectra"])]
+    cells = _cells(run, names)
+    shown, left_out = _choose(folder, cells, study, most_pictures)
+    wanted = dict.fromkeys(name for name in (*truths, *(cell.picture for cell in shown)) if name)
+    pictures = {name: read_whole(folder / PICTURES, name) for name in wanted}
+    sizes = [_size(pictures, truths[place * len(study["spectra"])]) for place in range(len(names))]
+    missing = run.wanted - len(run.rows)
+    unmade = [f"{missing} of {run.wanted} cells are not made yet: rodcone sweep goes on with them."] if missing else []
+    data = ReportData(
+        rodcone=metadata.version("rodcone"),
+        name=study["name"],
+        scenes=tuple(ReportScene(name, *size) for name, size in zip(names, sizes, strict=True)),
+        spectra=tuple(study["spectra"]),
+        sensors=tuple(sensor_of(name) for name in study["sensors"]),
+        exposures=tuple(study["exposures"]),
+        levels=tuple(level_of(level) for level in study["levels"]),
+        cameras=tuple(study["processors"]),
+        seeds=tuple(study["seeds"]),
+        cells=tuple(shown),
+        truths=tuple(truths),
+        renders=tuple(render_of(run.rows, name) for name in names),
+        stages=run.stages,
+        environment=environment_of(run.rows),
+        configuration=configuration(study),
+        exposure_rule=RULE.format(longest=study["longest_exposure_s"] * 1e3),
+        display_white=DISPLAY_WHITE,
+        left_out=lenses_left_out(run.rows, study["sensors"]),
+        notes=(*fallbacks(run.rows), *render_notes(run.rows), *unmade),
+        pictures_left_out=left_out,
+    )
+    return data, pictures
 
 
-def _cells(ledger: Ledger) -> Iterator[dict[str, Any]]:
-    """A cell for each combination that was asked for; one that isn't made yet has no figure."""
-    study = ledger.study
-    axes = (study["spectra"], study["levels"], study["exposures"])
-    found = {(r.scene, r.spectrum, r.level, r.exposure, r.sensor, r.processor, r.seed): r for r in ledger.rows}
-    light = {
-        (r.scene, r.spectrum, r.level): {"luminance_cd_m2": r.luminance_cd_m2, "illuminance_lux": r.illuminance_lux}
-        for r in ledger.rows
-    }
-    for choice, spectrum, level, exposure, sensor, camera, seed in product(
-        study["scenes"], *axes, study["sensors"], study["processors"], study["seeds"]
-    ):
-        row = found.get((label(choice["source"]), spectrum, level, exposure, label(sensor), camera, seed))
-        yield {
-            "scene": label(choice["source"]),
-            "spectrum": spectrum,
-            "level": study["levels"].index(level),
-            "exposure": exposure,
-            "sensor": label(sensor),
-            "camera": camera,
-            "seed": seed,
-            **light.get((label(choice["source"]), spectrum, level), {}),
-            **(dict.fromkeys(_UNKNOWN) | {"picture": None} if row is None else _figures(row)),
-        }
+def _cells(run: LastRun, names: Sequence[str]) -> list[ReportCell]:
+    """Return a cell for each combination that was asked for; one that isn't made yet has no figure."""
+    study = run.study
+    sensors = [label(name) for name in study["sensors"]]
+    found = {(r.scene, r.spectrum, r.sensor, r.exposure, r.level, r.processor, r.seed): r for r in run.rows}
+    light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in run.rows}
+    views = view_names(names, study["spectra"])
+    in_view = group_names(sensors, study["exposures"])
+    titles = [name + (f", {view}" if view else "") for view in views for name in in_view]
+    groups = product(names, study["spectra"], sensors, study["exposures"])
+    cells = []
+    for title, group in zip(titles, groups, strict=True):
+        for level, camera in product(study["levels"], study["processors"]):
+            of_seeds = [found.get((*group, level, camera, seed)) for seed in study["seeds"]]
+            in_both_units = light.get((*group[:2], level), (None, None))
+            cells.append(over_seeds(of_seeds, title, study["levels"].index(level), camera, in_both_units))
+    return cells
 
 
-def _figures(row: Row) -> dict[str, Any]:
-    return {
-        **{name: getattr(row, name) for name in (*SCATTERED, "exposure_s", "budget_share", "picture")},
-        "substitution": None if row.substitution is None else bool(row.substitution),
-        "balance": json.loads(row.balance),
-        "mean_electrons": json.loads(row.mean_electrons),
-        "engines": {"render": row.variant, "capture": row.readout_engine, "develop": row.development_engine},
-        "seconds": {"capture": row.capture_s, "develop": row.develop_s, "measure": row.measure_s},
-        "file": f"{PICTURES}/{row.picture}",
-    }
-
-
-def _truths(ledger: Ledger, names: Sequence[str]) -> list[str | None]:
-    """File of each scene's truth under each spectrum; None where no cell of it is made yet."""
-    found = {(row.scene, row.spectrum): row.truth for row in ledger.rows}
-    return [found.get(view) for view in product(names, ledger.study["spectra"])]
-
-
-def _size(pictures: Mapping[str, bytes], name: str | None) -> list[int]:
+def _size(pictures: Mapping[str, bytes], name: str | None) -> tuple[int, int]:
     """Height and width of a picture; of one not made yet 1 each."""
     if name is None:
-        return [1, 1]
+        return 1, 1
     with Image.open(BytesIO(pictures[name])) as picture:
-        return [picture.height, picture.width]
+        return picture.height, picture.width
 
 
-def _choose(folder: Path, cells: Sequence[dict[str, Any]], study: Mapping[str, Any], most: int | None) -> str:
+def _choose(
+    folder: Path, cells: Sequence[ReportCell], study: Mapping[str, Any], most: int | None
+) -> tuple[list[ReportCell], str]:
     """Leave pictures out of the cells until `most` are left; says in words which."""
-    cameras, levels = len(study["processors"]), len(study["levels"])
-    first_seed = [cell for cell in cells if cell["seed"] == study["seeds"][0]]
-    held = [cell["picture"] for cell in first_seed if cell["picture"]]
+    cameras = len(study["processors"])
     if most is None:
-        mean = sum((folder / PICTURES / name).stat().st_size for name in held) / len(held) if held else 1.0
-        most = int(SHOWN_BYTES / mean)
-    # In the report's order levels run within a group; in the study's the exposures and sensors run within a level.
-    order = sorted(first_seed, key=lambda cell: _place(cell, study))
-    conditions = [order[start : start + cameras] for start in range(0, len(order), cameras)]
-    chosen = chosen_conditions(len(conditions), levels, max(most // cameras, 1))
-    for place, condition in enumerate(conditions):
-        for cell in condition:
-            if place not in chosen:
-                cell["picture"] = None
-    for cell in cells:
-        if cell["seed"] != study["seeds"][0]:
-            cell["picture"] = None
-    if len(chosen) == len(conditions):
-        return ""
-    return (
-        f"To keep the page small, pictures of {len(chosen)} of {len(conditions)} conditions are in it, numbers of all; "
-        "the others are files beside the ledger, and rodcone report --pictures N puts more into the page."
+        files = [folder / PICTURES / cell.picture for cell in cells if cell.picture]
+        sizes = [file.stat().st_size for file in files if file.is_file()]  # `read_whole` tells of one that is gone
+        most = int(SHOWN_BYTES * len(sizes) / sum(sizes)) if sizes else len(cells)
+    count = len(cells) // cameras
+    chosen = chosen_conditions(count, len(study["levels"]), max(most // cameras, 1))
+    if len(chosen) == count:
+        return list(cells), ""
+    shown = [cell if index // cameras in chosen else replace(cell, picture=None) for index, cell in enumerate(cells)]
+    return shown, (
+        f"To keep the page small, pictures of {len(chosen)} of {count} conditions are in it, numbers of all; the "
+        "others are files beside the results database, and rodcone report --pictures N puts more into the page."
     )
-
-
-def _place(cell: Mapping[str, Any], study: Mapping[str, Any]) -> tuple[int, ...]:
-    """Place of a cell in the report's order."""
-    axes = (
-        [label(choice["source"]) for choice in study["scenes"]],
-        study["spectra"],
-        [label(name) for name in study["sensors"]],
-        study["exposures"],
-        list(range(len(study["levels"]))),
-        study["processors"],
-    )
-    names = ("scene", "spectrum", "sensor", "exposure", "level", "camera")
-    return tuple(axis.index(cell[name]) for name, axis in zip(names, axes, strict=True))

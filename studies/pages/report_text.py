@@ -1,24 +1,19 @@
-"""Numbers as text, and the report's sentences computed from them."""
+"""Numbers and names as text: what the pages write."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import product
 from math import floor, isfinite, isinf, isnan, log10
-from typing import Any
 
-from studies.budget.budget import MOST_SHARE, OF_PIXELS
+from studies.pages.report_data import ReportCell
+from studies.study.levels import parse_level
+from studies.study.study import OWN, parse_exposure
 
 MISSING = "—"
 NBSP = "\N{NO-BREAK SPACE}"
 CAMERA_NAMES = {"interleaved": "Interleaved", "bayer": "Bayer"}
 # As the title writes them; elsewhere the short names stand beside their pictures.
 CAMERA_TITLES = {"interleaved": "Interleaved RGBW"}
-STOPPED_BY = {
-    "seconds": "the time it was given was used up",
-    "noise": "the error asked for was reached",
-    "samples": "the samples asked for were done",
-    "interrupt": "it was interrupted",
-}
 
 
 @dataclass(frozen=True)
@@ -66,6 +61,12 @@ def significant(value: float | None, unit: str = "", digits: int = 3) -> str:
     return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "\N{MINUS SIGN}") + (NBSP + unit if unit else "")
 
 
+def level_text(level: str) -> str:
+    """Write ``25cd/m2`` as prose does."""
+    value, unit = parse_level(level)
+    return significant(value, unit.replace("m2", "m²"))
+
+
 def percent(value: float | None) -> str:
     """Write a fraction as per cent with two significant digits."""
     return significant(None if value is None else 100 * value, "%", 2)
@@ -78,17 +79,17 @@ def duration(seconds: float | None) -> str:
     return significant(seconds, "s", 3)
 
 
-def metric_text(metric: Metric, cell: Mapping[str, Any]) -> str:
+def metric_text(metric: Metric, cell: ReportCell) -> str:
     """Write a cell's value of `metric`, with the half of its confidence interval where there is one."""
     return interval_text(cell, metric.key, metric.digits, metric.unit)
 
 
-def interval_text(cell: Mapping[str, Any], key: str, digits: int, unit: str = "") -> str:
+def interval_text(cell: ReportCell, key: str, digits: int, unit: str = "") -> str:
     """Write a cell's figure as "20.1 ± 0.3 dB" where seeds give an interval, else as "20.1 dB"."""
-    interval = cell.get("intervals", {}).get(key)
+    interval = cell.intervals.get(key)
     if interval is None:
-        return fixed(cell[key], digits, unit)
-    return f"{fixed(cell[key], digits)}{NBSP}±{NBSP}{fixed((interval[1] - interval[0]) / 2, digits, unit)}"
+        return fixed(cell.figures[key], digits, unit)
+    return f"{fixed(cell.figures[key], digits)}{NBSP}±{NBSP}{fixed((interval[1] - interval[0]) / 2, digits, unit)}"
 
 
 def substitution_text(share: float | None) -> str:
@@ -103,151 +104,44 @@ def camera_name(camera: str) -> str:
     return CAMERA_NAMES.get(camera, camera)
 
 
-def join(parts: Sequence[str]) -> str:
-    """Join with commas and a last "and"."""
-    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1] if parts else ""
-
-
-def leader(metric: Metric, cells: Sequence[Mapping[str, Any]]) -> tuple[Mapping[str, Any] | None, float]:
+def leader(metric: Metric, cells: Sequence[ReportCell]) -> tuple[ReportCell | None, float]:
     """Return the cell that is best in `metric` and its lead over the next; None where nothing is to be told apart.
 
     That is where the written numbers tie, or where the confidence intervals over seeds overlap. (A test of the
     difference would find a lead in some cases in which 95 % intervals overlap: overlap is the stricter rule.)
     """
-    known = [cell for cell in cells if cell[metric.key] is not None and not isnan(cell[metric.key])]
-    ranked = sorted(known, key=lambda cell: float(cell[metric.key]), reverse=metric.higher)
-    if len(ranked) < 2:
-        return None, 0.0
-    first, second = (float(cell[metric.key]) for cell in ranked[:2])
+    found = ((value, cell) for cell in cells if (value := cell.figures[metric.key]) is not None and not isnan(value))
+    ranked = sorted(found, key=lambda pair: pair[0], reverse=metric.higher)[:2]
     # Judged on the numbers as printed: nobody should read "leads" beside two equal figures.
-    if fixed(first, metric.digits) == fixed(second, metric.digits):
+    if len({fixed(value, metric.digits) for value, _ in ranked}) < 2:
         return None, 0.0
-    spans_of_two = [cell.get("intervals", {}).get(metric.key) for cell in ranked[:2]]
-    if None not in spans_of_two and max(low for low, _ in spans_of_two) <= min(high for _, high in spans_of_two):
+    intervals = [cell.intervals[metric.key] for _, cell in ranked if metric.key in cell.intervals]
+    if len(intervals) == 2 and max(low for low, _ in intervals) <= min(high for _, high in intervals):
         return None, 0.0
-    return ranked[0], abs(first - second)
+    return ranked[0][1], abs(ranked[0][0] - ranked[1][0])
 
 
-def spans(levels: Sequence[str], chosen: Iterable[int]) -> str:
-    """Write a set of level numbers as runs: "from moonlight to dusk and at office"."""
-    wanted = sorted(chosen)
-    if len(wanted) == len(levels) > 1:
-        return "at every level"
-    runs = []
-    for _, group in groupby(enumerate(wanted), key=lambda pair: pair[1] - pair[0]):
-        run = [index for _, index in group]
-        runs.append(f"at {levels[run[0]]}" if len(run) == 1 else f"from {levels[run[0]]} to {levels[run[-1]]}")
-    return join(runs)
+def view_names(scenes: Sequence[str], spectra: Sequence[str]) -> list[str]:
+    """Return a title for each scene under each spectrum, of what varies; all are empty where there is one alone."""
+    several = len(scenes) > 1, len(spectra) > 1
+    return [
+        ", ".join(part for part, named in zip((scene, spectrum_name(spectrum)), several, strict=True) if named)
+        for scene, spectrum in product(scenes, spectra)
+    ]
 
 
-def _lead_sentence(metric: Metric, levels: Sequence[str], rows: Sequence[Sequence[Mapping[str, Any]]]) -> str:
-    """Say where each camera leads in `metric`, and by how much."""
-    led: dict[str, list[tuple[int, float]]] = {}
-    for index, cells in enumerate(rows):
-        best, margin = leader(metric, cells)
-        led.setdefault("" if best is None else best["camera"], []).append((index, margin))
-    clauses = []
-    for camera in [cell["camera"] for cell in rows[0] if cell["camera"] in led]:
-        margins = [margin for _, margin in led[camera]]
-        low, high = fixed(min(margins), metric.digits), fixed(max(margins), metric.digits)
-        by = high if low == high else f"{low} to {high}"
-        where = spans(levels, [index for index, _ in led[camera]])
-        clauses.append(f"{camera_name(camera)} leads {where}, by {by}{NBSP + metric.unit if metric.unit else ''}")
-    if "" in led:
-        clauses.append(f"no camera leads {spans(levels, [index for index, _ in led['']])}")
-    return f"{metric.name}: {'; '.join(clauses)}."
+def group_names(sensors: Sequence[str], exposures: Sequence[str]) -> list[str]:
+    """Return a title for each sensor and exposure; the exposure is named where there are several."""
+    named = [f", exposure {exposure_name(time)}" if len(exposures) > 1 else "" for time in exposures]
+    return [sensor + name for sensor, name in product(sensors, named)]
 
 
-def sensor_sentences(levels: Sequence[str], rows: Sequence[Sequence[Mapping[str, Any]]]) -> list[str]:
-    """Say in words what one sensor's cells show; `rows` holds one sequence of cells (a camera each) for each level."""
-    sentences = [_lead_sentence(metric, levels, rows) for metric in (PSNR, SSIM, DELTA_E)]
-    for slot, camera in enumerate(cell["camera"] for cell in rows[0]):
-        states = [cells[slot]["substitution"] for cells in rows]
-        if any(state is not None for state in states):
-            sentences.append(f"Luminance substitution ({camera_name(camera)}): {_substituted(levels, states)}.")
-        fallen = [index for index, cells in enumerate(rows) if "calibrated" in (cells[slot]["balance"] or {}).values()]
-        if fallen:
-            where = spans(levels, fallen)
-            sentences.append(f"White balance ({camera_name(camera)}): falls back to calibrated gains {where}.")
-    return sentences
+def exposure_name(exposure: str) -> str:
+    """Write an exposure as prose does: ``auto`` as "automatic", ``10ms`` as "10 ms"."""
+    seconds = parse_exposure(exposure)
+    return "automatic" if seconds is None else duration(seconds)
 
 
-def _substituted(levels: Sequence[str], states: Sequence[float | None]) -> str:
-    """Say at which levels luminance was substituted; a state is the share of the seeds with it."""
-    on = [index for index, state in enumerate(states) if state == 1]
-    some = [index for index, state in enumerate(states) if state and state < 1]
-    if not on and not some:
-        return "off at every level"
-    said = [f"on {spans(levels, on)}"] if on else []
-    said += [f"on for some seeds {spans(levels, some)}"] if some else []
-    return ", ".join(said) + (", off elsewhere" if len(on) + len(some) < len(levels) else "")
-
-
-def headline(levels: Sequence[str], cells: Sequence[Sequence[Mapping[str, Any]]]) -> str:
-    """Count the conditions in which each camera leads in PSNR (sensor, exposure, level), with its largest lead."""
-    won: dict[str, list[tuple[float, Mapping[str, Any]]]] = {cell["camera"]: [] for cell in cells[0]}
-    for condition in cells:
-        best, margin = leader(PSNR, condition)
-        if best is not None:
-            won[best["camera"]].append((margin, best))
-    counts = []
-    for camera, leads in won.items():
-        most = max(leads, key=lambda pair: pair[0], default=None)
-        tail = ""
-        if most:
-            cell = most[1]
-            tail = f" (by {fixed(most[0], 1, 'dB')} at most: {levels[cell['level']]}, {cell['group']})"
-        counts.append(f"{camera_name(camera)} in {len(leads)}{tail}")
-    tied = len(cells) - sum(len(leads) for leads in won.values())
-    ending = f"; in {tied} no camera leads" if tied else ""
-    return f"Of {len(cells)} conditions, PSNR is higher for {join(counts)}{ending}."
-
-
-def render_sentence(render: Mapping[str, Any]) -> str:
-    """Say how long the render ran, why it stopped and what error it reached."""
-    why = STOPPED_BY.get(str(render["stopped_by"]), f"of: {render['stopped_by']}")
-    return (
-        f"The render made {render['passes']} passes, {render['spp']} samples a pixel, in {duration(render['seconds'])} "
-        f"and stopped because {why}. The relative Monte Carlo error it reached is "
-        f"{percent(render['relative_mc_error'])}. In the brightest light its noise variance is at most "
-        f"{percent(render['brightest_share'])} of the sensor's own in {percent(OF_PIXELS)} of the pixels "
-        f"({percent(MOST_SHARE)} is the aim)."
-    )
-
-
-def budget_sentence(cells: Sequence[Mapping[str, Any]]) -> str:
-    """Say what a plan predicts that its approximations add; empty where the pictures follow none."""
-    known = [cell["budget_share"] for cell in cells if cell.get("budget_share") is not None]
-    if not known:
-        return ""
-    return (
-        f"By the plan that the pictures follow, all its approximations together add at most {percent(max(known))} to "
-        "the variance of the sensor's own noise."
-    )
-
-
-def seeds_sentence(seeds: Sequence[int]) -> str:
-    """Say how many seeds the numbers come from, and what that means for them."""
-    if len(seeds) == 1:
-        return f"One seed ({seeds[0]}): how far another draw of the noise would move the numbers is not known here."
-    return (
-        f"Means over {len(seeds)} seeds; ± and bands are the 95{NBSP}% confidence interval of the mean (Student's t), "
-        f"and where the intervals of two cameras overlap none leads. Pictures are those of seed {seeds[0]}."
-    )
-
-
-def share_sentence(levels: Sequence[str], cells: Sequence[Mapping[str, Any]]) -> str:
-    """Judge the Monte Carlo share of all cells against the aim."""
-    known = [cell for cell in cells if cell["mc_share"] is not None and isfinite(cell["mc_share"])]
-    if not known:
-        return "The Monte Carlo share is not known for any picture."
-    worst = max(known, key=lambda cell: float(cell["mc_share"]))
-    where = f"{levels[worst['level']]}, {worst['group']}, {camera_name(worst['camera'])}"
-    over = sum(cell["mc_share"] > MOST_SHARE for cell in known)
-    most = f"The largest Monte Carlo share is {percent(worst['mc_share'])} ({where})"
-    if not over:
-        return f"{most}: all {len(known)} pictures keep the {percent(MOST_SHARE)} aim."
-    return (
-        f"{most}: {over} of {len(known)} pictures miss the {percent(MOST_SHARE)} aim. "
-        "In those, noise of the render counts as texture of the scene, and the metrics see it."
-    )
+def spectrum_name(spectrum: str) -> str:
+    """Write a spectrum as prose does."""
+    return "own light" if spectrum == OWN else f"under {spectrum}"

@@ -1,101 +1,41 @@
 """Speed against error as one self-contained page: a chart and a table for each stage. It has no script."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import ceil, floor, log10
+from collections.abc import Mapping
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
+from matplotlib import rc_context
+from matplotlib.figure import Figure
 
 from studies.pages import report_text as text
-from studies.pages.charts import Point as Mark
-from studies.pages.charts import Scale, Tick, decades, line_path, spread, tick_text
-from studies.pages.report import TEMPLATES
-
-WIDTH, HEIGHT = 540.0, 300.0
-LEFT, RIGHT, TOP, BOTTOM = 64.0, 190.0, 30.0, 44.0
-LABEL_GAP = 15.0
-
-
-@dataclass(frozen=True)
-class Place:
-    """One choice in the chart: its mark, its name and where that stands, and whether it is on the front."""
-
-    mark: Mark
-    name: str
-    label_y: float
-    on_front: bool
-
-
-@dataclass(frozen=True)
-class Plane:
-    """Error over time, both logarithmic, in SVG units."""
-
-    x_ticks: tuple[Tick, ...]
-    y_ticks: tuple[Tick, ...]
-    places: tuple[Place, ...]
-    front: str
-    noise: Tick | None
-    width: float = WIDTH
-    height: float = HEIGHT
-    left: float = LEFT
-    right: float = WIDTH - RIGHT
-    top: float = TOP
-    bottom: float = HEIGHT - BOTTOM
+from studies.pages.page import address, own_file, write_out
+from studies.pages.plots import BLUE, CHART, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
 
 
 def bench_page(results: Mapping[str, Any]) -> str:
-    """HTML of a bench's results as `rodcone bench --json` prints them."""
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    style = (TEMPLATES / "report.css").read_text(encoding="utf-8")
-    drawn = [(stage, plane(stage)) for stage in results["stages"]]
-    page = environment.get_template("bench.html.j2")
-    # The style is a file of this package, never input.
-    return page.render(results=results, stages=drawn, text=text, style=Markup(style))
+    """Return the HTML of a bench's results as `rodcone bench --json` prints them."""
+    drawn = [(stage, address("svg+xml", svg_text(plane(stage)).encode())) for stage in results["stages"]]
+    return write_out("bench.html.j2", results=results, stages=drawn, text=text, style=own_file("report.css"))
 
 
-def plane(stage: Mapping[str, Any]) -> Plane:
-    """Lay out one stage's chart; the reference itself, which has no error, stands in the table alone."""
+@rc_context(STYLE)
+def plane(stage: Mapping[str, Any]) -> Figure:
+    """Draw one stage's error over time; the reference itself, which has no error, stands in the table alone."""
     points = [point for point in stage["points"] if point["error_e"] > 0 and point["seconds"] > 0]
-    across = _scale([point["seconds"] for point in points], LEFT, WIDTH - RIGHT)
-    up = _scale([point["error_e"] for point in points], HEIGHT - BOTTOM, TOP)
-    marks = [
-        Mark(
-            across.at(point["seconds"]),
-            up.at(point["error_e"]),
-            f"{point['choice']}: {text.duration(point['seconds'])}, {text.significant(point['error_e'])} e⁻",
+    figure = blank(*CHART)
+    axes = figure.subplots()
+    for point in points:
+        mark = {"color": BLUE, "marker": "o"} if point["on_front"] else {"color": ORANGE, "marker": "s"}
+        axes.loglog(point["seconds"], point["error_e"], **mark)
+    front = sorted((point["seconds"], point["error_e"]) for point in points if point["on_front"])
+    axes.loglog([seconds for seconds, _ in front], [error for _, error in front], color=BLUE)
+    low, high = axes.get_ylim()
+    if low <= stage["noise_e"] <= high:
+        axes.axhline(stage["noise_e"], color=SOFT, linestyle="--")
+        axes.annotate(
+            "the sensor's own noise", (0.01, stage["noise_e"]), (0, 3), axes.get_yaxis_transform(), "offset points"
         )
-        for point in points
-    ]
-    labels = spread([mark.y for mark in marks], LABEL_GAP, TOP, HEIGHT - BOTTOM)
-    places = tuple(
-        Place(mark, point["choice"], round(y, 2), point["on_front"])
-        for mark, point, y in zip(marks, points, labels, strict=True)
-    )
-    front = sorted((place.mark for place in places if place.on_front), key=lambda mark: mark.x)
-    inside = up.low <= stage["noise_e"] <= up.high
-    return Plane(
-        x_ticks=_ticks(across),
-        y_ticks=_ticks(up),
-        places=places,
-        front=line_path(front),
-        noise=Tick(up.at(stage["noise_e"]), "the sensor's own noise") if inside else None,
-    )
-
-
-def _scale(values: Sequence[float], start: float, stop: float) -> Scale:
-    """Decades that hold all values."""
-    low, high = (min(values), max(values)) if values else (1.0, 10.0)
-    first, last = floor(log10(low) + 1e-9), ceil(log10(high) - 1e-9)
-    return Scale(10.0**first, 10.0 ** max(last, first + 1), start, stop, log=True)
-
-
-def _ticks(scale: Scale) -> tuple[Tick, ...]:
-    return tuple(Tick(scale.at(value), tick_text(value)) for value in decades(scale.low, scale.high))
+    axes.set(title="error, e⁻", xlabel="seconds")
+    plain_ticks(axes)
+    colours = {True: BLUE, False: ORANGE}
+    name_at_ends(axes, [(point["choice"], point["error_e"], colours[point["on_front"]]) for point in points])
+    return figure

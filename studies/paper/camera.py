@@ -13,16 +13,15 @@ from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
-from sensor.cfa import channels
+from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.optics import form_image
 from sensor.raw import RawImage
-from sensor.readout import read_out
 from sensor.response import expected_electrons
 from studies.metrics.quality import psnr_db
-from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
-from studies.photograph.camera import colour_fit
+from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
+from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.sweep.cells import Coordinates, device_stream, exposure_stream
 
 Image = NDArray[np.float64]
@@ -58,40 +57,28 @@ def view_of(transport: Transport, light: Spectrum, luminance_cd_m2: float | None
     return View(radiance, light_in_bands(light, transport.wavelength_nm, transport.width_nm), white)
 
 
-def electrons(view: View, sensor: SensorConfig, exposure_s: float) -> Image:
-    """Expected electrons of the mosaic, shape (h, w)."""
-    return expected_electrons(form_image(view.radiance, sensor), sensor, exposure_s)
-
-
 def exposures(view: View, sensor: SensorConfig, exposure_s: float, at: Coordinates, seeds: int) -> list[RawImage]:
     """Exposures by as many chips, drawn as a sweep draws the cells at these coordinates."""
-    expected_e, made = electrons(view, sensor, exposure_s), []
-    mosaic = PROCESSORS[at.processor].mosaic
+    expected_e = expected_electrons(form_image(view.radiance, sensor), sensor, exposure_s)
+    mosaic, made = PROCESSORS[at.processor].mosaic, []
     for seed in range(seeds):
         place = replace(at, seed=seed)
         device = draw_device(sensor, expected_e.shape, device_stream(place, mosaic))
-        made.append(read_out(expected_e, sensor, device, exposure_s, exposure_stream(place, mosaic)))
+        made.append(expose(expected_e, sensor, exposure_s, device, exposure_stream(place, mosaic), exact=True))
     return made
 
 
 def develop(
     raw: RawImage, view: View, sensor: SensorConfig, processor: str = "interleaved", **options: Any
 ) -> tuple[Image, Picture]:
-    """Develop an exposure with the colours fitted under the view's light.
+    """Develop an exposure as `develop_to_scale` does, with the colours fitted under the view's light.
 
-    Returns
-    -------
-    (h, w, 3) float64, Picture
-        Linear sRGB with the view's white at 1, and the processor's own result. `options` are the processor's; a
-        ``matrix`` among them stands in place of the fit.
+    A ``matrix`` among the processor's `options` stands in place of the fit.
     """
     used = PROCESSORS[processor]
-    neutral = neutral_electrons(sensor, view.light, raw.exposure_s)
     matrix = options.pop("matrix", None)
     colours = colour_fit(sensor, used, view.light) if matrix is None else matrix
-    picture = used.develop(raw, colours, neutral=neutral, **options)
-    unit_e = neutral[channels(sensor.cfa).index(used.unit)]
-    return picture.rgb / (unit_e * view.white_cd_m2), picture
+    return develop_to_scale(raw, used, colours, sensor, view.light, view.white_cd_m2, **options)
 
 
 def noise(pictures: Sequence[Image]) -> float:

@@ -14,7 +14,7 @@ ABOUT = 0.2
 
 
 @dataclass(frozen=True)
-class Check:
+class ClaimCheck:
     """One number of a claim under one condition, and the range in which the claim holds.
 
     Attributes
@@ -50,7 +50,7 @@ class Claim:
         Figure, table or section.
     text : str
         The statement.
-    checks : tuple of Check
+    checks : tuple of ClaimCheck
         One or more.
     note : str
         How the numbers were got, and what was ours to choose.
@@ -63,7 +63,7 @@ class Claim:
 
     where: str
     text: str
-    checks: tuple[Check, ...]
+    checks: tuple[ClaimCheck, ...]
     note: str = ""
 
     def __post_init__(self) -> None:
@@ -78,21 +78,21 @@ class Claim:
         return VERDICTS[0] if held == len(self.checks) else VERDICTS[1] if held else VERDICTS[2]
 
 
-def about(condition: str, value: float, claimed: float, unit: str = "") -> Check:
+def about(condition: str, value: float, claimed: float, unit: str = "") -> ClaimCheck:
     """Check against a number that the paper gives as "about": a fifth more or less, `ABOUT`."""
-    return Check(condition, value, claimed * (1 - ABOUT), claimed * (1 + ABOUT), unit)
+    return ClaimCheck(condition, value, claimed * (1 - ABOUT), claimed * (1 + ABOUT), unit)
 
 
-def near(condition: str, value: float, claimed: float, margin: float, unit: str = "") -> Check:
+def near(condition: str, value: float, claimed: float, margin: float, unit: str = "") -> ClaimCheck:
     """Check against a number within a margin on either side."""
-    return Check(condition, value, claimed - margin, claimed + margin, unit)
+    return ClaimCheck(condition, value, claimed - margin, claimed + margin, unit)
 
 
-def at_least(condition: str, value: float, low: float, unit: str = "") -> Check:
+def at_least(condition: str, value: float, low: float, unit: str = "") -> ClaimCheck:
     """Check that a value is no less."""
-    return Check(condition, value, low, inf, unit)
+    return ClaimCheck(condition, value, low, inf, unit)
 
 
-def at_most(condition: str, value: float, high: float, unit: str = "") -> Check:
+def at_most(condition: str, value: float, high: float, unit: str = "") -> ClaimCheck:
     """Check that a value is no more."""
-    return Check(condition, value, -inf, high, unit)
+    return ClaimCheck(condition, value, -inf, high, unit)

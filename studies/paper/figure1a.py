@@ -11,10 +11,11 @@ from sensor.exposure import LONGEST_S
 from sensor.optics import form_image
 from sensor.response import channel_electrons
 from studies.pages import report_text as text
-from studies.pages.layout import Figure, sheet
+from studies.pages.plots import picture_rows
 from studies.paper.camera import View, develop, exposures
 from studies.paper.checks import Claim, at_least, at_most
 from studies.paper.flat import decibels, snr
+from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, TODAY, Setup, sensor_of, view
 from studies.sweep.cells import Coordinates
 
@@ -59,7 +60,7 @@ def claims_1a(dark_db: Mapping[str, float], lit_db: Mapping[str, float]) -> tupl
     )
 
 
-def figure_1a(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
+def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """The photograph under both readings, as it is and with its dark half made as bright as the other."""
     seen = view(setup, "lit_and_shadowed", None, "lamp")
     rows, half = [], seen.radiance.shape[1] // 2
@@ -75,10 +76,9 @@ def figure_1a(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
                 (f"left half {text.significant(DARK_GAIN)} times brighter", encode_srgb(raised)),
             ]
         )
-    drawing = sheet("Figure 1a", "one photograph, its left half in the dark of night, its right half lit", rows)
     dark, lit = ({name: half_snr_db(seen, name, side) for name in (*READINGS, TODAY, LARGE)} for side in (True, False))
     caption = (
         f"One photograph of a cabinet: the left half at {DARK_CD_M2:g} cd/m², the right one at {LIT_CD_M2:g}. "
         "Beside it the same with the left half brightened on the screen: what the camera recorded there."
     )
-    return Figure("1a", caption, drawing), claims_1a(dark, lit)
+    return PaperFigure("1a", caption, picture_rows(rows)), claims_1a(dark, lit)

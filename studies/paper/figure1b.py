@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from studies.pages.layout import Figure, sheet
-from studies.paper.checks import Check, Claim, at_least, near
+from studies.pages.plots import picture_rows
+from studies.paper.checks import Claim, ClaimCheck, at_least, near
 from studies.paper.flat import channel_e, decibels, light_of, shot_noise_alone, snr
+from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, SWEEP, Setup, sensor_of, swept
 from studies.sweep.prepare import PICTURES
 from studies.sweep.row import Row
@@ -50,7 +51,7 @@ def claims_1b(shot_db: float, all_db: Mapping[str, float], psnr_gain_db: float) 
     psnr_gain_db : float
         Of the developed pictures.
     """
-    checks: Sequence[Check] = (
+    checks: Sequence[ClaimCheck] = (
         near("shot noise alone", shot_db, CLAIMED_DB, MARGIN_DB, "dB"),
         *(near(f"{name}, all noise", value, CLAIMED_DB, MARGIN_DB, "dB") for name, value in all_db.items()),
     )
@@ -72,7 +73,7 @@ def claims_1b(shot_db: float, all_db: Mapping[str, float], psnr_gain_db: float) 
     )
 
 
-def figure_1b(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
+def figure_1b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Pictures of the study `paper_1b.toml`, and the SNR."""
     rows = swept(setup, "1b")
     by_sensor = {
@@ -80,10 +81,9 @@ def figure_1b(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
     }
     psnr = {pitch: float(np.mean([row.psnr_db for row in own])) for pitch, own in by_sensor.items()}
     pictures = [(f"{pitch} µm, PSNR {psnr[pitch]:.1f} dB", shown(setup, own[0])) for pitch, own in by_sensor.items()]
-    drawing = sheet("Figure 1b", "one scene with pixels of 6 and of 2 micrometres", [pictures])
     everything = {name: gain_db(name) for name in READINGS}
     claims = claims_1b(gain_db("table1_output", shot_alone=True), everything, psnr[LARGE_UM] - psnr[SMALL_UM])
     caption = (
         "The same scene at 100 cd/m², f/4 and 10 ms with pixels of 6 µm and of 2 µm; both pictures have as many pixels."
     )
-    return Figure("1b", caption, drawing), claims
+    return PaperFigure("1b", caption, picture_rows([pictures])), claims

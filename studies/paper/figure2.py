@@ -5,19 +5,23 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 
 from render.spectrum import Floats
 from sensor.curves import rgbw
 from sensor.readout import noise_variance
-from studies.pages.drawing import Box, Drawing, Mark, Text
-from studies.pages.layout import HEIGHT, WIDTH, Figure, curves
+from studies.pages.plots import BLUE, CHART, COLOURS, GREEN, INK, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks
 from studies.paper.checks import Claim, about, at_least
 from studies.paper.flat import channel_e, light_of, snr, without_prnu
 from studies.paper.numbers import MOONLIGHT_CD_M2
+from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, TODAY, sensor_of
 
 NM: Floats = np.arange(400.0, 701.0, 2.0)  # the paper's range
-LETTERS = "RGBW"
+CHANNELS = "RGBW"
 CLAIMED = {"R": 10.0, "G": 6.0, "B": 10.0}
 SNR_EXPOSURE_S = 0.020  # Figure 6's longest
 BRIGHT = 0.9  # share of the well that W holds in "bright light": beyond it, W saturates
@@ -53,8 +57,8 @@ def snr_gains(name: str, luminance_cd_m2: float, *, fixed_pattern: bool = True) 
     values, variance = snr(electrons, sensor, SNR_EXPOSURE_S), noise_variance(electrons, sensor, SNR_EXPOSURE_S)
     dark = float(noise_variance(np.zeros(1), sensor, SNR_EXPOSURE_S)[0] / variance[3])
     return {
-        letter: Gain(float(values[3] / values[i]), dark, float(electrons[i] / variance[i]))
-        for i, letter in enumerate("RGB")
+        channel: Gain(float(values[3] / values[i]), dark, float(electrons[i] / variance[i]))
+        for i, channel in enumerate("RGB")
     }
 
 
@@ -66,7 +70,7 @@ def bright_cd_m2(name: str) -> float:
 
 def coverage() -> float:
     """Least of W's response over the largest of R, G and B, over the range."""
-    values = rgbw().band_average(tuple(LETTERS), NM, np.full(NM.size, 2.0))
+    values = rgbw().band_average(tuple(CHANNELS), NM, np.full(NM.size, 2.0))
     return float((values[3] / values[:3].max(axis=0)).min())
 
 
@@ -91,9 +95,9 @@ def signal_claims(ratios: Mapping[str, Ratios], least: float) -> tuple[Claim, ..
             "Section 2",
             "W gathers about 6 times the signal of G and 10 times that of R and of B",
             tuple(
-                about(f"{letter}, {light}, 380-780 nm", value, CLAIMED[letter], "×")
+                about(f"{channel}, {light}, 380-780 nm", value, CLAIMED[channel], "×")
                 for light, of_light in ratios.items()
-                for letter, value in of_light.items()
+                for channel, value in of_light.items()
             ),
         ),
     )
@@ -109,17 +113,17 @@ def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
     pure : mapping
         As `bright`, without fixed pattern.
     """
-    roots = {letter: sqrt(value) for letter, value in signal_ratios("D65").items()}
+    roots = {channel: sqrt(value) for channel, value in signal_ratios("D65").items()}
     conditions = f"One pixel of each, {SNR_EXPOSURE_S * 1e3:g} ms, f/2.8, D65;"
     return (
         Claim(
             "Section 2",
             "W's SNR is about 6 times that of G and 10 times that of R and of B",
             tuple(
-                about(f"{letter}, {name}, {where}: {gain.dark:.0%} dark noise", gain.ratio, CLAIMED[letter], "×")
+                about(f"{channel}, {name}, {where}: {gain.dark:.0%} dark noise", gain.ratio, CLAIMED[channel], "×")
                 for where, by_sensor in (("moonlight", moon), ("W full", bright))
                 for name, of_sensor in by_sensor.items()
-                for letter, gain in of_sensor.items()
+                for channel, gain in of_sensor.items()
             ),
             f"{conditions} in moonlight, and where W is nearly full. The per cent are dark noise's part of W's "
             "variance: where it is nearly all of it, the SNR goes as the signal.",
@@ -128,9 +132,9 @@ def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
             "Section 2",
             "Where shot noise dominates, W's gain in SNR is the root of its gain in signal",
             tuple(
-                about(f"{letter}, {name}: {gain.shot:.0%} shot noise", gain.ratio, roots[letter], "×")
+                about(f"{channel}, {name}: {gain.shot:.0%} shot noise", gain.ratio, roots[channel], "×")
                 for name, of_sensor in pure.items()
-                for letter, gain in of_sensor.items()
+                for channel, gain in of_sensor.items()
             ),
             f"{conditions} where W is nearly full, fixed pattern (PRNU) left out. The per cent are shot noise's part "
             "of the colour's variance. low_noise is a pixel of today, with 1.5 e⁻ of read noise.",
@@ -138,7 +142,7 @@ def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
     )
 
 
-def figure_2() -> tuple[Figure, tuple[Claim, ...]]:
+def figure_2() -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Curves, tile and W's gain over light, with the claims about them."""
     moon = {name: snr_gains(name, MOONLIGHT_CD_M2) for name in READINGS}
     bright = {name: snr_gains(name, bright_cd_m2(name)) for name in READINGS}
@@ -148,26 +152,38 @@ def figure_2() -> tuple[Figure, tuple[Claim, ...]]:
         "Electrons per photon of R, G, B and W, and the 2×2 tile. On the right W's gain in SNR over G, one pixel at "
         f"{SNR_EXPOSURE_S * 1e3:g} ms and f/2.8 under D65: the signal's ratio in the dark, less in light."
     )
-    return Figure("2", caption, _drawing()), (*claims, *snr_claims(moon, bright, pure))
+    return PaperFigure("2", caption, _drawing()), (*claims, *snr_claims(moon, bright, pure))
 
 
-def _drawing() -> Drawing:
-    responses = rgbw().band_average(tuple(LETTERS), NM, np.full(NM.size, 2.0))
-    colours = {"R": "1", "G": "2", "B": "0", "W": "ink"}
-    lines = [(x, line.tolist(), colours[x], x == "W") for x, line in zip(LETTERS, responses, strict=True)]
-    marks: list[Mark] = list(curves("Responses, electrons per photon", "wavelength, nm", NM.tolist(), lines))
-    for index, letter in enumerate(LETTERS):
-        x, y = WIDTH - 40 + 34 * (index % 2), HEIGHT - 112 + 34 * (index // 2)
-        marks += [Box(x, y, 34, 34, "soft", FILLS[letter]), Text(x + 17, y + 21, letter, "middle", "tile")]
-    gains = [
-        (name, [snr_gains(name, float(level))["G"].ratio for level in LEVELS], str(slot), slot == 1)
-        for slot, name in enumerate(SENSORS)
-    ]
-    root = [sqrt(signal_ratios("D65")["G"])] * LEVELS.size
-    gains.append(("√ of signals' ratio", root, "soft", True))
-    corner = (WIDTH + 60, 0.0)
-    marks += curves(
-        "W's SNR over G's, one pixel", "luminance, cd/m²", LEVELS.tolist(), gains, log=(True, False), at=corner
-    )
-    described = "response over wavelength, the tile R G over B W, and W's gain in SNR over luminance"
-    return Drawing(2 * WIDTH + 70, HEIGHT, "Figure 2", described, tuple(marks))
+@rc_context(STYLE)
+def _drawing() -> Figure:
+    """Responses, the tile, and W's gain."""
+    figure = blank(2 * CHART[0], CHART[1])
+    left, middle, right = figure.subplots(1, 3, width_ratios=(10, 2, 10))
+    responses = rgbw().band_average(tuple(CHANNELS), NM, np.full(NM.size, 2.0))
+    for channel, response, colour in zip(CHANNELS, responses, (ORANGE, GREEN, BLUE, INK), strict=True):
+        left.plot(NM, response, color=colour, linestyle="--" if channel == "W" else "-")
+        peak = int(response.argmax())
+        place = NM[peak], response[peak]
+        left.annotate(channel, place, (0, 3), textcoords="offset points", color=colour, ha="center")
+    left.set(title="Responses, electrons per photon", xlabel="wavelength, nm", ylim=(0.0, None))
+    _draw_tile(middle)
+    ends = []
+    for slot, name in enumerate(SENSORS):
+        gains = [snr_gains(name, float(level))["G"].ratio for level in LEVELS]
+        right.semilogx(LEVELS, gains, color=COLOURS[slot], linestyle="--" if slot == 1 else "-")
+        ends.append((name, gains[-1], COLOURS[slot]))
+    root = sqrt(signal_ratios("D65")["G"])
+    right.axhline(root, color=SOFT, linestyle="--")
+    right.set(title="W's SNR over G's, one pixel", xlabel="luminance, cd/m²", xlim=(LEVELS[0], LEVELS[-1]))
+    plain_ticks(right)
+    name_at_ends(right, [*ends, ("√ of signals' ratio", root, SOFT)])
+    return figure
+
+
+def _draw_tile(axes: Axes) -> None:
+    """Draw the 2x2 tile, the channel in each pixel."""
+    axes.set_axis_off()
+    axes.imshow([[to_rgb(FILLS[channel]) for channel in row] for row in ("RG", "BW")])
+    for index, channel in enumerate(CHANNELS):
+        axes.text(index % 2, index // 2, channel, ha="center", va="center")

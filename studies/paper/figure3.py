@@ -12,9 +12,10 @@ from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.raw import RawImage
 from studies.metrics.truth import neutral_electrons
-from studies.pages.layout import Figure, sheet
+from studies.pages.plots import picture_rows
 from studies.paper.camera import Image, View, develop, exposures, noise, quality_db
 from studies.paper.checks import Claim, at_least, at_most
+from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, Setup, sensor_of, view
 from studies.photograph.camera import colour_fit
 from studies.sweep.cells import Coordinates
@@ -75,7 +76,7 @@ def claims_3(stages: Mapping[str, Stages]) -> tuple[Claim, ...]:
     )
 
 
-def figure_3(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
+def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Colour image, W image and result under both readings."""
     seen = view(setup, "still_life", LUMINANCE_CD_M2)
     stages, rows = {}, []
@@ -91,9 +92,8 @@ def figure_3(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
         )
         words = (f"{reading}: colour", "W", "result")
         rows.append([(name, encode_srgb(made[0])) for name, made in zip(words, (colour, white, result), strict=True)])
-    drawing = sheet("Figure 3", "colour image, W image and the result of both, in low light", rows)
     caption = (
         f"One exposure at {LUMINANCE_CD_M2:g} cd/m² and {EXPOSURE_S * 1e3:g} ms: R, G and B filled in bilinearly, W "
         "filled in, and the interleaved reconstruction with luminance substitution."
     )
-    return Figure("3", caption, drawing), claims_3(stages)
+    return PaperFigure("3", caption, picture_rows(rows)), claims_3(stages)

@@ -4,17 +4,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from isp.planes import planes
 from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import channels
 from sensor.raw import RawImage
-from studies.pages.drawing import Box, Drawing, Mark, Picture, Text
-from studies.pages.layout import GAP, HEAD, SIDE, Figure
+from studies.pages.plots import ORANGE, SIDE, STYLE, blank, show_picture
 from studies.paper.camera import Image, exposures
 from studies.paper.checks import Claim, at_least
 from studies.paper.numbers import MOONLIGHT_CD_M2
+from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, Setup, sensor_of, view
 from studies.sweep.cells import Coordinates
 
@@ -91,7 +94,7 @@ def claims_4(shares: Mapping[str, float]) -> tuple[Claim, ...]:
     )
 
 
-def figure_4(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
+def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """The edge with three patches, under both readings and at two levels."""
     shares, parts = {}, []
     for name, level in LEVELS.items():
@@ -109,15 +112,16 @@ def figure_4(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
         f"W beside an edge at {next(iter(LEVELS))}, in units of noise, and the patches around x, y and z enlarged. "
         "The numbers are their distances."
     )
-    return Figure("4", caption, _drawing(parts)), claims_4(shares)
+    return PaperFigure("4", caption, _drawing(parts)), claims_4(shares)
 
 
-def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Drawing:
+@rc_context(STYLE)
+def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Figure:
     """For each reading the plane around one x with three boxes, and beside it their patches large."""
-    marks: list[Mark] = []
-    small, wide, half = (SIDE - 2 * GAP) / 3, SIDE + 150.0, PATCH // 2
-    for index, (reading, plane, found) in enumerate(parts):
-        middle, corner = len(found.places) // 2, index * wide
+    figure = blank(len(parts) * (SIDE + 150), SIDE + 28)
+    for (reading, plane, found), part in zip(parts, figure.subfigures(1, len(parts), squeeze=False)[0], strict=True):
+        axes = part.subplot_mosaic([["plane", name, "."] for name in "xyz"], width_ratios=(10, 3, 5))
+        middle = len(found.places) // 2
         row, column = found.places[middle].tolist()
         side = min(CROP, *plane.shape)
         top, left = (
@@ -125,20 +129,14 @@ def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Drawing:
         )
         low, high = np.percentile(plane, [1, 99])
         shown = encode_srgb(np.repeat(np.clip((plane - low) / (high - low), 0.0, 1.0)[..., None] ** 2.2, 3, axis=-1))
-        scale = SIDE / side
-        marks += [Text(corner, 13, reading), Picture(corner, HEAD, SIDE, SIDE, shown[top:, left:][:side, :side])]
+        show_picture(axes["plane"], shown[top:, left:][:side, :side], reading)
         words = {"x": "x", "y": f"y, {found.to_y[middle]:.1f} away", "z": f"z, {found.to_z[middle]:.1f} away"}
-        for place, (letter, down, across) in enumerate((("x", 0, 0), ("y", AWAY, 0), ("z", 0, -AWAY))):
-            i, j = row + down - half, column + across - half
-            x, y = corner + (j - left) * scale, HEAD + (i - top) * scale
-            marks += [
-                Box(x, y, PATCH * scale, PATCH * scale, "1"),
-                Text(x + 3, y + 12, letter, "start", "1", bold=True),
-            ]
-            at = corner + SIDE + GAP, HEAD + place * (small + GAP)
-            marks += [
-                Picture(*at, small, small, shown[i : i + PATCH, j : j + PATCH]),
-                Text(at[0] + small + 6, at[1] + small / 2 + 4, words[letter]),
-            ]
-    title, described = "Figure 4", "an edge, and the patches around x, y and z"
-    return Drawing(len(parts) * wide, HEAD + SIDE, title, described, tuple(marks))
+        for letter, down, across in (("x", 0, 0), ("y", AWAY, 0), ("z", 0, -AWAY)):
+            i, j = row + down - PATCH // 2, column + across - PATCH // 2
+            corner = j - left - 0.5, i - top - 0.5  # a pixel's middle has whole coordinates
+            axes["plane"].add_patch(Rectangle(corner, PATCH, PATCH, fill=False, edgecolor=ORANGE, linewidth=1.6))
+            axes["plane"].text(*corner, letter, color=ORANGE, weight="bold", va="top")
+            show_picture(axes[letter], shown[i : i + PATCH, j : j + PATCH])
+            told = axes[letter].text(1.1, 0.5, words[letter], va="center", transform=axes[letter].transAxes)
+            told.set_in_layout(False)  # the empty column holds it
+    return figure

@@ -12,9 +12,10 @@ from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from sensor.cfa import channels, mask
 from sensor.raw import RawImage
-from studies.pages.layout import Figure, grey, sheet
+from studies.pages.plots import picture_rows
 from studies.paper.camera import Image, View, develop, exposures, quality_db
-from studies.paper.checks import Check, Claim, at_least
+from studies.paper.checks import Claim, ClaimCheck, at_least
+from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, Setup, sensor_of, view
 from studies.sweep.cells import Coordinates
 
@@ -85,7 +86,7 @@ def claims_5(found: Mapping[str, Bright], gains_db: Mapping[str, float]) -> tupl
         Claim(
             "Figure 5",
             "At 200 cd/m², 66 ms and 3 µm W is partly saturated",
-            tuple(Check(name, one.white_full, *PARTLY, "of its pixels") for name, one in found.items()),
+            tuple(ClaimCheck(name, one.white_full, *PARTLY, "of its pixels") for name, one in found.items()),
             "still_life, f/2.8; the well in proportion to area.",
         ),
         Claim(
@@ -110,7 +111,12 @@ def claims_5(found: Mapping[str, Bright], gains_db: Mapping[str, float]) -> tupl
     )
 
 
-def figure_5(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
+def grey(plane: Image, white: float) -> Image:
+    """Plane (h, w) as encoded grey (h, w, 3), `white` being 1: shown as a camera would, by sRGB's curve."""
+    return encode_srgb(np.repeat(np.asarray(plane, dtype=np.float64)[..., None] / white, 3, axis=-1))
+
+
+def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """R image, W image and result under both readings, with the opponents' PSNR."""
     seen = view(setup, "still_life", LUMINANCE_CD_M2)
     found, gains_db, rows = {}, {}, []
@@ -129,9 +135,8 @@ def figure_5(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
                 ("result", encode_srgb(made[0])),
             ]
         )
-    drawing = sheet("Figure 5", "R image, W image that is partly saturated, and the result", rows)
     caption = "R as recorded, W as recorded with much of it full, and the result, at 200 cd/m², 66 ms and 3 µm."
-    return Figure("5", caption, drawing), claims_5(found, gains_db)
+    return PaperFigure("5", caption, picture_rows(rows)), claims_5(found, gains_db)
 
 
 def _shoot(

@@ -10,10 +10,11 @@ from isp.processors.catalogue import PROCESSORS
 from isp.substitution import SUBSTITUTION_SNR
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from sensor.raw import RawImage
-from studies.pages.layout import Figure, sheet
+from studies.pages.plots import picture_rows
 from studies.paper.camera import Image, View, develop, exposures, noise, quality_db
 from studies.paper.checks import Claim, at_least, at_most, near
 from studies.paper.figure1b import shown
+from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, Setup, sensor_of, swept, view
 from studies.photograph.camera import colour_fit
 from studies.study.study import parse_exposure
@@ -105,7 +106,7 @@ def claims_6(
     )
 
 
-def figure_6(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
+def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Pictures of the study `paper_6.toml`, and what substitution does at 5 ms.
 
     A processor in a sweep substitutes by the threshold of `table1_output`; under the other reading the interleaved
@@ -122,10 +123,10 @@ def figure_6(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
                 for name in pictures
             }
             place = f"{reading}, {exposure}"
-            bayer[place], encoded = _of_ledger(setup, kept["bayer"])
+            bayer[place], encoded = _of_sweep(setup, kept["bayer"])
             pictures["bayer"].append((f"Bayer, {exposure}", encoded))
             if threshold == SUBSTITUTION_SNR:
-                interleaved[place], encoded = _of_ledger(setup, kept["interleaved"])
+                interleaved[place], encoded = _of_sweep(setup, kept["interleaved"])
             else:
                 interleaved[place], encoded = _again(setup, seen, reading, exposure, threshold)
             words = "W's luminance" if interleaved[place].substituted else "interleaved"
@@ -133,8 +134,8 @@ def figure_6(setup: Setup) -> tuple[Figure, tuple[Claim, ...]]:
         for own in pictures.values():
             table.append([(f"{reading}: {own[0][0]}", own[0][1]), *own[1:]])
     claims = claims_6(bayer, interleaved, {name: swap(setup, seen, name) for name in READINGS})
-    drawing = sheet("Figure 6", "Bayer above interleaved at 5, 10 and 20 ms, under both readings of Table 1", table)
-    return Figure("6", "Bayer and interleaved with Table 1's pixel at 25 cd/m², by exposure time.", drawing), claims
+    caption = "Bayer and interleaved with Table 1's pixel at 25 cd/m², by exposure time."
+    return PaperFigure("6", caption, picture_rows(table)), claims
 
 
 def swap(setup: Setup, seen: View, reading: str) -> Swap:
@@ -151,13 +152,13 @@ def swap(setup: Setup, seen: View, reading: str) -> Swap:
 
 
 def _raws(setup: Setup, seen: View, reading: str, exposure: str) -> list[RawImage]:
-    """The interleaved camera's exposures as the ledger's cells draw them."""
+    """The interleaved camera's exposures as the sweep's cells draw them."""
     at = Coordinates("still_life", "own", "25cd/m2", exposure, reading, "interleaved", 0)
     return exposures(seen, sensor_of(reading), parse_exposure(exposure) or 0.0, at, setup.seeds)
 
 
-def _of_ledger(setup: Setup, rows: Sequence[Row]) -> tuple[Outcome, Image]:
-    """Outcome of the ledger's rows of one condition, and its first picture, encoded."""
+def _of_sweep(setup: Setup, rows: Sequence[Row]) -> tuple[Outcome, Image]:
+    """Outcome of the sweep's rows of one condition, and its first picture, encoded."""
     pictures = [shown(setup, row) for row in rows]
     decided = [row.substitution for row in rows if row.substitution is not None]
     share = float(np.mean(decided)) if decided else None
@@ -166,11 +167,11 @@ def _of_ledger(setup: Setup, rows: Sequence[Row]) -> tuple[Outcome, Image]:
 
 
 def _again(setup: Setup, seen: View, reading: str, exposure: str, threshold: float) -> tuple[Outcome, Image]:
-    """As `_of_ledger`, developed with another threshold of substitution."""
+    """As `_of_sweep`, developed with another threshold of substitution."""
     made = [
         develop(raw, seen, sensor_of(reading), substitution_snr=threshold)
         for raw in _raws(setup, seen, reading, exposure)
     ]
-    pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in made]  # as the ledger's files hold them
+    pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in made]  # as the sweep's files hold them
     share = float(np.mean([bool(picture.substituted) for _, picture in made]))
     return Outcome(noise(pictures), quality_db(pictures, seen.truth), share), encode_srgb(pictures[0])

@@ -12,7 +12,7 @@ from sensor.config import LensConfig
 from sensor.device import Device
 from sensor.readout import read_out
 from studies.paper.camera import View
-from studies.paper.checks import Check, Claim, about, near
+from studies.paper.checks import Claim, ClaimCheck, about, near
 from studies.paper.flat import decibels, light_of, photons, shot_noise_alone
 from studies.paper.setup import READINGS, sensor_of
 
@@ -102,7 +102,7 @@ def range_claim(spans: Mapping[str, float]) -> Claim:
     return Claim(
         "Section 1",
         "Scene intensities span about 10⁸ from day to night",
-        tuple(Check(name, float(np.log10(span)), 7.5, 8.5, "decades") for name, span in spans.items()),
+        tuple(ClaimCheck(name, float(np.log10(span)), 7.5, 8.5, "decades") for name, span in spans.items()),
         "Moonlight 0.036 cd/m², full sun 100 000 lux on a reflectance of 0.18, moonless clear sky 0.002 lux; of pixels "
         "0.1 and 99.9 %.",
     )

@@ -2,15 +2,14 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from rodcone.files import replacing
-from studies.pages.drawing import to_picture, to_svg
-from studies.pages.layout import Figure
+from studies.pages.plots import png_bytes, svg_text
 from studies.pages.results import environment
 from studies.paper.bilateral import bilateral_claims
 from studies.paper.checks import VERDICTS, Claim
@@ -22,17 +21,17 @@ from studies.paper.figure4 import figure_4
 from studies.paper.figure5 import figure_5
 from studies.paper.figure6 import figure_6
 from studies.paper.numbers import number_claims
-from studies.paper.page import paper_page
+from studies.paper.page import PaperFigure, paper_page
 from studies.paper.setup import READINGS, Setup, Step, view
 
-Made = tuple[Figure, tuple[Claim, ...]]
+Made = tuple[PaperFigure, tuple[Claim, ...]]
 
 
 @dataclass(frozen=True)
 class Paper:
     """The figures in the paper's order, the claims, and what made them."""
 
-    figures: tuple[Figure, ...]
+    figures: tuple[PaperFigure, ...]
     claims: tuple[Claim, ...]
     facts: dict[str, Any]
 
@@ -73,8 +72,8 @@ def _part(step: Step, name: str, index: int, count: int, what: str, share: float
 
 def write(paper: Paper, folder: Path) -> Path:
     """Write ``paper.html``, ``paper.json`` and each figure as SVG and PNG; all appear or none."""
-    files = {f"figure_{figure.name}.svg": to_svg(figure.drawing).encode() for figure in paper.figures}
-    files |= {f"figure_{figure.name}.png": to_picture(figure.drawing) for figure in paper.figures}
+    files = {f"figure_{figure.name}.svg": svg_text(figure.drawing).encode() for figure in paper.figures}
+    files |= {f"figure_{figure.name}.png": png_bytes(figure.drawing) for figure in paper.figures}
     files["paper.json"] = (json.dumps(as_json(paper), indent=1, allow_nan=False) + "\n").encode()
     files["paper.html"] = paper_page(paper.figures, paper.claims, paper.facts).encode()
     with replacing(*(folder / name for name in files)) as places:
@@ -91,14 +90,7 @@ def as_json(paper: Paper) -> dict[str, Any]:
             "claim": claim.text,
             "verdict": claim.verdict,
             "checks": [
-                {
-                    "condition": check.condition,
-                    "value": _finite(check.value),
-                    "low": _finite(check.low),
-                    "high": _finite(check.high),
-                    "unit": check.unit,
-                    "holds": check.holds,
-                }
+                {name: _finite(value) for name, value in asdict(check).items()} | {"holds": check.holds}
                 for check in claim.checks
             ],
             "note": claim.note,
@@ -109,6 +101,6 @@ def as_json(paper: Paper) -> dict[str, Any]:
     return {**paper.facts, "verdicts": count, "claims": claims}
 
 
-def _finite(value: float) -> float | None:
+def _finite(value: float | str) -> float | str | None:
     """Number as JSON has it: none for what isn't finite."""
-    return value if abs(value) < float("inf") else None
+    return value if isinstance(value, str) or abs(value) < float("inf") else None

@@ -96,7 +96,7 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
     opened = open_choice(study.scenes[0], study)
     model = as_stated(study).renders[opened.choice]
     folder = setup.out / SWEEP / RENDERS  # the sweeps' own: one render serves them and this
-    transport = make_transport(opened, study, model, folder, lambda share, _: setup.step(f"render {scene}", share))
+    transport, _ = make_transport(opened, study, model, folder, lambda share, _: setup.step(f"render {scene}", share))
     group = transport.groups[white or next(iter(transport.groups))]
     return view_of(transport, group.spectrum, luminance_cd_m2)
 

@@ -1,80 +1,23 @@
-"""A camera under study: its sensor, its chip, its colour matrix, and one photograph developed and measured."""
+"""From a raw image to a picture at the scale of the truth, with the colours that the camera is calibrated to."""
 
-from copy import deepcopy
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit, fit_colours
 from isp.picture import Picture
-from isp.processors.catalogue import PROCESSORS, Processor
-from rodcone.colour_spaces import encode_srgb
+from isp.processors.catalogue import Processor
 from scenes.reflectances import color_checker, held
 from sensor.cfa import channels, mask
 from sensor.config import SensorConfig
-from sensor.device import Device, draw_device
-from sensor.presets import preset
+from sensor.optics import falloff
 from sensor.raw import RawImage
-from sensor.readout import read_out
-from sensor.variations import vary
-from studies.metrics.quality import Quality, measure
 from studies.metrics.truth import Light, neutral_electrons
-from studies.photograph.clock import timed
-
-# The paper's two, which the demo compares: mosaic and software. A study may ask for any of `PROCESSORS`.
-CAMERAS = {name: (PROCESSORS[name].mosaic, PROCESSORS[name].develop) for name in ("interleaved", "bayer")}
-
-
-@dataclass(frozen=True)
-class Camera:
-    """One camera with one chip.
-
-    Attributes
-    ----------
-    name : str
-        Of `isp.processors.catalogue.PROCESSORS`.
-    sensor_name : str
-    sensor : SensorConfig
-    device : Device
-    colours : ColourFit
-        Fitted under the study's light on the ColorChecker.
-    """
-
-    name: str
-    sensor_name: str
-    sensor: SensorConfig
-    device: Device
-    colours: ColourFit
-
-
-@dataclass(frozen=True)
-class Shot:
-    """A photograph: raw image, developed picture (linear sRGB, then encoded), its quality, decisions, and seconds.
-
-    `first_s` are those of first calls, as `studies.photograph.clock.timed` tells them apart from the others.
-    """
-
-    raw: RawImage
-    linear: NDArray[np.float64]
-    encoded: NDArray[np.float64]
-    quality: Quality
-    picture: Picture
-    capture_s: float
-    develop_s: float
-    measure_s: float
-    first_s: float
-
-
-def build_camera(name: str, sensor_name: str, light: Light, shape: tuple[int, int], rng: np.random.Generator) -> Camera:
-    """Make a camera: preset and mosaic, one chip drawn from `rng`, colours for the light."""
-    sensor = vary(preset(sensor_name), PROCESSORS[name].mosaic)
-    colours = colour_fit(sensor, PROCESSORS[name], light)
-    return Camera(name, sensor_name, sensor, draw_device(sensor, shape, rng), colours)
 
 
 def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> ColourFit:
-    """Fit of the processor's balanced colours, and the mosaic's other letters, under a light on the ColorChecker."""
+    """Fit of the processor's balanced colours, and the mosaic's other channels, under a light on the ColorChecker."""
     nm, width = light.wavelength_nm, light.width_nm
     surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker()])
     letters = (*processor.colours, *(x for x in channels(sensor.cfa) if x not in processor.colours))
@@ -82,44 +25,58 @@ def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> Colo
     return fit_colours(letters, responses, nm, light.spectrum, surfaces, width)
 
 
-def photograph(
-    camera: Camera,
-    expected_e: NDArray[np.float64],
-    truth: NDArray[np.float64],
+def develop_to_scale(
+    raw: RawImage,
+    processor: Processor,
+    colours: ColourFit,
+    sensor: SensorConfig,
     light: Light,
     white_cd_m2: float,
-    exposure_s: float,
-    rng: np.random.Generator,
-) -> Shot:
-    """Expose, develop and measure once.
+    **options: Any,
+) -> tuple[NDArray[np.float64], Picture]:
+    """Develop an exposure and bring it to the truth's scale by what the camera is known to collect.
+
+    Nothing is taken from the noisy picture for the scale. The falloff that the sensor's lens is known to have is
+    corrected.
 
     Parameters
     ----------
-    expected_e : (h, w) float64
-        Expected electrons of the mosaic.
-    truth : (h, w, 3) float64
-        Encoded sRGB of the noise-free scene, in which `white_cd_m2` is white.
-    rng : numpy.random.Generator
-        Of the exposure's noise; it is left as it is.
+    raw : RawImage
+    processor : Processor
+        Of `isp.processors.catalogue.PROCESSORS`.
+    colours : ColourFit
+        Of the processor's balanced colours; the paper's literal camera has a (3, 3) matrix in its place.
+    sensor : SensorConfig
+        That took the exposure.
+    light : Light
+        That the camera's neutral is set to.
+    white_cd_m2 : float
+        Luminance shown as white [cd m^-2].
+    **options
+        Of the processor.
+
+    Returns
+    -------
+    linear : (h, w, 3) float64
+        Linear sRGB, in which `white_cd_m2` is 1; not clipped.
+    picture : Picture
+        The processor's own result, in electrons of its unit's channel.
+
+    Raises
+    ------
+    InputError
+        As the processor does.
     """
-    raw, capture_s, first_capture_s = timed(
-        lambda: read_out(expected_e, camera.sensor, camera.device, exposure_s, deepcopy(rng)), "exact capture"
-    )
-    neutral, saturated = neutral_electrons(camera.sensor, light, exposure_s), raw.saturated
-    processor = PROCESSORS[camera.name]
-    picture, develop_s, first_develop_s = timed(
-        lambda: processor.develop(raw, camera.colours, neutral=neutral),
-        *("develop", camera.name, raw.shape, bool(saturated.any()), bool(saturated.all())),
-    )
-    unit_e = neutral[channels(camera.sensor.cfa).index(processor.unit)]  # of 1 cd/m^2
+    neutral = neutral_electrons(sensor, light, raw.exposure_s)  # of 1 cd/m^2
+    picture = processor.develop(raw, colours, neutral=neutral, **options)
+    unit_e = float(neutral[channels(sensor.cfa).index(processor.unit)])
     linear = picture.rgb / (unit_e * white_cd_m2)
-    encoded = encode_srgb(linear)
-    quality, measure_s, first_measure_s = timed(lambda: measure(encoded, truth), "quality")
-    first_s = first_capture_s + first_develop_s + first_measure_s
-    return Shot(raw, linear, encoded, quality, picture, capture_s, develop_s, measure_s, first_s)
+    if sensor.lens.horizontal_view_deg:
+        linear = linear / falloff(sensor.lens, linear.shape[:2])[..., None]
+    return linear, picture
 
 
 def mean_electrons(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> dict[str, float]:
-    """Mean expected electrons of each letter's pixels."""
+    """Mean expected electrons of each channel's pixels."""
     shape = (expected_e.shape[0], expected_e.shape[1])
     return {letter: float(expected_e[mask(sensor.cfa, letter, shape)].mean()) for letter in channels(sensor.cfa)}

@@ -33,7 +33,7 @@ from sensor.raw_files.raw_file import check_ending, write_raw
 from studies.photograph.calibrate import calibrate, iso_speed
 from studies.study.levels import parse_level
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
-from studies.study.scene_source import asked_level, open_scene
+from studies.study.scene_source import asked_level, film_size, open_scene
 
 Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
@@ -126,17 +126,10 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
         return sensor, None
     opened = open_scene(order.source, order.trust, order.extend)
     asked_level(opened.scene, order.level)
-    height, width = _size(order, opened)
+    height, width = film_size(opened.size, order.size)
     check_covers(sensor.cfa, (height, width))
     require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
     return sensor, opened
-
-
-def _size(order: Order, opened: SceneFile) -> tuple[int, int]:
-    """Height and width: the film's own, or its proportions with the longer side that was asked for."""
-    height, width = opened.size
-    scale = 1.0 if order.size is None else order.size / max(height, width)
-    return max(1, round(height * scale)), max(1, round(width * scale))
 
 
 def _light(order: Order, scene: Scene) -> tuple[Spectrum, list[str]]:
@@ -153,7 +146,7 @@ def _light(order: Order, scene: Scene) -> tuple[Spectrum, list[str]]:
 def _render(order: Order, opened: SceneFile, step: Step) -> Transport:
     return render(
         opened.scene,
-        _size(order, opened),
+        film_size(opened.size, order.size),
         spp=order.spp,
         seed=order.seed,
         progress=lambda share, error: step(f"render, relative error {error:.3f}", 0.9 * share),

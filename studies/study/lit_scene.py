@@ -1,6 +1,5 @@
 """A study's scene: opened, rendered once, and lit by the spectra that the study asks for."""
 
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 from render.engine import render
 from render.illuminants import illuminant
 from render.photometry import luminance
+from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import is_radiance_file
 from render.scene import Scene
 from render.scene_range import check_range
@@ -18,11 +18,11 @@ from render.spectrum import Floats, Spectrum
 from render.transport import Transport
 from rodcone.digests import digest, digest_file
 from rodcone.errors import InputError
-from scenes.catalog import load
 from studies.study.levels import parse_level
 from studies.study.model import RenderModel
+from studies.study.quiet_render import render_quietly
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
-from studies.study.scene_source import CATALOGUE_SIDE, asked_level, open_scene
+from studies.study.scene_source import asked_level, film_size, open_scene
 from studies.study.study import OWN, SceneChoice, Study
 
 Progress = Callable[[float, float], None]
@@ -65,28 +65,15 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
             raise InputError(f"scenes: extend for {choice.source}, a picture without surfaces; leave it out")
         check_radiance_file(choice.source, study.levels)
         return OpenedScene(choice, None, (0, 0), digest([digest_file(choice.source), choice.light]))
-    if choice.source.endswith(".xml"):
-        if choice.light is not None:
-            raise InputError(f"scenes: light {choice.light!r} for {choice.source}; allowed: none, a file has its own")
-        opened = open_scene(choice.source, extend=choice.extend)
-        scene, own_size, notes = opened.scene, opened.size, opened.notes
-    else:
-        scene = load(choice.source, **({} if choice.light is None else {"light": choice.light}))
-        scene = replace(scene, extend=choice.extend)
-        own_size, notes = (CATALOGUE_SIDE, CATALOGUE_SIDE), ()
+    opened = open_scene(choice.source, extend=choice.extend, light=choice.light)
+    scene = opened.scene
     for level in study.levels:
         asked_level(scene, level)
     for spectrum in study.spectra:
         _check_relit(scene, spectrum)
     check_range(scene, *study.render.range_nm)
-    size = _size(own_size, study.render.size)
-    return OpenedScene(choice, scene, size, digest([digest_scene(scene), size]), tuple(notes))
-
-
-def _size(own: tuple[int, int], longest: int | None) -> tuple[int, int]:
-    """Height and width of the film, or its proportions with the longer side that was asked for."""
-    scale = 1.0 if longest is None else longest / max(own)
-    return max(1, round(own[0] * scale)), max(1, round(own[1] * scale))
+    size = film_size(opened.size, study.render.size)
+    return OpenedScene(choice, scene, size, digest([digest_scene(scene), size]), tuple(opened.notes))
 
 
 def _check_relit(scene: Scene, spectrum: str) -> None:
@@ -99,9 +86,23 @@ def _check_relit(scene: Scene, spectrum: str) -> None:
 
 
 def make_transport(
-    opened: OpenedScene, study: Study, model: RenderModel | None, cache: Path, progress: Progress
-) -> Transport:
-    """Render a scene, or read a picture file; a coarser render in `cache` is gone on from, a finer one is taken.
+    opened: OpenedScene,
+    study: Study,
+    model: RenderModel | None,
+    cache: Path,
+    progress: Progress,
+    share: Callable[[Transport], float] | None = None,
+) -> tuple[Transport, tuple[str, ...]]:
+    """Render a scene, or read a picture file, with what had to be assumed of the file.
+
+    Parameters
+    ----------
+    model : RenderModel or None
+        None for a picture file.
+    cache : Path
+        Folder of renders: a coarser one is continued, a finer one is taken.
+    share : callable, optional
+        Noise variance of a render over the sensor's own, for a study with a `noise_share`.
 
     Raises
     ------
@@ -112,24 +113,71 @@ def make_transport(
     """
     if opened.scene is None or model is None:
         transport, _, assumed = open_radiance_file(opened.choice.source, opened.choice.light)
-        for note in assumed:
-            warnings.warn(note, stacklevel=2)
-        return transport
+        return transport, tuple(assumed)
     limits = study.render
-    transport = render(
-        opened.scene,
-        opened.size,
-        wavelength_nm=model.wavelength_nm,
-        width_nm=model.width_nm,
-        max_spp=model.spp,  # in passes of 16 samples, so that a finer request goes on from a coarser one's
-        max_seconds=limits.max_seconds,
-        seed=limits.seed,
-        cache=cache,
-        progress=progress,
-    )
+    asked: dict[str, Any] = {
+        "wavelength_nm": model.wavelength_nm,
+        "width_nm": model.width_nm,
+        "max_spp": model.spp,  # in passes of 16 samples, so that a finer request goes on from a coarser one's
+        "max_seconds": limits.max_seconds,
+        "seed": limits.seed,
+        "cache": cache,
+        "progress": progress,
+    }
+    if limits.noise_share is None or share is None:
+        transport = render(opened.scene, opened.size, **asked)
+    else:
+        transport = render_quietly(opened.scene, opened.size, share, most_share=limits.noise_share, **asked)
     if transport.stopped_by == "interrupt":
         raise KeyboardInterrupt
-    return transport
+    return transport, ()
+
+
+@dataclass(frozen=True)
+class RenderFacts:
+    """How a render was made, as `render.transport.Transport` has it, and the error that it reached.
+
+    Attributes
+    ----------
+    integrator, variant, stopped_by : str
+    seconds : float
+    spp, passes, bands : int
+    relative_mc_error, relative_level_error : float or None
+        Of the lit scene, as `render.radiance.SpectralRadiance`.
+    first_nm, last_nm, width_nm : float
+        Centres of the first and the last band, and the width of the first.
+    """
+
+    integrator: str
+    variant: str
+    seconds: float
+    spp: int
+    passes: int
+    stopped_by: str
+    relative_mc_error: float | None
+    relative_level_error: float | None
+    bands: int
+    first_nm: float
+    last_nm: float
+    width_nm: float
+
+
+def render_facts(transport: Transport, radiance: SpectralRadiance) -> RenderFacts:
+    """Return the facts of a render; `radiance` is the scene that it lights."""
+    return RenderFacts(
+        integrator=transport.integrator,
+        variant=transport.variant,
+        seconds=transport.seconds,
+        spp=transport.spp,
+        passes=transport.passes,
+        stopped_by=transport.stopped_by,
+        relative_mc_error=radiance.relative_mc_error,
+        relative_level_error=radiance.relative_level_error,
+        bands=transport.wavelength_nm.size,
+        first_nm=float(transport.wavelength_nm[0]),
+        last_nm=float(transport.wavelength_nm[-1]),
+        width_nm=float(transport.width_nm[0]),
+    )
 
 
 def under(transport: Transport, spectrum: str) -> Transport:

@@ -1,8 +1,13 @@
 """What is modelled: how each scene is rendered, and what each condition's image holds."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from sensor.config import LensConfig
+from render.radiance import SpectralRadiance
+from sensor.config import LensConfig, SensorConfig
+from sensor.exposure import auto_exposure_s
+from sensor.optics import form_image
+
+_DARK_S = 1e7  # longer than any exposure
 
 
 @dataclass(frozen=True)
@@ -23,3 +28,14 @@ class ImageModel:
 
     lens: LensConfig
     exact: bool = True
+
+
+def unit_exposure_s(radiance: SpectralRadiance, preset: SensorConfig) -> float:
+    """Auto exposure of a scene at 1 cd/m^2 [s], without a longest time; `_DARK_S` where there is no light.
+
+    It is the same for every processor and every model of the lens, so that their pictures can be compared: the preset's
+    own mosaic behind a lens that spreads no light.
+    """
+    bare = replace(preset.lens, diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0, defocus_um=0.0)
+    plain = replace(preset, lens=bare)
+    return auto_exposure_s(form_image(radiance, plain), plain, _DARK_S)

@@ -13,19 +13,37 @@ from studies.study.levels import parse_level
 CATALOGUE_SIDE = 256  # pixels, where neither the scene nor the user states a size
 
 
-def open_scene(source: str, trust: bool = False, extend: str | None = None) -> SceneFile:
-    """Scene, the size of its film and notes; `trust` and `extend` as of `load_scene_file`.
+def open_scene(source: str, trust: bool = False, extend: str | None = None, light: str | None = None) -> SceneFile:
+    """Scene, the size of its film and notes.
+
+    Parameters
+    ----------
+    source : str
+        Name in the catalogue, or a Mitsuba scene (``.xml``).
+    trust, extend
+        As of `load_scene_file`.
+    light : str, optional
+        Option of a catalogue scene's builder.
 
     Raises
     ------
     InputError
-        For an unknown name, a scene file that isn't allowed, or trust in a scene by name.
+        For an unknown name, a scene file that isn't allowed, trust in a scene by name, or a light for a file.
     """
     if Path(source).suffix.lower() == ".xml":
+        if light is not None:
+            raise InputError(f"scenes: light {light!r} for {source}; allowed: none, a file has its own")
         return load_scene_file(source, trust=trust, extend=extend)
     if trust:
         raise InputError(f"trust-scene: {source!r} is no .xml scene; leave --trust-scene out")
-    return SceneFile(replace(load(source), extend=extend), (CATALOGUE_SIDE, CATALOGUE_SIDE), ())
+    scene = load(source, **({} if light is None else {"light": light}))
+    return SceneFile(replace(scene, extend=extend), (CATALOGUE_SIDE, CATALOGUE_SIDE), ())
+
+
+def film_size(own: tuple[int, int], longest: int | None) -> tuple[int, int]:
+    """Height and width of the film, or its proportions with the longer side that was asked for."""
+    scale = 1.0 if longest is None else longest / max(own)
+    return max(1, round(own[0] * scale)), max(1, round(own[1] * scale))
 
 
 def asked_level(scene: Scene, text: str | None) -> tuple[float | None, float | None]:

@@ -65,6 +65,9 @@ class RenderLimits:
     seed : int
     range_nm : (float, float)
         Wavelengths that are rendered; a sensor whose window reaches beyond 380-780 nm needs them.
+    noise_share : float, optional
+        Stop earlier, once 95 % of the pixels see a Monte Carlo variance of this share of the sensor's own or less, in
+        the brightest light that the study asks for.
     """
 
     size: int | None = None
@@ -73,6 +76,7 @@ class RenderLimits:
     max_seconds: float | None = None
     seed: int = 0
     range_nm: tuple[float, float] = VISIBLE_NM
+    noise_share: float | None = None
 
 
 @dataclass(frozen=True)
@@ -269,6 +273,8 @@ def _check_numbers(study: Study) -> None:
     require_whole("render.seed", limits.seed, 0, 2**31, "give a whole number")
     if limits.max_seconds is not None:
         require_range("render.max_seconds", limits.max_seconds, 1e-3, 1e7, "give seconds")
+    if limits.noise_share is not None:
+        require_range("render.noise_share", limits.noise_share, 1e-6, 1e3, "give a share of the noise variance: 0.03")
     require_range("lens.diffraction", lens.diffraction, 0.0, 100.0, "give 1 for an ideal lens, 0 for none")
     require_range("lens.veiling_glare", lens.veiling_glare, 0.0, 1.0, "give a fraction, 0 for none")
     if lens.horizontal_view_deg is not None:

@@ -1,6 +1,7 @@
 """Cells of a study: one picture each, with all that decides it, a key of that, and random streams by coordinates."""
 
-from dataclasses import astuple, dataclass
+import json
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from rodcone.digests import digest
 from sensor.config import SensorConfig
 from studies.metrics.truth import Light
 from studies.study.levels import parse_level
+from studies.study.lit_scene import RenderFacts
 from studies.study.study import Condition, label, parse_exposure
 from studies.sweep.provenance import Provenance
 
@@ -25,6 +27,35 @@ class Coordinates:
     sensor: str
     processor: str
     seed: int
+
+
+@dataclass(frozen=True)
+class RenderRecord:
+    """A render as a sweep keeps it.
+
+    Attributes
+    ----------
+    content : str
+        Hash of the radiance.
+    facts : RenderFacts
+    brightest_share : float or None
+        Monte Carlo share in the brightest light, for a study that asks for one (`RenderLimits.noise_share`).
+    notes : tuple of str
+        What had to be assumed of the scene, and what fell back.
+    """
+
+    content: str
+    facts: RenderFacts
+    brightest_share: float | None
+    notes: tuple[str, ...]
+
+
+def render_text(record: RenderRecord) -> str:
+    """What a row holds of a render beside columns of its own, as JSON."""
+    facts = asdict(record.facts)
+    for column in ("variant", "seconds", "spp", "bands"):
+        del facts[column]
+    return json.dumps({**facts, "brightest_share": record.brightest_share, "notes": record.notes})
 
 
 @dataclass(frozen=True)
@@ -51,11 +82,11 @@ class Cell:
     white_cd_m2 : float
         Luminance shown as white.
     electrons, half_difference, truth : Path
-        As `studies.sweep.frames.Frame` and `LitScene` hold them.
+        As `studies.sweep.frames.Frame` holds them.
     pictures : Path
         Folder that the picture goes to, under the hash of its content.
-    spp, bands, render_s : int, int, float
-        Of the render, for the ledger.
+    render : RenderRecord
+        For the ledger.
     budget_share : float or None
         Share of the noise variance that a plan predicts for its approximations.
     """
@@ -74,22 +105,14 @@ class Cell:
     half_difference: Path
     truth: Path
     pictures: Path
-    spp: int
-    bands: int
-    render_s: float
+    render: RenderRecord
     budget_share: float | None = None
 
 
 def coordinates(condition: Condition, processor: str, seed: int) -> Coordinates:
     """Coordinates of a condition's cell, files under their names."""
-    scene, spectrum, level, exposure, sensor = (
-        condition.scene.source,
-        condition.spectrum,
-        condition.level,
-        condition.exposure,
-        condition.sensor,
-    )
-    return Coordinates(label(scene), spectrum, level, exposure, label(sensor), processor, seed)
+    scene, sensor = label(condition.scene.source), label(condition.sensor)
+    return Coordinates(scene, condition.spectrum, condition.level, condition.exposure, sensor, processor, seed)
 
 
 def cell_key(

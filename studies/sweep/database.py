@@ -9,18 +9,19 @@ import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import astuple, dataclass, fields
+from dataclasses import asdict, fields
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from rodcone.digests import digest
 from rodcone.errors import InputError, one_line
-from studies.sweep.cells import Coordinates
+from studies.study.lit_scene import RenderFacts
+from studies.sweep.cells import Coordinates, RenderRecord
 from studies.sweep.row import Row
 from studies.sweep.stored import is_whole
 
-VERSION = 3  # of the tables; raise it with any change to them
+VERSION = 4  # of the tables; raise it with any change to them
 APPLICATION_ID = 0x726F6463  # "rodc": tells this file from other SQLite files
 FILE = "ledger.sqlite"
 _DAMAGED = (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_TOOBIG)
@@ -42,22 +43,10 @@ _CREATE = (
     # What the last run asks for, in the study's order; of a scene that isn't rendered yet the keys aren't known. The
     # cells of earlier runs stay in `cells`.
     "CREATE TABLE wanted (place INTEGER PRIMARY KEY, key TEXT) STRICT",
-    "CREATE TABLE renders (request TEXT PRIMARY KEY, content TEXT NOT NULL, variant TEXT NOT NULL, "
-    "spp INTEGER NOT NULL, bands INTEGER NOT NULL, seconds REAL NOT NULL, digest TEXT NOT NULL) STRICT",
+    "CREATE TABLE renders (request TEXT PRIMARY KEY, record TEXT NOT NULL, digest TEXT NOT NULL) STRICT",
     "CREATE TABLE runs (started TEXT NOT NULL, host TEXT NOT NULL, study TEXT NOT NULL, stages TEXT NOT NULL, "
     "digest TEXT NOT NULL) STRICT",
 )
-
-
-@dataclass(frozen=True)
-class RenderRecord:
-    """A render as the ledger knows it: hash of its content, variant, samples a pixel, bands, seconds that it took."""
-
-    content: str
-    variant: str
-    spp: int
-    bands: int
-    seconds: float
 
 
 @contextmanager
@@ -238,12 +227,20 @@ def render_record(base: sqlite3.Connection, request: str) -> RenderRecord | None
     """What was found about a render that was asked for before; None too where it isn't what was written."""
     found = base.execute("SELECT * FROM renders WHERE request = ?", (request,)).fetchone()
     values = None if found is None else _sealed(found)
-    return None if values is None else RenderRecord(*values[1:])
+    if values is None:
+        return None
+    stored = json.loads(values[1])
+    return RenderRecord(
+        content=stored["content"],
+        facts=RenderFacts(**stored["facts"]),
+        brightest_share=stored["brightest_share"],
+        notes=tuple(stored["notes"]),
+    )
 
 
 def note_render(base: sqlite3.Connection, request: str, record: RenderRecord) -> None:
     """Keep what was found about a render."""
-    _put(base, "renders", [request, *astuple(record)])
+    _put(base, "renders", [request, json.dumps(asdict(record))])
 
 
 def _put(base: sqlite3.Connection, table: str, values: list[Any]) -> int:

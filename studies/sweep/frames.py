@@ -5,70 +5,51 @@ cell reads one (h, w) array from its path, whatever the number of bands, and no 
 """
 
 import json
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
-from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
 from rodcone.digests import digest
 from rodcone.files import replacing
 from sensor.config import SensorConfig
-from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.response import expected_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
-from studies.study.lit_scene import OpenedScene, white_spectrum
+from studies.study.lit_scene import OpenedScene
+from studies.study.model import unit_exposure_s
 from studies.sweep.provenance import versions
 from studies.sweep.stored import is_whole, keep
-
-_DARK_S = 1e7  # what `auto_exposure_s` answers where there is no light: longer than any exposure
-
-
-@dataclass(frozen=True)
-class LitScene:
-    """A render under one spectrum, at a mean luminance of 1 cd/m^2.
-
-    Attributes
-    ----------
-    key : str
-    light : Light
-        That the cameras' colours are set to.
-    white_cd_m2 : float
-        Luminance shown as white.
-    lux_per_cd_m2 : float or None
-        Illuminance of the reference plane; None without one.
-    truth : Path
-        Linear sRGB of the noise-free scene, not clipped, `white_cd_m2` reads 1, (h, w, 3) float64; the same at every
-        level.
-    """
-
-    key: str
-    light: Light
-    white_cd_m2: float
-    lux_per_cd_m2: float | None
-    truth: Path
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A lit scene on a sensor, at 1 cd/m^2 and 1 s.
+    """A lit scene on a sensor, at a mean luminance of 1 cd/m^2 and an exposure of 1 s.
 
     Attributes
     ----------
     key : str
     sensor : SensorConfig
         With the modelled lens.
+    light : Light
+        That the cameras' colours are set to.
+    white_cd_m2 : float
+        Luminance shown as white.
+    lux_per_cd_m2 : float or None
+        Illuminance of the reference plane; None without one.
     auto_s : float
         Auto exposure there, without a longest time [s].
+    truth : Path
+        Linear sRGB of the noise-free scene, not clipped, `white_cd_m2` reads 1, (h, w, 3) float64; the same at every
+        level and for every sensor.
     electrons : Path
         Expected electrons, (h, w) float64.
     half_difference : Path
@@ -77,88 +58,70 @@ class Frame:
 
     key: str
     sensor: SensorConfig
+    light: Light
+    white_cd_m2: float
+    lux_per_cd_m2: float | None
     auto_s: float
+    truth: Path
     electrons: Path
     half_difference: Path
 
 
-def lit_key(render: str, opened: OpenedScene, spectrum: str) -> str:
-    """Key of a lit scene: the render's content, the scene's own lights, the spectrum, and what computes it."""
-    return digest([render, opened.identity, spectrum, versions()])
+def frame_key(render: str, opened: OpenedScene, spectrum: str, preset: SensorConfig, sensor: SensorConfig) -> str:
+    """Key of a frame: the render's content, the scene's own lights, the spectrum, and what computes it.
 
-
-def frame_key(lit: str, preset: SensorConfig, sensor: SensorConfig) -> str:
-    """Key of a frame: the lit scene, the preset that sets the exposure, and the sensor as it is modelled."""
-    return digest([lit, preset, sensor])
-
-
-def read_lit(folder: Path, key: str) -> LitScene | None:
-    """Lit scene made earlier, None where there is none that is whole."""
-    facts = _read(folder, key, "truth")
-    if facts is None:
-        return None
-    light = Light(*(np.array(facts["light"][name], float) for name in ("wavelength_nm", "width_nm", "spectrum")))
-    return LitScene(key, light, facts["white_cd_m2"], facts["lux_per_cd_m2"], folder / facts["truth"])
-
-
-def make_lit(folder: Path, key: str, opened: OpenedScene, transport: Transport, spectrum: str) -> LitScene:
-    """Make and keep a lit scene; `transport` is lit by `under` already."""
-    radiance = transport.relight(luminance_cd_m2=1.0)
-    light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
-    white = shown_white_cd_m2(transport, 1.0)
-    lux = transport.illuminance_lux(1.0)
-    facts: dict[str, Any] = {
-        "light": {name: value.tolist() for name, value in vars(light).items()},
-        "white_cd_m2": white,
-        "lux_per_cd_m2": lux,
-        "truth": keep(folder, _npy(true_srgb(radiance, light, white)), ".npy"),
-    }
-    _write(folder, key, facts)
-    return LitScene(key, light, white, lux, folder / facts["truth"])
+    The preset sets the exposure; the sensor is as it is modelled.
+    """
+    return digest([render, opened.identity, spectrum, versions(), preset, sensor])
 
 
 def read_frame(folder: Path, key: str, sensor: SensorConfig) -> Frame | None:
-    """Frame made earlier, None where there is none that is whole."""
-    facts = _read(folder, key, "electrons", "half_difference")
-    if facts is None:
+    """Frame made earlier, None where it or a file that it names isn't whole: it is made again."""
+    try:
+        stored = json.loads((folder / f"{key}.json").read_text("utf-8"))
+    except (OSError, ValueError):
         return None
-    return Frame(key, sensor, facts["auto_s"], folder / facts["electrons"], folder / facts["half_difference"])
+    if not isinstance(stored, dict) or digest(stored.get("facts")) != stored.get("digest"):
+        return None
+    facts = stored["facts"]
+    files = {name: folder / facts.pop(name) for name in ("truth", "electrons", "half_difference")}
+    if not all(is_whole(path) for path in files.values()):
+        return None
+    light = Light(**{name: np.array(values, float) for name, values in facts.pop("light").items()})
+    return Frame(key=key, sensor=sensor, light=light, **facts, **files)
 
 
-def make_frame(
-    folder: Path,
-    key: str,
-    views: tuple[SpectralRadiance, SpectralRadiance, SpectralRadiance],
-    preset: SensorConfig,
-    sensor: SensorConfig,
+def make_frames(
+    folder: Path, transport: Transport, light: Light, wanted: Mapping[str, tuple[SensorConfig, SensorConfig]]
 ) -> None:
-    """Make and keep a frame.
+    """Make and keep the frames of one lit scene.
 
     Parameters
     ----------
-    views : three SpectralRadiance
-        The lit scene at 1 cd/m^2: all passes of its render, the even, and the odd ones.
-    preset : SensorConfig
-        Whose auto exposure it is, whatever mosaic and lens `sensor` has.
+    transport : Transport
+        Lit by `studies.study.lit_scene.under`.
+    light : Light
+        That the cameras' colours are set to.
+    wanted : mapping of str to (SensorConfig, SensorConfig)
+        By key: the preset, whose auto exposure it is whatever mosaic and lens it gets, and the sensor as modelled.
     """
-    whole, even, odd = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in views)
-    facts = {
-        "auto_s": _auto_s(views[0], preset),
-        "electrons": keep(folder, _npy(whole), ".npy"),
-        "half_difference": keep(folder, _npy(((even - odd) / 2).astype(np.float32)), ".npy"),
+    views = (transport.relight(luminance_cd_m2=1.0), *transport.relight_halves(luminance_cd_m2=1.0))
+    white = shown_white_cd_m2(transport, 1.0)
+    scene = {
+        "light": {name: value.tolist() for name, value in vars(light).items()},
+        "white_cd_m2": white,
+        "lux_per_cd_m2": transport.illuminance_lux(1.0),
+        "truth": keep(folder, _npy(true_srgb(views[0], light, white)), ".npy"),
     }
-    _write(folder, key, facts)
-
-
-def _auto_s(radiance: SpectralRadiance, preset: SensorConfig) -> float:
-    """Auto exposure at 1 cd/m^2 [s], without a longest time.
-
-    It is the same for every processor and every model of the lens, so that their pictures can be compared: the preset's
-    own mosaic behind a lens that spreads no light.
-    """
-    bare = replace(preset.lens, diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0, defocus_um=0.0)
-    plain = replace(preset, lens=bare)
-    return auto_exposure_s(form_image(radiance, plain), plain, _DARK_S)
+    for key, (preset, sensor) in wanted.items():
+        whole, even, odd = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in views)
+        facts = scene | {
+            "auto_s": unit_exposure_s(views[0], preset),
+            "electrons": keep(folder, _npy(whole), ".npy"),
+            "half_difference": keep(folder, _npy(((even - odd) / 2).astype(np.float32)), ".npy"),
+        }
+        with replacing(folder / f"{key}.json") as (text,):
+            text.write_text(json.dumps({"facts": facts, "digest": digest(facts)}), "utf-8")
 
 
 def colours_under(sensor: SensorConfig, processor: Processor, spectrum: Spectrum) -> ColourFit:
@@ -174,20 +137,3 @@ def _npy(array: NDArray[np.floating]) -> memoryview:
     file = BytesIO()
     np.save(file, array)
     return file.getbuffer()
-
-
-def _write(folder: Path, key: str, facts: dict[str, Any]) -> None:
-    with replacing(folder / f"{key}.json") as (text,):
-        text.write_text(json.dumps({"facts": facts, "digest": digest(facts)}), "utf-8")
-
-
-def _read(folder: Path, key: str, *files: str) -> dict[str, Any] | None:
-    """Facts kept under a key, None where they or the files that they name aren't whole: these are made again."""
-    try:
-        stored = json.loads((folder / f"{key}.json").read_text("utf-8"))
-    except (OSError, ValueError):
-        return None
-    if not isinstance(stored, dict) or digest(stored.get("facts")) != stored.get("digest"):
-        return None
-    facts: dict[str, Any] = stored["facts"]
-    return facts if all(is_whole(folder / facts[name]) for name in files) else None

@@ -3,6 +3,7 @@
 import sqlite3
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,28 +17,37 @@ from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
+from studies.budget.budget import render_share
 from studies.budget.model_plan import Plan
+from studies.metrics.truth import light_in_bands
 from studies.photograph.clock import Clock
-from studies.study.lit_scene import OpenedScene, level_luminance, make_transport, under, white_spectrum
+from studies.study.lit_scene import (
+    OpenedScene,
+    level_luminance,
+    make_transport,
+    render_facts,
+    under,
+    white_spectrum,
+)
 from studies.study.model import ImageModel
 from studies.study.study import Condition, Study, conditions, parse_exposure
-from studies.sweep.cells import Cell, cell_key, coordinates
-from studies.sweep.database import RenderRecord, note_render, render_record
+from studies.sweep.cells import Cell, RenderRecord, cell_key, coordinates
+from studies.sweep.database import note_render, render_record
 from studies.sweep.frames import (
     Frame,
-    LitScene,
     colours_under,
     frame_key,
-    lit_key,
-    make_frame,
-    make_lit,
+    make_frames,
     read_frame,
-    read_lit,
 )
 from studies.sweep.provenance import provenance, versions
 
 Progress = Callable[[float, float], None]
 RENDERS, FRAMES, PICTURES = "renders", "frames", "pictures"  # folders beside the ledger
+FELL_BACK = (
+    "Neither LLVM nor CUDA answered: stock path + specfilm rendered in scalar_spectral, captures and the "
+    "reconstruction ran their NumPy forms.",
+)
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,9 @@ class Job:
     clock: Clock = field(default_factory=Clock)
 
 
+Sensors = tuple[SensorConfig, SensorConfig]
+
+
 class Variant(NamedTuple):
     """What a scene is imaged with."""
 
@@ -58,14 +71,6 @@ class Variant(NamedTuple):
     sensor: str
     processor: str
     model: ImageModel
-
-
-class Shared(NamedTuple):
-    """What the cells of one variant share."""
-
-    scene: LitScene
-    frame: Frame
-    colours: ColourFit
 
 
 def known_cells(job: Job, opened: OpenedScene) -> list[Cell] | None:
@@ -89,14 +94,14 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
         return cells
     with job.clock.stage("renders"):
         model = job.plan.renders.get(opened.choice)
-        transport = make_transport(opened, job.study, model, job.out / RENDERS, progress)
+        share = partial(_brightest_share, job, opened)
+        transport, assumed = make_transport(opened, job.study, model, job.out / RENDERS, progress, share)
     with job.clock.stage("what cells share"):
         record = RenderRecord(
-            digest_bytes(np.ascontiguousarray(transport.radiance).data),
-            transport.variant,
-            transport.spp,
-            transport.wavelength_nm.size,
-            transport.seconds,
+            content=digest_bytes(np.ascontiguousarray(transport.radiance).data),
+            facts=render_facts(transport, transport.relight(luminance_cd_m2=1.0)),
+            brightest_share=None if job.study.render.noise_share is None else share(transport),
+            notes=(*opened.notes, *assumed, *(FELL_BACK if backend() == "numpy" else ())),
         )
         _make_files(job, opened, record, transport)
         note_render(job.base, _request(job, opened), record)
@@ -104,6 +109,21 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
     if cells is None:
         raise OSError(None, "files just written are gone", str(job.out / FRAMES))
     return cells
+
+
+def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> float:
+    """Largest `render_share` of the study's sensors in its brightest light: where a render's noise shows most."""
+    study, shares = job.study, []
+    for variant in _variants(job, opened):
+        lit = under(transport, variant.spectrum)
+        lux = lit.illuminance_lux(1.0)
+        brightest = max(level_luminance(level, lux) for level in study.levels)
+        _, sensor = _sensors(variant)
+        shares += [
+            render_share(lit, sensor, brightest, study.longest_exposure_s, parse_exposure(exposure))
+            for exposure in study.exposures
+        ]
+    return max(shares)
 
 
 def _request(job: Job, opened: OpenedScene) -> str:
@@ -125,7 +145,7 @@ def _conditions(job: Job, opened: OpenedScene) -> Iterator[Condition]:
     return (condition for condition in conditions(job.study) if condition.scene == opened.choice)
 
 
-def _sensors(variant: Variant) -> tuple[SensorConfig, SensorConfig]:
+def _sensors(variant: Variant) -> Sensors:
     """Preset of a variant, and the sensor that is modelled."""
     own = preset(variant.sensor)
     return own, replace(vary(own, PROCESSORS[variant.processor].mosaic), lens=variant.model.lens)
@@ -136,31 +156,34 @@ def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: 
     folder = job.out / FRAMES
     folder.mkdir(parents=True, exist_ok=True)
     for spectrum in job.study.spectra:
-        lit = under(transport, spectrum)
-        views = (lit.relight(luminance_cd_m2=1.0), *lit.relight_halves(luminance_cd_m2=1.0))
-        key = lit_key(record.content, opened, spectrum)
-        if read_lit(folder, key) is None:
-            make_lit(folder, key, opened, lit, spectrum)
-        for variant in (each for each in _variants(job, opened) if each.spectrum == spectrum):
-            own, sensor = _sensors(variant)
-            name = frame_key(key, own, sensor)
-            if read_frame(folder, name, sensor) is None:
-                make_frame(folder, name, views, own, sensor)
+        wanted = {
+            key: sensors
+            for variant, key, sensors in _keyed(job, opened, record)
+            if variant.spectrum == spectrum and read_frame(folder, key, sensors[1]) is None
+        }
+        if wanted:
+            light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
+            make_frames(folder, under(transport, spectrum), light, wanted)
+
+
+def _keyed(job: Job, opened: OpenedScene, record: RenderRecord) -> Iterator[tuple[Variant, str, Sensors]]:
+    """Each variant with its frame's key, its preset and the sensor as modelled."""
+    for variant in _variants(job, opened):
+        sensors = _sensors(variant)
+        yield variant, frame_key(record.content, opened, variant.spectrum, *sensors), sensors
 
 
 def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | None:
     """Cells of a scene whose files stand; None where one is missing."""
-    shared: dict[Variant, Shared] = {}
-    for variant in _variants(job, opened):
-        own, sensor = _sensors(variant)
-        lit = read_lit(job.out / FRAMES, lit_key(record.content, opened, variant.spectrum))
-        frame = None if lit is None else read_frame(job.out / FRAMES, frame_key(lit.key, own, sensor), sensor)
-        if lit is None or frame is None:
+    shared: dict[Variant, tuple[Frame, ColourFit]] = {}
+    for variant, key, (_, sensor) in _keyed(job, opened, record):
+        frame = read_frame(job.out / FRAMES, key, sensor)
+        if frame is None:
             return None
         white = white_spectrum(opened, variant.spectrum)
-        shared[variant] = Shared(lit, frame, colours_under(sensor, PROCESSORS[variant.processor], white))
+        shared[variant] = frame, colours_under(sensor, PROCESSORS[variant.processor], white)
     return [
-        _cell(job, condition, name, seed, record, shared[Variant(condition.spectrum, condition.sensor, name, model)])
+        _cell(job, condition, name, seed, record, *shared[Variant(condition.spectrum, condition.sensor, name, model)])
         for condition in _conditions(job, opened)
         for model in (job.plan.images[condition],)
         for name in job.study.processors
@@ -174,31 +197,29 @@ def _cell(
     processor: str,
     seed: int,
     record: RenderRecord,
-    shared: Shared,
+    frame: Frame,
+    colours: ColourFit,
 ) -> Cell:
-    scene, frame = shared.scene, shared.frame
     at = coordinates(condition, processor, seed)
-    luminance = level_luminance(condition.level, scene.lux_per_cd_m2)
+    luminance = level_luminance(condition.level, frame.lux_per_cd_m2)
     asked_s = parse_exposure(condition.exposure)
     exposure_s = min(job.study.longest_exposure_s, frame.auto_s / luminance) if asked_s is None else asked_s
-    made_by = provenance(record.variant, processor, exact=job.plan.images[condition].exact)
+    made_by = provenance(record.facts.variant, processor, exact=job.plan.images[condition].exact)
     return Cell(
-        key=cell_key(at, frame.key, luminance, exposure_s, shared.colours, made_by),
+        key=cell_key(at, frame.key, luminance, exposure_s, colours, made_by),
         at=at,
         luminance_cd_m2=luminance,
-        illuminance_lux=None if scene.lux_per_cd_m2 is None else luminance * scene.lux_per_cd_m2,
+        illuminance_lux=None if frame.lux_per_cd_m2 is None else luminance * frame.lux_per_cd_m2,
         exposure_s=exposure_s,
         sensor=frame.sensor,
         made_by=made_by,
-        colours=shared.colours,
-        light=scene.light,
-        white_cd_m2=scene.white_cd_m2 * luminance,
+        colours=colours,
+        light=frame.light,
+        white_cd_m2=frame.white_cd_m2 * luminance,
         electrons=frame.electrons.resolve(),
         half_difference=frame.half_difference.resolve(),
-        truth=scene.truth.resolve(),
+        truth=frame.truth.resolve(),
         pictures=(job.out / PICTURES).resolve(),
-        spp=record.spp,
-        bands=record.bands,
-        render_s=record.seconds,
+        render=record,
         budget_share=job.plan.shares.get(condition),
     )

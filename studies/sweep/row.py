@@ -17,6 +17,8 @@ class Row:
         The level in both units (lux where the scene states a plane), and the time.
     spp, bands : int
         Of the render.
+    render : str
+        What else is known of it, as JSON: `studies.sweep.cells.render_text`.
     lens : str
         Terms of the modelled lens, as JSON.
     budget_share : float or None
@@ -69,6 +71,7 @@ class Row:
     exposure_s: float
     spp: int
     bands: int
+    render: str
     lens: str
     budget_share: float | None
     psnr_db: float

@@ -106,11 +106,12 @@ def sweep(
             [cell.key for cell in cells] if cells else [None] * count for cells in found
         ]
         want(base, chain.from_iterable(keys))
-        made = 0
+        made, notes = 0, dict[str, None]()
         for index, opened in enumerate(scenes.values()):
             part = _part(step, index, len(scenes))
             cells = found[index] or scene_cells(job, opened, _rendering(part))
             asked = [cell.key for cell in cells]
+            notes.update(dict.fromkeys(cells[0].render.notes))
             keys[index] = asked
             want(base, chain.from_iterable(keys))
             kept = done(base, out / PICTURES, asked)
@@ -119,8 +120,7 @@ def sweep(
             forget_old(base)
         stages = clock.stages()
         note_stages(base, run, stages)
-    notes = tuple(dict.fromkeys(note for opened in scenes.values() for note in opened.notes))
-    return Swept(out, count * len(scenes), made, sum(stages.values()), notes)
+    return Swept(out, count * len(scenes), made, sum(stages.values()), tuple(notes))
 
 
 def _clear(out: Path) -> None:

@@ -14,7 +14,7 @@ from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum
 from rodcone.errors import InputError
 from rodcone.jit import backend
-from sensor.capture import capture, capture_strips
+from sensor.capture import capture, capture_strips, expose
 from sensor.curves import Responses
 from sensor.device import draw_device
 from sensor.optics import form_image
@@ -43,6 +43,33 @@ def test_an_exact_capture_is_the_chain_of_its_parts_bit_for_bit(name, cfa, dtype
     for field in ("cfa", "black_dn", "white_dn", "gain_e_per_dn", "read_noise_e", "dsnu_e", "prnu", "exposure_s"):
         assert getattr(raw, field) == getattr(parts, field), field
     assert 0.001 < np.mean(expected_e / sensor.pixel.full_well_e) < 0.9  # a picture, neither black nor white
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_expected_electrons_are_read_out_as_a_capture_reads_them(exact):
+    """Exact: to the bit; Dr.Jit forms its electrons in single precision."""
+    sensor = preset("low_noise")
+    radiance = SpectralRadiance(np.full((16, 24, NM.size), 0.0078125, np.float32), NM)
+    device = draw_device(sensor, radiance.shape, np.random.default_rng(2))
+    expected_e = expected_electrons(form_image(radiance, sensor), sensor, 0.02)
+    raw = expose(expected_e, sensor, 0.02, device, np.random.default_rng(3), exact=exact)
+    whole = capture(radiance, sensor, 0.02, device, np.random.default_rng(3), exact=exact)
+    assert raw.engine == whole.engine == ("numpy" if exact else backend())
+    if exact:
+        np.testing.assert_array_equal(raw.dn, whole.dn)
+    else:  # the electrons differ by some parts in 1e7, which moves few of the draws
+        assert np.mean(raw.dn != whole.dn) < 0.01
+
+
+@pytest.mark.parametrize("exact", [False, True])
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
+def test_electrons_that_no_light_makes_are_refused_at_their_place(exact, value):
+    sensor = preset("low_noise")
+    device = draw_device(sensor, (8, 8), np.random.default_rng(2))
+    expected_e = np.ones((8, 8))
+    expected_e[2, 5] = value
+    with pytest.raises(InputError, match=r"expected_e: .* at row 2, column 5; allowed: finite numbers >= 0"):
+        expose(expected_e, sensor, 0.02, device, np.random.default_rng(3), exact=exact)
 
 
 @pytest.mark.parametrize("exact", [False, True])

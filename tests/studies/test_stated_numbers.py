@@ -1,4 +1,4 @@
-"""What a row and the demo's results state of how pictures were made, counted another way: paths, arrays, wells."""
+"""What rows and results state of how pictures were made, counted another way: paths, arrays, wells."""
 
 import json
 from pathlib import Path
@@ -11,11 +11,10 @@ from sweep_sample import swept
 from render.engine import render
 from rodcone.jit import backend
 from sensor.presets import low_noise
-from studies.budget import quiet_render
-from studies.commands import demo
-from studies.commands.demo import Demo
+from studies.study import quiet_render
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep.database import open_ledger, rows
+from studies.sweep.results import results_json
 
 
 def test_bands_and_samples_are_those_of_the_stored_render(tmp_path: Path) -> None:
@@ -51,32 +50,39 @@ def test_an_automatic_exposure_fills_the_well_or_ends_at_the_longest(tmp_path: P
 
 
 @pytest.mark.skipif(backend() == "numpy", reason="counts the wavefronts of Dr.Jit")
-def test_the_demos_results_state_the_render_and_the_exposures_that_were_made(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_results_state_the_render_and_the_exposures_that_were_made(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     paths, made = count_paths(monkeypatch), []
     monkeypatch.setattr(quiet_render, "render", lambda *a, **k: made.append(render(*a, **k)) or made[-1])
     size, longest_s = 16, 0.05
-    asked = Demo(
-        scene="slanted_edge", size=size, spp=33, sensors=("low_noise",), levels=("0.001cd/m2", "1000cd/m2"),
-        longest_s=longest_s,
-    )  # fmt: skip
-    results = demo.run(asked).results
-    (transport,), told = made, results["render"]
-    assert told["spp"] == paths["camera"] / size**2 / len(transport.groups)
+    study = Study(
+        (SceneChoice("slanted_edge"),),
+        ("0.001cd/m2", "1000cd/m2"),
+        longest_exposure_s=longest_s,
+        render=RenderLimits(size=size, spp=33, noise_share=1e-6),
+    )
+    swept(study, tmp_path)
+    found = json.loads(results_json(tmp_path))["rows"]
+    (transport,), told = made, found[0]["render"]
+    assert found[0]["spp"] == paths["camera"] / size**2 / len(transport.groups)
     assert told["passes"] == len(transport.pass_means.radiance)
     assert told["stopped_by"] == "samples"
-    assert told["bands"] == transport.radiance.shape[1]
+    assert told["brightest_share"] > 1e-6
+    bands = found[0]["bands"]
+    assert bands == transport.radiance.shape[1]
     low, high = told["first_nm"] - told["width_nm"] / 2, told["last_nm"] + told["width_nm"] / 2
     assert (low, high) == pytest.approx((380, 780))
-    assert told["bands"] * told["width_nm"] == pytest.approx(high - low)
+    assert bands * told["width_nm"] == pytest.approx(high - low)
     scattered = transport.pass_means.radiance.sum(axis=(1, 2))  # one light of one power in every band
     assert told["relative_level_error"] == pytest.approx(scattered.std(ddof=1) / 8**0.5 / scattered.mean(), rel=0.3)
     well = low_noise().pixel.full_well_e
-    for cell in results["cells"]:
-        fullest = max(cell["mean_electrons"].values())
-        if cell["level"] == 0:
-            assert cell["exposure_s"] == longest_s
+    for row in found:
+        fullest = max(row["mean_electrons"].values())
+        if row["level"] == "0.001cd/m2":
+            assert row["exposure_s"] == longest_s
             assert fullest < 0.01 * well
         else:
-            assert cell["exposure_s"] < longest_s
-            assert 0.2 * well < cell["mean_electrons"]["G"] < 0.8 * well  # the brightest greens have 80 %
-        assert cell["saturated"] <= 0.3
+            assert row["exposure_s"] < longest_s
+            assert 0.2 * well < row["mean_electrons"]["G"] < 0.8 * well  # the brightest greens have 80 %
+        assert row["saturated"] <= 0.3

@@ -1,85 +1,130 @@
-"""The main job end to end, small; levels as written by a user; nothing half-written."""
+"""`rodcone demo` end to end, small: its files, its numbers, and what it refuses before it renders."""
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from render.radiance import SpectralRadiance
+from render.radiance_files.exr import write_exr
 from rodcone.errors import InputError
 from scenes.levels import DEMO_LEVELS
-from studies.commands.demo import Demo, Outcome, run, write
+from studies.commands.cli import main
+from studies.commands.demo import STUDY
 from studies.study.levels import parse_level
+from studies.study.study_file import read_study
+from studies.sweep.export import read_rows
 
-SMALL = Demo(size=48, spp=16, sensors=("low_noise",), levels=("0.5cd/m2", "500lux"))
+SMALL = ["--size", "48", "--spp", "16", "--sensor", "low_noise", "--level", "0.5cd/m2", "--level", "500lux"]
+NM = 385.0 + 10 * np.arange(40)
+
+
+def call(arguments: list[str]) -> int:
+    """Exit code of the command."""
+    with pytest.raises(SystemExit) as stopped:
+        main(["demo", *arguments])
+    return int(stopped.value.code or 0)
 
 
 @pytest.fixture(scope="module")
-def outcome() -> Outcome:
-    return run(SMALL)
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a small demo leaves."""
+    out = tmp_path_factory.mktemp("demo") / "new" / "folder"
+    assert call([*SMALL, "-o", str(out)]) == 0
+    return out
+
+
+def results(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "results.json").read_text("utf-8"))
+    return found
 
 
 def test_seven_levels_run_from_moonlight_to_daylight() -> None:
-    luminances = [level.luminance_cd_m2 for level in DEMO_LEVELS]
+    study = read_study(STUDY)
+    assert study.levels == tuple(level.name for level in DEMO_LEVELS)
+    luminances = [parse_level(level)[0] for level in study.levels]
     assert len(luminances) == 7
     assert luminances == sorted(luminances)
     assert luminances[0] == 0.036
     assert luminances[-1] == pytest.approx(100_000 * 0.18 / np.pi)
 
 
-def test_every_condition_has_a_cell_and_a_picture(outcome: Outcome) -> None:
-    cells = outcome.results["cells"]
-    assert {(cell["level"], cell["camera"]) for cell in cells} == {
-        (level, camera) for level in (0, 1) for camera in ("interleaved", "bayer")
+def test_every_condition_has_a_row_and_a_picture(folder: Path) -> None:
+    rows = results(folder)["rows"]
+    assert {(row["level"], row["processor"]) for row in rows} == {
+        (level, processor) for level in ("0.5cd/m2", "500lux") for processor in ("interleaved", "bayer")
     }
-    assert set(outcome.pictures) == {cell["picture"] for cell in cells} | {"truth"}
+    assert all((folder / "pictures" / row["picture"]).is_file() for row in rows)
 
 
-def test_level_in_lux_is_illuminance_on_the_reference_plane(outcome: Outcome) -> None:
-    assert [level["illuminance_lux"] for level in outcome.results["levels"]][1] == pytest.approx(500.0)
-    assert outcome.results["levels"][0]["luminance_cd_m2"] == 0.5
+def test_level_in_lux_is_illuminance_on_the_reference_plane(folder: Path) -> None:
+    by_level = {row["level"]: row for row in results(folder)["rows"]}
+    assert by_level["500lux"]["illuminance_lux"] == pytest.approx(500.0)
+    assert by_level["0.5cd/m2"]["luminance_cd_m2"] == 0.5
 
 
-def test_dim_picture_is_better_from_the_interleaved_camera(outcome: Outcome) -> None:
-    psnr = {cell["camera"]: cell["psnr_db"] for cell in outcome.results["cells"] if cell["level"] == 0}
+def test_dim_picture_is_better_from_the_interleaved_camera(folder: Path) -> None:
+    psnr = {row["processor"]: row["psnr_db"] for row in results(folder)["rows"] if row["level"] == "0.5cd/m2"}
     assert psnr["interleaved"] > psnr["bayer"]
 
 
-def test_results_state_render_error_and_monte_carlo_share(outcome: Outcome) -> None:
-    assert 0 < outcome.results["render"]["relative_mc_error"] < 1
-    assert all(cell["mc_share"] > 0 for cell in outcome.results["cells"])
+def test_the_results_are_the_ledgers_rows_and_state_the_render(folder: Path) -> None:
+    found = results(folder)
+    for told, row in zip(found["rows"], read_rows(folder), strict=True):
+        assert {name: told[name] for name in ("key", "psnr_db", "mc_share", "exposure_s")} == {
+            name: getattr(row, name) for name in ("key", "psnr_db", "mc_share", "exposure_s")
+        }
+        assert told["mc_share"] > 0
+        assert 0 < told["render"]["relative_mc_error"] < 1
+    assert found["study"]["render"]["spp"] == 16
+    assert {"renders", "captures", "develop interleaved", "metrics", "other"} <= set(found["stages"])
 
 
-def test_same_seed_gives_the_same_numbers(outcome: Outcome) -> None:
-    again = run(SMALL).results["cells"]
-    for ours, theirs in zip(outcome.results["cells"], again, strict=True):
-        assert {k: v for k, v in ours.items() if k != "seconds"} == {k: v for k, v in theirs.items() if k != "seconds"}
+def test_same_seed_gives_the_same_numbers(folder: Path, tmp_path: Path) -> None:
+    assert call([*SMALL, "-o", str(tmp_path)]) == 0
+    differ = {"render_s", "capture_s", "develop_s", "measure_s", "first_s", "finished", "worker"}
+    for ours, theirs in zip(results(folder)["rows"], results(tmp_path)["rows"], strict=True):
+        assert {k: v for k, v in ours.items() if k not in differ} == {
+            k: v for k, v in theirs.items() if k not in differ
+        }
 
 
-def test_files_are_written_whole(outcome: Outcome, tmp_path: Path) -> None:
-    report = write(outcome, tmp_path / "new" / "folder")
-    assert report.read_text(encoding="utf-8").lstrip().lower().startswith("<!doctype html>")
-    assert json.loads((report.parent / "results.json").read_text())["scene"] == "still_life"
-    with Image.open(report.parent / "overview.png") as sheet:
+def test_the_report_and_the_overview_stand_beside_the_results(folder: Path) -> None:
+    assert (folder / "report.html").read_text("utf-8").lstrip().lower().startswith("<!doctype html>")
+    with Image.open(folder / "overview.png") as sheet:
         assert sheet.size == (2 * 48 + 4, 2 * 48 + 4)
-    assert sorted(path.name for path in report.parent.iterdir()) == ["overview.png", "report.html", "results.json"]
+        shown = np.asarray(sheet)
+    row = results(folder)["rows"][-1]  # the brighter level's Bayer: the last column of the last line
+    with Image.open(folder / "pictures" / row["picture"]) as picture:
+        assert np.array_equal(shown[-48:, -48:], np.asarray(picture))
 
 
-def test_failed_write_leaves_nothing_half_done(
-    outcome: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_report_names_a_level_and_its_source(tmp_path: Path) -> None:
+    assert (
+        call(["--size", "16", "--spp", "2", "--sensor", "low_noise", "--level", "moonlight", "-o", str(tmp_path)]) == 0
+    )
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "moonlight" in page
+    assert "10 photons per um^2 and second" in page
+    assert results(tmp_path)["rows"][0]["luminance_cd_m2"] == 0.036
+
+
+def test_a_failed_write_leaves_no_half_report(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("report.html", "results.json", "overview.png")
+    before = {name: (folder / name).read_bytes() for name in names}
     real = Path.write_bytes
 
     def full_disk(path: Path, data: bytes) -> int:
-        if path.name == "report.html":
+        if path.name == "overview.png":
             raise OSError(28, "No space left on device", str(path))
         return real(path, data)
 
     monkeypatch.setattr(Path, "write_bytes", full_disk)
-    with pytest.raises(OSError, match="No space left"):
-        write(outcome, tmp_path)
-    assert list(tmp_path.iterdir()) == []
+    assert call([*SMALL, "-o", str(folder)]) == 1
+    assert {name: (folder / name).read_bytes() for name in names} == before
 
 
 @pytest.mark.parametrize(
@@ -99,18 +144,88 @@ def test_bad_levels_are_refused_in_one_line(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("demo", "message"),
+    ("arguments", "message"),
     [
-        (Demo(scene="still_live"), r"^scene: 'still_live' is unknown; allowed: .*did you mean 'still_life'\?"),
-        (Demo(sensors=("lownoise",)), r"^sensor preset: 'lownoise' is unknown"),
-        (Demo(sensors=()), r"^demo: \(\) is not allowed"),
-        (Demo(size=4), r"^size: 4 is outside 16 to 4096"),
-        (Demo(longest_s=-1.0), r"^longest exposure: -1.0 is outside"),
-        (Demo(seed=-1), r"^seed: -1 is outside"),
-        (Demo(spp=0), r"^spp: 0 is outside"),
+        (["--scene", "still_live"], "scene: 'still_live' is unknown; allowed: "),
+        (["--scene", "missing.exr"], "no such file"),
+        (["--sensor", "lownoise"], "sensor preset: 'lownoise' is unknown"),
+        (["--level", "500candles"], "candles"),
+        (["--level", "1lux", "--level", "1lux"], "levels: ['1lux', '1lux'] is not allowed"),
+        (["--light", "D66"], "D66"),
+        (["--scene", "furnace", "--light", "A"], "furnace: option"),
+        (["--size", "4"], "render.size: 4 is outside"),
+        (["--longest-exposure-s=-1"], "longest_exposure_s: -1.0 is outside"),
+        (["--seed=-1"], "seeds: -1 is outside"),
+        (["--spp", "0"], "render.spp: 0 is outside"),
+        (["--max-seconds", "0"], "render.max_seconds: 0.0 is outside"),
     ],
 )
-def test_bad_input_is_refused_before_the_render(demo: Demo, message: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studies.commands.demo.render_quietly", lambda *args, **more: pytest.fail("rendered"))
-    with pytest.raises(InputError, match=message):
-        run(demo)
+def test_bad_input_is_refused_before_the_render(
+    arguments: list[str],
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+) -> None:
+    monkeypatch.setattr("studies.sweep.prepare.make_transport", lambda *args, **more: pytest.fail("rendered"))
+    assert call([*arguments, "-o", str(tmp_path / "out")]) == 2
+    told = capsys.readouterr().err
+    assert message in told
+    assert told.startswith("rodcone: ")
+    assert told.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def ramp(path: Path, height: int = 20, width: int = 26, error: float = 0.0) -> Path:
+    """Picture in equal-energy greys, darker from left to right."""
+    values = np.broadcast_to(np.linspace(1.0, 0.05, width)[None, :, None], (height, width, NM.size))
+    write_exr(path, SpectralRadiance(values * 1e-3, NM, error))
+    return path
+
+
+def of_file(path: Path, out: Path, *more: str) -> dict[str, Any]:
+    assert call(["--scene", str(path), "--sensor", "low_noise", "--level", "25cd/m2", *more, "-o", str(out)]) == 0
+    return results(out)
+
+
+def test_demo_runs_from_a_file_in_the_files_own_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = of_file(ramp(tmp_path / "my scene.exr", error=0.25), tmp_path / "out", "--light", "E")
+    assert len(found["rows"]) == 2
+    for row in found["rows"]:
+        assert (row["scene"], row["illuminance_lux"], row["bands"]) == ("my scene.exr", None, 40)
+        assert row["render"]["integrator"] == "file"
+        with Image.open(tmp_path / "out" / "pictures" / row["picture"]) as picture:
+            assert picture.size == (26, 20)
+    told = "relative Monte Carlo error of 0.250"
+    assert told in capsys.readouterr().err
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "my scene.exr" in page
+    assert told in page
+
+
+def test_grey_picture_is_grey_under_its_own_light_alone(tmp_path: Path) -> None:
+    """Equal energy is neutral under E; under D65, which is bluer, it is reddish."""
+    path, spread = ramp(tmp_path / "a.exr"), {}
+    for light, more in (("E", ["--light", "E"]), (None, [])):
+        row = of_file(path, tmp_path / str(light), *more)["rows"][0]
+        with Image.open(tmp_path / str(light) / "pictures" / row["truth"]) as truth:
+            pixels = np.asarray(truth, dtype=int)
+        spread[light] = (pixels[:, :, 0] - pixels[:, :, 2]).max()
+    assert spread["E"] <= 1  # 40 bands round the neutral by less than a step of 8 bits
+    assert spread[None] > 10
+
+
+def test_a_level_in_lux_of_a_file_is_refused_before_it_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.exr"
+    path.write_text("never read", "utf-8")
+    assert call(["--scene", str(path), "--level", "500lux", "-o", str(tmp_path / "out")]) == 2
+    assert "reference plane" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_demo_s_report_stays_under_6_mb(tmp_path: Path) -> None:
+    """The demo's size, sensors and levels; fewer samples a pixel leave more noise, which packs worse."""
+    assert call(["--spp", "16", "--max-seconds", "20", "-o", str(tmp_path)]) == 0
+    assert 1e6 < (tmp_path / "report.html").stat().st_size < 6e6

@@ -82,7 +82,8 @@ def test_monte_carlo_share_is_the_ratio_of_variances() -> None:
         SpectralRadiance(scene.values * (1 + 0.02 * rng.standard_normal((256, 256, 1))), NM) for _ in range(2)
     )
     expected_e = expected_electrons(form_image(scene, sensor), sensor, 0.01)
-    share = monte_carlo_share(expected_e, halves, sensor, 0.01)
+    even, odd = (expected_electrons(form_image(half, sensor), sensor, 0.01) for half in halves)
+    share = monte_carlo_share((even - odd) / 2, expected_e, sensor, 0.01)
     noise = expected_e + (0.01 * expected_e) ** 2 + 1.5**2 + 1.0 + sensor.gain_e_per_dn**2 / 12
     assert share == pytest.approx((0.02**2 / 2 * expected_e**2).mean() / noise.mean(), rel=0.03)
 

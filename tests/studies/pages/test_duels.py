@@ -15,7 +15,7 @@ from studies.pages.duels import (
     BEHIND,
     LEVEL,
     METRICS,
-    cases_of,
+    contests_of,
     duels,
     is_ranked,
     lead_over,
@@ -39,7 +39,7 @@ def rows_of(figures: dict[str, list[float]], metric: str = "psnr_db", **values: 
 def test_a_lead_is_clear_where_its_whole_interval_is_on_one_side_of_0(
     ours: list[float], theirs: list[float], outcome: str
 ) -> None:
-    (duel,) = duels(cases_of(rows_of({"a": ours, "b": theirs})), "a", "b", PSNR)
+    (duel,) = duels(contests_of(rows_of({"a": ours, "b": theirs})), "a", "b", PSNR)
     assert duel.outcome == outcome
     assert duel.lead.mean == pytest.approx(sum(x - y for x, y in zip(ours, theirs, strict=True)) / 3)
     if outcome == LEVEL:  # 1, 2 and 3: a deviation of 1
@@ -48,13 +48,13 @@ def test_a_lead_is_clear_where_its_whole_interval_is_on_one_side_of_0(
 
 def test_seeds_are_paired_by_their_number_not_by_their_place() -> None:
     rows = rows_of({"a": [10.0, 30.0]}) + rows_of({"b": [9.0, 29.0]})[::-1]
-    lead = lead_over(cases_of(rows)[0], "a", "b", PSNR)
+    lead = lead_over(contests_of(rows)[0], "a", "b", PSNR)
     assert (lead.low, lead.high) == (1.0, 1.0)
 
 
 def test_of_a_colour_difference_less_is_better() -> None:
-    case = cases_of(rows_of({"a": [2.0, 2.0], "b": [5.0, 5.0]}, "delta_e_median"))[0]
-    assert lead_over(case, "a", "b", DELTA_E).mean == 3.0
+    contest = contests_of(rows_of({"a": [2.0, 2.0], "b": [5.0, 5.0]}, "delta_e_median"))[0]
+    assert lead_over(contest, "a", "b", DELTA_E).mean == 3.0
 
 
 def test_every_metric_is_a_column_of_the_ledger() -> None:
@@ -68,7 +68,7 @@ def test_conditions_come_group_by_group_from_dark_to_bright() -> None:
         for level, light in (("25cd/m2", 25.0), ("100lux", 5.7), ("3cd/m2", 3.0))
         for one in rows_of({"a": [1.0, 1.0], "b": [0.0, 0.0]}, sensor=sensor, level=level, luminance_cd_m2=light)
     ]
-    found = [(case.group.sensor, case.level) for case in cases_of(rows)]
+    found = [(contest.group.sensor, contest.level) for contest in contests_of(rows)]
     assert found == [(sensor, level) for sensor in "za" for level in ("3cd/m2", "100lux", "25cd/m2")]
 
 
@@ -78,28 +78,28 @@ def test_a_camera_is_ranked_where_ws_snr_is_1_or_more(share: float, ranked: bool
     dark2 = sensor.pixel.read_noise_e**2 + sensor.pixel.fixed_dark_e**2 + sensor.gain_e_per_dn**2 / 12
     one = (1 + sqrt(1 + 4 * dark2)) / 2  # electrons x of an SNR of 1: x = sqrt(x + dark^2)
     values = {"sensor": "table1_output", "mean_electrons": json.dumps({"W": one * share, "G": 1.0})}
-    case = cases_of(rows_of({"interleaved": [1, 1], "bayer": [0, 0]}, **values))[0]
-    assert is_ranked(case, "interleaved") is ranked
-    assert abs(snr_db(case, "interleaved", "W")) < 0.2
-    assert len(duels([case], "interleaved", "bayer", PSNR)) == ranked
+    contest = contests_of(rows_of({"interleaved": [1, 1], "bayer": [0, 0]}, **values))[0]
+    assert is_ranked(contest, "interleaved") is ranked
+    assert abs(snr_db(contest, "interleaved", "W")) < 0.2
+    assert len(duels([contest], "interleaved", "bayer", PSNR)) == ranked
 
 
 def test_a_camera_without_w_or_of_unknown_noise_is_ranked() -> None:
     dark = {"mean_electrons": json.dumps({"W": 1e-6, "G": 1e-6})}
     for values in ({"sensor": "table1_output"}, dark):
-        case = cases_of(rows_of({"bayer": [1, 1], "bayer_nlm": [0, 0]}, **values))[0]
-        assert is_ranked(case, "bayer")
+        contest = contests_of(rows_of({"bayer": [1, 1], "bayer_nlm": [0, 0]}, **values))[0]
+        assert is_ranked(contest, "bayer")
 
 
 def test_what_no_interval_or_comparison_can_be_made_of_is_refused() -> None:
     whole = rows_of({"a": [1.0, 1.0], "b": [0.0, 0.0]})
     with pytest.raises(InputError, match=r"cells: b on desk at 1cd/m2 lacks seeds"):
-        cases_of(whole[:-1])
+        contests_of(whole[:-1])
     with pytest.raises(InputError, match=r"seeds: \[0\] is not allowed; give two or more"):
-        cases_of([one for one in whole if one.seed == 0])
+        contests_of([one for one in whole if one.seed == 0])
     with pytest.raises(InputError, match=r"camera: 'c' is unknown; allowed: a, b"):
-        opponents_of(cases_of(whole), "c")
+        opponents_of(contests_of(whole), "c")
     with pytest.raises(InputError, match="give the camera and an opponent"):
-        opponents_of(cases_of(whole[:2]), "a")
+        opponents_of(contests_of(whole[:2]), "a")
     with pytest.raises(InputError, match="seeds: "):
-        cases_of([])
+        contests_of([])

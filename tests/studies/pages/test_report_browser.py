@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of made-up results."""
-    results = SAMPLE.sample_results()
+    results = SAMPLE.sample_report()
     file: Path = tmp_path_factory.mktemp("report") / "report.html"
     file.write_text(render_report(results, SAMPLE.sample_pictures(results)), encoding="utf-8")
     return file
@@ -73,14 +74,13 @@ def test_page_is_quiet_and_asks_for_nothing(browser: Any, report: Path) -> None:
 
 def test_slider_by_keyboard_changes_picture_and_numbers(browser: Any, report: Path) -> None:
     page = Page(browser, report)
-    results = SAMPLE.sample_results()
     before = shown(page)
     page.value("document.getElementById('level').focus()")
     page.press("ArrowRight", 39)
     after = shown(page)
     assert (before["level"], after["level"]) == ("moonlight", "street light")
-    cell = next(cell for cell in results["cells"] if cell["level"] == 1 and cell["sensor"] == "table1_output")
-    assert after["psnr"] == f"{cell['psnr_db']:.1f}\N{NO-BREAK SPACE}dB" != before["psnr"]
+    psnr_db = SAMPLE.sample_row(1, 0, "interleaved").psnr_db
+    assert after["psnr"] == f"{psnr_db:.1f}\N{NO-BREAK SPACE}dB" != before["psnr"]
     assert after["spoken"].startswith("street light, 0.5")
     assert "street light" in after["status"]
     overview = page.value("document.querySelector('[data-cell=\"2\"] img').src")
@@ -112,7 +112,7 @@ def test_detail_holds_the_pixels_it_names(browser: Any, report: Path) -> None:
              const canvas = document.querySelector("[data-truth] canvas");
              return [...canvas.getContext("2d").getImageData(0, 0, 1, 1).data].slice(0, 3)})()"""
     )
-    truth = np.asarray(Image.open(BytesIO(SAMPLE.sample_pictures(SAMPLE.sample_results())["truth"])).convert("RGB"))
+    truth = np.asarray(Image.open(BytesIO(SAMPLE.sample_pictures(SAMPLE.sample_report())["truth"])).convert("RGB"))
     assert color == truth[180 - 8, 100 - 16].tolist()
     assert page.value("getComputedStyle(document.querySelector('[data-truth] canvas')).imageRendering") == "pixelated"
 
@@ -155,7 +155,6 @@ def test_fits_the_window_with_whole_pixels(browser: Any, report: Path) -> None:
 
 def test_exposure_slider_changes_picture_and_numbers_and_nothing_scrolls(browser: Any, axes: Path) -> None:
     page = Page(browser, axes)
-    of = SAMPLE.sample_axes()
     page.press("Tab", 9)  # the skip link; from it on by keyboard alone
     page.value("document.getElementById('level').focus()")
     page.press("ArrowRight", 39)
@@ -165,7 +164,7 @@ def test_exposure_slider_changes_picture_and_numbers_and_nothing_scrolls(browser
     assert page.value("getComputedStyle(document.activeElement).outlineStyle") == "solid", "the focus can't be seen"
     page.press("ArrowRight", 39)
     after = shown(page)
-    mean = next(c for c in of["cells"] if (c["level"], c["seed"], c["exposure"]) == (1, 6, "10ms"))["psnr_db"]
+    mean = SAMPLE.sample_row(1, 0, "interleaved").psnr_db - 3.0
     assert after["psnr"].replace("\N{NO-BREAK SPACE}", " ") == f"{mean:.1f} ± 0.2 dB"
     assert page.value("document.getElementById('exposure').getAttribute('aria-valuetext')").startswith("10")
     assert after["level"] == before["level"] == "street light"
@@ -238,7 +237,7 @@ def test_a_picture_left_out_is_said_to_be_and_its_numbers_stand(browser: Any, vi
     page.press("ArrowRight", 39)
     assert page.value(gone) == "grid"
     words = page.value("document.querySelector('#side .gone').textContent")
-    assert words == "Not in this page; its numbers are: color_checker/1/1.png"
+    assert words == "Not in this page; its numbers are: pictures/color_checker/A/1/1/interleaved"
     assert shown(page)["psnr"] == f"{10 + 8 + 4 + 2 + 1:.1f}\N{NO-BREAK SPACE}dB"
     assert page.value("document.querySelector('#side img').hasAttribute('src')") is False
     page.value("document.querySelector('[name=view][value=wipe]').click()")
@@ -342,11 +341,17 @@ def test_without_script_the_first_level_stands(browser: Any, report: Path) -> No
 
 
 def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
-    results = SAMPLE.sample_results()
+    results = SAMPLE.sample_report()
     pictures = SAMPLE.sample_pictures(results)
-    results["scene"] = results["levels"][0]["name"] = results["notes"][0] = results["exposure_rule"] = HOSTILE
-    results["name"] = HOSTILE
-    results["configuration"] = {HOSTILE: HOSTILE}
+    results = replace(
+        results,
+        name=HOSTILE,
+        scenes=(replace(results.scenes[0], name=HOSTILE),),
+        levels=(replace(results.levels[0], name=HOSTILE), *results.levels[1:]),
+        notes=(HOSTILE,),
+        exposure_rule=HOSTILE,
+        configuration={HOSTILE: HOSTILE},
+    )
     file = tmp_path / "hostile.html"
     file.write_text(render_report(results, pictures), encoding="utf-8")
     page = Page(browser, file)

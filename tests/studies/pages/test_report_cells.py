@@ -1,97 +1,67 @@
-"""The report's cells: in order, each once, means and intervals over seeds."""
+"""The report's cells: in order, means and intervals over seeds."""
 
-import re
-from collections.abc import Callable
+import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
 import report_sample as SAMPLE
 
-from rodcone.errors import InputError
-from studies.pages.report_cells import SCATTERED, exposure_name, groups, ordered_cells, over_seeds, seeds
+from studies.pages.report_cells import SCATTERED, over_seeds
+from studies.pages.report_data import ReportCell
+from studies.pages.report_text import exposure_name
+from studies.sweep.row import Row
+
+
+def cell_of(*rows: Row | None) -> ReportCell:
+    return over_seeds(rows, "low_noise", 1, "interleaved", (8.0, None))
+
+
+def made(seed: int = 0, **values: Any) -> Row:
+    return SAMPLE.sample_row(1, 0, "interleaved", seed, **values)
 
 
 def test_two_seeds_give_mean_and_student_s_interval() -> None:
-    base = dict.fromkeys(SCATTERED, 1.0)
-    rest = {"substitution": None, "balance": None, "picture": "a"}
-    cell = over_seeds([{**base, **rest, "psnr_db": 20.0}, {**base, **rest, "psnr_db": 21.0, "picture": "b"}])
+    cell = cell_of(made(psnr_db=20.0, ssim=1.0, picture="a"), made(1, psnr_db=21.0, ssim=1.0, picture="b"))
     # n = 2: s / sqrt(2) = 0.5, and t of one degree of freedom at 97.5 % is tan(0.475 pi) = 12.7062 (the Cauchy law).
-    assert cell["psnr_db"] == 20.5
-    assert cell["intervals"]["psnr_db"] == pytest.approx((20.5 - 6.3531, 20.5 + 6.3531), abs=1e-4)
-    assert cell["intervals"]["ssim"] == (1.0, 1.0)
-    assert cell["picture"] == "a"
+    assert cell.figures["psnr_db"] == 20.5
+    assert cell.intervals["psnr_db"] == pytest.approx((20.5 - 6.3531, 20.5 + 6.3531), abs=1e-4)
+    assert cell.intervals["ssim"] == (1.0, 1.0)
+    assert cell.picture == "a"
 
 
 def test_figure_unknown_for_a_seed_is_unknown() -> None:
-    one, other = [SAMPLE.sample_cell(1, 0, "interleaved") for _ in range(2)]
-    one["snr_db"], other["psnr_db"] = None, float("inf")
-    cell = over_seeds([one, other])
-    assert cell["snr_db"] is None
-    assert cell["psnr_db"] is None
-    assert set(cell["intervals"]).isdisjoint({"snr_db", "psnr_db"})
+    cell = cell_of(made(snr_db=None), made(1, psnr_db=float("inf")))
+    assert cell.figures["snr_db"] is None
+    assert cell.figures["psnr_db"] is None
+    assert set(cell.intervals).isdisjoint({"snr_db", "psnr_db"})
+
+
+def test_a_seed_that_is_not_made_yet_leaves_every_figure_unknown() -> None:
+    for rows in ((made(), None), (None, made(1)), (None, None)):
+        cell = cell_of(*rows)
+        assert set(cell.figures.values()) == {None}
+        assert cell.substitution is None
+        assert cell.picture == (rows[0].picture if rows[0] else None)
 
 
 def test_decisions_of_all_seeds_count() -> None:
-    cells = [SAMPLE.sample_cell(1, 0, "interleaved") for _ in range(4)]
-    cells[3]["substitution"] = False
-    cells[2]["balance"] = cells[2]["balance"] | {"B": "calibrated"}
-    cell = over_seeds(cells)
-    assert cell["substitution"] == 0.75
-    assert cell["balance"] == {"R": "gray world", "G": "gray world", "B": "calibrated"}
+    balances = [{"R": "gray world", "G": "gray world", "B": "calibrated" if seed == 2 else "gray world"}
+                for seed in range(4)]  # fmt: skip
+    rows = [made(seed, substitution=int(seed < 3), balance=json.dumps(balances[seed])) for seed in range(4)]
+    cell = cell_of(*rows)
+    assert cell.substitution == 0.75
+    assert cell.balance == {"R": "gray world", "G": "gray world", "B": "calibrated"}
 
 
 def test_one_seed_keeps_its_numbers() -> None:
-    cell = SAMPLE.sample_cell(1, 0, "bayer")
-    assert over_seeds([cell]) == {**cell, "intervals": {}}
+    row = replace(made(), psnr_db=float("inf"))
+    cell = cell_of(row)
+    assert cell.figures == {key: getattr(row, key) for key in SCATTERED}
+    assert cell.intervals == {}
+    assert cell.first is row
 
 
-def test_cells_come_by_sensor_exposure_level_and_camera() -> None:
-    of = SAMPLE.sample_axes()
-    of["cells"].reverse()
-    cells = ordered_cells(of)
-    places = [(cell["exposure"], cell["level"], cell["camera"]) for cell in cells]
-    assert places == [(e, lv, c) for e in ("auto", "10ms") for lv in range(3) for c in ("interleaved", "bayer")]
-    assert groups(of) == ["table1_output, exposure automatic", "table1_output, exposure 10\N{NO-BREAK SPACE}ms"]
-    assert [cell["group"] for cell in cells] == [title for title in groups(of) for _ in range(6)]
-    assert seeds(of) == [7, 6, 5]
-
-
-def test_results_without_axes_have_one_exposure_and_the_study_s_seed() -> None:
-    of = SAMPLE.sample_results()
-    assert groups(of) == ["table1_output", "low_noise"]
-    assert seeds(of) == [0]
+def test_an_exposure_is_written_as_prose_does() -> None:
     assert exposure_name("auto") == "automatic"
-
-
-def _drop(of: dict[str, Any]) -> None:
-    of["cells"] = [c for c in of["cells"] if (c["seed"], c["exposure"], c["level"], c["camera"]) != MISSING]
-
-
-def _unknown(of: dict[str, Any]) -> None:
-    of["cells"][0]["exposure"] = "20ms"
-
-
-def _unreadable(of: dict[str, Any]) -> None:
-    of["exposures"] = ["auto", "</script>"]
-
-
-MISSING = (6, "10ms", 2, "bayer")
-
-
-@pytest.mark.parametrize(
-    ("fault", "words"),
-    [
-        (_drop, "sensor 'table1_output', exposure '10ms', level 2, camera 'bayer', seed 6 is missing"),
-        (_unknown, "'20ms'"),
-        (_unreadable, "'</script>' is not a time"),
-    ],
-)
-def test_incomplete_axes_are_refused(fault: Callable[[dict[str, Any]], None], words: str) -> None:
-    of = SAMPLE.sample_axes()
-    fault(of)
-    if fault is _unreadable:
-        for cell in of["cells"]:
-            cell["exposure"] = cell["exposure"].replace("10ms", "</script>")
-    with pytest.raises(InputError, match=re.escape(words)) as caught:
-        ordered_cells(of)
-    assert "\n" not in str(caught.value)
+    assert exposure_name("10ms") == "10\N{NO-BREAK SPACE}ms"

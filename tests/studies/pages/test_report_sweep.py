@@ -5,10 +5,13 @@ import re
 import shutil
 import sqlite3
 from contextlib import closing
+from dataclasses import replace
 from html import unescape
+from itertools import product
 from pathlib import Path
 
 import pytest
+import report_sample as REPORTS
 import sweep_sample as SAMPLE
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -16,8 +19,9 @@ from hypothesis import strategies as st
 from rodcone.errors import InputError
 from studies.commands.cli import main
 from studies.pages.report import render_report
-from studies.pages.report_cells import ordered_cells
 from studies.pages.report_choice import chosen_conditions
+from studies.pages.report_data import ReportSensor
+from studies.pages.report_facts import fallbacks, sensor_of
 from studies.pages.report_sweep import ledger_results
 from studies.study.study import SceneChoice
 from studies.sweep.database import FILE
@@ -49,22 +53,34 @@ def copied(out: Path, place: Path) -> Path:
     return place
 
 
-def test_every_row_stands_in_the_results_as_it_is(out: Path) -> None:
-    results, pictures = ledger_results(out)
+def test_every_row_stands_in_the_report(out: Path) -> None:
+    report, pictures = ledger_results(out)
     rows = {(r.scene, r.level, r.exposure, r.processor, r.seed): r for r in read_rows(out)}
-    assert len(rows) == len(results["cells"]) == 32
-    names = ("psnr_db", "flip_mean", "s_cielab_p95", "pu21_psnr_db", "mc_share", "exposure_s", "luminance_cd_m2")
-    for cell in results["cells"]:
-        level = ("1cd/m2", "25cd/m2")[cell["level"]]
-        row = rows[cell["scene"], level, cell["exposure"], cell["camera"], cell["seed"]]
-        assert [cell[name] for name in names] == [getattr(row, name) for name in names]
-        assert cell["file"] == f"pictures/{row.picture}"
-        assert cell["seconds"] == {"capture": row.capture_s, "develop": row.develop_s, "measure": row.measure_s}
-        assert cell["picture"] == (row.picture if row.seed == 0 else None)
+    assert len(rows) == 2 * len(report.cells) == 32
+    for cell in report.cells:
+        level = ("1cd/m2", "25cd/m2")[cell.level]
+        assert cell.first is not None
+        place = cell.first.scene, level, cell.first.exposure, cell.camera
+        both = [rows[*place, seed] for seed in (0, 1)]
+        assert cell.first == both[0]
+        assert cell.luminance_cd_m2 == both[0].luminance_cd_m2
+        assert cell.picture == both[0].picture
+        for name in ("psnr_db", "flip_mean", "s_cielab_p95", "pu21_psnr_db", "mc_share"):
+            assert cell.figures[name] == pytest.approx(sum(getattr(row, name) for row in both) / 2)
     for name, content in pictures.items():
         assert (out / "pictures" / name).read_bytes() == content
-    assert [scene["size"] for scene in results["scenes"]] == [[16, 20], [24, 16]]
-    assert results["pictures_left_out"] == ""
+    assert [(scene.height, scene.width) for scene in report.scenes] == [(16, 20), (24, 16)]
+    assert report.pictures_left_out == ""
+
+
+def test_cells_come_by_scene_exposure_level_and_camera(out: Path) -> None:
+    report, _ = ledger_results(out)
+    places = [(cell.first.scene, cell.first.exposure, cell.level, cell.camera) for cell in report.cells if cell.first]
+    assert places == list(product(FILES, ("auto", "2ms"), (0, 1), ("interleaved", "bayer")))
+    titles = [
+        f"low_noise, exposure {time}, {name}" for name in FILES for time in ("automatic", "2\N{NO-BREAK SPACE}ms")
+    ]
+    assert [cell.group for cell in report.cells] == [title for title in titles for _ in range(4)]
 
 
 def test_the_page_holds_the_names_as_text_and_the_means_over_seeds(out: Path) -> None:
@@ -93,14 +109,16 @@ def test_the_page_holds_the_names_as_text_and_the_means_over_seeds(out: Path) ->
 
 def test_fewer_pictures_than_there_are_leave_whole_groups_and_say_so(out: Path) -> None:
     results, pictures = ledger_results(out, 8)
-    shown = {(cell["scene"], cell["exposure"], cell["level"]) for cell in results["cells"] if cell["picture"]}
+    found = [cell.first for cell in results.cells if cell.picture]
+    levels = {"1cd/m2": 0, "25cd/m2": 1}
+    shown = {(row.scene, row.exposure, levels[row.level]) for row in found if row}
     # Eight pictures are four conditions of two cameras: of the four groups of two levels the first and the third.
     assert shown == {(name, "auto", level) for name in FILES for level in (0, 1)}
     assert len(pictures) == 8 + 2, "and each scene's truth"
-    assert results["pictures_left_out"].startswith("To keep the page small, pictures of 4 of 8 conditions are in it")
+    assert results.pictures_left_out.startswith("To keep the page small, pictures of 4 of 8 conditions are in it")
     page = render_report(results, pictures)
     assert page.count("data-cell=") == 8
-    assert results["pictures_left_out"] in page
+    assert results.pictures_left_out in page
     assert len(json.loads(page.split('id="data">')[1].split("</script>")[0])["cells"]) == 16
 
 
@@ -125,14 +143,32 @@ def test_cells_not_made_yet_are_dashes_and_the_page_says_how_many(out: Path, tmp
         base.execute("DELETE FROM cells WHERE scene = ?", (FILES[1],))
         base.execute("DELETE FROM cells WHERE seed = 1 AND level = '1cd/m2' AND processor = 'bayer'")
     results, pictures = ledger_results(part)
-    assert results["notes"] == ["18 of 32 cells are not made yet: rodcone sweep goes on with them."]
-    found = {(cell["scene"], cell["exposure"], cell["level"], cell["camera"]): cell for cell in ordered_cells(results)}
-    assert found[FILES[0], "auto", 0, "bayer"]["psnr_db"] is None
-    assert found[FILES[0], "auto", 1, "bayer"]["psnr_db"] is not None
-    assert found[FILES[1], "auto", 1, "bayer"]["picture"] is None
+    assert results.notes == ("18 of 32 cells are not made yet: rodcone sweep goes on with them.",)
+    places = product(FILES, ("auto", "2ms"), (0, 1), ("interleaved", "bayer"))
+    found = dict(zip(places, results.cells, strict=True))
+    assert found[FILES[0], "auto", 0, "bayer"].figures["psnr_db"] is None
+    assert found[FILES[0], "auto", 1, "bayer"].figures["psnr_db"] is not None
+    assert found[FILES[1], "auto", 1, "bayer"].picture is None
     page = render_report(results, pictures)
-    assert results["notes"][0] in page
+    assert results.notes[0] in page
     assert re.search(r"\b(nan|None)\b", unescape(re.sub(r"base64,[^\"]*", "", page))) is None
+
+
+def test_a_machine_on_which_neither_llvm_nor_cuda_answered_is_told() -> None:
+    made = [SAMPLE.row("bayer", 0, versions=json.dumps({"llvm": llvm, **cuda})) for llvm, cuda in (
+        ("23.1", {}), ("none", {"cuda": "12.8"}), ("none", {}))]  # fmt: skip
+    assert fallbacks(made[:2]) == []
+    (note,) = fallbacks(made)
+    assert all(part in note for part in ("LLVM", "CUDA", "scalar_spectral", "captures", "reconstruction", "NumPy"))
+
+
+def test_a_sensor_whose_file_is_gone_is_said_to_be() -> None:
+    gone = sensor_of("gone.toml")
+    assert gone == ReportSensor("gone.toml", None)
+    report = REPORTS.sample_report(levels=1)
+    pictures = REPORTS.sample_pictures(report)
+    report = replace(report, sensors=(gone, *report.sensors[1:]))
+    assert "<p>Its file is no longer there.</p>" in render_report(report, pictures)
 
 
 def test_what_is_no_sweep_or_has_lost_a_picture_is_one_line(out: Path, tmp_path: Path) -> None:

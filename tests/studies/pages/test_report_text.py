@@ -1,52 +1,47 @@
 """The report's parts: numbers as text, sentences, and the charts' geometry."""
 
-from copy import deepcopy
-
 import pytest
 
 from studies.pages import report_text as text
-from studies.pages.charts import Line, Scale, band_path, line_chart, linear_ticks, spread
+from studies.pages.charts import ChartLine, Scale, band_path, line_chart, linear_ticks, spread
+from studies.pages.report_data import ReportCell
+
+
+def cell(
+    camera: str, interval: tuple[float, float] | None = None, key: str = "psnr_db", **figures: float
+) -> ReportCell:
+    """A cell of which nothing else is known."""
+    known = {"psnr_db": interval} if interval else {}
+    return ReportCell("s", 0, camera, None, None, None, figures, known, None, {}, None)
 
 
 def test_leads_are_judged_on_printed_numbers() -> None:
-    near = [{"camera": "a", "psnr_db": 20.01}, {"camera": "b", "psnr_db": 20.04}]
+    near = [cell("a", psnr_db=20.01), cell("b", psnr_db=20.04)]
     assert text.leader(text.PSNR, near) == (None, 0.0)
-    apart = [{"camera": "a", "delta_e_median": 3.0}, {"camera": "b", "delta_e_median": 2.0}]
+    apart = [cell("a", delta_e_median=3.0), cell("b", delta_e_median=2.0)]
     assert text.leader(text.DELTA_E, apart) == (apart[1], 1.0)
 
 
-def test_monte_carlo_share_is_judged_against_the_aim() -> None:
-    names = ["dark", "light"]
-    low = [{"level": 0, "group": "s", "camera": "bayer", "mc_share": 0.03}]
-    high = [*deepcopy(low), {"level": 1, "group": "s", "camera": "bayer", "mc_share": 0.052}]
-    assert "all 1 pictures keep" in text.share_sentence(names, low)
-    said = text.share_sentence(names, high).replace("\N{NO-BREAK SPACE}", " ")
-    assert said.startswith(
-        "The largest Monte Carlo share is 5.2 % (light, s, Bayer): 1 of 2 pictures miss the 3 % aim."
-    )
-
-
 def test_no_camera_leads_where_intervals_overlap() -> None:
-    ahead = {"camera": "a", "psnr_db": 21.0, "intervals": {"psnr_db": (20.4, 21.6)}}
-    near = {"camera": "b", "psnr_db": 20.0, "intervals": {"psnr_db": (19.5, 20.5)}}
-    apart = {"camera": "b", "psnr_db": 20.0, "intervals": {"psnr_db": (19.7, 20.3)}}
+    ahead = cell("a", (20.4, 21.6), psnr_db=21.0)
+    near, apart = cell("b", (19.5, 20.5), psnr_db=20.0), cell("b", (19.7, 20.3), psnr_db=20.0)
     assert text.leader(text.PSNR, [near, ahead]) == (None, 0.0)
     assert text.leader(text.PSNR, [apart, ahead]) == (ahead, 1.0)
     assert text.metric_text(text.PSNR, apart).replace("\N{NO-BREAK SPACE}", " ") == "20.0 ± 0.3 dB"
 
 
 def test_substitution_of_some_seeds_is_told_apart() -> None:
-    cells = [[{"camera": "a", "substitution": share, "balance": None}] for share in (1.0, 0.25, 0.0)]
-    for (cell,) in cells:
-        cell |= {"psnr_db": None, "ssim": None, "delta_e_median": None}
-    said = text.sensor_sentences(["dark", "dim", "light"], cells)[-1]
-    assert said == "Luminance substitution (a): on at dark, on for some seeds at dim, off elsewhere."
     assert [text.substitution_text(share) for share in (None, True, 0.25, 0.0)] == [
         "not applicable",
         "on",
         "on for 25\N{NO-BREAK SPACE}% of the seeds",
         "off",
     ]
+
+
+@pytest.mark.parametrize(("level", "words"), [("0.036cd/m2", "0.036 cd/m²"), ("500lux", "500 lux")])
+def test_levels_are_written_as_prose_does(level: str, words: str) -> None:
+    assert text.level_text(level).replace("\N{NO-BREAK SPACE}", " ") == words
 
 
 @pytest.mark.parametrize(
@@ -72,7 +67,7 @@ def test_times_choose_their_unit() -> None:
 
 
 def test_chart_keeps_order_scale_and_gaps() -> None:
-    line = Line("a", [3.0, None, 1.0, 2.0], ["", "", "", ""])
+    line = ChartLine("a", [3.0, None, 1.0, 2.0], ["", "", "", ""])
     chart = line_chart("t", "d", [1000.0, 100.0, 1.0, 10.0], [line])
     points = chart.series[0].points
     assert [point.x for point in points] == sorted(point.x for point in points)
@@ -87,7 +82,7 @@ def test_chart_keeps_order_scale_and_gaps() -> None:
 def test_band_outlines_each_run_of_intervals() -> None:
     scale = Scale(0.0, 10.0, 100.0, 0.0)
     assert band_path([1, 2, 3, 4], [(1, 2), (3, 5), None, (4, 6)], scale) == "M1 80L2 50L2 70L1 90Z M4 40L4 60Z"
-    chart = line_chart("t", "d", [1.0, 10.0], [Line("a", [5.0, 5.0], ["", ""], [(-3.0, 13.0), (4.0, 6.0)])])
+    chart = line_chart("t", "d", [1.0, 10.0], [ChartLine("a", [5.0, 5.0], ["", ""], [(-3.0, 13.0), (4.0, 6.0)])])
     ticks = [float(tick.text.replace("\N{MINUS SIGN}", "-")) for tick in chart.y_ticks]
     assert ticks[0] <= -3.0 <= 13.0 <= ticks[-1], "the axis holds the band"
     assert chart.series[0].band.startswith("M")

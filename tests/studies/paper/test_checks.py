@@ -7,7 +7,7 @@ import pytest
 
 from rodcone.errors import InputError
 from studies.paper.bilateral import filter_claims
-from studies.paper.checks import Check, Claim, about, at_least, at_most, near
+from studies.paper.checks import Claim, ClaimCheck, about, at_least, at_most, near
 from studies.paper.figure1a import claims_1a
 from studies.paper.figure1b import claims_1b
 from studies.paper.figure2 import Gain, signal_claims, signal_ratios, snr_claims
@@ -22,7 +22,7 @@ PIXEL, OUTPUT = "table1_pixel", "table1_output"
 
 
 def claim(*values: float) -> Claim:
-    return Claim("", "", tuple(Check(str(place), value, 1.0, 2.0) for place, value in enumerate(values)))
+    return Claim("", "", tuple(ClaimCheck(str(place), value, 1.0, 2.0) for place, value in enumerate(values)))
 
 
 def test_verdict_is_all_some_or_none_of_the_checks() -> None:
@@ -33,7 +33,7 @@ def test_verdict_is_all_some_or_none_of_the_checks() -> None:
 
 @pytest.mark.parametrize("value", [nan, inf, -inf])
 def test_what_is_not_finite_never_holds(value: float) -> None:
-    assert not Check("", value, -inf, inf).holds
+    assert not ClaimCheck("", value, -inf, inf).holds
 
 
 def test_kinds_of_checks_hold_at_their_ends_and_not_beyond() -> None:

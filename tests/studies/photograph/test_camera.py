@@ -1,5 +1,7 @@
 """A photograph with every processor: on a known grey and on colours, all show the scene's own numbers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,10 +11,14 @@ from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.colour_spaces import encode_srgb
 from scenes.reflectances import color_checker
+from sensor.capture import expose
+from sensor.device import draw_device
 from sensor.optics import form_image
+from sensor.presets import low_noise
 from sensor.response import expected_electrons
+from sensor.variations import vary
 from studies.metrics.truth import light_in_bands, true_srgb
-from studies.photograph.camera import build_camera, photograph
+from studies.photograph.camera import colour_fit, develop_to_scale
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
@@ -30,16 +36,24 @@ def chart(reflectances: np.ndarray) -> SpectralRadiance:
     return SpectralRadiance(values, NM)
 
 
-def patches(name: str, radiance: SpectralRadiance) -> tuple[np.ndarray, np.ndarray]:
+def patches(name: str, radiance: SpectralRadiance, view_deg: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Mean colour of each patch as the camera shows it, and the right one, (4, 6, 3), encoded."""
-    camera = build_camera(name, "low_noise", LIGHT, radiance.shape, np.random.default_rng(0))
-    expected = expected_electrons(form_image(radiance, camera.sensor), camera.sensor, EXPOSURE_S)
+    processor = PROCESSORS[name]
+    sensor = vary(low_noise(), processor.mosaic)
+    if view_deg:
+        sensor = replace(sensor, lens=replace(sensor.lens, horizontal_view_deg=view_deg))
+    device = draw_device(sensor, radiance.shape, np.random.default_rng(0))
+    expected = expected_electrons(form_image(radiance, sensor), sensor, EXPOSURE_S)
+    raw = expose(expected, sensor, EXPOSURE_S, device, np.random.default_rng(1), exact=True)
+    assert not raw.saturated.any()
+    colours = colour_fit(sensor, processor, LIGHT)
+    linear, picture = develop_to_scale(raw, processor, colours, sensor, LIGHT, 100.0)
+    assert picture.rgb.shape == linear.shape
     truth = encode_srgb(true_srgb(radiance, LIGHT, 100.0))
-    shot = photograph(camera, expected, truth, LIGHT, 100.0, EXPOSURE_S, np.random.default_rng(1))
-    assert not shot.raw.saturated.any()
     inside = slice(4, -4)
     shown, right = (
-        picture.reshape(4, SIDE, 6, SIDE, 3).swapaxes(1, 2)[:, :, inside, inside] for picture in (shot.encoded, truth)
+        picture.reshape(4, SIDE, 6, SIDE, 3).swapaxes(1, 2)[:, :, inside, inside]
+        for picture in (encode_srgb(linear), truth)
     )
     return shown.mean((2, 3)), right.mean((2, 3))
 
@@ -58,6 +72,15 @@ def test_every_camera_shows_greys_at_their_own_level(name: str) -> None:
     # times 2 in the matrix of R, G and B or 4 in that of C, Y and M, and 3.5 sigma for the largest of 72: 15 %. On
     # average over the greys a fifth of it. A unit mixed up, such as green's for yellow's, would be 20 % everywhere.
     assert np.abs(shown / right - 1).max() < 0.15
+    assert np.abs(shown / right - 1).mean() < 0.02
+
+
+@pytest.mark.parametrize("name", ["interleaved", "bayer"])
+def test_the_falloff_that_a_lens_is_known_to_have_is_corrected(name: str) -> None:
+    """At 60 degrees the corners get less than half of the light: cos^4 of 35 degrees is 0.45."""
+    greys = np.full((4, 6, NM.size), 0.5)
+    shown, right = patches(name, chart(greys), view_deg=60.0)
+    assert np.abs(shown / right - 1).max() < 0.15  # as above
     assert np.abs(shown / right - 1).mean() < 0.02
 
 

@@ -18,13 +18,13 @@ import sweep_sample as SAMPLE
 
 from isp.processors.catalogue import PROCESSORS
 from rodcone.jit import backend
-from studies.commands.demo import Demo, run
 from studies.pages.report_sweep import ledger_results
-from studies.photograph import camera, clock
+from studies.photograph import clock
 from studies.photograph.clock import FIRST, OTHER, Clock, timed
 from studies.sweep import run_cell as cell_run
 from studies.sweep.cells import Cell
 from studies.sweep.export import read_rows
+from studies.sweep.results import results_json
 from studies.sweep.row import Row
 
 
@@ -55,10 +55,9 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Work:
     monkeypatch.setattr(clock, "time", SimpleNamespace(perf_counter=made.now))
     monkeypatch.setattr(clock, "_CALLED", set())
     slow = {name: replace(one, picture=made.taking(name, 10.0, one.picture)) for name, one in PROCESSORS.items()}
-    for module in (cell_run, camera):
-        monkeypatch.setattr(module, "PROCESSORS", slow)
-        monkeypatch.setattr(module, "read_out", made.taking("capture", 1.0, module.read_out))
-        monkeypatch.setattr(module, "measure", made.taking("measure", 100.0, module.measure))
+    monkeypatch.setattr(cell_run, "PROCESSORS", slow)
+    monkeypatch.setattr(cell_run, "expose", made.taking("capture", 1.0, cell_run.expose))
+    monkeypatch.setattr(cell_run, "measure", made.taking("measure", 100.0, cell_run.measure))
     return made
 
 
@@ -108,7 +107,7 @@ def test_the_reports_stages_add_up_to_the_runs_wall_clock(workers: int, work: Wo
     with pytest.raises(KeyboardInterrupt):
         SAMPLE.swept(study, out, ended)
     assert SAMPLE.swept(study, out, labelled).made == 2
-    stages = {stage["name"]: stage["seconds"] for stage in ledger_results(out)[0]["stages"]}
+    stages = ledger_results(out)[0].stages
     assert sum(stages.values()) == pytest.approx(work.now() - start)
     own = {"captures": 4 * 1.0, "develop bayer": 4 * 10.0, "metrics": 4 * 100.0}
     own |= {FIRST: work.now() - start - sum(own.values())}
@@ -122,31 +121,31 @@ def test_a_render_counts_once_however_many_cells_share_it(
 ) -> None:
     module = sys.modules["studies.sweep.prepare"]
     make = work.taking("render", 7.0, module.make_transport)
-    monkeypatch.setattr(module, "make_transport", lambda *given: replace(make(*given), seconds=7.0))
+
+    def slow(*given: Any) -> Any:
+        transport, notes = make(*given)
+        return replace(transport, seconds=7.0), notes
+
+    monkeypatch.setattr(module, "make_transport", slow)
     SAMPLE.swept(SAMPLE.small_study(tmp_path), tmp_path / "out")
-    stages = {stage["name"]: stage["seconds"] for stage in ledger_results(tmp_path / "out")[0]["stages"]}
+    stages = ledger_results(tmp_path / "out")[0].stages
     assert work.of("render") == stages["renders"] == 7.0
     assert [row.render_s for row in read_rows(tmp_path / "out")] == [7.0] * 4, "of the render that they share"
     assert sum(stages.values()) == pytest.approx(sum(seconds for _, seconds in work.done))
 
 
-def test_the_demos_stages_add_up_and_its_cells_name_their_engines(work: Work, tmp_path: Path) -> None:
-    SAMPLE.picture(tmp_path / "scene.exr")
+def test_the_results_stages_are_the_runs_and_their_rows_name_their_engines(work: Work, tmp_path: Path) -> None:
+    study = SAMPLE.small_study(tmp_path, processors=("interleaved", "bayer"), seeds=(0,))
     start = work.now()
-    demo = Demo(scene=str(tmp_path / "scene.exr"), sensors=("low_noise",), levels=("1cd/m2", "25cd/m2"))
-    results = run(demo).results
-    stages = {stage["name"]: stage["seconds"] for stage in results["stages"]}
-    assert sum(stages.values()) == pytest.approx(work.now() - start)
-    assert stages["capture"] == 4 * 1.0
-    assert (stages["develop interleaved"], stages["develop bayer"], stages["metrics"]) == (20.0, 20.0, 400.0)
-    assert stages[FIRST] == pytest.approx(work.now() - start - 444.0)
-    assert [cell["seconds"] for cell in results["cells"]] == 4 * [{"capture": 1.0, "develop": 10.0, "measure": 100.0}]
-    engines = {cell["camera"]: cell["engines"] for cell in results["cells"]}
-    assert engines == {
-        "interleaved": {"capture": "numpy", "develop": backend()},
-        "bayer": {"capture": "numpy", "develop": "numpy"},
-    }
-    assert results["environment"]["engine of captures"] == "numpy"
+    SAMPLE.swept(study, tmp_path / "out")
+    results = json.loads(results_json(tmp_path / "out"))
+    assert sum(results["stages"].values()) == pytest.approx(work.now() - start)
+    assert results["stages"]["captures"] == 4 * 1.0
+    assert (results["stages"]["develop interleaved"], results["stages"]["develop bayer"]) == (20.0, 20.0)
+    seconds = [(row["capture_s"], row["develop_s"], row["measure_s"]) for row in results["rows"]]
+    assert seconds == [(1.0, 10.0, 100.0)] * 4
+    engines = {row["processor"]: (row["readout_engine"], row["development_engine"]) for row in results["rows"]}
+    assert engines == {"interleaved": ("numpy", backend()), "bayer": ("numpy", "numpy")}
 
 
 COMPILED = """

@@ -69,6 +69,7 @@ def test_auto_exposure_needs_a_green_in_the_presets_own_mosaic(tmp_path: Path) -
         ({"longest_exposure_s": 0.0}, "longest_exposure_s"),
         ({"render": replace(STUDY.render, spp=0)}, "render.spp"),
         ({"render": replace(STUDY.render, size=8)}, "render.size"),
+        ({"render": replace(STUDY.render, noise_share=0.0)}, "render.noise_share"),
         ({"lens": replace(STUDY.lens, veiling_glare=2.0)}, "lens.veiling_glare"),
         ({"budget": replace(STUDY.budget, monte_carlo=0.2)}, "within budget.total"),
     ],

@@ -72,7 +72,7 @@ def test_a_number_of_seeds_counts_from_0_and_a_list_names_them(
     [
         (["lvels=3"], "key: 'lvels' is unknown; allowed: budget, exposures"),
         (["lvels=3"], "did you mean 'levels'?"),
-        (["render.ssp=3"], "render: key: 'ssp' is unknown; allowed: band_nm, max_seconds, range_nm, seed, size, spp"),
+        (["render.ssp=3"], "render: key: 'ssp' is unknown; allowed: band_nm, max_seconds, noise_share, range_nm, seed"),
         (['scenes=[{sorce="x"}]'], "did you mean 'source'?"),
         (["seeds=[true]"], "seeds: True is not a whole number"),
         (['seeds=["1"]'], "seeds: '1' is not a whole number"),

@@ -10,10 +10,11 @@ import pytest
 from sweep_sample import ROW
 
 from rodcone.errors import InputError
+from studies.study.lit_scene import RenderFacts
+from studies.sweep.cells import RenderRecord
 from studies.sweep.database import (
     FILE,
     VERSION,
-    RenderRecord,
     add,
     done,
     forget_old,
@@ -74,13 +75,14 @@ def test_what_the_last_run_wants_takes_the_place_of_the_ones_before(tmp_path: Pa
 
 
 def test_renders_and_runs_are_noted(tmp_path: Path) -> None:
-    record = RenderRecord("content", "llvm_ad_spectral", 64, 20, 1.5)
+    facts = RenderFacts("dense", "llvm_ad_spectral", 1.5, 64, 8, "samples", 0.01, None, 20, 390.0, 770.0, 20.0)
+    record = RenderRecord("content", facts, 0.02, ("assumed",))
     with open_ledger(tmp_path) as base:
         assert render_record(base, "request") is None
-        note_render(base, "request", RenderRecord("coarser", "llvm_ad_spectral", 16, 20, 0.5))
+        note_render(base, "request", replace(record, content="coarser"))
         note_render(base, "request", record)
         assert render_record(base, "request") == record
-        base.execute("UPDATE renders SET spp = 65")
+        base.execute("UPDATE renders SET record = replace(record, '64', '65')")
         assert render_record(base, "request") is None, "it isn't what was written"
 
 

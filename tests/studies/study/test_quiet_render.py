@@ -12,9 +12,9 @@ from render.scene import LightGroup
 from scenes.catalog import load
 from sensor.presets import low_noise, table1_output
 from sensor.readout import noise_variance
-from studies.budget import quiet_render
-from studies.budget.budget import MOST_SHARE, OF_PIXELS, pixel_share
-from studies.budget.quiet_render import render_quietly
+from studies.budget.budget import MOST_SHARE, OF_PIXELS, render_share
+from studies.study import quiet_render
+from studies.study.quiet_render import render_quietly
 
 NM, WIDTH_NM = np.arange(405.0, 780.0, 50.0), np.full(8, 50.0)
 LONGEST_S = 0.066
@@ -38,15 +38,15 @@ def grey(relative_error, size=(8, 10), **changes):
 def test_an_even_picture_has_the_share_of_its_fullest_pixels(sensor):
     # Auto exposure brings an even grey to 80 % of the well in its brightest channel that doesn't saturate; a channel of
     # n electrons has Monte Carlo variance (error n)^2, and the share grows with n.
-    share = pixel_share(grey(0.01), sensor, 1e5, LONGEST_S)
+    share = render_share(grey(0.01), sensor, 1e5, LONGEST_S)
     most = sensor.pixel.full_well_e
     bound = (0.01 * most) ** 2 / noise_variance(np.array(most), sensor, 1e-3)
     assert 0.2 * bound < share < bound
-    assert pixel_share(grey(0.02), sensor, 1e5, LONGEST_S) == pytest.approx(4 * share, rel=1e-4)
+    assert render_share(grey(0.02), sensor, 1e5, LONGEST_S) == pytest.approx(4 * share, rel=1e-4)
 
 
 def test_in_the_dark_read_noise_hides_the_render():
-    bright, dark = (pixel_share(grey(0.01), table1_output(), level, LONGEST_S) for level in (1e4, 1e-3))
+    bright, dark = (render_share(grey(0.01), table1_output(), level, LONGEST_S) for level in (1e4, 1e-3))
     assert dark < 1e-4 * bright
 
 
@@ -56,10 +56,10 @@ def test_the_share_is_of_the_noisiest_pixels_but_a_twentieth():
     few = grey(0.01, size=(8, 100))
     some = few.variance.copy()
     some[:, :, :, 0] *= 1e4
-    assert pixel_share(replace(few, variance=some), low_noise(), 100.0, LONGEST_S) == pytest.approx(
-        pixel_share(few, low_noise(), 100.0, LONGEST_S), rel=1e-3
+    assert render_share(replace(few, variance=some), low_noise(), 100.0, LONGEST_S) == pytest.approx(
+        render_share(few, low_noise(), 100.0, LONGEST_S), rel=1e-3
     )
-    assert pixel_share(grey(0.01, variance=variance), low_noise(), 100.0, LONGEST_S) > 100 * pixel_share(
+    assert render_share(grey(0.01, variance=variance), low_noise(), 100.0, LONGEST_S) > 100 * render_share(
         grey(0.01), low_noise(), 100.0, LONGEST_S
     )
     assert OF_PIXELS == 0.95
@@ -79,7 +79,8 @@ def calls(monkeypatch):
 
 
 def quietly(share_at_128, max_spp=100_000):
-    return render_quietly(None, (8, 10), lambda made: share_at_128 * 128 / made.spp, max_spp=max_spp, max_seconds=9.0)
+    limits = {"most_share": MOST_SHARE, "max_seconds": 9.0}
+    return render_quietly(None, (8, 10), lambda made: share_at_128 * 128 / made.spp, **limits, max_spp=max_spp)
 
 
 def test_a_quiet_render_is_left_as_it_is(calls):
@@ -106,9 +107,10 @@ def test_the_caps_stop_it(calls):
 
 def test_a_real_render_reaches_the_share_it_is_asked_for():
     scene = load("cornell_box")
-    share = lambda made: pixel_share(made, table1_output(), 0.1, LONGEST_S)  # noqa: E731
+    share = lambda made: render_share(made, table1_output(), 0.1, LONGEST_S)  # noqa: E731
     bands = {"wavelength_nm": np.arange(405.0, 780.0, 50.0), "seed": 3}
-    made = render_quietly(scene, (8, 8), share, max_spp=1024, max_seconds=60.0, **bands)
+    limits = {"most_share": MOST_SHARE, "max_spp": 1024, "max_seconds": 60.0}
+    made = render_quietly(scene, (8, 8), share, **limits, **bands)
     assert share(made) <= MOST_SHARE
     assert made.spp > 128
     once = render(scene, (8, 8), max_spp=made.spp, **bands)

@@ -8,7 +8,6 @@ import numpy as np
 from render.engine import render
 from render.scene import Scene
 from render.transport import Transport
-from studies.budget.budget import MOST_SHARE
 
 FIRST_SPP = 128  # in eight passes: enough to tell how many more it takes
 MARGIN = 1.05  # on samples that the share so far asks for: it is an estimate
@@ -20,18 +19,22 @@ def render_quietly(
     size: tuple[int, int],
     share: Callable[[Transport], float],
     *,
+    most_share: float,
     max_spp: int,
-    max_seconds: float,
+    max_seconds: float | None,
     **options: Any,
 ) -> Transport:
-    """Render until `share` is `MOST_SHARE` or less, or samples or time are used up; the passes made are kept.
+    """Render until `share` is `most_share` or less, or samples or time are used up; the passes made are kept.
 
     Parameters
     ----------
     share : callable
-        The render's noise variance over the sensor's own, such as `pixel_share`.
-    max_spp, max_seconds : int, float
-        The cap.
+        The render's noise variance over the sensor's own, such as `studies.budget.budget.render_share`.
+    most_share : float
+    max_spp : int
+        Samples a pixel, at most.
+    max_seconds : float or None
+        Time, at most.
     **options
         Of `render.engine.render`: bands, seed, cache, progress.
     """
@@ -39,6 +42,6 @@ def render_quietly(
     while True:
         made = render(scene, size, max_spp=wanted, max_seconds=max_seconds, resume=made, **options)
         now = share(made)
-        if now <= MOST_SHARE or made.stopped_by != "samples" or made.spp >= max_spp:
+        if now <= most_share or made.stopped_by != "samples" or made.spp >= max_spp:
             return made
-        wanted = min(max_spp, int(np.ceil(made.spp * min(MARGIN * now / MOST_SHARE, MOST_GROWTH))))
+        wanted = min(max_spp, int(np.ceil(made.spp * min(MARGIN * now / most_share, MOST_GROWTH))))

@@ -1,0 +1,32 @@
+"""Pages from the templates beside this module: everything that is put into them is escaped."""
+
+from base64 import b64encode
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
+
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+def address(kind: str, picture: bytes) -> str:
+    """Return a picture as a ``data:`` address; `kind` is ``png`` or ``svg+xml``."""
+    return f"data:image/{kind};base64,{b64encode(picture).decode('ascii')}"
+
+
+def own_file(name: str) -> Markup:
+    """Return a style or script of this package, which is never input and goes into a page as it is."""
+    return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
+
+
+def write_out(name: str, **values: Any) -> str:
+    """Return a template with its values put in; a name that has none is an error."""
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(name).render(**values)

@@ -1,0 +1,77 @@
+"""The last run of a sweep as files: its rows as JSON, and an overview of its pictures."""
+
+import json
+from dataclasses import asdict
+from importlib import metadata
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+from studies.sweep.database import last_study, read_ledger, rows
+from studies.sweep.prepare import PICTURES
+from studies.sweep.row import Row
+from studies.sweep.stored import read_whole
+
+GAP = 4  # pixels between the pictures of a sheet
+_JSON_COLUMNS = ("render", "lens", "balance", "mean_electrons", "versions")
+
+
+def results_json(folder: Path) -> bytes:
+    """Study, seconds by stage and rows of a sweep's last run, as a JSON file.
+
+    A row has the columns of the ledger (`studies.sweep.row.Row`), those that are JSON as objects; a number that isn't
+    finite is null.
+    """
+    study, stages, found = _last_run(folder)
+    results = {
+        "rodcone": metadata.version("rodcone"),
+        "study": study,
+        "stages": stages,
+        "rows": [_as_json(row) for row in found],
+    }
+    return (json.dumps(results, indent=1, allow_nan=False) + "\n").encode()
+
+
+def overview(folder: Path) -> bytes:
+    """PNG of the pictures of a sweep's first scene, spectrum, exposure and seed.
+
+    A column for each level, a row for each sensor and processor; what isn't made yet is left white.
+    """
+    study, _, found = _last_run(folder)
+    first = found[0]
+    shown = {
+        (row.sensor, row.processor, row.level): row.picture
+        for row in found
+        if (row.scene, row.spectrum, row.exposure, row.seed)
+        == (first.scene, first.spectrum, first.exposure, first.seed)
+    }
+    lines = list(dict.fromkeys((sensor, processor) for sensor, processor, _ in shown))
+    with Image.open(BytesIO(read_whole(folder / PICTURES, first.picture))) as picture:
+        width, height = picture.width + GAP, picture.height + GAP
+    sheet = Image.new("RGB", (len(study["levels"]) * width - GAP, len(lines) * height - GAP), "white")
+    for (sensor, processor, level), name in shown.items():
+        with Image.open(BytesIO(read_whole(folder / PICTURES, name))) as picture:
+            sheet.paste(picture, (study["levels"].index(level) * width, lines.index((sensor, processor)) * height))
+    file = BytesIO()
+    sheet.save(file, "PNG")
+    return file.getvalue()
+
+
+def _last_run(folder: Path) -> tuple[dict[str, Any], dict[str, float], list[Row]]:
+    with read_ledger(folder) as base:
+        found, run = rows(base), last_study(base)
+    if run is None or not found:
+        raise AssertionError(f"{folder} holds no run of which a report was just made")
+    return *run, found
+
+
+def _as_json(row: Row) -> dict[str, Any]:
+    """Row as JSON takes it."""
+    values = {name: _finite(value) for name, value in asdict(row).items()}
+    return values | {name: json.loads(values[name]) for name in _JSON_COLUMNS}
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not abs(value) < float("inf") else value
