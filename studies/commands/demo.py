@@ -57,7 +57,7 @@ def demo(
     seed
         Seed of the render, the chips and the exposures.
     light
-        Light of the scene by name, such as A; for a file the light whose white is neutral in its pictures (D65 by default).
+        Light of the scene by name, such as A; for a file the light that is shown as neutral (D65 by default).
     force
         Run even where more memory is needed than is free.
     """
