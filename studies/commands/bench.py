@@ -62,7 +62,7 @@ def bench(
         raise InputError(f"level: {level!r} is not allowed; give a mean luminance such as 25cd/m2")
     for name, side in (("size", size), ("picture", picture)):
         require_whole(name, side, 16, 4096, "give pixels")
-    task = Bench(scene, sensor, luminance_cd_m2, size, picture, seed=seed)
+    task = Bench(scene=scene, sensor=sensor, level_cd_m2=luminance_cd_m2, size=size, picture=picture, seed=seed)
     task = more(task) if full else task
     work = stages(task, load(scene), preset(sensor))
     out.mkdir(parents=True, exist_ok=True)

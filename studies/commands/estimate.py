@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from rodcone.memory import file_extent, memory
 from studies.budget.model_plan import Plan
@@ -23,9 +22,9 @@ class Estimate:
     Attributes
     ----------
     cells, kept, renders, workers : int
-        `kept` cells stand in the ledger from an earlier run; `renders` counts scenes, files of radiance left out.
+        `kept` cells are in the ledger from an earlier run; `renders` counts scenes, not files of radiance.
     seconds : float
-        With so many workers, renders done before or `kept` cells not taken off.
+        With so many workers; renders and cells that exist already are counted too.
     bytes : float
         Memory of all processes together, at most.
     largest_bytes : float
@@ -59,8 +58,3 @@ def estimate(study: Study, plan: Plan, scenes: Mapping[SceneChoice, OpenedScene]
     renders = sum(opened.scene is not None for opened in scenes.values())
     total, largest = max(need.total for need in needs), max(need.largest for need in needs)
     return Estimate(cells, kept, renders, workers, seconds, total, largest)
-
-
-def as_facts(found: Estimate) -> dict[str, Any]:
-    """Estimate as JSON holds it."""
-    return dict(vars(found))

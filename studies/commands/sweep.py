@@ -20,7 +20,7 @@ from studies.budget.model_plan import as_stated as plan_as_stated
 from studies.budget.plan import plan as plan_study
 from studies.budget.plan import reference_plan
 from studies.commands.console import INTERRUPTED, Flag, Out, Several, say
-from studies.commands.estimate import Estimate, as_facts, estimate
+from studies.commands.estimate import Estimate, estimate
 from studies.commands.report import write_results
 from studies.photograph.clock import Clock
 from studies.study.lit_scene import open_all
@@ -92,18 +92,12 @@ def sweep(
         require_whole("workers", workers, 1, MOST_WORKERS, "give processes")
     if dry_run:
         found = _estimated(task, out, reference, workers or cores())
-        print(notation.dumps(as_facts(found)) if json else _words(found))
+        print(notation.dumps(vars(found)) if json else _words(found))
         return 0
     check_memory(task, out, reference=reference, workers=0 if cluster else workers or cores(), force=force)
-    with _saying_what_is_kept(out), nullcontext(_local(workers)) if cluster is None else on_cluster(cluster) as runner:
-        swept, report = make_all(
-            task,
-            out,
-            lambda step: _plan(task, out, reference, as_stated, step),
-            runner,
-            keep_old=keep_old,
-            clock=clock,
-        )
+    with nullcontext(_local(workers)) if cluster is None else on_cluster(cluster) as runner:
+        planned = partial(_plan, task, out, reference, as_stated)
+        swept, report = make_all(task, out, planned, runner, keep_old=keep_old, clock=clock)
     say(f"its report is {report}")
     print(notation.dumps(_facts(swept) | {"report": str(report)}) if json else swept.out / FILE)
     return 0
@@ -145,8 +139,9 @@ def make_all(
         with clock.stage("plan"):
             plan = planned(step)
         swept = run_sweep(study, out, plan, runner, step, keep_old=keep_old, clock=clock)
+        report = write_results(out)
     say(*swept.notes)
-    return swept, write_results(out)
+    return swept, report
 
 
 def export(
