@@ -105,7 +105,10 @@ def api_page() -> str:
 
 def package_page(package: str) -> str:
     """List of a package's modules, a line each."""
-    rows = [f"| [`{name}`]({name}.md) | {summary(ROOT.joinpath(package, *name.split('.')).with_suffix('.py'))} |" for name in modules(package)]
+    rows = [
+        f"| [`{name}`]({name}.md) | {summary(ROOT.joinpath(package, *name.split('.')).with_suffix('.py'))} |"
+        for name in modules(package)
+    ]
     text = summary(ROOT / package / "__init__.py")
     return f"# {package}\n\n{text}\n\n| module | what |\n|---|---|\n" + "\n".join(rows)
 

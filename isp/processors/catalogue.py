@@ -93,6 +93,11 @@ def _processors() -> dict[str, Processor]:
 PROCESSORS: Mapping[str, Processor] = MappingProxyType(_processors())
 
 
+def names() -> tuple[str, ...]:
+    """Names of all processors, installed or not."""
+    return tuple(PROCESSORS)
+
+
 def libraries(name: str) -> tuple[str, ...]:
     """Libraries that a processor of `PROCESSORS` needs beside rodcone's own."""
     extra = PROCESSORS[name].extra
