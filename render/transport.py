@@ -103,8 +103,8 @@ class Transport:
         Returns
         -------
         SpectralRadiance
-            float32, each value rounded once from float64. Its `band_error` tells what products of band averages miss,
-            its `relative_level_error` how far the level that was asked for may be off.
+            float32, each value rounded once from float64. Its `relative_level_error` tells how far the level that was
+            asked for may be off; `band_error` what products of band averages miss.
 
         Raises
         ------
@@ -117,14 +117,13 @@ class Transport:
         UserWarning
             Where a light's spectrum ends within the bands at a value other than 0: it gives no light beyond.
         """
-        lights = self._lights(spectra, powers)
-        coefficients, level_error = self._at_level(self._emission(lights), luminance_cd_m2, illuminance_lux)
+        emitted = self._emission(self._lights(spectra, powers))
+        coefficients, level_error = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         return SpectralRadiance(
             values=_view(_combine(coefficients, self.radiance)),
             wavelength_nm=self.wavelength_nm,
             relative_mc_error=relative_error(coefficients, self.radiance, self.variance, shared=self.shared),
             width_nm=self.width_nm,
-            band_error=within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm),
             relative_level_error=level_error,
         )
 
@@ -158,6 +157,17 @@ class Transport:
         if self.shared is None:
             return independent
         return np.asarray(np.maximum(independent + self.shared.term(coefficients, self.variance), np.float32(0)))
+
+    def band_error(
+        self, spectra: Mapping[str, Spectrum | str] | None = None, *, powers: Mapping[str, float] | None = None
+    ) -> Floats:
+        """Error of `relight` where light and transport both vary within a band, shape (band,).
+
+        Relative, RMS over pixels: the product of band averages misses their covariance
+        (`render.error_estimates.within_band_error`).
+        """
+        lights = self._lights(spectra, powers)
+        return within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm)
 
     def level(
         self, spectra: Mapping[str, Spectrum | str] | None = None, *, powers: Mapping[str, float] | None = None

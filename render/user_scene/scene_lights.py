@@ -111,7 +111,7 @@ def _emission(mi: Any, where: str, emitter: Node, parts: Mapping[str, Node]) -> 
     while type_of(value) == "ref":
         value = parts[value["id"]]
     inner = [node["type"] for _, node in walk({"": value} if isinstance(value, dict) else {})]
-    if any(kind not in (*SPECTRA, "rgb", "spectrum") for kind in inner):
+    if any(kind not in (*SPECTRA, "rgb") for kind in inner):
         return None
     try:  # the `constant` emitter: its emission depends on wavelength alone
         probe = mi.load_dict({"type": "constant"} | ({} if value is None else {"radiance": value}))
@@ -122,7 +122,7 @@ def _emission(mi: Any, where: str, emitter: Node, parts: Mapping[str, Node]) -> 
 
 def _stated(value: Any) -> Spectrum | None:
     """Spectrum that states its own points: taken as it is, since a line may lie between those of any grid."""
-    if type_of(value) in ("uniform", "spectrum") and set(value) - {"type", "id"} == {"value"}:
+    if type_of(value) == "uniform" and set(value) - {"type", "id"} == {"value"}:
         return flat(float(value["value"]))
     return table_of(value) if isinstance(value, dict) else None
 

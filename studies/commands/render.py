@@ -157,7 +157,8 @@ def run(order: Order) -> dict[str, Any]:
         )
     radiance = transport.relight(spectra, luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
     write_exr(order.out, radiance, scene=scene.name)
-    return _facts(order, opened, transport, radiance)
+    largest = float(transport.band_error(spectra).max())
+    return _facts(order, opened, transport, radiance) | {"largest_band_error": largest}
 
 
 def _bands(text: str | None) -> tuple[Floats | None, Floats | None]:
@@ -223,7 +224,6 @@ def _facts(order: Order, opened: SceneFile, transport: Transport, radiance: Spec
         **render_facts(transport),
         "relative_mc_error": radiance.relative_mc_error,
         "relative_level_error": radiance.relative_level_error,
-        "largest_band_error": None if radiance.band_error is None else float(np.max(radiance.band_error)),
         "mean_luminance_cd_m2": float(radiance.luminance().mean()),
         "groups": groups,
         "notes": list(opened.notes),
