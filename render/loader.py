@@ -208,7 +208,7 @@ def integrators(film: Film, part_bands: int, unit: Loaded, seed: int, meter: boo
     if backend() == "numpy":
         kind = "path" if meter else "scatteredpath"
         return [mi.load_dict({"type": kind, "max_depth": film.max_depth})]
-    how = {"own_colour": unit.own_colour, "sample_lights": unit.sample_lights, "even_sky": len(unit.groups) > 1}
+    how = {"coloured": unit.own_colour, "sample_lights": unit.sample_lights, "environment": len(unit.groups) > 1}
     offsets, made = band_offsets(seed), []
     for part in parts(film, part_bands):
         padded = np.concatenate([part, np.full(-part.size % LANES, part[-1])])
@@ -219,7 +219,7 @@ def integrators(film: Film, part_bands: int, unit: Loaded, seed: int, meter: boo
         }
         made.append(mi.load_dict({"type": "densepath", "max_depth": film.max_depth, "meter": meter, **how, **bands}))
         if unit.curves:
-            made[-1].prepare(offsets, reflectance_table(unit.curves, centre + width * offsets[:, None]))
+            made[-1].tracer.prepare(offsets, reflectance_table(unit.curves, centre + width * offsets[:, None]))
     return made
 
 
