@@ -109,7 +109,7 @@ class Scene:
         if self.extend:
             object.__setattr__(self, "geometry", _hold(self.geometry, present))
 
-    def is_even_sky(self, group: str) -> bool:
+    def is_environment(self, group: str) -> bool:
         """Whether a group is one light of one spectrum and of the same radiance from all around."""
         lights = self.groups[group]
         kinds = [emitter_paths(self.geometry)[path] for path in lights.emitters]
