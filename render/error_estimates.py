@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.scene import LightGroup
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
+from rodcone.types import Floats, Planes
 
 SAMPLE_PIXELS = 1024  # judged: with 40 bands the median of the error is then sure to about 1 %
 SUB_BANDS = 64  # of a band, over which a light's moments are summed: 0.16 nm in a band of 10 nm
@@ -29,9 +30,9 @@ class SharedPaths:
     """
 
     groups: tuple[int, int]
-    correlation: NDArray[np.float32]
+    correlation: Planes
 
-    def term(self, emitted: Floats, variance: NDArray[np.float32]) -> NDArray[np.float32]:
+    def term(self, emitted: Floats, variance: Planes) -> Planes:
         """Twice the covariance of the two groups' light: what it adds to the variance of the sum, (band, h, w).
 
         Parameters
@@ -46,8 +47,8 @@ class SharedPaths:
 
 def relative_error(
     emitted: Floats,
-    radiance: NDArray[np.float32],
-    variance: NDArray[np.float32],
+    radiance: Planes,
+    variance: Planes,
     factor: float = 1.0,
     shared: SharedPaths | None = None,
 ) -> float:
@@ -82,7 +83,7 @@ def relative_error(
 
 
 def within_band_error(
-    lights: Mapping[str, LightGroup], radiance: NDArray[np.float32], wavelength_nm: Floats, width_nm: Floats
+    lights: Mapping[str, LightGroup], radiance: Planes, wavelength_nm: Floats, width_nm: Floats
 ) -> Floats:
     """Error of the product of band averages, over the radiance, RMS over pixels; shape (band,).
 

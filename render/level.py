@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from render.spectrum import Floats
 from rodcone.errors import InputError
+from rodcone.types import Floats
 
 
 @dataclass(frozen=True)

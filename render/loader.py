@@ -14,10 +14,11 @@ from render.integrator.matte import matte_surface, with_matte_surfaces
 from render.integrator.reflectance_table import band_offsets, reflectance_table, with_rows
 from render.integrator.scattered_path import scattered_path
 from render.scene import EMISSION_PARAMETER, OWN_COLOUR_EMITTERS, Node, Scene, uniform_node
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError, one_line
 from rodcone.jit import backend
+from rodcone.types import Floats
 
 METER_PIXELS = 64  # film of the irradiance meter, each side
 
@@ -200,10 +201,8 @@ def integrators(
     """
     mi, count = mitsuba_module(), film.wavelength_nm.size
     if backend() == "numpy":
-        yield (
-            np.arange(count),
-            mi.load_dict({"type": "path" if meter else "scatteredpath", "max_depth": film.max_depth}),
-        )
+        plug_in = "path" if meter else "scatteredpath"
+        yield np.arange(count), mi.load_dict({"type": plug_in, "max_depth": film.max_depth})
         return
     offsets = band_offsets(seed)
     for part in np.array_split(np.arange(count), -(-count // part_bands)):

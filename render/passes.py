@@ -5,19 +5,16 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from render.error_estimates import SharedPaths
 from render.integrator.dense import LANES
 from render.level import PassMeans
 from render.loader import PART_BANDS, Film, Loaded, integrators, mitsuba_module, seen_directly
 from render.scene import Scene
-from render.spectrum import Floats
 from render.transport import Transport
 from rodcone.errors import InputError, one_line
 from rodcone.jit import backend
-
-Planes = NDArray[np.float32]  # (band, h, w)
+from rodcone.types import Floats, Planes
 
 METER_BANDS = 4  # traced together by the irradiance meter: its film is small, and its kernel another one to compile
 METER_SPP = 16  # most samples a pixel and pass of its 64x64 film: 65 536 paths a pass for one number a band
@@ -32,11 +29,11 @@ class Sums:
     `spp`, `uncovered`, `radiance` and `irradiance` hold a value a pass, as `PassMeans`.
     """
 
-    mean: NDArray[np.float32]
-    scatter: NDArray[np.float32]
-    signed: NDArray[np.float32]
+    mean: Planes
+    scatter: Planes
+    signed: Planes
     seen: list[Planes]
-    coverage: NDArray[np.float32]
+    coverage: Planes
     share: tuple[int, int] | None = None
     product: Planes | None = None
     spp: list[int] = field(default_factory=list)

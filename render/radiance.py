@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.photometry import luminance, tristimulus
-from render.spectrum import Floats, band_widths
+from render.spectrum import band_widths
 from rodcone.errors import InputError, require_range
 from rodcone.notebook import XYZ_TO_SRGB, html_of, preview_png
+from rodcone.types import Floats
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from render.optical_constants import optical_constant
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.errors import InputError, one_line, unknown
+from rodcone.types import Floats
 
 Node: TypeAlias = dict[str, Any]
 

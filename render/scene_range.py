@@ -7,8 +7,9 @@ import numpy as np
 
 from render.optical_constants import optical_constant
 from render.scene import Node, Scene, emitter_paths, table_of
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.errors import InputError
+from rodcone.types import Floats
 
 SUNSKY_NM = (320.0, 720.0)  # Mitsuba's tables (Hosek & Wilkie 2012) end here, and give 0 beyond: found by evaluating it
 CIE_NM = (360.0, 830.0)  # Mitsuba's MI_CIE_MIN and MI_CIE_MAX, likewise for the two below

@@ -14,10 +14,11 @@ from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.scene_range import warn_of_dark_ends
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.errors import InputError, require_keys, require_range
 from rodcone.jit import arrays, backend, dr
 from rodcone.notebook import html_of
+from rodcone.types import Floats, Planes
 
 Stop = Literal["samples", "noise", "seconds", "interrupt"]
 
@@ -56,11 +57,11 @@ class Transport:
         Two groups whose errors are correlated, since an even sky is rendered along with another group.
     """
 
-    radiance: NDArray[np.float32]
-    half_difference: NDArray[np.float32]
-    variance: NDArray[np.float32]
-    coverage: NDArray[np.float32]
-    seen: tuple[NDArray[np.float32], ...]
+    radiance: Planes
+    half_difference: Planes
+    variance: Planes
+    coverage: Planes
+    seen: tuple[Planes, ...]
     pass_means: PassMeans
     groups: Mapping[str, LightGroup]
     wavelength_nm: Floats
@@ -150,7 +151,7 @@ class Transport:
         )
         return even, odd
 
-    def relight_variance(self, *, luminance_cd_m2: float) -> NDArray[np.float32]:
+    def relight_variance(self, *, luminance_cd_m2: float) -> Planes:
         """Monte Carlo variance of `relight` at a level of the scene's own lights, shape (band, h, w)."""
         coefficients = self._own_at(luminance_cd_m2)
         independent = _combine(coefficients**2, self.variance)
@@ -274,7 +275,7 @@ def emission(lights: Mapping[str, LightGroup], wavelength_nm: Floats, width_nm: 
     return np.array([x.spectrum.band_average(wavelength_nm, width_nm) * x.power for x in lights.values()])
 
 
-def _combine(coefficients: Floats, planes: NDArray[np.float32]) -> NDArray[np.float32]:
+def _combine(coefficients: Floats, planes: Planes) -> Planes:
     """Sum over groups, shape (band, h, w): in float64, rounded once; every value is read once."""
     groups, bands, height, width = planes.shape
     pixels = height * width
@@ -296,6 +297,6 @@ def _combine(coefficients: Floats, planes: NDArray[np.float32]) -> NDArray[np.fl
     return np.asarray(sums.numpy()).reshape(bands, height, width)
 
 
-def _view(planes: NDArray[np.float32]) -> NDArray[np.float32]:
+def _view(planes: Planes) -> Planes:
     """(h, w, band) view, as the type promises, of band-planar memory: every later step sums over bands."""
     return np.moveaxis(planes, 0, -1)

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.scene import Node, table_of, uniform_node
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.jit import dr
+from rodcone.types import Floats
 
 STEPS = 16  # offsets within a band: a pass's mean over them is off by under 1e-4 of the steepest reflectance here
 

@@ -28,6 +28,7 @@ from render.radiance_files.exr_layout import (
 from render.radiance_files.file_checks import MOST_EXPANSION, require_extent, require_file
 from rodcone.errors import InputError, one_line
 from rodcone.files import replacing
+from rodcone.notebook import XYZ_TO_SRGB
 
 ERROR, SCENE, PREVIEW = "rodconeRelativeMcError", "rodconeScene", "rodconePreview"
 PREVIEW_PERCENTILE, PREVIEW_AT = 99.0, 0.9
@@ -36,9 +37,6 @@ PREVIEW_TEXT = (
     "1 is whiteLuminance cd/m^2, of which the 99th percentile of luminance reaches 0.9"
 )
 _MAGIC = b"\x76\x2f\x31\x01"
-_XYZ_TO_SRGB = np.array(  # IEC 61966-2-1
-    [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
-)
 _HALF_MAX, _FLOAT = 65504.0, np.finfo(np.float32)
 MOST_TILE_BYTES = 64 << 20  # of one tile, however small the file: 1024 x 1024 pixels in 16 channels
 
@@ -87,11 +85,6 @@ def write_exr(path: str | Path, radiance: SpectralRadiance, *, scene: str = "") 
         PREVIEW: PREVIEW_TEXT,
         **({SCENE: scene} if scene else {}),
     }
-    _write_whole(path, header, channels)
-
-
-def _write_whole(path: Path, header: dict[str, Any], channels: dict[str, NDArray[np.float32]]) -> None:
-    """Write beside the place and move there."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as (place,):
         try:
@@ -105,7 +98,7 @@ def _preview(radiance: SpectralRadiance) -> tuple[NDArray[np.float32], float]:
     xyz = tristimulus(radiance.values, radiance.wavelength_nm, radiance.widths_nm)
     white = float(np.percentile(xyz[:, :, 1], PREVIEW_PERCENTILE)) / PREVIEW_AT or 1.0
     white = float(np.clip(white, _FLOAT.tiny, _FLOAT.max))
-    return np.clip(xyz / white @ _XYZ_TO_SRGB.T, 0.0, _HALF_MAX).astype(np.float32), white
+    return np.clip(xyz / white @ XYZ_TO_SRGB.T, 0.0, _HALF_MAX).astype(np.float32), white
 
 
 def read_exr(path: str | Path) -> SpectralRadiance:

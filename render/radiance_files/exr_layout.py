@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from render.radiance_files.file_checks import bands_between
-from render.spectrum import Floats, band_widths
+from render.spectrum import band_widths
 from rodcone.errors import InputError, require_range
+from rodcone.types import Floats
 
 VERSION = "1.0"
 LAYOUT_UNITS = "W.m^-2.sr^-1"  # what the layout prescribes, though its values are spectral: per nm

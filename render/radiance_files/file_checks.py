@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from render.spectrum import Floats, band_widths
+from render.spectrum import band_widths
 from rodcone.errors import InputError
+from rodcone.types import Floats
 
 MOST_SIDE = 1 << 15  # pixels; the engine's own limit
 MOST_BYTES = 1 << 33  # of float32 pixels: 8 GiB, such as 4 Mpx with 500 bands; a render that size needs three times it

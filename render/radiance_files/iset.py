@@ -16,8 +16,8 @@ from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from render.radiance_files.file_checks import MOST_EXPANSION, SMALL_BYTES, bands_between, require_extent, require_file
 from render.radiance_files.mat_file import read_numbers
-from render.spectrum import Floats
 from rodcone.errors import InputError
+from rodcone.types import Floats
 
 MOST_NEGATIVE = 0.01  # of the samples of stored photons; more is no noise
 _KEYS = (

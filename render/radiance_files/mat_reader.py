@@ -20,7 +20,7 @@ def main(path: str, found: str, most_bytes: str, *keys: str) -> None:
     warnings.simplefilter("error", np.exceptions.ComplexWarning)  # it would drop the imaginary part
     names = {key.split("/")[0] for key in keys}
     content = loadmat(path, variable_names=names, mat_dtype=True, struct_as_record=False)
-    numbers = {key: value for key in keys if (value := _numbers(content, key)) is not None}
+    numbers: dict[str, Any] = {key: value for key in keys if (value := _numbers(content, key)) is not None}
     np.savez(found, **numbers)
 
 

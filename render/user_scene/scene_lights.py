@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from render.scene import EMISSION_PARAMETER, LightGroup, Node, table_of
-from render.spectrum import Floats, Spectrum, flat
+from render.spectrum import Spectrum, flat
 from render.user_scene.allowed_plugins import ALLOWED, SPECTRA
 from rodcone.errors import InputError, one_line
 from rodcone.jit import backend, dr
+from rodcone.types import Floats
 
 # MI_CIE_MIN to MI_CIE_MAX, outside of which Mitsuba's own spectra (rgb, d65, blackbody) are zero, and one point more,
 # which makes 472, by fours.
