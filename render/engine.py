@@ -17,7 +17,7 @@ from render.limits import Limits
 from render.loader import Film, integrator_name, load_groups, samples_drawn, variant
 from render.passes import add_pass, let_go, no_passes, sums_of
 from render.scene import Scene
-from render.scene_range import check_range, warn_of_own_colours
+from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from render.transport import Transport, emission
 from rodcone.errors import InputError, require_whole
@@ -91,7 +91,7 @@ def render(
         Where data of a light with colours of its own end within the bands: it gives no light beyond.
     """
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
-    warn_of_own_colours(scene, film.wavelength_nm, film.width_nm)
+    warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
     limits = Limits(spp, max_spp, noise, max_seconds, seed)
     earlier = _checked_earlier(resume, scene, film)
     if cache is not None:

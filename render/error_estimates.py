@@ -125,17 +125,12 @@ def _derivatives(values: Floats, wavelength_nm: Floats) -> tuple[Floats, Floats]
     """Slope and curvature over wavelength (axis 0), from the parabola through each band and its two neighbours."""
     if wavelength_nm.size < 2:
         return np.zeros_like(values), np.zeros_like(values)
+    slope = np.gradient(values, wavelength_nm, axis=0, edge_order=1 if wavelength_nm.size == 2 else 2)
     if wavelength_nm.size == 2:
-        slope = np.diff(values, axis=0) / np.diff(wavelength_nm)[0]
-        return np.repeat(slope, 2, axis=0), np.zeros_like(values)
+        return slope, np.zeros_like(values)
     steps = np.diff(wavelength_nm)[:, None, None]
-    rises = np.diff(values, axis=0) / steps
-    curvature = 2 * np.diff(rises, axis=0) / (steps[1:] + steps[:-1])
-    middle = (rises[1:] * steps[:-1] + rises[:-1] * steps[1:]) / (steps[1:] + steps[:-1])
-    slope = np.concatenate(
-        [rises[:1] - curvature[:1] * steps[:1] / 2, middle, rises[-1:] + curvature[-1:] * steps[-1:] / 2]
-    )
-    return slope, np.concatenate([curvature[:1], curvature, curvature[-1:]])
+    curvature = 2 * np.diff(np.diff(values, axis=0) / steps, axis=0) / (steps[1:] + steps[:-1])
+    return slope, np.pad(curvature, ((1, 1), (0, 0), (0, 0)), mode="edge")
 
 
 def _moments(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) -> tuple[Floats, Floats, Floats]:

@@ -13,7 +13,7 @@ from render.integrator.dense import LANES, dense_path
 from render.integrator.matte import matte_surface, with_matte_surfaces
 from render.integrator.reflectance_table import band_offsets, reflectance_table, with_rows
 from render.integrator.scattered_path import scattered_path
-from render.scene import EMISSION_PARAMETER, OWN_COLOUR_EMITTERS, Node, Scene, uniform_node
+from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node
 from render.spectrum import Spectrum
 from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError, one_line
@@ -144,7 +144,7 @@ def _load_group(scene: Scene, group: str, film: Film) -> Loaded:
         recorder = _recorder(film, (METER_PIXELS, METER_PIXELS))
         meter = {"type": "irradiancemeter", "film": recorder, "sampler": _METER_SAMPLER}
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
-    index, coloured = (list(scene.groups).index(group),), scene.groups[group].own_colour
+    index, coloured = (list(scene.groups).index(group),), scene.groups[group].coloured
     if backend() == "numpy":
         covering = _load(scene, _covering(scene, group, film))
         return Loaded(_load(scene, description), index, coloured, sample_lights=True, covering=covering)
@@ -162,10 +162,10 @@ def _covering(scene: Scene, group: str, film: Film) -> Node:
     description = scene.lit({group: uniform_node(1.0)})
     one_band = replace(film, wavelength_nm=film.wavelength_nm[:1], width_nm=film.width_nm[:1])
     description["sensor"] = {**description["sensor"], "film": _recorder(one_band, film.size), "sampler": _SAMPLER}
-    for path in scene.groups[group].emitters if scene.groups[group].own_colour else ():
+    for path in scene.groups[group].emitters if scene.groups[group].coloured else ():
         *way, key = path.split("/")
         holder = reduce(getitem, way, description)
-        kind = "constant" if holder[key]["type"] in OWN_COLOUR_EMITTERS else holder[key]["type"]
+        kind = "constant" if holder[key]["type"] in COLOURED_EMITTERS else holder[key]["type"]
         holder[key] = {"type": kind, EMISSION_PARAMETER[kind]: uniform_node(1.0)}
     return description
 

@@ -76,7 +76,7 @@ def no_passes(scene: Scene, film: Film) -> Sums:
     """Sums before the first pass."""
     bands = film.wavelength_nm.size
     mean, scatter, signed = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(3))
-    seen = [np.zeros((bands if x.own_colour else 1, *film.size), np.float32) for x in scene.groups.values()]
+    seen = [np.zeros((bands if x.coloured else 1, *film.size), np.float32) for x in scene.groups.values()]
     return Sums(mean, scatter, signed, seen, np.zeros(film.size, np.float32))
 
 

@@ -22,7 +22,7 @@ EMISSION_PARAMETER = {
     "directional": "irradiance",
 }
 # Emitter plug-ins with colours of their own, which differ over directions: a spectrum can only filter them.
-OWN_COLOUR_EMITTERS = ("envmap", "sunsky")
+COLOURED_EMITTERS = ("envmap", "sunsky")
 HELD_NM = (100.0, 20_000.0)  # as far as held ends go
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
 _SIZELESS_EMITTERS = ("point", "spot", "directional")  # rays can't meet them
@@ -38,17 +38,17 @@ class LightGroup:
         Where they stand in the scene's dict: ``"sun"``, or ``"panel/emitter"`` for one inside a shape.
     spectrum : Spectrum
         Emission at power 1: W m^-2 sr^-1 nm^-1 for ``area`` and ``constant``, per m^2 less for the others. With
-        `own_colour` a factor on what the emitters give by themselves, `flat()` to leave it as it is.
+        `coloured` a factor on what the emitters give by themselves, `flat()` to leave it as it is.
     power : float
         Factor on the spectrum.
-    own_colour : bool
+    coloured : bool
         The emitters keep the emission that stands in the scene's dict: an ``envmap``, a ``sunsky``, a textured panel.
     """
 
     emitters: tuple[str, ...]
     spectrum: Spectrum
     power: float = 1.0
-    own_colour: bool = False
+    coloured: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Scene:
     ------
     InputError
         Where a light is missing, of a kind that can't be relit, or in no group; where an ``envmap`` or ``sunsky`` is in
-        a group without `own_colour`; or the plane isn't in the scene; or `extend` is something else.
+        a group without `coloured`; or the plane isn't in the scene; or `extend` is something else.
     """
 
     name: str
@@ -87,21 +87,21 @@ class Scene:
         for path in grouped:
             if path not in present:
                 raise unknown(f"scene {self.name}: emitter", path, present)
-        tinted = {path for group in self.groups.values() if group.own_colour for path in group.emitters}
+        tinted = {path for group in self.groups.values() if group.coloured for path in group.emitters}
         for path, kind in present.items():
             if kind in _REFUSED_EMITTERS:
                 raise InputError(
                     f"scene {self.name}: emitter {path!r} of type {kind!r} can't be relit; "
-                    f"allowed: {', '.join((*EMISSION_PARAMETER, *OWN_COLOUR_EMITTERS))}; replace it by one of these"
+                    f"allowed: {', '.join((*EMISSION_PARAMETER, *COLOURED_EMITTERS))}; replace it by one of these"
                 )
             if grouped.count(path) != 1:
                 raise InputError(
                     f"scene {self.name}: emitter {path!r} is in {grouped.count(path)} light groups; put it in one"
                 )
-            if kind in OWN_COLOUR_EMITTERS and path not in tinted:
+            if kind in COLOURED_EMITTERS and path not in tinted:
                 raise InputError(
                     f"scene {self.name}: emitter {path!r} of type {kind!r} has colours of its own; "
-                    "allowed: a light group with own_colour=True, whose spectrum is a factor; set it"
+                    "allowed: a light group with coloured=True, whose spectrum is a factor; set it"
                 )
         if self.reference_plane is not None and self.reference_plane not in self.geometry:
             raise unknown(f"scene {self.name}: reference_plane", self.reference_plane, self.geometry)
@@ -114,7 +114,7 @@ class Scene:
         """Whether a group is one light of one spectrum and of the same radiance from all around."""
         lights = self.groups[group]
         kinds = [emitter_paths(self.geometry)[path] for path in lights.emitters]
-        return kinds == ["constant"] and not lights.own_colour
+        return kinds == ["constant"] and not lights.coloured
 
     def check_meter(self) -> None:
         """Raise `InputError` where Mitsuba's own irradiance meter, whose rays have to meet a light, would read 0."""
@@ -138,7 +138,7 @@ class Scene:
         result: Node = _copy(self.geometry)
         for name, group in self.groups.items():
             for path in group.emitters:
-                _replace_emitter(result, path.split("/"), emission.get(name), group.own_colour)
+                _replace_emitter(result, path.split("/"), emission.get(name), group.coloured)
         return result
 
 
@@ -220,7 +220,7 @@ def emitter_paths(node: Node, prefix: str = "") -> dict[str, str]:
         if not isinstance(value, dict):
             continue
         path, kind = f"{prefix}{key}", value.get("type")
-        if kind in (*EMISSION_PARAMETER, *OWN_COLOUR_EMITTERS, *_REFUSED_EMITTERS):
+        if kind in (*EMISSION_PARAMETER, *COLOURED_EMITTERS, *_REFUSED_EMITTERS):
             found[path] = str(kind)
         found |= emitter_paths(value, f"{path}/")
     return found
@@ -233,12 +233,12 @@ def _copy(value: Any) -> Any:
     return list(value) if isinstance(value, list) else value
 
 
-def _replace_emitter(node: Node, path: list[str], emission: Node | None, own_colour: bool) -> None:
+def _replace_emitter(node: Node, path: list[str], emission: Node | None, coloured: bool) -> None:
     """Give the emitter at `path` its emission, or remove it; one of its own colour keeps what it has."""
     *way, key = path
     for step in way:
         node = node[step]
     if emission is None:
         del node[key]
-    elif not own_colour:
+    elif not coloured:
         node[key][EMISSION_PARAMETER[node[key]["type"]]] = emission

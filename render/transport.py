@@ -54,7 +54,7 @@ class Transport:
     relative_mc_error : float
         Error reached under the scene's own lights: median over pixels and bands of standard error over mean.
     shared : SharedPaths or None
-        Two groups whose errors are correlated, since an even sky is rendered along with another group.
+        Two groups whose errors are correlated, since a constant environment is rendered along with another group.
     """
 
     radiance: Planes
@@ -118,7 +118,7 @@ class Transport:
         UserWarning
             Where a light's spectrum ends within the bands at a value other than 0: it gives no light beyond.
         """
-        emitted = self._emission(self._lights(spectra, powers))
+        emitted = self._emission(spectra, powers)
         coefficients, level_error = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         return SpectralRadiance(
             values=_view(_combine(coefficients, self.radiance)),
@@ -142,7 +142,7 @@ class Transport:
         unbiased estimate of that function's Monte Carlo variance. Where an error is larger than the value, a half may
         be under 0: both are `signed`.
         """
-        emitted = self._emission(self._lights(spectra, powers))
+        emitted = self._emission(spectra, powers)
         coefficients, _ = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         values, difference = _combine(coefficients, self.radiance), _combine(coefficients, self.half_difference)
         even, odd = (
@@ -182,7 +182,7 @@ class Transport:
         InputError
             As `relight`, and where lights fill the picture.
         """
-        return self.pass_means.luminance_level(self._luminance_weights(self._emission(self._lights(spectra, powers))))
+        return self.pass_means.luminance_level(self._luminance_weights(self._emission(spectra, powers)))
 
     def illuminance_lux(self, luminance_cd_m2: float) -> float | None:
         """Illuminance on the reference plane at a mean luminance under the scene's own lights; None without a plane."""
@@ -199,7 +199,7 @@ class Transport:
 
         At a level of the scene's own lights; None: at their own powers.
         """
-        emitted = self._emission(self._lights(None, None))
+        emitted = self._emission()
         weights = self._luminance_weights(self._at_level(emitted, luminance_cd_m2, None)[0])
         total = np.zeros(self.coverage.shape)
         for of_group, radiance, seen in zip(weights, self.radiance, self.seen, strict=True):
@@ -239,12 +239,15 @@ class Transport:
             lights[name] = replace(group, spectrum=spectrum, power=power)
         return lights
 
-    def _emission(self, lights: Mapping[str, LightGroup]) -> Floats:
-        return emission(lights, self.wavelength_nm, self.width_nm)
+    def _emission(
+        self, spectra: Mapping[str, Spectrum | str] | None = None, powers: Mapping[str, float] | None = None
+    ) -> Floats:
+        """Spectral emission of the lights asked for, shape (group, band)."""
+        return emission(self._lights(spectra, powers), self.wavelength_nm, self.width_nm)
 
     def _own_at(self, luminance_cd_m2: float) -> Floats:
         """Emission of the scene's own lights brought to a level, shape (group, band)."""
-        return self._at_level(self._emission(self._lights(None, None)), luminance_cd_m2, None)[0]
+        return self._at_level(self._emission(), luminance_cd_m2, None)[0]
 
     def _at_level(
         self, emitted: Floats, luminance_cd_m2: float | None, illuminance_lux: float | None

@@ -78,7 +78,7 @@ def _stored(found: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[n
     if any(key.startswith("scene/") for key in found):
         wave, data, photons = "scene/spectrum/wave", "scene/data/", "scene/data/photons"
     else:
-        wave, data = "wavelength" if "wavelength" in found else "wave", ""
+        wave, data = "wave" if "wave" in found else "wavelength", ""
         photons = "data" if "data" in found else "photons"
     nm = _numbers(found, wave).ravel().astype(np.float64)
     cube = _cube(found, photons, nm.size)

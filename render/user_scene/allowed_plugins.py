@@ -7,7 +7,7 @@ this list may be native code. The list is what Mitsuba 3.9 ships, less what the 
 
 from typing import Any
 
-from render.scene import EMISSION_PARAMETER, OWN_COLOUR_EMITTERS
+from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER
 from rodcone.errors import InputError, unknown
 
 CAMERAS = ("perspective", "thinlens")
@@ -37,7 +37,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         *("plastic", "principled", "principledthin", "roughconductor", "roughdielectric", "roughplastic"),
         *("thindielectric", "twosided"),
     ),
-    "emitter": (*EMISSION_PARAMETER, *OWN_COLOUR_EMITTERS),
+    "emitter": (*EMISSION_PARAMETER, *COLOURED_EMITTERS),
     "texture": ("bitmap", "checkerboard", "mesh_attribute", *SPECTRA),
     "sensor": (*CAMERAS, METER),
     "film": ("hdrfilm", "specfilm"),

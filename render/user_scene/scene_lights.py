@@ -94,7 +94,7 @@ def light_groups(mi: Any, name: str, geometry: Node, parts: Mapping[str, Node]) 
             for _, node in lights:
                 node.pop(EMISSION_PARAMETER[node["type"]], None)
         emitters = tuple("/".join(path) for path, _ in lights)
-        groups[group] = LightGroup(emitters, flat() if common is None else common, own_colour=common is None)
+        groups[group] = LightGroup(emitters, flat() if common is None else common, coloured=common is None)
     return groups
 
 

@@ -203,7 +203,7 @@ def _spectra(scene: Scene, lights: tuple[str, ...]) -> dict[str, Spectrum]:
 
 def _luminance(scene: Scene, name: str, group: LightGroup) -> float:
     """Luminance of a group's spectrum at power 1, which another illuminant is brought to."""
-    if group.own_colour:
+    if group.coloured:
         raise InputError(f"light: group {name!r} of scene {scene.name} has colours of its own; leave it as it is")
     nm, width = np.arange(360.5, 830.0), np.ones(470)  # as in `render.illuminants.unit_luminance`
     own = float(luminance(group.spectrum.band_average(nm, width), nm, width))
@@ -214,7 +214,7 @@ def _luminance(scene: Scene, name: str, group: LightGroup) -> float:
 
 def _facts(order: Order, opened: SceneFile, transport: Transport, radiance: SpectralRadiance) -> dict[str, Any]:
     groups = {
-        name: {"emitters": list(group.emitters), "power": group.power, "own_colour": group.own_colour}
+        name: {"emitters": list(group.emitters), "power": group.power, "own_colour": group.coloured}
         for name, group in opened.scene.groups.items()
     }
     return {

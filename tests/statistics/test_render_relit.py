@@ -1,6 +1,6 @@
 """Relit equals directly rendered: under lines, tables and LEDs, on line bands, on 10 nm, and against 1 nm bands.
 
-"Directly" means that the lamp keeps its own spectrum in the scene (`own_colour`), so that transport and emission are
+"Directly" means that the lamp keeps its own spectrum in the scene (`coloured`), so that transport and emission are
 multiplied along each path, within the bands. The difference is judged by its own scatter over independent seeds
 (paired t-test). All comparisons of a test together fail by chance with probability `FALSE_ALARM` at most (Bonferroni);
 seeds are fixed.
@@ -45,7 +45,7 @@ def with_lamp(scene, name):
     """The same scene whose lamp has its spectrum in the scene's own dict."""
     emitter = {"type": "area", "radiance": spectrum_node(illuminant(name))}
     geometry = scene.geometry | {"lamp": scene.geometry["lamp"] | {"emitter": emitter}}
-    return Scene("direct", geometry, {"lamp": LightGroup(("lamp/emitter",), flat(), own_colour=True)})
+    return Scene("direct", geometry, {"lamp": LightGroup(("lamp/emitter",), flat(), coloured=True)})
 
 
 def blocks(radiance):

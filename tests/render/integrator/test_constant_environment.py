@@ -146,7 +146,7 @@ def test_a_sky_of_its_own_colour_or_with_another_light_is_rendered_by_itself():
     scene = courtyard()
     assert scene.is_environment("sky")
     assert not scene.is_environment("lamp")
-    own = replace(scene.groups["sky"], own_colour=True)
+    own = replace(scene.groups["sky"], coloured=True)
     assert not replace(scene, groups=scene.groups | {"sky": own}).is_environment("sky")
     together = LightGroup(("sky", "lamp/emitter"), flat())
     assert not replace(scene, groups={"all": together}).is_environment("all")

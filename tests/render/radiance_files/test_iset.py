@@ -157,7 +157,7 @@ def test_uneven_wavelengths_are_told(tmp_path: Path) -> None:
         ({"photons": PHOTONS, "wave": NM[::-1]}, "increasing"),
         ({"photons": PHOTONS, "wave": NM - 400}, "increasing"),
         ({"photons": "none", "wave": NM}, "no numbers 'photons'"),
-        ({"scene": 1.0}, "no numbers 'wave'"),
+        ({"scene": 1.0}, "no numbers 'wavelength'"),
         ({"scene": {"data": {"photons": PHOTONS}}}, r"no numbers 'scene\.spectrum\.wave'"),
         ({"mcCOEF": PHOTONS}, r"no numbers 'basis\.wave'"),
         ({"mcCOEF": PHOTONS, "basis": {"basis": np.ones((30, 31)), "wave": NM}}, "one row"),

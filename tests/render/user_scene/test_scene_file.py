@@ -124,7 +124,7 @@ def test_spectrum_of_a_light_is_what_stock_mitsuba_emits(form: str, tmp_path: Pa
     seen = mi.SurfaceInteraction3f()
     seen.wi, seen.wavelengths = mi.Vector3f(0, 0, 1), mi.Spectrum(*nm)
     group = load_scene_file(path).scene.groups["lamp"]
-    assert not group.own_colour
+    assert not group.coloured
     ours = np.interp(nm, group.spectrum.wavelength_nm, group.spectrum.values, left=0.0, right=0.0)
     # 1e-3: between points 1 nm apart, d65's own 5 nm kinks are met half-way.
     np.testing.assert_allclose(ours, np.array(emitter.eval(seen)).ravel(), rtol=1e-3)
@@ -173,7 +173,7 @@ def test_lights_are_grouped_by_id_or_their_shapes_up_to_a_colon(tmp_path: Path) 
         **dict.fromkeys(("lamp", "mixed"), 2),
         **dict.fromkeys(("own.id", "shape_0", "emitter_0", "sky"), 1),
     }
-    assert {name for name, group in scene.groups.items() if group.own_colour} == {"mixed", "sky"}
+    assert {name for name, group in scene.groups.items() if group.coloured} == {"mixed", "sky"}
     assert scene.geometry["mixed:b"]["_arg_0"]["radiance"] == {"type": "rgb", "value": [1.0, 0.0, 0.0]}
     assert "radiance" not in scene.geometry["lamp:1"]["_arg_0"]
 
@@ -196,7 +196,7 @@ def test_textured_light_keeps_its_picture(tmp_path: Path) -> None:
     picture = '<texture type="bitmap" name="radiance"><string name="filename" value="p.png"/></texture>'
     path = write(tmp_path, CAMERA, f'<shape type="disk" id="tv"><emitter type="area">{picture}</emitter></shape>')
     scene = load_scene_file(path).scene
-    assert scene.groups["tv"].own_colour
+    assert scene.groups["tv"].coloured
     assert scene.geometry["tv"]["_arg_0"]["radiance"]["filename"] == str((tmp_path / "p.png").resolve())
 
 
