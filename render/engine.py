@@ -56,12 +56,12 @@ def render(
         emission lines bands of their own.
     spp : int, optional
         Samples a pixel, in eight passes or some more; rounded up by a fifth at most to what an even number of passes
-        and the stratified sampler can hold (below 5, to the next even number). `Transport.spp` tells the samples drawn.
+        and the stratified sampler can hold (below 5, to the next even number). `Transport.spp` holds the samples drawn.
     max_spp : int, optional
         The same as a ceiling beside `noise` or `max_seconds`: in passes of 16 or fewer.
     noise : float, optional
         Relative Monte Carlo error (median over pixels and bands, variance pooled over 3x3 pixels, scene's own lights)
-        to reach, judged from eight passes on.
+        to reach, estimated from eight passes on.
     max_seconds : float, optional
         Time to keep, earlier calls' included; at least two passes are made.
     max_depth : int
@@ -128,7 +128,7 @@ def _checked_film(
 
 
 def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film) -> Transport | None:
-    """Give the result to go on from; refuse another scene's."""
+    """Return the result to continue; refuse another scene's."""
     if earlier is None:
         return None
     shape = (len(scene.groups), film.wavelength_nm.size, *film.size)
@@ -158,7 +158,7 @@ def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None,
             now = time.perf_counter()
             error = relative_error(lights, sums.mean, sums.scatter, float(sums.variance_factor), sums.shared)
             progress(limits.share(sums.drawn, error, now - start), error)
-            # The second of a pair compiles nothing: it tells how long the next ones take.
+            # The second of a pair compiles nothing: its time is that of the next ones.
             stopped_by = limits.stop(sums.drawn, sums.passes, error, now - start, now - pass_start)
             if stopped_by is None and interrupted():
                 stopped_by = "interrupt"

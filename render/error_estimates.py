@@ -1,6 +1,6 @@
 """How far a render may be off: Monte Carlo noise, and light that varies within a band together with the scene.
 
-Both are judged on pixels spread evenly over the picture, so that asking costs little beside relighting itself.
+Both are estimated from pixels spread evenly over the picture, and cost little beside relighting.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from render.scene import LightGroup
 from render.spectrum import Spectrum
 from rodcone.types import Floats, Planes
 
-SAMPLE_PIXELS = 1024  # judged: with 40 bands the median of the error is then sure to about 1 %
+SAMPLE_PIXELS = 1024  # with 40 bands the median of the error is then known to about 1 %
 SUB_BANDS = 64  # of a band, over which a light's moments are summed: 0.16 nm in a band of 10 nm
 
 
@@ -72,11 +72,11 @@ def relative_error(
     for down in (-1, 0, 1):
         for right in (-1, 0, 1):
             around = np.clip(rows + down, 0, last_row)[:, None], np.clip(columns + right, 0, last_column)
-            here = variance[:, :, around[0], around[1]]
-            pooled += (squares * here).sum(axis=0)
+            neighbour = variance[:, :, around[0], around[1]]
+            pooled += (squares * neighbour).sum(axis=0)
             if shared:
                 part = replace(shared, correlation=shared.correlation[:, around[0], around[1]])
-                pooled += part.term(emitted, here)
+                pooled += part.term(emitted, neighbour)
     values = (emitted[:, :, None, None] * radiance[:, :, rows[:, None], columns]).sum(axis=0)
     lit = values > 0
     return float(np.median(np.sqrt(np.maximum(pooled[lit], 0.0) * factor / 9) / values[lit])) if lit.any() else 0.0
@@ -90,7 +90,7 @@ def within_band_error(
     The mean of transport T times emission S over a band is not the product of their means. With T expanded about the
     band's centre, T + s x + q/2 (x^2 - w^2/12), what is missed is s <S x> + q/2 <S (x^2 - w^2/12)>, x from the centre.
     Slope s and curvature q come from the neighbouring bands. The two terms are added without their signs; what T does
-    within a band beyond a parabola stays unseen. A light of its own colour is averaged as it is rendered, so a flat
+    within a band beyond a parabola stays unseen. A coloured emitter is averaged as it is rendered, so a flat
     factor on it misses nothing.
 
     Parameters

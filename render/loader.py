@@ -91,7 +91,7 @@ class Loaded:
         would be met at few of the table's wavelengths.
     covering : mitsuba.Scene or None
         The same scene with a film of one band and lights of 1 whatever their colours: it shows what they cover. None
-        with Dr.Jit, where the camera's paths tell.
+        with Dr.Jit, whose camera paths record it.
     """
 
     mi_scene: Any

@@ -28,7 +28,7 @@ class SpectralRadiance:
         Band widths; left out, the spacing of evenly spaced centres.
     relative_level_error : float, optional
         Monte Carlo standard error over the value of the level that the light was brought to; None where none was asked
-        for, or nothing tells it.
+        for, or there is no estimate.
     signed : bool
         Whether values may be negative: half of a render's passes, whose noise may cross 0.
 

@@ -21,7 +21,7 @@ EMISSION_PARAMETER = {
     "spot": "intensity",
     "directional": "irradiance",
 }
-# Emitter plug-ins with colours of their own, which differ over directions: a spectrum can only filter them.
+# Emitter plug-ins whose colour differs over directions: a spectrum can only filter them.
 COLOURED_EMITTERS = ("envmap", "sunsky")
 HELD_NM = (100.0, 20_000.0)  # as far as held ends go
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
@@ -35,14 +35,14 @@ class LightGroup:
     Attributes
     ----------
     emitters : tuple of str
-        Where they stand in the scene's dict: ``"sun"``, or ``"panel/emitter"`` for one inside a shape.
+        Their keys in the scene's dict: ``"sun"``, or ``"panel/emitter"`` for one inside a shape.
     spectrum : Spectrum
         Emission at power 1: W m^-2 sr^-1 nm^-1 for ``area`` and ``constant``, per m^2 less for the others. With
         `coloured` a factor on what the emitters give by themselves, `flat()` to leave it as it is.
     power : float
         Factor on the spectrum.
     coloured : bool
-        The emitters keep the emission that stands in the scene's dict: an ``envmap``, a ``sunsky``, a textured panel.
+        The emitters keep the emission that the scene's dict states: an ``envmap``, a ``sunsky``, a textured panel.
     """
 
     emitters: tuple[str, ...]
@@ -129,7 +129,7 @@ class Scene:
     def description(self) -> Node:
         """Plain dict for `mitsuba.load_dict`, every light at its own spectrum and power.
 
-        Lights of their own colour stand in it as they are: Mitsuba has no place for a factor on them.
+        Coloured emitters are left as they are: Mitsuba has no parameter for a factor on them.
         """
         return self.lit({name: spectrum_node(group.spectrum * group.power) for name, group in self.groups.items()})
 
@@ -187,7 +187,7 @@ def _numbers(text: Any) -> Floats:
 
 
 def _hold(node: Node, emitters: Mapping[str, str], prefix: str = "") -> Node:
-    """Copy of a node in which the tables outside of lights go on at their end values."""
+    """Copy of a node in which the tables outside of lights continue at their end values."""
     if (table := table_of(node)) is not None:
         return spectrum_node(_held(table))
     result: Node = {}
@@ -207,7 +207,7 @@ def _hold(node: Node, emitters: Mapping[str, str], prefix: str = "") -> Node:
 
 
 def _held(table: Spectrum) -> Spectrum:
-    """Table that goes on at its end values."""
+    """Table continued at its end values."""
     nm = table.wavelength_nm
     far = np.unique([min(HELD_NM[0], nm[0]), *nm, max(HELD_NM[1], nm[-1])])
     return Spectrum(far, np.interp(far, nm, table.values))
@@ -234,7 +234,7 @@ def _copy(value: Any) -> Any:
 
 
 def _replace_emitter(node: Node, path: list[str], emission: Node | None, coloured: bool) -> None:
-    """Give the emitter at `path` its emission, or remove it; one of its own colour keeps what it has."""
+    """Give the emitter at `path` its emission, or remove it; a coloured one keeps its own."""
     *way, key = path
     for step in way:
         node = node[step]

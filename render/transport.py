@@ -104,8 +104,8 @@ class Transport:
         Returns
         -------
         SpectralRadiance
-            float32, each value rounded once from float64. Its `relative_level_error` tells how far the level that was
-            asked for may be off; `band_error` what products of band averages miss.
+            float32 over band-planar memory, each value rounded once from float64. `relative_level_error` is the error
+            of the level that was asked for. `Transport.band_error` estimates what products of band averages miss.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class Transport:
         emitted = self._emission(spectra, powers)
         coefficients, level_error = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         return SpectralRadiance(
-            values=_view(_combine(coefficients, self.radiance)),
+            values=np.moveaxis(_combine(coefficients, self.radiance), 0, -1),
             wavelength_nm=self.wavelength_nm,
             relative_mc_error=relative_error(coefficients, self.radiance, self.variance, shared=self.shared),
             width_nm=self.width_nm,
@@ -146,7 +146,7 @@ class Transport:
         coefficients, _ = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         values, difference = _combine(coefficients, self.radiance), _combine(coefficients, self.half_difference)
         even, odd = (
-            SpectralRadiance(_view(half), self.wavelength_nm, width_nm=self.width_nm, signed=True)
+            SpectralRadiance(np.moveaxis(half, 0, -1), self.wavelength_nm, width_nm=self.width_nm, signed=True)
             for half in (values + difference, values - difference)
         )
         return even, odd
@@ -298,8 +298,3 @@ def _combine(coefficients: Floats, planes: Planes) -> Planes:
         dr.scatter(sums, types.Float(total), index + dr.opaque(types.UInt, band * pixels), mode=dr.ReduceMode.Permute)
         dr.eval(sums)
     return np.asarray(sums.numpy()).reshape(bands, height, width)
-
-
-def _view(planes: Planes) -> Planes:
-    """(h, w, band) view, as the type promises, of band-planar memory: every later step sums over bands."""
-    return np.moveaxis(planes, 0, -1)

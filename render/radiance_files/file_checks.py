@@ -54,8 +54,8 @@ def require_extent(height: int, width: int, channels: int) -> int:
 def bands_between(wavelength_nm: Floats) -> tuple[Floats, Floats]:
     """Band centres and widths [nm] of a file that states its samples' wavelengths alone: they are as wide as spaced.
 
-    Where the spacing is uneven, bands meet half-way between neighbours (widths as in the trapezoidal rule), which a
-    `UserWarning` tells: a sample then lies beside its band's centre.
+    Where the spacing is uneven, bands meet half-way between neighbours (widths as in the trapezoidal rule), with a
+    `UserWarning`: a sample then lies beside its band's centre.
 
     Raises
     ------

@@ -32,7 +32,7 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
 
     Three forms are known, and looked for in this order: a saved ``scene`` struct; ``mcCOEF`` and ``basis``, with
     ``imgMean`` where the mean was taken out; ``photons`` (or ``data``) with ``wave`` (or ``wavelength``). Negative
-    photons become 0, as in ISETCam, which a `UserWarning` tells: any that a basis gives, and up to 1 % of those that
+    photons become 0, as in ISETCam, with a `UserWarning`: any that a basis gives, and up to 1 % of those that
     stand in the file. Wavelength samples stand for bands as wide as their spacing. The illuminant in the file is not
     needed for radiance and not read.
 
@@ -79,7 +79,7 @@ def _stored(found: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[n
         wave, data, photons = "scene/spectrum/wave", "scene/data/", "scene/data/photons"
     else:
         wave, data = "wave" if "wave" in found else "wavelength", ""
-        photons = "data" if "data" in found else "photons"
+        photons = "photons" if "photons" in found else "data"
     nm = _numbers(found, wave).ravel().astype(np.float64)
     cube = _cube(found, photons, nm.size)
     scale, offset = _quantised(cube.dtype, found, data)
@@ -112,7 +112,7 @@ def _from_basis(found: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArr
 
 
 def _clip_negative(planes: NDArray[np.float32], most: float) -> None:
-    """Set negative values to 0 and tell their share; where it is over `most` they stay, to be refused."""
+    """Set negative values to 0 and warn of their share; where it is over `most` they stay, to be refused."""
     share = sum(int(np.count_nonzero(plane < 0)) for plane in planes) / planes.size
     if 0 < share <= most and np.isfinite(planes.min()):
         np.maximum(planes, 0.0, out=planes)

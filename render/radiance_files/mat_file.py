@@ -63,6 +63,6 @@ def _run_reader(path: Path, found: Path, most_bytes: int, keys: Collection[str],
     except subprocess.TimeoutExpired:
         raise InputError(f"{path}: the .mat file took over {seconds:.0f} s to read; save it again") from None
     if done.returncode:
-        told = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
-        reason = told if done.returncode > 0 else f"it ended the reader by signal {-done.returncode}"
+        said = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+        reason = said if done.returncode > 0 else f"it ended the reader by signal {-done.returncode}"
         raise InputError(f"{path}: SciPy can't read the .mat file: {reason}; save it again")

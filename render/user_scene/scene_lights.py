@@ -39,7 +39,7 @@ def walk(node: Node, path: Path = ()) -> Iterator[tuple[Path, Node]]:
 
 
 def attach_area_lights(name: str, geometry: Node) -> None:
-    """Move area lights that stand in the scene into the shape that refers to them, as Mitsuba has it in the end.
+    """Move area lights that stand in the scene into the shape that refers to them, as Mitsuba does itself.
 
     Raises
     ------
@@ -49,18 +49,18 @@ def attach_area_lights(name: str, geometry: Node) -> None:
     for key in [key for key, part in geometry.items() if type_of(part) == "area"]:
         light: Node = {"id": key, **geometry.pop(key)}
         held = [
-            (shape, place)
+            (shape, key_in_shape)
             for shape in geometry.values()
             if isinstance(shape, dict)
-            for place, part in shape.items()
+            for key_in_shape, part in shape.items()
             if type_of(part) == "ref" and part.get("id") in (key, light["id"])
         ]
         if len(held) != 1:
             raise InputError(
                 f"scene {name}: area light {key!r} is on {len(held)} shapes; allowed: one; give each its own"
             )
-        shape, place = held[0]
-        shape[place] = light
+        shape, key_in_shape = held[0]
+        shape[key_in_shape] = light
 
 
 def light_groups(mi: Any, name: str, geometry: Node, parts: Mapping[str, Node]) -> dict[str, LightGroup]:

@@ -156,7 +156,7 @@ def test_uneven_wavelengths_are_told(tmp_path: Path) -> None:
         ({"photons": PHOTONS[:, :, 0], "wave": 550.0}, "width"),
         ({"photons": PHOTONS, "wave": NM[::-1]}, "increasing"),
         ({"photons": PHOTONS, "wave": NM - 400}, "increasing"),
-        ({"photons": "none", "wave": NM}, "no numbers 'photons'"),
+        ({"photons": "none", "wave": NM}, "no numbers 'data'"),
         ({"scene": 1.0}, "no numbers 'wavelength'"),
         ({"scene": {"data": {"photons": PHOTONS}}}, r"no numbers 'scene\.spectrum\.wave'"),
         ({"mcCOEF": PHOTONS}, r"no numbers 'basis\.wave'"),
