@@ -9,6 +9,7 @@ import os
 import re
 import sys
 import warnings
+from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
 
@@ -29,23 +30,22 @@ def llvm_version(path: Path) -> int | None:
     return int(match[1] or match[2]) if match else None
 
 
+def _newest(paths: Iterable[Path]) -> Path | None:
+    versions = {path: llvm_version(path) or 0 for path in paths}
+    return max((path for path in versions if versions[path] >= OLDEST_LLVM), key=versions.__getitem__, default=None)
+
+
 def _wheel_library() -> Path | None:
     try:
         files = metadata.files("karellen-llvm-core") or []
     except metadata.PackageNotFoundError:
         return None
-    paths = [Path(str(file.locate())).resolve() for file in files if llvm_version(Path(file.name))]
-    return max(paths, key=lambda path: llvm_version(path) or 0, default=None)
+    return _newest(Path(str(file.locate())).resolve() for file in files if llvm_version(Path(file.name)))
 
 
 def _system_library() -> Path | None:
     folders = [Path(name) for name in _SYSTEM_DIRECTORIES] + sorted(Path("/usr/lib").glob("llvm-*/lib"))
-    paths = [path for folder in folders for path in folder.glob("libLLVM*.so*") if path.is_file()]
-    return max(
-        (path for path in paths if (llvm_version(path) or 0) >= OLDEST_LLVM),
-        key=lambda path: llvm_version(path) or 0,
-        default=None,
-    )
+    return _newest(path for folder in folders for path in folder.glob("libLLVM*.so*") if path.is_file())
 
 
 def find_llvm() -> Path | None:

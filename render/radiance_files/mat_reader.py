@@ -36,12 +36,17 @@ def _numbers(content: dict[str, Any], key: str) -> np.ndarray[Any, Any] | None:
 
 def _limit(most_bytes: int) -> None:
     """Bound this process's memory and the file that it writes; without /proc its output alone."""
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes))
+    _lower(resource.RLIMIT_FSIZE, most_bytes)
     statm = Path("/proc/self/statm")
     if statm.is_file():
         held = int(statm.read_text().split()[0]) * resource.getpagesize()
-        most = held + READER_BYTES + COPIES * most_bytes
-        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+        _lower(resource.RLIMIT_AS, held + READER_BYTES + COPIES * most_bytes)
+
+
+def _lower(limit: int, most: int) -> None:
+    hard = resource.getrlimit(limit)[1]  # the user's own, which can't be raised
+    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(limit, (most, most))
 
 
 if __name__ == "__main__":
