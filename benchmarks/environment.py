@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.jit import LIBLLVM, backend, dr
+from rodcone.jit import backend, dr
+from rodcone.llvm import LIBLLVM
 
 
 def print_environment() -> None:

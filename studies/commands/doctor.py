@@ -122,15 +122,15 @@ def engine_rows() -> tuple[Row, ...]:
     """LLVM library, backend, variant and threads, as the render and the kernels use them."""
     try:
         from render.loader import integrator_name, variant
-        from rodcone import jit
+        from rodcone import jit, llvm
     except (ImportError, NameError) as error:  # Dr.Jit stumbles with a NameError over a failed import of its own
         cause = str(error.__context__ or error)
         fix = "; Debian: apt install libatomic1" if "libatomic" in cause else ""
         return (Row("engine", f"can't be imported: {cause}{fix}", False),)
-    version = jit.llvm_version(jit.LIBLLVM) if jit.LIBLLVM else None
+    version = llvm.llvm_version(llvm.LIBLLVM) if llvm.LIBLLVM else None
     backend = jit.backend()
     return (
-        llvm_row(jit.LIBLLVM, version, jit.OLDEST_LLVM),
+        llvm_row(llvm.LIBLLVM, version, llvm.OLDEST_LLVM),
         Row("backend", FALLBACK if backend == "numpy" else backend),
         Row("Mitsuba variant", variant()),
         Row("integrator", integrator_name()),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rodcone import jit
+from rodcone import jit, llvm
 from studies.commands import doctor
 
 HOME = Path(doctor.__file__).resolve().parents[2]
@@ -34,7 +34,7 @@ def test_one_row_at_fault_makes_the_report_not_ok() -> None:
 
 
 def test_without_llvm_and_cuda_the_fallback_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(jit, "LIBLLVM", None)
+    monkeypatch.setattr(llvm, "LIBLLVM", None)
     monkeypatch.setattr(jit, "backend", lambda: "numpy")
     rows = {row.name: row for row in doctor.engine_rows()}
     assert rows["LLVM"].value.startswith("none of version 17 or newer")
