@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.jit import LIBLLVM, backend, dr
+from rodcone.jit import backend, dr
+from rodcone.llvm import LIBLLVM
 from studies.speed.machine import processor_facts
 from studies.speed.points import laps
 

@@ -6,7 +6,7 @@ BIN ?= .venv/bin
 FIGURES ?= out/figures
 DEMO ?=
 PAPER ?=
-CODE := $(wildcard render/*.py scenes/*.py sensor/*.py sensor/data/* isp/*.py studies/*.py studies/configs/* studies/templates/*)
+CODE := $(shell find rodcone render scenes sensor isp studies -type f -not -path '*/__pycache__/*')
 # Pages whose blocks run; each in a folder of its own, from which its pictures are taken.
 PAGES := $(wildcard docs/tutorial/*.md docs/how_to/*.md)
 RAN := $(PAGES:docs/%.md=$(FIGURES)/%/ran)

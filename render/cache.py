@@ -5,13 +5,11 @@ How far they were taken isn't in it, nor are the lights' spectra and powers: tra
 
 import hashlib
 import json
-import os
 import re
-import tempfile
-from dataclasses import asdict, fields
+from dataclasses import fields
 from importlib import metadata
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +18,8 @@ from render.level import PassMeans
 from render.loader import Film, integrator_name, variant
 from render.scene import Node, Scene
 from render.transport import Transport, emission
+from rodcone.digests import digest, digest_file
+from rodcone.files import replacing
 from rodcone.jit import compiler_version
 
 ENGINE_VERSION = 4  # raise it with any change that moves a rendered value: older entries are then not used
@@ -27,23 +27,20 @@ _DIGEST_BYTES = hashlib.sha256().digest_size
 _ARRAYS = ("radiance", "half_difference", "variance", "coverage")
 _MEANS = tuple(field.name for field in fields(PassMeans))
 _VALUES = ("spp", "passes", "stopped_by", "seconds", "integrator", "variant")
-_CHUNK_BYTES = 1 << 22
 _NOT_IN_NAMES = re.compile(r"[^\w.-]+")  # separators of folders above all: entries stay in theirs
 
 
 def load_transport(folder: Path, scene: Scene, film: Film, seed: int) -> Transport | None:
-    """Stored transport, or None where there is none that is whole: a SHA-256 digest ends the file.
+    """Stored transport, or None where there is none that is whole: a SHA-256 digest begins the file.
 
     The digest tells damage by accident. Whoever writes to the folder on purpose is believed.
     """
-    path = _path(folder, scene, film, seed)
     try:
-        with path.open("rb") as file:
-            size = path.stat().st_size - _DIGEST_BYTES
-            digest = _digest(file, size)
-            if size < 0 or file.read() != digest:
+        with _path(folder, scene, film, seed).open("rb") as file:
+            stated = file.read(_DIGEST_BYTES)
+            if hashlib.file_digest(file, "sha256").digest() != stated:
                 return None
-            file.seek(0)
+            file.seek(_DIGEST_BYTES)
             with np.load(file) as entry:
                 arrays = dict(entry)
     except OSError:
@@ -72,41 +69,26 @@ def save_transport(folder: Path, scene: Scene, film: Film, seed: int, transport:
     arrays |= {f"pass_{name}": x for name, x in vars(transport.pass_means).items() if x is not None}
     arrays |= {"correlation": shared.correlation} if shared else {}
     values = {name: getattr(transport, name) for name in _VALUES} | {"shared": shared.groups if shared else None}
-    handle, temporary = tempfile.mkstemp(dir=folder, suffix=".part")
-    try:
-        with os.fdopen(handle, "w+b") as file:
-            np.savez(file, values=np.array(json.dumps(values)), **arrays)
-            size = file.seek(0, os.SEEK_END)
-            file.seek(0)
-            digest = _digest(file, size)
-            file.seek(0, os.SEEK_END)
-            file.write(digest)
-        Path(temporary).replace(_path(folder, scene, film, seed))
-    finally:
-        Path(temporary).unlink(missing_ok=True)
-
-
-def _digest(file: BinaryIO, size: int) -> bytes:
-    """SHA-256 of the next `size` bytes, read in pieces."""
-    digest = hashlib.sha256()
-    while size > 0 and (piece := file.read(min(size, _CHUNK_BYTES))):
-        digest.update(piece)
-        size -= len(piece)
-    return digest.digest()
+    with replacing(_path(folder, scene, film, seed)) as (place,), place.open("w+b") as file:
+        file.write(bytes(_DIGEST_BYTES))
+        np.savez(file, values=np.array(json.dumps(values)), **arrays)
+        file.seek(_DIGEST_BYTES)
+        content = hashlib.file_digest(file, "sha256").digest()
+        file.seek(0)
+        file.write(content)
 
 
 def _path(folder: Path, scene: Scene, film: Film, seed: int) -> Path:
-    key = {
-        "engine": [ENGINE_VERSION, integrator_name(), variant(), *map(metadata.version, ("mitsuba", "drjit"))],
-        "compiler": compiler_version(),
-        "scene": [scene.name, scene.geometry, scene.reference_plane, _file_digests(scene.geometry)],
-        "groups": [[name, group.emitters, group.own_colour] for name, group in scene.groups.items()],
-        "film": asdict(film),
-        "seed": seed,
-    }
-    text = json.dumps(key, sort_keys=True, default=lambda value: np.asarray(value).tolist())
-    name = _NOT_IN_NAMES.sub("_", scene.name)
-    return folder / f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
+    key = digest(
+        [
+            *(ENGINE_VERSION, integrator_name(), variant(), compiler_version()),
+            *map(metadata.version, ("mitsuba", "drjit")),
+            *(scene.name, scene.geometry, scene.reference_plane, _file_digests(scene.geometry)),
+            [[name, group.emitters, group.coloured] for name, group in scene.groups.items()],
+            *(film, seed),
+        ]
+    )
+    return folder / f"{_NOT_IN_NAMES.sub('_', scene.name)}-{key}.npz"
 
 
 def _file_digests(node: Node) -> list[str]:
@@ -116,5 +98,5 @@ def _file_digests(node: Node) -> list[str]:
         if isinstance(value, dict):
             digests += _file_digests(value)
         elif key == "filename" and Path(str(value)).is_file():
-            digests.append(hashlib.sha256(Path(str(value)).read_bytes()).hexdigest())
+            digests.append(digest_file(str(value)))
     return digests

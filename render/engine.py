@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike
 from render.cache import load_transport, save_transport
 from render.error_estimates import relative_error
 from render.limits import Limits
-from render.loader import Film, integrator_name, load_units, samples_drawn, variant
-from render.passes import Sums, add_pass, let_go, no_passes, sums_of
+from render.loader import Film, integrator_name, load_groups, samples_drawn, variant
+from render.passes import add_pass, let_go, no_passes, sums_of
 from render.scene import Scene
-from render.scene_range import check_range, warn_of_own_colours
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
-from render.transport import Stop, Transport, emission
+from render.scene_range import check_range, warn_of_coloured_lights
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from render.transport import Transport, emission
 from rodcone.errors import InputError, require_whole
 
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
@@ -56,12 +56,12 @@ def render(
         emission lines bands of their own.
     spp : int, optional
         Samples a pixel, in eight passes or some more; rounded up by a fifth at most to what an even number of passes
-        and the stratified sampler can hold (below 5, to the next even number). `Transport.spp` tells the samples drawn.
+        and the stratified sampler can hold (below 5, to the next even number). `Transport.spp` holds the samples drawn.
     max_spp : int, optional
         The same as a ceiling beside `noise` or `max_seconds`: in passes of 16 or fewer.
     noise : float, optional
         Relative Monte Carlo error (median over pixels and bands, variance pooled over 3x3 pixels, scene's own lights)
-        to reach, judged from eight passes on.
+        to reach, estimated from eight passes on.
     max_seconds : float, optional
         Time to keep, earlier calls' included; at least two passes are made.
     max_depth : int
@@ -69,7 +69,7 @@ def render(
     seed : int
         The same seed gives the same bits on one machine, variant and LLVM, whatever the number of threads.
     cache : path, optional
-        Folder of renders: one that is fine enough is returned, a coarser one is gone on from, a damaged one not used.
+        Folder of renders. A stored one that is fine enough is returned, a coarser one continued, a damaged one ignored.
     resume : Transport, optional
         An earlier result of the same scene, size, bands, depth and seed to go on from; its passes are kept.
     progress : callable, optional
@@ -91,7 +91,7 @@ def render(
         Where data of a light with colours of its own end within the bands: it gives no light beyond.
     """
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
-    warn_of_own_colours(scene, film.wavelength_nm, film.width_nm)
+    warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
     limits = Limits(spp, max_spp, noise, max_seconds, seed)
     earlier = _checked_earlier(resume, scene, film)
     if cache is not None:
@@ -128,7 +128,7 @@ def _checked_film(
 
 
 def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film) -> Transport | None:
-    """Give the result to go on from; refuse another scene's."""
+    """Return the result to continue; refuse another scene's."""
     if earlier is None:
         return None
     shape = (len(scene.groups), film.wavelength_nm.size, *film.size)
@@ -148,9 +148,9 @@ def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None,
     start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
     sums = sums_of(earlier) if earlier else no_passes(scene, film)
     pass_spp = limits.pass_spp(samples_drawn, sums.spp)
-    loaded = load_units(scene, film)
-    lights, stopped_by = _lights(scene, film), None
-    with _told_to_stop() as told:
+    loaded = load_groups(scene, film)
+    lights, stopped_by = emission(scene.groups, film.wavelength_nm, film.width_nm), None
+    with _interrupt_noted() as interrupted:
         while stopped_by is None:
             for _ in range(2):  # two by two, so that even and odd halves stay equal
                 pass_start = time.perf_counter()
@@ -158,15 +158,11 @@ def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None,
             now = time.perf_counter()
             error = relative_error(lights, sums.mean, sums.scatter, float(sums.variance_factor), sums.shared)
             progress(limits.share(sums.drawn, error, now - start), error)
-            # The second of a pair compiles nothing: it tells how long the next ones take.
+            # The second of a pair compiles nothing: its time is that of the next ones.
             stopped_by = limits.stop(sums.drawn, sums.passes, error, now - start, now - pass_start)
-            if stopped_by is None and told():
+            if stopped_by is None and interrupted():
                 stopped_by = "interrupt"
-    return _transport(scene, film, sums, stopped_by, start)
-
-
-def _transport(scene: Scene, film: Film, sums: Sums, stopped_by: Stop, start: float) -> Transport:
-    """Turn the sums into a result, in place: they are used up."""
+    # The sums become the result in place: they are used up.
     shared, samples = sums.shared, np.float32(sums.drawn)
     sums.scatter *= sums.variance_factor
     for planes in (sums.signed, sums.coverage, *sums.seen):
@@ -187,19 +183,14 @@ def _transport(scene: Scene, film: Film, sums: Sums, stopped_by: Stop, start: fl
         seconds=time.perf_counter() - start,
         integrator=integrator_name(),
         variant=variant(),
-        relative_mc_error=relative_error(_lights(scene, film), sums.mean, sums.scatter, shared=shared),
+        relative_mc_error=relative_error(lights, sums.mean, sums.scatter, shared=shared),
         shared=shared,
     )
 
 
-def _lights(scene: Scene, film: Film) -> Floats:
-    """Spectral emission of the scene's own lights, shape (group, band)."""
-    return emission(scene.groups, film.wavelength_nm, film.width_nm)
-
-
 @contextmanager
-def _told_to_stop() -> Iterator[Callable[[], bool]]:
-    """Within it, the first Ctrl-C is noted and the second one raises KeyboardInterrupt. Main thread alone gets them."""
+def _interrupt_noted() -> Iterator[Callable[[], bool]]:
+    """Note the first Ctrl-C; a second one raises KeyboardInterrupt. Only the main thread gets them."""
     noted = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield noted.is_set

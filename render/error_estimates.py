@@ -1,6 +1,6 @@
 """How far a render may be off: Monte Carlo noise, and light that varies within a band together with the scene.
 
-Both are judged on pixels spread evenly over the picture, so that asking costs little beside relighting itself.
+Both are estimated from pixels spread evenly over the picture, and cost little beside relighting.
 """
 
 from collections.abc import Mapping
@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.scene import LightGroup
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
+from rodcone.types import Floats, Planes
 
-SAMPLE_PIXELS = 1024  # judged: with 40 bands the median of the error is then sure to about 1 %
+SAMPLE_PIXELS = 1024  # with 40 bands the median of the error is then known to about 1 %
 SUB_BANDS = 64  # of a band, over which a light's moments are summed: 0.16 nm in a band of 10 nm
 
 
@@ -29,9 +30,9 @@ class SharedPaths:
     """
 
     groups: tuple[int, int]
-    correlation: NDArray[np.float32]
+    correlation: Planes
 
-    def term(self, emitted: Floats, variance: NDArray[np.float32]) -> NDArray[np.float32]:
+    def term(self, emitted: Floats, variance: Planes) -> Planes:
         """Twice the covariance of the two groups' light: what it adds to the variance of the sum, (band, h, w).
 
         Parameters
@@ -46,8 +47,8 @@ class SharedPaths:
 
 def relative_error(
     emitted: Floats,
-    radiance: NDArray[np.float32],
-    variance: NDArray[np.float32],
+    radiance: Planes,
+    variance: Planes,
     factor: float = 1.0,
     shared: SharedPaths | None = None,
 ) -> float:
@@ -71,25 +72,25 @@ def relative_error(
     for down in (-1, 0, 1):
         for right in (-1, 0, 1):
             around = np.clip(rows + down, 0, last_row)[:, None], np.clip(columns + right, 0, last_column)
-            here = variance[:, :, around[0], around[1]]
-            pooled += (squares * here).sum(axis=0)
+            neighbour = variance[:, :, around[0], around[1]]
+            pooled += (squares * neighbour).sum(axis=0)
             if shared:
                 part = replace(shared, correlation=shared.correlation[:, around[0], around[1]])
-                pooled += part.term(emitted, here)
+                pooled += part.term(emitted, neighbour)
     values = (emitted[:, :, None, None] * radiance[:, :, rows[:, None], columns]).sum(axis=0)
     lit = values > 0
     return float(np.median(np.sqrt(np.maximum(pooled[lit], 0.0) * factor / 9) / values[lit])) if lit.any() else 0.0
 
 
 def within_band_error(
-    lights: Mapping[str, LightGroup], radiance: NDArray[np.float32], wavelength_nm: Floats, width_nm: Floats
+    lights: Mapping[str, LightGroup], radiance: Planes, wavelength_nm: Floats, width_nm: Floats
 ) -> Floats:
     """Error of the product of band averages, over the radiance, RMS over pixels; shape (band,).
 
     The mean of transport T times emission S over a band is not the product of their means. With T expanded about the
     band's centre, T + s x + q/2 (x^2 - w^2/12), what is missed is s <S x> + q/2 <S (x^2 - w^2/12)>, x from the centre.
     Slope s and curvature q come from the neighbouring bands. The two terms are added without their signs; what T does
-    within a band beyond a parabola stays unseen. A light of its own colour is averaged as it is rendered, so a flat
+    within a band beyond a parabola stays unseen. A coloured emitter is averaged as it is rendered, so a flat
     factor on it misses nothing.
 
     Parameters
@@ -124,17 +125,12 @@ def _derivatives(values: Floats, wavelength_nm: Floats) -> tuple[Floats, Floats]
     """Slope and curvature over wavelength (axis 0), from the parabola through each band and its two neighbours."""
     if wavelength_nm.size < 2:
         return np.zeros_like(values), np.zeros_like(values)
+    slope = np.gradient(values, wavelength_nm, axis=0, edge_order=1 if wavelength_nm.size == 2 else 2)
     if wavelength_nm.size == 2:
-        slope = np.diff(values, axis=0) / np.diff(wavelength_nm)[0]
-        return np.repeat(slope, 2, axis=0), np.zeros_like(values)
+        return slope, np.zeros_like(values)
     steps = np.diff(wavelength_nm)[:, None, None]
-    rises = np.diff(values, axis=0) / steps
-    curvature = 2 * np.diff(rises, axis=0) / (steps[1:] + steps[:-1])
-    middle = (rises[1:] * steps[:-1] + rises[:-1] * steps[1:]) / (steps[1:] + steps[:-1])
-    slope = np.concatenate(
-        [rises[:1] - curvature[:1] * steps[:1] / 2, middle, rises[-1:] + curvature[-1:] * steps[-1:] / 2]
-    )
-    return slope, np.concatenate([curvature[:1], curvature, curvature[-1:]])
+    curvature = 2 * np.diff(np.diff(values, axis=0) / steps, axis=0) / (steps[1:] + steps[:-1])
+    return slope, np.pad(curvature, ((1, 1), (0, 0), (0, 0)), mode="edge")
 
 
 def _moments(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) -> tuple[Floats, Floats, Floats]:

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from render.spectrum import Floats
 from rodcone.jit import Matrix4
+from rodcone.types import Floats
 
 
 def translate(x: float, y: float, z: float) -> Floats:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from render.spectrum import Floats
 from rodcone.errors import InputError
+from rodcone.types import Floats
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Level:
     value : float
         Mean luminance [cd m^-2], or illuminance [lux].
     relative_error : float or None
-        Monte Carlo standard error over the value; None where fewer than two passes tell it.
+        Monte Carlo standard error over the value; None with fewer than two passes.
     """
 
     value: float
@@ -32,7 +32,7 @@ class Level:
 
 @dataclass(frozen=True)
 class PassMeans:
-    """What each pass of a render gives for levels, at unit spectral emission.
+    """Means over each pass of a render, from which levels are computed, at unit spectral emission.
 
     Attributes
     ----------
@@ -106,6 +106,6 @@ class PassMeans:
 
 
 def one_picture(planes: NDArray[np.float32]) -> PassMeans:
-    """What a picture without passes gives for levels: its mean (group, band, h, w), whose error nothing tells."""
+    """Means of a picture (group, band, h, w) that has no passes, and so no error estimate."""
     mean = planes.mean(axis=(2, 3), dtype=np.float64)[None]
     return PassMeans(np.ones(1, np.int64), np.ones(1), mean, None)

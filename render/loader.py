@@ -1,5 +1,6 @@
 """From a `Scene` to Mitsuba objects: variant, film, and the scene at unit emission."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, reduce
 from operator import getitem
@@ -12,11 +13,12 @@ from render.integrator.dense import LANES, dense_path
 from render.integrator.matte import matte_surface, with_matte_surfaces
 from render.integrator.reflectance_table import band_offsets, reflectance_table, with_rows
 from render.integrator.scattered_path import scattered_path
-from render.scene import EMISSION_PARAMETER, OWN_COLOUR_EMITTERS, Node, Scene, uniform_node
-from render.spectrum import Floats, Spectrum
+from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node
+from render.spectrum import Spectrum
 from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError, one_line
 from rodcone.jit import backend
+from rodcone.types import Floats
 
 METER_PIXELS = 64  # film of the irradiance meter, each side
 
@@ -72,29 +74,29 @@ class Film:
 
 @dataclass(frozen=True)
 class Loaded:
-    """Mitsuba's scene of one light group, or of one and an even sky.
+    """Mitsuba's scene of one light group, or of one and a constant environment.
 
     Attributes
     ----------
     mi_scene : mitsuba.Scene
     groups : tuple of int
-        Which of the scene's groups it tells, by their order. A second one is the even sky, which isn't in `mi_scene`:
-        paths that escape bring its light.
-    own_colour : bool
+        Which of the scene's groups it gives, by their order. A second one is the constant environment, which isn't in
+        `mi_scene`: paths that escape bring its light.
+    coloured : bool
         Whether emission depends on wavelength; at unit emission it is evaluated once.
     sample_lights : bool
-        Whether paths go to look for lights.
+        Whether directions are sampled towards lights.
     curves : tuple of Spectrum
         Reflectances that are read from a table, row by row. None where lights have colours of their own: a line in them
         would be met at few of the table's wavelengths.
     covering : mitsuba.Scene or None
         The same scene with a film of one band and lights of 1 whatever their colours: it shows what they cover. None
-        with Dr.Jit, where the camera's paths tell.
+        with Dr.Jit, whose camera paths record it.
     """
 
     mi_scene: Any
     groups: tuple[int, ...]
-    own_colour: bool
+    coloured: bool
     sample_lights: bool
     curves: tuple[Spectrum, ...] = ()
     covering: Any = None
@@ -122,37 +124,37 @@ def integrator_name() -> str:
     return "path + specfilm" if backend() == "numpy" else "dense path (all bands along each path)"
 
 
-def load_units(scene: Scene, film: Film) -> list[Loaded]:
-    """Load what is rendered one after the other: each light group by itself, and an even sky along with the first."""
+def load_groups(scene: Scene, film: Film) -> list[Loaded]:
+    """Load what is rendered one after the other: each light group, and a constant environment along with the first."""
     names = list(scene.groups)
-    skies = [] if backend() == "numpy" or len(names) == 1 else [name for name in names if scene.is_even_sky(name)][:1]
-    units = [_load_unit(scene, name, film) for name in names if name not in skies]
-    if skies:
-        units[0] = replace(units[0], groups=(*units[0].groups, names.index(skies[0])))
-    return units
+    carried = [] if backend() == "numpy" or len(names) == 1 else [x for x in names if scene.is_environment(x)][:1]
+    loaded = [_load_group(scene, name, film) for name in names if name not in carried]
+    if carried:
+        loaded[0] = replace(loaded[0], groups=(*loaded[0].groups, names.index(carried[0])))
+    return loaded
 
 
-def _load_unit(scene: Scene, group: str, film: Film) -> Loaded:
-    """Load a scene with one light group at unit spectral emission (or its own colour)."""
+def _load_group(scene: Scene, group: str, film: Film) -> Loaded:
+    """Load a scene with one light group at unit spectral emission (or its own colours)."""
     description = scene.lit({group: uniform_node(1.0)})
     description["sensor"] = {**description["sensor"], "film": _recorder(film, film.size), "sampler": _SAMPLER}
     if scene.reference_plane:
         if backend() == "numpy":
             scene.check_meter()
-        meter = {
-            "type": "irradiancemeter",
-            "film": _recorder(film, (METER_PIXELS, METER_PIXELS)),
-            "sampler": _METER_SAMPLER,
-        }
+        recorder = _recorder(film, (METER_PIXELS, METER_PIXELS))
+        meter = {"type": "irradiancemeter", "film": recorder, "sampler": _METER_SAMPLER}
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
-    place, own_colour = (list(scene.groups).index(group),), scene.groups[group].own_colour
+    index, coloured = (list(scene.groups).index(group),), scene.groups[group].coloured
     if backend() == "numpy":
         covering = _load(scene, _covering(scene, group, film))
-        return Loaded(_load(scene, description), place, own_colour, sample_lights=True, covering=covering)
+        return Loaded(_load(scene, description), index, coloured, sample_lights=True, covering=covering)
     matte = with_matte_surfaces(description)
-    tabulated, curves = (matte, ()) if own_colour else with_rows(matte)
+    tabulated, curves = (matte, ()) if coloured else with_rows(matte)
     mi_scene = _load(scene, tabulated)
-    return Loaded(mi_scene, place, own_colour, not _is_even_sky(mi_scene), curves)
+    # A constant environment is met in every direction: directions sampled for the surface alone leave less noise than a
+    # mixture with ones sampled for the light, and half of the rays are saved.
+    environment = [light.class_name() for light in mi_scene.emitters()] == ["ConstantBackgroundEmitter"]
+    return Loaded(mi_scene, index, coloured, not environment, curves)
 
 
 def _covering(scene: Scene, group: str, film: Film) -> Node:
@@ -160,10 +162,10 @@ def _covering(scene: Scene, group: str, film: Film) -> Node:
     description = scene.lit({group: uniform_node(1.0)})
     one_band = replace(film, wavelength_nm=film.wavelength_nm[:1], width_nm=film.width_nm[:1])
     description["sensor"] = {**description["sensor"], "film": _recorder(one_band, film.size), "sampler": _SAMPLER}
-    for path in scene.groups[group].emitters if scene.groups[group].own_colour else ():
+    for path in scene.groups[group].emitters if scene.groups[group].coloured else ():
         *way, key = path.split("/")
         holder = reduce(getitem, way, description)
-        kind = "constant" if holder[key]["type"] in OWN_COLOUR_EMITTERS else holder[key]["type"]
+        kind = "constant" if holder[key]["type"] in COLOURED_EMITTERS else holder[key]["type"]
         holder[key] = {"type": kind, EMISSION_PARAMETER[kind]: uniform_node(1.0)}
     return description
 
@@ -174,16 +176,6 @@ def _load(scene: Scene, description: Node) -> Any:
     except RuntimeError as error:
         words = one_line(error)
         raise InputError(f"scene {scene.name}: Mitsuba can't load it: {words}; correct the description") from error
-
-
-def _is_even_sky(mi_scene: Any) -> bool:
-    """Whether the one light is a sky of the same radiance all around.
-
-    Every direction finds it, so that directions sampled for the surface alone leave less noise than a mixture with ones
-    sampled for the sky; and half of the rays are saved.
-    """
-    emitters = mi_scene.emitters()
-    return len(emitters) == 1 and emitters[0].class_name() == "ConstantBackgroundEmitter"
 
 
 def _recorder(film: Film, size: tuple[int, int]) -> Node:
@@ -198,39 +190,41 @@ def _recorder(film: Film, size: tuple[int, int]) -> Node:
     return node
 
 
-def integrators(film: Film, part_bands: int, unit: Loaded, seed: int, meter: bool = False) -> list[Any]:
-    """Integrators that together give all bands in order, each at most `part_bands` (a multiple of four).
+def integrators(
+    film: Film, part_bands: int, loaded: Loaded, seed: int, meter: bool = False
+) -> Iterator[tuple[NDArray[np.int64], Any]]:
+    """Indices of some bands and their integrator, which together give all bands in order.
 
-    Parts of one size share a kernel. A part is filled up to a multiple of four by repeating its last band; `parts`
-    tells how many count. The seed decides where in the bands the paths' wavelengths lie.
+    With Dr.Jit each has at most `part_bands` (a multiple of four), their numbers as even as can be: parts of one size
+    share a kernel. A part is filled up to a multiple of four by repeating its last band. The seed decides where in the
+    bands the paths' wavelengths lie.
     """
-    mi = mitsuba_module()
+    mi, count = mitsuba_module(), film.wavelength_nm.size
     if backend() == "numpy":
-        kind = "path" if meter else "scatteredpath"
-        return [mi.load_dict({"type": kind, "max_depth": film.max_depth})]
-    how = {"own_colour": unit.own_colour, "sample_lights": unit.sample_lights, "even_sky": len(unit.groups) > 1}
-    offsets, made = band_offsets(seed), []
-    for part in parts(film, part_bands):
+        plug_in = "path" if meter else "scatteredpath"
+        yield np.arange(count), mi.load_dict({"type": plug_in, "max_depth": film.max_depth})
+        return
+    offsets = band_offsets(seed)
+    for part in np.array_split(np.arange(count), -(-count // part_bands)):
         padded = np.concatenate([part, np.full(-part.size % LANES, part[-1])])
         centre, width = film.wavelength_nm[padded], film.width_nm[padded]
-        bands = {
-            name: ",".join(map(repr, values.tolist()))
-            for name, values in (("wavelength_nm", centre), ("width_nm", width))
-        }
-        made.append(mi.load_dict({"type": "densepath", "max_depth": film.max_depth, "meter": meter, **how, **bands}))
-        if unit.curves:
-            made[-1].prepare(offsets, reflectance_table(unit.curves, centre + width * offsets[:, None]))
-    return made
+        made = mi.load_dict(
+            {
+                "type": "densepath",
+                "max_depth": film.max_depth,
+                "meter": meter,
+                "coloured": loaded.coloured,
+                "sample_lights": loaded.sample_lights,
+                "environment": len(loaded.groups) > 1,
+                "wavelength_nm": ",".join(map(repr, centre.tolist())),
+                "width_nm": ",".join(map(repr, width.tolist())),
+            }
+        )
+        if loaded.curves:
+            made.tracer.prepare(offsets, reflectance_table(loaded.curves, centre + width * offsets[:, None]))
+        yield part, made
 
 
 def seen_directly() -> Any:
     """Integrator of the light that the camera sees directly, without LLVM or CUDA."""
     return mitsuba_module().load_dict({"type": "path", "max_depth": 1})
-
-
-def parts(film: Film, part_bands: int) -> list[NDArray[np.int64]]:
-    """Indices of the bands in each part, as even as can be: their sizes differ by one at most. One without Dr.Jit."""
-    count = film.wavelength_nm.size
-    if backend() == "numpy":
-        return [np.arange(count)]
-    return np.array_split(np.arange(count), -(-count // part_bands))

@@ -18,8 +18,8 @@ def optical_constant(material: str, part: str) -> Spectrum | None:
 
     None for a material that Mitsuba has no table of, such as ``none``, its perfect mirror.
     """
-    place = metadata.distribution("mitsuba").locate_file(f"mitsuba/data/ior/{material}.{part}.spd")
-    if not _NAME.fullmatch(material) or not Path(str(place)).is_file():
+    path = metadata.distribution("mitsuba").locate_file(f"mitsuba/data/ior/{material}.{part}.spd")
+    if not _NAME.fullmatch(material) or not Path(str(path)).is_file():
         return None
-    table = np.loadtxt(str(place))
+    table = np.loadtxt(str(path))
     return Spectrum(table[:, 0], table[:, 1])

@@ -1,23 +1,20 @@
 """Independent passes over a scene, and their running sums: the mean is the picture, the scatter its error."""
 
 import traceback
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from render.error_estimates import SharedPaths
 from render.integrator.dense import LANES
 from render.level import PassMeans
-from render.loader import PART_BANDS, Film, Loaded, integrators, mitsuba_module, parts, seen_directly, variant
+from render.loader import PART_BANDS, Film, Loaded, integrators, mitsuba_module, seen_directly
 from render.scene import Scene
-from render.spectrum import Floats
 from render.transport import Transport
 from rodcone.errors import InputError, one_line
-
-Planes = NDArray[np.float32]  # (band, h, w)
+from rodcone.jit import backend
+from rodcone.types import Floats, Planes
 
 METER_BANDS = 4  # traced together by the irradiance meter: its film is small, and its kernel another one to compile
 METER_SPP = 16  # most samples a pixel and pass of its 64x64 film: 65 536 paths a pass for one number a band
@@ -32,11 +29,11 @@ class Sums:
     `spp`, `uncovered`, `radiance` and `irradiance` hold a value a pass, as `PassMeans`.
     """
 
-    mean: NDArray[np.float32]
-    scatter: NDArray[np.float32]
-    signed: NDArray[np.float32]
+    mean: Planes
+    scatter: Planes
+    signed: Planes
     seen: list[Planes]
-    coverage: NDArray[np.float32]
+    coverage: Planes
     share: tuple[int, int] | None = None
     product: Planes | None = None
     spp: list[int] = field(default_factory=list)
@@ -79,7 +76,7 @@ def no_passes(scene: Scene, film: Film) -> Sums:
     """Sums before the first pass."""
     bands = film.wavelength_nm.size
     mean, scatter, signed = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(3))
-    seen = [np.zeros((bands if x.own_colour else 1, *film.size), np.float32) for x in scene.groups.values()]
+    seen = [np.zeros((bands if x.coloured else 1, *film.size), np.float32) for x in scene.groups.values()]
     return Sums(mean, scatter, signed, seen, np.zeros(film.size, np.float32))
 
 
@@ -103,105 +100,92 @@ def sums_of(transport: Transport) -> Sums:
     return sums
 
 
-def add_pass(loaded: list[Loaded], sums: Sums, film: Film, pass_spp: int, seed: int) -> None:
+def add_pass(light_groups: list[Loaded], sums: Sums, film: Film, pass_spp: int, seed: int) -> None:
     """Render every group once more, with a seed of its own, and add it to the sums."""
     groups, bands = sums.mean.shape[:2]
     index, covered = sums.passes, 0.0
     radiance, irradiance = np.zeros((groups, bands)), np.zeros((groups, bands))
     sums.spp.append(pass_spp)
-    for unit in loaded:
-        of_pass = pass_seed(seed, unit.groups[0], index)
-        for part in camera_parts(unit, film, pass_spp, of_pass):
-            chosen = slice(part.first, part.first + part.scattered.shape[1])
-            _add(sums, unit.groups, chosen, part)
-            radiance[unit.groups, chosen] = part.scattered.mean(axis=(2, 3), dtype=np.float64)
-            if part.first == 0:  # every part of the bands sees the same paths
-                sums.coverage += np.float32(pass_spp) * part.coverage
-                covered += float(part.coverage.mean(dtype=np.float64))
-        if unit.meter is not None:
-            irradiance[list(unit.groups)] = _irradiance(unit, film, min(pass_spp, METER_SPP), of_pass)
+    for loaded in light_groups:
+        of_pass = pass_seed(seed, loaded.groups[0], index)
+        for part, integrator in integrators(film, PART_BANDS, loaded, of_pass):
+            scattered, seen, coverage = _camera_part(loaded, integrator, film.width_nm[part], pass_spp, of_pass)
+            chosen = slice(int(part[0]), int(part[-1]) + 1)
+            _add(sums, loaded.groups, chosen, scattered, seen)
+            radiance[loaded.groups, chosen] = scattered.mean(axis=(2, 3), dtype=np.float64)
+            if part[0] == 0:  # every part of the bands sees the same paths
+                sums.coverage += np.float32(pass_spp) * coverage
+                covered += float(coverage.mean(dtype=np.float64))
+        if loaded.meter is not None:
+            irradiance[list(loaded.groups)] = _irradiance(loaded, film, min(pass_spp, METER_SPP), of_pass)
     sums.uncovered.append(1 - covered)
     sums.radiance.append(radiance)
-    if any(unit.meter is not None for unit in loaded):
+    if any(loaded.meter is not None for loaded in light_groups):
         sums.irradiance.append(irradiance)
 
 
-@dataclass(frozen=True)
-class Part:
-    """Some bands of one pass, as a camera sees them.
-
-    Attributes
-    ----------
-    first : int
-        Index of the first band.
-    scattered : (group, band, h, w) float32
-        Band averages without the light that is seen directly, of the unit's groups in order.
-    seen : tuple of (band or 1, h, w) float32
-        Light that is seen directly, of each group: by band where it has a colour of its own.
-    coverage : (h, w) float32
-        Share of the samples that meet a light first.
-    """
-
-    first: int
-    scattered: Planes
-    seen: tuple[Planes, ...]
-    coverage: Planes
-
-
-def _add(sums: Sums, groups: tuple[int, ...], bands: slice, part: Part) -> None:
+def _add(sums: Sums, groups: tuple[int, ...], bands: slice, scattered: Planes, seen: tuple[Planes, ...]) -> None:
     """Add some bands of the pass whose samples were noted last."""
-    weight, drawn, off_mean, told = np.float32(sums.spp[-1]), np.float32(sums.drawn), [], []
-    for group, scattered, seen in zip(groups, part.scattered, part.seen, strict=True):
-        of_group = scattered + seen
+    weight, drawn = np.float32(sums.spp[-1]), np.float32(sums.drawn)
+    deltas, radiances = [], []
+    for group, scattered_of_group, seen_of_group in zip(groups, scattered, seen, strict=True):
+        radiance = scattered_of_group + seen_of_group
         mean = sums.mean[group, bands]
-        delta = of_group - mean
+        delta = radiance - mean
         mean += delta * (weight / drawn)
-        sums.scatter[group, bands] += weight * delta * (of_group - mean)
-        sums.signed[group, bands] += weight * (of_group if sums.passes % 2 else -of_group)
-        if len(seen) > 1 or bands.start == 0:
-            sums.seen[group][bands if len(seen) > 1 else slice(None)] += weight * seen
-        off_mean.append(delta)
-        told.append(of_group)
+        sums.scatter[group, bands] += weight * delta * (radiance - mean)
+        sums.signed[group, bands] += weight * (radiance if sums.passes % 2 else -radiance)
+        if len(seen_of_group) > 1 or bands.start == 0:
+            sums.seen[group][bands if len(seen_of_group) > 1 else slice(None)] += weight * seen_of_group
+        deltas.append(delta)
+        radiances.append(radiance)
     if len(groups) == 2:
         if sums.product is None:
             sums.share, sums.product = (groups[0], groups[1]), np.zeros_like(sums.mean[0])
-        sums.product[bands] += weight * off_mean[0] * (told[1] - sums.mean[groups[1], bands])
+        sums.product[bands] += weight * deltas[0] * (radiances[1] - sums.mean[groups[1], bands])
 
 
-def camera_parts(unit: Loaded, film: Film, spp: int, seed: int) -> Iterator[Part]:
-    """Render the camera's picture, at most `PART_BANDS` bands at a time; every part sees the same paths."""
-    first, count = 0, len(unit.groups)
-    for part, integrator in zip(parts(film, PART_BANDS), integrators(film, PART_BANDS, unit, seed), strict=True):
-        image = _rendered(unit.mi_scene, unit.camera, integrator, spp, seed)
-        scattered, others = _bands(image, count, film.width_nm[part])
-        shares, of_light = others[:count], others[count : count + part.size]
-        if unit.covering is not None:
-            image = _rendered(unit.covering, unit.covering.sensors()[0], seen_directly(), spp, seed)
-            shares = _bands(image, 1, film.width_nm[:1])[0][0]
-            if unit.own_colour:
-                image = _rendered(unit.mi_scene, unit.camera, seen_directly(), spp, seed)
-                of_light = _bands(image, 1, film.width_nm)[0][0]
-        seen = (of_light if unit.own_colour else shares[:1], *shares[1:, None])
-        yield Part(first, scattered, seen, shares.sum(axis=0))
-        first += part.size
+def _camera_part(
+    loaded: Loaded, integrator: Any, width_nm: Floats, spp: int, seed: int
+) -> tuple[Planes, tuple[Planes, ...], Planes]:
+    """Render some bands of the camera's picture.
+
+    Returns
+    -------
+    scattered : (group, band, h, w) float32
+        Band averages without the light that is seen directly.
+    seen : tuple of (band or 1, h, w) float32
+        Light that is seen directly, of each group: by band where it has colours of its own.
+    coverage : (h, w) float32
+        Share of the samples that meet a light first.
+    """
+    count = len(loaded.groups)
+    image = _rendered(loaded.mi_scene, loaded.camera, integrator, spp, seed)
+    scattered, others = _bands(image, count, width_nm)
+    shares, of_light = others[:count], others[count : count + width_nm.size]
+    if loaded.covering is not None:  # without Dr.Jit renders of their own show the lights
+        image = _rendered(loaded.covering, loaded.covering.sensors()[0], seen_directly(), spp, seed)
+        shares = _bands(image, 1, width_nm[:1])[0][0]
+        if loaded.coloured:
+            image = _rendered(loaded.mi_scene, loaded.camera, seen_directly(), spp, seed)
+            of_light = _bands(image, 1, width_nm)[0][0]
+    return scattered, (of_light if loaded.coloured else shares[:1], *shares[1:, None]), shares.sum(axis=0)
 
 
-def _irradiance(unit: Loaded, film: Film, spp: int, seed: int) -> Floats:
+def _irradiance(loaded: Loaded, film: Film, spp: int, seed: int) -> Floats:
     """Irradiance on the reference plane, shape (group, band); summed in float64, so that threads don't change it."""
     means = []
-    for part, integrator in zip(
-        parts(film, METER_BANDS), integrators(film, METER_BANDS, unit, seed, meter=True), strict=True
-    ):
-        image = _rendered(unit.mi_scene, unit.meter, integrator, spp, seed)
-        means.append(_bands(image, len(unit.groups), film.width_nm[part])[0].mean(axis=(2, 3), dtype=np.float64))
+    for part, integrator in integrators(film, METER_BANDS, loaded, seed, meter=True):
+        image = _rendered(loaded.mi_scene, loaded.meter, integrator, spp, seed)
+        means.append(_bands(image, len(loaded.groups), film.width_nm[part])[0].mean(axis=(2, 3), dtype=np.float64))
     # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
-    return np.concatenate(means, axis=1) * (1 if variant() == "scalar_spectral" else np.pi)
+    return np.concatenate(means, axis=1) * (1 if backend() == "numpy" else np.pi)
 
 
 def _bands(image: Planes, groups: int, width_nm: Floats) -> tuple[Planes, Planes]:
     """Band averages (group, band, h, w) of a rendered part, and the channels after them."""
     size = width_nm.size
-    if variant() == "scalar_spectral":  # specfilm integrates over the band
+    if backend() == "numpy":  # specfilm integrates over the band
         return (image[:size] / width_nm.astype(np.float32)[:, None, None])[None], image[size:]
     if image[-1].any():
         raise InputError(

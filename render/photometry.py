@@ -5,8 +5,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.tables import colour_science
+from rodcone.types import Floats
 
 PLANCK_J_S = 6.62607015e-34  # exact, SI 2019
 LIGHT_M_S = 299792458.0  # exact

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.photometry import luminance, tristimulus
-from render.spectrum import Floats, band_widths
+from render.spectrum import band_widths
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.errors import InputError, require_range
 from rodcone.notebook import html_of, preview_png
+from rodcone.types import Floats
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,9 @@ class SpectralRadiance:
         Median over pixels and bands of the Monte Carlo standard error over the mean; 0 where nothing was rendered.
     width_nm : (band,) float64
         Band widths; left out, the spacing of evenly spaced centres.
-    band_error : (band,) float64, optional
-        What light that varies within a band adds to each band, relative, RMS over pixels: the product of band averages
-        of transport and emission misses their covariance (`render.error_estimates.within_band_error`).
     relative_level_error : float, optional
         Monte Carlo standard error over the value of the level that the light was brought to; None where none was asked
-        for, or nothing tells it.
+        for, or there is no estimate.
     signed : bool
         Whether values may be negative: half of a render's passes, whose noise may cross 0.
 
@@ -46,7 +44,6 @@ class SpectralRadiance:
     wavelength_nm: Floats
     relative_mc_error: float = 0.0
     width_nm: Floats | None = None
-    band_error: Floats | None = None
     relative_level_error: float | None = None
     signed: bool = False
 

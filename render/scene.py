@@ -7,8 +7,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from render.optical_constants import optical_constant
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.errors import InputError, one_line, unknown
+from rodcone.types import Floats
 
 Node: TypeAlias = dict[str, Any]
 
@@ -20,8 +21,8 @@ EMISSION_PARAMETER = {
     "spot": "intensity",
     "directional": "irradiance",
 }
-# Emitter plug-ins with colours of their own, which differ over directions: a spectrum can only filter them.
-OWN_COLOUR_EMITTERS = ("envmap", "sunsky")
+# Emitter plug-ins whose colour differs over directions: a spectrum can only filter them.
+COLOURED_EMITTERS = ("envmap", "sunsky")
 HELD_NM = (100.0, 20_000.0)  # as far as held ends go
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
 _SIZELESS_EMITTERS = ("point", "spot", "directional")  # rays can't meet them
@@ -34,20 +35,20 @@ class LightGroup:
     Attributes
     ----------
     emitters : tuple of str
-        Where they stand in the scene's dict: ``"sun"``, or ``"panel/emitter"`` for one inside a shape.
+        Their keys in the scene's dict: ``"sun"``, or ``"panel/emitter"`` for one inside a shape.
     spectrum : Spectrum
         Emission at power 1: W m^-2 sr^-1 nm^-1 for ``area`` and ``constant``, per m^2 less for the others. With
-        `own_colour` a factor on what the emitters give by themselves, `flat()` to leave it as it is.
+        `coloured` a factor on what the emitters give by themselves, `flat()` to leave it as it is.
     power : float
         Factor on the spectrum.
-    own_colour : bool
-        The emitters keep the emission that stands in the scene's dict: an ``envmap``, a ``sunsky``, a textured panel.
+    coloured : bool
+        The emitters keep the emission that the scene's dict states: an ``envmap``, a ``sunsky``, a textured panel.
     """
 
     emitters: tuple[str, ...]
     spectrum: Spectrum
     power: float = 1.0
-    own_colour: bool = False
+    coloured: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class Scene:
     ------
     InputError
         Where a light is missing, of a kind that can't be relit, or in no group; where an ``envmap`` or ``sunsky`` is in
-        a group without `own_colour`; or the plane isn't in the scene; or `extend` is something else.
+        a group without `coloured`; or the plane isn't in the scene; or `extend` is something else.
     """
 
     name: str
@@ -86,21 +87,21 @@ class Scene:
         for path in grouped:
             if path not in present:
                 raise unknown(f"scene {self.name}: emitter", path, present)
-        tinted = {path for group in self.groups.values() if group.own_colour for path in group.emitters}
+        tinted = {path for group in self.groups.values() if group.coloured for path in group.emitters}
         for path, kind in present.items():
             if kind in _REFUSED_EMITTERS:
                 raise InputError(
                     f"scene {self.name}: emitter {path!r} of type {kind!r} can't be relit; "
-                    f"allowed: {', '.join((*EMISSION_PARAMETER, *OWN_COLOUR_EMITTERS))}; replace it by one of these"
+                    f"allowed: {', '.join((*EMISSION_PARAMETER, *COLOURED_EMITTERS))}; replace it by one of these"
                 )
             if grouped.count(path) != 1:
                 raise InputError(
                     f"scene {self.name}: emitter {path!r} is in {grouped.count(path)} light groups; put it in one"
                 )
-            if kind in OWN_COLOUR_EMITTERS and path not in tinted:
+            if kind in COLOURED_EMITTERS and path not in tinted:
                 raise InputError(
                     f"scene {self.name}: emitter {path!r} of type {kind!r} has colours of its own; "
-                    "allowed: a light group with own_colour=True, whose spectrum is a factor; set it"
+                    "allowed: a light group with coloured=True, whose spectrum is a factor; set it"
                 )
         if self.reference_plane is not None and self.reference_plane not in self.geometry:
             raise unknown(f"scene {self.name}: reference_plane", self.reference_plane, self.geometry)
@@ -109,11 +110,11 @@ class Scene:
         if self.extend:
             object.__setattr__(self, "geometry", _hold(self.geometry, present))
 
-    def is_even_sky(self, group: str) -> bool:
+    def is_environment(self, group: str) -> bool:
         """Whether a group is one light of one spectrum and of the same radiance from all around."""
         lights = self.groups[group]
         kinds = [emitter_paths(self.geometry)[path] for path in lights.emitters]
-        return kinds == ["constant"] and not lights.own_colour
+        return kinds == ["constant"] and not lights.coloured
 
     def check_meter(self) -> None:
         """Raise `InputError` where Mitsuba's own irradiance meter, whose rays have to meet a light, would read 0."""
@@ -128,7 +129,7 @@ class Scene:
     def description(self) -> Node:
         """Plain dict for `mitsuba.load_dict`, every light at its own spectrum and power.
 
-        Lights of their own colour stand in it as they are: Mitsuba has no place for a factor on them.
+        Coloured emitters are left as they are: Mitsuba has no parameter for a factor on them.
         """
         return self.lit({name: spectrum_node(group.spectrum * group.power) for name, group in self.groups.items()})
 
@@ -137,7 +138,7 @@ class Scene:
         result: Node = _copy(self.geometry)
         for name, group in self.groups.items():
             for path in group.emitters:
-                _replace_emitter(result, path.split("/"), emission.get(name), group.own_colour)
+                _replace_emitter(result, path.split("/"), emission.get(name), group.coloured)
         return result
 
 
@@ -186,7 +187,7 @@ def _numbers(text: Any) -> Floats:
 
 
 def _hold(node: Node, emitters: Mapping[str, str], prefix: str = "") -> Node:
-    """Copy of a node in which the tables outside of lights go on at their end values."""
+    """Copy of a node in which the tables outside of lights continue at their end values."""
     if (table := table_of(node)) is not None:
         return spectrum_node(_held(table))
     result: Node = {}
@@ -206,7 +207,7 @@ def _hold(node: Node, emitters: Mapping[str, str], prefix: str = "") -> Node:
 
 
 def _held(table: Spectrum) -> Spectrum:
-    """Table that goes on at its end values."""
+    """Table continued at its end values."""
     nm = table.wavelength_nm
     far = np.unique([min(HELD_NM[0], nm[0]), *nm, max(HELD_NM[1], nm[-1])])
     return Spectrum(far, np.interp(far, nm, table.values))
@@ -219,7 +220,7 @@ def emitter_paths(node: Node, prefix: str = "") -> dict[str, str]:
         if not isinstance(value, dict):
             continue
         path, kind = f"{prefix}{key}", value.get("type")
-        if kind in (*EMISSION_PARAMETER, *OWN_COLOUR_EMITTERS, *_REFUSED_EMITTERS):
+        if kind in (*EMISSION_PARAMETER, *COLOURED_EMITTERS, *_REFUSED_EMITTERS):
             found[path] = str(kind)
         found |= emitter_paths(value, f"{path}/")
     return found
@@ -232,12 +233,12 @@ def _copy(value: Any) -> Any:
     return list(value) if isinstance(value, list) else value
 
 
-def _replace_emitter(node: Node, path: list[str], emission: Node | None, own_colour: bool) -> None:
-    """Give the emitter at `path` its emission, or remove it; one of its own colour keeps what it has."""
+def _replace_emitter(node: Node, path: list[str], emission: Node | None, coloured: bool) -> None:
+    """Give the emitter at `path` its emission, or remove it; a coloured one keeps its own."""
     *way, key = path
     for step in way:
         node = node[step]
     if emission is None:
         del node[key]
-    elif not own_colour:
+    elif not coloured:
         node[key][EMISSION_PARAMETER[node[key]["type"]]] = emission

@@ -7,8 +7,9 @@ import numpy as np
 
 from render.optical_constants import optical_constant
 from render.scene import Node, Scene, emitter_paths, table_of
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.errors import InputError
+from rodcone.types import Floats
 
 SUNSKY_NM = (320.0, 720.0)  # Mitsuba's tables (Hosek & Wilkie 2012) end here, and give 0 beyond: found by evaluating it
 CIE_NM = (360.0, 830.0)  # Mitsuba's MI_CIE_MIN and MI_CIE_MAX, likewise for the two below
@@ -36,9 +37,9 @@ def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:
             raise InputError(f"{asked} {path} is known over {low:g}-{high:g} nm alone; give bands within{extend}")
 
 
-def warn_of_own_colours(scene: Scene, wavelength_nm: Floats, width_nm: Floats) -> None:
+def warn_of_coloured_lights(scene: Scene, wavelength_nm: Floats, width_nm: Floats) -> None:
     """Tell by a `UserWarning` where data of a light with colours of its own end within the bands."""
-    for path in (path for group in scene.groups.values() if group.own_colour for path in group.emitters):
+    for path in (path for group in scene.groups.values() if group.coloured for path in group.emitters):
         for part in _parts(scene.geometry, path.split("/")):
             within_cie = Spectrum(np.array(CIE_NM), np.ones(2)) if part.get("type") in _EMISSION_WITHIN_CIE else None
             if table := within_cie or table_of(part):

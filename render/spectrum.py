@@ -1,14 +1,12 @@
 """Spectra as piecewise linear functions, and their averages over wavelength bands."""
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rodcone.errors import InputError
-
-Floats: TypeAlias = NDArray[np.float64]
+from rodcone.types import Floats as Floats  # noqa: PLC0414  (other packages import it from here)
 
 VISIBLE_NM = (380.0, 780.0)
 SHORTEST_NM, LONGEST_NM = 100.0, 20_000.0  # what is taken for a wavelength in nm: from the far ultraviolet to heat

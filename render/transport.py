@@ -14,10 +14,11 @@ from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.scene_range import warn_of_dark_ends
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.errors import InputError, require_keys, require_range
 from rodcone.jit import arrays, backend, dr
 from rodcone.notebook import html_of
+from rodcone.types import Floats, Planes
 
 Stop = Literal["samples", "noise", "seconds", "interrupt"]
 
@@ -53,14 +54,14 @@ class Transport:
     relative_mc_error : float
         Error reached under the scene's own lights: median over pixels and bands of standard error over mean.
     shared : SharedPaths or None
-        Two groups whose errors are correlated, since an even sky is rendered along with another group.
+        Two groups whose errors are correlated, since a constant environment is rendered along with another group.
     """
 
-    radiance: NDArray[np.float32]
-    half_difference: NDArray[np.float32]
-    variance: NDArray[np.float32]
-    coverage: NDArray[np.float32]
-    seen: tuple[NDArray[np.float32], ...]
+    radiance: Planes
+    half_difference: Planes
+    variance: Planes
+    coverage: Planes
+    seen: tuple[Planes, ...]
     pass_means: PassMeans
     groups: Mapping[str, LightGroup]
     wavelength_nm: Floats
@@ -103,8 +104,8 @@ class Transport:
         Returns
         -------
         SpectralRadiance
-            float32, each value rounded once from float64. Its `band_error` tells what products of band averages miss,
-            its `relative_level_error` how far the level that was asked for may be off.
+            float32 over band-planar memory, each value rounded once from float64. `relative_level_error` is the error
+            of the level that was asked for. `Transport.band_error` estimates what products of band averages miss.
 
         Raises
         ------
@@ -117,14 +118,13 @@ class Transport:
         UserWarning
             Where a light's spectrum ends within the bands at a value other than 0: it gives no light beyond.
         """
-        lights = self._lights(spectra, powers)
-        coefficients, level_error = self._at_level(self._emission(lights), luminance_cd_m2, illuminance_lux)
+        emitted = self._emission(spectra, powers)
+        coefficients, level_error = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         return SpectralRadiance(
-            values=_view(_combine(coefficients, self.radiance)),
+            values=np.moveaxis(_combine(coefficients, self.radiance), 0, -1),
             wavelength_nm=self.wavelength_nm,
             relative_mc_error=relative_error(coefficients, self.radiance, self.variance, shared=self.shared),
             width_nm=self.width_nm,
-            band_error=within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm),
             relative_level_error=level_error,
         )
 
@@ -142,22 +142,33 @@ class Transport:
         unbiased estimate of that function's Monte Carlo variance. Where an error is larger than the value, a half may
         be under 0: both are `signed`.
         """
-        emitted = self._emission(self._lights(spectra, powers))
+        emitted = self._emission(spectra, powers)
         coefficients, _ = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         values, difference = _combine(coefficients, self.radiance), _combine(coefficients, self.half_difference)
         even, odd = (
-            SpectralRadiance(_view(half), self.wavelength_nm, width_nm=self.width_nm, signed=True)
+            SpectralRadiance(np.moveaxis(half, 0, -1), self.wavelength_nm, width_nm=self.width_nm, signed=True)
             for half in (values + difference, values - difference)
         )
         return even, odd
 
-    def relight_variance(self, *, luminance_cd_m2: float) -> NDArray[np.float32]:
+    def relight_variance(self, *, luminance_cd_m2: float) -> Planes:
         """Monte Carlo variance of `relight` at a level of the scene's own lights, shape (band, h, w)."""
         coefficients = self._own_at(luminance_cd_m2)
         independent = _combine(coefficients**2, self.variance)
         if self.shared is None:
             return independent
         return np.asarray(np.maximum(independent + self.shared.term(coefficients, self.variance), np.float32(0)))
+
+    def band_error(
+        self, spectra: Mapping[str, Spectrum | str] | None = None, *, powers: Mapping[str, float] | None = None
+    ) -> Floats:
+        """Error of `relight` where light and transport both vary within a band, shape (band,).
+
+        Relative, RMS over pixels: the product of band averages misses their covariance
+        (`render.error_estimates.within_band_error`).
+        """
+        lights = self._lights(spectra, powers)
+        return within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm)
 
     def level(
         self, spectra: Mapping[str, Spectrum | str] | None = None, *, powers: Mapping[str, float] | None = None
@@ -171,7 +182,7 @@ class Transport:
         InputError
             As `relight`, and where lights fill the picture.
         """
-        return self.pass_means.luminance_level(self._luminance_weights(self._emission(self._lights(spectra, powers))))
+        return self.pass_means.luminance_level(self._luminance_weights(self._emission(spectra, powers)))
 
     def illuminance_lux(self, luminance_cd_m2: float) -> float | None:
         """Illuminance on the reference plane at a mean luminance under the scene's own lights; None without a plane."""
@@ -188,7 +199,7 @@ class Transport:
 
         At a level of the scene's own lights; None: at their own powers.
         """
-        emitted = self._emission(self._lights(None, None))
+        emitted = self._emission()
         weights = self._luminance_weights(self._at_level(emitted, luminance_cd_m2, None)[0])
         total = np.zeros(self.coverage.shape)
         for of_group, radiance, seen in zip(weights, self.radiance, self.seen, strict=True):
@@ -228,12 +239,15 @@ class Transport:
             lights[name] = replace(group, spectrum=spectrum, power=power)
         return lights
 
-    def _emission(self, lights: Mapping[str, LightGroup]) -> Floats:
-        return emission(lights, self.wavelength_nm, self.width_nm)
+    def _emission(
+        self, spectra: Mapping[str, Spectrum | str] | None = None, powers: Mapping[str, float] | None = None
+    ) -> Floats:
+        """Spectral emission of the lights asked for, shape (group, band)."""
+        return emission(self._lights(spectra, powers), self.wavelength_nm, self.width_nm)
 
     def _own_at(self, luminance_cd_m2: float) -> Floats:
         """Emission of the scene's own lights brought to a level, shape (group, band)."""
-        return self._at_level(self._emission(self._lights(None, None)), luminance_cd_m2, None)[0]
+        return self._at_level(self._emission(), luminance_cd_m2, None)[0]
 
     def _at_level(
         self, emitted: Floats, luminance_cd_m2: float | None, illuminance_lux: float | None
@@ -264,7 +278,7 @@ def emission(lights: Mapping[str, LightGroup], wavelength_nm: Floats, width_nm: 
     return np.array([x.spectrum.band_average(wavelength_nm, width_nm) * x.power for x in lights.values()])
 
 
-def _combine(coefficients: Floats, planes: NDArray[np.float32]) -> NDArray[np.float32]:
+def _combine(coefficients: Floats, planes: Planes) -> Planes:
     """Sum over groups, shape (band, h, w): in float64, rounded once; every value is read once."""
     groups, bands, height, width = planes.shape
     pixels = height * width
@@ -284,8 +298,3 @@ def _combine(coefficients: Floats, planes: NDArray[np.float32]) -> NDArray[np.fl
         dr.scatter(sums, types.Float(total), index + dr.opaque(types.UInt, band * pixels), mode=dr.ReduceMode.Permute)
         dr.eval(sums)
     return np.asarray(sums.numpy()).reshape(bands, height, width)
-
-
-def _view(planes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(h, w, band) view, as the type promises, of band-planar memory: every later step sums over bands."""
-    return np.moveaxis(planes, 0, -1)

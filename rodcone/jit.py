@@ -1,88 +1,16 @@
-"""Dr.Jit, and the choice of the LLVM library it compiles with. The only module that imports Dr.Jit.
+"""Dr.Jit, with the LLVM library of `rodcone.llvm`. The only module that imports Dr.Jit."""
 
-Dr.Jit 1.5 refuses LLVM 14 and aborts the process with 15 and 16, so a library is judged by its file name and never
-loaded to find out. Order: the user's own ``DRJIT_LIBLLVM_PATH``, the `karellen-llvm-core` wheel, the newest system
-library of version 17 or more.
-"""
-
-import os
-import re
-import sys
-import warnings
 from functools import cache
-from importlib import metadata
-from pathlib import Path
 from typing import Any, Literal
+
+import drjit as dr  # the package's own import has run `rodcone.llvm` by now, which tells Dr.Jit where its LLVM is
+import drjit.scalar
+
+from rodcone.llvm import LIBLLVM
 
 Backend = Literal["cuda", "llvm", "numpy"]
 
-OLDEST_LLVM = 17  # 15 and 16 abort with "Cannot select: fmaximum" at the first kernel (measured with Dr.Jit 1.5)
-_SYSTEM_DIRECTORIES = (
-    "/usr/lib",
-    "/usr/lib64",
-    "/usr/local/lib",
-    "/usr/lib/x86_64-linux-gnu",
-    "/usr/lib/aarch64-linux-gnu",
-)
-_LIBRARY_NAME = re.compile(r"libLLVM(?:-(\d+)\.so(?:\.\d+)*|\.so\.(\d+)(?:\.\d+)*)$")
-
-
-def llvm_version(path: Path) -> int | None:
-    """Major version of an LLVM library by its file name, None where the name doesn't tell."""
-    match = _LIBRARY_NAME.match(path.name)
-    return int(match[1] or match[2]) if match else None
-
-
-def _wheel_library() -> Path | None:
-    try:
-        files = metadata.files("karellen-llvm-core") or []
-    except metadata.PackageNotFoundError:
-        return None
-    paths = [Path(str(file.locate())).resolve() for file in files if llvm_version(Path(file.name))]
-    return max(paths, key=lambda path: llvm_version(path) or 0, default=None)
-
-
-def _system_library() -> Path | None:
-    folders = [Path(name) for name in _SYSTEM_DIRECTORIES] + sorted(Path("/usr/lib").glob("llvm-*/lib"))
-    paths = [path for folder in folders for path in folder.glob("libLLVM*.so*") if path.is_file()]
-    return max(
-        (path for path in paths if (llvm_version(path) or 0) >= OLDEST_LLVM),
-        key=lambda path: llvm_version(path) or 0,
-        default=None,
-    )
-
-
-def find_llvm() -> Path | None:
-    """Library that Dr.Jit is told to use, None where there is none of version 17 or more."""
-    own = os.environ.get("DRJIT_LIBLLVM_PATH")
-    return Path(own) if own else _wheel_library() or _system_library()
-
-
-def _loaded_too_early() -> Path | None:
-    """LLVM library of less than 17 that an earlier `import drjit` has already loaded; it can't be replaced."""
-    maps = Path("/proc/self/maps")
-    if "drjit" not in sys.modules or not maps.is_file():
-        return None
-    paths = {Path(line.split()[-1]) for line in maps.read_text().splitlines() if "libLLVM" in line}
-    return next((path for path in paths if (llvm_version(path) or OLDEST_LLVM) < OLDEST_LLVM), None)
-
-
-LIBLLVM = find_llvm()
-if _early := _loaded_too_early():
-    warnings.warn(
-        f"Dr.Jit was imported before rodcone and loaded {_early}, which aborts: rendering and reconstruction run their "
-        f"slow forms; import rodcone's modules first, or set DRJIT_LIBLLVM_PATH={LIBLLVM}",
-        RuntimeWarning,
-        stacklevel=2,
-    )
-    LIBLLVM = None
-# Without a usable library Dr.Jit would search by itself and may load one that aborts the process: name one that isn't.
-os.environ["DRJIT_LIBLLVM_PATH"] = str(LIBLLVM) if LIBLLVM else "/nonexistent/libLLVM.so"
-
-import drjit as dr  # noqa: E402  (the environment variable above must come first)
-import drjit.scalar  # noqa: E402
-
-__all__ = ["LIBLLVM", "Matrix4", "arrays", "backend", "compiler_version", "dr", "find_llvm", "llvm_version"]
+__all__ = ["Backend", "Matrix4", "arrays", "backend", "compiler_version", "dr"]
 
 Matrix4 = dr.scalar.Matrix4f64  # a 4x4 transform as `mitsuba.load_dict` takes it in every variant
 

@@ -86,7 +86,7 @@ def require_memory(need: Memory, force: bool = False) -> None:
 
 
 def memory_limits(root: Path = Path("/")) -> Iterator[Limit]:
-    """Bounds on this process's memory that the system tells; none where it tells none.
+    """Bounds on this process's memory that the system states, if any.
 
     Parameters
     ----------

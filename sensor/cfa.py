@@ -33,6 +33,11 @@ MOSAICS: Mapping[str, Tile] = MappingProxyType(
 )
 
 
+def mosaics() -> tuple[str, ...]:
+    """Names of the mosaics that `tile_of` knows."""
+    return tuple(MOSAICS)
+
+
 def tile_of(mosaic: str | Sequence[str]) -> Tile:
     """Tile of a mosaic given by a name of `MOSAICS`, or by its rows of channels.
 

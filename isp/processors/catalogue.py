@@ -106,6 +106,11 @@ PROCESSORS: Mapping[str, Processor] = MappingProxyType(
 )
 
 
+def names() -> tuple[str, ...]:
+    """Names of all processors, installed or not."""
+    return tuple(PROCESSORS)
+
+
 def libraries(name: str) -> tuple[str, ...]:
     """Libraries that a processor of `PROCESSORS` needs beside rodcone's own."""
     extra = PROCESSORS[name].extra

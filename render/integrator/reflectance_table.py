@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.scene import Node, table_of, uniform_node
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.jit import dr
+from rodcone.types import Floats
 
 STEPS = 16  # offsets within a band: a pass's mean over them is off by under 1e-4 of the steepest reflectance here
 
@@ -20,7 +21,7 @@ STEPS = 16  # offsets within a band: a pass's mean over them is off by under 1e-
 def band_offsets(seed: int) -> Floats:
     """Offsets from a band's centre in widths, one in each of `STEPS` equal parts of the band, shape (step,).
 
-    Every part's place is uniform over it, so that averages over passes are band averages without bias. Neighbours lie
+    The offset is uniform over its part, so that averages over passes are band averages without bias. Neighbours lie
     mirrored, so that their mean is the centre's in each pass: a reflectance that rises evenly is then averaged exactly.
     """
     within = np.random.default_rng(seed).random()

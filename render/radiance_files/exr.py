@@ -85,11 +85,6 @@ def write_exr(path: str | Path, radiance: SpectralRadiance, *, scene: str = "") 
         PREVIEW: PREVIEW_TEXT,
         **({SCENE: scene} if scene else {}),
     }
-    _write_whole(path, header, channels)
-
-
-def _write_whole(path: Path, header: dict[str, Any], channels: dict[str, NDArray[np.float32]]) -> None:
-    """Write beside the place and move there."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as (place,):
         try:
@@ -110,7 +105,7 @@ def read_exr(path: str | Path) -> SpectralRadiance:
     """Read radiance from a spectral OpenEXR file, rodcone's own or another program's.
 
     Any S0 channels in any order, in wavelengths or frequencies, in half or float, with or without a preview. What has
-    to be assumed is told by a `UserWarning`. Polarisation (S1 to S3) is left out: S0 is the radiance. Of a picture
+    to be assumed is named by a `UserWarning`. Polarisation (S1 to S3) is left out: S0 is the radiance. Of a picture
     that is smaller than its frame the part that is there is read.
 
     Parameters

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 
 from render.radiance_files.file_checks import bands_between
-from render.spectrum import Floats, band_widths
+from render.spectrum import band_widths
 from rodcone.errors import InputError, require_range
+from rodcone.types import Floats
 
 VERSION = "1.0"
 LAYOUT_UNITS = "W.m^-2.sr^-1"  # what the layout prescribes, though its values are spectral: per nm
@@ -86,7 +87,7 @@ def read_bands(channels: Mapping[str, float], header: Mapping[str, Any]) -> tupl
     """Band centres and widths [nm] of a file's radiance channels.
 
     As rodcone's own attribute states them, if it still fits the channels; else the names' wavelengths, as
-    `bands_between` takes them. What has to be assumed is told by a `UserWarning`.
+    `bands_between` takes them. A `UserWarning` names what has to be assumed.
 
     Raises
     ------
@@ -119,7 +120,7 @@ def _parsed(text: str) -> tuple[Floats, Floats] | None:
 
 
 def check_units(header: Mapping[str, Any], channels: Iterable[str]) -> None:
-    """Raise `InputError` for units that aren't spectral radiance; tell what is assumed by a `UserWarning`."""
+    """Raise `InputError` for units that aren't spectral radiance; a `UserWarning` names what is assumed."""
     stated = header.get(OWN_UNITS, header.get(UNITS))
     if stated is None:
         warnings.warn(f"it states no {UNITS}: {TRUE_UNITS} is assumed", UserWarning, stacklevel=3)

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from render.spectrum import Floats, band_widths
+from render.spectrum import band_widths
 from rodcone.errors import InputError
+from rodcone.types import Floats
 
 MOST_SIDE = 1 << 15  # pixels; the engine's own limit
 MOST_BYTES = 1 << 33  # of float32 pixels: 8 GiB, such as 4 Mpx with 500 bands; a render that size needs three times it
@@ -53,8 +54,8 @@ def require_extent(height: int, width: int, channels: int) -> int:
 def bands_between(wavelength_nm: Floats) -> tuple[Floats, Floats]:
     """Band centres and widths [nm] of a file that states its samples' wavelengths alone: they are as wide as spaced.
 
-    Where the spacing is uneven, bands meet half-way between neighbours (widths as in the trapezoidal rule), which a
-    `UserWarning` tells: a sample then lies beside its band's centre.
+    Where the spacing is uneven, bands meet half-way between neighbours (widths as in the trapezoidal rule), with a
+    `UserWarning`: a sample then lies beside its band's centre.
 
     Raises
     ------

@@ -15,12 +15,16 @@ from numpy.typing import NDArray
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from render.radiance_files.file_checks import MOST_EXPANSION, SMALL_BYTES, bands_between, require_extent, require_file
-from render.radiance_files.mat5 import Value, read_variables
-from render.spectrum import Floats
+from render.radiance_files.mat_file import read_numbers
 from rodcone.errors import InputError
+from rodcone.types import Floats
 
 MOST_NEGATIVE = 0.01  # of the samples of stored photons; more is no noise
-_VARIABLES = ("scene", "mcCOEF", "basis", "imgMean", "photons", "data", "wave", "wavelength")
+_KEYS = (
+    *("scene/spectrum/wave", "scene/data/photons", "scene/data/dmin", "scene/data/dmax", "scene/data/min"),
+    *("scene/data/max", "mcCOEF", "basis/basis", "basis/wave", "imgMean", "photons", "data", "wave", "wavelength"),
+)
+Numbers = Mapping[str, NDArray[Any]]  # by the keys above
 
 
 def read_iset_scene(path: str | Path) -> SpectralRadiance:
@@ -28,7 +32,7 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
 
     Three forms are known, and looked for in this order: a saved ``scene`` struct; ``mcCOEF`` and ``basis``, with
     ``imgMean`` where the mean was taken out; ``photons`` (or ``data``) with ``wave`` (or ``wavelength``). Negative
-    photons become 0, as in ISETCam, which a `UserWarning` tells: any that a basis gives, and up to 1 % of those that
+    photons become 0, as in ISETCam, with a `UserWarning`: any that a basis gives, and up to 1 % of those that
     stand in the file. Wavelength samples stand for bands as wide as their spacing. The illuminant in the file is not
     needed for radiance and not read.
 
@@ -49,9 +53,10 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
         size is over 32768 pixels a side or 8 GiB, over 1 % of stored photons are negative, or a value is not finite.
     """
     path = Path(path)
-    found = read_variables(path, _VARIABLES)
+    found = read_numbers(path, _KEYS)
     try:
-        nm, shape, photons = _photons(found)
+        from_basis = "mcCOEF" in found and not any(key.startswith("scene/") for key in found)
+        nm, shape, photons = _from_basis(found) if from_basis else _stored(found)
         centres, widths = bands_between(nm)
         needed, file_bytes = require_extent(*shape, nm.size), require_file(path)
         if needed > max(SMALL_BYTES, MOST_EXPANSION * file_bytes):
@@ -62,55 +67,40 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
         with np.errstate(all="ignore"):  # SpectralRadiance tells where a value isn't finite
             for plane, band, per_joule in zip(planes, photons, photons_per_joule(nm), strict=True):
                 plane[:] = band / per_joule
-        _clip_negative(planes, 1.0 if _is_basis(found) else MOST_NEGATIVE)
+        _clip_negative(planes, 1.0 if from_basis else MOST_NEGATIVE)
         return SpectralRadiance(np.moveaxis(planes, 0, -1), centres, width_nm=widths)
     except InputError as refused:
         raise InputError(f"{path}: {refused}") from None
 
 
-def _is_basis(found: Mapping[str, Value]) -> bool:
-    """Whether the file holds coefficients of basis functions instead of photons."""
-    return "mcCOEF" in found and "scene" not in found
-
-
-def _photons(found: Mapping[str, Value]) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
-    """Wavelengths, height and width, and the photons of one band after another."""
-    if "scene" in found:
-        scene = _struct(found, "scene")
-        data = _struct(scene, "data")
-        return _stored(_struct(scene, "spectrum"), "wave", data, "photons")
-    if _is_basis(found):
-        return _from_basis(found)
-    photons = "photons" if "photons" in found else "data"
-    return _stored(found, "wave" if "wave" in found else "wavelength", found, photons)
-
-
-def _stored(
-    spectrum: Mapping[str, Value], wave: str, data: Mapping[str, Value], photons: str
-) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
-    """Photons as they stand in the file."""
-    nm = _numbers(spectrum, wave).ravel().astype(np.float64)
-    cube = _cube(data, photons, nm.size)
-    scale, offset = _quantised(cube.dtype, data)
+def _stored(found: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
+    """Wavelengths, height and width, and the photons of one band after another, as they stand in the file."""
+    if any(key.startswith("scene/") for key in found):
+        wave, data, photons = "scene/spectrum/wave", "scene/data/", "scene/data/photons"
+    else:
+        wave, data = "wave" if "wave" in found else "wavelength", ""
+        photons = "photons" if "photons" in found else "data"
+    nm = _numbers(found, wave).ravel().astype(np.float64)
+    cube = _cube(found, photons, nm.size)
+    scale, offset = _quantised(cube.dtype, found, data)
     return nm, cube.shape[:2], (cube[:, :, k].astype(np.float64) * scale + offset for k in range(nm.size))
 
 
-def _quantised(dtype: np.dtype[Any], data: Mapping[str, Value]) -> tuple[float, float]:
+def _quantised(dtype: np.dtype[Any], found: Numbers, data: str) -> tuple[float, float]:
     """Scale and offset of photons: old files hold 16 or 32 bit integers that span least to most (ieCompressData)."""
     if dtype.kind == "f":
         return 1.0, 0.0
     for least, most in (("dmin", "dmax"), ("min", "max")):
-        if dtype in (np.uint16, np.uint32) and {least, most} <= data.keys():
-            low, high = (float(_numbers(data, name).ravel()[0]) for name in (least, most))
+        if dtype in (np.uint16, np.uint32) and {data + least, data + most} <= found.keys():
+            low, high = (float(_numbers(found, data + name).ravel()[0]) for name in (least, most))
             return (high - low) / float(np.iinfo(dtype).max), low
     raise InputError(f"photons are {dtype}; allowed: floating, or uint16 or uint32 with dmin and dmax; save them so")
 
 
-def _from_basis(found: Mapping[str, Value]) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
+def _from_basis(found: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
     """Photons from coefficients: coefficients times basis, and the mean where it was taken out."""
-    basis = _struct(found, "basis")
-    nm = _numbers(basis, "wave").ravel().astype(np.float64)
-    functions = np.atleast_2d(_numbers(basis, "basis").astype(np.float64))
+    nm = _numbers(found, "basis/wave").ravel().astype(np.float64)
+    functions = np.atleast_2d(_numbers(found, "basis/basis").astype(np.float64))
     if functions.shape[0] != nm.size:
         raise InputError(f"basis.basis: shape {functions.shape} has not one row for each of {nm.size} wavelengths")
     coefficients = _cube(found, "mcCOEF", functions.shape[1]).astype(np.float64)
@@ -122,7 +112,7 @@ def _from_basis(found: Mapping[str, Value]) -> tuple[Floats, tuple[int, int], It
 
 
 def _clip_negative(planes: NDArray[np.float32], most: float) -> None:
-    """Set negative values to 0 and tell their share; where it is over `most` they stay, to be refused."""
+    """Set negative values to 0 and warn of their share; where it is over `most` they stay, to be refused."""
     share = sum(int(np.count_nonzero(plane < 0)) for plane in planes) / planes.size
     if 0 < share <= most and np.isfinite(planes.min()):
         np.maximum(planes, 0.0, out=planes)
@@ -131,24 +121,17 @@ def _clip_negative(planes: NDArray[np.float32], most: float) -> None:
         )
 
 
-def _struct(parent: Mapping[str, Value], name: str) -> Mapping[str, Value]:
-    value = parent.get(name)
-    if not isinstance(value, dict):
-        raise InputError(f"it has no struct {name!r}; allowed: an ISETCam scene; save it with sceneToFile")
-    return value
+def _numbers(found: Numbers, name: str) -> NDArray[Any]:
+    if name not in found or not found[name].size:
+        stated = name.replace("/", ".")
+        raise InputError(f"it has no numbers {stated!r}; allowed: an ISETCam scene; save it with sceneToFile")
+    return found[name]
 
 
-def _numbers(parent: Mapping[str, Value], name: str) -> NDArray[Any]:
-    value = parent.get(name)
-    if not isinstance(value, np.ndarray) or not value.size:
-        raise InputError(f"it has no numbers {name!r}; allowed: an ISETCam scene; save it with sceneToFile")
-    return value
-
-
-def _cube(parent: Mapping[str, Value], name: str, depth: int) -> NDArray[Any]:
+def _cube(found: Numbers, name: str, depth: int) -> NDArray[Any]:
     """Array of (h, w, depth); MATLAB drops a last axis of 1."""
-    value = _numbers(parent, name)
+    value = _numbers(found, name)
     cube = value[:, :, None] if value.ndim == 2 and depth == 1 else value
     if cube.ndim != 3 or cube.shape[2] != depth:
-        raise InputError(f"{name}: shape {value.shape} is not (h, w, {depth}); correct it")
+        raise InputError(f"{name.replace('/', '.')}: shape {value.shape} is not (h, w, {depth}); correct it")
     return cube

@@ -7,7 +7,7 @@ this list may be native code. The list is what Mitsuba 3.9 ships, less what the 
 
 from typing import Any
 
-from render.scene import EMISSION_PARAMETER, OWN_COLOUR_EMITTERS
+from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER
 from rodcone.errors import InputError, unknown
 
 CAMERAS = ("perspective", "thinlens")
@@ -15,39 +15,22 @@ METER = "irradiancemeter"  # in a shape it marks the plane on which illuminance 
 SPECTRA = ("blackbody", "d65", "irregular", "rawconstant", "regular", "srgb", "uniform")
 
 # By kind. Films, filters, samplers and integrators are read and left out: the engine brings its own.
-ALLOWED: dict[str, tuple[str, ...]] = {
-    "scene": ("scene",),
-    "shape": (
-        *("bsplinecurve", "cube", "cylinder", "disk", "instance", "linearcurve", "obj", "ply", "rectangle"),
-        *("sdfgrid", "serialized", "shapegroup", "sphere"),
-    ),
-    "bsdf": (
-        *(
-            "blendbsdf",
-            "bumpmap",
-            "conductor",
-            "dielectric",
-            "diffuse",
-            "hair",
-            "mask",
-            "measured",
-            "normalmap",
-            "null",
-        ),
-        *("plastic", "principled", "principledthin", "roughconductor", "roughdielectric", "roughplastic"),
-        *("thindielectric", "twosided"),
-    ),
-    "emitter": (*EMISSION_PARAMETER, *OWN_COLOUR_EMITTERS),
-    "texture": ("bitmap", "checkerboard", "mesh_attribute", *SPECTRA),
-    "sensor": (*CAMERAS, METER),
-    "film": ("hdrfilm", "specfilm"),
-    "rfilter": ("box", "catmullrom", "gaussian", "lanczos", "mitchell", "tent"),
-    "sampler": ("independent", "ldsampler", "multijitter", "orthogonal", "stratified"),
-    "integrator": (
-        *("aov", "depth", "direct", "direct_projective", "moment", "path", "prb", "prb_basic", "prb_projective"),
-        *("prbvolpath", "ptracer", "stokes", "volpath", "volpathmis"),
-    ),
+_STOCK = {
+    "scene": "scene",
+    "shape": "bsplinecurve cube cylinder disk instance linearcurve obj ply rectangle sdfgrid serialized shapegroup "
+    "sphere",
+    "bsdf": "blendbsdf bumpmap conductor dielectric diffuse hair mask measured normalmap null plastic principled "
+    "principledthin roughconductor roughdielectric roughplastic thindielectric twosided",
+    "texture": "bitmap checkerboard mesh_attribute",
+    "film": "hdrfilm specfilm",
+    "rfilter": "box catmullrom gaussian lanczos mitchell tent",
+    "sampler": "independent ldsampler multijitter orthogonal stratified",
+    "integrator": "aov depth direct direct_projective moment path prb prb_basic prb_projective prbvolpath ptracer "
+    "stokes volpath volpathmis",
 }
+ALLOWED: dict[str, tuple[str, ...]] = {kind: tuple(names.split()) for kind, names in _STOCK.items()}
+ALLOWED["texture"] += SPECTRA
+ALLOWED |= {"emitter": (*EMISSION_PARAMETER, *COLOURED_EMITTERS), "sensor": (*CAMERAS, METER)}
 _KIND = {name: kind for kind, names in ALLOWED.items() for name in names}
 
 _MEDIA = "participating media aren't simulated", "remove the medium"

@@ -1,6 +1,7 @@
 """A user's own scene as Mitsuba XML, checked before anything in it is instantiated."""
 
 import os
+import re
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,13 +11,15 @@ import numpy as np
 
 from render.geometry import to_world
 from render.loader import mitsuba_module
-from render.scene import Node
+from render.scene import Node, spectrum_node, uniform_node
+from render.spectrum import Spectrum
 from render.user_scene.allowed_plugins import require_allowed
-from render.user_scene.scene_dict import RESERVED, inline_spectrum
 from render.user_scene.scene_lights import reason
 from render.user_scene.scene_parts import SceneFile, assemble
 from render.user_scene.scene_paths import find_file, screen, search_path
 from rodcone.errors import InputError, unknown
+
+_RESERVED = re.compile(r"[./\s]")  # Mitsuba's and our own separators in paths of a scene's dict
 
 
 def load_scene_file(path: str | Path, *, trust: bool = False, extend: str | None = None) -> SceneFile:
@@ -106,7 +109,7 @@ def _xml_part(
     if properties.id():
         result["id"] = properties.id()
     for name, value in properties.items():
-        key, kind = RESERVED.sub("_", name), properties.type(name).name
+        key, kind = _RESERVED.sub("_", name), properties.type(name).name
         if key in ("type", "id") or key in result:
             raise InputError(f"property name {name!r} is not allowed here; rename it")
         if kind == "Reference":
@@ -123,7 +126,7 @@ def _xml_part(
 
 def _key(taken: Node, ids: Mapping[str, int], numbers: Counter[str], wanted: str, tag: str) -> str:
     """Key of a part: the name wanted, else its kind; without separators of paths, numbered where a part has it."""
-    own = RESERVED.sub("_", wanted) or tag
+    own = _RESERVED.sub("_", wanted) or tag
     name = own if wanted else ""
     while not name or name in taken or (name != wanted and name in ids):
         name = f"{own}_{numbers[own]}"
@@ -132,6 +135,7 @@ def _key(taken: Node, ids: Mapping[str, int], numbers: Counter[str], wanted: str
 
 
 def _xml_value(kind: str, value: Any) -> Any:
+    """Value of a property as `mitsuba.load_dict` takes it in every variant."""
     if kind == "Transform":
         matrix = np.array(value.matrix, dtype=np.float64)
         if not np.all(np.isfinite(matrix)):
@@ -142,5 +146,7 @@ def _xml_value(kind: str, value: Any) -> Any:
     if kind == "Vector":
         return [float(x) for x in value]
     if kind == "Spectrum":
-        return inline_spectrum(value.wavelengths, value.values)
+        if len(value.values) == 1 and not len(value.wavelengths):
+            return uniform_node(float(value.values[0]))
+        return spectrum_node(Spectrum(np.array(value.wavelengths), np.array(value.values)))
     return value

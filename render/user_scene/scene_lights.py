@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from render.scene import EMISSION_PARAMETER, LightGroup, Node, table_of
-from render.spectrum import Floats, Spectrum, flat
+from render.spectrum import Spectrum, flat
 from render.user_scene.allowed_plugins import ALLOWED, SPECTRA
 from rodcone.errors import InputError, one_line
 from rodcone.jit import backend, dr
+from rodcone.types import Floats
 
 # MI_CIE_MIN to MI_CIE_MAX, outside of which Mitsuba's own spectra (rgb, d65, blackbody) are zero, and one point more,
 # which makes 472, by fours.
@@ -38,7 +39,7 @@ def walk(node: Node, path: Path = ()) -> Iterator[tuple[Path, Node]]:
 
 
 def attach_area_lights(name: str, geometry: Node) -> None:
-    """Move area lights that stand in the scene into the shape that refers to them, as Mitsuba has it in the end.
+    """Move area lights that stand in the scene into the shape that refers to them, as Mitsuba does itself.
 
     Raises
     ------
@@ -48,18 +49,18 @@ def attach_area_lights(name: str, geometry: Node) -> None:
     for key in [key for key, part in geometry.items() if type_of(part) == "area"]:
         light: Node = {"id": key, **geometry.pop(key)}
         held = [
-            (shape, place)
+            (shape, key_in_shape)
             for shape in geometry.values()
             if isinstance(shape, dict)
-            for place, part in shape.items()
+            for key_in_shape, part in shape.items()
             if type_of(part) == "ref" and part.get("id") in (key, light["id"])
         ]
         if len(held) != 1:
             raise InputError(
                 f"scene {name}: area light {key!r} is on {len(held)} shapes; allowed: one; give each its own"
             )
-        shape, place = held[0]
-        shape[place] = light
+        shape, key_in_shape = held[0]
+        shape[key_in_shape] = light
 
 
 def light_groups(mi: Any, name: str, geometry: Node, parts: Mapping[str, Node]) -> dict[str, LightGroup]:
@@ -93,7 +94,7 @@ def light_groups(mi: Any, name: str, geometry: Node, parts: Mapping[str, Node]) 
             for _, node in lights:
                 node.pop(EMISSION_PARAMETER[node["type"]], None)
         emitters = tuple("/".join(path) for path, _ in lights)
-        groups[group] = LightGroup(emitters, flat() if common is None else common, own_colour=common is None)
+        groups[group] = LightGroup(emitters, flat() if common is None else common, coloured=common is None)
     return groups
 
 
@@ -111,7 +112,7 @@ def _emission(mi: Any, where: str, emitter: Node, parts: Mapping[str, Node]) -> 
     while type_of(value) == "ref":
         value = parts[value["id"]]
     inner = [node["type"] for _, node in walk({"": value} if isinstance(value, dict) else {})]
-    if any(kind not in (*SPECTRA, "rgb", "spectrum") for kind in inner):
+    if any(kind not in (*SPECTRA, "rgb") for kind in inner):
         return None
     try:  # the `constant` emitter: its emission depends on wavelength alone
         probe = mi.load_dict({"type": "constant"} | ({} if value is None else {"radiance": value}))
@@ -122,7 +123,7 @@ def _emission(mi: Any, where: str, emitter: Node, parts: Mapping[str, Node]) -> 
 
 def _stated(value: Any) -> Spectrum | None:
     """Spectrum that states its own points: taken as it is, since a line may lie between those of any grid."""
-    if type_of(value) in ("uniform", "spectrum") and set(value) - {"type", "id"} == {"value"}:
+    if type_of(value) == "uniform" and set(value) - {"type", "id"} == {"value"}:
         return flat(float(value["value"]))
     return table_of(value) if isinstance(value, dict) else None
 

@@ -37,7 +37,7 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
     """Build the scene: first camera, groups of lights by id, a shape with an ``irradiancemeter`` as reference plane.
 
     Lights belong to a group by their own id, or else their shape's, up to a colon: ``lamp:left`` and ``lamp:right``
-    are dimmed together. One spectrum that differs over place or direction, or several in a group, make it `own_colour`.
+    are dimmed together. One spectrum that differs over place or direction, or several in a group, make it `coloured`.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ def find_file(name: str, searched: list[Path], folder: Path | None) -> Path:
     searched : list of Path
         Folders in which a relative name is looked for, in this order.
     folder : Path or None
-        The file has to lie inside it, links followed; None allows any place.
+        The file has to lie inside it, links followed; None allows any folder.
 
     Raises
     ------

@@ -116,15 +116,15 @@ def engine_findings() -> list[Finding]:
     """LLVM library, backend, variant and threads, as the render and the kernels use them."""
     try:
         from render.loader import integrator_name, variant
-        from rodcone import jit
+        from rodcone import jit, llvm
     except (ImportError, NameError) as error:  # Dr.Jit stumbles with a NameError over a failed import of its own
         cause = str(error.__context__ or error)
         fix = "; Debian: apt install libatomic1" if "libatomic" in cause else ""
         return [Finding("engine", f"can't be imported: {cause}{fix}", False)]
-    version = jit.llvm_version(jit.LIBLLVM) if jit.LIBLLVM else None
+    version = llvm.llvm_version(llvm.LIBLLVM) if llvm.LIBLLVM else None
     backend = jit.backend()
     return [
-        llvm_finding(jit.LIBLLVM, version, jit.OLDEST_LLVM),
+        llvm_finding(llvm.LIBLLVM, version, llvm.OLDEST_LLVM),
         Finding("backend", FALLBACK if backend == "numpy" else backend),
         Finding("Mitsuba variant", variant()),
         Finding("integrator", integrator_name()),

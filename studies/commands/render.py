@@ -125,7 +125,9 @@ def render(
     interrupted = transport.stopped_by == "interrupt"
     if interrupted:
         say(f"stopped; {transport.spp} samples a pixel are kept in {out}")
-    print_result(out, {"path": str(out), **_facts(opened, transport, radiance)}, json=json)
+    facts = {"path": str(out), **_facts(opened, transport, radiance)}
+    facts["largest_band_error"] = float(transport.band_error(spectra).max())
+    print_result(out, facts, json=json)
     return INTERRUPTED if interrupted else 0
 
 
@@ -167,8 +169,8 @@ def _spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
         require_keys(f"scene {scene.name}: light group", [group], scene.groups)
         lit = scene.groups[group]
         own = spectral_luminance(lit.spectrum)
-        if lit.own_colour or own <= 0:
-            why = "has colours of its own" if lit.own_colour else "is dark"
+        if lit.coloured or own <= 0:
+            why = "has colours of its own" if lit.coloured else "is dark"
             raise InputError(f"light: group {group!r} of scene {scene.name} {why}; leave it as it is")
         found[group] = illuminant(name) * own
     return found
@@ -176,14 +178,13 @@ def _spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
 
 def _facts(opened: SceneFile, transport: Transport, radiance: SpectralRadiance) -> dict[str, Any]:
     groups = {
-        name: {"emitters": list(group.emitters), "power": group.power, "own_colour": group.own_colour}
+        name: {"emitters": list(group.emitters), "power": group.power, "own_colour": group.coloured}
         for name, group in opened.scene.groups.items()
     }
     return {
         "scene": opened.scene.name,
         "size": list(radiance.shape[:2]),
         **vars(render_facts(transport, radiance)),
-        "largest_band_error": None if radiance.band_error is None else float(np.max(radiance.band_error)),
         "mean_luminance_cd_m2": float(radiance.luminance().mean()),
         "groups": groups,
         "notes": list(opened.notes),

@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 
 from isp.colour.calibrated_colours import fit_of_calibration
 from isp.colour.encoding import ENCODINGS, encode
+from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError, require_range, unknown
+from sensor.calibration import ColourCalibration
 from sensor.cfa import channels
+from sensor.raw import RawImage
 from sensor.raw_files.dng import is_bayer
 from sensor.raw_files.raw_file import open_raw
 from studies.metrics.truth import WHITE_AT, WHITE_PERCENTILE  # the demo's rule, here on the picture's own luminance
@@ -26,6 +29,51 @@ class Developed:
 
     encoded: NDArray[np.float64]
     facts: dict[str, Any]
+
+
+def mosaic_processor(raw: RawImage) -> str:
+    """Processor that the paper has for a raw image's mosaic."""
+    return "bayer" if is_bayer(raw.cfa) else "interleaved"
+
+
+def develop(
+    raw: RawImage,
+    calibration: ColourCalibration | None = None,
+    *,
+    processor: str | None = None,
+    white_balance: str = WHITE_BALANCES[0],
+) -> Picture:
+    """Develop a raw image into a linear picture.
+
+    Parameters
+    ----------
+    raw : RawImage
+    calibration : ColourCalibration, optional
+        Colours of the camera, as `studies.photograph.calibrate.calibrate` fits them; the raw image's own by default.
+    processor : str, optional
+        Of `isp.processors.catalogue.PROCESSORS`; ``bayer`` or ``interleaved``, by the mosaic, where left out.
+    white_balance : str
+        ``gray-world`` as in the paper, with the as-shot neutral where the picture is too dark for that; or ``as-shot``,
+        that neutral in any case.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a raw image without colours, or a mosaic that the processor doesn't know.
+    """
+    name = processor or mosaic_processor(raw)
+    for what, value, allowed in (("isp", name, PROCESSORS), ("white_balance", white_balance, WHITE_BALANCES)):
+        if value not in allowed:
+            raise unknown(what, value, allowed)
+    colour = calibration or raw.colour
+    if colour is None:
+        raise InputError(
+            "raw: it holds no colour calibration; allowed: one of a camera with R, G and B; give "
+            "calibrate(sensor, illuminant('D65')) as well"
+        )
+    colours = fit_of_calibration(colour, channels(raw.cfa))
+    fixed = colour.neutral if white_balance == "as-shot" else None
+    return PROCESSORS[name].develop(raw, colours, neutral=colour.neutral, balance=fixed)
 
 
 def develop_file(
@@ -58,29 +106,20 @@ def develop_file(
     InputError
         For a file that can't be read, holds no colours, or whose mosaic the pipeline doesn't know.
     """
-    for what, value, allowed in (
-        ("isp", isp or "bayer", PROCESSORS),
-        ("white_balance", white_balance, WHITE_BALANCES),
-        ("encoding", encoding, ENCODINGS),
-    ):
-        if value not in allowed:
-            raise unknown(what, value, allowed)
+    if encoding not in ENCODINGS:
+        raise unknown("encoding", encoding, ENCODINGS)
     if ev is not None:
         require_range("ev", ev, -40.0, 40.0, "give stops")
     raw, told = open_raw(path)
     if raw.colour is None:
         raise InputError(f"{path}: it holds no colour calibration; allowed: a camera with R, G and B; capture with one")
-    name = isp or ("bayer" if is_bayer(raw.cfa) else "interleaved")
-    neutral = raw.colour.neutral
-    fixed = neutral if white_balance == "as-shot" else None
-    colours = fit_of_calibration(raw.colour, channels(raw.cfa))
-    picture = PROCESSORS[name].develop(raw, colours, neutral=neutral, balance=fixed)
+    picture = develop(raw, processor=isp, white_balance=white_balance)
     full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
     linear = picture.rgb / full_e
     stops = _stops(linear) if ev is None else ev
     facts = {
         "raw": str(path),
-        "isp": name,
+        "isp": isp or mosaic_processor(raw),
         "engine": picture.engine,
         "ev": stops,
         "balance": dict(picture.balance),

@@ -137,7 +137,7 @@ def _light(order: Order, scene: Scene) -> tuple[Spectrum, list[str]]:
     if order.white_balance is not None:
         return illuminant(order.white_balance), []
     name, first = next(iter(scene.groups.items()))
-    if not first.own_colour:
+    if not first.coloured:
         return first.spectrum, []
     assumed = f"scene {scene.name}: light group {name!r} has colours of its own; white balance is set to {LIGHT}"
     return illuminant(LIGHT), [f"{assumed}, --white-balance sets it otherwise"]

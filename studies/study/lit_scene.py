@@ -78,7 +78,7 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
 
 def _check_relit(scene: Scene, spectrum: str) -> None:
     for name, group in scene.groups.items():
-        if spectrum != OWN and group.own_colour:
+        if spectrum != OWN and group.coloured:
             raise InputError(
                 f"spectra: {spectrum!r} can't relight group {name!r} of scene {scene.name}, whose lights have colours "
                 f"of their own; allowed: {OWN}; put the scene into a study of its own"
@@ -205,7 +205,7 @@ def white_spectrum(opened: OpenedScene, spectrum: str) -> Spectrum:
     if opened.scene is None:
         return illuminant(opened.choice.light or LIGHT)
     first = next(iter(opened.scene.groups.values()))
-    return illuminant(LIGHT) if first.own_colour else first.spectrum
+    return illuminant(LIGHT) if first.coloured else first.spectrum
 
 
 def level_luminance(level: str, lux_per_cd_m2: float | None) -> float:

@@ -627,8 +627,8 @@ RENDERS = (
     _fault(
         "halves clipped at 0",
         "render/transport.py",
-        "SpectralRadiance(_view(half),",
-        "SpectralRadiance(_view(np.maximum(half, 0)),",
+        "SpectralRadiance(np.moveaxis(half, 0, -1),",
+        "SpectralRadiance(np.moveaxis(np.maximum(half, 0), 0, -1),",
         "render/test_transport",
     ),
     _fault(

@@ -53,11 +53,14 @@ class Target:
         By the ending of the file that is changed.
     read : callable
         Takes the path of the first file.
+    in_child : bool
+        Whether it reads in a process of its own, with files of its own in the system's temporary folder.
     """
 
     samples: Callable[[], list[Sample]]
     mutators: Mapping[str, Mutator]
     read: Callable[[Path], object]
+    in_child: bool = False
 
 
 def _made(write: Callable[[Path], object]) -> Sample:
@@ -326,7 +329,7 @@ def _ledger_samples() -> list[Sample]:
 
 TARGETS: dict[str, Target] = {
     "exr": Target(_exr_samples, {".exr": any_bytes}, read_exr),
-    "mat": Target(_mat_samples, {".mat": mat_elements}, read_iset_scene),
+    "mat": Target(_mat_samples, {".mat": mat_elements}, read_iset_scene, in_child=True),
     "dng": Target(_dng_samples, {".dng": json_in(b"rodcone\0")}, read_dng),
     "tiff": Target(_tiff_samples, {".tif": tiff_tags, ".json": json_values}, read_tiff),
     "photograph": Target(_camera_samples, {".dng": tiff_tags}, read_photograph),

@@ -5,6 +5,7 @@ import os
 import random
 import resource
 import sys
+import tempfile
 import time
 import traceback
 import warnings
@@ -49,7 +50,7 @@ def judge(target: Target, made: Sample, folder: Path) -> tuple[str, str]:
     before, start = _peak_mib(), time.process_time()
     told, words = "accepted", ""
     try:
-        with _guarded(folder):
+        with _guarded(folder, target.in_child):
             target.read(folder / next(iter(made)))
     except InputErrorlessRefusal:
         told = "refused"
@@ -69,30 +70,35 @@ def judge(target: Target, made: Sample, folder: Path) -> tuple[str, str]:
     return told, words
 
 
-_inside: list[str] = []  # the folder while a reader is at work
+_inside: list[str] = []  # folders that may be written to while a reader is at work
+_own_programs: list[str] = []  # that it may start
 
 
 def _audit(event: str, arguments: tuple[Any, ...]) -> None:
     if not _inside:
         return
-    if event in _FORBIDDEN:
+    if event in _FORBIDDEN and not (event == "subprocess.Popen" and arguments[0] in _own_programs):
         raise OutsideError(f"{event} {arguments!r:.300}")
     if (event == "open" and isinstance(arguments[2], int) and arguments[2] & _WRITING) or event in _CHANGING:
         path = str(arguments[0])
-        if path != os.devnull and not os.path.realpath(path).startswith(_inside[0]):
+        if path != os.devnull and not os.path.realpath(path).startswith(tuple(_inside)):
             raise OutsideError(f"{event} {arguments!r:.300}")
 
 
 @contextmanager
-def _guarded(folder: Path) -> Iterator[None]:
+def _guarded(folder: Path, in_child: bool) -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         warnings.simplefilter("error", RuntimeWarning)
         _inside.append(os.path.realpath(folder))
+        if in_child:
+            _inside.append(os.path.realpath(tempfile.gettempdir()))
+            _own_programs.append(sys.executable)
         try:
             yield
         finally:
             _inside.clear()
+            _own_programs.clear()
 
 
 def _reset_peak() -> None:

@@ -250,7 +250,7 @@ def test_a_file_that_can_not_be_written_leaves_nothing(tmp_path, renders, monkey
     def fail(*args):
         raise OSError("disk full")
 
-    monkeypatch.setattr("render.cache.Path.replace", fail)  # the last step: the whole file is under its other name
+    monkeypatch.setattr("rodcone.files.os.replace", fail)  # the last step: the whole file is under its other name
     with pytest.raises(OSError, match="disk full"):
         small(tmp_path)
     assert list(tmp_path.iterdir()) == []

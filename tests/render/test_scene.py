@@ -115,12 +115,12 @@ def test_a_light_that_cannot_be_relit_is_refused_with_what_can(kind, grouped):
 @pytest.mark.parametrize("kind", ["envmap", "sunsky"])
 def test_a_light_with_colours_of_its_own_needs_a_group_that_says_so(kind):
     text = complaint({"sky": SKY, "lamp": LAMP}, sky={"type": kind})
-    assert f"emitter 'sky' of type {kind!r} has colours of its own; allowed: a light group with own_colour=True" in text
+    assert f"emitter 'sky' of type {kind!r} has colours of its own; allowed: a light group with coloured=True" in text
 
 
 def test_a_light_of_its_own_colour_keeps_it_and_goes_out_with_its_group():
     sky = {"type": "sunsky", "turbidity": 3.0}
-    own = LightGroup(("sky",), flat(), 2.0, own_colour=True)
+    own = LightGroup(("sky",), flat(), 2.0, coloured=True)
     tinted = Scene("test", GEOMETRY | {"sky": sky}, {"sky": own, "lamp": LAMP})
     assert tinted.lit({"sky": uniform_node(7.0)})["sky"] == sky
     assert tinted.description["sky"] == sky

@@ -14,7 +14,7 @@ from render.geometry import look_at, to_world
 from render.illuminants import illuminant
 from render.illuminants import names as illuminants
 from render.scene import LightGroup, Node, Scene, spectrum_node, uniform_node
-from render.scene_range import check_range, warn_of_dark_ends, warn_of_own_colours
+from render.scene_range import check_range, warn_of_coloured_lights, warn_of_dark_ends
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, flat
 from render.user_scene.scene_file import load_scene_file
 from rodcone.errors import InputError
@@ -117,7 +117,7 @@ def test_what_mitsuba_knows_at_every_wavelength_is_never_refused(bsdf: Node) -> 
 def test_a_table_that_only_a_light_refers_to_is_no_surface() -> None:
     lit = wall(matte(uniform_node(0.5)), tint=EVEN)
     panel = {"type": "rectangle", "emitter": {"type": "area", "radiance": {"type": "ref", "id": "tint"}}}
-    group = LightGroup(("panel/emitter",), flat(), own_colour=True)
+    group = LightGroup(("panel/emitter",), flat(), coloured=True)
     groups = {**lit.groups, "panel": group}
     check_range(Scene("wall", lit.geometry | {"panel": panel}, groups), 380.0, 780.0)
 
@@ -130,7 +130,7 @@ def test_held_ends_go_on_in_the_picture(reflectance: Node, rows: bool) -> None:
     scene = wall(matte(reflectance))
     if not rows:  # a light of its own colour is evaluated wavelength by wavelength
         sun = scene.geometry["sun"] | {"irradiance": uniform_node(1.0)}
-        groups = {"sun": LightGroup(("sun",), flat(), own_colour=True)}
+        groups = {"sun": LightGroup(("sun",), flat(), coloured=True)}
         scene = Scene("wall", scene.geometry | {"sun": sun}, groups)
     inside = {id(EVEN): (0.5, 0.6), id(UNEVEN): (0.65, 0.55)}[id(reflectance)]
     found = radiance(replace(scene, extend="hold"))
@@ -152,7 +152,7 @@ def test_holding_leaves_the_scene_and_its_lights_as_they_were() -> None:
     geometry = wall(matte(EVEN)).geometry | {"lamp": lamp}
     groups = {
         "sun": LightGroup(("sun",), flat()),
-        "lamp": LightGroup(("lamp/emitter",), flat(), own_colour=True),
+        "lamp": LightGroup(("lamp/emitter",), flat(), coloured=True),
     }
     held = Scene("wall", geometry, groups, extend="hold")
     assert held.geometry["lamp"] == lamp
@@ -213,7 +213,7 @@ def told(lights: Scene | Spectrum, low: float, high: float) -> list[str]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         if isinstance(lights, Scene):
-            warn_of_own_colours(lights, *band)
+            warn_of_coloured_lights(lights, *band)
         else:
             warn_of_dark_ends("lamp", lights, *band)
     assert all(warning.category is UserWarning for warning in caught)
@@ -254,7 +254,7 @@ def test_a_light_of_its_own_colour_tells_of_the_tables_in_it(tmp_path: Path) -> 
     ):
         panel = {"type": "rectangle", "emitter": {"type": "area", "radiance": radiance_of}}
         geometry = {key: part for key, part in bare.items() if key != "sun"} | {"panel": panel}
-        scene = Scene("wall", geometry, {"panel": LightGroup(("panel/emitter",), flat(), own_colour=True)})
+        scene = Scene("wall", geometry, {"panel": LightGroup(("panel/emitter",), flat(), coloured=True)})
         assert told(scene, 400.0, 700.0) == []
         expected = f"scene wall: light 'panel/emitter' is known over {known} nm, and bands reach 400-{beyond_nm:g} nm"
         assert [text[: len(expected)] for text in told(scene, 400.0, beyond_nm)] == ([expected] if known else [])

@@ -1,6 +1,6 @@
 """Relit equals directly rendered: under lines, tables and LEDs, on line bands, on 10 nm, and against 1 nm bands.
 
-"Directly" means that the lamp keeps its own spectrum in the scene (`own_colour`), so that transport and emission are
+"Directly" means that the lamp keeps its own spectrum in the scene (`coloured`), so that transport and emission are
 multiplied along each path, within the bands. The difference is judged by its own scatter over independent seeds
 (paired t-test). All comparisons of a test together fail by chance with probability `FALSE_ALARM` at most (Bonferroni);
 seeds are fixed.
@@ -45,7 +45,7 @@ def with_lamp(scene, name):
     """The same scene whose lamp has its spectrum in the scene's own dict."""
     emitter = {"type": "area", "radiance": spectrum_node(illuminant(name))}
     geometry = scene.geometry | {"lamp": scene.geometry["lamp"] | {"emitter": emitter}}
-    return Scene("direct", geometry, {"lamp": LightGroup(("lamp/emitter",), flat(), own_colour=True)})
+    return Scene("direct", geometry, {"lamp": LightGroup(("lamp/emitter",), flat(), coloured=True)})
 
 
 def blocks(radiance):
@@ -67,10 +67,10 @@ def drawn(name, nm, width_nm, draws, spp, apart=0):
     relit, direct, reported = [], [], []
     for seed in range(draws):
         options = {"wavelength_nm": nm, "width_nm": width_nm, "spp": spp}
-        made = render(stall(), SIZE, seed=seed, **options).relight({"lamp": name})
-        relit.append(blocks(made))
+        made = render(stall(), SIZE, seed=seed, **options)
+        relit.append(blocks(made.relight({"lamp": name})))
         direct.append(blocks(render(with_lamp(stall(), name), SIZE, seed=seed + apart, **options).relight()))
-        reported.append(made.band_error)
+        reported.append(made.band_error({"lamp": name}))
     return np.array(relit), np.array(direct), np.mean(reported, axis=0)
 
 
@@ -143,15 +143,17 @@ def test_on_10_nm_relit_is_directly_rendered_within_the_error_reported(name, ran
 @only_dense
 def test_a_line_in_a_coarse_grid_is_off_by_what_is_reported_against_1_nm_bands():
     options = {"spp": 64, "seed": 3}  # the same paths: their noise is in both
-    coarse = render(stall(), SIZE, wavelength_nm=[575.0, 585.0, 595.0], **options).relight({"lamp": "sodium_low"})
-    fine = render(stall(), SIZE, wavelength_nm=np.arange(570.5, 600.0), **options).relight({"lamp": "sodium_low"})
-    whole = blocks(fine).reshape(3, 10, -1).mean(axis=1)
-    off = rms(blocks(coarse) - whole)
+    lights = {"lamp": "sodium_low"}
+    coarse = render(stall(), SIZE, wavelength_nm=[575.0, 585.0, 595.0], **options)
+    fine = render(stall(), SIZE, wavelength_nm=np.arange(570.5, 600.0), **options)
+    whole = blocks(fine.relight(lights)).reshape(3, 10, -1).mean(axis=1)
+    off = rms(blocks(coarse.relight(lights)) - whole)
     assert not whole[[0, 2]].any()
     assert not off[[0, 2]].any()
     found = off[1] / rms(whole)[1]
     assert found > 0.05  # the camera would be wrong by as much
     # 1 nm bands hold the doublet off centre too: they miss up to 1 % themselves.
-    own = fine.band_error.max()
+    own = fine.band_error(lights).max()
     assert own < 0.015
-    assert coarse.band_error[1] / 1.5 - own < found < INSIDE * coarse.band_error[1] + own
+    reported = coarse.band_error(lights)[1]
+    assert reported / 1.5 - own < found < INSIDE * reported + own

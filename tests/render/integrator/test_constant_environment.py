@@ -144,9 +144,9 @@ def test_wider_bands_keep_the_correlation(both):
 
 def test_a_sky_of_its_own_colour_or_with_another_light_is_rendered_by_itself():
     scene = courtyard()
-    assert scene.is_even_sky("sky")
-    assert not scene.is_even_sky("lamp")
-    own = replace(scene.groups["sky"], own_colour=True)
-    assert not replace(scene, groups=scene.groups | {"sky": own}).is_even_sky("sky")
+    assert scene.is_environment("sky")
+    assert not scene.is_environment("lamp")
+    own = replace(scene.groups["sky"], coloured=True)
+    assert not replace(scene, groups=scene.groups | {"sky": own}).is_environment("sky")
     together = LightGroup(("sky", "lamp/emitter"), flat())
-    assert not replace(scene, groups={"all": together}).is_even_sky("all")
+    assert not replace(scene, groups={"all": together}).is_environment("all")

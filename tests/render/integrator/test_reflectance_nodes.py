@@ -14,7 +14,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from render.engine import render
-from render.loader import Film, load_units, mitsuba_module
+from render.loader import Film, load_groups, mitsuba_module
 from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_paths import search_path
 from rodcone.jit import backend
@@ -152,7 +152,7 @@ def test_each_kind_of_reflectance_renders_as_in_stock_mitsuba(paint: str, lamps:
     opened = load_scene_file(path)
     film = Film(opened.size, BANDS_NM, np.full(4, WIDTH_NM), DEPTH)
     rows = lamps == "one spectrum" and paint in IN_ROWS
-    assert [bool(unit.curves) for unit in load_units(opened.scene, film)] == [rows]
+    assert [bool(unit.curves) for unit in load_groups(opened.scene, film)] == [rows]
     made = [
         render(
             opened.scene,

@@ -114,7 +114,7 @@ def test_a_line_in_a_light_of_its_own_colour_is_met_anew_by_each_path():
     """A line of 0.1 nm in a band of 1 nm: 16 wavelengths a pass would miss it in most passes."""
     scene, line = load("flat_field"), line_spectrum([589.0], [2.0])
     sky = {"type": "constant", "radiance": spectrum_node(line)}
-    own = replace(scene.groups["sky"], spectrum=flat(), own_colour=True)
+    own = replace(scene.groups["sky"], spectrum=flat(), coloured=True)
     scene = replace(scene, geometry=scene.geometry | {"sky": sky}, groups={"sky": own})
     made = render(scene, (24, 32), wavelength_nm=[589.0], width_nm=1.0, spp=64)
     # 2 W m^-2 sr^-1 in the line and a wall of 0.5. A triangle's square over its mean's: 4/3 x 1 nm / 0.1 nm.

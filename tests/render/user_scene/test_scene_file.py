@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -15,11 +14,9 @@ import pytest
 from PIL import Image
 
 from render.engine import render
-from render.geometry import look_at, to_world
 from render.loader import mitsuba_module
-from render.user_scene.scene_dict import scene_from_dict
 from render.user_scene.scene_file import load_scene_file
-from render.user_scene.scene_parts import LONGEST_CHAIN, SceneFile
+from render.user_scene.scene_parts import LONGEST_CHAIN
 from render.user_scene.scene_paths import MOST_NESTED
 from rodcone.errors import InputError
 
@@ -127,7 +124,7 @@ def test_spectrum_of_a_light_is_what_stock_mitsuba_emits(form: str, tmp_path: Pa
     seen = mi.SurfaceInteraction3f()
     seen.wi, seen.wavelengths = mi.Vector3f(0, 0, 1), mi.Spectrum(*nm)
     group = load_scene_file(path).scene.groups["lamp"]
-    assert not group.own_colour
+    assert not group.coloured
     ours = np.interp(nm, group.spectrum.wavelength_nm, group.spectrum.values, left=0.0, right=0.0)
     # 1e-3: between points 1 nm apart, d65's own 5 nm kinks are met half-way.
     np.testing.assert_allclose(ours, np.array(emitter.eval(seen)).ravel(), rtol=1e-3)
@@ -176,7 +173,7 @@ def test_lights_are_grouped_by_id_or_their_shapes_up_to_a_colon(tmp_path: Path) 
         **dict.fromkeys(("lamp", "mixed"), 2),
         **dict.fromkeys(("own.id", "shape_0", "emitter_0", "sky"), 1),
     }
-    assert {name for name, group in scene.groups.items() if group.own_colour} == {"mixed", "sky"}
+    assert {name for name, group in scene.groups.items() if group.coloured} == {"mixed", "sky"}
     assert scene.geometry["mixed:b"]["_arg_0"]["radiance"] == {"type": "rgb", "value": [1.0, 0.0, 0.0]}
     assert "radiance" not in scene.geometry["lamp:1"]["_arg_0"]
 
@@ -199,7 +196,7 @@ def test_textured_light_keeps_its_picture(tmp_path: Path) -> None:
     picture = '<texture type="bitmap" name="radiance"><string name="filename" value="p.png"/></texture>'
     path = write(tmp_path, CAMERA, f'<shape type="disk" id="tv"><emitter type="area">{picture}</emitter></shape>')
     scene = load_scene_file(path).scene
-    assert scene.groups["tv"].own_colour
+    assert scene.groups["tv"].coloured
     assert scene.geometry["tv"]["_arg_0"]["radiance"]["filename"] == str((tmp_path / "p.png").resolve())
 
 
@@ -301,6 +298,10 @@ MEDIUM = '<shape type="sphere"><medium type="homogeneous" name="interior"/></sha
 REFUSED = {
     "no light": ([CAMERA, WALL], ["it has no light", "add one"]),
     "no camera": ([SUN], ["camera 'none'", "perspective, thinlens"]),
+    "part of the camera's key": (
+        [CAMERA, SUN, '<shape type="sphere" id="sensor"/>'],
+        ["part 'sensor' is not the camera"],
+    ),
     "meter as camera": (['<sensor type="irradiancemeter"/>', SUN], ["camera 'irradiancemeter'"]),
     "medium": ([CAMERA, SUN, MEDIUM], ["(line 7", "'homogeneous' is refused, participating media"]),
     "polariser": ([CAMERA, SUN, '<bsdf type="polarizer"/>'], ["'polarizer'", "polarisation isn't simulated"]),
@@ -405,10 +406,6 @@ def test_native_code_of_a_scenes_own_is_refused_before_it_is_loaded(tmp_path: Pa
     write(tmp_path, '<path value="."/>', name="in.xml")
     assert "<path>" in refusal(write(tmp_path, '<include filename="in.xml"/>', CAMERA, SUN))
     assert "plug-in: 'ball' is unknown" in refusal(write(tmp_path, CAMERA, SUN, '<shape type="ball"/>'))
-    with pytest.raises(InputError, match="plug-in: 'ball' is unknown"):
-        scene_from_dict({"type": "scene", "s": {"type": "ball"}}, "s", folder=tmp_path)
-    with pytest.raises(InputError, match="plug-in: 'resources' is unknown"):
-        scene_from_dict({"type": "scene", "s": {"type": "resources", "path": str(tmp_path)}}, "s")
     assert str(tmp_path) not in loaded_libraries()
 
 
@@ -465,9 +462,6 @@ def test_a_stock_name_never_loads_a_file_beside_the_scene(tmp_path: Path, monkey
     stock = Path(mi.__file__).parent
     assert Path(str(mi.file_resolver().resolve("plugins/hair.so"))) == stock / "plugins" / "hair.so"
     mi.load_dict(opened.scene.description)
-    mi.file_resolver().prepend(str(tmp_path))
-    scene_from_dict({"type": "scene", "sun": {"type": "directional"}, "s": {"type": "perspective"}}, "s")
-    assert Path(str(mi.file_resolver().resolve("plugins/hair.so"))) == stock / "plugins" / "hair.so"
 
 
 @pytest.mark.usefixtures("nothing_is_loaded")
@@ -523,70 +517,3 @@ def test_bombs_are_refused_within_a_second(tmp_path: Path) -> None:
     path = write(tmp_path, CAMERA, SUN)
     path.write_text('<!DOCTYPE s [<!ENTITY a "evil">]>' + path.read_text().replace("hdrfilm", "&a;"))
     assert "a DOCTYPE is not allowed" in refusal(path)
-
-
-# --- dicts
-
-
-def test_a_dict_gives_the_scene_of_the_same_xml(tmp_path: Path) -> None:
-    (tmp_path / "quad.obj").write_text(QUAD)
-    mesh = '<string name="filename" value="quad.obj"/><rgb name="unused" value="1"/>'
-    xml = load_scene_file(write(tmp_path, CAMERA, SUN, f'<shape type="obj" id="quad">{mesh}</shape>'))
-    mi = mitsuba_module()
-    turn = mi.ScalarTransform4f().look_at(origin=[0, 0, 4], target=[0, 0, 0], up=[0, 1, 0])
-    described = {
-        "type": "scene",
-        "integrator": {"type": "path"},
-        "eye": {
-            "type": "perspective",
-            "fov": np.float32(20.0),
-            "to_world": turn,
-            "film": {"type": "hdrfilm", "width": 8, "height": 6},
-        },
-        "sun": {"type": "directional", "direction": np.array([0, 0, -1.0]), "irradiance": {"type": "d65"}},
-        "quad": {"type": "obj", "filename": "quad.obj", "unused": {"type": "rgb", "value": 1}},
-    }
-    ours = scene_from_dict(described, "scene", folder=tmp_path)
-    assert (ours.size, len(ours.notes)) == (xml.size, 1)
-    np.testing.assert_allclose(
-        np.array(ours.scene.geometry["sensor"]["to_world"]), np.array(xml.scene.geometry["sensor"]["to_world"])
-    )
-    np.testing.assert_allclose(
-        np.array(xml.scene.geometry["sensor"]["to_world"]), np.array(to_world(look_at([0, 0, 4], [0, 0, 0])))
-    )
-    for part in ("sun", "quad"):
-        bare = {key: value for key, value in xml.scene.geometry[part].items() if key != "id"}
-        assert ours.scene.geometry[part] == bare
-    assert ours.scene.groups.keys() == xml.scene.groups.keys()
-    np.testing.assert_array_equal(ours.scene.groups["sun"].spectrum.values, xml.scene.groups["sun"].spectrum.values)
-
-
-def of_dict(**parts: Any) -> SceneFile:
-    return scene_from_dict({"type": "scene", "eye": {"type": "perspective"}, **parts}, "s")
-
-
-def test_live_objects_and_unreadable_values_in_a_dict_are_refused() -> None:
-    mi, sun = mitsuba_module(), {"type": "directional"}
-    circle: dict[str, Any] = {"type": "twosided"}
-    circle["again"] = circle
-    for parts, words in (
-        ({"lamp": mi.load_dict({"type": "point"})}, "'lamp' is of type Emitter"),
-        ({"wall": {"type": "rectangle", "bsdf": mi.load_dict({"type": "diffuse"})}}, "s/wall: 'bsdf' is of type"),
-        ({"wall": {"type": "rectangle", "to_world": [1, 2]}}, "'to_world' is of type list"),
-        ({"wall": {"bsdf": {"type": "diffuse"}}}, "s/wall: type None"),
-        ({"a/b": {"type": "rectangle"}}, "key 'a/b'"),
-        ({"a": circle}, f"over {MOST_NESTED} deep"),
-        ({"wall": {"type": "rectangle", "id": [1, 2, 3]}}, r"id [1, 2, 3]"),
-        ({"wall": {"type": "diffuse", "reflectance": {"type": "rgb", "value": "red"}}}, "rgb without a readable value"),
-        ({"sensor": {"type": "rectangle"}}, "part 'sensor' is not the camera"),
-        ({"wall": {"type": "ply", "filename": "none.ply"}}, "'none.ply' is missing"),
-    ):
-        with pytest.raises(InputError, match=re.escape(words)):
-            of_dict(sun=sun, **parts)
-
-
-def test_inline_spectra_of_a_dict_are_read() -> None:
-    point = {"type": "point", "intensity": {"type": "spectrum", "value": [(400, 1.0), (450, 3.0), (700, 2.0)]}}
-    opened = of_dict(lamp=point, other={"type": "point", "intensity": {"type": "spectrum", "value": 2.0}})
-    assert opened.scene.groups["lamp"].spectrum.values.tolist() == [1.0, 3.0, 2.0]
-    assert opened.scene.groups["other"].spectrum.values.tolist() == [2.0, 2.0]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rodcone import jit
+from rodcone import jit, llvm
 from studies.commands import doctor
 from studies.commands.cli import main
 
@@ -39,7 +39,7 @@ def test_one_fault_makes_the_exit_code_1(monkeypatch: pytest.MonkeyPatch, capsys
 
 
 def test_without_llvm_and_cuda_the_fallback_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(jit, "LIBLLVM", None)
+    monkeypatch.setattr(llvm, "LIBLLVM", None)
     monkeypatch.setattr(jit, "backend", lambda: "numpy")
     rows = {each.name: each for each in doctor.engine_findings()}
     assert rows["LLVM"].value.startswith("none of version 17 or newer")

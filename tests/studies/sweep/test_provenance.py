@@ -15,7 +15,8 @@ import sweep_sample as SAMPLE
 
 from isp.processors.catalogue import PROCESSORS
 from rodcone.errors import InputError
-from rodcone.jit import LIBLLVM, backend, dr
+from rodcone.jit import backend, dr
+from rodcone.llvm import LIBLLVM
 from studies.budget.model_plan import Plan
 from studies.commands.cli import main
 from studies.pages.duels import contests_of

@@ -1,0 +1,68 @@
+"""Numbers from MATLAB level 5 files (``save -v6`` and ``-v7``), by SciPy in a process of its own.
+
+A few changed bytes make SciPy's reader leave its memory (version 1.17 ends the process within some thousand random
+changes), and a scene may come from anywhere. So `mat_reader` runs it in a child, whose memory, output and time are
+bounded by the file's size; the child's end is an error of one line here.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.radiance_files import mat_reader
+from render.radiance_files.file_checks import MOST_BYTES, MOST_EXPANSION, SMALL_BYTES, require_file
+from rodcone.errors import InputError
+
+_HEADER_BYTES = 128
+_SECONDS, _BYTES_PER_SECOND = 120, 1e6  # that the child may take, its start included: a hundred times what it takes
+
+
+def read_numbers(path: Path, keys: Collection[str]) -> Mapping[str, NDArray[Any]]:
+    """Arrays of a file, as (row, column, ...) in the type that MATLAB would give them.
+
+    Parameters
+    ----------
+    path : Path
+    keys : collection of str
+        What to read: a variable, or a field of a struct such as ``scene/data/photons``. What isn't there, or is no
+        array of real numbers, is missing from the result.
+
+    Raises
+    ------
+    InputError
+        Where there is no file, none of level 5 (MATLAB's ``-v7.3`` and ``-v4`` are named), it is damaged, or what is
+        wanted takes over 8 GiB, or over 64 MiB and 2000 times the file.
+    """
+    size = require_file(path)
+    with path.open("rb") as file:
+        header = file.read(_HEADER_BYTES)
+    if header.startswith((b"MATLAB 7.3", b"\x89HDF")):
+        raise InputError(f"{path}: it is a -v7.3 (HDF5) file; allowed: level 5; in MATLAB save it with save -v7")
+    if header[126:128] not in (b"IM", b"MI"):
+        raise InputError(f"{path}: it is no level 5 .mat file; allowed: MATLAB's -v6 or -v7; save it with save -v7")
+    most = min(MOST_BYTES, max(SMALL_BYTES, MOST_EXPANSION * size))
+    with tempfile.TemporaryDirectory() as folder:
+        found = Path(folder) / "numbers.npz"
+        _run_reader(path, found, most, keys, _SECONDS + size / _BYTES_PER_SECOND)
+        with np.load(found) as numbers:
+            return dict(numbers)
+
+
+def _run_reader(path: Path, found: Path, most_bytes: int, keys: Collection[str], seconds: float) -> None:
+    command = [sys.executable, "-P", mat_reader.__file__, os.path.realpath(path), str(found), str(most_bytes), *keys]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OPENBLAS_NUM_THREADS": "1"}
+    try:
+        done = subprocess.run(command, env=environment, capture_output=True, timeout=seconds, check=False)
+    except subprocess.TimeoutExpired:
+        raise InputError(f"{path}: the .mat file took over {seconds:.0f} s to read; save it again") from None
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+        reason = said if done.returncode > 0 else f"it ended the reader by signal {-done.returncode}"
+        raise InputError(f"{path}: SciPy can't read the .mat file: {reason}; save it again")

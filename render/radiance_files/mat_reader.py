@@ -1,0 +1,53 @@
+"""The process in which SciPy reads a MATLAB file: run as a script by `mat_file`, it imports nothing of rodcone's."""
+
+import resource
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+READER_BYTES = 1 << 28  # beside the file's values: SciPy's buffers
+COPIES = 4  # of the values on their way: inflated, stored type, MATLAB's type, written
+
+
+def main(path: str, found: str, most_bytes: str, *keys: str) -> None:
+    """Write the numbers that stand under some keys as one .npz file."""
+    from scipy.io import loadmat
+
+    _limit(int(most_bytes))
+    warnings.simplefilter("error", np.exceptions.ComplexWarning)  # it would drop the imaginary part
+    names = {key.split("/")[0] for key in keys}
+    content = loadmat(path, variable_names=names, mat_dtype=True, struct_as_record=False)
+    numbers: dict[str, Any] = {key: value for key in keys if (value := _numbers(content, key)) is not None}
+    np.savez(found, **numbers)
+
+
+def _numbers(content: dict[str, Any], key: str) -> np.ndarray[Any, Any] | None:
+    """Array of real numbers under a key, None where there is none."""
+    name, *fields = key.split("/")
+    value = content.get(name)
+    for field in fields:
+        struct = value.item() if isinstance(value, np.ndarray) and value.dtype == object and value.size == 1 else None
+        value = getattr(struct, "__dict__", {}).get(field)
+    return value if isinstance(value, np.ndarray) and value.dtype.kind in "iuf" else None
+
+
+def _limit(most_bytes: int) -> None:
+    """Bound this process's memory and the file that it writes; without /proc its output alone."""
+    _lower(resource.RLIMIT_FSIZE, most_bytes)
+    statm = Path("/proc/self/statm")
+    if statm.is_file():
+        held = int(statm.read_text().split()[0]) * resource.getpagesize()
+        _lower(resource.RLIMIT_AS, held + READER_BYTES + COPIES * most_bytes)
+
+
+def _lower(limit: int, most: int) -> None:
+    hard = resource.getrlimit(limit)[1]  # the user's own, which can't be raised
+    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(limit, (most, most))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,55 @@
+"""NumPy's arrays as Dr.Jit takes them quickest, and whole numbers divided exactly."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodcone.jit import arrays, dr
+
+ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel for memory that isn't aligned, and refuses it packet loads
+
+
+def aligned(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+    """Empty array whose memory starts at a multiple of `ALIGNMENT`: Dr.Jit takes it without a copy."""
+    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+    memory = np.empty(size + ALIGNMENT, dtype=np.uint8)
+    start = -memory.ctypes.data % ALIGNMENT
+    return np.asarray(memory[start : start + size].view(dtype).reshape(shape))
+
+
+def upload(values: NDArray[Any]) -> Any:
+    """Evaluated Dr.Jit array of the same values and type, flat, over aligned memory."""
+    jit = arrays()
+    kinds = {"f4": jit.Float, "f8": jit.Float64, "u4": jit.UInt, "i4": jit.Int}
+    if values.ctypes.data % ALIGNMENT or not values.flags.c_contiguous:
+        copy = aligned(values.shape, values.dtype)
+        copy[...] = values
+        values = copy
+    return kinds[values.dtype.str[1:]](values.ravel())
+
+
+@dataclass(frozen=True)
+class Divisor:
+    """A whole number to divide by: itself (UInt) and its inverse (Float64), by which CPUs multiply in vectors."""
+
+    number: Any
+    inverse: Any
+
+
+def divisor(number: int) -> Divisor:
+    """Divisor as data of the kernel: another number doesn't compile it anew."""
+    jit = arrays()
+    return Divisor(dr.opaque(jit.UInt, number), dr.opaque(jit.Float64, 1 / number))
+
+
+def divide(number: Any, by: Divisor) -> tuple[Any, Any]:
+    """Quotient and remainder of whole numbers (UInt) under 2^31.
+
+    Exact: number + 1/2 is at least half a step of 1/divisor from the next multiple, far above the rounding of its
+    double-precision quotient. The way through Int is the one that CPUs convert in vectors.
+    """
+    jit = arrays()
+    quotient = jit.UInt(jit.Int((jit.Float64(jit.Int(number)) + 0.5) * by.inverse))
+    return quotient, number - quotient * by.number

@@ -1,0 +1,127 @@
+"""`import rodcone`: the public names, what it loads, and that LLVM is chosen first whatever is imported."""
+
+import ast
+import os
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import rodcone as public
+
+ROOT = Path(public.__file__).resolve().parent
+HEAVY = ("mitsuba", "drjit", "colour", "numpy", "scipy", "skimage", "OpenEXR", "render", "scenes", "sensor", "isp")
+
+
+def in_new_python(code: str, **variables: str) -> str:
+    """What `code` prints in a Python of its own, with the variable that names LLVM unset."""
+    kept = {name: value for name, value in os.environ.items() if name != "DRJIT_LIBLLVM_PATH"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=kept | variables, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.mark.parametrize(("name", "place"), public._PUBLIC.items(), ids=list(public._PUBLIC))
+def test_every_name_is_the_object_of_its_module(name: str, place: tuple[str, str]) -> None:
+    module, attribute = place
+    assert getattr(public, name) is getattr(import_module(module), attribute)
+    assert getattr(public, name) is getattr(public, name)
+
+
+def test_tab_the_star_and_the_stub_show_the_same_names() -> None:
+    stub = ast.parse((ROOT / "__init__.pyi").read_text("utf-8"))
+    typed = {
+        alias.asname: (node.module, alias.name)
+        for node in stub.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert typed == public._PUBLIC
+    (listed,) = (ast.literal_eval(node.value) for node in stub.body if isinstance(node, ast.Assign))
+    assert dir(public) == public.__all__ == listed == sorted(public._PUBLIC)
+
+
+def test_no_ground_module_bears_a_public_name() -> None:
+    modules = {path.stem for path in ROOT.iterdir()}
+    assert not modules & public._PUBLIC.keys(), "the module's import would hide the public name"
+
+
+def test_an_unknown_name_is_told_as_python_tells_it() -> None:
+    with pytest.raises(AttributeError, match="module 'rodcone' has no attribute 'reconstruct_all'"):
+        _ = public.reconstruct_all  # type: ignore[attr-defined]
+    with pytest.raises(ImportError, match="reconstruct_all"):
+        exec("from rodcone import reconstruct_all")
+
+
+def test_everything_that_has_a_name_can_be_listed() -> None:
+    assert "still_life" in public.scenes()
+    assert "low_noise" in public.sensors()
+    assert "rgbw" in public.mosaics()
+    assert "D65" in public.illuminants()
+    assert public.processors()[:2] == ("interleaved", "bayer")
+
+
+def test_the_import_loads_nothing_heavy() -> None:
+    code = f"import rodcone, sys; dir(rodcone); print([name for name in {HEAVY} if name in sys.modules])"
+    assert in_new_python(code) == "[]"
+
+
+def test_a_name_loads_no_more_than_it_needs() -> None:
+    code = (
+        "import rodcone, sys; rodcone.InputError; print([name for name in ('numpy', 'drjit') if name in sys.modules])"
+    )
+    assert in_new_python(code) == "[]"
+
+
+PACKAGES = ("rodcone.errors", "render.spectrum", "scenes.catalog", "sensor.presets", "isp.settings")
+
+
+@pytest.mark.parametrize("module", PACKAGES)
+def test_any_package_names_the_llvm_library_before_dr_jit_is_loaded(module: str) -> None:
+    code = (
+        "import builtins, os, sys\n"
+        "real = builtins.__import__\n"
+        "def spy(name, *rest):\n"
+        "    assert name.split('.')[0] not in ('drjit', 'mitsuba') or 'DRJIT_LIBLLVM_PATH' in os.environ, name\n"
+        "    return real(name, *rest)\n"
+        "builtins.__import__ = spy\n"
+        f"import {module}\n"
+        "print(os.environ['DRJIT_LIBLLVM_PATH'])"
+    )
+    assert in_new_python(code) == in_new_python("from rodcone.llvm import LIBLLVM; print(LIBLLVM)")
+
+
+def test_rodcone_before_mitsuba_gives_the_library_chosen() -> None:
+    code = "import rodcone, mitsuba; from rodcone import jit, llvm; print(jit.backend(), llvm.LIBLLVM)"
+    backend, library = in_new_python(code).split()
+    if library == "None":
+        pytest.skip("no LLVM of version 17 or newer is installed here")
+    assert backend in ("llvm", "cuda")
+    maps = "import rodcone, mitsuba; import rodcone.jit as j; j.backend(); print(open('/proc/self/maps').read())"
+    if Path("/proc/self/maps").is_file() and backend == "llvm":
+        loaded = {line.split()[-1] for line in in_new_python(maps).splitlines() if "libLLVM" in line}
+        assert {Path(path).resolve() for path in loaded} == {Path(library).resolve()}
+
+
+def test_mitsuba_before_rodcone_is_told_where_it_loaded_a_library_that_aborts(tmp_path: Path) -> None:
+    """Dr.Jit is taken for loaded, and a file of the name of LLVM 15 is mapped into the process."""
+    old = tmp_path / "libLLVM-15.so"
+    old.write_bytes(bytes(4096))
+    code = (
+        "import mmap, sys, types, warnings\n"
+        f"file = open({str(old)!r}, 'rb'); kept = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)\n"
+        "sys.modules['drjit'] = types.ModuleType('drjit')\n"
+        "with warnings.catch_warnings(record=True) as told:\n"
+        "    warnings.simplefilter('always')\n"
+        "    import rodcone.llvm\n"
+        "print(rodcone.llvm.LIBLLVM, *[each.message for each in told])"
+    )
+    if not Path("/proc/self/maps").is_file():
+        pytest.skip("no /proc: the libraries that a process has loaded can't be listed")
+    said = in_new_python(code)
+    assert said.startswith(f"None Dr.Jit was imported before rodcone and loaded {old}")
+    assert "import rodcone first" in said

@@ -1,0 +1,48 @@
+"""A raw image developed from Python: with its own colours or given ones, by the paper's processor for its mosaic."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from rodcone.errors import InputError
+from sensor.capture import capture
+from sensor.device import draw_device
+from sensor.presets import low_noise
+from sensor.raw import RawImage
+from studies.photograph.calibrate import calibrate
+from studies.photograph.develop import develop
+
+
+def raw_of(cfa: str) -> RawImage:
+
+    nm = np.arange(385.0, 780.0, 10.0)
+    spectrum = illuminant("D65").band_average(nm, np.full(nm.size, 10.0))
+    radiance = SpectralRadiance(np.broadcast_to(20 * spectrum, (24, 28, nm.size)).copy(), nm)
+    sensor = low_noise(cfa)
+    device = draw_device(sensor, radiance.shape, np.random.default_rng(1))
+    raw = capture(radiance, sensor, 0.01, device, np.random.default_rng(2), exact=True)
+    return replace(raw, colour=calibrate(sensor, illuminant("D65")))
+
+
+@pytest.mark.parametrize(("cfa", "processor"), [("rgbw", "interleaved"), ("bayer", "bayer")])
+def test_the_mosaic_chooses_the_processor_and_a_grey_wall_is_grey(cfa: str, processor: str) -> None:
+    raw = raw_of(cfa)
+    picture = develop(raw)
+    assert np.array_equal(picture.rgb, develop(raw, processor=processor).rgb)
+    assert np.array_equal(picture.rgb, develop(replace(raw, colour=None), raw.colour).rgb)
+    mean = picture.rgb.mean(axis=(0, 1))
+    assert mean == pytest.approx(np.full(3, mean[1]), rel=0.02)
+
+
+def test_what_is_missing_or_unknown_is_said_in_one_line() -> None:
+    raw = raw_of("bayer")
+    for arguments, told in (
+        ({"raw": replace(raw, colour=None)}, r"no colour calibration; .* calibrate\(sensor, illuminant\('D65'\)\)"),
+        ({"raw": raw, "processor": "bayerr"}, "'bayerr' is unknown; .*did you mean 'bayer'"),
+        ({"raw": raw, "white_balance": "none"}, "white_balance: 'none' is unknown"),
+    ):
+        with pytest.raises(InputError, match=told):
+            develop(**arguments)  # type: ignore[arg-type]
