@@ -30,7 +30,7 @@ _SMALLEST = 32  # pixels of a picture of half the size: the library fails on one
 def picture_bayer_nlm(
     raw: RawImage, matrix: ArrayLike, *, neutral: ArrayLike | None = None, balance: ArrayLike | None = None
 ) -> Picture:
-    """Develop a Bayer raw image with `isp.interleaved.reconstruct`, each colour judged by itself.
+    """Develop a Bayer raw image with `isp.interleaved.reconstruct`, each colour its own guide.
 
     With a `ColourFit` the colours know their noise, as the interleaved camera's do.
     """

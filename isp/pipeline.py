@@ -8,8 +8,8 @@ from isp.bayer import bilinear
 from isp.colour_fit import ColourFit, relative_noise
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, checked_matrix, finish, require_letters
-from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S
-from isp.similarity import saturated_fraction
+from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Settings
+from isp.similarity.guide import saturated_fraction
 from isp.substitution import (
     OCTAVES,
     SUBSTITUTION_SNR,
@@ -51,7 +51,7 @@ def develop_interleaved(
     balance : (channel,) array_like, optional
         Response to what shall come out neutral, such as a file's as-shot neutral, in place of Gray World's means.
     neighbourhood, patch, sigma_d, sigma_s
-        Of `isp.interleaved.reconstruct`.
+        Of `isp.settings.Settings`.
     substitution_snr : float
         W gives half of the luminance where the frame's green SNR is this, more under it; 0 never, inf always.
     octaves : float
@@ -98,7 +98,8 @@ def picture_interleaved(
     letters = require_letters(raw, ("R", "G", "B", "W"))
     if not isinstance(matrix, ColourFit):
         matrix = checked_matrix(matrix)
-    result = reconstruct_with_noise(raw, neighbourhood=neighbourhood, patch=patch, sigma_d=sigma_d, sigma_s=sigma_s)
+    settings = Settings(neighbourhood=neighbourhood, patch=patch, sigma_d=sigma_d, sigma_s=sigma_s)
+    result = reconstruct_with_noise(raw, settings)
     planes = np.asarray(result.estimate, dtype=np.float64)
     white = white_balance(raw, planes, neutral, balance)
     snr = green_snr(raw, planes)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from isp.interleaved import reconstruct
 from isp.reference import reconstruct_reference
+from isp.settings import Settings
 from render.radiance import SpectralRadiance
 from render.scene import Scene
 from render.transport import Transport
@@ -93,7 +94,7 @@ def by_reconstruction(bench: Bench, camera: Camera) -> Iterator[Stage]:
     truth = channel_electrons(form_image(camera.radiance, sensor), sensor, exposure_s)
     calls = {
         f"{neighbourhood}x{neighbourhood}, patch {patch}": partial(
-            reconstruct, raw, neighbourhood=neighbourhood, patch=patch
+            reconstruct, raw, Settings(neighbourhood=neighbourhood, patch=patch)
         )
         for patch in bench.patches
         for neighbourhood in bench.neighbourhoods
@@ -107,10 +108,10 @@ def by_reconstruction(bench: Bench, camera: Camera) -> Iterator[Stage]:
     noise_e = _noise_e(camera)
     yield Stage("neighbourhood and patch", question, words, noise_e, points, points[-1].times)
     small = replace(raw, dn=raw.dn[:64, :64])
-    width, patch = bench.neighbourhoods[0], bench.patches[0]
+    settings = Settings(neighbourhood=bench.neighbourhoods[0], patch=bench.patches[0])
     forms: dict[str, Callable[[], NDArray[np.floating]]] = {
-        "Dr.Jit, single": partial(reconstruct, small, neighbourhood=width, patch=patch),
-        "NumPy, double": partial(reconstruct_reference, small, neighbourhood=width, patch=patch),
+        "Dr.Jit, single": partial(reconstruct, small, settings),
+        "NumPy, double": partial(reconstruct_reference, small, settings),
     }
     made = timed(forms, 1)
     exact = made["NumPy, double"][0]

@@ -15,7 +15,7 @@ from studies.stress_chain import CAMERAS, develop_fixed, shoot, to_picture
 Image = NDArray[np.float64]
 
 # What the kernel states: 1e-4 of the samples' range, or what single precision makes of the largest log weight, some 16
-# roundings of it (isp.weighted_sums, isp.kernel). Two developments differ by twice that.
+# roundings of it (isp.kernel.accumulate, isp.kernel.kernel). Two developments differ by twice that.
 KERNEL_ERROR = 1e-4
 KERNEL_ROUNDINGS = 16 * 2.0**-24
 DOUBLE_ROUNDINGS = 64 * 2.0**-53  # bilinear planes and their matrix, all in double precision
