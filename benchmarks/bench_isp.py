@@ -66,8 +66,8 @@ def compare(name: str, function: Call, yardstick: Call, rounds: int = 9) -> None
 
 
 def first_call() -> None:
-    """Time of the first calls in this process: two small frames that between them run every kernel of the fixed scale."""
-    # Wide enough for lanes that lie inside, and with edges of saturation.
+    """Time of the first calls in this process: two small frames that run every kernel of the fixed scale."""
+    # With edges of saturation.
     small, edge = frame(300.0, size=96), frame(14000.0, size=96)
     wall, cpu = seconds_of(lambda: [reconstruct(raw, PATCHES) for raw in (small, edge)])
     print(f"first calls, all kernels of the fixed scale compiled: {wall:.2f} s, processor {cpu:.2f} s", flush=True)

@@ -2,7 +2,8 @@
 
 With guide W a thread owns all pixels of its block and reads W's plane. Otherwise it owns those whose y lie at one cell
 of the tile, and reads the plane of the channel there. So one compiled kernel serves all phases and cells, and all
-mosaics with a tile of this size. Loading is what costs: at y whole rows are loaded, a packet each (`isp.kernel.layout`).
+mosaics with a tile of this size. Loading is what costs: at y whole rows are loaded, a packet each
+(`isp.kernel.layout`).
 """
 
 from dataclasses import dataclass
@@ -129,7 +130,7 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Sums)
         beta_squared = distances[0]
         if shape.guide == "mixed":
             lines = {r: load(inputs.alpha, y + r * inputs.row_packets, inputs.alpha_values, block) for r in rows}
-            beta_squared = mixed_squares(*distances, [lines[r][c] for r, c in pixels])
+            beta_squared = mixed_squares(distances[0], distances[1], [lines[r][c] for r, c in pixels])
         if not shape.running:
             log_spatial = log_spatial + HEADROOM
         log_weights = [dr.fma(-v, beta, log_spatial) for v, beta in zip(inverse_variance, beta_squared, strict=True)]
@@ -147,22 +148,31 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Sums)
             inside = (jit.UInt(threads.row + r) < inputs.height) & (jit.UInt(threads.column + c) < inputs.width)
             failed |= inside & (weight < LEAST_WEIGHT)
 
-    # Store: [phase, row, column] is (phase * rows + row) * columns + column, of the pixel (row + a, column + b)
-    row = threads.row - sums.first_row + threads.phase // across
-    column = threads.column + threads.phase % across
-    first = (threads.phase * sums.rows + row) * sums.columns + column
+    targets = _store(jit, totals, pixels, threads, shape, sums)
+    dr.eval(failed, targets)  # all at once, for the loop to run once
+    return failed
+
+
+def _store(
+    jit: Any, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, shape: Shape, sums: Sums
+) -> list[Any]:
+    """Store what the loop has summed up; what is stored into is returned, not evaluated yet."""
     targets = [sums.weight, sums.mean] + [sums.noise_gain] * shape.noise + [sums.unit] * shape.running
     stored = [
         (weight, value / weight, *(square / dr.square(weight) for square in more[: shape.noise]), *more[shape.noise :])
         for weight, value, *more in totals
     ]
-    packet = block & -block if dense else 1  # values stored at once: the largest power of two that divides the row
+    # [phase, row, column]: (phase * rows + row) * columns + column, of the pixel (row + a, column + b)
+    row = threads.row - sums.first_row + threads.phase // shape.tile[1]
+    column = threads.column + threads.phase % shape.tile[1]
+    first = (threads.phase * sums.rows + row) * sums.columns + column
+    # Values that are stored at once: the largest power of two that divides a row of the block.
+    packet = shape.block[1] & -shape.block[1] if shape.guide == "W" else 1
     for i in range(0, len(pixels), packet):
         index = jit.UInt(first + pixels[i][0] * sums.columns + pixels[i][1]) // packet
         for target, *values in zip(targets, *stored[i : i + packet], strict=True):
             dr.scatter(target, jit.ArrayXf(values), index, mode=dr.ReduceMode.NoConflicts)
-    dr.eval(failed, targets)  # all at once, for the loop to run once
-    return failed
+    return targets
 
 
 def _pixel(source: Any, index: Any) -> Any:

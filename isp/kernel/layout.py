@@ -17,15 +17,13 @@
     A row:      h0 h1 h2 h3 h4 h5 ...  of a plane,  s0 s1 s2 s3 s4 s5 ...  samples
     Packets:    |h0 h1 h2 h3 s0 s1 s2 s3|h2 h3 h4 h5 s2 s3 s4 s5| ...      (block 4 wide, patch 1, every 2nd column)
 
-A packet holds all that a thread reads of a row of y: the plane under the patches of its block, and the block's samples.
-It comes with one load. At x, which a thread reads once, planes are read pixel by pixel. The addresses:
-
+A packet is one load: all that a thread reads of a row of y, the plane under the patches of its block and the block's
+samples. At x, which a thread reads once, planes are read pixel by pixel. The addresses:
     pixel   (row - top) * stride + column - left
     packet  (row - top) * row_packets + (column - left) / step        step: `packet_step`
 
-Row and column are those of a pixel; planes are stored half a patch early, so that there the pixel's patch begins.
-Beyond the frame planes go on by reflection for half a patch and are OUTSIDE further on. Nothing in a strip depends on
-where the strip begins or ends.
+Planes are stored half a patch early: where a pixel stands, its patch begins. Beyond the frame they go on by reflection
+for half a patch and are OUTSIDE further on. Nothing in a strip depends on where the strip begins or ends.
 """
 
 from dataclasses import dataclass
@@ -84,12 +82,10 @@ class Inputs:
 
     Attributes
     ----------
-    planes : Float
-        Planes h_i, [channel, row, column]: read at x. W's alone with guide W.
-    inverse_variance : Float
-        [row, column]: read at x.
+    planes, inverse_variance : Float
+        Read at x: planes h_i, [channel, row, column], W's alone with guide W; [row, column].
     packets : Float
-        [channel, row, packet, value]: read at y.
+        Read at y: [channel, row, packet, value].
     alpha : Float
         Packets of alpha, [row, packet, value]. None with guide W, and where it is 0 everywhere.
     entries, counts : Float, Int
@@ -100,10 +96,8 @@ class Inputs:
         Floats of a packet, of one of alpha, and of an entry.
     top, left : Int
         Row and column of the frame where the arrays begin.
-    stride, row_packets : Int
-        Pixels and packets in a row.
-    plane_size, plane_packets : Int
-        Pixels and packets in a plane.
+    stride, row_packets, plane_size, plane_packets : Int
+        Pixels and packets in a row, and in a plane.
     white : Int
         Number of W's plane.
     height, width : UInt
@@ -280,15 +274,14 @@ def _surroundings(
     """Rows and columns of the frame that some depend on: half a patch or window for sums, twice a tile for tents."""
     margin = max(settings.patch // 2, WINDOW // 2) + 2 * max(pattern.tile)
     rows, columns = (
-        # From a row with the phase of the frame's first.
         slice(max(first - margin, 0) // size * size, min(last + margin, length))
-        for (first, last), size, length in zip(spans, pattern.tile, shape, strict=True)
+        for (first, last), size, length in zip(spans, pattern.tile, shape, strict=True)  # with the frame's phase
     )
     return rows, columns
 
 
 def _window(values: Array, start: tuple[int, int], size: tuple[int, int], reflected: int, outside: float) -> Array:
-    """Rows and columns from `start` on, which may be negative: beyond the border reflected, and further on `outside`."""
+    """Rows and columns from `start` on, which may be negative: beyond the border reflected, then `outside`."""
     source, result = np.pad(values, reflected, mode="reflect"), np.full(size, outside, np.float32)
     into, out_of = list[slice](), list[slice]()
     for first, count, length in zip(start, source.shape, size, strict=True):

@@ -107,7 +107,7 @@ def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern, *, noise: bo
 def _finish(jit: Any, started: Started, raw: RawImage, pattern: Pattern, results: list[Any]) -> None:
     """Put estimate and, where asked for, noise gain of a strip into the frame's results, [row, column, channel]."""
     for one in started.launches:
-        again = dr.compress(one.failed)  # waits for the launch
+        again: Any = dr.compress(one.failed)  # waits for the launch
         if dr.width(again):
             threads = Threads(**{name: dr.gather(type(part), part, again) for name, part in vars(one.threads).items()})
             dr.eval(vars(threads))

@@ -1,9 +1,9 @@
 """Which thread does what: blocks of pixels, phases of offsets, and which plane guides the similarity.
 
-A thread owns the pixels x of one block and goes through the offsets d = y - x of one phase: those that are (a, b) modulo
-the size of the CFA's tile. The blocks of phase (a, b) begin a rows and b columns early. So their y begin at the tile's
-first cell whatever the phase, and y of the block's pixel (r, c) lies at cell (r mod th, c mod tw): a pixel's channel at
-y is known when the kernel is compiled, and each pair (x, y) is met once.
+A thread owns the pixels x of one block and goes through the offsets d = y - x of one phase: those that are (a, b)
+modulo the size of the CFA's tile. The blocks of phase (a, b) begin a rows and b columns early. So their y begin at the
+tile's first cell whatever the phase, and y of the block's pixel (r, c) lies at cell (r mod th, c mod tw): a pixel's
+channel at y is known when the kernel is compiled, and each pair (x, y) is met once.
 """
 
 from dataclasses import dataclass
@@ -91,14 +91,17 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
     Returns
     -------
     entries : (list, length, values) float32
-        Row and column of the offset, log2 G(beta_d, sigma_d) of eqs. (2) and (4), noise distances. With guide W a list
-        a phase, whose distances are W's for the cells of y. Else a list a phase and cell: the plane's at that cell, W's.
+        Row and column of the offset, log2 G(beta_d, sigma_d) of eqs. (2) and (4), noise distances. With guide W there
+        is a list for each phase, with W's distances for the cells of y. Else there is one for each phase and cell, with
+        those of the channel at that cell and of W.
     counts : (list,) int32
         Entries that hold; the rest is padding.
     """
     (down, across), reach, lists = pattern.tile, settings.reach, []
     tables = noise_distances(pattern.cfa, settings.patch, reach)
-    cells, line = list(np.ndindex(pattern.tile)), np.arange(-reach, reach + 1)
+    if settings.distance == "raw":
+        tables = [np.zeros_like(table) for table in tables]
+    line = np.arange(-reach, reach + 1)
     for phase in np.ndindex(pattern.tile):
         rows, columns = (line[line % size == first] for size, first in zip(pattern.tile, phase, strict=True))
         row, column = (offset.ravel() for offset in np.meshgrid(rows, columns, indexing="ij"))
@@ -108,17 +111,13 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
             row, column = row[order], column[order]
         log_spatial = -np.log2(np.e) * (row**2 + column**2) / (2.0 * settings.sigma_d**2)
 
-        def noise(channel: int | None, cell: tuple[int, ...]) -> NDArray[np.float64]:
-            """B(x, d) of a channel, for y at a cell of the tile: x = y - d lies at cell - phase."""
-            if channel is None or settings.distance == "raw":
-                return np.zeros(row.size)
-            table = tables[channel][(cell[0] - phase[0]) % down, (cell[1] - phase[1]) % across]
-            return np.asarray(table[row + reach, column + reach])
-
+        # B(x, d) by channel and cell of y: x = y - d lies at cell - phase.
+        at_x = [((i - phase[0]) % down, (j - phase[1]) % across) for i, j in np.ndindex(pattern.tile)]
+        noise = [[table[at][row + reach, column + reach] for at in at_x] for table in tables]
+        white = [np.zeros(row.size)] * len(at_x) if pattern.white is None else noise[pattern.white]
+        distances = [[noise[channel][k], white[k]] for k, channel in enumerate(pattern.cells)]
         if guide == "W":
-            distances = [[noise(pattern.white, cell) for cell in cells]]
-        else:
-            distances = [[noise(pattern.cells[k], cell), noise(pattern.white, cell)] for k, cell in enumerate(cells)]
+            distances = [white]
         lists += [np.stack([row, column, log_spatial, *some], axis=-1) for some in distances]
     counts = np.array([len(table) for table in lists], dtype=np.int32)
     entries = np.zeros((len(lists), int(counts.max()), lists[0].shape[1]), dtype=np.float32)

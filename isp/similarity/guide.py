@@ -44,8 +44,8 @@ def fraction_of_full(full: NDArray[np.bool_], tile: Tile, window: int = WINDOW) 
     saturated = fill(full[box[0], box[1]].astype(np.float32), tile, "W") > 0.0
     # Saturated pixels in the window over all of its pixels in the frame; small whole numbers: 0 and 1 are exact.
     half, count = window // 2, box_sums(np.pad(saturated, window // 2).astype(np.uint16), (window, window))
-    lines = [np.arange(size) for size in saturated.shape]
-    rows, columns = (np.minimum(line + half, line[-1]) - np.maximum(line - half, 0) + 1 for line in lines)
+    pixels = [np.arange(size) for size in saturated.shape]
+    rows, columns = (np.minimum(line + half, line[-1]) - np.maximum(line - half, 0) + 1 for line in pixels)
     alpha[box[0], box[1]] = count / np.outer(rows, columns)
     return alpha
 

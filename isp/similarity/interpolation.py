@@ -75,8 +75,8 @@ def opposite_pairs(tile: Tile) -> dict[tuple[int, int], Plane]:
     Returns
     -------
     mapping of (row, column) to (th, tw) float64
-        Of p and -p the one with the larger row, or column. The weights of a channel's pairs add up to 1 / channels, or to
-        0 where a pixel is one of its samples and isn't interpolated.
+        Of p and -p the one with the larger row, or column. The weights of a channel's pairs add up to 1 / channels, or
+        to 0 where a pixel is one of its samples and isn't interpolated.
     """
     all_weights, pairs = tent_weights(tile), dict[tuple[int, int], Plane]()
     for weights in all_weights:

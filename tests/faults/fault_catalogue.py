@@ -29,13 +29,18 @@ class Fault:
 
 
 def _fault(name: str, file: str, there: str, instead: str, *tests: str) -> Fault:
-    return Fault(name, file, ((there, instead),), tuple(f"tests/test_{test}.py" for test in tests))
+    return Fault(
+        name,
+        file,
+        ((there, instead),),
+        tuple(f"tests/{test}.py" if "/" in test else f"tests/test_{test}.py" for test in tests),
+    )
 
 
 _READOUT = ("sensor_noise", "sensor_capture", "sensor_crosstalk", "sensor_device", "sensor_lanes", "sensor_emva")
 _LENS = ("sensor_optics", "sensor_diffraction", "sensor_hard_cases")
 _LIGHT = ("render_photometry", "render_spectrum", "render_illuminants", "sensor_optics")
-_SIMILARITY = ("isp_similarity", "isp_planes", "isp_bayer", "isp_interleaved")
+_SIMILARITY = ("isp/similarity/test_guide", "isp/test_planes", "isp_bayer", "isp/test_interleaved")
 _COLOUR = ("isp_colour", "isp_colour_fit", "isp_pipeline", "studies_truth_metrics")
 
 SENSOR = (
@@ -330,90 +335,90 @@ ISP = (
         "isp/reference.py",
         "alpha[at] * np.sqrt(distance[i][at]) + (1.0 - alpha[at])",
         "(1.0 - alpha[at]) * np.sqrt(distance[i][at]) + alpha[at]",
-        "isp_interleaved",
-        "isp_kernel",
+        "isp/test_interleaved",
+        "isp/kernel/test_kernel",
     ),
     _fault(
         "neighbourhood one short",
         "isp/reference.py",
         "range(-settings.reach, settings.reach + 1)",
         "range(-settings.reach, settings.reach)",
-        "isp_interleaved",
-        "isp_kernel",
+        "isp/test_interleaved",
+        "isp/kernel/test_kernel",
     ),
     _fault(
         "wrong normaliser",
         "isp/reference.py",
         "sums.value / sums.weight,",
         "sums.value / np.sqrt(sums.square),",
-        "isp_interleaved",
-        "isp_kernel",
+        "isp/test_interleaved",
+        "isp/kernel/test_kernel",
     ),
     _fault(
         "spatial weight without its 2",
         "isp/reference.py",
         "/ (2.0 * settings.sigma_d**2)",
         "/ settings.sigma_d**2",
-        "isp_interleaved",
-        "isp_kernel",
+        "isp/test_interleaved",
+        "isp/kernel/test_kernel",
     ),
     _fault(
         "similarity not squared",
         "isp/reference.py",
         "trust[at] * beta_s**2",
         "trust[at] * beta_s",
-        "isp_interleaved",
-        "isp_kernel",
+        "isp/test_interleaved",
+        "isp/kernel/test_kernel",
     ),
     _fault(
         "noise added to the distance",
         "isp/reference.py",
         "np.maximum(total - noise",
         "np.maximum(total + noise",
-        "isp_interleaved",
-        "isp_kernel",
+        "isp/test_interleaved",
+        "isp/kernel/test_kernel",
     ),
     _fault(
         "patches repeat the border",
         "isp/reference.py",
         '(half, half)), mode="reflect")',
         '(half, half)), mode="edge")',
-        "isp_interleaved",
-        "isp_kernel",
+        "isp/test_interleaved",
+        "isp/kernel/test_kernel",
     ),
     _fault(
         "alpha not normalised at the border",
-        "isp/similarity.py",
-        "np.pad(np.ones((1, size), np.uint16), ((0, 0), (window // 2,) * 2))",
-        "np.ones((1, size + window - 1), np.uint16)",
+        "isp/similarity/guide.py",
+        "np.minimum(line + half, line[-1]) - np.maximum(line - half, 0) + 1 for",
+        "np.full(line.size, window) for",
         *_SIMILARITY,
     ),
     _fault(
         "similarity always trusted",
-        "isp/similarity.py",
+        "isp/similarity/guide.py",
         "    result /= signal_e\n",
         "    result[...] = 1.0\n",
         *_SIMILARITY,
     ),
     _fault(
         "noise taken for interpolation error",
-        "isp/interpolation.py",
+        "isp/similarity/interpolation.py",
         "change -= 2.0",
         "change -= 0.0",
-        "isp_interpolation",
+        "isp/similarity/test_interpolation",
         *_SIMILARITY,
     ),
     _fault(
         "distances trusted between samples that differ",
-        "isp/interpolation.py",
+        "isp/similarity/interpolation.py",
         "    result += NOISE_OVER_INTERPOLATION\n",
         "    result[...] = NOISE_OVER_INTERPOLATION\n",
-        "isp_interpolation",
+        "isp/similarity/test_interpolation",
         *_SIMILARITY,
     ),
     _fault(
         "overlap of patches forgotten",
-        "isp/similarity.py",
+        "isp/similarity/noise_distance.py",
         "variance + other - 2.0 * covariance[at]",
         "variance + other",
         *_SIMILARITY,
@@ -486,55 +491,59 @@ ISP = (
     ),
 )
 
-_KERNEL = ("isp_interleaved", "isp_kernel")
+_KERNEL = ("isp/test_interleaved", "isp/kernel/test_kernel")
 
 KERNEL = (
     _fault(
         "kernel's alpha inverted",
-        "isp/kernel.py",
-        "(band, white), (share,) = distances, alpha",
-        "(white, band), (share,) = distances, alpha",
+        "isp/kernel/accumulate.py",
+        "zip(own, white, alpha, strict=True)",
+        "zip(white, own, alpha, strict=True)",
         *_KERNEL,
     ),
     _fault(
-        "kernel mixes without the cross term", "isp/kernel.py", "(2.0 / ROOT_SCALE)", "(0.0 / ROOT_SCALE)", *_KERNEL
+        "kernel mixes without the cross term",
+        "isp/kernel/accumulate.py",
+        "(2.0 / ROOT_SCALE)",
+        "(0.0 / ROOT_SCALE)",
+        *_KERNEL,
     ),
     _fault(
         "kernel forgets what noise alone makes",
-        "isp/kernel.py",
-        "at_least(total - noise[shape.noise_number((row, column), judge)], 0.0)",
-        "at_least(total, 0.0)",
+        "isp/kernel/accumulate.py",
+        "_at_least(total - share, 0.0)",
+        "_at_least(total, 0.0)",
         *_KERNEL,
     ),
     _fault(
         "kernel's neighbourhood one short",
-        "isp/tiles.py",
-        "range(-reach, reach + 1) if d % size",
-        "range(-reach, reach) if d % size",
+        "isp/kernel/schedule.py",
+        "np.arange(-reach, reach + 1)",
+        "np.arange(-reach, reach)",
         *_KERNEL,
     ),
     _fault(
         "kernel's spatial weight in base e",
-        "isp/tiles.py",
-        "log_weight = -np.log2(np.e) * (row**2",
-        "log_weight = -(row**2",
+        "isp/kernel/schedule.py",
+        "log_spatial = -np.log2(np.e) * (row**2",
+        "log_spatial = -(row**2",
         *_KERNEL,
     ),
     _fault(
         "kernel counts samples outside the frame",
-        "isp/strips.py",
-        "FAR = 1e13",
-        "FAR = 0.0",
+        "isp/kernel/accumulate.py",
+        "OUTSIDE = 1e13",
+        "OUTSIDE = 0.0",
         *_KERNEL,
     ),
     _fault(
         "kernel counts samples outside the frame where similarity isn't trusted",
-        "isp/strips.py",
-        "np.maximum(result, LEAST_DECAY, out=result)",
-        "np.maximum(result, np.float32(0.0), out=result)",
+        "isp/kernel/layout.py",
+        "np.maximum(inverse_variance, np.float32(LEAST_INVERSE_VARIANCE), out=inverse_variance)",
+        "np.maximum(inverse_variance, np.float32(0.0), out=inverse_variance)",
         *_KERNEL,
     ),
-    _fault("2^x with a wrong coefficient", "isp/weighted_sums.py", "0.22606716", "0.22906716", *_KERNEL),
+    _fault("2^x with a wrong coefficient", "isp/kernel/accumulate.py", "0.22606716", "0.22906716", *_KERNEL),
 )
 
 STUDIES = (

@@ -53,7 +53,9 @@ def test_without_similarity_an_impulse_is_the_spatial_weight_in_closed_form(tile
     shape, place, height = (15, 18), (6, 9), 1000.0
     electrons = np.zeros(shape)
     electrons[place] = height
-    result = reconstruct_with_noise(raw_image(electrons, tile), Settings(sigma_d=sigma_d, sigma_s=math.inf, neighbourhood=9))
+    result = reconstruct_with_noise(
+        raw_image(electrons, tile), Settings(sigma_d=sigma_d, sigma_s=math.inf, neighbourhood=9)
+    )
     letters = letter_map(tile, shape)
     for i, letter in enumerate(channels(tile)):
         for x in np.ndindex(shape):
@@ -207,7 +209,9 @@ def test_threads_of_every_guide_are_the_reference(turns):
     alpha = saturated_fraction(raw)
     work = list_threads(make_pattern(RGBW), raw.shape, (0, raw.shape[0]), alpha, 0, settings.reach)
     assert {guide for guide, threads in work.items() if len(threads.row)} == {"W", "channel", "mixed"}
-    error = np.abs(reconstruct(raw, Settings(patch=5, sigma_s=20.0)) - reconstruct_reference(raw, Settings(patch=5, sigma_s=20.0)))
+    error = np.abs(
+        reconstruct(raw, Settings(patch=5, sigma_s=20.0)) - reconstruct_reference(raw, Settings(patch=5, sigma_s=20.0))
+    )
     assert error.max() < 4e-5 * FULL
 
 

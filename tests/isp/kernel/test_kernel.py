@@ -116,7 +116,12 @@ def test_hard_frames_give_finite_results_within_the_range_of_the_samples(name, d
     raw = raw_image(np.asarray(electrons, float), RGBW, black, gain)
     letters, samples = letter_map(RGBW, raw.shape), raw.electrons
     for sigma_s in (1e-3, 0.1, 8.0, 1e6, math.inf):
-        result = reconstruct_with_noise(raw, Settings(sigma_s=sigma_s * (gain if distance == "raw" else 1.0) if gain > 1 else sigma_s, distance=distance))
+        result = reconstruct_with_noise(
+            raw,
+            Settings(
+                sigma_s=sigma_s * (gain if distance == "raw" else 1.0) if gain > 1 else sigma_s, distance=distance
+            ),
+        )
         assert np.isfinite(result.estimate).all()
         for i, letter in enumerate(channels(RGBW)):
             own = samples[letters == letter]
@@ -156,7 +161,9 @@ def test_frames_may_be_smaller_than_a_patch_and_than_a_packet(shape, tile):
 def test_a_pixel_without_a_similar_neighbour_keeps_its_sample_and_takes_the_nearest_of_the_others():
     raw = raw_image(HARD_FRAMES["no similar neighbour"][0])
     exact = reconstruct_reference(raw, Settings(sigma_s=0.05, patch=5))
-    assert sum_weights(raw, Settings(patch=5, sigma_s=0.05)).largest.min() < -1000.0  # every weight underflows by itself
+    assert (
+        sum_weights(raw, Settings(patch=5, sigma_s=0.05)).largest.min() < -1000.0
+    )  # every weight underflows by itself
     assert np.abs(reconstruct(raw, Settings(sigma_s=0.05, patch=5)) - exact).max() < 0.05
     letters = letter_map(RGBW, raw.shape)
     for i, letter in enumerate(channels(RGBW)):
