@@ -86,42 +86,48 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Sums)
     noises = down * across if dense else 2
 
     # Where things are
-    x = (threads.row - inputs.top) * inputs.stride + threads.column - inputs.left  # pixel
-    planes = {"W": [inputs.white], "channel": [threads.plane], "mixed": [threads.plane, inputs.white]}[shape.guide]
+    x_row, x_column = threads.row - inputs.top, threads.column - inputs.left
+    x = jit.UInt(x_row) * inputs.stride + jit.UInt(x_column)  # pixel
+    own = jit.UInt(threads.plane)
+    planes = {"W": [inputs.white], "channel": [own], "mixed": [own, inputs.white]}[shape.guide]
+    first_packets = [plane * inputs.plane_packets for plane in planes]
+    below = {i: i * inputs.row_packets for i in window}
     # A list of offsets a phase, or a phase and cell: phase * cells + cell
-    offsets = threads.phase if dense else threads.phase * (down * across) + threads.cell
-    first_entry, entries = offsets * inputs.length, dr.gather(jit.Int, inputs.counts, jit.UInt(offsets))
+    offsets = jit.UInt(threads.phase if dense else threads.phase * (down * across) + threads.cell)
+    first_entry, entries = offsets * inputs.length, dr.gather(jit.UInt, inputs.counts, offsets)
 
     # What the thread reads at x, once
     patches_at_x = [
         {
-            i: [_pixel(inputs.planes, plane * inputs.plane_size + x + i * inputs.stride + j) for j in range(under)]
+            i: [
+                dr.gather(jit.Float, inputs.planes, plane * inputs.plane_size + x + i * inputs.stride + j)
+                for j in range(under)
+            ]
             for i in window
         }
         for plane in planes
     ]
-    inverse_variance = [_pixel(inputs.inverse_variance, x + r * inputs.stride + c) for r, c in pixels]
+    inverse_variance = [dr.gather(jit.Float, inputs.inverse_variance, x + r * inputs.stride + c) for r, c in pixels]
 
     def load(source: Any, packet: Any, size: int, needed: int) -> list[Any]:
         """First values of a packet, 8 at a time: part k of packet p is number p * (size / 8) + k."""
         part, values = min(size, 8), list[Any]()
         for k in range(-(-needed // part)):
-            index = jit.UInt(packet * (size // part) + k)
+            index = packet * (size // part) + k
             values.extend(dr.gather(jit.ArrayXf, source, index, shape=(part, count)))
         return values[:needed]
 
     def add_offset(k: Any, totals: list[Any]) -> tuple[Any, list[Any]]:
         """Add the samples at y = x + d for offset k of the list."""
         row, column, log_spatial, *noise = load(inputs.entries, first_entry + k, inputs.entry_values, 3 + noises)
-        y_row, y_column = threads.row + jit.Int(row), threads.column + jit.Int(column)
-        y = (y_row - inputs.top) * inputs.row_packets + (y_column - inputs.left) // (across if dense else 1)  # packet
+        y_row, y_column = jit.UInt(x_row + jit.Int(row)), jit.UInt(x_column + jit.Int(column))
+        y = y_row * inputs.row_packets + y_column // (across if dense else 1)  # packet
         distances, samples = list[list[Any]](), dict[int, list[Any]]()
-        for n, (plane, patches) in enumerate(zip(planes, patches_at_x, strict=True)):
+        for n, (first_packet, patches) in enumerate(zip(first_packets, patches_at_x, strict=True)):
             patches_at_y = {}
             for i in window:
                 needed = under + block if n == 0 and i in rows else under  # every plane's packets have the samples
-                packet = plane * inputs.plane_packets + y + i * inputs.row_packets
-                values = load(inputs.packets, packet, inputs.packet_values, needed)
+                values = load(inputs.packets, first_packet + y + below[i], inputs.packet_values, needed)
                 patches_at_y[i] = values[:under]
                 samples.setdefault(i, values[under:])
             # A noise distance for each cell of y, or for each plane.
@@ -129,7 +135,7 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Sums)
             distances.append(squared_distances(patches, patches_at_y, less, pixels, patch))
         beta_squared = distances[0]
         if shape.guide == "mixed":
-            lines = {r: load(inputs.alpha, y + r * inputs.row_packets, inputs.alpha_values, block) for r in rows}
+            lines = {r: load(inputs.alpha, y + below[r], inputs.alpha_values, block) for r in rows}
             beta_squared = mixed_squares(distances[0], distances[1], [lines[r][c] for r, c in pixels])
         if not shape.running:
             log_spatial = log_spatial + HEADROOM
@@ -138,18 +144,21 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Sums)
         return k + 1, add_samples(totals, log_weights, values, running=shape.running)
 
     start = [tuple(dr.full(jit.Float, value, count) for value in start_sums(shape.running, shape.noise))] * len(pixels)
-    _, totals = dr.while_loop((jit.Int(0), start), lambda k, _: k < entries, add_offset)
+    _, totals = dr.while_loop((jit.UInt(0), start), lambda k, _: k < entries, add_offset)
 
-    # Pixels of other strips may fail too: all strips decide alike.
-    failed = dr.full(jit.Bool, False, count)
-    if not shape.running:
-        for (r, c), (weight, *_) in zip(pixels, totals, strict=True):
-            # In the frame: unsigned, a negative number is a large one.
-            inside = (jit.UInt(threads.row + r) < inputs.height) & (jit.UInt(threads.column + c) < inputs.width)
-            failed |= inside & (weight < LEAST_WEIGHT)
-
+    failed = dr.full(jit.Bool, False, count) if shape.running else _failed(jit, totals, pixels, threads, inputs)
     targets = _store(jit, totals, pixels, threads, shape, sums)
     dr.eval(failed, targets)  # all at once, for the loop to run once
+    return failed
+
+
+def _failed(jit: Any, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, inputs: Inputs) -> Any:
+    """Threads that hold a pixel of the frame with too small a sum; those of other strips too: all decide alike."""
+    failed = dr.full(jit.Bool, False, dr.width(threads.row))
+    for (r, c), (weight, *_) in zip(pixels, totals, strict=True):
+        # In the frame: unsigned, a negative number is a large one.
+        inside = (jit.UInt(threads.row + r) < inputs.height) & (jit.UInt(threads.column + c) < inputs.width)
+        failed |= inside & (weight < LEAST_WEIGHT)
     return failed
 
 
@@ -173,7 +182,3 @@ def _store(
         for target, *values in zip(targets, *stored[i : i + packet], strict=True):
             dr.scatter(target, jit.ArrayXf(values), index, mode=dr.ReduceMode.NoConflicts)
     return targets
-
-
-def _pixel(source: Any, index: Any) -> Any:
-    return dr.gather(type(source), source, dr.uint32_array_t(index)(index))

@@ -88,17 +88,17 @@ class Inputs:
         Read at y: [channel, row, packet, value].
     alpha : Float
         Packets of alpha, [row, packet, value]. None with guide W, and where it is 0 everywhere.
-    entries, counts : Float, Int
+    entries, counts : Float, UInt
         Of `isp.kernel.schedule.list_offsets`.
-    length : Int
+    length : UInt
         Entries that a list has room for.
     packet_values, alpha_values, entry_values : int
         Floats of a packet, of one of alpha, and of an entry.
     top, left : Int
         Row and column of the frame where the arrays begin.
-    stride, row_packets, plane_size, plane_packets : Int
+    stride, row_packets, plane_size, plane_packets : UInt
         Pixels and packets in a row, and in a plane.
-    white : Int
+    white : UInt
         Number of W's plane.
     height, width : UInt
         Of the whole frame.
@@ -150,13 +150,13 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
     dn = dn.astype(np.float32)
     samples = dn - black
     guide = guide_mosaic(samples * gain, raw, settings.distance)
-    # log2(e) r(x) c(x) / (2 sigma_s^2)
-    inverse_variance = np.full(dn.shape, np.log2(np.e) / (2.0 * settings.sigma_s**2), np.float32)
+    factor = np.float32(np.log2(np.e) / (2.0 * settings.sigma_s**2))
+    inverse_variance = np.full(dn.shape, factor)
     if settings.distance == "noise":
-        light_e = (dn if pattern.white is None else fill(dn, raw.cfa, "W")) - black
-        trust = reliability(light_e * gain, dark_noise_e, WINDOW)
-        trust *= certainty(guide, raw.cfa, settings.patch)
-        inverse_variance *= trust
+        light_e = ((dn if pattern.white is None else fill(dn, raw.cfa, "W")) - black) * gain
+        inverse_variance = reliability(light_e, dark_noise_e, WINDOW)
+        inverse_variance *= certainty(guide, raw.cfa, settings.patch)
+        inverse_variance *= factor
     np.maximum(inverse_variance, np.float32(LEAST_INVERSE_VARIANCE), out=inverse_variance)
     return Strip(
         shape=(shape[0], shape[1]),
@@ -224,17 +224,17 @@ def lay_out(
         alpha=None if alpha is None else upload(jit, alpha),
         entries=upload(jit, entries),
         counts=upload(jit, counts),
-        length=dr.opaque(jit.Int, entries.shape[1]),
+        length=dr.opaque(jit.UInt, entries.shape[1]),
         packet_values=packets.shape[3],
         alpha_values=packet_width(block),
         entry_values=entries.shape[2],
         top=dr.opaque(jit.Int, top),
         left=dr.opaque(jit.Int, left),
-        stride=dr.opaque(jit.Int, size[1]),
-        row_packets=dr.opaque(jit.Int, row_packets),
-        plane_size=dr.opaque(jit.Int, size[0] * size[1]),
-        plane_packets=dr.opaque(jit.Int, size[0] * row_packets),
-        white=dr.opaque(jit.Int, channels.index(pattern.white) if pattern.white is not None else 0),
+        stride=dr.opaque(jit.UInt, size[1]),
+        row_packets=dr.opaque(jit.UInt, row_packets),
+        plane_size=dr.opaque(jit.UInt, size[0] * size[1]),
+        plane_packets=dr.opaque(jit.UInt, size[0] * row_packets),
+        white=dr.opaque(jit.UInt, channels.index(pattern.white) if pattern.white is not None else 0),
         height=dr.opaque(jit.UInt, strip.shape[0]),
         width=dr.opaque(jit.UInt, strip.shape[1]),
     )
@@ -252,7 +252,7 @@ def upload_threads(jit: Any, threads: Threads) -> Threads:
 
 def upload(jit: Any, values: Array) -> Any:
     """Evaluated Dr.Jit array of the same type, in aligned memory."""
-    kinds = {"f": jit.Float, "i": jit.Int}
+    kinds = {"f": jit.Float, "u": jit.UInt, "i": jit.Int}
     if values.ctypes.data % ALIGNMENT:
         memory = aligned(values.shape, values.dtype)
         memory[:] = values

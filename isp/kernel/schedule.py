@@ -85,7 +85,7 @@ def make_pattern(cfa: Tile) -> Pattern:
     )
 
 
-def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Every offset of Omega, phase by phase.
 
     Returns
@@ -94,7 +94,7 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
         Row and column of the offset, log2 G(beta_d, sigma_d) of eqs. (2) and (4), noise distances. With guide W there
         is a list for each phase, with W's distances for the cells of y. Else there is one for each phase and cell, with
         those of the channel at that cell and of W.
-    counts : (list,) int32
+    counts : (list,) uint32
         Entries that hold; the rest is padding.
     """
     (down, across), reach, lists = pattern.tile, settings.reach, []
@@ -119,7 +119,7 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
         if guide == "W":
             distances = [white]
         lists += [np.stack([row, column, log_spatial, *some], axis=-1) for some in distances]
-    counts = np.array([len(table) for table in lists], dtype=np.int32)
+    counts = np.array([len(table) for table in lists], dtype=np.uint32)
     entries = np.zeros((len(lists), int(counts.max()), lists[0].shape[1]), dtype=np.float32)
     for target, table in zip(entries, lists, strict=True):
         target[: len(table)] = table

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.planes import Plane, box_sums, fill
+from isp.planes import BLOCK_ROWS, Plane, box_sums, fill
 from isp.settings import WINDOW
 from sensor.cfa import Tile
 from sensor.raw import RawImage
@@ -70,9 +70,11 @@ def reliability(light_e: NDArray[Any], dark_noise_e: float, window: int) -> NDAr
     (h, w) of the same type
         0 to 1. Beyond the border the window goes on by reflection, as the patches h_i do.
     """
-    mean_e = box_sums(np.pad(light_e, window // 2, mode="reflect"), (window, window))
-    mean_e /= window**2
-    return reliability_of_mean(mean_e, dark_noise_e)
+    padded, result = np.pad(light_e, window // 2, mode="reflect"), np.empty_like(light_e)
+    for first in range(0, len(result), BLOCK_ROWS):
+        mean_e = box_sums(padded[first : first + BLOCK_ROWS + window - 1], (window, window)) / window**2
+        result[first : first + BLOCK_ROWS] = reliability_of_mean(mean_e, dark_noise_e)
+    return result
 
 
 def reliability_of_mean(mean_e: NDArray[Any], dark_noise_e: float) -> NDArray[Any]:
