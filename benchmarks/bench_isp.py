@@ -20,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
 
@@ -28,7 +29,7 @@ from environment import beside, in_turn, print_environment, seconds_of
 from skimage.restoration import denoise_nl_means
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
-from isp.settings import PATCH, SIGMA_S
+from isp.settings import Settings
 from rodcone.jit import backend
 from sensor.cfa import RGBW, letter_map
 from sensor.raw import RawImage
@@ -37,7 +38,7 @@ SIZE = 1024
 FULL_E = 15000.0
 READ_NOISE_E = 2.0
 BLACK = 20.0
-PATCHES = {"patch": 5, "sigma_s": 8.0}  # of the comparisons: the default, one pixel a patch, is faster
+PATCHES = Settings(patch=5, sigma_s=8.0)  # of the comparisons: the default, one pixel a patch, is faster
 
 
 def frame(mean_w_e: float, saturated_disc: float = 0.0, size: int = SIZE, height: int | None = None) -> RawImage:
@@ -65,10 +66,10 @@ def compare(name: str, function: Call, yardstick: Call, rounds: int = 9) -> None
 
 def first_call() -> None:
     """Time of the first calls in this process: two small frames that run every kernel of the fixed scale."""
-    # Wide enough for blocks away from the border, and with edges of saturation.
+    # With edges of saturation.
     small, edge = frame(300.0, size=96), frame(14000.0, size=96)
-    wall, cpu = seconds_of(lambda: [reconstruct(raw, **PATCHES) for raw in (small, edge)])
-    print(f"first calls, kernels compiled: {wall:.2f} s, processor {cpu:.2f} s", flush=True)
+    wall, cpu = seconds_of(lambda: [reconstruct(raw, PATCHES) for raw in (small, edge)])
+    print(f"first calls, all kernels of the fixed scale compiled: {wall:.2f} s, processor {cpu:.2f} s", flush=True)
 
 
 def others() -> Call:
@@ -94,19 +95,19 @@ def others() -> Call:
 def ways(yardstick: Call) -> None:
     """Time frames for which the kernel does different work."""
     frames = {
-        "one pixel a patch, the default": (frame(300.0), {"patch": PATCH, "sigma_s": SIGMA_S}),
-        "nothing saturated (guide: W)": (frame(300.0), {}),
-        "3 % saturated": (frame(3000.0, saturated_disc=0.03), {}),
-        "5 % saturated": (frame(3000.0, saturated_disc=0.05), {}),
-        "all saturated (guide: each channel itself)": (frame(1e6), {}),
-        "at the edge of saturation (guide: mixed)": (frame(14000.0), {}),
-        "sigma_s = 0.5 (running maximum nearly everywhere)": (frame(300.0), {"sigma_s": 0.5}),
-        "7x7 patches, nothing saturated": (frame(300.0), {"patch": 7}),
-        "raw distance": (frame(300.0), {"distance": "raw", "sigma_s": 50.0}),
+        "one pixel a patch, the default": (frame(300.0), Settings()),
+        "nothing saturated (W guides)": (frame(300.0), PATCHES),
+        "3 % saturated": (frame(3000.0, saturated_disc=0.03), PATCHES),
+        "5 % saturated": (frame(3000.0, saturated_disc=0.05), PATCHES),
+        "all saturated (each channel guides itself)": (frame(1e6), PATCHES),
+        "at the edge of saturation (both guide)": (frame(14000.0), PATCHES),
+        "sigma_s = 0.5 (running maximum nearly everywhere)": (frame(300.0), replace(PATCHES, sigma_s=0.5)),
+        "7x7 patches, nothing saturated": (frame(300.0), replace(PATCHES, patch=7)),
+        "raw distance": (frame(300.0), replace(PATCHES, distance="raw", sigma_s=50.0)),
     }
     for name, (raw, settings) in frames.items():
-        compare(name, partial(reconstruct, raw, **{**PATCHES, **settings}), yardstick)
-    compare("nothing saturated, with the noise", partial(reconstruct_with_noise, frame(300.0), **PATCHES), yardstick)
+        compare(name, partial(reconstruct, raw, settings), yardstick)
+    compare("nothing saturated, with the noise", partial(reconstruct_with_noise, frame(300.0), PATCHES), yardstick)
 
 
 def sizes(yardstick: Call, large: bool) -> None:
@@ -115,7 +116,7 @@ def sizes(yardstick: Call, large: bool) -> None:
     for width, height in [(512, 512), (1024, 1024), (2048, 2048), *([(6000, 4000)] if large else [])]:
         raw = frame(300.0, size=width, height=height)
         name = f"{raw.dn.size / SIZE**2:.2f} x 1024 x 1024"
-        compare(name, partial(reconstruct, raw, **PATCHES), yardstick, 3 if width > 3000 else 9)
+        compare(name, partial(reconstruct, raw, PATCHES), yardstick, 3 if width > 3000 else 9)
 
 
 def main() -> None:

@@ -14,40 +14,22 @@ What the paper leaves open is settled so:
 import numpy as np
 from numpy.typing import NDArray
 
+from isp.kernel.run import reconstruct_strips
 from isp.reference import reference_with_noise
-from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Distance, Reconstruction, Settings
-from isp.strip_sums import Started, end_rows, start_rows
-from isp.strips import strip_rows
-from isp.tiles import number_tile
-from rodcone.jit import arrays, backend, dr
-from sensor.cfa import channels
+from isp.settings import DEFAULTS, Reconstruction, Settings
+from rodcone.jit import backend
 from sensor.raw import RawImage
 
 
-def reconstruct(
-    raw: RawImage,
-    *,
-    neighbourhood: int = NEIGHBOURHOOD,
-    patch: int = PATCH,
-    sigma_d: float = SIGMA_D,
-    sigma_s: float = SIGMA_S,
-    distance: Distance = "noise",
-) -> NDArray[np.float32]:
+def reconstruct(raw: RawImage, settings: Settings = DEFAULTS) -> NDArray[np.float32]:
     """Reconstruct every channel at every pixel.
 
     Parameters
     ----------
     raw : RawImage
-        One exposure; any tile of letters.
-    neighbourhood, patch : int
-        Odd widths of Omega and of the patches h_i [pixels]. The time grows with the square of the first.
-    sigma_d : float
-        Standard deviation of the spatial weight, eq. (4) [pixels]; 0.001 to inf.
-    sigma_s : float
-        Standard deviation of the similarity weight, eq. (5) [standard deviations of one pixel's noise, or electrons];
-        0.001 to inf.
-    distance : {"noise", "raw"}
-        Patches in units of noise, debiased and trusted as far as their SNR allows, or in electrons as the paper has it.
+        One exposure; any tile of channels.
+    settings : Settings
+        Widths of Omega and the patches, sigmas, units of the distance.
 
     Returns
     -------
@@ -57,49 +39,24 @@ def reconstruct(
     Raises
     ------
     InputError
-        Where a parameter is outside its range, or Omega may miss a letter of the tile.
+        Where Omega may miss a channel of the tile.
 
     Notes
     -----
     Other sizes, sigmas and neighbourhoods run the kernels compiled already; another patch or size of tile compiles its
     own. Besides the result a call takes some 1.2 GB at most.
     """
-    settings = Settings(neighbourhood, patch, sigma_d, sigma_s, distance)
     settings.check_reaches(raw.cfa)
     if backend() == "numpy":
         return reference_with_noise(raw, settings).estimate.astype(np.float32)
-    return _reconstruct(raw, settings, noise=False)[0]
+    return reconstruct_strips(raw, settings, noise=False)[0]
 
 
-def reconstruct_with_noise(
-    raw: RawImage,
-    *,
-    neighbourhood: int = NEIGHBOURHOOD,
-    patch: int = PATCH,
-    sigma_d: float = SIGMA_D,
-    sigma_s: float = SIGMA_S,
-    distance: Distance = "noise",
-) -> Reconstruction:
+def reconstruct_with_noise(raw: RawImage, settings: Settings = DEFAULTS) -> Reconstruction:
     """As `reconstruct`, with the factor by which the weights reduce white noise, and the engine that ran."""
-    settings = Settings(neighbourhood, patch, sigma_d, sigma_s, distance)
     settings.check_reaches(raw.cfa)
     engine = backend()
     if engine == "numpy":
         return reference_with_noise(raw, settings)
-    estimate, noise_gain = _reconstruct(raw, settings, noise=True)
-    return Reconstruction(estimate, noise_gain, engine)
-
-
-def _reconstruct(raw: RawImage, settings: Settings, *, noise: bool) -> list[NDArray[np.float32]]:
-    """Estimate and, where asked for, noise gain, strip by strip."""
-    pattern, jit, height = number_tile(raw.cfa), arrays(), raw.shape[0]
-    step, started = strip_rows(raw.shape, pattern, settings.patch), list[Started]()
-    shape = (*raw.shape, len(channels(raw.cfa)))
-    results = [dr.empty(jit.Float, int(np.prod(shape))) for _ in range(1 + noise)]
-    for first in range(0, height, step):
-        rows = first, min(first + step, height)
-        started.append(start_rows(raw, rows, pattern, settings, noise=noise))
-        if len(started) > 1:
-            end_rows(started.pop(0), raw, pattern, results)
-    end_rows(started.pop(), raw, pattern, results)
-    return [values.numpy().reshape(shape) for values in results]
+    estimate, noise_gain = reconstruct_strips(raw, settings, noise=True)
+    return Reconstruction(estimate=estimate, noise_gain=noise_gain, engine=engine)

@@ -9,8 +9,8 @@ from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish, require_letters
-from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Settings
-from isp.similarity import saturated_fraction
+from isp.settings import DEFAULTS, Settings
+from isp.similarity.guide import saturated_fraction
 from isp.substitution import (
     COLOUR_ERROR,
     OCTAVES,
@@ -21,8 +21,6 @@ from isp.substitution import (
 )
 from sensor.raw import RawImage
 
-SETTINGS = Settings(NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S)
-
 
 def picture_interleaved(
     raw: RawImage,
@@ -30,7 +28,7 @@ def picture_interleaved(
     *,
     neutral: ArrayLike | None = None,
     balance: ArrayLike | WhiteBalance | None = None,
-    settings: Settings = SETTINGS,
+    settings: Settings = DEFAULTS,
     substitution_snr: float = SUBSTITUTION_SNR,
     octaves: float = OCTAVES,
 ) -> Picture:
@@ -71,7 +69,7 @@ def picture_interleaved(
     colours = ColourFit.of(matrix)
     white_balance = WhiteBalance.of(raw, neutral, balance)
 
-    result = reconstruct_with_noise(raw, **vars(settings))
+    result = reconstruct_with_noise(raw, settings)
     planes = np.asarray(result.estimate, dtype=np.float64)
     gains = white_balance.gains(raw, planes)
     noise = relative_noise(raw, planes, result.noise_gain, gains.factors, colours)

@@ -1,7 +1,7 @@
-"""From the mosaic to one full plane a letter, in units of noise: where the patches h_i of eq. (5) are read.
+"""From the mosaic to one full plane a channel, in units of noise: where the patches h_i of eq. (5) are read.
 
 Planes are filled by normalised convolution (Knutsson & Westin 1993) of the samples with a tent, so a flat field stays
-flat up to the border. They serve only to judge similarity: what is averaged are the samples themselves.
+flat up to the border. They serve only to guide the similarity: what is averaged are the samples themselves.
 """
 
 from functools import lru_cache
@@ -26,9 +26,9 @@ def tent(radius: int) -> Plane:
 
 
 @lru_cache(maxsize=64)
-def tent_radius(tile: Tile, letter: str) -> int:
-    """Smallest radius of a tent that reaches a sample of `letter` from every phase of an endless mosaic."""
-    sampled = np.array([list(row) for row in tile]) == letter
+def tent_radius(tile: Tile, channel: str) -> int:
+    """Smallest radius of a tent that reaches a sample of `channel` from every phase of an endless mosaic."""
+    sampled = np.array([list(row) for row in tile]) == channel
     for radius in range(int(max(sampled.shape))):
         reached: NDArray[np.bool_] = sampled
         for axis in (0, 1):
@@ -39,26 +39,31 @@ def tent_radius(tile: Tile, letter: str) -> int:
     return int(max(sampled.shape))
 
 
-def tent_weights(tile: Tile, letter: str) -> Plane:
+def tent_weights(tile: Tile) -> list[Plane]:
     """Weights with which `fill` makes a plane of an endless mosaic, by phase.
 
     Returns
     -------
-    (th, tw, 2r + 1, 2r + 1) float64
-        Weight, for the pixel at phase (i, j) of the tile, of the site at each offset up to the radius r. Sums to 1.
+    list of (th, tw, 2r + 1, 2r + 1) float64
+        For each channel, in the order of `sensor.cfa.channels`: weight, for the pixel at phase (i, j) of the tile, of
+        the site at each offset up to the radius r. Sums to 1.
     """
-    radius = tent_radius(tile, letter)
+    return [_channel_weights(tile, channel) for channel in channels(tile)]
+
+
+def _channel_weights(tile: Tile, channel: str) -> Plane:
+    radius = tent_radius(tile, channel)
     weights = np.zeros((len(tile), len(tile[0]), 2 * radius + 1, 2 * radius + 1))
     for phase in np.ndindex(*weights.shape[:2]):
-        if tile[phase[0]][phase[1]] == letter:
+        if tile[phase[0]][phase[1]] == channel:
             weights[(*phase, radius, radius)] = 1.0
         else:
-            weights[phase] = _phase_tent(tile, letter, phase, radius)
+            weights[phase] = _phase_tent(tile, channel, phase, radius)
     return np.asarray(weights / weights.sum((2, 3), keepdims=True))
 
 
-def fill(values: NDArray[Any], tile: Tile, letter: str) -> NDArray[Any]:
-    """One full plane from the samples of `letter`; a sampled site keeps its sample.
+def fill(values: NDArray[Any], tile: Tile, channel: str) -> NDArray[Any]:
+    """One full plane from the samples of `channel`; a sampled site keeps its sample.
 
     Parameters
     ----------
@@ -73,24 +78,24 @@ def fill(values: NDArray[Any], tile: Tile, letter: str) -> NDArray[Any]:
     """
     result, down, across = np.empty_like(values), len(tile), len(tile[0])
     for phase in np.ndindex(down, across):
-        at, radius = (slice(phase[0], None, down), slice(phase[1], None, across)), tent_radius(tile, letter)
-        if tile[phase[0]][phase[1]] == letter:
+        at, radius = (slice(phase[0], None, down), slice(phase[1], None, across)), tent_radius(tile, channel)
+        if tile[phase[0]][phase[1]] == channel:
             result[at] = values[at]
             continue
-        total, weight = _tent_sums(values, tile, letter, phase, radius)
+        total, weight = _tent_sums(values, tile, channel, phase, radius)
         while not np.all(weight):
             radius += 1
-            more, more_weight = _tent_sums(values, tile, letter, phase, radius)
+            more, more_weight = _tent_sums(values, tile, channel, phase, radius)
             total, weight = np.where(weight > 0.0, total, more), np.where(weight > 0.0, weight, more_weight)
         np.divide(total, weight, out=result[at])
     return result
 
 
 def _tent_sums(
-    values: NDArray[Any], tile: Tile, letter: str, phase: tuple[int, ...], radius: int
+    values: NDArray[Any], tile: Tile, channel: str, phase: tuple[int, ...], radius: int
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Sums of tent times sample, and of the tent, over the samples in the frame, for the pixels at one phase."""
-    size, tents = (len(tile), len(tile[0])), _phase_tent(tile, letter, phase, radius).astype(values.dtype)
+    size, tents = (len(tile), len(tile[0])), _phase_tent(tile, channel, phase, radius).astype(values.dtype)
     counts = [len(range(first, length, pace)) for first, length, pace in zip(phase, values.shape, size, strict=True)]
     total, weight = np.zeros(counts, values.dtype), np.zeros(counts, values.dtype)
     for i, j in np.argwhere(tents).tolist():
@@ -107,13 +112,13 @@ def _tent_sums(
 
 
 @lru_cache(maxsize=256)
-def _phase_tent(tile: Tile, letter: str, phase: tuple[int, ...], radius: int) -> Plane:
-    """Tent around a pixel of some phase of the tile, 0 where there is no sample of the letter."""
+def _phase_tent(tile: Tile, channel: str, phase: tuple[int, ...], radius: int) -> Plane:
+    """Tent around a pixel of some phase of the tile, 0 where there is no sample of the channel."""
     size = 2 * radius + 1
     rows, columns = (
         (np.arange(size) - radius + first) % n for first, n in zip(phase, (len(tile), len(tile[0])), strict=True)
     )
-    sampled = np.array([list(row) for row in tile])[np.ix_(rows, columns)] == letter
+    sampled = np.array([list(row) for row in tile])[np.ix_(rows, columns)] == channel
     return np.asarray(sampled * np.outer(tent(radius), tent(radius)))
 
 
@@ -139,12 +144,12 @@ def _line_sums(values: NDArray[Any], count: int) -> NDArray[Any]:
         values, power = values[:-power] + values[power:], 2 * power
 
 
-def judged_mosaic(electrons: NDArray[Any], raw: RawImage, distance: Distance) -> NDArray[Any]:
+def guide_mosaic(electrons: NDArray[Any], raw: RawImage, distance: Distance) -> NDArray[Any]:
     """The mosaic of `raw` [e-] as patches are read from it: in units of noise, or as it is."""
     return stabilise(electrons, raw.dark_noise_e, raw.prnu) if distance == "noise" else electrons
 
 
 def planes(raw: RawImage, distance: Distance = "noise") -> Plane:
     """Planes h_i, shape (channel, h, w), in the order of `sensor.cfa.channels`."""
-    mosaic = judged_mosaic(raw.electrons, raw, distance)
-    return np.stack([fill(mosaic, raw.cfa, letter) for letter in channels(raw.cfa)])
+    mosaic = guide_mosaic(raw.electrons, raw, distance)
+    return np.stack([fill(mosaic, raw.cfa, channel) for channel in channels(raw.cfa)])

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
-from isp.interpolation import certainty
-from isp.planes import Plane, fill, judged_mosaic, planes
-from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, WINDOW, Distance, Reconstruction, Settings
-from isp.similarity import noise_distance, reliability, saturated_fraction
+from isp.planes import Plane, fill, guide_mosaic, planes
+from isp.settings import DEFAULTS, WINDOW, Reconstruction, Settings
+from isp.similarity.guide import reliability, saturated_fraction
+from isp.similarity.interpolation import certainty
+from isp.similarity.noise_distance import noise_distances
 from sensor.cfa import channels, mask
 from sensor.raw import RawImage
 
@@ -44,15 +45,7 @@ class Sums:
     value: Plane
 
 
-def reconstruct_reference(
-    raw: RawImage,
-    *,
-    neighbourhood: int = NEIGHBOURHOOD,
-    patch: int = PATCH,
-    sigma_d: float = SIGMA_D,
-    sigma_s: float = SIGMA_S,
-    distance: Distance = "noise",
-) -> NDArray[np.float64]:
+def reconstruct_reference(raw: RawImage, settings: Settings = DEFAULTS) -> NDArray[np.float64]:
     """Reconstruct every channel at every pixel: `isp.interleaved.reconstruct` in float64.
 
     Returns
@@ -63,13 +56,12 @@ def reconstruct_reference(
     Raises
     ------
     InputError
-        As `isp.settings.Settings`.
+        As `reconstruct`.
     """
-    settings = Settings(neighbourhood, patch, sigma_d, sigma_s, distance)
     return np.asarray(reference_with_noise(raw, settings).estimate, dtype=np.float64)
 
 
-def reference_with_noise(raw: RawImage, settings: Settings) -> Reconstruction:
+def reference_with_noise(raw: RawImage, settings: Settings = DEFAULTS) -> Reconstruction:
     """Estimate and noise gain in float64."""
     sums = sum_weights(raw, settings)
     return Reconstruction(sums.value / sums.weight, sums.square / sums.weight**2, "numpy")
@@ -89,24 +81,24 @@ def sum_weights(raw: RawImage, settings: Settings) -> Sums:
 
 
 def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
-    letters, half = channels(raw.cfa), settings.patch // 2
+    names, half = channels(raw.cfa), settings.patch // 2
     in_noise = settings.distance == "noise"
-    noise = [noise_distance(raw.cfa, letter, settings.patch, settings.reach) for letter in letters]
+    noise = noise_distances(raw.cfa, settings.patch, settings.reach)
     return _Inputs(
         electrons=raw.electrons,
-        channel=np.argmax([mask(raw.cfa, letter, raw.shape) for letter in letters], axis=0),
+        channel=np.argmax([mask(raw.cfa, name, raw.shape) for name in names], axis=0),
         h=np.pad(planes(raw, settings.distance), ((0, 0), (half, half), (half, half)), mode="reflect"),
         alpha=saturated_fraction(raw),
         reliability=_reliability(raw, settings) if in_noise else np.ones(raw.shape),
         noise=noise if in_noise else [np.zeros_like(table) for table in noise],
-        white=letters.index("W") if "W" in letters else None,
+        white=names.index("W") if "W" in names else None,
     )
 
 
 def _reliability(raw: RawImage, settings: Settings) -> Plane:
-    judging_e = fill(raw.electrons, raw.cfa, "W") if "W" in channels(raw.cfa) else raw.electrons
-    mosaic = judged_mosaic(raw.electrons, raw, settings.distance)
-    return np.asarray(reliability(judging_e, raw.dark_noise_e, WINDOW) * certainty(mosaic, raw.cfa, settings.patch))
+    light_e = fill(raw.electrons, raw.cfa, "W") if "W" in channels(raw.cfa) else raw.electrons
+    mosaic = guide_mosaic(raw.electrons, raw, settings.distance)
+    return np.asarray(reliability(light_e, raw.dark_noise_e, WINDOW) * certainty(mosaic, raw.cfa, settings.patch))
 
 
 def _add_offset(sums: Sums, inputs: _Inputs, settings: Settings, offset: tuple[int, int]) -> None:

@@ -1,6 +1,7 @@
-"""What both forms of the reconstruction take, checked once, and what they return."""
+"""The reconstruction's settings, checked once, and its result."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
@@ -22,18 +23,19 @@ WINDOW = 9  # pixels a side over which eq. (6) counts, and W's SNR is averaged
 SMALLEST_SIGMA = 1e-3  # below it the spatial weight of the next pixel is exp(-5e5) or less: nothing new to ask for
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Parameters of eqs. (1)-(6) for one tile.
+    """Parameters of eqs. (1)-(6).
 
     Attributes
     ----------
     neighbourhood, patch : int
-        Odd widths of Omega and of the patches h_i [pixels].
+        Odd widths of Omega and of the patches h_i [pixels]. The time grows with the square of the first.
     sigma_d : float
-        Standard deviation of the spatial weight, eq. (4) [pixels].
+        Standard deviation of the spatial weight, eq. (4) [pixels]; 0.001 to inf.
     sigma_s : float
-        Standard deviation of the similarity weight, eq. (5) [standard deviations of one pixel's noise, or electrons].
+        Standard deviation of the similarity weight, eq. (5) [standard deviations of one pixel's noise, or electrons];
+        0.001 to inf.
     distance : {"noise", "raw"}
         Whether patches are compared in units of noise, debiased and trusted as far as their SNR allows, or as the paper
         has it, in electrons.
@@ -44,13 +46,13 @@ class Settings:
         Where a width is even or not positive, a sigma under 0.001 or NaN, or the distance is neither of the two.
     """
 
-    neighbourhood: int
-    patch: int
-    sigma_d: float
-    sigma_s: float
+    neighbourhood: int = NEIGHBOURHOOD
+    patch: int = PATCH
+    sigma_d: float = SIGMA_D
+    sigma_s: float = SIGMA_S
     distance: Distance = "noise"
 
-    @property
+    @cached_property
     def reach(self) -> int:
         """Largest offset in Omega along one axis [pixels]."""
         return self.neighbourhood // 2
@@ -68,13 +70,16 @@ class Settings:
             raise unknown("distance", self.distance, get_args(Distance))
 
     def check_reaches(self, tile: Tile) -> None:
-        """Raise `InputError` where Omega, cut at a corner of the frame, may hold no sample of some letter."""
+        """Raise `InputError` where Omega, cut at a corner of the frame, may hold no sample of some channel."""
         smallest = 2 * max(len(tile), len(tile[0])) - 1
         if self.neighbourhood < smallest:
             raise InputError(
-                f"neighbourhood: {self.neighbourhood} may miss a letter of the tile {tile}; "
+                f"neighbourhood: {self.neighbourhood} may miss a channel of the tile {tile}; "
                 f"allowed: odd numbers from {smallest}; try {max(smallest, NEIGHBOURHOOD)}"
             )
+
+
+DEFAULTS = Settings()
 
 
 @dataclass(frozen=True)

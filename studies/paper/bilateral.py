@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.interleaved import reconstruct
+from isp.settings import Settings
 from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.readout import read_out
@@ -48,9 +49,8 @@ def filtered(values: NDArray[np.float64], patch: int) -> NDArray[np.float64]:
 def difference(reading: str, patch: int) -> float:
     """Largest relative difference of eq. (1) and the filter, over the frame [parts per million]."""
     raw = noisy_edge(reading)
-    ours = reconstruct(raw, neighbourhood=2 * REACH + 1, patch=patch, sigma_d=SIGMA_D, sigma_s=SIGMA_S, distance="raw")[
-        ..., 0
-    ]
+    settings = Settings(neighbourhood=2 * REACH + 1, patch=patch, sigma_d=SIGMA_D, sigma_s=SIGMA_S, distance="raw")
+    ours = reconstruct(raw, settings)[..., 0]
     theirs = filtered(raw.electrons, patch)
     return float((np.abs(ours - theirs) / np.abs(theirs)).max() * 1e6)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from isp.interleaved import reconstruct
 from isp.reference import reconstruct_reference
+from isp.settings import Settings
 from render.engine import render
 from render.radiance import SpectralRadiance
 from render.scene import Scene
@@ -162,7 +163,7 @@ def _reconstruction(
     noise_e = _noise_e(_electrons(radiance, sensor, exposure_s), sensor, exposure_s)
     truth = channel_electrons(form_image(radiance, sensor), sensor, exposure_s)
     calls = {
-        f"{width}x{width}, patch {patch}": partial(reconstruct, raw, neighbourhood=width, patch=patch)
+        f"{width}x{width}, patch {patch}": partial(reconstruct, raw, Settings(neighbourhood=width, patch=patch))
         for patch in bench.patches
         for width in bench.neighbourhoods
     }
@@ -172,10 +173,11 @@ def _reconstruction(
     yield _stage(
         "neighbourhood and patch", question, reference, noise_e, made, lambda image: _rms_e(image, truth, sensor)
     )
-    small, width, patch = replace(raw, dn=raw.dn[:64, :64]), bench.neighbourhoods[0], bench.patches[0]
+    small = replace(raw, dn=raw.dn[:64, :64])
+    smallest = Settings(neighbourhood=bench.neighbourhoods[0], patch=bench.patches[0])
     forms: dict[str, Callable[[], NDArray[np.floating]]] = {
-        "Dr.Jit, single": partial(reconstruct, small, neighbourhood=width, patch=patch),
-        "NumPy, double": partial(reconstruct_reference, small, neighbourhood=width, patch=patch),
+        "Dr.Jit, single": partial(reconstruct, small, smallest),
+        "NumPy, double": partial(reconstruct_reference, small, smallest),
     }
     results = timed(forms, 1)
     exact, _ = results["NumPy, double"]

@@ -12,8 +12,8 @@ from hard.case import Image, Situation
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import neutral_response
 from isp.picture import Picture
-from isp.pipeline import SETTINGS
 from isp.processors.catalogue import PROCESSORS
+from isp.settings import DEFAULTS
 from isp.substitution import matrix_with_white
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
@@ -77,9 +77,9 @@ def shoot(situation: Situation, name: str, seed: int = 0) -> RawImage:
 
 def keywords(develop: Mapping[str, Any]) -> dict[str, Any]:
     """Keywords of `picture_interleaved`: the fields of `Settings` among them as one value."""
-    of_settings = {name: value for name, value in develop.items() if hasattr(SETTINGS, name)}
+    of_settings = {name: value for name, value in develop.items() if hasattr(DEFAULTS, name)}
     return {name: value for name, value in develop.items() if name not in of_settings} | {
-        "settings": replace(SETTINGS, **of_settings)
+        "settings": replace(DEFAULTS, **of_settings)
     }
 
 

@@ -12,7 +12,7 @@ from sensor.cfa import Tile, channels, letter_map
 from sensor.raw import RawImage
 
 # The kernel's own bound: 1e-4 of the samples' range, or some 16 roundings of the largest log weight
-# (isp.weighted_sums, isp.kernel). Two developments differ by twice that.
+# (isp.kernel.accumulate, isp.kernel.kernel). Two developments differ by twice that.
 KERNEL_ERROR = 1e-4
 KERNEL_ROUNDINGS = 16 * 2.0**-24
 DOUBLE_ROUNDINGS = 64 * 2.0**-53  # bilinear planes and their matrix, all in double precision

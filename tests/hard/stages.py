@@ -181,10 +181,10 @@ def _reconstructed(at: Parameters) -> Found:
     electrons = np.minimum(rng.poisson(at["level_e"] * edges * response), full_e) + rng.normal(0, 2.0, (side, side))
     dn = np.clip(np.rint(electrons + black), 0, 65_535).astype(np.uint16)
     raw = RawImage(dn, RGBW, black, black + full_e, 1.0, 2.0, 0.0, 0.0, 0.01)
-    settings = Settings(9, 1, 6.0, at["sigma_s"])
+    settings = Settings(neighbourhood=9, sigma_s=at["sigma_s"])
     sums = sum_weights(raw, settings)
     double = sums.value / sums.weight
-    single = reconstruct(raw, neighbourhood=9, sigma_s=at["sigma_s"])
+    single = reconstruct(raw, settings)
     share = np.maximum(1e-4, 16 * ROUNDING * -sums.largest)
     return beside_noise(single - double, _shot(double, raw.dark_noise_e), np.ptp(raw.electrons) * share)
 

@@ -6,7 +6,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from isp.pipeline import SETTINGS, develop_bayer, develop_interleaved, picture_bayer, picture_interleaved
+from isp.pipeline import develop_bayer, develop_interleaved, picture_bayer, picture_interleaved
+from isp.settings import DEFAULTS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend
@@ -65,7 +66,7 @@ def test_substitution_follows_its_threshold() -> None:
 
 def test_substitution_lowers_luminance_noise_a_lot() -> None:
     image = raw(("RG", "BW"), {"R": 10, "G": 20, "B": 8, "W": 100}, (96, 96), noise_e=20.0)
-    small = replace(SETTINGS, neighbourhood=5)
+    small = replace(DEFAULTS, neighbourhood=5)
     noisy = luminance_of_srgb(picture_interleaved(image, IDENTITY, substitution_snr=0.0, settings=small).rgb).std()
     clean = luminance_of_srgb(picture_interleaved(image, IDENTITY, settings=small).rgb).std()
     assert clean < noisy / 3  # W has five times green's signal at the same noise

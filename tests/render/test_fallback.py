@@ -21,13 +21,14 @@ from scenes.catalog import load
 from sensor.raw import RawImage
 from sensor.cfa import RGBW
 from isp.interleaved import reconstruct_with_noise
+from isp.settings import Settings
 
 nm, width_nm = np.array([450.0, 550.0, 650.0]), np.array([100.0, 100.0, 40.0])
 made = render(load("flat_field"), (12, 16), wavelength_nm=nm, width_nm=width_nm, spp=64, seed=1)
 again = render(load("flat_field"), (12, 16), wavelength_nm=nm, width_nm=width_nm, spp=64, seed=1)
 far = render(load("color_checker"), (12, 12), wavelength_nm=[900.0], width_nm=100.0, spp=256, seed=1)
 raw = RawImage(np.full((8, 10), 1000, np.uint16), RGBW, 100.0, 4000.0, 1.0, 2.0, 0.0, 0.0, 0.01)
-result = reconstruct_with_noise(raw, neighbourhood=7)
+result = reconstruct_with_noise(raw, Settings(neighbourhood=7))
 print(json.dumps({
     "backend": backend(),
     "variant": [variant(), made.variant, made.integrator],

@@ -9,7 +9,7 @@ import pytest
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.reference import reconstruct_reference, sum_weights
 from isp.settings import Settings
-from isp.similarity import reliability, reliability_of_mean
+from isp.similarity.guide import reliability, reliability_of_mean
 from rodcone.errors import InputError
 from rodcone.jit import backend
 from sensor.cfa import BAYER, RGBW, channels, letter_map
@@ -46,8 +46,7 @@ def assert_single_precision(raw, settings):
     that share a pixel then share it wrongly by up to half of the sum of both errors.
     """
     sums = sum_weights(raw, settings)
-    keywords = {name: getattr(settings, name) for name in ("neighbourhood", "patch", "sigma_d", "sigma_s", "distance")}
-    error = np.abs(reconstruct(raw, **keywords) - sums.value / sums.weight)
+    error = np.abs(reconstruct(raw, settings) - sums.value / sums.weight)
     scale = FULL * raw.gain_e_per_dn
     assert (error <= scale * np.maximum(1e-4, 16 * 2.0**-24 * -sums.largest)).all()
     # The bound is not slack: nearly all pixels are far better than 1e-4, by the exponential's own 3.8e-5.
@@ -59,7 +58,10 @@ def random_settings(rng, tile, patch):
     neighbourhood = max(smallest, int(rng.choice([3, 7, 13, 21])))
     distance = str(rng.choice(["noise", "noise", "raw"]))
     sigma_s = 10.0 ** rng.uniform(-1.0, 2.0) * (20.0 if distance == "raw" else 1.0)
-    return Settings(neighbourhood, patch, float(rng.uniform(0.5, 10.0)), float(sigma_s), distance)
+    sigma_d = float(rng.uniform(0.5, 10.0))
+    return Settings(
+        neighbourhood=neighbourhood, patch=patch, sigma_d=sigma_d, sigma_s=float(sigma_s), distance=distance
+    )
 
 
 @needs_kernel
@@ -115,7 +117,10 @@ def test_hard_frames_give_finite_results_within_the_range_of_the_samples(name, d
     letters, samples = letter_map(RGBW, raw.shape), raw.electrons
     for sigma_s in (1e-3, 0.1, 8.0, 1e6, math.inf):
         result = reconstruct_with_noise(
-            raw, sigma_s=sigma_s * (gain if distance == "raw" else 1.0) if gain > 1 else sigma_s, distance=distance
+            raw,
+            Settings(
+                sigma_s=sigma_s * (gain if distance == "raw" else 1.0) if gain > 1 else sigma_s, distance=distance
+            ),
         )
         assert np.isfinite(result.estimate).all()
         for i, letter in enumerate(channels(RGBW)):
@@ -129,7 +134,7 @@ def test_hard_frames_give_finite_results_within_the_range_of_the_samples(name, d
 
 @needs_kernel
 @pytest.mark.parametrize("patch", [1, 5])
-@pytest.mark.parametrize("white", [0.0, 100.0, 2 * FULL])  # in the dark, where W judges, where bands do
+@pytest.mark.parametrize("white", [0.0, 100.0, 2 * FULL])  # in the dark, where W guides, where channels do
 @pytest.mark.parametrize(
     "settings", [{}, {"sigma_s": math.inf}, {"sigma_s": 0.001}, {"distance": "raw", "sigma_s": math.inf}]
 )
@@ -139,7 +144,7 @@ def test_nothing_beyond_the_frame_is_averaged(patch, white, settings):
     raw = raw_image(np.vectorize(flat.get)(letter_map(RGBW, (17, 22))))
     expected = [min(flat[letter], 65535 - BLACK) for letter in channels(RGBW)]
     np.testing.assert_allclose(
-        reconstruct(raw, patch=patch, **settings), np.broadcast_to(expected, (17, 22, 4)), rtol=1e-6
+        reconstruct(raw, Settings(patch=patch, **settings)), np.broadcast_to(expected, (17, 22, 4)), rtol=1e-6
     )
 
 
@@ -148,16 +153,18 @@ def test_nothing_beyond_the_frame_is_averaged(patch, white, settings):
 @pytest.mark.parametrize("tile", [("RW",), ("R", "W")])
 def test_frames_may_be_smaller_than_a_patch_and_than_a_packet(shape, tile):
     raw = raw_image(np.random.default_rng(6).uniform(0.0, FULL / 2, shape), tile)
-    settings = {"patch": 7, "neighbourhood": 3}
-    assert np.abs(reconstruct(raw, **settings) - reconstruct_reference(raw, **settings)).max() < 1e-4 * FULL
+    settings = Settings(patch=7, neighbourhood=3)
+    assert np.abs(reconstruct(raw, settings) - reconstruct_reference(raw, settings)).max() < 1e-4 * FULL
 
 
 @needs_kernel
 def test_a_pixel_without_a_similar_neighbour_keeps_its_sample_and_takes_the_nearest_of_the_others():
     raw = raw_image(HARD_FRAMES["no similar neighbour"][0])
-    exact = reconstruct_reference(raw, sigma_s=0.05, patch=5)
-    assert sum_weights(raw, Settings(21, 5, 6.0, 0.05)).largest.min() < -1000.0  # every weight underflows by itself
-    assert np.abs(reconstruct(raw, sigma_s=0.05, patch=5) - exact).max() < 0.05
+    exact = reconstruct_reference(raw, Settings(sigma_s=0.05, patch=5))
+    assert (
+        sum_weights(raw, Settings(patch=5, sigma_s=0.05)).largest.min() < -1000.0
+    )  # every weight underflows by itself
+    assert np.abs(reconstruct(raw, Settings(sigma_s=0.05, patch=5)) - exact).max() < 0.05
     letters = letter_map(RGBW, raw.shape)
     for i, letter in enumerate(channels(RGBW)):
         here = letters[12:15, 12:15] == letter
@@ -169,16 +176,16 @@ def test_the_raw_distance_is_the_papers_in_electrons(function):
     # Two levels of every band, 40 e- apart: a patch of 25 differs by 5 x 40 in W alone.
     electrons = np.where(np.arange(40) < 20, 300.0, 340.0) * np.ones((24, 40))
     raw = raw_image(electrons)
-    apart = function(raw, distance="raw", patch=5, sigma_s=20.0, sigma_d=math.inf, neighbourhood=9)
-    mixed = function(raw, distance="raw", patch=5, sigma_s=2000.0, sigma_d=math.inf, neighbourhood=9)
+    apart = function(raw, Settings(distance="raw", patch=5, sigma_s=20.0, sigma_d=math.inf, neighbourhood=9))
+    mixed = function(raw, Settings(distance="raw", patch=5, sigma_s=2000.0, sigma_d=math.inf, neighbourhood=9))
     assert apart[:, 16] == pytest.approx(300.0, abs=0.01)
     assert mixed[:, 16].mean() > 301.0
     # beta = 5 x 40 where the whole patch differs: at sigma_s = 200 it weighs exp(-1/2). From x = 14 only y = 18 is
     # reached, all at 300; from x = 19, half a patch from the edge, closed forms would need the planes between.
-    same = function(raw, distance="raw", patch=5, sigma_s=200.0, sigma_d=math.inf, neighbourhood=9)
+    same = function(raw, Settings(distance="raw", patch=5, sigma_s=200.0, sigma_d=math.inf, neighbourhood=9))
     assert same[:, 10] == pytest.approx(300.0, rel=2e-4)
     scaled = RawImage(raw.dn, RGBW, BLACK, BLACK + FULL, 3.0, 6.0, 0.0, 0.0, 0.01)
-    tripled = function(scaled, distance="raw", patch=5, sigma_s=600.0, sigma_d=math.inf, neighbourhood=9)
+    tripled = function(scaled, Settings(distance="raw", patch=5, sigma_s=600.0, sigma_d=math.inf, neighbourhood=9))
     assert tripled == pytest.approx(3.0 * same, rel=2e-4)
 
 
@@ -202,12 +209,12 @@ def test_in_the_dark_similarity_falls_back_to_the_distance_weight(function):
     dark = raw_image(rng.normal(0.0, 30.0, (20, 22)), read_noise_e=30.0)
     bright = raw_image(rng.poisson(900.0, (20, 22)), read_noise_e=2.0)
     for raw, least, most in ((dark, 0.0, 0.02), (bright, 0.05, 1.0)):
-        spatial = function(raw, patch=5, sigma_s=math.inf)
-        alike = function(raw, patch=5, sigma_s=2.0)
+        spatial = function(raw, Settings(patch=5, sigma_s=math.inf))
+        alike = function(raw, Settings(patch=5, sigma_s=2.0))
         change = np.abs(alike - spatial).mean() / np.abs(raw.electrons - raw.electrons.mean()).mean()
         assert least <= change <= most
 
 
 def test_an_unknown_distance_is_refused():
     with pytest.raises(InputError, match="distance: 'noisy' is unknown; allowed: noise, raw; did you mean 'noise'"):
-        reconstruct(raw_image(np.zeros((6, 6))), distance="noisy")
+        reconstruct(raw_image(np.zeros((6, 6))), Settings(distance="noisy"))

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
+from isp.kernel.schedule import list_threads, make_pattern
 from isp.reference import reconstruct_reference, reference_with_noise, sum_weights
 from isp.settings import SIGMA_D, WINDOW, Settings
-from isp.similarity import noise_distance, saturated_fraction
-from isp.tiles import number_tile, sort_tiles
+from isp.similarity.guide import saturated_fraction
+from isp.similarity.noise_distance import noise_distances
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.cfa import BAYER, RGBW, channels, letter_map
@@ -20,7 +21,7 @@ RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
 RGBW_PHASES = [("RG", "BW"), ("GR", "WB"), ("BW", "RG"), ("WB", "GR")]
 BAYER_PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
 BLACK, FULL = 100.0, 4000.0
-EXP2_ERROR = 1.6e-4  # of a ratio of two weights: each is right to 7.5e-5 (isp.weighted_sums), and rounded
+EXP2_ERROR = 1.6e-4  # of a ratio of two weights: each is right to 7.5e-5 (isp.kernel.accumulate), and rounded
 
 
 def raw_image(electrons, tile=RGBW, read_noise_e=2.0):
@@ -52,7 +53,9 @@ def test_without_similarity_an_impulse_is_the_spatial_weight_in_closed_form(tile
     shape, place, height = (15, 18), (6, 9), 1000.0
     electrons = np.zeros(shape)
     electrons[place] = height
-    result = reconstruct_with_noise(raw_image(electrons, tile), sigma_d=sigma_d, sigma_s=math.inf, neighbourhood=9)
+    result = reconstruct_with_noise(
+        raw_image(electrons, tile), Settings(sigma_d=sigma_d, sigma_s=math.inf, neighbourhood=9)
+    )
     letters = letter_map(tile, shape)
     for i, letter in enumerate(channels(tile)):
         for x in np.ndindex(shape):
@@ -87,7 +90,7 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
     h = {i: {y: plane(stable, i, y) for y in np.ndindex(raw.shape)} for i in "RGBW"}
     white = {y: plane(raw.electrons, "W", y) for y in np.ndindex(raw.shape)}
     steps = list(product(range(-half, half + 1), repeat=2))
-    noise = {i: noise_distance(raw.cfa, i, patch, reach) for i in "RGBW"}
+    noise = dict(zip("RGBW", noise_distances(raw.cfa, patch, reach), strict=True))
 
     def reflect(k, size):
         while not 0 <= k < size:
@@ -145,7 +148,7 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
 def test_the_reference_is_the_paper_pixel_by_pixel(patch, sigma_s):
     raw = scene((7, 8), 2500.0)  # partly saturated
     assert 0 < raw.saturated.mean() < 0.5
-    got = reconstruct_reference(raw, neighbourhood=7, patch=patch, sigma_d=2.5, sigma_s=sigma_s)
+    got = reconstruct_reference(raw, Settings(neighbourhood=7, patch=patch, sigma_d=2.5, sigma_s=sigma_s))
     for place, log_weights, values in transcription(raw, 7, patch, 2.5, sigma_s):
         weights = np.exp(log_weights - log_weights.max())
         expected = (weights * values).sum() / weights.sum()
@@ -178,15 +181,15 @@ def single_precision(raw, settings):
 @pytest.mark.parametrize(("shape", "tile", "level", "seed"), KERNEL_CASES)
 def test_kernel_is_the_reference_in_single_precision(shape, tile, level, seed, sigma_s):
     raw = scene(shape, level, tile, seed)
-    kernel = reconstruct_with_noise(raw, patch=5, sigma_s=sigma_s)
-    settings = Settings(21, 5, 6.0, sigma_s)
+    kernel = reconstruct_with_noise(raw, Settings(patch=5, sigma_s=sigma_s))
+    settings = Settings(patch=5, sigma_s=sigma_s)
     reference = reference_with_noise(raw, settings)
     assert kernel.engine == backend()
     assert (np.abs(kernel.estimate - reference.estimate) < single_precision(raw, settings)).all()
     assert np.abs(kernel.noise_gain - reference.noise_gain).max() < 2e-3
 
 
-def test_all_three_ways_to_judge_occur_in_the_partly_saturated_frames():
+def test_all_three_guides_occur_in_the_partly_saturated_frames():
     alpha = saturated_fraction(scene((40, 31), 2500.0, seed=3))
     assert (alpha == 0.0).any()
     assert ((alpha > 0.0) & (alpha < 1.0)).any()
@@ -194,29 +197,31 @@ def test_all_three_ways_to_judge_occur_in_the_partly_saturated_frames():
 
 
 def half_saturated(turns=0):
-    """Bright left, saturated right, or turned: wide enough for lanes of every kind, away from the border too."""
+    """Bright left, saturated right, or turned: wide enough for threads of every guide, away from the border too."""
     electrons = np.random.default_rng(4).uniform(3000.0, 3900.0, (42, 130))
     electrons[:, 80:] = FULL
     return raw_image(np.rot90(electrons, turns))
 
 
 @pytest.mark.parametrize("turns", [0, 1, 2, 3])
-def test_lanes_of_every_kind_are_the_reference(turns):
-    raw, settings = half_saturated(turns), Settings(21, 5, 6.0, 20.0)  # so large that both halves count
+def test_threads_of_every_guide_are_the_reference(turns):
+    raw, settings = half_saturated(turns), Settings(patch=5, sigma_s=20.0)  # so large that both halves count
     alpha = saturated_fraction(raw)
-    work = sort_tiles(raw.shape, (0, raw.shape[0]), alpha, 0, number_tile(RGBW), settings.reach)
-    assert {judge for judge, lanes in work.items() if len(lanes.row)} == {"white", "band", "both"}
-    error = np.abs(reconstruct(raw, patch=5, sigma_s=20.0) - reconstruct_reference(raw, patch=5, sigma_s=20.0))
+    work = list_threads(make_pattern(RGBW), raw.shape, (0, raw.shape[0]), alpha, 0, settings.reach)
+    assert {guide for guide, threads in work.items() if len(threads.row)} == {"W", "channel", "mixed"}
+    error = np.abs(
+        reconstruct(raw, Settings(patch=5, sigma_s=20.0)) - reconstruct_reference(raw, Settings(patch=5, sigma_s=20.0))
+    )
     assert error.max() < 4e-5 * FULL
 
 
 @pytest.mark.skipif(backend() == "numpy", reason="nothing is compiled without Dr.Jit")
 def test_other_sizes_sigmas_and_phases_run_the_kernels_that_are_compiled_already():
-    reconstruct(half_saturated(), patch=5)
+    reconstruct(half_saturated(), Settings(patch=5))
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         for turns, sigma in ((1, 3.0), (3, math.inf)):
-            reconstruct(half_saturated(turns), patch=5, sigma_d=sigma, sigma_s=2.0 * sigma)
-        reconstruct(scene((33, 65), 2500.0, ("WB", "GR")), patch=5, neighbourhood=15)
+            reconstruct(half_saturated(turns), Settings(patch=5, sigma_d=sigma, sigma_s=2.0 * sigma))
+        reconstruct(scene((33, 65), 2500.0, ("WB", "GR")), Settings(patch=5, neighbourhood=15))
         history = [kernel for kernel in dr.kernel_history() if "cache_hit" in kernel]
     assert len(history) > 6
     assert all(kernel["cache_hit"] for kernel in history)
@@ -229,10 +234,10 @@ def test_the_result_does_not_depend_on_the_number_of_threads():
     lonely.dn[20, 20] = BLACK
     threads = dr.thread_count()
     for raw, sigma_s in ((half_saturated(), 8.0), (lonely, 0.5)):
-        first = reconstruct_with_noise(raw, patch=5, sigma_s=sigma_s)
+        first = reconstruct_with_noise(raw, Settings(patch=5, sigma_s=sigma_s))
         try:
             dr.set_thread_count(1)
-            second = reconstruct_with_noise(raw, patch=5, sigma_s=sigma_s)
+            second = reconstruct_with_noise(raw, Settings(patch=5, sigma_s=sigma_s))
         finally:
             dr.set_thread_count(threads)
         assert np.array_equal(first.estimate, second.estimate)
@@ -253,9 +258,9 @@ def test_extreme_input_gives_finite_results_within_the_range_of_the_samples(name
     raw = raw_image(EXTREME_FRAMES[name])
     for sigma_d, sigma_s in ((sigma, 4.0), (6.0, sigma), (sigma, sigma)):
         if function == "reference":
-            result = reference_with_noise(raw, Settings(21, 5, sigma_d, sigma_s))
+            result = reference_with_noise(raw, Settings(patch=5, sigma_d=sigma_d, sigma_s=sigma_s))
         else:
-            result = function(raw, patch=5, sigma_d=sigma_d, sigma_s=sigma_s)
+            result = function(raw, Settings(patch=5, sigma_d=sigma_d, sigma_s=sigma_s))
         letters, electrons = letter_map(RGBW, raw.shape), raw.electrons
         for i, letter in enumerate(channels(RGBW)):
             samples = electrons[letters == letter]
@@ -270,7 +275,7 @@ def test_extreme_input_gives_finite_results_within_the_range_of_the_samples(name
 def test_with_a_tiny_sigma_the_result_lies_among_the_samples_that_tie_for_the_best(sigma_s):
     """Single precision can't tell log weights apart that differ by its rounding: any mean of those samples is right."""
     raw = scene((8, 9), 2500.0)
-    result = reconstruct(raw, neighbourhood=11, patch=5, sigma_s=sigma_s)
+    result = reconstruct(raw, Settings(neighbourhood=11, patch=5, sigma_s=sigma_s))
     largest = 2 * math.sqrt(raw.electrons.max() + raw.dark_noise_e**2 + 3 / 8)
     for place, log_weights, values in transcription(raw, 11, 5, SIGMA_D, sigma_s):
         distance = -log_weights.max() * 2 * sigma_s**2
@@ -287,7 +292,7 @@ def test_with_a_tiny_sigma_the_result_lies_among_the_samples_that_tie_for_the_be
     [
         ({"neighbourhood": 20}, r"neighbourhood: 20 isn't allowed"),
         ({"neighbourhood": -3}, r"neighbourhood: -3 isn't allowed"),
-        ({"neighbourhood": 1}, r"neighbourhood: 1 may miss a letter"),
+        ({"neighbourhood": 1}, r"neighbourhood: 1 may miss a channel"),
         ({"patch": 4}, r"patch: 4 isn't allowed"),
         ({"patch": 0}, r"patch: 0 isn't allowed"),
         ({"patch": 5.0}, r"patch: 5.0 isn't allowed"),
@@ -299,15 +304,15 @@ def test_with_a_tiny_sigma_the_result_lies_among_the_samples_that_tie_for_the_be
 )
 def test_bad_parameters_are_one_line_of_advice(wrong, message, function):
     with pytest.raises(InputError, match=message) as caught:
-        function(raw_image(np.zeros((6, 6))), **wrong)
+        function(raw_image(np.zeros((6, 6))), Settings(**wrong))
     assert "\n" not in str(caught.value)
 
 
 def test_a_wide_tile_needs_a_wide_neighbourhood():
     raw = raw_image(np.full((4, 4), 300.0), RGBW_4X4)
     with pytest.raises(InputError, match="odd numbers from 7"):
-        reconstruct(raw, neighbourhood=5)
-    assert np.abs(reconstruct(raw, neighbourhood=7) / 300.0 - 1.0).max() < 1e-6
+        reconstruct(raw, Settings(neighbourhood=5))
+    assert np.abs(reconstruct(raw, Settings(neighbourhood=7)) / 300.0 - 1.0).max() < 1e-6
 
 
 def test_without_dr_jit_the_reference_runs_and_the_result_says_so(monkeypatch):

@@ -5,7 +5,8 @@ import pytest
 
 from isp.planes import fill
 from isp.settings import WINDOW
-from isp.similarity import noise_distance, reliability, reliability_of_mean, saturated_fraction
+from isp.similarity.guide import reliability, reliability_of_mean, saturated_fraction
+from isp.similarity.noise_distance import noise_distances
 from sensor.cfa import BAYER, RGBW, channels
 from sensor.raw import RawImage
 
@@ -63,14 +64,14 @@ def test_similarity_is_trusted_by_the_fourth_power_of_snr() -> None:
 def test_the_mean_is_that_of_w_around_each_pixel() -> None:
     electrons = np.zeros((24, 24))
     electrons[1::2, 1::2] = 50.0  # W's sites alone
-    judging = fill(electrons, RGBW, "W")
-    assert reliability(judging, 3.0, WINDOW) == pytest.approx(
+    light = fill(electrons, RGBW, "W")
+    assert reliability(light, 3.0, WINDOW) == pytest.approx(
         reliability_of_mean(np.full((24, 24), 50.0), 3.0), rel=1e-12
     )
 
 
 def test_a_single_plane_of_independent_pixels_has_twice_the_patch_area():
-    table = noise_distance(("W",), "W", 5, 4)[0, 0]
+    table = noise_distances(("W",), 5, 4)[0][0, 0]
     assert table[4, 4] == 0.0
     assert np.count_nonzero(table - 50.0) == 1  # D of n pairs of unit variance is 2n, whatever the overlap
 
@@ -85,13 +86,12 @@ def test_noise_distance_is_the_mean_over_random_mosaics(tile, patch):
     """
     size, reach, half = 128, 3, patch // 2
     rng = np.random.default_rng(11)
-    for letter in channels(tile):
+    for letter, table in zip(channels(tile), noise_distances(tile, patch, reach), strict=True):
         means = []
         for _ in range(40):
             plane = fill(rng.normal(size=(size, size)), tile, letter)
             means.append(_mean_distances(plane, (len(tile), len(tile[0])), reach, half))
         error = np.std(means, axis=0, ddof=1) / np.sqrt(len(means))
-        table = noise_distance(tile, letter, patch, reach)
         assert (np.abs(np.mean(means, axis=0) - table) <= 6.5 * error + 1e-12).all()
 
 

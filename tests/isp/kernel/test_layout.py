@@ -6,14 +6,14 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.ndimage import convolve1d
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
+from isp.kernel.layout import cut_strip, strip_rows
+from isp.kernel.schedule import make_pattern
 from isp.planes import fill
 from isp.settings import WINDOW, Settings
-from isp.similarity import saturated_fraction, share_of_saturated
-from isp.strip_sums import _around
-from isp.strips import make_strip, strip_rows
-from isp.tiles import lane_size, number_tile
+from isp.similarity.guide import saturated_fraction
 from rodcone.jit import backend
 from sensor.cfa import BAYER, RGBW
 from sensor.raw import RawImage
@@ -34,38 +34,16 @@ def frame(tile, shape=(85, 61)):
 
 
 @pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4])
-@pytest.mark.parametrize("sigma_s", [8.0, 0.5])  # the small one needs exact sums in places
+@pytest.mark.parametrize("sigma_s", [8.0, 0.5])  # the small one needs the running maximum in places
 def test_the_height_of_strips_changes_no_bit(tile, sigma_s, monkeypatch):
     raw = frame(tile)
-    whole = reconstruct_with_noise(raw, sigma_s=sigma_s)
-    for height in (1, 2, 5):  # lanes a strip
-        lane = lane_size(number_tile(tile))[0]
-        monkeypatch.setattr("isp.interleaved.strip_rows", lambda *_, rows=height * lane: rows)
-        strips = reconstruct_with_noise(raw, sigma_s=sigma_s)
+    whole = reconstruct_with_noise(raw, Settings(sigma_s=sigma_s))
+    for height in (1, 2, 5):  # blocks a strip
+        block = make_pattern(tile).block[0]
+        monkeypatch.setattr("isp.kernel.run.strip_rows", lambda *_, rows=height * block: rows)
+        strips = reconstruct_with_noise(raw, Settings(sigma_s=sigma_s))
         assert np.array_equal(strips.estimate, whole.estimate)
         assert np.array_equal(strips.noise_gain, whole.noise_gain)
-
-
-@pytest.mark.parametrize("place", [(24, 90), (0, 0), (60, 199)])
-def test_laying_out_planes_around_saturated_pixels_alone_changes_no_bit(place, monkeypatch):
-    electrons = np.random.default_rng(3).poisson(300.0, (64, 200)).astype(float)
-    electrons[max(place[0] - 3, 0) : place[0] + 4, max(place[1] - 3, 0) : place[1] + 4] = 1e5
-    raw = RawImage(
-        np.minimum(electrons + 100.0, 4100.0).astype(np.uint16), RGBW, 100.0, 4100.0, 1.0, 2.0, 0.0, 0.0, 0.01
-    )
-    parts = []
-
-    def seen(places, lane, whole):
-        parts.append((_around(places, lane, whole), whole))
-        return parts[-1][0]
-
-    monkeypatch.setattr("isp.strip_sums._around", seen)
-    near = reconstruct_with_noise(raw)
-    assert any(part != whole for part, whole in parts)
-    monkeypatch.setattr("isp.strip_sums._around", lambda places, lane, whole: whole)
-    everywhere = reconstruct_with_noise(raw)
-    assert np.array_equal(near.estimate, everywhere.estimate)
-    assert np.array_equal(near.noise_gain, everywhere.noise_gain)
 
 
 @pytest.mark.parametrize("tile", [RGBW, RGBW_4X4])
@@ -74,11 +52,16 @@ def test_alpha_around_full_samples_is_alpha_of_the_frame(place, tile):
     dn = np.full((64, 200), 500, np.uint16)
     dn[max(place[0] - 1, 0) : place[0] + 2, max(place[1] - 1, 0) : place[1] + 2] = 4100
     raw = RawImage(dn, tile, 100.0, 4100.0, 1.0, 2.0, 0.0, 0.0, 0.01)
-    strip = make_strip(raw, (0, 64), (0, 200), number_tile(tile), Settings(21, 5, 6.0, 3.0))
-    whole = share_of_saturated(fill((dn == 4100).astype(np.float32), tile, "W") > 0.0, WINDOW)
-    assert 0.0 < whole.max() <= 1.0
-    assert np.array_equal(strip.alpha, whole)
-    assert np.array_equal(saturated_fraction(raw), whole)
+    strip = cut_strip(raw, (0, 64), make_pattern(tile), Settings(patch=5))
+    saturated = (fill((dn == 4100).astype(np.float32), tile, "W") > 0.0).astype(float)
+    box = np.ones(WINDOW)
+    count, area = (
+        convolve1d(convolve1d(values, box, 0, mode="constant"), box, 1, mode="constant")
+        for values in (saturated, np.ones(dn.shape))
+    )
+    assert count.max() > 0.0
+    assert strip.alpha == pytest.approx(count / area, abs=1e-12)
+    assert np.array_equal(saturated_fraction(raw), strip.alpha)
 
 
 def test_asking_for_the_noise_changes_no_bit_of_the_estimate():
@@ -86,39 +69,40 @@ def test_asking_for_the_noise_changes_no_bit_of_the_estimate():
     assert np.array_equal(reconstruct(raw), reconstruct_with_noise(raw).estimate)
 
 
-def test_strips_are_whole_lanes_and_fewer_rows_the_wider_the_frame():
-    pattern = number_tile(RGBW)
-    lane = lane_size(pattern)[0]
+def test_strips_are_whole_blocks_and_fewer_rows_the_wider_the_frame():
+    pattern = make_pattern(RGBW)
+    block = pattern.block[0]
     rows = [strip_rows((100_000, width), pattern, 5) for width in (100, 4000, 12_000, 10**9)]
-    assert all(count % lane == 0 for count in rows)
+    assert all(count % block == 0 for count in rows)
     assert rows == sorted(rows, reverse=True)
-    assert rows[-1] == lane
+    assert rows[-1] == block
     assert 1.2e6 < rows[1] * 4000 < 2.4e6
 
 
 def test_strips_of_a_frame_are_even():
     """A frame a little higher than a strip isn't a strip and a rest, whose surroundings would cost as much."""
-    pattern = number_tile(RGBW)
-    lane, most = lane_size(pattern)[0], strip_rows((10**6, 4000), pattern, 5)
-    for height in (1, lane, most, most + 1, most + lane + 1, 5 * most // 2):
+    pattern = make_pattern(RGBW)
+    block, most = pattern.block[0], strip_rows((10**6, 4000), pattern, 5)
+    for height in (1, block, most, most + 1, most + block + 1, 5 * most // 2):
         rows = strip_rows((height, 4000), pattern, 5)
         count = -(-height // rows)
         assert rows <= most
         assert count == -(-height // most)
-        assert rows * count - height < lane * count
+        assert rows * count - height < block * count
 
 
 MEASURE = """
 import json, resource, sys
 import numpy as np
 from isp.interleaved import reconstruct
+from isp.settings import Settings
 from sensor.raw import RawImage
 height, width = int(sys.argv[1]), int(sys.argv[2])
 dn = np.full((height, width), 120, np.uint16)
 dn += np.random.default_rng(0).integers(0, 60, width, dtype=np.uint16)
 dn[height // 2 : height // 2 + 64] = 4100
 raw = RawImage(dn, ("RG", "BW"), 100.0, 4100.0, 1.0, 2.0, 0.0, 0.0, 0.01)
-result = reconstruct(raw, neighbourhood=int(sys.argv[3]))
+result = reconstruct(raw, Settings(neighbourhood=int(sys.argv[3])))
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 print(json.dumps({"peak": peak, "finite": bool(np.isfinite(result).all()), "shape": result.shape}))
 """

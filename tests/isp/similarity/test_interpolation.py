@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from isp.interleaved import reconstruct
-from isp.interpolation import certainty, interpolation_variance, opposite_pairs
 from isp.planes import fill, tent_weights
+from isp.similarity.interpolation import certainty, interpolation_variance, opposite_pairs
 from sensor.cfa import MOSAICS, channels
 from sensor.raw import RawImage
 
@@ -29,8 +29,7 @@ def test_weights_of_a_pixels_pairs_add_up_to_the_share_of_interpolated_letters(t
     total = sum(opposite_pairs(tile).values())
     letters = sorted(set("".join(tile)))
     has_pairs = np.zeros((len(letters), len(tile), len(tile[0])))
-    for i, letter in enumerate(letters):
-        weights = tent_weights(tile, letter)
+    for i, weights in enumerate(tent_weights(tile)):
         radius = weights.shape[2] // 2
         both = (weights > 0.0) & (weights[:, :, ::-1, ::-1] > 0.0)
         both[:, :, radius, radius] = False

@@ -51,7 +51,7 @@ def test_tent_has_the_smallest_radius_that_reaches_a_sample(tile, letter, radius
 @pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4, SPARSE])
 def test_weights_are_what_fill_does_inside_a_frame(tile):
     for letter in channels(tile):
-        weights = tent_weights(tile, letter)
+        weights = tent_weights(tile)[channels(tile).index(letter)]
         radius = weights.shape[2] // 2
         values = np.random.default_rng(3).normal(size=(12, 12))
         plane = fill(values, tile, letter)

@@ -1,6 +1,6 @@
 """How far the distance of patches can be trusted where the planes h_i are interpolated.
 
-Between two samples of a letter that differ, a plane holds a value that neither side has. The sample nearest to it wins
+Between two samples of a channel that differ, a plane holds a value that neither side has. The sample nearest to it wins
 all weight, on another side in each colour, and edges get coloured fringes. So the similarity weight is told by how much
 its distance may be wrong, and both sides count (docs/decisions/0025).
 """
@@ -31,7 +31,7 @@ def certainty(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDArray[Any]:
 
 
 def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDArray[Any]:
-    """V(x): the variance of the samples that fill a pixel, mean over the letters, summed over the patch around x.
+    """V(x): the variance of the samples that fill a pixel, mean over the channels, summed over the patch around x.
 
     Taken from pairs of samples on opposite sides, as good as all of them and less work; less what noise alone makes of
     it.
@@ -39,7 +39,7 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
     Parameters
     ----------
     mosaic : (h, w) float32 or float64
-        In units of noise, as `isp.planes.judged_mosaic`; begins at the tile's first phase.
+        In units of noise, as `isp.planes.guide_mosaic`; begins at the tile's first phase.
     tile : tuple of str
     patch : int
         Width of the patches.
@@ -70,24 +70,23 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
 
 @lru_cache(maxsize=16)
 def opposite_pairs(tile: Tile) -> dict[tuple[int, int], Plane]:
-    """Sites x + p and x - p that hold the same letter and fill x, by p: the pair's weight in V at each phase of x.
+    """Sites x + p and x - p that hold the same channel and fill x, by p: the pair's weight in V at each phase of x.
 
     Returns
     -------
     mapping of (row, column) to (th, tw) float64
-        Of p and -p the one with the larger row, or column. The weights of a letter's pairs add up to 1 / letters, or to
-        0 where a pixel is one of its samples and isn't interpolated.
+        Of p and -p the one with the larger row, or column. The weights of a channel's pairs add up to 1 / channels, or
+        to 0 where a pixel is one of its samples and isn't interpolated.
     """
-    letters, pairs = sorted(set("".join(tile))), dict[tuple[int, int], Plane]()
-    for letter in letters:
-        weights = tent_weights(tile, letter)
+    all_weights, pairs = tent_weights(tile), dict[tuple[int, int], Plane]()
+    for weights in all_weights:
         radius = weights.shape[2] // 2
         both = np.where(weights[:, :, ::-1, ::-1] > 0.0, weights, 0.0)
         both[:, :, radius, radius] = 0.0
-        total = both.sum((2, 3), keepdims=True) * len(letters)
+        total = both.sum((2, 3), keepdims=True) * len(all_weights)
         share = 2.0 * np.divide(both, total, out=np.zeros_like(both), where=total > 0.0)
         for row, column in (np.argwhere(share.any((0, 1))) - radius).tolist():
             if (row, column) > (0, 0):
-                at = share[:, :, row + radius, column + radius]
-                pairs[row, column] = pairs[row, column] + at if (row, column) in pairs else at
+                weight = share[:, :, row + radius, column + radius]
+                pairs[row, column] = pairs[row, column] + weight if (row, column) in pairs else weight
     return pairs

@@ -1,0 +1,184 @@
+"""Eqs. (1) to (5) for many blocks of pixels: what one thread does, in Dr.Jit, for LLVM and CUDA alike.
+
+With guide W a thread owns all pixels of its block and reads W's plane. Otherwise it owns those whose y lie at one cell
+of the tile, and reads the plane of the channel there. So one compiled kernel serves all phases and cells, and all
+mosaics with a tile of this size. Loading is what costs: at y whole rows are loaded, a packet each
+(`isp.kernel.layout`).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from isp.kernel.accumulate import (
+    HEADROOM,
+    LEAST_WEIGHT,
+    add_samples,
+    mixed_squares,
+    squared_distances,
+    start_sums,
+)
+from isp.kernel.layout import Inputs
+from isp.kernel.schedule import Guide, Threads
+from rodcone.jit import dr
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a kernel is compiled for.
+
+    Attributes
+    ----------
+    tile, block : (int, int)
+        Rows and columns of the CFA's tile, and of a block.
+    patch : int
+        Width of the patches.
+    guide : {"W", "channel", "mixed"}
+        The plane that guides: W's, that of the channel at y, or both as alpha mixes them.
+    running, noise : bool
+        Whether sums are in units of the largest weight so far, or at a fixed scale; whether weights are squared too.
+    """
+
+    tile: tuple[int, int]
+    block: tuple[int, int]
+    patch: int
+    guide: Guide
+    running: bool
+    noise: bool
+
+
+@dataclass(frozen=True)
+class Sums:
+    """What the threads of a strip give, Dr.Jit arrays [phase, row, column].
+
+    In phase (a, b) the strip's pixel (r, c) stands at row r + a and column c + b, for blocks to begin at whole blocks.
+
+    Attributes
+    ----------
+    weight, unit : Float
+        Sum of the weights in units of 2^unit.
+    mean : Float
+        Weighted mean of the samples.
+    noise_gain : Float or None
+        Sum of the squared weights over the squared sum; None where nobody asks for it.
+    first_row, rows, columns : Int
+        The strip's first row in the frame; rows and columns of a phase.
+    """
+
+    weight: Any
+    unit: Any
+    mean: Any
+    noise_gain: Any
+    first_row: Any
+    rows: Any
+    columns: Any
+
+
+def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Sums) -> Any:
+    """Start the threads; says which of them hold a pixel whose sums are too small for the fixed scale."""
+    patch, (down, across), count = shape.patch, shape.tile, dr.width(threads.row)
+    dense = shape.guide == "W"
+    rows, columns = (range(0, n, 1 if dense else step) for n, step in zip(shape.block, shape.tile, strict=True))
+    # Row by row: instructions come in the order in which sums are evaluated, and each row of patches is loaded when
+    # the first pixel needs it.
+    pixels = [(r, c) for r in rows for c in columns]
+    window = sorted({r + i for r in rows for i in range(patch)})  # rows under the patches
+    under, block = shape.block[1] + patch - 1, shape.block[1]  # values of a packet: of the plane, and samples
+    noises = down * across if dense else 2
+
+    # Where things are
+    x_row, x_column = threads.row - inputs.top, threads.column - inputs.left
+    x = jit.UInt(x_row) * inputs.stride + jit.UInt(x_column)  # pixel
+    own = jit.UInt(threads.plane)
+    planes = {"W": [inputs.white], "channel": [own], "mixed": [own, inputs.white]}[shape.guide]
+    first_packets = [plane * inputs.plane_packets for plane in planes]
+    below = {i: i * inputs.row_packets for i in window}
+    # A list of offsets a phase, or a phase and cell: phase * cells + cell
+    offsets = jit.UInt(threads.phase if dense else threads.phase * (down * across) + threads.cell)
+    first_entry, entries = offsets * inputs.length, dr.gather(jit.UInt, inputs.counts, offsets)
+
+    # What the thread reads at x, once
+    patches_at_x = [
+        {
+            i: [
+                dr.gather(jit.Float, inputs.planes, plane * inputs.plane_size + x + i * inputs.stride + j)
+                for j in range(under)
+            ]
+            for i in window
+        }
+        for plane in planes
+    ]
+    inverse_variance = [dr.gather(jit.Float, inputs.inverse_variance, x + r * inputs.stride + c) for r, c in pixels]
+
+    def load(source: Any, packet: Any, size: int, needed: int) -> list[Any]:
+        """First values of a packet, 8 at a time: part k of packet p is number p * (size / 8) + k."""
+        part, values = min(size, 8), list[Any]()
+        for k in range(-(-needed // part)):
+            index = packet * (size // part) + k
+            values.extend(dr.gather(jit.ArrayXf, source, index, shape=(part, count)))
+        return values[:needed]
+
+    def add_offset(k: Any, totals: list[Any]) -> tuple[Any, list[Any]]:
+        """Add the samples at y = x + d for offset k of the list."""
+        row, column, log_spatial, *noise = load(inputs.entries, first_entry + k, inputs.entry_values, 3 + noises)
+        y_row, y_column = jit.UInt(x_row + jit.Int(row)), jit.UInt(x_column + jit.Int(column))
+        y = y_row * inputs.row_packets + y_column // (across if dense else 1)  # packet
+        distances, samples = list[list[Any]](), dict[int, list[Any]]()
+        for n, (first_packet, patches) in enumerate(zip(first_packets, patches_at_x, strict=True)):
+            patches_at_y = {}
+            for i in window:
+                needed = under + block if n == 0 and i in rows else under  # every plane's packets have the samples
+                values = load(inputs.packets, first_packet + y + below[i], inputs.packet_values, needed)
+                patches_at_y[i] = values[:under]
+                samples.setdefault(i, values[under:])
+            # A noise distance for each cell of y, or for each plane.
+            less = [noise[r % down * across + c % across if dense else n] for r, c in pixels]
+            distances.append(squared_distances(patches, patches_at_y, less, pixels, patch))
+        beta_squared = distances[0]
+        if shape.guide == "mixed":
+            lines = {r: load(inputs.alpha, y + below[r], inputs.alpha_values, block) for r in rows}
+            beta_squared = mixed_squares(distances[0], distances[1], [lines[r][c] for r, c in pixels])
+        if not shape.running:
+            log_spatial = log_spatial + HEADROOM
+        log_weights = [dr.fma(-v, beta, log_spatial) for v, beta in zip(inverse_variance, beta_squared, strict=True)]
+        values = [samples[r][c] for r, c in pixels]
+        return k + 1, add_samples(totals, log_weights, values, running=shape.running)
+
+    start = [tuple(dr.full(jit.Float, value, count) for value in start_sums(shape.running, shape.noise))] * len(pixels)
+    _, totals = dr.while_loop((jit.UInt(0), start), lambda k, _: k < entries, add_offset)
+
+    failed = dr.full(jit.Bool, False, count) if shape.running else _failed(jit, totals, pixels, threads, inputs)
+    targets = _store(jit, totals, pixels, threads, shape, sums)
+    dr.eval(failed, targets)  # all at once, for the loop to run once
+    return failed
+
+
+def _failed(jit: Any, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, inputs: Inputs) -> Any:
+    """Threads that hold a pixel of the frame with too small a sum; those of other strips too: all decide alike."""
+    failed = dr.full(jit.Bool, False, dr.width(threads.row))
+    for (r, c), (weight, *_) in zip(pixels, totals, strict=True):
+        # In the frame: unsigned, a negative number is a large one.
+        inside = (jit.UInt(threads.row + r) < inputs.height) & (jit.UInt(threads.column + c) < inputs.width)
+        failed |= inside & (weight < LEAST_WEIGHT)
+    return failed
+
+
+def _store(
+    jit: Any, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, shape: Shape, sums: Sums
+) -> list[Any]:
+    """Store what the loop has summed up; what is stored into is returned, not evaluated yet."""
+    targets = [sums.weight, sums.mean] + [sums.noise_gain] * shape.noise + [sums.unit] * shape.running
+    stored = [
+        (weight, value / weight, *(square / dr.square(weight) for square in more[: shape.noise]), *more[shape.noise :])
+        for weight, value, *more in totals
+    ]
+    # [phase, row, column]: (phase * rows + row) * columns + column, of the pixel (row + a, column + b)
+    row = threads.row - sums.first_row + threads.phase // shape.tile[1]
+    column = threads.column + threads.phase % shape.tile[1]
+    first = (threads.phase * sums.rows + row) * sums.columns + column
+    # Values that are stored at once: the largest power of two that divides a row of the block.
+    packet = shape.block[1] & -shape.block[1] if shape.guide == "W" else 1
+    for i in range(0, len(pixels), packet):
+        index = jit.UInt(first + pixels[i][0] * sums.columns + pixels[i][1]) // packet
+        for target, *values in zip(targets, *stored[i : i + packet], strict=True):
+            dr.scatter(target, jit.ArrayXf(values), index, mode=dr.ReduceMode.NoConflicts)
+    return targets

@@ -1,0 +1,300 @@
+"""Strips: some rows of a frame at a time, so that memory stays bounded, laid out for the kernel's loads.
+
+            left                                                                     right
+      top    +------------------------------------------------------------------------+
+             |  halo: blocks begin up to tile - 1 early, y lie up to the reach away    |
+    rows[0] -|     +--------+--------+--------+- - -+                                  |
+             |     | block  | block  | block  |     |  blocks of phase (0, 0), 8 x 4   |
+             |     |        |        |        |     |  pixels; those of phase (a, b)   |
+             |     +--------+--------+--------+- - -+  begin a rows and b columns      |
+             |     | x----------->y           |     |  early                           |
+             |     |        | d = y - x       |     |                                  |
+             |     +--------+--------+--------+- - -+                                  |
+    rows[1] -|     :        :        :        :     :                                  |
+             |  halo: the rest of the last blocks, the reach, patch - 1                |
+    bottom   +------------------------------------------------------------------------+
+
+    A row:      h0 h1 h2 h3 h4 h5 ...  of a plane,  s0 s1 s2 s3 s4 s5 ...  samples
+    Packets:    |h0 h1 h2 h3 s0 s1 s2 s3|h2 h3 h4 h5 s2 s3 s4 s5| ...      (block 4 wide, patch 1, every 2nd column)
+
+A packet is one load: all that a thread reads of a row of y, the plane under the patches of its block and the block's
+samples. At x, which a thread reads once, planes are read pixel by pixel. The addresses:
+    pixel   (row - top) * stride + column - left
+    packet  (row - top) * row_packets + (column - left) / step        step: `packet_step`
+
+Planes are stored half a patch early: where a pixel stands, its patch begins. Beyond the frame they go on by reflection
+for half a patch and are OUTSIDE further on. Nothing in a strip depends on where the strip begins or ends.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.kernel.accumulate import LEAST_INVERSE_VARIANCE, OUTSIDE
+from isp.kernel.schedule import Guide, Pattern, Threads, list_offsets
+from isp.planes import fill, guide_mosaic
+from isp.settings import WINDOW, Settings
+from isp.similarity.guide import fraction_of_full, reliability, saturation_dn
+from isp.similarity.interpolation import certainty
+from rodcone.jit import dr
+from sensor.raw import RawImage
+
+STRIP_BYTES = 600_000_000  # of all that a strip takes: one and a half megapixels of RGBW
+ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel for memory that isn't aligned, and refuses it packet loads
+
+Array = NDArray[Any]
+Span = tuple[int, int]  # the first of some rows or columns, and past the last
+
+
+@dataclass(frozen=True)
+class Strip:
+    """The part of a frame that some of its rows depend on, pixel by pixel.
+
+    Attributes
+    ----------
+    shape : (int, int)
+        Height and width of the whole frame [pixels].
+    origin : (int, int)
+        Row and column of the frame where the arrays begin: whole tiles lie before it.
+    samples : (h, w) float32
+        Mosaic over black [DN].
+    guide : (h, w) float32
+        Mosaic as patches are read from it (`isp.planes.guide_mosaic`).
+    inverse_variance : (h, w) float32
+        log2(e) r(x) c(x) / (2 sigma_s^2), the factor on beta_s^2 of eq. (5): `reliability` and `certainty` included.
+    alpha : (h, w) float64 or None
+        Eq. (6); None where it is 0 everywhere, or without W.
+    """
+
+    shape: tuple[int, int]
+    origin: tuple[int, int]
+    samples: Array
+    guide: Array
+    inverse_variance: Array
+    alpha: Array | None
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Evaluated Dr.Jit arrays that all threads of a kernel read.
+
+    Attributes
+    ----------
+    planes, inverse_variance : Float
+        Read at x: planes h_i, [channel, row, column], W's alone with guide W; [row, column].
+    packets : Float
+        Read at y: [channel, row, packet, value].
+    alpha : Float
+        Packets of alpha, [row, packet, value]. None with guide W, and where it is 0 everywhere.
+    entries, counts : Float, UInt
+        Of `isp.kernel.schedule.list_offsets`.
+    length : UInt
+        Entries that a list has room for.
+    packet_values, alpha_values, entry_values : int
+        Floats of a packet, of one of alpha, and of an entry.
+    top, left : Int
+        Row and column of the frame where the arrays begin.
+    stride, row_packets, plane_size, plane_packets : UInt
+        Pixels and packets in a row, and in a plane.
+    white : UInt
+        Number of W's plane.
+    height, width : UInt
+        Of the whole frame.
+    """
+
+    planes: Any
+    inverse_variance: Any
+    packets: Any
+    alpha: Any
+    entries: Any
+    counts: Any
+    length: Any
+    packet_values: int
+    alpha_values: int
+    entry_values: int
+    top: Any
+    left: Any
+    stride: Any
+    row_packets: Any
+    plane_size: Any
+    plane_packets: Any
+    white: Any
+    height: Any
+    width: Any
+
+
+def packet_width(count: int) -> int:
+    """Smallest power of two up to 8, or multiple of 8, that holds `count` values: 8 floats are one AVX register."""
+    return int(2 ** (count - 1).bit_length()) if count <= 8 else -(-count // 8) * 8
+
+
+def strip_rows(shape: tuple[int, int], pattern: Pattern, patch: int) -> int:
+    """Rows of strips that take STRIP_BYTES or less, as even as whole blocks allow."""
+    channels, block = len(pattern.channels), pattern.block
+    # Planes and their packets, packets of alpha, three sums a cell of the tile, results, the strip itself.
+    floats = channels * (packet_width(2 * block[1] + patch - 1) + 1) + packet_width(block[1])
+    floats += 3 * len(pattern.cells) + 2 * channels + 8
+    most, blocks = max(int(STRIP_BYTES / (4 * floats * shape[1])) // block[0], 1), -(-shape[0] // block[0])
+    return -(-blocks // -(-blocks // most)) * block[0]
+
+
+def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -> Strip:
+    """What some rows of a frame depend on."""
+    shape, dark_noise_e = raw.dn.shape, raw.dark_noise_e
+    part = _surroundings(shape, halo((rows, (0, shape[1])), pattern, settings), pattern, settings)
+    dn, black, gain = raw.dn[part], np.float32(raw.black_dn), np.float32(raw.gain_e_per_dn)
+    full = dn >= saturation_dn(raw)
+    alpha = fraction_of_full(full, raw.cfa) if pattern.white is not None and full.any() else None
+    dn = dn.astype(np.float32)
+    samples = dn - black
+    guide = guide_mosaic(samples * gain, raw, settings.distance)
+    factor = np.float32(np.log2(np.e) / (2.0 * settings.sigma_s**2))
+    inverse_variance = np.full(dn.shape, factor)
+    if settings.distance == "noise":
+        light_e = ((dn if pattern.white is None else fill(dn, raw.cfa, "W")) - black) * gain
+        inverse_variance = reliability(light_e, dark_noise_e, WINDOW)
+        inverse_variance *= certainty(guide, raw.cfa, settings.patch)
+        inverse_variance *= factor
+    np.maximum(inverse_variance, np.float32(LEAST_INVERSE_VARIANCE), out=inverse_variance)
+    return Strip(
+        shape=(shape[0], shape[1]),
+        origin=(part[0].start, part[1].start),
+        samples=samples,
+        guide=guide,
+        inverse_variance=inverse_variance,
+        alpha=alpha,
+    )
+
+
+def halo(region: tuple[Span, Span], pattern: Pattern, settings: Settings) -> tuple[Span, Span]:
+    """Rows and columns of the arrays for a region of the frame, (top, bottom) and (left, right); may lie beyond it.
+
+    Blocks begin up to tile - 1 before the region and end up to block - 1 behind it; their y lie up to the reach away.
+    The arrays begin with a whole tile. Rows and columns of planes are stored half a patch early, so that patches end up
+    to patch - 1 behind.
+    """
+    spans = list[Span]()
+    for (first, last), tile, block in zip(region, pattern.tile, pattern.block, strict=True):
+        start = (first - (tile - 1) - settings.reach) // tile * tile
+        end = last + (block - 1) + settings.reach + (settings.patch - 1)
+        spans.append((start, end + -(end - start) % tile))
+    return spans[0], spans[1]
+
+
+def lay_out(
+    jit: Any, strip: Strip, region: tuple[Span, Span], pattern: Pattern, settings: Settings, guide: Guide
+) -> Inputs:
+    """Fill planes, make packets and upload what the threads of a region of the strip's rows and columns read."""
+    # The part of the strip that counts, and where the arrays begin in it.
+    (top, bottom), (left, right) = spans = halo(region, pattern, settings)
+    part = _surroundings(strip.shape, spans, pattern, settings)
+    own = tuple(slice(at.start - first, at.stop - first) for at, first in zip(part, strip.origin, strict=True))
+    start, size = (top - part[0].start, left - part[1].start), (bottom - top, right - left)
+    half, block = settings.patch // 2, pattern.block[1]
+    channels = [number for number in range(len(pattern.channels)) if guide != "W" or number == pattern.white]
+    samples = _window(strip.samples[own], start, (size[0], size[1] + block), 0, 0.0)
+
+    # Packets: a row of a plane under the patches of a block, then the block's samples.
+    row_packets = size[1] // packet_step(pattern, guide)
+    under = block + settings.patch - 1
+    planes = aligned((len(channels), *size))
+    packets = aligned((len(channels), size[0], row_packets, packet_width(under + block)))
+    for number, plane, target in zip(channels, planes, packets, strict=True):
+        filled = fill(strip.guide[own], pattern.cfa, pattern.channels[number])
+        early = start[0] - half, start[1] - half
+        wide = _window(filled, early, (size[0], size[1] + under), half, OUTSIDE)
+        plane[:] = wide[:, : size[1]]
+        _put_packets(target[..., :under], wide, packet_step(pattern, guide))
+        _put_packets(target[..., under : under + block], samples, packet_step(pattern, guide))
+    alpha = None
+    if guide != "W" and strip.alpha is not None:
+        shares = _window(strip.alpha[own], start, (size[0], size[1] + block), 0, 0.0)
+        alpha = aligned((size[0], row_packets, packet_width(block)))
+        _put_packets(alpha[..., :block], shares, packet_step(pattern, guide))
+
+    offsets, counts = list_offsets(pattern, settings, guide)
+    entries = np.zeros((*offsets.shape[:2], packet_width(offsets.shape[2])), np.float32)
+    entries[..., : offsets.shape[2]] = offsets
+    return Inputs(
+        planes=upload(jit, planes),
+        inverse_variance=upload(jit, _window(strip.inverse_variance[own], start, size, 0, 0.0)),
+        packets=upload(jit, packets),
+        alpha=None if alpha is None else upload(jit, alpha),
+        entries=upload(jit, entries),
+        counts=upload(jit, counts),
+        length=dr.opaque(jit.UInt, entries.shape[1]),
+        packet_values=packets.shape[3],
+        alpha_values=packet_width(block),
+        entry_values=entries.shape[2],
+        top=dr.opaque(jit.Int, top),
+        left=dr.opaque(jit.Int, left),
+        stride=dr.opaque(jit.UInt, size[1]),
+        row_packets=dr.opaque(jit.UInt, row_packets),
+        plane_size=dr.opaque(jit.UInt, size[0] * size[1]),
+        plane_packets=dr.opaque(jit.UInt, size[0] * row_packets),
+        white=dr.opaque(jit.UInt, channels.index(pattern.white) if pattern.white is not None else 0),
+        height=dr.opaque(jit.UInt, strip.shape[0]),
+        width=dr.opaque(jit.UInt, strip.shape[1]),
+    )
+
+
+def packet_step(pattern: Pattern, guide: Guide) -> int:
+    """Columns from one packet to the next: with guide W all y of a block begin at the tile's first column."""
+    return pattern.tile[1] if guide == "W" else 1
+
+
+def upload_threads(jit: Any, threads: Threads) -> Threads:
+    """Threads with Dr.Jit arrays."""
+    return Threads(**{name: upload(jit, values) for name, values in vars(threads).items()})
+
+
+def upload(jit: Any, values: Array) -> Any:
+    """Evaluated Dr.Jit array of the same type, in aligned memory."""
+    kinds = {"f": jit.Float, "u": jit.UInt, "i": jit.Int}
+    if values.ctypes.data % ALIGNMENT:
+        memory = aligned(values.shape, values.dtype)
+        memory[:] = values
+        values = memory
+    return kinds[values.dtype.kind](values.ravel())
+
+
+def aligned(shape: tuple[int, ...], kind: Any = np.float32) -> Array:
+    """Empty array that Dr.Jit takes as it is."""
+    size = int(np.prod(shape)) * np.dtype(kind).itemsize
+    memory = np.empty(size + ALIGNMENT, dtype=np.uint8)
+    start = -memory.ctypes.data % ALIGNMENT
+    return np.asarray(memory[start : start + size].view(kind).reshape(shape))
+
+
+def _surroundings(
+    shape: tuple[int, ...], spans: tuple[Span, Span], pattern: Pattern, settings: Settings
+) -> tuple[slice, slice]:
+    """Rows and columns of the frame that some depend on: half a patch or window for sums, twice a tile for tents."""
+    margin = max(settings.patch // 2, WINDOW // 2) + 2 * max(pattern.tile)
+    rows, columns = (
+        slice(max(first - margin, 0) // size * size, min(last + margin, length))
+        for (first, last), size, length in zip(spans, pattern.tile, shape, strict=True)  # with the frame's phase
+    )
+    return rows, columns
+
+
+def _window(values: Array, start: tuple[int, int], size: tuple[int, int], reflected: int, outside: float) -> Array:
+    """Rows and columns from `start` on, which may be negative: beyond the border reflected, then `outside`."""
+    source, result = np.pad(values, reflected, mode="reflect"), np.full(size, outside, np.float32)
+    into, out_of = list[slice](), list[slice]()
+    for first, count, length in zip(start, source.shape, size, strict=True):
+        shift = first + reflected  # result[i] = source[i + shift]
+        low = max(-shift, 0)
+        high = max(min(count - shift, length), low)
+        into.append(slice(low, high))
+        out_of.append(slice(low + shift, high + shift))
+    result[into[0], into[1]] = source[out_of[0], out_of[1]]
+    return result
+
+
+def _put_packets(target: Array, rows: Array, step: int) -> None:
+    """target[i, p, k] = rows[i, step * p + k]."""
+    for k in range(target.shape[2]):
+        target[..., k] = rows[:, k : k + step * target.shape[1] : step]

@@ -1,0 +1,152 @@
+"""The reconstruction of a frame, strip by strip.
+
+Kernels run beside Python. So a strip is finished when the next one has been started: what NumPy does to prepare it is
+hidden behind the kernels of the one before.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.kernel.accumulate import HEADROOM
+from isp.kernel.kernel import Shape, Sums, launch
+from isp.kernel.layout import Inputs, Span, cut_strip, lay_out, strip_rows, upload_threads
+from isp.kernel.schedule import Guide, Pattern, Threads, list_threads, make_pattern
+from isp.settings import Settings
+from rodcone.jit import arrays, dr
+from sensor.raw import RawImage
+
+
+@dataclass(frozen=True)
+class Launch:
+    """Threads that run, and which of them must run again in units of the largest weight so far."""
+
+    inputs: Inputs
+    threads: Threads
+    shape: Shape
+    failed: Any
+
+
+@dataclass(frozen=True)
+class Started:
+    """A strip whose kernels run: rows of the frame, where their sums go, and the launches."""
+
+    rows: Span
+    sums: Sums
+    launches: list[Launch]
+
+
+def reconstruct_strips(raw: RawImage, settings: Settings, *, noise: bool) -> list[NDArray[np.float32]]:
+    """f_i(x) of eq. (1) [e-] and, where asked for, sum w^2 / (sum w)^2; each (h, w, channel)."""
+    jit, pattern, (height, width) = arrays(), make_pattern(raw.cfa), raw.dn.shape
+    shape = height, width, len(pattern.channels)
+    results = [dr.empty(jit.Float, int(np.prod(shape))) for _ in range(1 + noise)]
+    step, started = strip_rows((height, width), pattern, settings.patch), list[Started]()
+    for first in range(0, height, step):
+        started.append(_start(jit, raw, (first, min(first + step, height)), pattern, settings, noise=noise))
+        if len(started) > 1:
+            _finish(jit, started.pop(0), raw, pattern, results)
+    _finish(jit, started.pop(), raw, pattern, results)
+    return [values.numpy().reshape(shape) for values in results]
+
+
+def _start(jit: Any, raw: RawImage, rows: Span, pattern: Pattern, settings: Settings, *, noise: bool) -> Started:
+    """Start the kernels of some rows of the frame; the first row is a whole number of blocks."""
+    columns, launches = (0, raw.dn.shape[1]), list[Launch]()
+    strip, sums = cut_strip(raw, rows, pattern, settings), _empty_sums(jit, rows, columns[1], pattern, noise=noise)
+    work = list_threads(pattern, strip.shape, rows, strip.alpha, strip.origin[0], settings.reach)
+    # W's threads read W's plane alone. For the others all planes are laid out, around them alone: mostly few.
+    for guides in (["W"], ["channel", "mixed"]):
+        chosen: list[Guide] = [guide for guide in work if guide in guides and len(work[guide].row)]
+        if not chosen:
+            continue
+        first_rows, first_columns = (
+            np.concatenate([getattr(work[guide], name) for guide in chosen]) for name in ("row", "column")
+        )
+        region = (
+            (max(int(first_rows.min()), rows[0]), min(int(first_rows.max()) + pattern.block[0], rows[1])),
+            (max(int(first_columns.min()), 0), min(int(first_columns.max()) + pattern.block[1], columns[1])),
+        )
+        inputs = lay_out(jit, strip, region, pattern, settings, chosen[0])
+        for guide in chosen:
+            shape = Shape(
+                tile=pattern.tile,
+                block=pattern.block,
+                patch=settings.patch,
+                guide=guide,
+                running=False,
+                noise=noise,
+            )
+            threads = upload_threads(jit, work[guide])
+            failed = launch(jit, inputs, threads, shape, sums)
+            launches.append(Launch(inputs=inputs, threads=threads, shape=shape, failed=failed))
+    return Started(rows=rows, sums=sums, launches=launches)
+
+
+def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern, *, noise: bool) -> Sums:
+    """Room for what the blocks of all phases give; at the fixed scale they leave the unit as it is."""
+    # Whole blocks that cover the strip and the tile - 1 rows and columns by which phases begin early.
+    size = [
+        -(-(length + tile - 1) // block) * block
+        for length, tile, block in zip((rows[1] - rows[0], width), pattern.tile, pattern.block, strict=True)
+    ]
+    count = len(pattern.cells) * size[0] * size[1]
+    return Sums(
+        weight=dr.empty(jit.Float, count),
+        unit=dr.full(jit.Float, -HEADROOM, count),
+        mean=dr.empty(jit.Float, count),
+        noise_gain=dr.empty(jit.Float, count) if noise else None,
+        first_row=dr.opaque(jit.Int, rows[0]),
+        rows=dr.opaque(jit.Int, size[0]),
+        columns=dr.opaque(jit.Int, size[1]),
+    )
+
+
+def _finish(jit: Any, started: Started, raw: RawImage, pattern: Pattern, results: list[Any]) -> None:
+    """Put estimate and, where asked for, noise gain of a strip into the frame's results, [row, column, channel]."""
+    for one in started.launches:
+        again: Any = dr.compress(one.failed)  # waits for the launch
+        if dr.width(again):
+            threads = Threads(**{name: dr.gather(type(part), part, again) for name, part in vars(one.threads).items()})
+            dr.eval(vars(threads))
+            launch(jit, one.inputs, threads, replace(one.shape, running=True), started.sums)
+
+    (down, across), (first, last), sums = pattern.tile, started.rows, started.sums
+    width, gain_e_per_dn = dr.opaque(jit.Int, raw.dn.shape[1]), dr.opaque(jit.Float, raw.gain_e_per_dn)
+    pixel = dr.arange(jit.Int, (last - first) * raw.dn.shape[1])
+    row, column = pixel // width, pixel % width
+    stored = [array for array in (sums.weight, sums.unit, sums.mean, sums.noise_gain) if array is not None]
+    planes = list[list[Any]]()
+    for channel in range(len(pattern.channels)):
+        parts = []
+        for cell in (cell for cell, number in enumerate(pattern.cells) if number == channel):
+            # y = x + d lies at the cell in phase (a, b) = cell - x, modulo the tile.
+            a, b = (cell // across + down - row % down) % down, (cell % across + across - column % across) % across
+            # [phase, row, column]: (phase * rows + row + a) * columns + column + b
+            index = ((a * across + b) * sums.rows + row + a) * sums.columns + column + b
+            parts.append([dr.gather(jit.Float, array, jit.UInt(index)) for array in stored])
+        mean, *noise_gain = _merge(parts)
+        planes.append([mean * gain_e_per_dn, *noise_gain])
+    index = jit.UInt(pixel + dr.opaque(jit.Int, first * raw.dn.shape[1]))
+    for result, values in zip(results, zip(*planes, strict=True), strict=True):
+        dr.scatter(result, jit.ArrayXf([*values]), index, mode=dr.ReduceMode.NoConflicts)
+    dr.eval(results)
+
+
+def _merge(parts: list[list[Any]]) -> list[Any]:
+    """Mean[, noise gain] of the samples at several cells, whose weights are in units of their own."""
+    if len(parts) == 1:
+        return parts[0][2:]
+    common = parts[0][1]
+    for _, unit, *_ in parts[1:]:
+        common = dr.maximum(common, unit)
+    weights = [weight * dr.exp2(unit - common) for weight, unit, *_ in parts]
+    total = sum(weights[1:], weights[0])
+    shares = [weight / total for weight in weights]
+    means, *noise_gains = zip(*(part[2:] for part in parts), strict=True)
+    result = [sum(share * mean for share, mean in zip(shares, means, strict=True))]
+    return result + [
+        sum(dr.square(share) * gain for share, gain in zip(shares, gains, strict=True)) for gains in noise_gains
+    ]

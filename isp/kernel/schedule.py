@@ -1,0 +1,205 @@
+"""Which thread does what: blocks of pixels, phases of offsets, and which plane guides the similarity.
+
+A thread owns the pixels x of one block and goes through the offsets d = y - x of one phase: those that are (a, b)
+modulo the size of the CFA's tile. The blocks of phase (a, b) begin a rows and b columns early. So their y begin at the
+tile's first cell whatever the phase, and y of the block's pixel (r, c) lies at cell (r mod th, c mod tw): a pixel's
+channel at y is known when the kernel is compiled, and each pair (x, y) is met once.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.settings import Settings
+from isp.similarity.noise_distance import noise_distances
+from sensor.cfa import Tile, channels
+
+Guide = Literal["W", "channel", "mixed"]
+Index = NDArray[np.int32]
+
+# Pixels of a block: 8 x 4 at most, or one tile. Measured: more sharing than 4 x 4 (a tenth less time); 12 x 4 or 8 x 8
+# gain nothing more.
+BLOCK_ROWS, BLOCK_COLUMNS = 8, 4
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """A CFA's tile in numbers, and the block of pixels that fits it.
+
+    Attributes
+    ----------
+    cfa : tuple of str
+    channels : tuple of str
+        In the order of `sensor.cfa.channels`.
+    cells : tuple of int
+        Number of the channel at each cell of the tile, row by row.
+    white : int or None
+        W's number.
+    tile, block : (int, int)
+        Rows and columns of the tile, and of a block: whole tiles.
+    """
+
+    cfa: Tile
+    channels: tuple[str, ...]
+    cells: tuple[int, ...]
+    white: int | None
+    tile: tuple[int, int]
+    block: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Threads:
+    """What each thread does; NumPy arrays, or Dr.Jit arrays once they are uploaded.
+
+    Attributes
+    ----------
+    row, column : (n,) int32
+        Its first pixel in the frame; may lie outside.
+    cell : (n,) int32
+        With guide W 0: it owns all pixels of its block. Else those whose y lie at this cell of the tile.
+    plane : (n,) int32
+        Number of the channel at that cell.
+    phase : (n,) int32
+        Number of its phase: a * tw + b.
+    """
+
+    row: Index
+    column: Index
+    cell: Index
+    plane: Index
+    phase: Index
+
+
+def make_pattern(cfa: Tile) -> Pattern:
+    """Tile in numbers, with blocks of whole tiles."""
+    names, tile = channels(cfa), (len(cfa), len(cfa[0]))
+    return Pattern(
+        cfa=cfa,
+        channels=names,
+        cells=tuple(names.index(channel) for channel in "".join(cfa)),
+        white=names.index("W") if "W" in names else None,
+        tile=tile,
+        block=(tile[0] * max(BLOCK_ROWS // tile[0], 1), tile[1] * max(BLOCK_COLUMNS // tile[1], 1)),
+    )
+
+
+def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """Every offset of Omega, phase by phase.
+
+    Returns
+    -------
+    entries : (list, length, values) float32
+        Row and column of the offset, log2 G(beta_d, sigma_d) of eqs. (2) and (4), noise distances. With guide W there
+        is a list for each phase, with W's distances for the cells of y. Else there is one for each phase and cell, with
+        those of the channel at that cell and of W.
+    counts : (list,) uint32
+        Entries that hold; the rest is padding.
+    """
+    (down, across), reach, lists = pattern.tile, settings.reach, []
+    tables = noise_distances(pattern.cfa, settings.patch, reach)
+    if settings.distance == "raw":
+        tables = [np.zeros_like(table) for table in tables]
+    line = np.arange(-reach, reach + 1)
+    for phase in np.ndindex(pattern.tile):
+        rows, columns = (line[line % size == first] for size, first in zip(pattern.tile, phase, strict=True))
+        row, column = (offset.ravel() for offset in np.meshgrid(rows, columns, indexing="ij"))
+        if guide != "W":
+            # Two rows of offsets in turn: they read mostly the same packets.
+            order = np.lexsort((row, column, (row - row[0]) // (2 * down)))
+            row, column = row[order], column[order]
+        log_spatial = -np.log2(np.e) * (row**2 + column**2) / (2.0 * settings.sigma_d**2)
+
+        # B(x, d) by channel and cell of y: x = y - d lies at cell - phase.
+        at_x = [((i - phase[0]) % down, (j - phase[1]) % across) for i, j in np.ndindex(pattern.tile)]
+        noise = [[table[at][row + reach, column + reach] for at in at_x] for table in tables]
+        white = [np.zeros(row.size)] * len(at_x) if pattern.white is None else noise[pattern.white]
+        distances = [[noise[channel][k], white[k]] for k, channel in enumerate(pattern.cells)]
+        if guide == "W":
+            distances = [white]
+        lists += [np.stack([row, column, log_spatial, *some], axis=-1) for some in distances]
+    counts = np.array([len(table) for table in lists], dtype=np.uint32)
+    entries = np.zeros((len(lists), int(counts.max()), lists[0].shape[1]), dtype=np.float32)
+    for target, table in zip(entries, lists, strict=True):
+        target[: len(table)] = table
+    return entries, counts
+
+
+def list_threads(
+    pattern: Pattern,
+    shape: tuple[int, int],
+    rows: tuple[int, int],
+    alpha: NDArray[np.float64] | None,
+    first_row: int,
+    reach: int,
+) -> dict[Guide, Threads]:
+    """Threads that reconstruct some rows of a frame, by what guides them.
+
+    Where no alpha > 0 is in a block's reach, eq. (5) holds W's distance alone; where all alpha are 1, the channel's own
+    alone, as it does wherever that channel is W. Exact, at a part of the work.
+
+    Parameters
+    ----------
+    shape : (int, int)
+        Height and width of the frame [pixels].
+    rows : (int, int)
+        First and past the last row to reconstruct; the first is a whole number of blocks.
+    alpha : (n, w) array or None
+        Eq. (6) from row `first_row` of the frame on, as far as it is in reach; None where all are 0.
+    """
+    # First row and column of the blocks that cover the rows in phase (0, 0), and in others that begin earlier.
+    ends = rows[1] + pattern.tile[0] - 1, shape[1] + pattern.tile[1] - 1
+    lines = [
+        np.arange(first, end, step, dtype=np.int32)
+        for first, end, step in zip((rows[0], 0), ends, pattern.block, strict=True)
+    ]
+    some = np.full((len(lines[0]), len(lines[1])), pattern.white is None)
+    whole = some
+    if pattern.white is not None and alpha is not None:
+        # What a block may reach in any phase: [first - (tile - 1) - reach, first + block + reach).
+        boxes = [
+            [slice(max(low - size + 1 - reach - first, 0), low + block + reach - first) for low in line]
+            for line, size, block, first in zip(lines, pattern.tile, pattern.block, (first_row, 0), strict=True)
+        ]
+        some = _over_boxes(np.max, alpha, boxes, initial=0.0) > 0.0
+        whole = _over_boxes(np.min, alpha, boxes, initial=1.0) == 1.0
+    white = [cell for cell, channel in enumerate(pattern.cells) if channel == pattern.white]
+    colours = [cell for cell, channel in enumerate(pattern.cells) if channel != pattern.white]
+    shares: dict[Guide, list[tuple[NDArray[np.bool_], list[int]]]] = {
+        "W": [(~some, [0])],
+        "channel": [(some & whole, colours), (some, white)],
+        "mixed": [(some & ~whole, colours)],
+    }
+    return {guide: _threads(pattern, lines, share, ends, guide) for guide, share in shares.items()}
+
+
+def _over_boxes(reduce: Any, values: NDArray[Any], boxes: list[list[slice]], initial: float) -> NDArray[Any]:
+    """Largest or smallest value in each box of rows and columns; `initial` in empty ones."""
+    lines = np.stack([reduce(values[rows], axis=0, initial=initial) for rows in boxes[0]])
+    return np.stack([reduce(lines[:, columns], axis=1, initial=initial) for columns in boxes[1]], axis=1)
+
+
+def _threads(
+    pattern: Pattern,
+    lines: list[Index],
+    shares: list[tuple[NDArray[np.bool_], list[int]]],
+    ends: tuple[int, int],
+    guide: Guide,
+) -> Threads:
+    """Threads of all phases for the chosen blocks and cells, without those that hold no pixel to reconstruct."""
+    (down, across), parts = pattern.tile, [np.empty((5, 0), np.int32)]
+    for chosen, cells in shares:
+        first = [line[at] for line, at in zip(lines, np.nonzero(chosen), strict=True)]
+        for number, phase in enumerate(np.ndindex(pattern.tile)):
+            row, column = first[0] - phase[0], first[1] - phase[1]
+            kept = (row < ends[0] - down + 1) & (column < ends[1] - across + 1)
+            for cell in cells:
+                # Its first pixel is the block's first one whose y lies at the cell.
+                part = np.empty((5, np.count_nonzero(kept)), np.int32)
+                part[0], part[1] = row[kept] + cell // across, column[kept] + cell % across
+                part[2], part[3] = cell, pattern.cells[cell]
+                part[4] = number
+                parts.append(part)
+    row, column, cell_of, plane, phases = np.concatenate(parts, axis=1)
+    return Threads(row=row, column=column, cell=cell_of, plane=plane, phase=phases)
