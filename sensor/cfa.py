@@ -69,7 +69,7 @@ def channels(tile: Tile) -> tuple[str, ...]:
     return tuple(name for name in "RGBW" if name in present) + tuple(name for name in present if name not in "RGBW")
 
 
-def letter_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
+def channel_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
     """Channel of each pixel, shape `shape`."""
     cells = np.array([list(row) for row in tile])
     repeats = (-(-shape[0] // cells.shape[0]), -(-shape[1] // cells.shape[1]))
@@ -78,7 +78,7 @@ def letter_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
 
 def mask(tile: Tile, channel: str, shape: tuple[int, int]) -> NDArray[np.bool_]:
     """Where the mosaic samples `channel`: S_i of eq. (1), shape `shape`."""
-    return np.asarray(letter_map(tile, shape) == channel)
+    return np.asarray(channel_map(tile, shape) == channel)
 
 
 def check_covers(tile: Tile, shape: tuple[int, ...]) -> None:

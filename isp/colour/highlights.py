@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from sensor.cfa import letter_map
+from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
 
@@ -13,7 +13,7 @@ def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> 
 
     Left out, the reach is one tile.
     """
-    hit = raw.saturated & np.isin(letter_map(raw.cfa, raw.shape), list(channels))
+    hit = raw.saturated & np.isin(channel_map(raw.cfa, raw.shape), list(channels))
     return np.asarray(maximum_filter(hit, size=2 * (len(raw.cfa) - 1 if reach is None else reach) + 1))
 
 

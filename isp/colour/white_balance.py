@@ -15,7 +15,7 @@ from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from rodcone.errors import InputError
-from sensor.cfa import channels, letter_map
+from sensor.cfa import channels, channel_map
 from sensor.curves import Responses, rgbw
 from sensor.raw import RawImage
 
@@ -92,7 +92,7 @@ class WhiteBalance:
         groups = {"RGB": usable}
         if "W" in names:  # before the colours, which then say where green's gain comes from
             groups = {"GW": usable & ~saturated_nearby(raw, "W"), "RGB": usable}
-        sites = letter_map(raw.cfa, raw.shape)
+        sites = channel_map(raw.cfa, raw.shape)
         factors = np.ones(len(names))
         sources: dict[str, BalanceSource] = dict.fromkeys(names, "calibrated")
         for group, pixels in groups.items():

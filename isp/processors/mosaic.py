@@ -10,7 +10,7 @@ from isp.colour.colour_fit import ColourFit
 from isp.colour.highlights import clip_highlights, full_e, saturated_nearby
 from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.planes import Plane
-from sensor.cfa import channels, letter_map
+from sensor.cfa import channels, channel_map
 from sensor.raw import RawImage
 
 Image = NDArray[np.float64]
@@ -40,7 +40,7 @@ def balance_mosaic(raw: RawImage, electrons: Plane, balance: WhiteBalance) -> tu
         Where each channel's gain comes from, as `Picture.balance` has it.
     """
     gains = balance.gains(raw, bilinear(raw))
-    sites = letter_map(raw.cfa, raw.shape)
+    sites = channel_map(raw.cfa, raw.shape)
     factors = np.zeros(raw.shape)
     for name, factor in zip(channels(raw.cfa), gains.factors, strict=True):
         factors[sites == name] = factor

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.jit import arrays, dr
-from sensor.cfa import channels, check_covers, letter_map
+from sensor.cfa import channels, check_covers, channel_map
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.kernel.poisson import alias_table, poisson
@@ -71,7 +71,7 @@ def expected_electrons_single(
     check_covers(sensor.cfa, (height, width))
     planes = _single(np.moveaxis(values, -1, 0).reshape(bands, -1))
     scalars = [[dr.opaque(jit.Float, float(weight)) for weight in row] for row in weights]
-    tile = letter_map(sensor.cfa, (len(sensor.cfa), len(sensor.cfa[0])))
+    tile = channel_map(sensor.cfa, (len(sensor.cfa), len(sensor.cfa[0])))
     tile_channels = _upload(np.vectorize(channels(sensor.cfa).index)(tile).astype(np.uint32), jit.UInt)
     tile_height, tile_width = _divisor(tile.shape[0]), _divisor(tile.shape[1])
     result = np.empty(planes.shape[1], dtype=np.float32)

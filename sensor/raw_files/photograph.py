@@ -15,7 +15,7 @@ from render.spectrum import Floats
 from rodcone.errors import InputError, one_line
 from rodcone.optional import optional_library
 from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile, letter_map
+from sensor.cfa import Tile, channel_map
 from sensor.raw import RawImage
 from sensor.raw_files.dng import is_bayer
 from sensor.raw_files.noise_estimate import NoiseEstimate, estimate_noise
@@ -121,7 +121,7 @@ def _channels(opened: Any, path: Path) -> NDArray[np.str_]:
 
 def _tile(mosaic: NDArray[np.str_], path: Path) -> Tile:
     tile = tuple("".join(row[:2]) for row in mosaic[:2])
-    if not is_bayer(tile) or np.any(letter_map(tile, (mosaic.shape[0], mosaic.shape[1])) != mosaic):
+    if not is_bayer(tile) or np.any(channel_map(tile, (mosaic.shape[0], mosaic.shape[1])) != mosaic):
         raise InputError(
             f"{path}: its mosaic begins with {tuple(''.join(row[:6]) for row in mosaic[:2])} and is not Bayer's; "
             "allowed: Bayer raw files, no X-Trans; take another file"

@@ -11,7 +11,7 @@ from scipy.stats import t
 
 from isp.colour.white_balance import neutral_response
 from rodcone.colour_spaces import encode_srgb
-from sensor.cfa import channels, letter_map
+from sensor.cfa import channels, channel_map
 from sensor.config import BLACK_SIGMAS, SensorConfig
 from sensor.raw import SATURATION_SIGMAS, RawImage
 from sensor.readout import noise_variance, spread_charge
@@ -60,7 +60,7 @@ def raw_unbiased(situation: Situation) -> Margin | None:
         sensor = behind(situation, name).sensor
         mean_e = _collected(behind(situation, name))
         room = _leaves_room(mean_e, sensor, situation.exposure_s)
-        letters = letter_map(sensor.cfa, mean_e.shape)
+        letters = channel_map(sensor.cfa, mean_e.shape)
         frames = [shoot(situation, name, 100 + seed) for seed in range(RAW_FRAMES)] if room.any() else []
         for letter in channels(sensor.cfa):
             pixels = room & (letters == letter)
@@ -80,7 +80,7 @@ def pictures_unbiased(situation: Situation) -> Margin | None:
         mean_e = _collected(behind(level, name))
         if not _leaves_room(mean_e, sensor, level.exposure_s).all():
             continue
-        letters = letter_map(sensor.cfa, mean_e.shape)
+        letters = channel_map(sensor.cfa, mean_e.shape)
         means = np.array([mean_e[letters == letter].mean() for letter in channels(sensor.cfa)])
         shown = to_picture(sensor.cfa, level.develop) @ means
         pictures = [develop_fixed(shoot(level, name, 200 + seed), level) for seed in range(PICTURES)]

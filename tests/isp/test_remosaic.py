@@ -8,7 +8,7 @@ import pytest
 from isp.remosaic import bayer_tile, remosaic
 from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile, channels, letter_map, mask
+from sensor.cfa import Tile, channels, channel_map, mask
 from sensor.raw import RawImage
 from sensor.raw_files.dng import is_bayer
 
@@ -50,7 +50,7 @@ def test_sites_on_which_both_mosaics_agree_keep_their_sample(cfa: Tile) -> None:
     noise = np.rint(20 * np.random.default_rng(3).standard_normal(clean.shape))  # the reconstruction averages over it
     noisy = replace(clean, dn=(clean.dn + noise).astype(np.uint16), read_noise_e=20.0)
     made = remosaic(noisy)
-    agree = letter_map(made.cfa, made.shape) == letter_map(cfa, noisy.shape)
+    agree = channel_map(made.cfa, made.shape) == channel_map(cfa, noisy.shape)
     assert agree.any()
     np.testing.assert_array_equal(made.dn[agree], noisy.dn[agree])
 

@@ -9,7 +9,7 @@ from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
-from sensor.cfa import MOSAICS, RGBW, Tile, channels, letter_map
+from sensor.cfa import MOSAICS, RGBW, Tile, channels, channel_map
 from sensor.raw import RawImage
 from sensor.variations import VARIATIONS
 
@@ -39,7 +39,7 @@ def phases(tile: Tile) -> Iterator[Tile]:
 
 def grey(name: str, tile: Tile, level_e: np.ndarray) -> RawImage:
     """Noise-free exposure of a neutral scene whose green collects `level_e` (h, w), one electron a DN, black 100."""
-    letters = letter_map(tile, level_e.shape)
+    letters = channel_map(tile, level_e.shape)
     share = np.vectorize(neutral_of(name).get)(letters)
     dn = np.clip(np.rint(level_e * share) + 100, 0, FULL_E + 100).astype(np.uint16)
     return RawImage(dn, tile, 100.0, FULL_E + 100, 1.0, 1.0, 1.0, 0.0, 0.01)

@@ -12,7 +12,7 @@ from isp.processors.fusion import (
     with_luminance,
 )
 from rodcone.colour_spaces import luminance_of_srgb
-from sensor.cfa import RGBW, Tile, channels, letter_map
+from sensor.cfa import RGBW, Tile, channels, channel_map
 from sensor.curves import complementary, matched_transmittance, rgbw
 from sensor.raw import RawImage
 
@@ -23,7 +23,7 @@ BALANCE = [0.5, 1.0, 0.4, 5.0]
 def exposure(planes_e: dict[str, np.ndarray], cfa: Tile = RGBW, dark_e: float = 1.0) -> RawImage:
     """Noise-free raw image in which each letter's sites read that letter's plane."""
     shape = next(iter(planes_e.values())).shape
-    electrons = np.select([letter_map(cfa, shape) == letter for letter in planes_e], list(planes_e.values()))
+    electrons = np.select([channel_map(cfa, shape) == letter for letter in planes_e], list(planes_e.values()))
     dn = np.clip(np.rint(4 * electrons) + 100, 0, 60_100).astype(np.uint16)
     return RawImage(dn, cfa, 100.0, 60_100.0, 0.25, dark_e, 0.0, 0.0, 0.01)
 
@@ -57,7 +57,7 @@ def test_yamagamis_colour_differences_have_less_noise_than_satos() -> None:
     sato, yamagami = (
         PROCESSORS[name].develop(noisy, np.eye(3), balance=[1, 1, 1, 1]).rgb for name in ("rgbw_sato", "rgbw_yamagami")
     )
-    blue_sites = letter_map(noisy.cfa, noisy.shape) == "B"
+    blue_sites = channel_map(noisy.cfa, noisy.shape) == "B"
     spread = [np.std((rgb[..., 2] - rgb[..., 0])[blue_sites]) for rgb in (sato, yamagami)]
     # at a B site Sato's B is a sample (1) and R the mean of two (1/2): sqrt(1.5) * 20; Yamagami's: sqrt(2 / 7.1) * 20
     assert spread[0] == pytest.approx(20 * np.sqrt(1.5), rel=0.1)
@@ -83,7 +83,7 @@ def test_kijima_gives_a_grey_scene_all_of_ws_detail() -> None:
     rgb = PROCESSORS["rgbw_kijima"].develop(white, np.eye(3), balance=BALANCE).rgb
     plane = fill(white.electrons / 5, RGBW, "W")
     for index, letter in enumerate("RGB"):
-        expected = plane + combine(np.where(letter_map(RGBW, (24, 24)) == letter, 500.0 - plane, 0.0), RGBW, letter)
+        expected = plane + combine(np.where(channel_map(RGBW, (24, 24)) == letter, 500.0 - plane, 0.0), RGBW, letter)
         assert rgb[..., index] == pytest.approx(expected, rel=1e-9)
 
 
