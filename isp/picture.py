@@ -108,10 +108,10 @@ def finish(
     return Picture(rgb, gains.sources, engine)
 
 
-def require_letters(raw: RawImage, letters: tuple[str, ...]) -> tuple[str, ...]:
+def require_letters(raw: RawImage, names: tuple[str, ...]) -> tuple[str, ...]:
     """Return the mosaic's channels, or raise `InputError` where they are others."""
-    if channels(raw.cfa) != letters:
+    if channels(raw.cfa) != names:
         raise InputError(
-            f"raw: mosaic {raw.cfa} holds {channels(raw.cfa)}; allowed here: {letters}; use the other camera's pipeline"
+            f"raw: mosaic {raw.cfa} holds {channels(raw.cfa)}; allowed here: {names}; use the other camera's pipeline"
         )
-    return letters
+    return names

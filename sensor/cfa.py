@@ -1,4 +1,4 @@
-"""Colour filter arrays: a tile of channels, each a letter, that repeats over the sensor."""
+"""Colour filter arrays: a tile of channels, one letter each, that repeats over the sensor."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -14,7 +14,7 @@ Tile: TypeAlias = tuple[str, ...]
 RGBW: Tile = ("RG", "BW")  # Parmar & Wandell 2009, Figure 2
 BAYER: Tile = ("RG", "GB")
 
-# Mosaics by name; any other tile of letters will do, with a response for each channel.
+# Mosaics by name; any other tile will do, with a response for each channel.
 MOSAICS: Mapping[str, Tile] = MappingProxyType(
     {
         "rgbw": RGBW,
@@ -44,7 +44,7 @@ def tile_of(mosaic: str | Sequence[str]) -> Tile:
     Raises
     ------
     InputError
-        For an unknown name, or rows that are no rectangle of letters.
+        For an unknown name, or rows that don't make a rectangle of letters.
     """
     if not isinstance(mosaic, str):
         return check_tile(mosaic)

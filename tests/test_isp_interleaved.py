@@ -13,7 +13,7 @@ from isp.similarity import noise_distance, saturated_fraction
 from isp.tiles import number_tile, sort_tiles
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
-from sensor.cfa import BAYER, RGBW, channels, channel_map
+from sensor.cfa import BAYER, RGBW, channel_map, channels
 from sensor.raw import RawImage
 
 RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")

@@ -12,7 +12,7 @@ from isp.settings import Settings
 from isp.similarity import reliability, reliability_of_mean
 from rodcone.errors import InputError
 from rodcone.jit import backend
-from sensor.cfa import BAYER, RGBW, channels, channel_map
+from sensor.cfa import BAYER, RGBW, channel_map, channels
 from sensor.raw import RawImage
 
 RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")

@@ -15,7 +15,7 @@ from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from rodcone.errors import InputError
-from sensor.cfa import channels, channel_map
+from sensor.cfa import channel_map, channels
 from sensor.curves import Responses, rgbw
 from sensor.raw import RawImage
 

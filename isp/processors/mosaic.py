@@ -10,7 +10,7 @@ from isp.colour.colour_fit import ColourFit
 from isp.colour.highlights import clip_highlights, full_e, saturated_nearby
 from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.planes import Plane
-from sensor.cfa import channels, channel_map
+from sensor.cfa import channel_map, channels
 from sensor.raw import RawImage
 
 Image = NDArray[np.float64]

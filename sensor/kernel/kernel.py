@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.jit import arrays, dr
-from sensor.cfa import channels, check_covers, channel_map
+from sensor.cfa import channel_map, channels, check_covers
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.kernel.poisson import alias_table, poisson

@@ -55,9 +55,9 @@ def chart(cfa: str, light: str) -> tuple[RawImage, Image]:
     electrons = (surfaces() * spectrum) @ weights.T * scale
     shape = (ROWS * SIDE, COLUMNS * SIDE)
     mosaic = np.zeros(shape)
-    for index, letter in enumerate(channels(sensor.cfa)):
+    for index, channel in enumerate(channels(sensor.cfa)):
         plane = np.kron(electrons[:, index].reshape(ROWS, COLUMNS), np.ones((SIDE, SIDE)))
-        mosaic[mask(sensor.cfa, letter, shape)] = plane[mask(sensor.cfa, letter, shape)]
+        mosaic[mask(sensor.cfa, channel, shape)] = plane[mask(sensor.cfa, channel, shape)]
     raw = RawImage(
         np.rint(mosaic / sensor.gain_e_per_dn + sensor.black_dn).astype(np.uint16),
         sensor.cfa,
@@ -117,8 +117,8 @@ def test_the_dark_has_no_tint_under_libraw_s_own_black_level(name: str, cfa: str
         assert theirs.black_level_per_channel == [sensor.black_dn] * 4
         lifted_e = (theirs.raw_image.astype(float) - theirs.black_level_per_channel[0]) * sensor.gain_e_per_dn
     spread_e = np.hypot(sensor.pixel.read_noise_e, sensor.gain_e_per_dn / np.sqrt(12))
-    for letter in channels(sensor.cfa):
-        here = mask(sensor.cfa, letter, shape)
+    for channel in channels(sensor.cfa):
+        here = mask(sensor.cfa, channel, shape)
         # 21 comparisons within 4 standard errors: false-alarm rate 1.3e-3
         assert abs((lifted_e - device.dark_offset_e)[here].mean()) < 4 * spread_e / np.sqrt(here.sum())
 

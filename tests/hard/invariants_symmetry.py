@@ -8,7 +8,7 @@ from hard.chain import CAMERAS, develop_fixed, shoot, to_picture
 
 from isp.reference import sum_weights
 from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, WINDOW, Settings
-from sensor.cfa import Tile, channels, channel_map
+from sensor.cfa import Tile, channel_map, channels
 from sensor.raw import RawImage
 
 # The kernel's own bound: 1e-4 of the samples' range, or some 16 roundings of the largest log weight

@@ -23,7 +23,7 @@ from isp.settings import SIGMA_S, Settings
 from render.spectrum import band_widths
 from render.transport import emission
 from rodcone.colour_spaces import encode_srgb
-from sensor.cfa import RGBW, channels, channel_map
+from sensor.cfa import RGBW, channel_map, channels
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device
 from sensor.kernel.kernel import expected_electrons_single, read_frame

@@ -49,7 +49,7 @@ def test_a_cut_frame_begins_at_the_next_phase_of_the_mosaic():
     assert np.array_equal(part.dn, raw.dn[1:, 1:])
     assert part.defects is None
     bayer = replace(raw, cfa=("RG", "GB"), defects=None)
-    order = [("R", "G", "B").index(letter) for letter in ("R", "G", "B")]
+    order = [("R", "G", "B").index(channel) for channel in ("R", "G", "B")]
     assert bilinear(cut(bayer))[2:-2, 2:-2] == pytest.approx(bilinear(bayer)[3:-2, 3:-2][..., order], rel=1e-12)
 
 

@@ -8,7 +8,7 @@ import pytest
 from isp.remosaic import bayer_tile, remosaic
 from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile, channels, channel_map, mask
+from sensor.cfa import Tile, channel_map, channels, mask
 from sensor.raw import RawImage
 from sensor.raw_files.dng import is_bayer
 
@@ -20,14 +20,14 @@ def raw(cfa: Tile, scene: dict[str, np.ndarray]) -> RawImage:
     """Noise-free mosaic of a scene's channels at one electron a DN, black 100."""
     shape = scene["R"].shape
     electrons = np.zeros(shape)
-    for letter in channels(cfa):
-        electrons[mask(cfa, letter, shape)] = scene[letter][mask(cfa, letter, shape)]
+    for channel in channels(cfa):
+        electrons[mask(cfa, channel, shape)] = scene[channel][mask(cfa, channel, shape)]
     dn = np.rint(electrons + 100).astype(np.uint16)
     return RawImage(dn, cfa, 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
 
 
 def flat(shape: tuple[int, int] = (33, 40)) -> dict[str, np.ndarray]:
-    return {letter: np.full(shape, level) for letter, level in LEVELS_E.items()}
+    return {channel: np.full(shape, level) for channel, level in LEVELS_E.items()}
 
 
 @pytest.mark.parametrize("cfa", PHASES)
@@ -40,8 +40,8 @@ def test_the_tile_is_bayer_with_red_where_it_was(cfa: Tile) -> None:
 @pytest.mark.parametrize("cfa", PHASES)
 def test_a_flat_field_stays_flat_to_the_border(cfa: Tile) -> None:
     made = remosaic(raw(cfa, flat()))
-    for letter in "RGB":
-        assert set(made.dn[mask(made.cfa, letter, made.shape)].tolist()) == {LEVELS_E[letter] + 100}
+    for channel in "RGB":
+        assert set(made.dn[mask(made.cfa, channel, made.shape)].tolist()) == {LEVELS_E[channel] + 100}
 
 
 @pytest.mark.parametrize("cfa", PHASES)
@@ -59,18 +59,18 @@ def test_sites_on_which_both_mosaics_agree_keep_their_sample(cfa: Tile) -> None:
 @pytest.mark.parametrize("cfa", PHASES)
 def test_a_ramp_is_sampled_where_the_new_pixel_lies(cfa: Tile, axis: int) -> None:
     place = np.indices((48, 48))[axis]
-    scene = {letter: level * (1 + 0.01 * (place - 24)) for letter, level in LEVELS_E.items()}
+    scene = {channel: level * (1 + 0.01 * (place - 24)) for channel, level in LEVELS_E.items()}
     made = remosaic(raw(cfa, scene))
     inner = np.zeros(made.shape, dtype=bool)
     inner[12:-12, 12:-12] = True  # Omega whole: samples lie evenly around each pixel
-    for letter in "RGB":
-        here = inner & mask(made.cfa, letter, made.shape)
+    for channel in "RGB":
+        here = inner & mask(made.cfa, channel, made.shape)
         # one pixel beside its place would be 1 %; noise-like weights of a ramp move the mean by a fifth of that
-        assert made.dn[here] - 100.0 == pytest.approx(scene[letter][here], rel=2.5e-3, abs=0.51), letter
+        assert made.dn[here] - 100.0 == pytest.approx(scene[channel][here], rel=2.5e-3, abs=0.51), channel
 
 
 def test_saturated_frames_stay_within_the_converter() -> None:
-    made = remosaic(raw(("RG", "BW"), {letter: np.full((16, 16), 15_000.0) for letter in "RGBW"}))
+    made = remosaic(raw(("RG", "BW"), {channel: np.full((16, 16), 15_000.0) for channel in "RGBW"}))
     assert set(made.dn.ravel().tolist()) == {15_100}
     assert made.saturated.all()
 

@@ -153,8 +153,8 @@ def test_measured_responses_are_read_beside_the_file_with_all_that_it_states(tmp
         (both, read_csv(tmp_path / "curves.csv", range_nm=(400, 700), ir_cut=cut, quantum_efficiency=efficiency)),
         (numbers, read_csv(tmp_path / "curves.csv", range_nm=(400, 700), ir_cut=650.0, quantum_efficiency=0.5)),
     ):
-        for letter in "RGBW":
-            one, other = sensor.responses.curves[letter], curves.curves[letter]
+        for channel in "RGBW":
+            one, other = sensor.responses.curves[channel], curves.curves[channel]
             np.testing.assert_array_equal(one.wavelength_nm, other.wavelength_nm)
             np.testing.assert_array_equal(one.values, other.values)
     assert plain.responses.curves["W"].values.max() == 0.9

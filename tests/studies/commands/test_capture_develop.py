@@ -359,7 +359,7 @@ def test_as_shot_balance_keeps_the_light_s_colour_that_gray_world_takes_away(
     raw = negative(tmp_path / "shot.dng", cfa, 0.1, light="A")
     colour = calibrate(preset("low_noise", cfa), illuminant("D65"))
     write_raw(replace(raw, colour=colour), tmp_path / "shot.dng")  # balanced for daylight, taken under a lamp
-    signal = np.array([raw.electrons[mask(raw.cfa, letter, SHAPE)].mean() for letter in "RGB"])
+    signal = np.array([raw.electrons[mask(raw.cfa, channel, SHAPE)].mean() for channel in "RGB"])
     full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
     orange = colour.to_srgb @ (signal / colour.neutral[:3] / full_e)
     for balance, source, expected in (("as-shot", "given", orange), ("gray-world", "gray world", np.full(3, 0.1))):
@@ -388,7 +388,7 @@ def test_a_picture_in_display_p3_as_tiff_carries_its_profile(
     raw = negative(tmp_path / "shot.dng", share=0.1, light="A")
     colour = calibrate(preset("low_noise", "bayer"), illuminant("D65"))
     write_raw(replace(raw, colour=colour), tmp_path / "shot.dng")  # an orange wall, as above
-    signal = np.array([raw.electrons[mask(raw.cfa, letter, SHAPE)].mean() for letter in "RGB"])
+    signal = np.array([raw.electrons[mask(raw.cfa, channel, SHAPE)].mean() for channel in "RGB"])
     full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
     orange = colour.to_srgb @ (signal / colour.neutral[:3] / full_e)
     out = tmp_path / "wide.tif"
