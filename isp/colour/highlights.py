@@ -17,15 +17,10 @@ def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> 
     return np.asarray(maximum_filter(hit, size=2 * (len(raw.cfa) - 1 if reach is None else reach) + 1))
 
 
-def full_e(raw: RawImage) -> float:
-    """Electrons of a full well."""
-    return float((raw.white_dn - raw.black_dn) * raw.gain_e_per_dn)
-
-
 def clip_highlights(raw: RawImage, balanced: NDArray[np.float64], reach: int | None = None) -> NDArray[np.float64]:
     """Hold every balanced colour at green's full well near a saturated colour sample: highlights stay neutral.
 
     `reach` as in `saturated_nearby`: that of the filter which made the planes.
     """
     clipped = saturated_nearby(raw, "RGB", reach)
-    return np.where(clipped[..., None], np.minimum(balanced, full_e(raw)), balanced)
+    return np.where(clipped[..., None], np.minimum(balanced, raw.full_well_e), balanced)

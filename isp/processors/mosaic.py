@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from isp.bilinear import bilinear
 from isp.colour.colour_fit import ColourFit
-from isp.colour.highlights import clip_highlights, full_e, saturated_nearby
+from isp.colour.highlights import clip_highlights, saturated_nearby
 from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.planes import Plane
 from sensor.cfa import channel_map, channels
@@ -46,7 +46,7 @@ def balance_mosaic(raw: RawImage, electrons: Plane, balance: WhiteBalance) -> tu
         factors[sites == name] = factor
     values = electrons * factors
     held = saturated_nearby(raw, "RGB", 1) & (sites != "W")
-    return np.where(held, np.minimum(values, full_e(raw)), values), gains.sources
+    return np.where(held, np.minimum(values, raw.full_well_e), values), gains.sources
 
 
 def to_rgb(raw: RawImage, planes: Image, colours: ColourFit, reach: int) -> Image:

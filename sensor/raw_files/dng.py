@@ -117,7 +117,6 @@ def dng_tags(raw: RawImage) -> Tags:
     where the well begins to clip (`RawImage.saturation_e`).
     """
     colour = _require(raw)
-    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
     height, width = raw.shape
     tags: dict[int, tuple[str, Values]] = {
         254: ("I", (0,)),  # NewSubfileType: the full picture
@@ -140,9 +139,9 @@ def dng_tags(raw: RawImage) -> Tags:
         50779: ("H", (_ILLUMINANT_D65,)),  # CalibrationIlluminant2
         50964: ("2i", rational(colour.camera_to_xyz_a)),  # ForwardMatrix1
         50965: ("2i", rational(colour.camera_to_xyz_d65)),  # ForwardMatrix2
-        50734: ("2I", rational(min(max(raw.saturation_e / full_e, 0.0), 1.0))),  # LinearResponseLimit
+        50734: ("2I", rational(min(max(raw.saturation_e / raw.full_well_e, 0.0), 1.0))),  # LinearResponseLimit
         50829: ("I", (0, 0, height, width)),  # ActiveArea
-        51041: ("d", (1 / full_e, (raw.dark_noise_e / full_e) ** 2)),  # NoiseProfile
+        51041: ("d", (1 / raw.full_well_e, (raw.dark_noise_e / raw.full_well_e) ** 2)),  # NoiseProfile
     }
     if colour.neutral.size == 4:  # a fourth plane asks for a way back to three: W carries no colour here
         tags |= dict.fromkeys((50725, 50726), ("2i", rational(np.eye(3, 4))))  # ReductionMatrix1, 2

@@ -114,8 +114,7 @@ def develop_file(
     if raw.colour is None:
         raise InputError(f"{path}: it holds no colour calibration; allowed: a camera with R, G and B; capture with one")
     picture = develop(raw, processor=isp, white_balance=white_balance)
-    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
-    linear = picture.rgb / full_e
+    linear = picture.rgb / raw.full_well_e
     stops = _stops(linear) if ev is None else ev
     facts = {
         "raw": str(path),
