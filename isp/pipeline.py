@@ -73,9 +73,9 @@ def picture_interleaved(
 
     result = reconstruct_with_noise(raw, **vars(settings))
     planes = np.asarray(result.estimate, dtype=np.float64)
-    gains = white_balance.gains(raw, planes)
-    noise = relative_noise(raw, planes, result.noise_gain, gains.factors, colours)
-    balanced = clip_highlights(raw, planes * gains.factors)
+    gains, sources = white_balance.gains(raw, planes)
+    noise = relative_noise(raw, planes, result.noise_gain, gains, colours)
+    balanced = clip_highlights(raw, planes * gains)
 
     snr = green_snr(raw, planes)
     weight = substitution_weight(snr, substitution_snr, octaves)
@@ -83,7 +83,7 @@ def picture_interleaved(
     alpha = saturated_fraction(raw)[..., None]
     rgb = (1.0 - alpha) * (balanced @ matrix_with_white(colours, noise, weight).T)
     rgb += alpha * (balanced[..., :3] @ colours.matrix("RGB", noise[:3] * COLOUR_ERROR).T)
-    return Picture(rgb, gains.sources, engine=result.engine, snr=snr, substitution=weight)
+    return Picture(rgb, sources, engine=result.engine, snr=snr, substitution=weight)
 
 
 def picture_bayer(

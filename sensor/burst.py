@@ -109,7 +109,7 @@ def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merg
         full &= rate * groups[start].exposure_s >= clear_e
     photo_rate = rate - dark_current_e_per_s
     fixed = (first.dsnu_e * per_s) ** 2 + (first.prnu * photo_rate) ** 2
-    return Merged(photo_rate, variance, fixed, full)
+    return Merged(rate_e_per_s=photo_rate, temporal_variance=variance, fixed_variance=fixed, saturated=full)
 
 
 def _grouped(frames: Sequence[RawImage]) -> list[_Group]:

@@ -69,6 +69,16 @@ def channels(tile: Tile) -> tuple[str, ...]:
     return tuple(name for name in "RGBW" if name in present) + tuple(name for name in present if name not in "RGBW")
 
 
+def is_bayer(tile: Tile) -> bool:
+    """Whether a tile is one of Bayer's four phases: 2x2, green on a diagonal, red and blue once."""
+    return tile in (("RG", "GB"), ("BG", "GR"), ("GR", "BG"), ("GB", "RG"))
+
+
+def is_rgbw(tile: Tile) -> bool:
+    """Whether a tile is 2x2 with R, G, B and W once each."""
+    return len(tile) == 2 and len(tile[0]) == 2 and sorted("".join(tile)) == list("BGRW")
+
+
 def channel_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
     """Channel of each pixel, shape `shape`."""
     cells = np.array([list(row) for row in tile])

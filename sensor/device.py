@@ -57,4 +57,4 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
         column_gain = np.maximum(1.0 + pixel.column_gain_spread * normals(key, NoiseTerm.COLUMN_GAIN, one_row)[0], 0.0)
     if pixel.hot_pixel_share:
         hot = normals(key, NoiseTerm.HOT, shape) < ndtri(pixel.hot_pixel_share)
-    return Device(response, offset_e, column_gain, hot)
+    return Device(photo_response=response, dark_offset_e=offset_e, column_gain=column_gain, hot=hot)

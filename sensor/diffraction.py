@@ -11,7 +11,7 @@ from sensor.config import LensConfig
 
 
 def limit_per_um(wavelength_nm: float, lens: LensConfig) -> float:
-    """Frequency from which on diffraction lets nothing through: 1 / (wavelength x working f-number), inf without."""
+    """Cut-off frequency of diffraction: 1 / (wavelength x working f-number); inf where the lens has none."""
     spot_um = wavelength_nm * 1e-3 * lens.f_number * (1 + lens.magnification) * lens.diffraction
     return 1 / spot_um if spot_um else inf
 

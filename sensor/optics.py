@@ -130,7 +130,11 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     else:
         values = spread_light(radiance, sensor, samples)
     return SpectralIrradiance(
-        values, radiance.wavelength_nm, sensor.pixel.pitch_um, radiance.widths_nm, radiance.signed
+        values=values,
+        wavelength_nm=radiance.wavelength_nm,
+        pitch_um=sensor.pixel.pitch_um,
+        width_nm=radiance.widths_nm,
+        signed=radiance.signed,
     )
 
 

@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit
-from render.spectrum import Floats
 from rodcone.colour_spaces import A_XY, D65_XY, adapt_to_d65, xyz_from_xy, xyz_to_srgb
 from sensor.calibration import ColourCalibration
 
@@ -32,7 +31,8 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
     if len(names) > 3:
         rows = np.vstack([rows, _from_srgb(colour)[3:]])
     untold = np.diag([0.0 if name in "RGB" else UNTOLD**2 for name in names])
-    return ColourFit(names, rows @ MEAN_SRGB, rows @ MOMENTS_SRGB @ rows.T + untold, rows @ MOMENTS_SRGB)
+    cross = rows @ MOMENTS_SRGB
+    return ColourFit(channels=names, mean=rows @ MEAN_SRGB, moments=cross @ rows.T + untold, cross=cross)
 
 
 def _from_srgb(colour: ColourCalibration) -> NDArray[np.float64]:
@@ -42,11 +42,6 @@ def _from_srgb(colour: ColourCalibration) -> NDArray[np.float64]:
         from_xyz, white = getattr(colour, f"xyz_to_camera_{name}"), xyz_from_xy(xy)
         neutral = from_xyz @ white
         to_xyz = np.linalg.inv(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)
-        found.append((_distance(neutral, colour.neutral), from_xyz @ to_xyz / neutral[:, None]))
+        stops = np.log2(np.maximum(neutral, 1e-9) / colour.neutral)
+        found.append((np.abs(stops - stops[1]).max(), from_xyz @ to_xyz / neutral[:, None]))
     return np.asarray(min(found, key=lambda pair: pair[0])[1])
-
-
-def _distance(neutral: Floats, other: Floats) -> float:
-    """Between two neutrals, in stops."""
-    ratio = np.log2(np.maximum(neutral, 1e-9) / other)
-    return float(np.abs(ratio - ratio[1]).max())

@@ -23,23 +23,6 @@ BalanceSource = Literal["gray world", "calibrated", "given"]
 
 
 @dataclass(frozen=True)
-class ChannelGains:
-    """White balance gains of a frame.
-
-    Attributes
-    ----------
-    factors : (channel,) float64
-        Factor on each channel, in the order of `sensor.cfa.channels`; green's is 1.
-    sources : mapping of str to str
-        Where each channel's factor comes from: ``gray world``, ``calibrated`` where the picture was too dark to tell,
-        or ``given``.
-    """
-
-    factors: Floats
-    sources: Mapping[str, BalanceSource]
-
-
-@dataclass(frozen=True)
 class WhiteBalance:
     """What a frame is balanced by: the calibrated neutral beside Gray World, or a response in its place.
 
@@ -70,13 +53,21 @@ class WhiteBalance:
             return balance
         return cls(_response("neutral", neutral, raw), _response("balance", balance, raw))
 
-    def gains(self, raw: RawImage, planes: NDArray[np.float64]) -> ChannelGains:
-        """Gains of a frame.
+    def gains(self, raw: RawImage, planes: NDArray[np.float64]) -> tuple[Floats, Mapping[str, BalanceSource]]:
+        """Gains of a frame, and where they come from.
 
         Parameters
         ----------
         planes : (h, w, channel) float64
             The pipeline's own linear planes [e-], channels in the order of `sensor.cfa.channels`.
+
+        Returns
+        -------
+        (channel,) float64
+            Factor on each channel; green's is 1.
+        mapping of str to str
+            Where each channel's factor comes from: ``gray world``, ``calibrated`` where the picture was too dark to
+            tell, or ``given``.
 
         Notes
         -----
@@ -86,7 +77,7 @@ class WhiteBalance:
         """
         names = channels(raw.cfa)
         if self.given is not None:
-            return ChannelGains(self.given[names.index("G")] / self.given, dict.fromkeys(names, "given"))
+            return self.given[names.index("G")] / self.given, dict.fromkeys(names, "given")
         neutral = neutral_response(names) if self.neutral is None else self.neutral
         usable = ~saturated_nearby(raw, "RGB")
         groups = {"RGB": usable}
@@ -103,7 +94,7 @@ class WhiteBalance:
             factors[index], certain = gray_world(means, errors, neutral[index], green=group.index("G"))
             for channel, sure in zip(group, certain, strict=True):
                 sources[channel] = "gray world" if sure else "calibrated"
-        return ChannelGains(factors, sources)
+        return factors, sources
 
 
 def neutral_response(names: Sequence[str], responses: Responses | None = None) -> Floats:

@@ -21,9 +21,8 @@ from isp.planes import Plane
 from isp.processors.mosaic import Image, balance_mosaic, to_rgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
-from sensor.cfa import Tile
+from sensor.cfa import Tile, is_bayer
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_bayer
 
 EXTRA = "opponents"
 # Pixels that a value depends on along one axis. Malvar's filters are 5 wide. Menon's take 2 for a green, 2 more for

@@ -22,9 +22,8 @@ from isp.planes import Plane
 from isp.processors.fusion import CHANNELS
 from isp.processors.mosaic import Image, balance_mosaic, to_rgb
 from rodcone.errors import InputError
-from sensor.cfa import Tile, mask
+from sensor.cfa import Tile, is_rgbw, mask
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_rgbw
 
 _PAD = 4  # two steps of two pixels each, in whole tiles
 REACH = 3  # pixels: two for W at a colour's site, one more for the difference

@@ -39,14 +39,14 @@ def balance_mosaic(raw: RawImage, electrons: Plane, balance: WhiteBalance) -> tu
     mapping of str to str
         Where each channel's gain comes from, as `Picture.balance` has it.
     """
-    gains = balance.gains(raw, bilinear(raw))
+    gains, sources = balance.gains(raw, bilinear(raw))
     sites = channel_map(raw.cfa, raw.shape)
     factors = np.zeros(raw.shape)
-    for name, factor in zip(channels(raw.cfa), gains.factors, strict=True):
+    for name, factor in zip(channels(raw.cfa), gains, strict=True):
         factors[sites == name] = factor
     values = electrons * factors
     held = saturated_nearby(raw, "RGB", 1) & (sites != "W")
-    return np.where(held, np.minimum(values, raw.full_well_e), values), gains.sources
+    return np.where(held, np.minimum(values, raw.full_well_e), values), sources
 
 
 def to_rgb(raw: RawImage, planes: Image, colours: ColourFit, reach: int) -> Image:

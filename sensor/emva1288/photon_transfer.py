@@ -8,18 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.spectrum import Floats
-from rodcone.jit import backend
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 
 # Expected photo-electrons of every pixel and the exposure time [s] in, one frame [DN] out.
 Expose: TypeAlias = Callable[[float, float], NDArray[np.uint16]]
-
-
-def engine(exact: bool = False) -> str:
-    """Engine that draws a bench's frames, as in `RawImage.engine`: ``numpy``, ``llvm`` or ``cuda``."""
-    return "numpy" if exact else backend()
 
 
 def bench(sensor: SensorConfig, shape: tuple[int, int], seed: int, exact: bool = False) -> Expose:

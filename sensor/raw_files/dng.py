@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from rodcone.errors import InputError
 from rodcone.files import replacing
 from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile, channels
+from sensor.cfa import Tile, channels, is_bayer, is_rgbw
 from sensor.raw import RawImage
 from sensor.raw_files.raw_json import parse_json, raw_image, to_json
 from sensor.raw_files.tiff import CFA, EXIF, Tags, Values, read_mosaic, read_tags, text, write_mosaic
@@ -39,18 +39,6 @@ _COMPARED = {
 _COLOURS = {"R": 0, "G": 1, "B": 2, "W": 6}  # numbers of CFAPattern and CFAPlaneColor; 6 is white
 _ILLUMINANT_A, _ILLUMINANT_D65 = 17, 21  # EXIF LightSource
 _LARGEST = 2**31 - 1  # of a rational's numerator and denominator
-
-
-def is_bayer(tile: Tile) -> bool:
-    """Whether a tile is one of Bayer's four phases: 2x2, green on a diagonal, red and blue once."""
-    if len(tile) != 2 or len(tile[0]) != 2 or sorted("".join(tile)) != list("BGGR"):
-        return False
-    return tile[0][0] == tile[1][1] or tile[0][1] == tile[1][0]
-
-
-def is_rgbw(tile: Tile) -> bool:
-    """Whether a tile is 2x2 with R, G, B and W once each."""
-    return len(tile) == 2 and len(tile[0]) == 2 and sorted("".join(tile)) == list("BGRW")
 
 
 def write_dng(raw: RawImage, path: Path) -> Path:

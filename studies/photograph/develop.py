@@ -14,9 +14,8 @@ from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError, require_range, unknown
 from sensor.calibration import ColourCalibration
-from sensor.cfa import channels
+from sensor.cfa import channels, is_bayer
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_bayer
 from sensor.raw_files.raw_file import open_raw
 from studies.metrics.truth import WHITE_AT, WHITE_PERCENTILE  # the demo's rule, here on the picture's own luminance
 

@@ -115,7 +115,7 @@ def _leaves_room(mean_e: Image, sensor: SensorConfig, exposure_s: float) -> NDAr
     # Highlights are held from where a pixel counts as saturated, some sigmas of the dark under the well.
     top_e = pixel.full_well_e * (1 - SATURATION_SIGMAS * pixel.column_gain_spread)
     top_e -= SATURATION_SIGMAS * float(np.hypot(dark_e, sensor.gain_e_per_dn))
-    fits = sensor.black_e >= BLACK_SIGMAS * dark_e * (1 - 1e-12)
+    fits = sensor.black_dn * sensor.gain_e_per_dn >= BLACK_SIGMAS * dark_e * (1 - 1e-12)
     return np.asarray(fits & (mean_e + ROOM_SIGMAS * sigma_e < top_e))
 
 

@@ -8,9 +8,8 @@ import pytest
 from isp.remosaic import bayer_tile, remosaic
 from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile, channel_map, channels, mask
+from sensor.cfa import Tile, channel_map, channels, is_bayer, mask
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_bayer
 
 PHASES = [("RG", "BW"), ("GR", "WB"), ("BW", "RG"), ("WB", "GR"), ("RW", "GB"), ("RB", "GW"), ("WG", "BR")]
 LEVELS_E = {"R": 500.0, "G": 1000.0, "B": 400.0, "W": 5000.0}

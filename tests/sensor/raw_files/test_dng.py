@@ -15,15 +15,13 @@ from hypothesis import strategies as st
 
 from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
-from sensor.cfa import MOSAICS, RGBW, Tile, channels
+from sensor.cfa import MOSAICS, RGBW, Tile, channels, is_bayer, is_rgbw
 from sensor.raw import RawImage
 from sensor.raw_files.dng import (
     PRIVATE,
     PRIVATE_DATA,
     dng_tags,
     exif_tags,
-    is_bayer,
-    is_rgbw,
     rational,
     read_dng,
     write_dng,
