@@ -1,7 +1,6 @@
 """The colours of a raw file whose curves nobody knows: a `ColourFit` from its calibration's matrices."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit
 from rodcone.colour_spaces import A_XY, D65_XY, adapt_to_d65, xyz_from_xy, xyz_to_srgb
@@ -29,19 +28,15 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
     """
     rows = np.linalg.inv(colour.to_srgb)
     if len(names) > 3:
-        rows = np.vstack([rows, _from_srgb(colour)[3:]])
+        # balanced channels of linear sRGB, (channel, 3), and how far their neutral lies from the exposure's, in stops
+        found = []
+        for name, xy in (("a", A_XY), ("d65", D65_XY)):
+            from_xyz, white = getattr(colour, f"xyz_to_camera_{name}"), xyz_from_xy(xy)
+            neutral = from_xyz @ white
+            to_xyz = np.linalg.inv(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)
+            stops = np.log2(np.maximum(neutral, 1e-9) / colour.neutral)
+            found.append((np.abs(stops - stops[1]).max(), from_xyz @ to_xyz / neutral[:, None]))
+        rows = np.vstack([rows, min(found, key=lambda pair: pair[0])[1][3:]])
     untold = np.diag([0.0 if name in "RGB" else UNTOLD**2 for name in names])
     cross = rows @ MOMENTS_SRGB
     return ColourFit(channels=names, mean=rows @ MEAN_SRGB, moments=cross @ rows.T + untold, cross=cross)
-
-
-def _from_srgb(colour: ColourCalibration) -> NDArray[np.float64]:
-    """Balanced channels of linear sRGB under the nearer illuminant, (channel, 3), rows sum to 1."""
-    found = []
-    for name, xy in (("a", A_XY), ("d65", D65_XY)):
-        from_xyz, white = getattr(colour, f"xyz_to_camera_{name}"), xyz_from_xy(xy)
-        neutral = from_xyz @ white
-        to_xyz = np.linalg.inv(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)
-        stops = np.log2(np.maximum(neutral, 1e-9) / colour.neutral)
-        found.append((np.abs(stops - stops[1]).max(), from_xyz @ to_xyz / neutral[:, None]))
-    return np.asarray(min(found, key=lambda pair: pair[0])[1])

@@ -16,9 +16,9 @@ import numpy as np
 
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
-from isp.picture import Picture
+from isp.picture import Image, Picture
 from isp.planes import Plane
-from isp.processors.mosaic import Image, balance_mosaic, to_rgb
+from isp.processors.mosaic import balance_mosaic, to_rgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
 from sensor.cfa import Tile, is_bayer

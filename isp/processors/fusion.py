@@ -26,9 +26,9 @@ from isp.bilinear import fill_channels
 from isp.colour.colour_fit import ColourFit
 from isp.colour.highlights import saturated_nearby
 from isp.colour.white_balance import WhiteBalance, neutral_response
-from isp.picture import Picture, require_letters
+from isp.picture import Image, Picture, require_letters
 from isp.planes import Plane, fill, tent
-from isp.processors.mosaic import Image, balance_mosaic, to_rgb
+from isp.processors.mosaic import balance_mosaic, to_rgb
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels, mask

@@ -17,10 +17,10 @@ from isp.bilinear import fill_channels
 from isp.colour.colour_fit import ColourFit
 from isp.colour.highlights import saturated_nearby
 from isp.colour.white_balance import WhiteBalance
-from isp.picture import Picture, require_letters
+from isp.picture import Image, Picture, require_letters
 from isp.planes import Plane
 from isp.processors.fusion import CHANNELS
-from isp.processors.mosaic import Image, balance_mosaic, to_rgb
+from isp.processors.mosaic import balance_mosaic, to_rgb
 from rodcone.errors import InputError
 from sensor.cfa import Tile, is_rgbw, mask
 from sensor.raw import RawImage

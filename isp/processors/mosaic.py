@@ -3,17 +3,15 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from isp.bilinear import bilinear
 from isp.colour.colour_fit import ColourFit
 from isp.colour.highlights import clip_highlights, saturated_nearby
 from isp.colour.white_balance import BalanceSource, WhiteBalance
+from isp.picture import Image
 from isp.planes import Plane
 from sensor.cfa import channel_map, channels
 from sensor.raw import RawImage
-
-Image = NDArray[np.float64]
 
 
 def balance_mosaic(raw: RawImage, electrons: Plane, balance: WhiteBalance) -> tuple[Plane, Mapping[str, BalanceSource]]:

@@ -10,12 +10,11 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rodcone.errors import InputError
 from rodcone.files import replacing
-from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile, channels, is_bayer, is_rgbw
+from sensor.cfa import channels, is_bayer, is_rgbw
 from sensor.raw import RawImage
 from sensor.raw_files.raw_json import parse_json, raw_image, to_json
 from sensor.raw_files.tiff import CFA, EXIF, Tags, Values, read_mosaic, read_tags, text, write_mosaic
@@ -103,9 +102,22 @@ def dng_tags(raw: RawImage) -> Tags:
     NoiseProfile is N(x)^2 = S x + O for x from black (0) to white (1), the same for all channels: S is the shot noise,
     1 / full scale in electrons, O the dark noise; PRNU grows with x^2 and doesn't fit the form. LinearResponseLimit is
     where the well begins to clip (`RawImage.saturation_e`).
+
+    Raises
+    ------
+    InputError
+        For another mosaic, a camera without colour calibration, or levels that DNG can't hold.
     """
-    colour = _require(raw)
-    height, width = raw.shape
+    if not (is_bayer(raw.cfa) or is_rgbw(raw.cfa)):
+        raise InputError(f"cfa: {raw.cfa} is not written as DNG; allowed: Bayer or 2x2 RGBW; write a .tif instead")
+    if raw.colour is None:
+        raise InputError("colour: the raw image holds no colour calibration, which a DNG needs; write a .tif instead")
+    if raw.black_dn < 0 or raw.white_dn != int(raw.white_dn):
+        raise InputError(
+            f"levels: black {raw.black_dn!r} and white {raw.white_dn!r} don't fit a DNG; "
+            "allowed: black of 0 or more, a whole white; write a .tif instead"
+        )
+    colour, (height, width) = raw.colour, raw.shape
     tags: dict[int, tuple[str, Values]] = {
         254: ("I", (0,)),  # NewSubfileType: the full picture
         MAKER: text(MAKE),
@@ -134,16 +146,12 @@ def dng_tags(raw: RawImage) -> Tags:
     if colour.neutral.size == 4:  # a fourth plane asks for a way back to three: W carries no colour here
         tags |= dict.fromkeys((50725, 50726), ("2i", rational(np.eye(3, 4))))  # ReductionMatrix1, 2
     if raw.defects is not None and is_bayer(raw.cfa):
-        tags[OPCODES] = ("U", _bad_pixels(raw.cfa, raw.defects))
+        # Opcode FixBadPixelsList of DNG 1.3, chapter 6: big-endian, optional for readers; for Bayer only.
+        phase = ("RG", "GR", "GB", "BG").index(raw.cfa[0])
+        parameters = struct.pack(">3I", phase, len(raw.defects), 0) + raw.defects.astype(">u4").tobytes()
+        tags[OPCODES] = ("U", struct.pack(">IIIII", 1, 5, 0x01030000, 1, len(parameters)) + parameters)
     tags[PRIVATE_DATA] = ("B", PRIVATE + to_json(raw).encode("ascii"))
     return dict(sorted(tags.items()))
-
-
-def _bad_pixels(tile: Tile, defects: NDArray[np.intp]) -> bytes:
-    """Opcode FixBadPixelsList of DNG 1.3, chapter 6: big-endian, optional for readers; for Bayer only."""
-    phase = ("RG", "GR", "GB", "BG").index(tile[0])
-    parameters = struct.pack(">3I", phase, len(defects), 0) + defects.astype(">u4").tobytes()
-    return struct.pack(">IIIII", 1, 5, 0x01030000, 1, len(parameters)) + parameters
 
 
 def exif_tags(raw: RawImage) -> Tags:
@@ -157,20 +165,6 @@ def exif_tags(raw: RawImage) -> Tags:
     if raw.iso is not None:
         tags[ISO] = ("H", (min(max(round(raw.iso), 1), 65_535),))
     return tags
-
-
-def _require(raw: RawImage) -> ColourCalibration:
-    """Colour calibration of a raw image that a DNG can hold, or `InputError`."""
-    if not (is_bayer(raw.cfa) or is_rgbw(raw.cfa)):
-        raise InputError(f"cfa: {raw.cfa} is not written as DNG; allowed: Bayer or 2x2 RGBW; write a .tif instead")
-    if raw.colour is None:
-        raise InputError("colour: the raw image holds no colour calibration, which a DNG needs; write a .tif instead")
-    if raw.black_dn < 0 or raw.white_dn != int(raw.white_dn):
-        raise InputError(
-            f"levels: black {raw.black_dn!r} and white {raw.white_dn!r} don't fit a DNG; "
-            "allowed: black of 0 or more, a whole white; write a .tif instead"
-        )
-    return raw.colour
 
 
 def rational(values: ArrayLike) -> Values:
