@@ -36,9 +36,9 @@ def unknown(what: str, value: object, allowed: Iterable[str]) -> InputError:
 
 
 def require_range(name: str, value: Any, low: float, high: float, fix: str) -> None:
-    """Raise `InputError` unless `value` is a finite number, no bool, and ``low <= value <= high``."""
+    """Raise `InputError` unless `value` is a finite number and ``low <= value <= high``."""
     try:
-        number = float(value) if not isinstance(value, bool) and isinstance(value, Real) else nan
+        number = float(value) if isinstance(value, Real) else nan
     except OverflowError:  # whole numbers of Python go on beyond float's
         number = nan
     if not (isfinite(number) and low <= number <= high):

@@ -98,7 +98,8 @@ def _lamp(name: str, x: float, z: float, towards: int) -> dict[str, Node]:
 
 def _car(pose: Floats) -> dict[str, Node]:
     """Parked car 4.1 m long, seen from behind: boxes, glazing, wheels, rear lamps, number plate."""
-    paint, glazing, tyre = glossy(band(460, 40, 0.03, 0.30), 0.1), glossy(DARK, 0.08), matte(DARK)
+    paint = glossy(band(460, 40, 0.03, 0.30), 0.1)
+    glazing, tyre = glossy(DARK, 0.08), matte(DARK)
     nodes = {
         "body": block(pose @ translate(0, 0.30, 0), 1.72, 0.55, 4.10, paint),
         "cabin": block(pose @ translate(0, 0.85, 0.30), 1.46, 0.52, 2.30, glazing),

@@ -80,6 +80,9 @@ def _numbers(name: str, content: Mapping[str, Any], kind: type) -> dict[str, Any
     for field in fields(kind):
         if field.default is MISSING and field.name not in table:
             raise InputError(f"{name}: {field.name} is missing; allowed: a number; add it to [{name}]")
+    for key, value in table.items():
+        if isinstance(value, bool):  # a Real for Python
+            raise InputError(f"{key}: {value!r} is not a number; allowed: a number, 0 to switch a term off; write one")
     return table
 
 

@@ -79,6 +79,9 @@ def raw_image(held: dict[str, Any], dn: NDArray[np.uint16], name: str) -> RawIma
         For a value of the wrong type or out of its range; `name` stands in front.
     """
     try:
+        for key, value in held.items():
+            if isinstance(value, bool):  # which Python takes for a number
+                raise InputError(f"{key}: {value!r} is not a number; correct it")
         colour = held["colour"]
         if colour is not None:
             names = {field.name for field in fields(ColourCalibration)}

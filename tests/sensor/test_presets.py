@@ -104,7 +104,7 @@ def test_the_least_file_leaves_the_rest_at_its_defaults(tmp_path):
         (LEAST.replace("prnu = 0.01\n", "") + LENS, ("pixel: prnu is missing", "add it to [pixel]")),
         (LEAST.replace("prnu = 0.01", "prnu = 1.7") + LENS, ("prnu: 1.7", "1.7 % is 0.017")),
         (LEAST.replace("prnu = 0.01", 'prnu = "0.01"') + LENS, ("prnu: '0.01'",)),
-        (LEAST.replace("prnu = 0.01", "prnu = true") + LENS, ("prnu: True is outside 0 to 1",)),
+        (LEAST.replace("prnu = 0.01", "prnu = true") + LENS, ("prnu: True is not a number",)),
         (LEAST.replace("prnu = 0.01", "prnu = nan") + LENS, ("prnu: nan",)),
         (LEAST.replace("prnu = 0.01", "prnu = [1]") + LENS, ("prnu: [1]",)),
         ("bits = 20\n" + LEAST + LENS, ("bits: 20", "1 to 16")),
