@@ -48,7 +48,7 @@ def picture_interleaved(
         Calibrated response to a neutral, in the order of `sensor.cfa.channels`: the white balance of pictures that are
         too dark for Gray World. The project's own curves under D65 by default.
     balance : (channel,) array_like, optional
-        Response to what shall come out neutral, such as a file's as-shot neutral, in place of Gray World's means. Or
+        Response to what should come out neutral, such as a file's as-shot neutral, in place of Gray World's means. Or
         both as one `WhiteBalance`.
     settings : Settings
         Of `isp.interleaved.reconstruct`.

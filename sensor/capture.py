@@ -33,7 +33,7 @@ def capture(
     With Dr.Jit on LLVM or CUDA all of it runs there: signal in single precision, shot noise as
     `sensor.kernel.poisson` says (exact under 30 e-, distribution function within 5e-6 above). Otherwise, and with
     `exact`, it is `read_out` of `expected_electrons` of `form_image`, NumPy's exact sampler. The raw image's `engine`
-    names what ran; the forms draw different frames of the same statistics, each always the same one for a seed.
+    names what ran. The two draw different frames with the same statistics; each draws the same frame for a seed.
 
     Parameters
     ----------

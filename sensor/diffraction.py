@@ -26,10 +26,10 @@ def diffraction_otf(frequency_per_um: Floats, wavelength_nm: float, lens: LensCo
 
 
 def defocus_otf(frequency_per_um: Floats, diameter_um: float) -> Floats:
-    """Transfer of an even disc, 2 J1(x) / x with x = pi x diameter x frequency; it goes under 0.
+    """Transfer of an even disc, 2 J1(x) / x with x = pi x diameter x frequency; negative in places.
 
     The geometric limit of Hopkins, "The frequency response of a defocused optical system" (Proc. R. Soc. A 231, 1955):
-    good where the disc is wider than the diffraction's, two wavelengths of path or more at the aperture's rim.
+    good where the disc is wider than the Airy disc, from two wavelengths of path or more at the aperture's rim.
     """
     x = np.pi * diameter_um * frequency_per_um
     return np.asarray(np.divide(2 * j1(x), x, out=np.ones_like(x), where=x > 1e-9))

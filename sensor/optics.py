@@ -1,4 +1,4 @@
-"""From scene radiance to irradiance on the sensor, and what that leaves out for a lens.
+"""From scene radiance to irradiance on the sensor, and what this leaves out of a lens.
 
 Where a lens spreads light the picture is transformed by cosines (DCT-II), which continue it as its own mirror image: no
 border darkens, and the sum of the light is kept to rounding. Bands are transformed in double precision, several at once
@@ -38,7 +38,7 @@ class SpectralIrradiance:
     Attributes
     ----------
     values : (h, w, band) floating
-        Band means [W m^-2 nm^-1], one pixel a sensor pixel.
+        Band means [W m^-2 nm^-1] at each sensor pixel.
     wavelength_nm : (band,) float64
     pitch_um : float
     width_nm : (band,) float64, optional
@@ -89,7 +89,7 @@ def falloff(lens: LensConfig, shape: tuple[int, int]) -> NDArray[np.float64]:
 
 
 def spreads(lens: LensConfig) -> bool:
-    """Whether light of one point reaches other pixels: a picture then can't be imaged in parts."""
+    """Whether the lens spreads a point's light over other pixels: a picture then can't be imaged in parts."""
     return lens.diffraction > 0 or lens.defocus_um > 0 or lens.veiling_glare > 0
 
 
@@ -99,8 +99,8 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     Parameters
     ----------
     radiance : SpectralRadiance
-        Box-filtered samples. One a pixel already holds the pixel's aperture, and the optical transfer function is all
-        that it lacks; detail finer than a pixel has aliased by then.
+        Box-filtered samples. One sample a pixel contains the pixel's aperture already and lacks the optical transfer
+        function alone; detail finer than a pixel has aliased by then.
     sensor : SensorConfig
         A term of its lens that is 0 costs nothing; `left_out` says what that leaves out.
     samples_per_pixel : int

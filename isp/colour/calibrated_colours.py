@@ -9,9 +9,9 @@ from sensor.calibration import ColourCalibration
 # Mean and mean product of the ColorChecker's 24 patches in linear sRGB under D65 (`scenes.reflectances`).
 MEAN_SRGB = np.array([0.3295, 0.2602, 0.2292])
 MOMENTS_SRGB = np.array([[0.1875, 0.1203, 0.0822], [0.1203, 0.1140, 0.0838], [0.0822, 0.0838, 0.0969]])
-# What three colours can't tell of W, as a share of white: our curve on the ColorChecker leaves 0.043 under D65,
-# 0.046 under F11 and 0.066 under A. Without it the fit would trust W where it has no noise.
-UNTOLD = 0.05
+# The part of W that three colours don't explain, as a share of white: our curve on the ColorChecker leaves 0.043 under
+# D65, 0.046 under F11 and 0.066 under A. Without it the fit would trust W where it has no noise.
+UNEXPLAINED = 0.05
 
 
 def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> ColourFit:
@@ -19,7 +19,7 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
 
     R, G and B answer to linear sRGB by the inverse of `colour.to_srgb`; any other channel by its row of the matrix from
     XYZ, under the one of A and D65 whose neutral is nearer to the exposure's. What a channel sees beyond three colours
-    is lost; `UNTOLD` stands for it.
+    is lost; `UNEXPLAINED` stands for it.
 
     Parameters
     ----------
@@ -37,6 +37,6 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
             stops = np.log2(np.maximum(neutral, 1e-9) / colour.neutral)
             found.append((np.abs(stops - stops[1]).max(), from_xyz @ to_xyz / neutral[:, None]))
         rows = np.vstack([rows, min(found, key=lambda pair: pair[0])[1][3:]])
-    untold = np.diag([0.0 if name in "RGB" else UNTOLD**2 for name in names])
+    unexplained = np.diag([0.0 if name in "RGB" else UNEXPLAINED**2 for name in names])
     cross = rows @ MOMENTS_SRGB
-    return ColourFit(channels=names, mean=rows @ MEAN_SRGB, moments=cross @ rows.T + untold, cross=cross)
+    return ColourFit(channels=names, mean=rows @ MEAN_SRGB, moments=cross @ rows.T + unexplained, cross=cross)

@@ -32,7 +32,7 @@ class WhiteBalance:
         Calibrated response to a neutral, in the order of `sensor.cfa.channels`, for pictures too dark for Gray World;
         None: the project's own curves under D65.
     given : (channel,) float64 or None
-        Response to what shall come out neutral, in place of Gray World's means.
+        Response to what should come out neutral, in place of Gray World's means.
     """
 
     neutral: Floats | None = None

@@ -55,7 +55,7 @@ def adams_planes(mosaic: Plane, cfa: Tile) -> Image:
 def luminance_plane(mosaic: Plane, cfa: Tile) -> Plane:
     """W everywhere, along the smaller gradient: first at the sites diagonal to W's, then at those beside them."""
     if not is_rgbw(cfa):
-        raise InputError(f"cfa: {cfa} is not 2x2 RGBW; allowed here: R, G, B and W once each; use another isp")
+        raise InputError(f"cfa: {cfa} is not 2x2 RGBW; allowed here: R, G, B and W once each; use another processor")
     padded = np.pad(mosaic, _PAD, mode="reflect")
     row, column = divmod("".join(cfa).index("W"), 2)
     opposite = mask(cfa, cfa[1 - row][1 - column], (padded.shape[0], padded.shape[1]))

@@ -17,7 +17,7 @@ Expose: TypeAlias = Callable[[float, float], NDArray[np.uint16]]
 
 
 def bench(sensor: SensorConfig, shape: tuple[int, int], seed: int, exact: bool = False) -> Expose:
-    """Put one chip under even light that is set in electrons: the quantum efficiency is 1 by construction.
+    """Put one chip under uniform light that is set in electrons: the quantum efficiency is 1 by construction.
 
     Its frames are drawn as `sensor.capture.expose` draws them.
     """

@@ -921,8 +921,8 @@ NONSENSE = (
     _fault(
         "window left open, untold",
         "sensor/response.py",
-        "LEAST_TOLD = 5e-3",
-        "LEAST_TOLD = 0.5",
+        "LEAST_WARNED = 5e-3",
+        "LEAST_WARNED = 0.5",
         "sensor/test_response_window",
     ),
     _fault(

@@ -76,6 +76,6 @@ def test_a_mosaic_is_balanced_to_greens_unit_and_held_beside_a_full_colour() -> 
 
 def test_other_tiles_are_refused() -> None:
     with pytest.raises(
-        InputError, match=r"^raw: mosaic \('RG', 'BW'\) is not Bayer; allowed here: .*; use another isp"
+        InputError, match=r"^raw: mosaic \('RG', 'BW'\) is not Bayer; allowed here: .*; use another processor"
     ):
         malvar(np.zeros((8, 8)), ("RG", "BW"))

@@ -90,5 +90,5 @@ def test_the_smaller_gradient_wins_on_a_diagonal() -> None:
 
 
 def test_other_tiles_are_refused() -> None:
-    with pytest.raises(InputError, match=r"^cfa: .* is not 2x2 RGBW; allowed here: .*; use another isp"):
+    with pytest.raises(InputError, match=r"^cfa: .* is not 2x2 RGBW; allowed here: .*; use another processor"):
         luminance_plane(np.zeros((8, 8)), ("WGWR", "GWRW", "WBWG", "BWGW"))
