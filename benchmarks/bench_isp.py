@@ -31,7 +31,7 @@ from skimage.restoration import denoise_nl_means
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.settings import Settings
 from rodcone.jit import backend
-from sensor.cfa import RGBW, letter_map
+from sensor.cfa import RGBW, channel_map
 from sensor.raw import RawImage
 
 SIZE = 1024
@@ -47,7 +47,7 @@ def frame(mean_w_e: float, saturated_disc: float = 0.0, size: int = SIZE, height
     y, x = np.indices(shape, dtype=np.float32)
     base = 1.0 + 0.5 * np.sin(x / 37.0) * np.cos(y / 23.0) + 0.4 * ((x // 24 + y // 40) % 2)
     base[(x - size / 2) ** 2 + (y - shape[0] / 2) ** 2 < saturated_disc * base.size / np.pi] = 1e4
-    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(letter_map(RGBW, (2, 2)))
+    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(channel_map(RGBW, (2, 2)))
     response = np.tile(response, (-(-shape[0] // 2), -(-shape[1] // 2)))[: shape[0], : shape[1]]
     electrons = np.minimum(rng.poisson(mean_w_e * base * response), FULL_E)
     dn = np.round(electrons + rng.normal(BLACK, READ_NOISE_E, shape))

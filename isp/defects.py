@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from sensor.cfa import letter_map
+from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
 _RINGS = 3  # tiles around a pixel that are searched for its channel before the whole frame's median serves
@@ -22,7 +22,7 @@ def mend(raw: RawImage) -> RawImage:
         return raw
     sound = np.ones(raw.shape, dtype=np.bool_)
     sound[tuple(raw.defects.T)] = False
-    names = letter_map(raw.cfa, raw.shape)
+    names = channel_map(raw.cfa, raw.shape)
 
     def sound_dn(window: tuple[slice, ...], name: str) -> NDArray[np.uint16]:
         return np.asarray(raw.dn[window][sound[window] & (names[window] == name)])

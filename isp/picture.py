@@ -100,18 +100,18 @@ def finish(
         Of `isp.interleaved.reconstruct_with_noise`: with a `ColourFit` as `matrix`, colours that know this noise.
     """
     colours = ColourFit.of(matrix)
-    gains = WhiteBalance.of(raw, neutral, balance).gains(raw, planes)
+    gains, sources = WhiteBalance.of(raw, neutral, balance).gains(raw, planes)
     noise = np.zeros(3)
     if noise_gain is not None:
-        noise = relative_noise(raw, planes, noise_gain, gains.factors, colours)
-    rgb = clip_highlights(raw, planes * gains.factors) @ colours.matrix(noise=noise * COLOUR_ERROR).T
-    return Picture(rgb, gains.sources, engine)
+        noise = relative_noise(raw, planes, noise_gain, gains, colours)
+    rgb = clip_highlights(raw, planes * gains) @ colours.matrix(noise=noise * COLOUR_ERROR).T
+    return Picture(rgb, sources, engine)
 
 
-def require_letters(raw: RawImage, letters: tuple[str, ...]) -> tuple[str, ...]:
+def require_letters(raw: RawImage, names: tuple[str, ...]) -> tuple[str, ...]:
     """Return the mosaic's channels, or raise `InputError` where they are others."""
-    if channels(raw.cfa) != letters:
+    if channels(raw.cfa) != names:
         raise InputError(
-            f"raw: mosaic {raw.cfa} holds {channels(raw.cfa)}; allowed here: {letters}; use the other camera's pipeline"
+            f"raw: mosaic {raw.cfa} holds {channels(raw.cfa)}; allowed here: {names}; use the other camera's pipeline"
         )
-    return letters
+    return names

@@ -46,7 +46,7 @@ def picture_interleaved(
         Calibrated response to a neutral, in the order of `sensor.cfa.channels`: the white balance of pictures that are
         too dark for Gray World. The project's own curves under D65 by default.
     balance : (channel,) array_like, optional
-        Response to what shall come out neutral, such as a file's as-shot neutral, in place of Gray World's means. Or
+        Response to what should come out neutral, such as a file's as-shot neutral, in place of Gray World's means. Or
         both as one `WhiteBalance`.
     settings : Settings
         Of `isp.interleaved.reconstruct`.
@@ -71,9 +71,9 @@ def picture_interleaved(
 
     result = reconstruct_with_noise(raw, settings)
     planes = np.asarray(result.estimate, dtype=np.float64)
-    gains = white_balance.gains(raw, planes)
-    noise = relative_noise(raw, planes, result.noise_gain, gains.factors, colours)
-    balanced = clip_highlights(raw, planes * gains.factors)
+    gains, sources = white_balance.gains(raw, planes)
+    noise = relative_noise(raw, planes, result.noise_gain, gains, colours)
+    balanced = clip_highlights(raw, planes * gains)
 
     snr = green_snr(raw, planes)
     weight = substitution_weight(snr, substitution_snr, octaves)
@@ -81,7 +81,7 @@ def picture_interleaved(
     alpha = saturated_fraction(raw)[..., None]
     rgb = (1.0 - alpha) * (balanced @ matrix_with_white(colours, noise, weight).T)
     rgb += alpha * (balanced[..., :3] @ colours.matrix("RGB", noise[:3] * COLOUR_ERROR).T)
-    return Picture(rgb, gains.sources, engine=result.engine, snr=snr, substitution=weight)
+    return Picture(rgb, sources, engine=result.engine, snr=snr, substitution=weight)
 
 
 def picture_bayer(

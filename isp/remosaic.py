@@ -7,9 +7,8 @@ import numpy as np
 from isp.defects import mend
 from isp.interleaved import reconstruct
 from rodcone.errors import InputError
-from sensor.cfa import Tile, channels, mask
+from sensor.cfa import Tile, channels, is_rgbw, mask
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_rgbw
 
 
 def bayer_tile(tile: Tile) -> Tile:

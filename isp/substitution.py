@@ -45,12 +45,12 @@ def green_snr(raw: RawImage, estimate: NDArray[np.floating]) -> float:
 
 
 def substitution_weight(snr: float, threshold: float, octaves: float = OCTAVES) -> float:
-    """How far W takes the luminance over, 0 to 1: smoothstep in log2(snr / threshold); over 0.5 counts as on.
+    """Share of W in the luminance, 0 to 1: smoothstep in log2(snr / threshold); over 0.5 counts as on.
 
     Parameters
     ----------
     snr : float
-        Of `green_snr`; NaN (all saturated) gives 0, none or less than none gives 1.
+        Of `green_snr`; NaN (all saturated) gives 0; no signal, 0 or less, gives 1.
     threshold : float
         SNR at a weight of one half; 0 never substitutes, inf always does.
     octaves : float

@@ -41,9 +41,31 @@ def cornell_box(light: str | None = None) -> Scene:
     light : str, optional
         Illuminant of the lamp; by default the measured lamp's, a warm one (400-700 nm: 0, 8, 15.6, 18.4).
     """
-    view = camera(float(CAMERA_FOV_DEG), (0.278, 0.273, -0.8), (0.278, 0.273, 0.0))
-    geometry: Node = {"type": "scene", "sensor": view, **_walls(), **_blocks(), "lamp": _lamp()}
-    spectrum = illuminant(light) if light else lamp_spectrum()
+    white = matte(paint("white"))
+    x, y, z = WIDTH_M / 2, HEIGHT_M / 2, DEPTH_M / 2
+    left = look_at((WIDTH_M, y, z), (0, y, z))  # the picture's left: x grows to the left of a camera that looks at +z
+    right = look_at((0, y, z), (WIDTH_M, y, z))
+    down = rotate((1, 0, 0), 90)
+    # Middle, turn and mean edge of the blocks' published corners.
+    short = translate(0.1855, 0, 0.169) @ rotate((0, 1, 0), -16.6)
+    tall = translate(0.3685, 0, 0.35125) @ rotate((0, 1, 0), 17.2)
+    lamp = translate(0.278, HEIGHT_M - 0.0005, 0.2795) @ down
+    geometry: Node = {
+        "type": "scene",
+        "sensor": camera(float(CAMERA_FOV_DEG), (0.278, 0.273, -0.8), (0.278, 0.273, 0.0)),
+        "floor": panel(floor(x, 0, z), WIDTH_M, DEPTH_M, white),
+        "ceiling": panel(translate(x, HEIGHT_M, z) @ down, WIDTH_M, DEPTH_M, white),
+        "back": panel(look_at((x, y, DEPTH_M), (x, y, 0)), WIDTH_M, HEIGHT_M, white),
+        "left": panel(left, DEPTH_M, HEIGHT_M, matte(paint("red"))),
+        "right": panel(right, DEPTH_M, HEIGHT_M, matte(paint("green"))),
+        "meter_card": panel(floor(x, 0.0002, 0.06), 0.10, 0.06, white),
+        "short": block(short, 0.1650, 0.165, 0.1673, white),
+        "tall": block(tall, 0.1655, 0.330, 0.1675, white),
+        "lamp": panel(lamp, 0.130, 0.105, white, emitter={"type": "area"}),
+    }
+    # Measured emission of the box's lamp, held beyond 700 nm.
+    measured = Spectrum(np.array([400.0, 500, 600, 700, 780]), np.array([0.0, 8.0, 15.6, 18.4, 18.4]))
+    spectrum = illuminant(light) if light else unit_luminance(measured)
     groups = {"lamp": LightGroup(("lamp/emitter",), spectrum, LAMP_LUMINANCE_CD_M2)}
     return Scene("cornell_box", geometry, groups, reference_plane="meter_card")
 
@@ -52,38 +74,3 @@ def paint(colour: str) -> Spectrum:
     """Measured reflectance of the box's ``white``, ``green`` or ``red``, its ends held outside 400-700 nm."""
     values = np.array(_PAINTS[colour].split(), dtype=np.float64) / 1000
     return resampled(np.arange(400.0, 701.0, 4.0), values)
-
-
-def lamp_spectrum() -> Spectrum:
-    """Measured emission of the box's lamp, scaled to 1 cd/m^2; held beyond 700 nm."""
-    return unit_luminance(Spectrum(np.array([400.0, 500, 600, 700, 780]), np.array([0.0, 8.0, 15.6, 18.4, 18.4])))
-
-
-def _walls() -> dict[str, Node]:
-    white, middle = matte(paint("white")), (WIDTH_M / 2, HEIGHT_M / 2, DEPTH_M / 2)
-    x, y, z = middle
-    left = look_at((WIDTH_M, y, z), (0, y, z))  # the picture's left: x grows to the left of a camera that looks at +z
-    right = look_at((0, y, z), (WIDTH_M, y, z))
-    ceiling = translate(x, HEIGHT_M, z) @ rotate((1, 0, 0), 90)
-    return {
-        "floor": panel(floor(x, 0, z), WIDTH_M, DEPTH_M, white),
-        "ceiling": panel(ceiling, WIDTH_M, DEPTH_M, white),
-        "back": panel(look_at((x, y, DEPTH_M), (x, y, 0)), WIDTH_M, HEIGHT_M, white),
-        "left": panel(left, DEPTH_M, HEIGHT_M, matte(paint("red"))),
-        "right": panel(right, DEPTH_M, HEIGHT_M, matte(paint("green"))),
-        "meter_card": panel(floor(x, 0.0002, 0.06), 0.10, 0.06, white),
-    }
-
-
-def _blocks() -> dict[str, Node]:
-    """Middle, turn and mean edge of the published corners."""
-    white = matte(paint("white"))
-    return {
-        "short": block(translate(0.1855, 0, 0.169) @ rotate((0, 1, 0), -16.6), 0.1650, 0.165, 0.1673, white),
-        "tall": block(translate(0.3685, 0, 0.35125) @ rotate((0, 1, 0), 17.2), 0.1655, 0.330, 0.1675, white),
-    }
-
-
-def _lamp() -> Node:
-    pose = translate(0.278, HEIGHT_M - 0.0005, 0.2795) @ rotate((1, 0, 0), 90)
-    return panel(pose, 0.130, 0.105, matte(paint("white")), emitter={"type": "area"})

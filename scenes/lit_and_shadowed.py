@@ -38,8 +38,7 @@ def lit_and_shadowed(dark_cd_m2: float = DARK_CD_M2, lit_cd_m2: float = LIT_CD_M
     geometry: Node = {"type": "scene", "sensor": camera(26.0, (0, 0.58, 2.55), (0, 0.58, 0))}
     for side, sign in (("left", -1), ("right", 1)):
         middle = translate(sign * (WIDTH_M + BOARD_M) / 2, 0, 0)
-        nodes = _boards(middle) | _upper(middle) | _lower(middle)
-        geometry |= {f"{side}_{key}": node for key, node in nodes.items()}
+        geometry |= {f"{side}_{key}": node for key, node in _half(middle).items()}
     groups = {
         "night": LightGroup(_lamps("left"), illuminant("moonlight"), dark_cd_m2 / NIGHT_HALF_PER_LAMP),
         "lamp": LightGroup(_lamps("right"), illuminant("LED-B3"), lit_cd_m2 / LAMP_HALF_PER_LAMP),
@@ -51,8 +50,9 @@ def _lamps(side: str) -> tuple[str, ...]:
     return tuple(f"{side}_{where}_lamp/emitter" for where in ("upper", "lower"))
 
 
-def _boards(middle: Floats) -> dict[str, Node]:
-    """Carcass and shelf, and below the top and below the shelf a lamp behind a black lip."""
+def _half(middle: Floats) -> dict[str, Node]:
+    """One half of the cabinet and what stands in it; `middle` is the middle of its bottom's front edge."""
+    # carcass and shelf, and below the top and below the shelf a lamp behind a black lip
     oak, side = matte(OAK), (WIDTH_M + BOARD_M) / 2
     across, z = WIDTH_M + 2 * BOARD_M, -DEPTH_M / 2
     nodes = {
@@ -68,11 +68,8 @@ def _boards(middle: Floats) -> dict[str, Node]:
         lamp = middle @ translate(0, y - 0.004, front - 0.07) @ rotate((1, 0, 0), 90)
         nodes[f"{where}_lamp"] = panel(lamp, 0.44, 0.06, matte(BLACK), emitter={"type": "area"})
         nodes[f"{where}_lip"] = block(middle @ translate(0, y - 0.05, front), WIDTH_M, 0.05, 0.012, matte(BLACK))
-    return nodes
 
-
-def _upper(middle: Floats) -> dict[str, Node]:
-    """On the shelf: colour chart, star, books, a copper mug and a gilt ball."""
+    # on the shelf: colour chart, star, books, a copper mug and a gilt ball
     books = (
         (0.125, 0.25, edge(605, 16, 0.05, 0.50)),
         (0.160, 0.22, band(465, 38, 0.05, 0.45)),
@@ -81,7 +78,7 @@ def _upper(middle: Floats) -> dict[str, Node]:
     )
     on_shelf = middle @ translate(0, SHELF_M, 0)
     card = on_shelf @ translate(-0.10, 0.115, -0.36) @ rotate((1, 0, 0), -10)
-    return {
+    nodes |= {
         **color_checker_nodes(card),
         "star": star(middle @ translate(-0.10, 0.90, -0.4395), 0.13, BLACK, WHITE, 36),
         **{
@@ -92,21 +89,16 @@ def _upper(middle: Floats) -> dict[str, Node]:
         "gilt_ball": _ball(on_shelf, (-0.215, 0.04, -0.25), 0.04, metal("Au", 0.2)),
     }
 
-
-def _lower(middle: Floats) -> dict[str, Node]:
-    """On the bottom: fruit on a checked cloth, a blue box with a steel ball, a terracotta pot."""
+    # on the bottom: fruit on a checked cloth, a blue box with a steel ball, a terracotta pot
     orange = glossy(edge(575, 14, 0.05, 0.72), 0.2)
-    fruit = {
+    box = matte(band(465, 38, 0.06, 0.55))
+    cloth = checks(edge(600, 12, 0.06, 0.60), WHITE, 16, 15)
+    return nodes | {
         "orange0": _ball(middle, (-0.19, 0.047, -0.19), 0.045, orange),
         "orange1": _ball(middle, (-0.10, 0.047, -0.22), 0.045, orange),
         "orange2": _ball(middle, (-0.145, 0.118, -0.205), 0.043, orange),
         "lime": _ball(middle, (-0.07, 0.036, -0.12), 0.034, glossy(band(548, 30, 0.04, 0.45), 0.15)),
         "plum": _ball(middle, (-0.17, 0.034, -0.10), 0.032, glossy(band(440, 36, 0.04, 0.25), 0.12)),
-    }
-    box = matte(band(465, 38, 0.06, 0.55))
-    cloth = checks(edge(600, 12, 0.06, 0.60), WHITE, 16, 15)
-    return {
-        **fruit,
         "cloth": panel(middle @ floor(-0.11, 0.002, -0.18), 0.32, 0.30, cloth),
         "box": block(middle @ translate(0.14, 0.0005, -0.22) @ rotate((0, 1, 0), 22), 0.17, 0.15, 0.14, box),
         "steel_ball": _ball(middle, (0.14, 0.1955, -0.22), 0.045, metal("Al", 0.25)),

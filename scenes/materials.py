@@ -58,7 +58,7 @@ def panel(pose: Floats, width_m: float, height_m: float, bsdf: Node, **more: Nod
 
 
 def floor(x: float, y: float, z: float) -> Floats:
-    """Place that faces up (+y) at a point."""
+    """Pose at a point that faces up (+y)."""
     return translate(x, y, z) @ rotate((1, 0, 0), -90)
 
 

@@ -27,10 +27,19 @@ DARK = grey(0.03)
 def night_street() -> Scene:
     """Street 5 m wide between house fronts; light groups ``moon``, ``sodium``, ``led`` and ``window``, all in view."""
     left, right = rotate((0, 1, 0), 90), rotate((0, 1, 0), -90)
+    line, kerb = matte(grey(0.50)), matte(KERB)
+    height, bearing = radians(MOON_HEIGHT_DEG), radians(MOON_BEARING_DEG)
+    to_moon = (sin(bearing) * cos(height), sin(height), -cos(bearing) * cos(height))
     geometry: Node = {
         "type": "scene",
         "sensor": camera(58.0, (-0.5, 1.65, 9.0), (0.1, 3.3, -9.0)),
-        **_ground(),
+        # asphalt, pavements 1.5 m wide behind kerbs 0.12 m high, a broken white line, a garden wall at the end
+        "asphalt": panel(floor(0, 0, -20), 60.0, 80.0, matte(ASPHALT)),
+        **{f"pavement{i}": block(translate(x, 0, -10), 1.6, 0.12, 44.0, kerb) for i, x in enumerate((-3.3, 3.3))},
+        **{f"mark{i}": panel(floor(0, 0.002, 5.0 - 4.5 * i), 0.12, 2.5, line) for i in range(6)},
+        "garden_wall": block(translate(3.6, 0, -25), 5.4, 1.8, 0.3, matte(edge(592, 20, 0.08, 0.30))),
+        "meter_card": panel(floor(-1.0, 0.001, -3.0), 0.6, 0.6, matte(ASPHALT)),
+        # houses, lamps, a car
         **_house("left0", translate(-4, 0, -2) @ left, 8.2, edge(480, 60, 0.34, 0.52)),
         **_house("left1", translate(-4, 0, -14) @ left, 9.0, edge(560, 45, 0.18, 0.50)),
         **_house("right0", translate(4, 0, -2) @ right, 8.8, edge(592, 20, 0.08, 0.30)),
@@ -39,7 +48,7 @@ def night_street() -> Scene:
         **_lamp("sodium", -2.75, -3.0, 1),
         **_lamp("led", 2.75, -11.0, -1),
         **_car(translate(1.45, 0, -1.5)),
-        "moon": _moon(),
+        "moon": far_disk(to_moon, MOON_DISTANCE_M, MOON_RADIUS_DEG),
     }
     geometry["right0_pane01"] |= {"emitter": {"type": "area"}}
     opening_m2 = OPENING_M[0] * OPENING_M[1]
@@ -50,28 +59,6 @@ def night_street() -> Scene:
         "window": LightGroup(("right0_pane01/emitter",), illuminant("3000K"), WINDOW_CD_M2),
     }
     return Scene("night_street", geometry, groups, reference_plane="meter_card")
-
-
-def _moon() -> Node:
-    height, bearing = radians(MOON_HEIGHT_DEG), radians(MOON_BEARING_DEG)
-    towards = (sin(bearing) * cos(height), sin(height), -cos(bearing) * cos(height))
-    return far_disk(towards, MOON_DISTANCE_M, MOON_RADIUS_DEG)
-
-
-def _ground() -> dict[str, Node]:
-    """Asphalt, pavements 1.5 m wide behind kerbs 0.12 m high, a broken white line, a garden wall at the end."""
-    line = matte(grey(0.50))
-    marks = {f"mark{i}": panel(floor(0, 0.002, 5.0 - 4.5 * i), 0.12, 2.5, line) for i in range(6)}
-    sides = {
-        f"pavement{i}": block(translate(x, 0, -10), 1.6, 0.12, 44.0, matte(KERB)) for i, x in enumerate((-3.3, 3.3))
-    }
-    return {
-        "asphalt": panel(floor(0, 0, -20), 60.0, 80.0, matte(ASPHALT)),
-        **sides,
-        **marks,
-        "garden_wall": block(translate(3.6, 0, -25), 5.4, 1.8, 0.3, matte(edge(592, 20, 0.08, 0.30))),
-        "meter_card": panel(floor(-1.0, 0.001, -3.0), 0.6, 0.6, matte(ASPHALT)),
-    }
 
 
 def _house(name: str, pose: Floats, height: float, front: Spectrum) -> dict[str, Node]:
@@ -111,7 +98,8 @@ def _lamp(name: str, x: float, z: float, towards: int) -> dict[str, Node]:
 
 def _car(pose: Floats) -> dict[str, Node]:
     """Parked car 4.1 m long, seen from behind: boxes, glazing, wheels, rear lamps, number plate."""
-    paint, glazing, tyre = glossy(band(460, 40, 0.03, 0.30), 0.1), glossy(DARK, 0.08), matte(DARK)
+    paint = glossy(band(460, 40, 0.03, 0.30), 0.1)
+    glazing, tyre = glossy(DARK, 0.08), matte(DARK)
     nodes = {
         "body": block(pose @ translate(0, 0.30, 0), 1.72, 0.55, 4.10, paint),
         "cabin": block(pose @ translate(0, 0.85, 0.30), 1.46, 0.52, 2.30, glazing),

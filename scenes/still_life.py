@@ -24,24 +24,17 @@ def still_life(light: str = "D65") -> Scene:
     light : str
         Illuminant of the softbox, the only light (group ``softbox``).
     """
-    view = camera(26.0, (0.0, 0.52, 2.05), (0.0, 0.21, 0.0))
-    geometry: Node = {"type": "scene", "sensor": view, **_room(), **_things(), **_lights()}
-    groups = {"softbox": LightGroup(("softbox/emitter",), illuminant(light), LIGHT_LUMINANCE_CD_M2)}
-    return Scene("still_life", geometry, groups, reference_plane="meter_card")
-
-
-def _room() -> dict[str, Node]:
-    return {
+    card = translate(0.14, 0.150, -0.30) @ rotate((1, 0, 0), -8)
+    softbox = look_at((-1.5, 1.75, 1.35), (0.05, 0.15, -0.05))
+    geometry: Node = {
+        "type": "scene",
+        "sensor": camera(26.0, (0.0, 0.52, 2.05), (0.0, 0.21, 0.0)),
+        # table, wall and cloth
         "table": panel(floor(0, 0, 0.2), 3.0, 2.2, matte(grey(0.42))),
         "wall": panel(translate(0, 0.9, -0.55), 4.0, 2.4, matte(grey(0.38))),
         "meter_card": panel(floor(0.0, 0.001, 0.55), 0.16, 0.08, matte(grey(0.18))),
         "cloth": panel(floor(-0.28, 0.002, 0.30), 0.40, 0.34, checks(edge(590, 12, 0.10, 0.62), WHITE, 26, 22)),
-    }
-
-
-def _things() -> dict[str, Node]:
-    card = translate(0.14, 0.150, -0.30) @ rotate((1, 0, 0), -8)
-    return {
+        # things
         "orange": ball(-0.36, 0.062, 0.26, 0.060, glossy(edge(575, 14, 0.05, 0.72), 0.18)),
         "lime": ball(-0.23, 0.050, 0.36, 0.048, glossy(band(545, 32, 0.05, 0.52), 0.15)),
         "plum": ball(-0.20, 0.050, 0.20, 0.048, glossy(band(450, 36, 0.05, 0.34), 0.10)),
@@ -50,16 +43,15 @@ def _things() -> dict[str, Node]:
         "steel_rod": rod((0.335, 0.0, 0.02), (0.335, 0.36, 0.02), 0.018, metal("Al", 0.15)),
         "box": _box(0.30, 0.08, 0.26, 0.16, 0.16, 24, matte(band(465, 38, 0.06, 0.55))),
         "book": _box(0.29, 0.175, 0.26, 0.20, 0.03, 10, matte(edge(605, 16, 0.05, 0.55))),
+        # charts
         **color_checker_nodes(card),
         "star_back": panel(translate(-0.24, 0.19, -0.32), 0.34, 0.34, matte(WHITE)),
         **_star(-0.24, 0.19, -0.318, 0.155),
         **_combs(),
+        "softbox": panel(softbox, 1.7, 1.7, matte(BLACK), emitter={"type": "area"}),
     }
-
-
-def _lights() -> dict[str, Node]:
-    pose = look_at((-1.5, 1.75, 1.35), (0.05, 0.15, -0.05))
-    return {"softbox": panel(pose, 1.7, 1.7, matte(BLACK), emitter={"type": "area"})}
+    groups = {"softbox": LightGroup(("softbox/emitter",), illuminant(light), LIGHT_LUMINANCE_CD_M2)}
+    return Scene("still_life", geometry, groups, reference_plane="meter_card")
 
 
 def _box(x: float, y: float, z: float, width: float, height: float, turn: float, bsdf: Node) -> Node:

@@ -29,14 +29,33 @@ def still_life_outdoor() -> Scene:
 
     The glass stands in the shade of the crate: sunlight focused by glass on its way to a surface can't be sampled.
     """
+    height, bearing = radians(SUN_HEIGHT_DEG), radians(SUN_BEARING_DEG)
+    to_sun = (-sin(bearing) * cos(height), sin(height), cos(bearing) * cos(height))
+    blue, slat = matte(band(465, 34, 0.05, 0.42)), rotate((1, 0, 0), 35)
     geometry: Node = {
         "type": "scene",
         "sensor": camera(26.0, (0.10, 0.62, 2.05), (0.0, 0.17, 0.0)),
-        **_garden(),
-        **_table(),
+        # terrace, whitewashed wall and a blue shutter with slats
+        "terrace": panel(floor(0, -0.74, 3.0), 30.0, 30.0, matte(edge(560, 60, 0.20, 0.34))),
+        "wall": block(translate(0, -0.74, -0.62), 12.0, 3.2, 0.2, matte(edge(470, 40, 0.58, 0.72))),
+        **{
+            f"slat{i:02d}": block(translate(0.40, 0.03 + 0.034 * i, -0.49) @ slat, 0.30, 0.036, 0.006, blue)
+            for i in range(19)
+        },
+        **{f"frame{i}": block(translate(x, -0.05, -0.49), 0.035, 0.80, 0.04, blue) for i, x in enumerate((0.24, 0.56))},
+        # table and cloth
+        **{
+            f"plank{i}": block(
+                translate(0, -0.03, 0.50 - 0.142 * i), 1.7, 0.03, 0.139, matte(edge(590, 45, 0.06, high))
+            )
+            for i, high in enumerate(WOOD)
+        },
+        "cloth": panel(floor(0.13, 0.002, 0.33), 0.36, 0.42, checks(edge(600, 12, 0.06, 0.60), grey(0.80), 15, 17)),
+        "meter_card": panel(floor(-0.22, 0.0002, 0.50), 0.10, 0.06, matte(edge(590, 45, 0.06, WOOD[0]))),
         **_fruit(),
         **_vessels(),
-        "sun": _sun(),
+        # black-backed disk of the sun's angular radius, seen from the middle of the table
+        "sun": far_disk(to_sun, SUN_DISTANCE_M, SUN_RADIUS_DEG),
         "sky": {"type": "constant"},
     }
     groups = {
@@ -44,46 +63,6 @@ def still_life_outdoor() -> Scene:
         "sky": LightGroup(("sky",), illuminant(SKY_LIGHT), SKY_LUX / pi),
     }
     return Scene("still_life_outdoor", geometry, groups, reference_plane="meter_card")
-
-
-def _sun() -> Node:
-    """Black-backed disk of the sun's angular radius, seen from the middle of the table."""
-    height, bearing = radians(SUN_HEIGHT_DEG), radians(SUN_BEARING_DEG)
-    towards = (-sin(bearing) * cos(height), sin(height), cos(bearing) * cos(height))
-    return far_disk(towards, SUN_DISTANCE_M, SUN_RADIUS_DEG)
-
-
-def _garden() -> dict[str, Node]:
-    """Terrace, whitewashed wall and a blue shutter with slats."""
-    blue = matte(band(465, 34, 0.05, 0.42))
-    shutter = {
-        f"slat{i:02d}": block(
-            translate(0.40, 0.03 + 0.034 * i, -0.49) @ rotate((1, 0, 0), 35), 0.30, 0.036, 0.006, blue
-        )
-        for i in range(19)
-    }
-    frame = {
-        f"frame{i}": block(translate(x, -0.05, -0.49), 0.035, 0.80, 0.04, blue) for i, x in enumerate((0.24, 0.56))
-    }
-    return {
-        "terrace": panel(floor(0, -0.74, 3.0), 30.0, 30.0, matte(edge(560, 60, 0.20, 0.34))),
-        "wall": block(translate(0, -0.74, -0.62), 12.0, 3.2, 0.2, matte(edge(470, 40, 0.58, 0.72))),
-        **shutter,
-        **frame,
-    }
-
-
-def _table() -> dict[str, Node]:
-    planks = {
-        f"plank{i}": block(translate(0, -0.03, 0.50 - 0.142 * i), 1.7, 0.03, 0.139, matte(edge(590, 45, 0.06, high)))
-        for i, high in enumerate(WOOD)
-    }
-    cloth = checks(edge(600, 12, 0.06, 0.60), grey(0.80), 15, 17)
-    return {
-        **planks,
-        "cloth": panel(floor(0.13, 0.002, 0.33), 0.36, 0.42, cloth),
-        "meter_card": panel(floor(-0.22, 0.0002, 0.50), 0.10, 0.06, matte(edge(590, 45, 0.06, WOOD[0]))),
-    }
 
 
 def _fruit() -> dict[str, Node]:

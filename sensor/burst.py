@@ -93,7 +93,7 @@ def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merg
     groups = _grouped(frames)
     first = frames[0]
     temporal_e2 = first.read_noise_e**2 + first.gain_e_per_dn**2 / 12
-    full_e = (first.white_dn - first.black_dn) * first.gain_e_per_dn
+    full_e = first.full_well_e
     spread_e = (full_e + first.dark_noise_e**2 + (first.column_gain_spread * full_e) ** 2) ** 0.5
     clear_e = max(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)  # half, lest a well of a few electrons never count
 
@@ -109,7 +109,7 @@ def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merg
         full &= rate * groups[start].exposure_s >= clear_e
     photo_rate = rate - dark_current_e_per_s
     fixed = (first.dsnu_e * per_s) ** 2 + (first.prnu * photo_rate) ** 2
-    return Merged(photo_rate, variance, fixed, full)
+    return Merged(rate_e_per_s=photo_rate, temporal_variance=variance, fixed_variance=fixed, saturated=full)
 
 
 def _grouped(frames: Sequence[RawImage]) -> list[_Group]:

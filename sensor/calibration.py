@@ -1,7 +1,7 @@
 """A camera's colour calibration: what its maker measures once, and a raw file carries to whoever develops it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -54,13 +54,13 @@ class ColourCalibration:
     def part(self, index: Sequence[int]) -> "ColourCalibration":
         """Calibration of some of the channels; ``R, G, B`` have to stay in front."""
         kept = list(index)
-        return ColourCalibration(
-            self.neutral[kept],
-            self.to_srgb,
-            self.xyz_to_camera_a[kept],
-            self.xyz_to_camera_d65[kept],
-            self.camera_to_xyz_a[:, kept],
-            self.camera_to_xyz_d65[:, kept],
+        return replace(
+            self,
+            neutral=self.neutral[kept],
+            xyz_to_camera_a=self.xyz_to_camera_a[kept],
+            xyz_to_camera_d65=self.xyz_to_camera_d65[kept],
+            camera_to_xyz_a=self.camera_to_xyz_a[:, kept],
+            camera_to_xyz_d65=self.camera_to_xyz_d65[:, kept],
         )
 
 

@@ -7,15 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
-from rodcone.errors import InputError, require_range
+from rodcone.errors import InputError
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.kernel.kernel import expected_electrons_single, read_frame
-from sensor.optics import camera_equation, falloff, form_image, spreads
-from sensor.random import draw_key
+from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.raw import RawImage
-from sensor.readout import as_raw, check_expected, read_out
+from sensor.readout import read_out
 from sensor.response import electrons_per_irradiance, expected_electrons
 
 
@@ -34,7 +33,7 @@ def capture(
     With Dr.Jit on LLVM or CUDA all of it runs there: signal in single precision, shot noise as
     `sensor.kernel.poisson` says (exact under 30 e-, distribution function within 5e-6 above). Otherwise, and with
     `exact`, it is `read_out` of `expected_electrons` of `form_image`, NumPy's exact sampler. The raw image's `engine`
-    names what ran; the forms draw different frames of the same statistics, each always the same one for a seed.
+    names what ran. The two draw different frames with the same statistics; each draws the same frame for a seed.
 
     Parameters
     ----------
@@ -67,10 +66,7 @@ def capture(
         return capture_strips([radiance], sensor, exposure_s, device, rng, exact=exact)
     image = form_image(radiance, sensor, samples_per_pixel)
     _check_frame(image.values.shape[0], image.values.shape[1], device)
-    if _numpy_runs(exact):
-        return expose(expected_electrons(image, sensor, exposure_s), sensor, exposure_s, device, rng, exact=exact)
-    weights = electrons_per_irradiance(sensor, image.wavelength_nm, image.widths_nm, exposure_s)
-    return expose(expected_electrons_single(image.values, weights, sensor), sensor, exposure_s, device, rng)
+    return expose(_expected(image, sensor, exposure_s, exact), sensor, exposure_s, device, rng, exact=exact)
 
 
 def capture_strips(
@@ -105,14 +101,12 @@ def capture_strips(
         raise InputError(
             "lens: diffraction, defocus or veiling_glare reach beyond a strip; set them to 0 or use capture"
         )
-    in_numpy = _numpy_runs(exact)
-    expected_e = np.empty(device.shape, dtype=np.float64 if in_numpy else np.float32)
+    expected_e = np.empty(device.shape, dtype=np.float64 if _numpy_runs(exact) else np.float32)
     row = 0
     for strip in strips:
         if row + strip.shape[0] > device.shape[0] or strip.shape[1] != device.shape[1]:
             _check_frame(row + strip.shape[0], strip.shape[1], device)
-        behind = _expected_numpy if in_numpy else _expected_single
-        expected_e[row : row + strip.shape[0]] = behind(strip, sensor, exposure_s, row)
+        expected_e[row : row + strip.shape[0]] = _expected(strip, sensor, exposure_s, exact, row)
         row += strip.shape[0]
     _check_frame(row, device.shape[1], device)
     if sensor.lens.horizontal_view_deg:
@@ -148,11 +142,7 @@ def expose(
     """
     if _numpy_runs(exact):
         return read_out(expected_e, sensor, device, exposure_s, rng)
-    require_range("exposure_s", exposure_s, 0.0, 1e7, "give seconds, 0 or more")
-    check_expected(expected_e, device)
-    single = np.asarray(expected_e, dtype=np.float32)
-    dn = read_frame(single, sensor, device, exposure_s, draw_key(rng))
-    return as_raw(dn, sensor, exposure_s, engine=backend(), hot=device.hot)
+    return read_out(expected_e, sensor, device, exposure_s, rng, draw=read_frame, engine=backend())
 
 
 def _check_frame(height: int, width: int, device: Device) -> None:
@@ -167,20 +157,21 @@ def _numpy_runs(exact: bool) -> bool:
     return exact or backend() == "numpy"
 
 
-def _expected_single(
-    strip: SpectralRadiance, sensor: SensorConfig, exposure_s: float, first_row: int
-) -> NDArray[np.float32]:
-    """Expected electrons of a strip but for the lens's falloff; the camera equation goes into the weights."""
-    irradiance_per_radiance = camera_equation(sensor.lens)
-    weights = electrons_per_irradiance(sensor, strip.wavelength_nm, strip.widths_nm, exposure_s)
-    return expected_electrons_single(strip.values, weights * irradiance_per_radiance, sensor, first_row)
-
-
-def _expected_numpy(
-    strip: SpectralRadiance, sensor: SensorConfig, exposure_s: float, first_row: int
-) -> NDArray[np.float64]:
-    """As `_expected_single`, in NumPy: the strip starts with another row of the tile."""
-    turn = first_row % len(sensor.cfa)
-    lens = replace(sensor.lens, horizontal_view_deg=0.0)
-    turned = replace(sensor, cfa=sensor.cfa[turn:] + sensor.cfa[:turn], lens=lens)
-    return expected_electrons(form_image(strip, turned), turned, exposure_s)
+def _expected(
+    light: SpectralRadiance | SpectralIrradiance,
+    sensor: SensorConfig,
+    exposure_s: float,
+    exact: bool,
+    first_row: int = 0,
+) -> NDArray[np.floating]:
+    """Expected electrons of a frame or a strip of it, from irradiance, or from radiance but for the lens's falloff."""
+    if _numpy_runs(exact):
+        turn = first_row % len(sensor.cfa)  # the row of the tile that a strip starts with
+        lens = replace(sensor.lens, horizontal_view_deg=0.0)
+        turned = replace(sensor, cfa=sensor.cfa[turn:] + sensor.cfa[:turn], lens=lens)
+        irradiance = form_image(light, turned) if isinstance(light, SpectralRadiance) else light
+        return expected_electrons(irradiance, turned, exposure_s)
+    weights = electrons_per_irradiance(sensor, light.wavelength_nm, light.widths_nm, exposure_s)
+    if isinstance(light, SpectralRadiance):
+        weights = weights * camera_equation(sensor.lens)
+    return expected_electrons_single(light.values, weights, sensor, first_row)

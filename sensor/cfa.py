@@ -1,4 +1,4 @@
-"""Colour filter arrays: a tile of channels, each a letter, that repeats over the sensor."""
+"""Colour filter arrays: a tile of channels, one letter each, that repeats over the sensor."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -14,7 +14,7 @@ Tile: TypeAlias = tuple[str, ...]
 RGBW: Tile = ("RG", "BW")  # Parmar & Wandell 2009, Figure 2
 BAYER: Tile = ("RG", "GB")
 
-# Mosaics by name; any other tile of letters will do, with a response for each channel.
+# Mosaics by name; any other tile will do, with a response for each channel.
 MOSAICS: Mapping[str, Tile] = MappingProxyType(
     {
         "rgbw": RGBW,
@@ -44,7 +44,7 @@ def tile_of(mosaic: str | Sequence[str]) -> Tile:
     Raises
     ------
     InputError
-        For an unknown name, or rows that are no rectangle of letters.
+        For an unknown name, or rows that don't make a rectangle of letters.
     """
     if not isinstance(mosaic, str):
         return check_tile(mosaic)
@@ -69,7 +69,17 @@ def channels(tile: Tile) -> tuple[str, ...]:
     return tuple(name for name in "RGBW" if name in present) + tuple(name for name in present if name not in "RGBW")
 
 
-def letter_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
+def is_bayer(tile: Tile) -> bool:
+    """Whether a tile is one of Bayer's four phases: 2x2, green on a diagonal, red and blue once."""
+    return tile in (("RG", "GB"), ("BG", "GR"), ("GR", "BG"), ("GB", "RG"))
+
+
+def is_rgbw(tile: Tile) -> bool:
+    """Whether a tile is 2x2 with R, G, B and W once each."""
+    return len(tile) == 2 and len(tile[0]) == 2 and sorted("".join(tile)) == list("BGRW")
+
+
+def channel_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
     """Channel of each pixel, shape `shape`."""
     cells = np.array([list(row) for row in tile])
     repeats = (-(-shape[0] // cells.shape[0]), -(-shape[1] // cells.shape[1]))
@@ -78,7 +88,7 @@ def letter_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
 
 def mask(tile: Tile, channel: str, shape: tuple[int, int]) -> NDArray[np.bool_]:
     """Where the mosaic samples `channel`: S_i of eq. (1), shape `shape`."""
-    return np.asarray(letter_map(tile, shape) == channel)
+    return np.asarray(channel_map(tile, shape) == channel)
 
 
 def check_covers(tile: Tile, shape: tuple[int, ...]) -> None:

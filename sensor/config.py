@@ -170,7 +170,8 @@ class SensorConfig:
             require_whole("black_level_dn", self.black_level_dn, 0, self.white_dn - 1, "give DN under the white level")
         pair = self.window_nm if isinstance(self.window_nm, tuple | list) and len(self.window_nm) == 2 else (0, 0)
         if not (all(isinstance(nm, Real) for nm in pair) and SHORTEST_NM <= pair[0] < pair[1] <= LONGEST_NM):
-            raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give (shortest, longest) in 100-20000 nm")
+            raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give [shortest, longest] in 100-20000 nm")
+        object.__setattr__(self, "window_nm", (float(pair[0]), float(pair[1])))
         self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every channel needs a curve
 
     @property
@@ -192,8 +193,3 @@ class SensorConfig:
     def gain_e_per_dn(self) -> float:
         """Electrons per DN: the full well reads the converter's top."""
         return self.pixel.full_well_e / (self.white_dn - self.black_dn)
-
-    @property
-    def black_e(self) -> float:
-        """Black level in electrons."""
-        return self.black_dn * self.gain_e_per_dn

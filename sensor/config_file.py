@@ -57,8 +57,6 @@ def _sensor(content: Mapping[str, Any], folder: Path, cfa: Tile | None) -> Senso
     else:
         responses = rgbw() if set(channels(tile)) <= set("RGBW") else built_in()
     settings = {name: content[name] for name in _SETTINGS if name in content}
-    if "window_nm" in settings:
-        settings["window_nm"] = _pair("window_nm", settings["window_nm"])
     return SensorConfig(
         PixelConfig(**_numbers("pixel", content, PixelConfig)),
         LensConfig(**_numbers("lens", content, LensConfig)),
@@ -88,12 +86,6 @@ def _numbers(name: str, content: Mapping[str, Any], kind: type) -> dict[str, Any
     return table
 
 
-def _pair(name: str, value: Any) -> tuple[float, float]:
-    if not (isinstance(value, list | tuple) and len(value) == 2 and all(isinstance(x, int | float) for x in value)):
-        raise InputError(f"{name}: {value!r} is not a pair of numbers; allowed: [shortest, longest] in nm; write so")
-    return float(value[0]), float(value[1])
-
-
 def _responses(table: Mapping[str, Any], folder: Path) -> Responses:
     """Responses of a CSV; what the file doesn't say about them is refused, not guessed."""
     require_keys("responses key", table, _RESPONSE_KEYS)
@@ -105,10 +97,13 @@ def _responses(table: Mapping[str, Any], folder: Path) -> Responses:
             )
     if not isinstance(table["csv"], str):
         raise InputError(f"csv: {table['csv']!r} is not a file's name; allowed: a name in quotes; write so")
+    pair = table["range_nm"]
+    if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(nm, int | float) for nm in pair)):
+        raise InputError(f"range_nm: {pair!r} is not a pair of numbers; allowed: [shortest, longest] in nm; write so")
     efficiency = None if table["quantum_efficiency"] == "included" else table["quantum_efficiency"]
     return read_csv(
         folder / table["csv"],
-        range_nm=_pair("range_nm", table["range_nm"]),
+        range_nm=(float(pair[0]), float(pair[1])),
         ir_cut=_number_or_curve("ir_cut", table.get("ir_cut"), folder),
         quantum_efficiency=_number_or_curve("quantum_efficiency", efficiency, folder),
     )

@@ -276,7 +276,7 @@ def _holds_quantum_efficiency(curves: Mapping[str, Spectrum]) -> str:
 
     Colour filters pass 0.8 or more at their peaks and clear ones the same everywhere, while front-lit silicon with its
     filters stays under 0.7, and a clear pixel (W, C) follows silicon's rise from blue to red (so do ISETCam's sensors).
-    Back-lit pixels without a clear one, whose R, G or B exceeds 0.7, pass for filters: nothing in the curves tells.
+    Back-lit pixels without a clear one, whose R, G or B exceeds 0.7, are taken for filters: no curve tells them apart.
     """
     most = max(float(curve.values.max()) for curve in curves.values())
     if most < 0.7:

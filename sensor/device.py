@@ -47,7 +47,8 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
         Where the shape doesn't hold a tile of the mosaic, or `rng` isn't a Generator.
     """
     check_covers(sensor.cfa, tuple(shape))
-    key, pixel, one_row = draw_key(rng), sensor.pixel, (1, shape[1])
+    key, one_row = draw_key(rng), (1, shape[1])
+    pixel = sensor.pixel
     response = np.maximum(1.0 + pixel.prnu * normals(key, NoiseTerm.PRNU, shape), 0.0)
     offset_e = pixel.dsnu_e * normals(key, NoiseTerm.DSNU, shape)
     column_gain = hot = None
@@ -57,4 +58,4 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
         column_gain = np.maximum(1.0 + pixel.column_gain_spread * normals(key, NoiseTerm.COLUMN_GAIN, one_row)[0], 0.0)
     if pixel.hot_pixel_share:
         hot = normals(key, NoiseTerm.HOT, shape) < ndtri(pixel.hot_pixel_share)
-    return Device(response, offset_e, column_gain, hot)
+    return Device(photo_response=response, dark_offset_e=offset_e, column_gain=column_gain, hot=hot)

@@ -1,27 +1,17 @@
-"""Light that a lens spreads: diffraction, defocus and veiling glare, band by band.
+"""Transfer functions of diffraction and defocus."""
 
-The picture is transformed by cosines (DCT-II), which continue it as its own mirror image: no border darkens, and
-the sum of the light is kept to rounding. Bands are transformed in double precision, several at once on threads.
-"""
-
-import os
-from concurrent.futures import ThreadPoolExecutor
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dctn, idctn
 from scipy.special import j1
 
-from render.radiance import SpectralRadiance
 from render.spectrum import Floats
 from sensor.config import LensConfig
 
-_BANDS_A_THREAD = 16  # a band at work takes as much memory as a dozen bands of float32
-
 
 def limit_per_um(wavelength_nm: float, lens: LensConfig) -> float:
-    """Frequency from which on diffraction lets nothing through: 1 / (wavelength x working f-number), inf without."""
+    """Cut-off frequency of diffraction: 1 / (wavelength x working f-number); inf where the lens has none."""
     spot_um = wavelength_nm * 1e-3 * lens.f_number * (1 + lens.magnification) * lens.diffraction
     return 1 / spot_um if spot_um else inf
 
@@ -36,10 +26,10 @@ def diffraction_otf(frequency_per_um: Floats, wavelength_nm: float, lens: LensCo
 
 
 def defocus_otf(frequency_per_um: Floats, diameter_um: float) -> Floats:
-    """Transfer of an even disc, 2 J1(x) / x with x = pi x diameter x frequency; it goes under 0.
+    """Transfer of an even disc, 2 J1(x) / x with x = pi x diameter x frequency; negative in places.
 
     The geometric limit of Hopkins, "The frequency response of a defocused optical system" (Proc. R. Soc. A 231, 1955):
-    good where the disc is wider than the diffraction's, two wavelengths of path or more at the aperture's rim.
+    good where the disc is wider than the Airy disc, from two wavelengths of path or more at the aperture's rim.
     """
     x = np.pi * diameter_um * frequency_per_um
     return np.asarray(np.divide(2 * j1(x), x, out=np.ones_like(x), where=x > 1e-9))
@@ -70,46 +60,3 @@ def sampled_otf(
         if nearest < limit < inf:
             total += lens_otf(np.hypot(rows[:, None] + down / step_um, columns + across / step_um))
     return total
-
-
-def spread_light(
-    radiance: SpectralRadiance, scale: NDArray[np.float64], lens: LensConfig, pitch_um: float, samples: int
-) -> NDArray[np.floating]:
-    """Irradiance behind the lens, shape (h / samples, w / samples, band), band-planar.
-
-    Parameters
-    ----------
-    radiance : SpectralRadiance
-        `samples` x `samples` values a pixel.
-    scale : (h, w) float64
-        Irradiance over radiance of each sample before light spreads.
-    lens : LensConfig
-    pitch_um : float
-        Of the pixels.
-    samples : int
-    """
-    height, width = (size // samples for size in radiance.shape)
-    planes = np.empty((radiance.wavelength_nm.size, height, width), dtype=radiance.values.dtype)
-
-    def one_band(band: int) -> None:
-        light = radiance.values[..., band] * scale
-        if lens.diffraction or lens.defocus_um:
-            nm, step_um = float(radiance.wavelength_nm[band]), pitch_um / samples
-            spectrum = dctn(light, type=2)
-            spectrum *= sampled_otf(radiance.shape, step_um, nm, lens, folded=samples > 1)
-            light = idctn(spectrum, type=2, overwrite_x=True)
-            light = light if radiance.signed else _without_undershoot(light)
-        light = light.reshape(height, samples, width, samples).mean(axis=(1, 3))
-        planes[band] = (1 - lens.veiling_glare) * light + lens.veiling_glare * light.mean()
-
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, 1 + len(planes) // _BANDS_A_THREAD)) as threads:
-        list(threads.map(one_band, range(len(planes))))
-    return np.moveaxis(planes, 0, -1)
-
-
-def _without_undershoot(light: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Light with its negative values set to 0, and scaled to the same sum."""
-    if light.min() >= 0:
-        return light
-    total, kept = light.sum(), np.maximum(light, 0.0)
-    return np.asarray(kept * (total / kept.sum() if total > 0 else 0.0))

@@ -1,5 +1,12 @@
-"""From scene radiance to irradiance on the sensor, and what that leaves out for a lens."""
+"""From scene radiance to irradiance on the sensor, and what this leaves out of a lens.
 
+Where a lens spreads light the picture is transformed by cosines (DCT-II), which continue it as its own mirror image: no
+border darkens, and the sum of the light is kept to rounding. Bands are transformed in double precision, several at once
+on threads.
+"""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import pi, radians, tan
 
@@ -12,7 +19,7 @@ from render.radiance import SpectralRadiance, check_values
 from render.spectrum import Floats, band_widths
 from rodcone.errors import InputError, require_whole
 from sensor.config import LensConfig, SensorConfig
-from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf, spread_light
+from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf
 
 # For the costs that `left_out` states.
 WAVELENGTH_NM = 550.0
@@ -20,6 +27,7 @@ VIEW_DEG = 40.0  # angle of view for the falloff
 DIAGONAL = 1.25  # over the width of a picture of 4:3
 APERTURE_AT_NYQUIST = 2 / pi  # transfer of a square pixel there, sin(pi / 2) / (pi / 2)
 AIRY_DIAMETER = 2.44  # of the first dark ring, in wavelengths x f-number
+_BANDS_A_THREAD = 16  # a band at work takes as much memory as a dozen bands of float32
 _LEAST_SHARE = 5e-4  # of a point's light: a smaller share in the negative lobes isn't stated
 
 
@@ -30,7 +38,7 @@ class SpectralIrradiance:
     Attributes
     ----------
     values : (h, w, band) floating
-        Band means [W m^-2 nm^-1], one pixel a sensor pixel.
+        Band means [W m^-2 nm^-1] at each sensor pixel.
     wavelength_nm : (band,) float64
     pitch_um : float
     width_nm : (band,) float64, optional
@@ -81,7 +89,7 @@ def falloff(lens: LensConfig, shape: tuple[int, int]) -> NDArray[np.float64]:
 
 
 def spreads(lens: LensConfig) -> bool:
-    """Whether light of one point reaches other pixels: a picture then can't be imaged in parts."""
+    """Whether the lens spreads a point's light over other pixels: a picture then can't be imaged in parts."""
     return lens.diffraction > 0 or lens.defocus_um > 0 or lens.veiling_glare > 0
 
 
@@ -91,8 +99,8 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     Parameters
     ----------
     radiance : SpectralRadiance
-        Box-filtered samples. One a pixel already holds the pixel's aperture, and the optical transfer function is all
-        that it lacks; detail finer than a pixel has aliased by then.
+        Box-filtered samples. One sample a pixel contains the pixel's aperture already and lacks the optical transfer
+        function alone; detail finer than a pixel has aliased by then.
     sensor : SensorConfig
         A term of its lens that is 0 costs nothing; `left_out` says what that leaves out.
     samples_per_pixel : int
@@ -120,11 +128,39 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
         if lens.horizontal_view_deg:
             values *= falloff(lens, radiance.shape)[..., None].astype(values.dtype)
     else:
-        plane = camera_equation(lens) * falloff(lens, radiance.shape)
-        values = spread_light(radiance, plane, lens, sensor.pixel.pitch_um, samples)
+        values = spread_light(radiance, sensor, samples)
     return SpectralIrradiance(
-        values, radiance.wavelength_nm, sensor.pixel.pitch_um, radiance.widths_nm, radiance.signed
+        values=values,
+        wavelength_nm=radiance.wavelength_nm,
+        pitch_um=sensor.pixel.pitch_um,
+        width_nm=radiance.widths_nm,
+        signed=radiance.signed,
     )
+
+
+def spread_light(radiance: SpectralRadiance, sensor: SensorConfig, samples: int) -> NDArray[np.floating]:
+    """Irradiance behind a lens that spreads light, shape (h / samples, w / samples, band), band-planar."""
+    lens = sensor.lens
+    per_radiance = camera_equation(lens) * falloff(lens, radiance.shape)
+    height, width = (size // samples for size in radiance.shape)
+    planes = np.empty((radiance.wavelength_nm.size, height, width), dtype=radiance.values.dtype)
+
+    def one_band(band: int) -> None:
+        light = radiance.values[..., band] * per_radiance
+        if lens.diffraction or lens.defocus_um:
+            nm, step_um = float(radiance.wavelength_nm[band]), sensor.pixel.pitch_um / samples
+            spectrum = dctn(light, type=2)
+            spectrum *= sampled_otf(radiance.shape, step_um, nm, lens, folded=samples > 1)
+            light = idctn(spectrum, type=2, overwrite_x=True)
+            if light.min() < 0 and not radiance.signed:  # undershoot becomes 0, the sum of the light stays
+                total, kept = light.sum(), np.maximum(light, 0.0)
+                light = kept * (total / kept.sum() if total > 0 else 0.0)
+        light = light.reshape(height, samples, width, samples).mean(axis=(1, 3))
+        planes[band] = (1 - lens.veiling_glare) * light + lens.veiling_glare * light.mean()
+
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, 1 + len(planes) // _BANDS_A_THREAD)) as threads:
+        list(threads.map(one_band, range(len(planes))))
+    return np.moveaxis(planes, 0, -1)
 
 
 def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...]:

@@ -61,15 +61,14 @@ def normals(key: int, term: NoiseTerm, shape: tuple[int, int]) -> NDArray[np.flo
     rows_at_once = max(1, _PIXELS_AT_ONCE // max(1, shape[1]))
     for first in range(0, shape[0], rows_at_once):
         rows = np.arange(first, min(first + rows_at_once, shape[0]), dtype=np.uint64)[:, None]
-        draws[first : first + rows_at_once] = _box_muller(philox((columns, rows, terms, zeros), key))
+        words = philox((columns, rows, terms, zeros), key)
+        radius, turn = (
+            (((a << np.uint64(32)) | b) >> np.uint64(11)).astype(np.float64) * 2.0**-53
+            for a, b in (words[:2], words[2:])
+        )
+        normal = np.sqrt(-2.0 * np.log1p(-radius)) * np.cos(2.0 * np.pi * turn)
+        draws[first : first + rows_at_once] = normal
     return draws
-
-
-def _box_muller(words: tuple[NDArray[np.uint64], ...]) -> NDArray[np.float64]:
-    first, second = (
-        (((a << np.uint64(32)) | b) >> np.uint64(11)).astype(np.float64) * 2.0**-53 for a, b in (words[:2], words[2:])
-    )
-    return np.asarray(np.sqrt(-2.0 * np.log1p(-first)) * np.cos(2.0 * np.pi * second))
 
 
 def poisson(key: int, term: NoiseTerm, mean: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -138,11 +138,15 @@ class RawImage:
         return (np.asarray(self.dn, dtype=np.float64) - self.black_dn) * self.gain_e_per_dn
 
     @property
+    def full_well_e(self) -> float:
+        """Electrons of a pixel that reads the white level."""
+        return float((self.white_dn - self.black_dn) * self.gain_e_per_dn)
+
+    @property
     def saturation_e(self) -> float:
         """Level from which a pixel counts as saturated [e-]: noise comes after the well clips (design, section 4)."""
-        full_e = (self.white_dn - self.black_dn) * self.gain_e_per_dn
-        spread_e = hypot(self.dark_noise_e, self.column_gain_spread * full_e)
-        return full_e - SATURATION_SIGMAS * spread_e - self.gain_e_per_dn / 2
+        spread_e = hypot(self.dark_noise_e, self.column_gain_spread * self.full_well_e)
+        return self.full_well_e - SATURATION_SIGMAS * spread_e - self.gain_e_per_dn / 2
 
     @property
     def saturated(self) -> NDArray[np.bool_]:

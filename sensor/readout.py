@@ -1,5 +1,8 @@
 """From expected photo-electrons to digital numbers: every noise source in physical order, and their variance."""
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,41 +12,20 @@ from sensor.device import Device
 from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
 
+# Digital numbers of one exposure from expected electrons, camera, chip, exposure time [s] and key.
+DrawFrame: TypeAlias = Callable[[NDArray[np.floating], SensorConfig, Device, float, int], NDArray[np.uint16]]
 
-def read_out(
-    expected_e: NDArray[np.floating],
-    sensor: SensorConfig,
-    device: Device,
-    exposure_s: float,
-    rng: np.random.Generator,
-) -> RawImage:
-    """Expose and read the chip once.
+
+def draw_frame(
+    expected_e: NDArray[np.floating], sensor: SensorConfig, device: Device, exposure_s: float, key: int
+) -> NDArray[np.uint16]:
+    """Digital numbers of one exposure, shape (h, w), with NumPy's exact Poisson sampler.
 
     In physical order: crosstalk and PRNU move the photo-electrons' means, dark current and hot pixels add to them, then
     one Poisson draw; the well clips; the column's amplifier multiplies what the well gave; fixed offsets and read noise
     are added; the converter rounds and clips.
-
-    Parameters
-    ----------
-    expected_e : (h, w) array
-        Expected photo-electrons of each pixel, without dark current.
-    sensor : SensorConfig
-    device : Device
-        The chip; its patterns are not drawn again.
-    exposure_s : float
-        For the dark current, and noted in the raw image [s].
-    rng : numpy.random.Generator
-        Gives one key; draws depend on key, row, column and term alone (shot noise: one stream a row).
-
-    Raises
-    ------
-    InputError
-        For a frame that isn't the device's size, negative or non-finite electrons, or a negative exposure.
     """
-    require_range("exposure_s", exposure_s, 0.0, 1e7, "give seconds, 0 or more")
-    expected = np.asarray(expected_e, dtype=np.float64)
-    check_expected(expected, device)
-    pixel, key = sensor.pixel, draw_key(rng)
+    pixel, expected = sensor.pixel, np.asarray(expected_e, dtype=np.float64)
 
     # PRNU scales the mean: after the draw the variance would be wrong. It is the spread of the whole pixel's response,
     # as a flat field shows it, so crosstalk, which leaves a flat field alone, comes first and doesn't smooth it.
@@ -60,8 +42,56 @@ def read_out(
     if pixel.read_noise_e:
         collected_e += pixel.read_noise_e * normals(key, NoiseTerm.READ, expected.shape)
     dn = np.rint(collected_e / sensor.gain_e_per_dn + sensor.black_dn)
-    dn = np.clip(dn, 0, sensor.white_dn).astype(np.uint16)
-    return as_raw(dn, sensor, exposure_s, engine="numpy", hot=device.hot)
+    return np.clip(dn, 0, sensor.white_dn).astype(np.uint16)
+
+
+def read_out(
+    expected_e: NDArray[np.floating],
+    sensor: SensorConfig,
+    device: Device,
+    exposure_s: float,
+    rng: np.random.Generator,
+    *,
+    draw: DrawFrame = draw_frame,
+    engine: str = "numpy",
+) -> RawImage:
+    """Expose and read the chip once.
+
+    Parameters
+    ----------
+    expected_e : (h, w) array
+        Expected photo-electrons of each pixel, without dark current.
+    sensor : SensorConfig
+    device : Device
+        The chip; its patterns are not drawn again.
+    exposure_s : float
+        For the dark current, and noted in the raw image [s].
+    rng : numpy.random.Generator
+        Gives one key; draws depend on key, row, column and term alone (shot noise: one stream a row).
+    draw : callable
+        What draws the frame: `draw_frame`, or `sensor.kernel.kernel.read_frame` in Dr.Jit.
+    engine : str
+        What it runs on, noted in the raw image.
+
+    Raises
+    ------
+    InputError
+        For a frame that isn't the device's size, negative or non-finite electrons, or a negative exposure.
+    """
+    require_range("exposure_s", exposure_s, 0.0, 1e7, "give seconds, 0 or more")
+    expected = np.asarray(expected_e)
+    if expected.shape != device.shape:
+        raise InputError(
+            f"expected_e: shape {expected.shape} is not the device's {device.shape}; "
+            "draw the device with the frame's shape"
+        )
+    if not (expected.min() >= 0 and expected.max() < np.inf):  # false for NaN too
+        row, column = (int(i) for i in np.argwhere(~(np.isfinite(expected) & (expected >= 0)))[0])
+        raise InputError(
+            f"expected_e: {expected[row, column]} at row {row}, column {column}; "
+            "allowed: finite numbers >= 0; repair the radiance"
+        )
+    return as_raw(draw(expected, sensor, device, exposure_s, draw_key(rng)), sensor, exposure_s, engine, device.hot)
 
 
 def spread_charge(expected_e: NDArray[np.float64], crosstalk: float) -> NDArray[np.float64]:
@@ -136,18 +166,3 @@ def as_raw(
         engine=engine,
         defects=None if hot is None else np.argwhere(hot),
     )
-
-
-def check_expected(expected: NDArray[np.floating], device: Device) -> None:
-    """Raise `InputError` for a frame of another size than the device, or electrons that are negative or not finite."""
-    if expected.shape != device.shape:
-        raise InputError(
-            f"expected_e: shape {expected.shape} is not the device's {device.shape}; "
-            "draw the device with the frame's shape"
-        )
-    if not (expected.min() >= 0 and expected.max() < np.inf):  # false for NaN too
-        row, column = (int(i) for i in np.argwhere(~(np.isfinite(expected) & (expected >= 0)))[0])
-        raise InputError(
-            f"expected_e: {expected[row, column]} at row {row}, column {column}; "
-            "allowed: finite numbers >= 0; repair the radiance"
-        )

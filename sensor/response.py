@@ -12,8 +12,8 @@ from sensor.cfa import channels, check_covers, mask
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
 
-MOST_LOST = 0.5  # of a channel's response: a picture of less than half of it is none of that channel
-LEAST_TOLD = 5e-3  # of a channel's response
+MOST_LOST = 0.5  # of a channel's response: with less than half of it a picture doesn't show that channel
+LEAST_WARNED = 5e-3  # of a channel's response: no warning under it
 _STEP_NM = 1.0  # of the wavelength grid on which shares are summed
 
 
@@ -129,7 +129,7 @@ def _check_covered(sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats
         return
     shares = lost_shares(sensor, wavelength_nm, width_nm)
     most = max(shares.values())
-    if most <= LEAST_TOLD:
+    if most <= LEAST_WARNED:
         return
     message = (
         f"radiance: its bands, {_reach(wavelength_nm, width_nm)}, don't fill the camera's window, {low:g} to "

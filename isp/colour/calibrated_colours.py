@@ -1,19 +1,17 @@
 """The colours of a raw file whose curves nobody knows: a `ColourFit` from its calibration's matrices."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit
-from render.spectrum import Floats
 from rodcone.colour_spaces import A_XY, D65_XY, adapt_to_d65, xyz_from_xy, xyz_to_srgb
 from sensor.calibration import ColourCalibration
 
 # Mean and mean product of the ColorChecker's 24 patches in linear sRGB under D65 (`scenes.reflectances`).
 MEAN_SRGB = np.array([0.3295, 0.2602, 0.2292])
 MOMENTS_SRGB = np.array([[0.1875, 0.1203, 0.0822], [0.1203, 0.1140, 0.0838], [0.0822, 0.0838, 0.0969]])
-# What three colours can't tell of W, as a share of white: our curve on the ColorChecker leaves 0.043 under D65,
-# 0.046 under F11 and 0.066 under A. Without it the fit would trust W where it has no noise.
-UNTOLD = 0.05
+# The part of W that three colours don't explain, as a share of white: our curve on the ColorChecker leaves 0.043 under
+# D65, 0.046 under F11 and 0.066 under A. Without it the fit would trust W where it has no noise.
+UNEXPLAINED = 0.05
 
 
 def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> ColourFit:
@@ -21,7 +19,7 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
 
     R, G and B answer to linear sRGB by the inverse of `colour.to_srgb`; any other channel by its row of the matrix from
     XYZ, under the one of A and D65 whose neutral is nearer to the exposure's. What a channel sees beyond three colours
-    is lost; `UNTOLD` stands for it.
+    is lost; `UNEXPLAINED` stands for it.
 
     Parameters
     ----------
@@ -30,23 +28,15 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
     """
     rows = np.linalg.inv(colour.to_srgb)
     if len(names) > 3:
-        rows = np.vstack([rows, _from_srgb(colour)[3:]])
-    untold = np.diag([0.0 if name in "RGB" else UNTOLD**2 for name in names])
-    return ColourFit(names, rows @ MEAN_SRGB, rows @ MOMENTS_SRGB @ rows.T + untold, rows @ MOMENTS_SRGB)
-
-
-def _from_srgb(colour: ColourCalibration) -> NDArray[np.float64]:
-    """Balanced channels of linear sRGB under the nearer illuminant, (channel, 3), rows sum to 1."""
-    found = []
-    for name, xy in (("a", A_XY), ("d65", D65_XY)):
-        from_xyz, white = getattr(colour, f"xyz_to_camera_{name}"), xyz_from_xy(xy)
-        neutral = from_xyz @ white
-        to_xyz = np.linalg.inv(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)
-        found.append((_distance(neutral, colour.neutral), from_xyz @ to_xyz / neutral[:, None]))
-    return np.asarray(min(found, key=lambda pair: pair[0])[1])
-
-
-def _distance(neutral: Floats, other: Floats) -> float:
-    """Between two neutrals, in stops."""
-    ratio = np.log2(np.maximum(neutral, 1e-9) / other)
-    return float(np.abs(ratio - ratio[1]).max())
+        # balanced channels of linear sRGB, (channel, 3), and how far their neutral lies from the exposure's, in stops
+        found = []
+        for name, xy in (("a", A_XY), ("d65", D65_XY)):
+            from_xyz, white = getattr(colour, f"xyz_to_camera_{name}"), xyz_from_xy(xy)
+            neutral = from_xyz @ white
+            to_xyz = np.linalg.inv(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)
+            stops = np.log2(np.maximum(neutral, 1e-9) / colour.neutral)
+            found.append((np.abs(stops - stops[1]).max(), from_xyz @ to_xyz / neutral[:, None]))
+        rows = np.vstack([rows, min(found, key=lambda pair: pair[0])[1][3:]])
+    unexplained = np.diag([0.0 if name in "RGB" else UNEXPLAINED**2 for name in names])
+    cross = rows @ MOMENTS_SRGB
+    return ColourFit(channels=names, mean=rows @ MEAN_SRGB, moments=cross @ rows.T + unexplained, cross=cross)

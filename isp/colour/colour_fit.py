@@ -129,7 +129,8 @@ def fit_colours(
     if signals.shape[1] != len(names):
         raise InputError(f"responses: {signals.shape[1]} channels don't fit the names {tuple(names)}; give one each")
     count = len(signals)
-    return ColourFit(tuple(names), signals.mean(axis=0), signals.T @ signals / count, signals.T @ target / count)
+    moments, cross = signals.T @ signals / count, signals.T @ target / count
+    return ColourFit(channels=tuple(names), mean=signals.mean(axis=0), moments=moments, cross=cross)
 
 
 def fit_matrix(

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from sensor.cfa import letter_map
+from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
 
@@ -13,13 +13,8 @@ def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> 
 
     Left out, the reach is one tile.
     """
-    hit = raw.saturated & np.isin(letter_map(raw.cfa, raw.shape), list(channels))
+    hit = raw.saturated & np.isin(channel_map(raw.cfa, raw.shape), list(channels))
     return np.asarray(maximum_filter(hit, size=2 * (len(raw.cfa) - 1 if reach is None else reach) + 1))
-
-
-def full_e(raw: RawImage) -> float:
-    """Electrons of a full well."""
-    return float((raw.white_dn - raw.black_dn) * raw.gain_e_per_dn)
 
 
 def clip_highlights(raw: RawImage, balanced: NDArray[np.float64], reach: int | None = None) -> NDArray[np.float64]:
@@ -28,4 +23,4 @@ def clip_highlights(raw: RawImage, balanced: NDArray[np.float64], reach: int | N
     `reach` as in `saturated_nearby`: that of the filter which made the planes.
     """
     clipped = saturated_nearby(raw, "RGB", reach)
-    return np.where(clipped[..., None], np.minimum(balanced, full_e(raw)), balanced)
+    return np.where(clipped[..., None], np.minimum(balanced, raw.full_well_e), balanced)

@@ -15,28 +15,11 @@ from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from rodcone.errors import InputError
-from sensor.cfa import channels, letter_map
+from sensor.cfa import channel_map, channels
 from sensor.curves import Responses, rgbw
 from sensor.raw import RawImage
 
 BalanceSource = Literal["gray world", "calibrated", "given"]
-
-
-@dataclass(frozen=True)
-class ChannelGains:
-    """White balance gains of a frame.
-
-    Attributes
-    ----------
-    factors : (channel,) float64
-        Factor on each channel, in the order of `sensor.cfa.channels`; green's is 1.
-    sources : mapping of str to str
-        Where each channel's factor comes from: ``gray world``, ``calibrated`` where the picture was too dark to tell,
-        or ``given``.
-    """
-
-    factors: Floats
-    sources: Mapping[str, BalanceSource]
 
 
 @dataclass(frozen=True)
@@ -49,7 +32,7 @@ class WhiteBalance:
         Calibrated response to a neutral, in the order of `sensor.cfa.channels`, for pictures too dark for Gray World;
         None: the project's own curves under D65.
     given : (channel,) float64 or None
-        Response to what shall come out neutral, in place of Gray World's means.
+        Response to what should come out neutral, in place of Gray World's means.
     """
 
     neutral: Floats | None = None
@@ -70,13 +53,21 @@ class WhiteBalance:
             return balance
         return cls(_response("neutral", neutral, raw), _response("balance", balance, raw))
 
-    def gains(self, raw: RawImage, planes: NDArray[np.float64]) -> ChannelGains:
-        """Gains of a frame.
+    def gains(self, raw: RawImage, planes: NDArray[np.float64]) -> tuple[Floats, Mapping[str, BalanceSource]]:
+        """Gains of a frame, and where they come from.
 
         Parameters
         ----------
         planes : (h, w, channel) float64
             The pipeline's own linear planes [e-], channels in the order of `sensor.cfa.channels`.
+
+        Returns
+        -------
+        (channel,) float64
+            Factor on each channel; green's is 1.
+        mapping of str to str
+            Where each channel's factor comes from: ``gray world``, ``calibrated`` where the picture was too dark to
+            tell, or ``given``.
 
         Notes
         -----
@@ -86,13 +77,13 @@ class WhiteBalance:
         """
         names = channels(raw.cfa)
         if self.given is not None:
-            return ChannelGains(self.given[names.index("G")] / self.given, dict.fromkeys(names, "given"))
+            return self.given[names.index("G")] / self.given, dict.fromkeys(names, "given")
         neutral = neutral_response(names) if self.neutral is None else self.neutral
         usable = ~saturated_nearby(raw, "RGB")
         groups = {"RGB": usable}
         if "W" in names:  # before the colours, which then say where green's gain comes from
             groups = {"GW": usable & ~saturated_nearby(raw, "W"), "RGB": usable}
-        sites = letter_map(raw.cfa, raw.shape)
+        sites = channel_map(raw.cfa, raw.shape)
         factors = np.ones(len(names))
         sources: dict[str, BalanceSource] = dict.fromkeys(names, "calibrated")
         for group, pixels in groups.items():
@@ -103,7 +94,7 @@ class WhiteBalance:
             factors[index], certain = gray_world(means, errors, neutral[index], green=group.index("G"))
             for channel, sure in zip(group, certain, strict=True):
                 sources[channel] = "gray world" if sure else "calibrated"
-        return ChannelGains(factors, sources)
+        return factors, sources
 
 
 def neutral_response(names: Sequence[str], responses: Responses | None = None) -> Floats:

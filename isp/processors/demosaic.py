@@ -5,7 +5,7 @@ H. S. Malvar, L.-W. He, R. Cutler, "High-quality linear interpolation for demosa
 ICASSP 2004; D. Menon, S. Andriani, G. Calvagno, "Demosaicing with directional filtering and a posteriori decision",
 IEEE Trans. Image Process. 16(1), 2007.
 
-Ours is what stands around: the mosaic is balanced first (`isp.processors.mosaic`), and reflected about its outermost
+Ours is what is done before: the mosaic is balanced first (`isp.processors.mosaic`), and reflected about its outermost
 pixels, which keeps the phase of the tile. The library's own border repeats the outermost pixel and so puts a colour
 where another belongs.
 """
@@ -16,14 +16,13 @@ import numpy as np
 
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
-from isp.picture import Picture
+from isp.picture import Image, Picture
 from isp.planes import Plane
-from isp.processors.mosaic import Image, balance_mosaic, to_rgb
+from isp.processors.mosaic import balance_mosaic, to_rgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
-from sensor.cfa import Tile
+from sensor.cfa import BAYER, Tile, is_bayer
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_bayer
 
 EXTRA = "opponents"
 # Pixels that a value depends on along one axis. Malvar's filters are 5 wide. Menon's take 2 for a green, 2 more for
@@ -69,7 +68,7 @@ def picture_demosaicked(
 def require_bayer(cfa: Tile) -> None:
     """Raise `InputError` unless the tile is one of Bayer's four phases."""
     if not is_bayer(cfa):
-        raise InputError(f"raw: mosaic {cfa} is not Bayer; allowed here: {('RG', 'GB')} in any phase; use another isp")
+        raise InputError(f"raw: mosaic {cfa} is not Bayer; allowed here: {BAYER} in any phase; use another processor")
 
 
 def _demosaic(function: str, mosaic: Plane, cfa: Tile, reach: int) -> Image:

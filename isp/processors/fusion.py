@@ -13,7 +13,7 @@ Kijima: T. Kijima et al., "Image sensor with improved light sensitivity", US pat
 being combined until they gather about as much light as W does, then one from both.
 
 Ours in all of them: white balance before, interpolation by normalised convolution, the way back to linear sRGB, and
-what happens to highlights. None of the three has an answer to a saturated W: luminance ends where W's well does.
+what happens to highlights. None of the three handles a saturated W: its luminance ends at W's full well.
 """
 
 from dataclasses import replace
@@ -26,9 +26,9 @@ from isp.bilinear import fill_channels
 from isp.colour.colour_fit import ColourFit
 from isp.colour.highlights import saturated_nearby
 from isp.colour.white_balance import WhiteBalance, neutral_response
-from isp.picture import Picture, require_letters
+from isp.picture import Image, Picture, require_letters
 from isp.planes import Plane, fill, tent
-from isp.processors.mosaic import Image, balance_mosaic, to_rgb
+from isp.processors.mosaic import balance_mosaic, to_rgb
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels, mask
@@ -72,7 +72,7 @@ def picture_complementary(raw: RawImage, colours: ColourFit, *, balance: WhiteBa
     """
     names = channels(raw.cfa)
     if set(names) != set(_STANDS_FOR):
-        raise InputError(f"raw: mosaic {raw.cfa} is not C, M, Y and W; allowed here: these four; use another isp")
+        raise InputError(f"raw: mosaic {raw.cfa} is not C, M, Y and W; allowed here: these four; use another processor")
     tile = tuple("".join(_STANDS_FOR[channel] for channel in row) for row in raw.cfa)
     true = {stand_in: channel for channel, stand_in in _STANDS_FOR.items()}
     order = [names.index(true[stand_in]) for stand_in in channels(tile)]

@@ -17,14 +17,13 @@ from isp.bilinear import fill_channels
 from isp.colour.colour_fit import ColourFit
 from isp.colour.highlights import saturated_nearby
 from isp.colour.white_balance import WhiteBalance
-from isp.picture import Picture, require_letters
+from isp.picture import Image, Picture, require_letters
 from isp.planes import Plane
 from isp.processors.fusion import CHANNELS
-from isp.processors.mosaic import Image, balance_mosaic, to_rgb
+from isp.processors.mosaic import balance_mosaic, to_rgb
 from rodcone.errors import InputError
-from sensor.cfa import Tile, mask
+from sensor.cfa import Tile, is_rgbw, mask
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_rgbw
 
 _PAD = 4  # two steps of two pixels each, in whole tiles
 REACH = 3  # pixels: two for W at a colour's site, one more for the difference
@@ -56,7 +55,7 @@ def adams_planes(mosaic: Plane, cfa: Tile) -> Image:
 def luminance_plane(mosaic: Plane, cfa: Tile) -> Plane:
     """W everywhere, along the smaller gradient: first at the sites diagonal to W's, then at those beside them."""
     if not is_rgbw(cfa):
-        raise InputError(f"cfa: {cfa} is not 2x2 RGBW; allowed here: R, G, B and W once each; use another isp")
+        raise InputError(f"cfa: {cfa} is not 2x2 RGBW; allowed here: R, G, B and W once each; use another processor")
     padded = np.pad(mosaic, _PAD, mode="reflect")
     row, column = divmod("".join(cfa).index("W"), 2)
     opposite = mask(cfa, cfa[1 - row][1 - column], (padded.shape[0], padded.shape[1]))

@@ -3,17 +3,15 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from isp.bilinear import bilinear
 from isp.colour.colour_fit import ColourFit
-from isp.colour.highlights import clip_highlights, full_e, saturated_nearby
+from isp.colour.highlights import clip_highlights, saturated_nearby
 from isp.colour.white_balance import BalanceSource, WhiteBalance
+from isp.picture import Image
 from isp.planes import Plane
-from sensor.cfa import channels, letter_map
+from sensor.cfa import channel_map, channels
 from sensor.raw import RawImage
-
-Image = NDArray[np.float64]
 
 
 def balance_mosaic(raw: RawImage, electrons: Plane, balance: WhiteBalance) -> tuple[Plane, Mapping[str, BalanceSource]]:
@@ -39,14 +37,14 @@ def balance_mosaic(raw: RawImage, electrons: Plane, balance: WhiteBalance) -> tu
     mapping of str to str
         Where each channel's gain comes from, as `Picture.balance` has it.
     """
-    gains = balance.gains(raw, bilinear(raw))
-    sites = letter_map(raw.cfa, raw.shape)
+    gains, sources = balance.gains(raw, bilinear(raw))
+    sites = channel_map(raw.cfa, raw.shape)
     factors = np.zeros(raw.shape)
-    for name, factor in zip(channels(raw.cfa), gains.factors, strict=True):
+    for name, factor in zip(channels(raw.cfa), gains, strict=True):
         factors[sites == name] = factor
     values = electrons * factors
     held = saturated_nearby(raw, "RGB", 1) & (sites != "W")
-    return np.where(held, np.minimum(values, full_e(raw)), values), gains.sources
+    return np.where(held, np.minimum(values, raw.full_well_e), values), sources
 
 
 def to_rgb(raw: RawImage, planes: Image, colours: ColourFit, reach: int) -> Image:

@@ -8,9 +8,10 @@ import numpy as np
 
 from render.spectrum import Floats
 from rodcone.errors import require_range, require_whole
+from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.emva1288 import estimators as emva
-from sensor.emva1288.photon_transfer import Expose, Transfer, bench, dark_slopes, engine, take_stack, take_transfer
+from sensor.emva1288.photon_transfer import Expose, Transfer, bench, dark_slopes, take_stack, take_transfer
 
 # Under this variance [DN^2] rounding is no longer an added 1/12, and the standard gives an upper limit alone.
 LEAST_VARIANCE_DN2 = 0.24
@@ -95,7 +96,8 @@ def characterise(
     require_whole("seed", seed, 0, 2**31, "give a whole number")
     require_range("exposure_s", exposure_s, 0.0, 1e6, "give seconds, 0 or more")
     result = measure(bench(sensor, shape, seed, exact), plan_for(sensor, exposure_s), sensor)
-    return replace(result, notes=(*result.notes, f"frames were drawn by {engine(exact)}"))
+    engine = "numpy" if exact else backend()
+    return replace(result, notes=(*result.notes, f"frames were drawn by {engine}"))
 
 
 def plan_for(sensor: SensorConfig, exposure_s: float = 0.01, levels: int = 55, frames: int = 32) -> ExposurePlan:
@@ -104,9 +106,10 @@ def plan_for(sensor: SensorConfig, exposure_s: float = 0.01, levels: int = 55, f
     current = pixel.dark_current_e_per_s + pixel.hot_pixel_dark_current_e_per_s
     longest_s = min(0.3 * pixel.full_well_e / current, 1e6) if current else 1.0
     even = np.linspace(0, 1.1 * pixel.full_well_e, levels + 1)[1:]
-    dim = np.geomspace(1e-4 * pixel.full_well_e, even[0], 8)[:-1]  # too dim to weigh in a fit: the plot's foot
+    dim = np.geomspace(1e-4 * pixel.full_well_e, even[0], 8)[:-1]  # too dim to weigh in a fit: for the plot
     light_e = np.concatenate([dim, even])
-    return ExposurePlan(light_e, exposure_s, frames, tuple(np.linspace(0, longest_s, 6)))
+    dark_times_s = tuple(np.linspace(0, longest_s, 6))
+    return ExposurePlan(light_e=light_e, exposure_s=exposure_s, frames=frames, dark_times_s=dark_times_s)
 
 
 def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Characterisation:
@@ -144,6 +147,16 @@ def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Charact
         ("greatest SNR", "dB", (_decibels(sqrt(saturation_e)), 0.0)),
         ("linearity error", "1", (linear_error, 0.0)),
     )
+    notes = [
+        "light is set in electrons: quantum efficiency is 1",
+        "saturation is where the temporal variance peaks, under the well where PRNU spreads the clipping; the dynamic "
+        "range and the greatest SNR follow from it, configured ones from the well",
+    ]
+    if dark.variance_dn2 < LEAST_VARIANCE_DN2:
+        notes.append(
+            f"the dark's variance, {dark.variance_dn2:.3f} DN^2, is under {LEAST_VARIANCE_DN2}: rounding hides the "
+            f"dark noise, which is less than {0.4 / gain[0]:.3g} e-, and moves DSNU"
+        )
     return Characterisation(
         figures=tuple(FigureOfMerit(name, unit, expected[name], *estimate) for name, unit, estimate in estimates),
         transfer=transfer,
@@ -152,7 +165,7 @@ def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Charact
         gain_dn_per_e=gain[0],
         saturation_e=saturation_e,
         linearity_share=linear,
-        notes=_notes(dark.variance_dn2, gain[0]),
+        notes=tuple(notes),
     )
 
 
@@ -184,17 +197,3 @@ def configured(sensor: SensorConfig, exposure_s: float) -> dict[str, float]:
 
 def _decibels(ratio: float) -> float:
     return 20 * log10(ratio)
-
-
-def _notes(dark_variance_dn2: float, gain_dn_per_e: float) -> tuple[str, ...]:
-    notes = [
-        "light is set in electrons: quantum efficiency is 1",
-        "saturation is where the temporal variance peaks, under the well where PRNU spreads the clipping; the dynamic "
-        "range and the greatest SNR follow from it, configured ones from the well",
-    ]
-    if dark_variance_dn2 < LEAST_VARIANCE_DN2:
-        notes.append(
-            f"the dark's variance, {dark_variance_dn2:.3f} DN^2, is under {LEAST_VARIANCE_DN2}: rounding hides the "
-            f"dark noise, which is less than {0.4 / gain_dn_per_e:.3g} e-, and moves DSNU"
-        )
-    return tuple(notes)

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.spectrum import Floats
-from rodcone.jit import backend
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -17,13 +16,8 @@ from sensor.device import draw_device
 Expose: TypeAlias = Callable[[float, float], NDArray[np.uint16]]
 
 
-def engine(exact: bool = False) -> str:
-    """Engine that draws a bench's frames, as in `RawImage.engine`: ``numpy``, ``llvm`` or ``cuda``."""
-    return "numpy" if exact else backend()
-
-
 def bench(sensor: SensorConfig, shape: tuple[int, int], seed: int, exact: bool = False) -> Expose:
-    """Put one chip under even light that is set in electrons: the quantum efficiency is 1 by construction.
+    """Put one chip under uniform light that is set in electrons: the quantum efficiency is 1 by construction.
 
     Its frames are drawn as `sensor.capture.expose` draws them.
     """

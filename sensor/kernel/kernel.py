@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.jit import arrays, dr
-from sensor.cfa import channels, check_covers, letter_map
+from sensor.cfa import channel_map, channels, check_covers
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.kernel.poisson import alias_table, poisson
@@ -71,7 +71,7 @@ def expected_electrons_single(
     check_covers(sensor.cfa, (height, width))
     planes = _single(np.moveaxis(values, -1, 0).reshape(bands, -1))
     scalars = [[dr.opaque(jit.Float, float(weight)) for weight in row] for row in weights]
-    tile = letter_map(sensor.cfa, (len(sensor.cfa), len(sensor.cfa[0])))
+    tile = channel_map(sensor.cfa, (len(sensor.cfa), len(sensor.cfa[0])))
     tile_channels = _upload(np.vectorize(channels(sensor.cfa).index)(tile).astype(np.uint32), jit.UInt)
     tile_height, tile_width = _divisor(tile.shape[0]), _divisor(tile.shape[1])
     result = np.empty(planes.shape[1], dtype=np.float32)
@@ -138,9 +138,10 @@ def _pieces(planes: NDArray[np.float32]) -> list[tuple[int, NDArray[np.float32]]
 
 
 def read_frame(
-    expected_e: NDArray[np.float32], sensor: SensorConfig, device: Device, exposure_s: float, key: int
+    expected_e: NDArray[np.floating], sensor: SensorConfig, device: Device, exposure_s: float, key: int
 ) -> NDArray[np.uint16]:
-    """Digital numbers of one exposure, shape (h, w): what `sensor.readout.read_out` does, with other draws."""
+    """Digital numbers of one exposure, shape (h, w): what `sensor.readout.draw_frame` does, with other draws."""
+    expected_e = np.asarray(expected_e, dtype=np.float32)
     jit, pixel = arrays(), sensor.pixel
     if pixel.crosstalk:
         expected_e = _single(spread_charge(np.minimum(expected_e, np.float64(LARGEST)), pixel.crosstalk))
@@ -150,7 +151,7 @@ def read_frame(
     shot, read = normal_pair(words[0], words[1])
 
     # The Poisson mean, PRNU on the light alone. Far above the well the draw is the well with certainty: the bound of
-    # the mean, as in `read_out`. An infinite sum times a response of 0 would be NaN: the bound of the light.
+    # the mean, as in `draw_frame`. An infinite sum times a response of 0 would be NaN: the bound of the light.
     dark_e = dr.opaque(jit.Float, pixel.dark_current_e_per_s * exposure_s)
     if device.hot is not None:
         hot_e = pixel.hot_pixel_dark_current_e_per_s * exposure_s

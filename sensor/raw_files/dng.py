@@ -10,12 +10,11 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rodcone.errors import InputError
 from rodcone.files import replacing
-from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile, channels
+from sensor.cfa import channels, is_bayer, is_rgbw
 from sensor.raw import RawImage
 from sensor.raw_files.raw_json import parse_json, raw_image, to_json
 from sensor.raw_files.tiff import CFA, EXIF, Tags, Values, read_mosaic, read_tags, text, write_mosaic
@@ -39,18 +38,6 @@ _COMPARED = {
 _COLOURS = {"R": 0, "G": 1, "B": 2, "W": 6}  # numbers of CFAPattern and CFAPlaneColor; 6 is white
 _ILLUMINANT_A, _ILLUMINANT_D65 = 17, 21  # EXIF LightSource
 _LARGEST = 2**31 - 1  # of a rational's numerator and denominator
-
-
-def is_bayer(tile: Tile) -> bool:
-    """Whether a tile is one of Bayer's four phases: 2x2, green on a diagonal, red and blue once."""
-    if len(tile) != 2 or len(tile[0]) != 2 or sorted("".join(tile)) != list("BGGR"):
-        return False
-    return tile[0][0] == tile[1][1] or tile[0][1] == tile[1][0]
-
-
-def is_rgbw(tile: Tile) -> bool:
-    """Whether a tile is 2x2 with R, G, B and W once each."""
-    return len(tile) == 2 and len(tile[0]) == 2 and sorted("".join(tile)) == list("BGRW")
 
 
 def write_dng(raw: RawImage, path: Path) -> Path:
@@ -115,10 +102,22 @@ def dng_tags(raw: RawImage) -> Tags:
     NoiseProfile is N(x)^2 = S x + O for x from black (0) to white (1), the same for all channels: S is the shot noise,
     1 / full scale in electrons, O the dark noise; PRNU grows with x^2 and doesn't fit the form. LinearResponseLimit is
     where the well begins to clip (`RawImage.saturation_e`).
+
+    Raises
+    ------
+    InputError
+        For another mosaic, a camera without colour calibration, or levels that DNG can't hold.
     """
-    colour = _require(raw)
-    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
-    height, width = raw.shape
+    if not (is_bayer(raw.cfa) or is_rgbw(raw.cfa)):
+        raise InputError(f"cfa: {raw.cfa} is not written as DNG; allowed: Bayer or 2x2 RGBW; write a .tif instead")
+    if raw.colour is None:
+        raise InputError("colour: the raw image holds no colour calibration, which a DNG needs; write a .tif instead")
+    if raw.black_dn < 0 or raw.white_dn != int(raw.white_dn):
+        raise InputError(
+            f"levels: black {raw.black_dn!r} and white {raw.white_dn!r} don't fit a DNG; "
+            "allowed: black of 0 or more, a whole white; write a .tif instead"
+        )
+    colour, (height, width) = raw.colour, raw.shape
     tags: dict[int, tuple[str, Values]] = {
         254: ("I", (0,)),  # NewSubfileType: the full picture
         MAKER: text(MAKE),
@@ -140,23 +139,19 @@ def dng_tags(raw: RawImage) -> Tags:
         50779: ("H", (_ILLUMINANT_D65,)),  # CalibrationIlluminant2
         50964: ("2i", rational(colour.camera_to_xyz_a)),  # ForwardMatrix1
         50965: ("2i", rational(colour.camera_to_xyz_d65)),  # ForwardMatrix2
-        50734: ("2I", rational(min(max(raw.saturation_e / full_e, 0.0), 1.0))),  # LinearResponseLimit
+        50734: ("2I", rational(min(max(raw.saturation_e / raw.full_well_e, 0.0), 1.0))),  # LinearResponseLimit
         50829: ("I", (0, 0, height, width)),  # ActiveArea
-        51041: ("d", (1 / full_e, (raw.dark_noise_e / full_e) ** 2)),  # NoiseProfile
+        51041: ("d", (1 / raw.full_well_e, (raw.dark_noise_e / raw.full_well_e) ** 2)),  # NoiseProfile
     }
     if colour.neutral.size == 4:  # a fourth plane asks for a way back to three: W carries no colour here
         tags |= dict.fromkeys((50725, 50726), ("2i", rational(np.eye(3, 4))))  # ReductionMatrix1, 2
     if raw.defects is not None and is_bayer(raw.cfa):
-        tags[OPCODES] = ("U", _bad_pixels(raw.cfa, raw.defects))
+        # Opcode FixBadPixelsList of DNG 1.3, chapter 6: big-endian, optional for readers; for Bayer only.
+        phase = ("RG", "GR", "GB", "BG").index(raw.cfa[0])
+        parameters = struct.pack(">3I", phase, len(raw.defects), 0) + raw.defects.astype(">u4").tobytes()
+        tags[OPCODES] = ("U", struct.pack(">IIIII", 1, 5, 0x01030000, 1, len(parameters)) + parameters)
     tags[PRIVATE_DATA] = ("B", PRIVATE + to_json(raw).encode("ascii"))
     return dict(sorted(tags.items()))
-
-
-def _bad_pixels(tile: Tile, defects: NDArray[np.intp]) -> bytes:
-    """Opcode FixBadPixelsList of DNG 1.3, chapter 6: big-endian, optional for readers; for Bayer only."""
-    phase = ("RG", "GR", "GB", "BG").index(tile[0])
-    parameters = struct.pack(">3I", phase, len(defects), 0) + defects.astype(">u4").tobytes()
-    return struct.pack(">IIIII", 1, 5, 0x01030000, 1, len(parameters)) + parameters
 
 
 def exif_tags(raw: RawImage) -> Tags:
@@ -170,20 +165,6 @@ def exif_tags(raw: RawImage) -> Tags:
     if raw.iso is not None:
         tags[ISO] = ("H", (min(max(round(raw.iso), 1), 65_535),))
     return tags
-
-
-def _require(raw: RawImage) -> ColourCalibration:
-    """Colour calibration of a raw image that a DNG can hold, or `InputError`."""
-    if not (is_bayer(raw.cfa) or is_rgbw(raw.cfa)):
-        raise InputError(f"cfa: {raw.cfa} is not written as DNG; allowed: Bayer or 2x2 RGBW; write a .tif instead")
-    if raw.colour is None:
-        raise InputError("colour: the raw image holds no colour calibration, which a DNG needs; write a .tif instead")
-    if raw.black_dn < 0 or raw.white_dn != int(raw.white_dn):
-        raise InputError(
-            f"levels: black {raw.black_dn!r} and white {raw.white_dn!r} don't fit a DNG; "
-            "allowed: black of 0 or more, a whole white; write a .tif instead"
-        )
-    return raw.colour
 
 
 def rational(values: ArrayLike) -> Values:

@@ -25,12 +25,12 @@ class NoiseEstimate:
 def estimate_noise(above_black_dn: NDArray[np.float64], full_dn: float) -> NoiseEstimate | None:
     """Fit variance = mean / gain + dark variance to a Bayer frame; None where it doesn't hold enough.
 
-    In each of the four pictures of one site, blocks of 2x2 give a mean and a diagonal difference. Bins of the mean use
-    the fifth of their blocks with the least structure around them, which is measured by other differences than the
-    block's own diagonal one. There the median of the difference's size gives the variance; the line is fitted with
-    a loss that gives single bins little weight. It is the photon transfer of one picture, in a simpler form than A. Foi
-    et al., "Practical Poissonian-Gaussian noise modeling and fitting for single-image raw-data", IEEE Trans. Image
-    Process. 17(10), 2008. Fine texture all over the frame passes for noise.
+    Each site of the 2x2 tile makes a picture of its own. In these four pictures, blocks of 2x2 give a mean and a
+    diagonal difference. Bins of the mean use the fifth of their blocks with the least structure around them, which is
+    measured by other differences than the block's own diagonal one. There the median of the difference's size gives the
+    variance; the line is fitted with a loss that gives single bins little weight. It is the photon transfer of one
+    picture, in a simpler form than A. Foi et al., "Practical Poissonian-Gaussian noise modeling and fitting for
+    single-image raw-data", IEEE Trans. Image Process. 17(10), 2008. Fine texture all over the frame passes for noise.
 
     Parameters
     ----------

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from render.radiance_files.file_checks import require_file
 from render.spectrum import Floats
+from rodcone.colour_spaces import D50_XYZ, SRGB_TO_XYZ, adapt_to_d65
 from rodcone.errors import InputError, one_line
 from rodcone.optional import optional_library
 from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile, letter_map
+from sensor.cfa import channel_map, is_bayer
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_bayer
 from sensor.raw_files.noise_estimate import NoiseEstimate, estimate_noise
 from sensor.raw_files.noise_profile import read_noise_profile
 
@@ -26,9 +26,8 @@ EXTRA = "photographs"
 ASSUMED_FULL_WELL_E, ASSUMED_DARK_NOISE_E = 30_000.0, 3.0
 # Of a file's bytes, at 2 a pixel. Lossless JPEG spends a bit or more on a pixel: it swells 16 times at most.
 MOST_EXPANSION = 200
-# Linear sRGB to XYZ under D65 (IEC 61966-2-1), and adapted to D50 (the sRGB profile of ICC), rounded to four digits.
-_XYZ_OF_SRGB = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
-_D50_OF_SRGB = np.array([[0.4361, 0.3851, 0.1431], [0.2225, 0.7169, 0.0606], [0.0139, 0.0971, 0.7142]])
+# Linear sRGB to XYZ adapted to D50.
+_SRGB_TO_D50 = np.linalg.inv(adapt_to_d65(np.eye(3), D50_XYZ).T) @ SRGB_TO_XYZ
 
 
 def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
@@ -42,8 +41,8 @@ def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
     dict
         ``reader``; ``noise``: where gain and dark noise come from (``profile of the file``, ``estimated from the
         frame`` or ``assumed``); ``gain_e_per_dn``, ``dark_noise_e``; ``as_shot``: ``file``, ``daylight`` where the file
-        has no balance, or ``none``; ``colour_matrix``: ``LibRaw``, or ``none`` where the camera's own colours pass for
-        sRGB.
+        has no balance, or ``none``; ``colour_matrix``: ``LibRaw``, or ``none`` where the camera's own colours are
+        taken for sRGB.
 
     Raises
     ------
@@ -54,7 +53,10 @@ def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
     size = require_file(path)
     try:
         with rawpy.imread(str(path)) as opened:
-            _check_extent(opened.sizes, size, path)
+            # A header that claims more pixels than its file can hold: LibRaw takes memory for them all.
+            height, width = int(opened.sizes.raw_height), int(opened.sizes.raw_width)
+            if 2 * height * width > MOST_EXPANSION * size:
+                raise InputError(f"{path}: {size} bytes can't hold the {height} x {width} pixels that it declares")
             return _raw_image(opened, path, f"LibRaw {'.'.join(map(str, rawpy.libraw_version))}")
     except (rawpy.LibRawError, rawpy.NotSupportedError) as error:
         first = error.args[0] if error.args else ""
@@ -70,24 +72,37 @@ def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
         ) from error
 
 
-def _check_extent(sizes: Any, file_bytes: int, path: Path) -> None:
-    """Raise `InputError` where a header claims more pixels than its file can hold: LibRaw takes memory for them all."""
-    height, width = int(sizes.raw_height), int(sizes.raw_width)
-    if 2 * height * width > MOST_EXPANSION * file_bytes:
-        raise InputError(f"{path}: {file_bytes} bytes can't hold the {height} x {width} pixels that it declares")
-
-
 def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str, Any]]:
-    mosaic = _channels(opened, path)
+    # mosaic
+    if opened.raw_image is None or opened.raw_image_visible.ndim != 2:
+        raise InputError(f"{path}: it holds no mosaic, but whole pixels; allowed: Bayer raw files; take another file")
+    names, indices = opened.color_desc.decode("ascii", "replace"), np.asarray(opened.raw_colors_visible)
+    if names != "RGBG" or indices.max() > 3:
+        raise InputError(f"{path}: its colours are {names!r}; allowed: Bayer's R, G and B; take another file")
+    sites = _turned(np.array(list(names))[indices], opened.sizes.flip)
+    tile = tuple("".join(row[:2]) for row in sites[:2])
+    if not is_bayer(tile) or np.any(channel_map(tile, (sites.shape[0], sites.shape[1])) != sites):
+        raise InputError(
+            f"{path}: its mosaic begins with {tuple(''.join(row[:6]) for row in sites[:2])} and is not Bayer's; "
+            "allowed: Bayer raw files, no X-Trans; take another file"
+        )
+
+    # levels
     black_levels = np.array(opened.black_level_per_channel, dtype=np.intp)
-    black = black_levels[np.asarray(opened.raw_colors_visible)]  # of each pixel [DN]
+    black = black_levels[indices]  # of each pixel [DN]
     white = int(opened.white_level)
     if not black.max() < white:
         raise InputError(f"{path}: black {black.max():g} is not under white {white:g}; it is damaged or no photograph")
     dn = np.minimum(opened.raw_image_visible + (black.max() - black), white)
     upright = _turned(dn.astype(np.uint16), opened.sizes.flip)
-    tile = _tile(_turned(mosaic, opened.sizes.flip), path)
-    noise, source = _noise(path, upright.astype(np.float64) - black.max(), float(white - black.max()))
+
+    # noise and colours
+    full_dn = float(white - black.max())
+    noise, source = read_noise_profile(path, full_dn), "profile of the file"
+    if noise is None:
+        noise, source = estimate_noise(upright.astype(np.float64) - black.max(), full_dn), "estimated from the frame"
+    if noise is None:
+        noise, source = NoiseEstimate(ASSUMED_FULL_WELL_E / full_dn, ASSUMED_DARK_NOISE_E), "assumed"
     colour, facts = _colour(opened)
     raw = RawImage(
         dn=upright,
@@ -108,42 +123,11 @@ def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str
     return raw, {"reader": reader, **levels, **facts}
 
 
-def _channels(opened: Any, path: Path) -> NDArray[np.str_]:
-    """Channel of each pixel of the picture, (h, w)."""
-    if opened.raw_image is None or opened.raw_image_visible.ndim != 2:
-        raise InputError(f"{path}: it holds no mosaic, but whole pixels; allowed: Bayer raw files; take another file")
-    names = opened.color_desc.decode("ascii", "replace")
-    indices = np.asarray(opened.raw_colors_visible)
-    if names != "RGBG" or indices.max() > 3:
-        raise InputError(f"{path}: its colours are {names!r}; allowed: Bayer's R, G and B; take another file")
-    return np.asarray(np.array(list(names))[indices])
-
-
-def _tile(mosaic: NDArray[np.str_], path: Path) -> Tile:
-    tile = tuple("".join(row[:2]) for row in mosaic[:2])
-    if not is_bayer(tile) or np.any(letter_map(tile, (mosaic.shape[0], mosaic.shape[1])) != mosaic):
-        raise InputError(
-            f"{path}: its mosaic begins with {tuple(''.join(row[:6]) for row in mosaic[:2])} and is not Bayer's; "
-            "allowed: Bayer raw files, no X-Trans; take another file"
-        )
-    return tile
-
-
 def _turned(frame: NDArray[Any], flip: int) -> NDArray[Any]:
     """Frame upright. LibRaw's `flip`: 1 mirrors the columns, 2 the rows, 4 then swaps the two."""
     rows, columns = (slice(None, None, -1 if flip & bit else 1) for bit in (2, 1))
     turned = frame[rows, columns]
     return np.ascontiguousarray(turned.T if flip & 4 else turned)
-
-
-def _noise(path: Path, above_black_dn: NDArray[np.float64], full_dn: float) -> tuple[NoiseEstimate, str]:
-    profile = read_noise_profile(path, full_dn)
-    if profile is not None:
-        return profile, "profile of the file"
-    estimate = estimate_noise(above_black_dn, full_dn)
-    if estimate is not None:
-        return estimate, "estimated from the frame"
-    return NoiseEstimate(ASSUMED_FULL_WELL_E / full_dn, ASSUMED_DARK_NOISE_E), "assumed"
 
 
 def _colour(opened: Any) -> tuple[ColourCalibration, dict[str, str]]:
@@ -155,13 +139,21 @@ def _colour(opened: Any) -> tuple[ColourCalibration, dict[str, str]]:
     daylight = _neutral(opened.daylight_whitebalance)
     shot = _neutral(opened.camera_whitebalance)
     neutral = shot if shot is not None else daylight if daylight is not None else np.ones(3)
-    from_xyz = np.linalg.inv(_XYZ_OF_SRGB @ to_srgb) * (neutral if daylight is None else daylight)[:, None]
-    back = _D50_OF_SRGB @ to_srgb
+    from_xyz = np.linalg.inv(SRGB_TO_XYZ @ to_srgb) * (neutral if daylight is None else daylight)[:, None]
+    back = _SRGB_TO_D50 @ to_srgb
     facts = {
         "as_shot": "file" if shot is not None else "daylight" if daylight is not None else "none",
         "colour_matrix": "none" if np.array_equal(to_srgb, np.eye(3)) else "LibRaw",
     }
-    return ColourCalibration(neutral, to_srgb, from_xyz, from_xyz, back, back), facts
+    calibration = ColourCalibration(
+        neutral=neutral,
+        to_srgb=to_srgb,
+        xyz_to_camera_a=from_xyz,
+        xyz_to_camera_d65=from_xyz,
+        camera_to_xyz_a=back,
+        camera_to_xyz_d65=back,
+    )
+    return calibration, facts
 
 
 def _neutral(gains: Any) -> Floats | None:

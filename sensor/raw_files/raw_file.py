@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from rodcone.errors import InputError
-from sensor.cfa import Tile
+from sensor.cfa import Tile, is_bayer, is_rgbw
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_bayer, is_own, is_rgbw, read_dng, write_dng
+from sensor.raw_files.dng import is_own, read_dng, write_dng
 from sensor.raw_files.photograph import read_photograph
 from sensor.raw_files.raw_tiff import read_tiff, write_tiff
 

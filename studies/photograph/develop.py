@@ -14,9 +14,8 @@ from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError, require_range, unknown
 from sensor.calibration import ColourCalibration
-from sensor.cfa import channels
+from sensor.cfa import channels, is_bayer
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_bayer
 from sensor.raw_files.raw_file import open_raw
 from studies.metrics.truth import WHITE_AT, WHITE_PERCENTILE  # the demo's rule, here on the picture's own luminance
 
@@ -114,8 +113,7 @@ def develop_file(
     if raw.colour is None:
         raise InputError(f"{path}: it holds no colour calibration; allowed: a camera with R, G and B; capture with one")
     picture = develop(raw, processor=isp, white_balance=white_balance)
-    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
-    linear = picture.rgb / full_e
+    linear = picture.rgb / raw.full_well_e
     stops = _stops(linear) if ev is None else ev
     facts = {
         "raw": str(path),

@@ -21,14 +21,13 @@ from rodcone.files import check_place
 from rodcone.memory import file_extent, memory, require_memory
 from sensor.calibration import ColourCalibration
 from sensor.capture import capture
-from sensor.cfa import channels, check_covers
+from sensor.cfa import channels, check_covers, is_rgbw
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_rgbw
 from sensor.raw_files.raw_file import check_ending, write_raw
 from studies.photograph.calibrate import calibrate, iso_speed
 from studies.study.levels import parse_level

@@ -25,7 +25,7 @@ from studies.sweep.stored import read_whole
 
 AXES = ("scene", "spectrum", "level", "exposure", "sensor", "processor")
 SAME = 1e-6  # below it a mean is none, and a half width, as a share of its mean, only sums in another order
-ELECTRONS = "electrons_"  # and a letter: mean electrons of its pixels
+ELECTRONS = "electrons_"  # and a channel: mean electrons of its pixels
 CHARTS = {"pair_delta_e": ("metamers", pair_delta_e), "daylight_delta_e": ("color_checker", daylight_delta_e)}
 TRUE_PAIRS = "true_pair_delta_e"  # of the light alone, whatever the camera
 FIGURES = tuple(one.name for one in fields(Row) if "float" in str(one.type) or one.name == "substitution")
@@ -56,7 +56,7 @@ def lines(
     by : sequence of str
         Axes, some of `AXES`.
     show : sequence of str
-        Columns of the ledger that are numbers; ``electrons_W`` and the other letters; ``pair_delta_e``, the mean
+        Columns of the ledger that are numbers; ``electrons_W`` and the other channels; ``pair_delta_e``, the mean
         CIEDE2000 within the pairs of scene metamers; ``daylight_delta_e``, the mean between the ColorChecker's patches
         and their colours under D65; both are measured in the 8-bit pictures. ``true_pair_delta_e`` is what the CIE
         observer sees of the pairs.

@@ -26,7 +26,7 @@ from sensor.optics import camera_equation, form_image
 from sensor.response import expected_electrons
 
 NM = np.arange(400.0, 701.0, 10.0)
-MEASURED = Responses({letter: Spectrum(RGBW_NM, values) for letter, values in RGBW.items()})
+MEASURED = Responses({channel: Spectrum(RGBW_NM, values) for channel, values in RGBW.items()})
 # Curves, and how well they must do.
 CURVES = {"measured": (MEASURED, 2e-3), "own": (rgbw(), 0.03)}
 TOLERANCE = 2e-3
@@ -66,15 +66,15 @@ def test_irradiance_on_the_sensor(f_number, magnification):
     assert image.photons()[0, 0] == pytest.approx(photons_per_um2_s, rel=TOLERANCE)
 
 
-@pytest.mark.parametrize("letter", "RGBW")
+@pytest.mark.parametrize("channel", "RGBW")
 @pytest.mark.parametrize(("curves", "case"), list(product(CURVES, ELECTRONS)))
-def test_electrons(curves, case, letter):
+def test_electrons(curves, case, channel):
     responses, tolerance = CURVES[curves]
     luminance_cd_m2, f_number, pitch_um, fill_factor = case
     sensor = camera(f_number, MAGNIFICATION, pitch_um, fill_factor, responses)
     mosaic = expected_electrons(form_image(scene("D65", luminance_cd_m2), sensor), sensor, 0.01)
     electrons = dict(zip("RGBW", mosaic.ravel(), strict=True))  # one tile: R G over B W
-    assert electrons[letter] == pytest.approx(ELECTRONS[case][letter], rel=tolerance)
+    assert electrons[channel] == pytest.approx(ELECTRONS[case][channel], rel=tolerance)
 
 
 @pytest.mark.parametrize(("curves", "light"), list(product(CURVES, W_RATIOS)))
@@ -88,8 +88,8 @@ def test_w_s_electron_ratios_over_380_to_780_nm(curves, light):
 
 
 def test_the_measured_curves_peak_where_the_project_s_do():
-    for letter, values in RGBW.items():
-        own = rgbw().curves[letter]
+    for channel, values in RGBW.items():
+        own = rgbw().curves[channel]
         assert values.max() == pytest.approx(own.values.max(), abs=5e-4)
         assert RGBW_NM[values.argmax()] == own.wavelength_nm[own.values.argmax()]
 

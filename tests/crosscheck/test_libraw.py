@@ -55,9 +55,9 @@ def chart(cfa: str, light: str) -> tuple[RawImage, Image]:
     electrons = (surfaces() * spectrum) @ weights.T * scale
     shape = (ROWS * SIDE, COLUMNS * SIDE)
     mosaic = np.zeros(shape)
-    for index, letter in enumerate(channels(sensor.cfa)):
+    for index, channel in enumerate(channels(sensor.cfa)):
         plane = np.kron(electrons[:, index].reshape(ROWS, COLUMNS), np.ones((SIDE, SIDE)))
-        mosaic[mask(sensor.cfa, letter, shape)] = plane[mask(sensor.cfa, letter, shape)]
+        mosaic[mask(sensor.cfa, channel, shape)] = plane[mask(sensor.cfa, channel, shape)]
     raw = RawImage(
         np.rint(mosaic / sensor.gain_e_per_dn + sensor.black_dn).astype(np.uint16),
         sensor.cfa,
@@ -71,10 +71,6 @@ def chart(cfa: str, light: str) -> tuple[RawImage, Image]:
         colour=calibrate(sensor, illuminant(light)),
     )
     return raw, electrons
-
-
-def full_e(raw: RawImage) -> float:
-    return (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
 
 
 def patches(picture: Image) -> Image:
@@ -117,8 +113,8 @@ def test_the_dark_has_no_tint_under_libraw_s_own_black_level(name: str, cfa: str
         assert theirs.black_level_per_channel == [sensor.black_dn] * 4
         lifted_e = (theirs.raw_image.astype(float) - theirs.black_level_per_channel[0]) * sensor.gain_e_per_dn
     spread_e = np.hypot(sensor.pixel.read_noise_e, sensor.gain_e_per_dn / np.sqrt(12))
-    for letter in channels(sensor.cfa):
-        here = mask(sensor.cfa, letter, shape)
+    for channel in channels(sensor.cfa):
+        here = mask(sensor.cfa, channel, shape)
         # 21 comparisons within 4 standard errors: false-alarm rate 1.3e-3
         assert abs((lifted_e - device.dark_offset_e)[here].mean()) < 4 * spread_e / np.sqrt(here.sum())
 
@@ -137,14 +133,14 @@ def test_the_dark_has_no_tint_under_libraw_s_own_black_level(name: str, cfa: str
 def test_libraw_develops_the_chart_as_the_tags_predict(cfa: str, light: str, bound: float, tmp_path: Path) -> None:
     raw, electrons = chart(cfa, light)
     (path,) = write_raw(raw, tmp_path / "chart.dng")
-    difference = patches(by_libraw(path)) - predicted(path, electrons / full_e(raw))[:, None]
+    difference = patches(by_libraw(path)) - predicted(path, electrons / raw.full_well_e)[:, None]
     assert np.abs(difference).max() < bound
 
 
 def test_libraw_and_our_own_development_agree_under_d65(tmp_path: Path) -> None:
     raw, _ = chart("bayer", "D65")
     assert raw.colour is not None
-    balanced = bilinear(raw) / full_e(raw) / raw.colour.neutral * raw.colour.neutral.max()
+    balanced = bilinear(raw) / raw.full_well_e / raw.colour.neutral * raw.colour.neutral.max()
     ours = np.clip(balanced @ raw.colour.to_srgb.T, 0.0, 1.0)
     (path,) = write_raw(raw, tmp_path / "chart.dng")
     assert np.abs(patches(by_libraw(path)) - patches(ours)).max() < 1e-3
@@ -157,7 +153,7 @@ def test_libraw_is_as_near_to_the_true_colours_as_the_matrix_fit(tmp_path: Path)
     light = illuminant("D65").band_average(NM, WIDTH)
     white = tristimulus(light, NM, WIDTH)
     true = xyz_to_srgb(adapt_to_d65(tristimulus(surfaces() * light, NM, WIDTH) / white[1], white))
-    true *= 0.95 * 15_000 / full_e(raw)
+    true *= 0.95 * 15_000 / raw.full_well_e
     error = np.abs(patches(by_libraw(path)).mean(axis=1) - np.clip(true, 0.0, 1.0))
     assert 0.003 < error.mean() < 0.007
     assert error.max() < 0.05
@@ -166,7 +162,7 @@ def test_libraw_is_as_near_to_the_true_colours_as_the_matrix_fit(tmp_path: Path)
 def test_libraw_develops_the_bayer_file_beside_an_rgbw_one(tmp_path: Path) -> None:
     raw, electrons = chart("rgbw", "D65")
     (path,) = write_raw(remosaic(raw), tmp_path / "chart_bayer.dng")
-    difference = patches(by_libraw(path)) - predicted(path, electrons[:, :3] / full_e(raw))[:, None]
+    difference = patches(by_libraw(path)) - predicted(path, electrons[:, :3] / raw.full_well_e)[:, None]
     assert np.abs(difference).max() < 1e-3
 
 
@@ -174,6 +170,6 @@ def test_a_wrong_matrix_or_balance_would_be_seen(tmp_path: Path) -> None:
     """One per cent on one entry moves some patch by more than the bounds above."""
     raw, electrons = chart("bayer", "D65")
     (path,) = write_raw(raw, tmp_path / "chart.dng")
-    whole = predicted(path, electrons / full_e(raw))
-    moved = predicted(path, electrons * [1.01, 1.0, 1.0] / full_e(raw))
+    whole = predicted(path, electrons / raw.full_well_e)
+    moved = predicted(path, electrons * [1.01, 1.0, 1.0] / raw.full_well_e)
     assert np.abs(whole - moved).max() > 5e-3

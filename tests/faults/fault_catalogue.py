@@ -160,8 +160,8 @@ SENSOR = (
     _fault(
         "saturation above the full well",
         "sensor/raw.py",
-        "full_e - SATURATION_SIGMAS",
-        "full_e + SATURATION_SIGMAS",
+        "full_well_e - SATURATION_SIGMAS",
+        "full_well_e + SATURATION_SIGMAS",
         "sensor/test_raw",
         "isp/test_pipeline",
     ),
@@ -248,7 +248,7 @@ LENS = (
     ),
     _fault(
         "veiling glare adds light",
-        "sensor/diffraction.py",
+        "sensor/optics.py",
         "(1 - lens.veiling_glare) * light +",
         "light +",
         "sensor/test_diffraction",
@@ -463,7 +463,7 @@ ISP = (
     _fault(
         "highlights not held",
         "isp/colour/highlights.py",
-        "np.where(clipped[..., None], np.minimum(balanced, full_e(raw)), balanced)",
+        "np.where(clipped[..., None], np.minimum(balanced, raw.full_well_e), balanced)",
         "balanced",
         "isp/test_pipeline",
         "isp/processors/test_catalogue",
@@ -925,8 +925,8 @@ NONSENSE = (
     _fault(
         "window left open, untold",
         "sensor/response.py",
-        "LEAST_TOLD = 5e-3",
-        "LEAST_TOLD = 0.5",
+        "LEAST_WARNED = 5e-3",
+        "LEAST_WARNED = 0.5",
         "sensor/test_response_window",
     ),
     _fault(

@@ -44,7 +44,7 @@ def _lens(f_number: float, mean_e: float, **terms: float) -> Situation:
 
 
 def _blind() -> SensorConfig:
-    return replace(low_noise(), responses=Responses({letter: flat(0.0) for letter in "RGBW"}))
+    return replace(low_noise(), responses=Responses({channel: flat(0.0) for channel in "RGBW"}))
 
 
 def _no_electrons(situation: Situation) -> Margin:

@@ -25,7 +25,7 @@ from hard.light import (
 
 from isp.interleaved import reconstruct
 from render.radiance import SpectralRadiance
-from sensor.cfa import channels, letter_map
+from sensor.cfa import channel_map, channels
 from sensor.config import LensConfig, SensorConfig
 from sensor.presets import low_noise, table1_pixel
 
@@ -104,12 +104,12 @@ def _finer() -> SpectralRadiance:
 
 def _white_of_a_flat_field(situation: Situation) -> Margin:
     """Over 48 frames the mean of the reconstructed W is that of W's samples."""
-    letters = letter_map(situation.sensor.cfa, situation.shape)
+    names = channel_map(situation.sensor.cfa, situation.shape)
     errors = []
     for seed in range(48):
         raw = shoot(situation, "interleaved", 300 + seed)
         estimate = reconstruct(raw)[..., channels(raw.cfa).index("W")].astype(np.float64)
-        errors.append(estimate.mean() - raw.electrons[letters == "W"].mean())
+        errors.append(estimate.mean() - raw.electrons[names == "W"].mean())
     return bias(np.array(errors), 1.0)
 
 

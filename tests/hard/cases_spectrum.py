@@ -11,7 +11,7 @@ from render.illuminants import lines_nm
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from render.spectrum import VISIBLE_NM
-from sensor.cfa import channels, letter_map
+from sensor.cfa import channel_map, channels
 from sensor.optics import camera_equation
 
 SODIUM = "sodium_low"
@@ -30,12 +30,12 @@ def _line_closed_form(situation: Situation) -> Margin:
     area_m2 = (sensor.pixel.pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
     powers = np.array([2.0, 1.0]) / 3.0 * camera_equation(sensor.lens) * area_m2 * situation.exposure_s * radiance
     exact = (at_lines * photons_per_joule(lines)) @ powers
-    letters = letter_map(sensor.cfa, situation.shape)
+    names = channel_map(sensor.cfa, situation.shape)
     found = expected(situation)
     margins = []
-    for number, letter in enumerate(channels(sensor.cfa)):
+    for number, channel in enumerate(channels(sensor.cfa)):
         slack = float(np.ptp(at_edges[number]) / at_lines[number].min() + np.ptp(edges) / lines[0])
-        margins.append(worst_of(found[letters == letter] - exact[number], slack * exact[number], "e⁻"))
+        margins.append(worst_of(found[names == channel] - exact[number], slack * exact[number], "e⁻"))
     return worse(*margins)
 
 

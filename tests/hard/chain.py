@@ -106,11 +106,11 @@ def camera_of(raw: RawImage) -> str:
 
 def to_picture(cfa: Tile, develop: Mapping[str, float]) -> Image:
     """Matrix (3, channel) from a camera's channels [e-] to its fixed picture, away from saturation."""
-    letters = channels(cfa)
-    with_white = "W" in letters
-    balance = np.asarray(develop.get("balance", neutral_response(letters)) if with_white else neutral_response("RGB"))
+    names = channels(cfa)
+    with_white = "W" in names
+    balance = np.asarray(develop.get("balance", neutral_response(names)) if with_white else neutral_response("RGB"))
     matrix = matrix_with_white(ColourFit.of(plain_matrix()), np.zeros(4), 1.0) if with_white else plain_matrix()
-    return np.asarray(matrix * (balance[letters.index("G")] / balance))
+    return np.asarray(matrix * (balance[names.index("G")] / balance))
 
 
 @cache

@@ -11,7 +11,7 @@ from scipy.stats import t
 
 from isp.colour.white_balance import neutral_response
 from rodcone.colour_spaces import encode_srgb
-from sensor.cfa import channels, letter_map
+from sensor.cfa import channel_map, channels
 from sensor.config import BLACK_SIGMAS, SensorConfig
 from sensor.raw import SATURATION_SIGMAS, RawImage
 from sensor.readout import noise_variance, spread_charge
@@ -42,13 +42,13 @@ def bounded(situation: Situation) -> Margin:
 
 def _picture_bound(raw: RawImage, situation: Situation) -> Image:
     """Largest value of each colour that means of the samples can give."""
-    letters = channels(raw.cfa)
-    samples = np.abs(raw.electrons).max() * np.ones(len(letters))
+    names = channels(raw.cfa)
+    samples = np.abs(raw.electrons).max() * np.ones(len(names))
     matrix = to_picture(raw.cfa, situation.develop)
     bound = np.abs(matrix) @ samples
-    if "W" in letters:  # near full samples of W the colours alone decide
-        balance = np.asarray(situation.develop.get("balance", neutral_response(letters)))
-        gains = (balance[letters.index("G")] / balance)[:3]
+    if "W" in names:  # near full samples of W the colours alone decide
+        balance = np.asarray(situation.develop.get("balance", neutral_response(names)))
+        gains = (balance[names.index("G")] / balance)[:3]
         bound = np.maximum(bound, np.abs(plain_matrix()) @ (gains * samples[:3]))
     return np.asarray(bound * (1 + ROUNDING) + 1e-300)
 
@@ -60,10 +60,10 @@ def raw_unbiased(situation: Situation) -> Margin | None:
         sensor = behind(situation, name).sensor
         mean_e = _collected(behind(situation, name))
         room = _leaves_room(mean_e, sensor, situation.exposure_s)
-        letters = letter_map(sensor.cfa, mean_e.shape)
+        names = channel_map(sensor.cfa, mean_e.shape)
         frames = [shoot(situation, name, 100 + seed) for seed in range(RAW_FRAMES)] if room.any() else []
-        for letter in channels(sensor.cfa):
-            pixels = room & (letters == letter)
+        for channel in channels(sensor.cfa):
+            pixels = room & (names == channel)
             sound = [(raw.electrons - mean_e)[pixels & ~_defective(raw)] for raw in frames]
             errors = np.array([error.mean() for error in sound if error.size])
             if errors.size:
@@ -80,8 +80,8 @@ def pictures_unbiased(situation: Situation) -> Margin | None:
         mean_e = _collected(behind(level, name))
         if not _leaves_room(mean_e, sensor, level.exposure_s).all():
             continue
-        letters = letter_map(sensor.cfa, mean_e.shape)
-        means = np.array([mean_e[letters == letter].mean() for letter in channels(sensor.cfa)])
+        names = channel_map(sensor.cfa, mean_e.shape)
+        means = np.array([mean_e[names == channel].mean() for channel in channels(sensor.cfa)])
         shown = to_picture(sensor.cfa, level.develop) @ means
         pictures = [develop_fixed(shoot(level, name, 200 + seed), level) for seed in range(PICTURES)]
         found = np.array([picture.mean(axis=(0, 1)) for picture in pictures])
@@ -115,7 +115,7 @@ def _leaves_room(mean_e: Image, sensor: SensorConfig, exposure_s: float) -> NDAr
     # Highlights are held from where a pixel counts as saturated, some sigmas of the dark under the well.
     top_e = pixel.full_well_e * (1 - SATURATION_SIGMAS * pixel.column_gain_spread)
     top_e -= SATURATION_SIGMAS * float(np.hypot(dark_e, sensor.gain_e_per_dn))
-    fits = sensor.black_e >= BLACK_SIGMAS * dark_e * (1 - 1e-12)
+    fits = sensor.black_dn * sensor.gain_e_per_dn >= BLACK_SIGMAS * dark_e * (1 - 1e-12)
     return np.asarray(fits & (mean_e + ROOM_SIGMAS * sigma_e < top_e))
 
 

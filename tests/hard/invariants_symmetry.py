@@ -8,7 +8,7 @@ from hard.chain import CAMERAS, develop_fixed, shoot, to_picture
 
 from isp.reference import sum_weights
 from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, WINDOW, Settings
-from sensor.cfa import Tile, channels, letter_map
+from sensor.cfa import Tile, channel_map, channels
 from sensor.raw import RawImage
 
 # The kernel's own bound: 1e-4 of the samples' range, or some 16 roundings of the largest log weight
@@ -78,7 +78,7 @@ def _margin(error: Image, raw: RawImage, situation: Situation) -> Margin:
     if "W" not in channels(raw.cfa):
         return _beside(error, raw, situation, DOUBLE_ROUNDINGS * float(np.abs(raw.electrons).max()))
     settings = _settings(situation)
-    samples = settings.neighbourhood**2 / np.size(letter_map(raw.cfa, (len(raw.cfa), len(raw.cfa[0]))))
+    samples = settings.neighbourhood**2 / np.size(channel_map(raw.cfa, (len(raw.cfa), len(raw.cfa[0]))))
     spread = float(np.ptp(raw.electrons))
     sums = 2 * samples * 2.0**-24 * float(np.abs(raw.electrons).max())  # roundings of the weights' sum and the values'
     plain = _beside(error, raw, situation, KERNEL_ERROR * spread + sums)

@@ -23,7 +23,7 @@ from isp.settings import SIGMA_S, Settings
 from render.spectrum import band_widths
 from render.transport import emission
 from rodcone.colour_spaces import encode_srgb
-from sensor.cfa import RGBW, channels, letter_map
+from sensor.cfa import RGBW, channel_map, channels
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device
 from sensor.kernel.kernel import expected_electrons_single, read_frame
@@ -122,7 +122,7 @@ def _summed(at: Parameters) -> Found:
     planes = (10.0 ** _rng(at).uniform(-3.0, 0.0, (count, *SHAPE))).astype(np.float32)
     weights = electrons_per_irradiance(camera, nm, band_widths(nm, np.diff(edges)), 1.0) * camera_equation(LENS)
     single = expected_electrons_single(np.moveaxis(planes, 0, -1), weights, camera).astype(np.float64)
-    channel = np.vectorize(channels(RGBW).index)(letter_map(RGBW, SHAPE))
+    channel = np.vectorize(channels(RGBW).index)(channel_map(RGBW, SHAPE))
     double = np.einsum("hwb,bhw->hw", weights[channel], planes.astype(np.float64))
     level = at["level_e"] / double.mean()
     # weight, first product or fma in each of at most 8, then one addition for each 8 bands
@@ -176,7 +176,7 @@ def _reconstructed(at: Parameters) -> Found:
     rng, side = _rng(at), 16
     rows, columns = np.indices((side, side))
     edges = 1.0 + at["contrast"] * ((columns // 5 + rows // 7) % 2)
-    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(letter_map(RGBW, (side, side)))
+    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(channel_map(RGBW, (side, side)))
     full_e, black = 15_000.0, 100.0
     electrons = np.minimum(rng.poisson(at["level_e"] * edges * response), full_e) + rng.normal(0, 2.0, (side, side))
     dn = np.clip(np.rint(electrons + black), 0, 65_535).astype(np.uint16)

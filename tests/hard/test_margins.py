@@ -9,7 +9,7 @@ from hard.invariants_raw import allowed_errors, bias
 from hard.invariants_symmetry import cut, mirrored
 
 from isp.bilinear import bilinear
-from sensor.cfa import letter_map
+from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
 
@@ -36,7 +36,7 @@ def test_a_mirrored_frame_holds_each_sample_under_its_own_letter_and_each_defect
     raw = raw_image(shape, tile)
     turned = mirrored(raw, axis)
     assert np.array_equal(turned.dn, np.flip(raw.dn, axis))
-    assert np.array_equal(letter_map(turned.cfa, shape), np.flip(letter_map(raw.cfa, shape), axis))
+    assert np.array_equal(channel_map(turned.cfa, shape), np.flip(channel_map(raw.cfa, shape), axis))
     here, there = np.zeros(shape, bool), np.zeros(shape, bool)
     here[tuple(raw.defects.T)] = there[tuple(turned.defects.T)] = True
     assert np.array_equal(there, np.flip(here, axis))
@@ -45,11 +45,11 @@ def test_a_mirrored_frame_holds_each_sample_under_its_own_letter_and_each_defect
 def test_a_cut_frame_begins_at_the_next_phase_of_the_mosaic():
     raw = raw_image((6, 7))
     part = cut(raw)
-    assert np.array_equal(letter_map(part.cfa, (5, 6)), letter_map(raw.cfa, (6, 7))[1:, 1:])
+    assert np.array_equal(channel_map(part.cfa, (5, 6)), channel_map(raw.cfa, (6, 7))[1:, 1:])
     assert np.array_equal(part.dn, raw.dn[1:, 1:])
     assert part.defects is None
     bayer = replace(raw, cfa=("RG", "GB"), defects=None)
-    order = [("R", "G", "B").index(letter) for letter in ("R", "G", "B")]
+    order = [("R", "G", "B").index(channel) for channel in ("R", "G", "B")]
     assert bilinear(cut(bayer))[2:-2, 2:-2] == pytest.approx(bilinear(bayer)[3:-2, 3:-2][..., order], rel=1e-12)
 
 

@@ -42,7 +42,7 @@ def test_green_impulse_reaches_its_four_neighbours() -> None:
 
 
 def test_samples_at_unequal_distance_weigh_by_a_tent() -> None:
-    """On two by two letters all samples within reach lie equally far; on four by four the nearest weigh most."""
+    """On a tile of two by two all samples within reach lie equally far; on four by four the nearest weigh most."""
     cfa, generator = ("WGWR", "GWRW", "WBWG", "BWGW"), np.random.default_rng(3)
     image = raw(generator.integers(1, 60_000, (12, 12)), cfa)
     red = bilinear(image)[..., 0]

@@ -1,4 +1,4 @@
-"""Defective pixels: the median of the nearest sound samples of their letter, and what a simulated chip lists."""
+"""Defective pixels: the median of the nearest sound samples of their channel, and what a simulated chip lists."""
 
 from dataclasses import replace
 

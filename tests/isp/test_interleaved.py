@@ -14,7 +14,7 @@ from isp.similarity.guide import saturated_fraction
 from isp.similarity.noise_distance import noise_distances
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
-from sensor.cfa import BAYER, RGBW, channels, letter_map
+from sensor.cfa import BAYER, RGBW, channel_map, channels
 from sensor.raw import RawImage
 
 RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
@@ -34,7 +34,7 @@ def scene(shape, level, tile=RGBW, seed=0):
     rng = np.random.default_rng(seed)
     y, x = np.indices(shape)
     base = 1.0 + 0.5 * np.sin(x / 3.0) * np.cos(y / 5.0) + 0.8 * ((x // 7 + y // 9) % 2)
-    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(letter_map(tile, shape))
+    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(channel_map(tile, shape))
     electrons = np.minimum(rng.poisson(level * base * response), FULL)
     return raw_image(electrons + rng.normal(0.0, 2.0, shape), tile)
 
@@ -56,7 +56,7 @@ def test_without_similarity_an_impulse_is_the_spatial_weight_in_closed_form(tile
     result = reconstruct_with_noise(
         raw_image(electrons, tile), Settings(sigma_d=sigma_d, sigma_s=math.inf, neighbourhood=9)
     )
-    letters = letter_map(tile, shape)
+    letters = channel_map(tile, shape)
     for i, letter in enumerate(channels(tile)):
         for x in np.ndindex(shape):
             omega = [
@@ -73,7 +73,7 @@ def test_without_similarity_an_impulse_is_the_spatial_weight_in_closed_form(tile
 def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
     """Log weights and samples of eq. (1) by pixel and channel, from eqs. (2) to (6); for RGBW in a 2x2 tile alone."""
     height, width = raw.shape
-    letters, half, reach = letter_map(raw.cfa, raw.shape), patch // 2, neighbourhood // 2
+    letters, half, reach = channel_map(raw.cfa, raw.shape), patch // 2, neighbourhood // 2
     stable = 2 * np.sqrt(np.maximum(raw.electrons + 3 / 8 + raw.dark_noise_e**2, 0))
 
     def plane(values, letter, y):
@@ -261,7 +261,7 @@ def test_extreme_input_gives_finite_results_within_the_range_of_the_samples(name
             result = reference_with_noise(raw, Settings(patch=5, sigma_d=sigma_d, sigma_s=sigma_s))
         else:
             result = function(raw, Settings(patch=5, sigma_d=sigma_d, sigma_s=sigma_s))
-        letters, electrons = letter_map(RGBW, raw.shape), raw.electrons
+        letters, electrons = channel_map(RGBW, raw.shape), raw.electrons
         for i, letter in enumerate(channels(RGBW)):
             samples = electrons[letters == letter]
             slack = 1e-5 * np.abs(samples).max()  # a weighted mean in single precision

@@ -22,8 +22,8 @@ BAYER_PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
 def raw(cfa: Tile, levels_e: dict[str, float], shape: tuple[int, int] = (32, 32), noise_e: float = 0.0) -> RawImage:
     """Raw image at one electron a DN with a black level of 100."""
     electrons = np.zeros(shape)
-    for letter in channels(cfa):
-        electrons[mask(cfa, letter, shape)] = levels_e[letter]
+    for channel in channels(cfa):
+        electrons[mask(cfa, channel, shape)] = levels_e[channel]
     electrons += noise_e * np.random.default_rng(0).standard_normal(shape)
     dn = np.clip(np.rint(electrons + 100), 0, 15_100).astype(np.uint16)
     return RawImage(dn, cfa, 100.0, 15_100.0, 1.0, max(noise_e, 1.0), 1.0, 0.0, 0.01)
@@ -108,12 +108,12 @@ def test_a_given_balance_takes_the_place_of_gray_world() -> None:
     three = raw(("RG", "GB"), {"R": 500, "G": 1000, "B": 400})
     # response 1 : 2 : 1 (: 4): R and B doubled, so that balanced signals are 1000, 1000 and 800
     expected = [1000.0, 1000.0, 800.0]
-    for picture, letters in (
+    for picture, names in (
         (picture_interleaved(four, matrix, balance=[1, 2, 1, 4]), "RGBW"),
         (picture_bayer(three, matrix, neutral=[7, 1, 7], balance=[1, 2, 1]), "RGB"),
     ):
         assert picture.rgb == pytest.approx(np.full((32, 32, 3), expected), rel=1e-5)
-        assert picture.balance == dict.fromkeys(letters, "given")
+        assert picture.balance == dict.fromkeys(names, "given")
 
 
 def test_a_picture_is_its_linear_rgb_to_numpy() -> None:
@@ -140,6 +140,6 @@ def test_gray_world_leaves_saturated_pixels_out() -> None:
     """The right half is a brighter neutral whose green is full: counted, it would take green for weaker than it is."""
     shape, levels = (32, 64), {"R": 500.0, "G": 1000.0, "B": 400.0}
     left = raw(("RG", "GB"), levels, shape)
-    bright = raw(("RG", "GB"), {letter: 30 * value for letter, value in levels.items()}, shape)
+    bright = raw(("RG", "GB"), {channel: 30 * value for channel, value in levels.items()}, shape)
     picture = picture_bayer(replace(left, dn=np.where(np.arange(64) < 32, left.dn, bright.dn)), IDENTITY)
     assert picture.rgb[:, :28] == pytest.approx(np.full((32, 28, 3), 1000.0), rel=1e-9)

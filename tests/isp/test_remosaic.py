@@ -8,9 +8,8 @@ import pytest
 from isp.remosaic import bayer_tile, remosaic
 from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile, channels, letter_map, mask
+from sensor.cfa import Tile, channel_map, channels, is_bayer, mask
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_bayer
 
 PHASES = [("RG", "BW"), ("GR", "WB"), ("BW", "RG"), ("WB", "GR"), ("RW", "GB"), ("RB", "GW"), ("WG", "BR")]
 LEVELS_E = {"R": 500.0, "G": 1000.0, "B": 400.0, "W": 5000.0}
@@ -20,14 +19,14 @@ def raw(cfa: Tile, scene: dict[str, np.ndarray]) -> RawImage:
     """Noise-free mosaic of a scene's channels at one electron a DN, black 100."""
     shape = scene["R"].shape
     electrons = np.zeros(shape)
-    for letter in channels(cfa):
-        electrons[mask(cfa, letter, shape)] = scene[letter][mask(cfa, letter, shape)]
+    for channel in channels(cfa):
+        electrons[mask(cfa, channel, shape)] = scene[channel][mask(cfa, channel, shape)]
     dn = np.rint(electrons + 100).astype(np.uint16)
     return RawImage(dn, cfa, 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
 
 
 def flat(shape: tuple[int, int] = (33, 40)) -> dict[str, np.ndarray]:
-    return {letter: np.full(shape, level) for letter, level in LEVELS_E.items()}
+    return {channel: np.full(shape, level) for channel, level in LEVELS_E.items()}
 
 
 @pytest.mark.parametrize("cfa", PHASES)
@@ -40,8 +39,8 @@ def test_the_tile_is_bayer_with_red_where_it_was(cfa: Tile) -> None:
 @pytest.mark.parametrize("cfa", PHASES)
 def test_a_flat_field_stays_flat_to_the_border(cfa: Tile) -> None:
     made = remosaic(raw(cfa, flat()))
-    for letter in "RGB":
-        assert set(made.dn[mask(made.cfa, letter, made.shape)].tolist()) == {LEVELS_E[letter] + 100}
+    for channel in "RGB":
+        assert set(made.dn[mask(made.cfa, channel, made.shape)].tolist()) == {LEVELS_E[channel] + 100}
 
 
 @pytest.mark.parametrize("cfa", PHASES)
@@ -50,7 +49,7 @@ def test_sites_on_which_both_mosaics_agree_keep_their_sample(cfa: Tile) -> None:
     noise = np.rint(20 * np.random.default_rng(3).standard_normal(clean.shape))  # the reconstruction averages over it
     noisy = replace(clean, dn=(clean.dn + noise).astype(np.uint16), read_noise_e=20.0)
     made = remosaic(noisy)
-    agree = letter_map(made.cfa, made.shape) == letter_map(cfa, noisy.shape)
+    agree = channel_map(made.cfa, made.shape) == channel_map(cfa, noisy.shape)
     assert agree.any()
     np.testing.assert_array_equal(made.dn[agree], noisy.dn[agree])
 
@@ -59,18 +58,18 @@ def test_sites_on_which_both_mosaics_agree_keep_their_sample(cfa: Tile) -> None:
 @pytest.mark.parametrize("cfa", PHASES)
 def test_a_ramp_is_sampled_where_the_new_pixel_lies(cfa: Tile, axis: int) -> None:
     place = np.indices((48, 48))[axis]
-    scene = {letter: level * (1 + 0.01 * (place - 24)) for letter, level in LEVELS_E.items()}
+    scene = {channel: level * (1 + 0.01 * (place - 24)) for channel, level in LEVELS_E.items()}
     made = remosaic(raw(cfa, scene))
     inner = np.zeros(made.shape, dtype=bool)
     inner[12:-12, 12:-12] = True  # Omega whole: samples lie evenly around each pixel
-    for letter in "RGB":
-        here = inner & mask(made.cfa, letter, made.shape)
+    for channel in "RGB":
+        here = inner & mask(made.cfa, channel, made.shape)
         # one pixel beside its place would be 1 %; noise-like weights of a ramp move the mean by a fifth of that
-        assert made.dn[here] - 100.0 == pytest.approx(scene[letter][here], rel=2.5e-3, abs=0.51), letter
+        assert made.dn[here] - 100.0 == pytest.approx(scene[channel][here], rel=2.5e-3, abs=0.51), channel
 
 
 def test_saturated_frames_stay_within_the_converter() -> None:
-    made = remosaic(raw(("RG", "BW"), {letter: np.full((16, 16), 15_000.0) for letter in "RGBW"}))
+    made = remosaic(raw(("RG", "BW"), {channel: np.full((16, 16), 15_000.0) for channel in "RGBW"}))
     assert set(made.dn.ravel().tolist()) == {15_100}
     assert made.saturated.all()
 

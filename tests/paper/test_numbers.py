@@ -63,12 +63,12 @@ def test_6_um_against_2_um_is_9_54_db_in_closed_form():
     assert decibels(np.sqrt(6.0**2 / 2.0**2)) == pytest.approx(9.542425, abs=1e-6)
 
 
-@pytest.mark.parametrize("letter", "RGBW")
-def test_6_um_against_2_um_is_9_54_db_of_two_sensors_at_100_cd_m2_and_f_4(letter):
+@pytest.mark.parametrize("channel", "RGBW")
+def test_6_um_against_2_um_is_9_54_db_of_two_sensors_at_100_cd_m2_and_f_4(channel):
     # Figure 1b. Shot noise alone: the SNR is the root of the electrons.
     radiance = scene("D65", 100.0)
     large, small = (
-        expected_electrons(form_image(radiance, sensor), sensor, 0.01)[mask(RGBW, letter, (2, 2))][0]
+        expected_electrons(form_image(radiance, sensor), sensor, 0.01)[mask(RGBW, channel, (2, 2))][0]
         for sensor in (camera(6.0, 4.0), camera(2.0, 4.0))
     )
     assert decibels(np.sqrt(large) / np.sqrt(small)) == pytest.approx(9.542425, abs=1e-6)

@@ -1,31 +1,31 @@
-"""Mosaics: which letter a pixel carries."""
+"""Mosaics: which channel a pixel has."""
 
 import numpy as np
 import pytest
 
 from rodcone.errors import InputError
-from sensor.cfa import BAYER, MOSAICS, RGBW, channels, check_covers, check_tile, letter_map, mask, tile_of
+from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map, channels, check_covers, check_tile, mask, tile_of
 
 RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
 
 
 def test_the_paper_s_tile_is_r_g_over_b_w_with_its_first_row_on_top():
-    assert letter_map(RGBW, (3, 5)).tolist() == [list("RGRGR"), list("BWBWB"), list("RGRGR")]
-    assert letter_map(BAYER, (2, 3)).tolist() == [list("RGR"), list("GBG")]
+    assert channel_map(RGBW, (3, 5)).tolist() == [list("RGRGR"), list("BWBWB"), list("RGRGR")]
+    assert channel_map(BAYER, (2, 3)).tolist() == [list("RGR"), list("GBG")]
 
 
 @pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4, ("W",), ("RGB",)])
 @pytest.mark.parametrize("shape", [(4, 4), (7, 9), (5, 4)])
 def test_each_pixel_carries_the_tile_s_letter_modulo_its_size(tile, shape):
-    letters = letter_map(tile, shape)
-    assert letters.shape == shape
+    names = channel_map(tile, shape)
+    assert names.shape == shape
     for row, column in np.ndindex(shape):
-        assert letters[row, column] == tile[row % len(tile)][column % len(tile[0])]
+        assert names[row, column] == tile[row % len(tile)][column % len(tile[0])]
 
 
 @pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4])
 def test_masks_of_all_letters_cover_each_pixel_once(tile):
-    count = sum(mask(tile, letter, (7, 9)).astype(int) for letter in channels(tile))
+    count = sum(mask(tile, channel, (7, 9)).astype(int) for channel in channels(tile))
     np.testing.assert_array_equal(count, 1)
 
 
@@ -72,7 +72,7 @@ def test_a_frame_that_does_not_hold_a_tile_is_refused_with_its_shape(shape):
 
 
 def test_bayer_s_four_phases_are_one_mosaic_moved_by_a_row_and_a_column():
-    start = letter_map(BAYER, (4, 4))
+    start = channel_map(BAYER, (4, 4))
     for name, row, column in (("rggb", 0, 0), ("grbg", 0, 1), ("gbrg", 1, 0), ("bggr", 1, 1)):
         moved = np.roll(start, (-row, -column), axis=(0, 1))[:2, :2]
         assert tuple("".join(line) for line in moved) == MOSAICS[f"bayer_{name}"]
@@ -81,11 +81,11 @@ def test_bayer_s_four_phases_are_one_mosaic_moved_by_a_row_and_a_column():
 
 
 def test_the_4x4_mosaic_is_a_white_checkerboard_with_a_bayer_mosaic_of_2x2_cells():
-    letters = letter_map(MOSAICS["rgbw_4x4"], (4, 4))
+    names = channel_map(MOSAICS["rgbw_4x4"], (4, 4))
     rows, columns = np.indices((4, 4))
-    np.testing.assert_array_equal(letters == "W", (rows + columns) % 2 == 0)
-    assert {letter: int((letters == letter).sum()) for letter in "RGB"} == {"R": 2, "G": 4, "B": 2}
-    cells = [["".join(letters[y : y + 2, x : x + 2].ravel()) for x in (0, 2)] for y in (0, 2)]
+    np.testing.assert_array_equal(names == "W", (rows + columns) % 2 == 0)
+    assert {channel: int((names == channel).sum()) for channel in "RGB"} == {"R": 2, "G": 4, "B": 2}
+    cells = [["".join(names[y : y + 2, x : x + 2].ravel()) for x in (0, 2)] for y in (0, 2)]
     assert cells == [["WGGW", "WRRW"], ["WBBW", "WGGW"]]
 
 

@@ -14,25 +14,25 @@ from sensor.curves import MOST_BYTES, QuantumEfficiencyWarning, Responses, read_
 PEAKS = {"R": (0.560, 592.0), "G": (0.678, 540.0), "B": (0.415, 476.0), "W": (1.0, 620.0)}
 
 
-def electrons(letter, light, first_nm, last_nm):
+def electrons(channel, light, first_nm, last_nm):
     """Relative electrons under a light given as energy: rectangle sum at 1 nm of energy x wavelength x response."""
     nm = np.arange(first_nm, last_nm + 1.0)
-    spectrum, curve = illuminant(light), rgbw().curves[letter]
+    spectrum, curve = illuminant(light), rgbw().curves[channel]
     energy = np.interp(nm, spectrum.wavelength_nm, spectrum.values)
     return np.sum(energy * nm * np.interp(nm, curve.wavelength_nm, curve.values))
 
 
-@pytest.mark.parametrize("letter", PEAKS)
-def test_each_curve_peaks_where_the_published_one_does(letter):
-    peak, nm = PEAKS[letter]
-    curve = rgbw().curves[letter]
+@pytest.mark.parametrize("channel", PEAKS)
+def test_each_curve_peaks_where_the_published_one_does(channel):
+    peak, nm = PEAKS[channel]
+    curve = rgbw().curves[channel]
     assert curve.values.max() == pytest.approx(peak, abs=5e-4)
     assert curve.wavelength_nm[curve.values.argmax()] == nm
 
 
-@pytest.mark.parametrize("letter", PEAKS)
-def test_each_curve_rises_to_its_peak_and_falls_behind_it_inside_0_to_1(letter):
-    curve = rgbw().curves[letter]
+@pytest.mark.parametrize("channel", PEAKS)
+def test_each_curve_rises_to_its_peak_and_falls_behind_it_inside_0_to_1(channel):
+    curve = rgbw().curves[channel]
     assert (curve.wavelength_nm[0], curve.wavelength_nm[-1]) == (380.0, 1068.0)
     at = int(curve.values.argmax())
     assert np.all(np.diff(curve.values[: at + 1]) > 0)
@@ -50,8 +50,8 @@ def test_each_curve_rises_to_its_peak_and_falls_behind_it_inside_0_to_1(letter):
 )
 def test_w_collects_the_published_multiple_of_r_g_and_b(light, first_nm, last_nm, ratios):
     white = electrons("W", light, first_nm, last_nm)
-    for letter, ratio in zip("RGB", ratios, strict=True):
-        assert white / electrons(letter, light, first_nm, last_nm) == pytest.approx(ratio, rel=0.03)
+    for channel, ratio in zip("RGB", ratios, strict=True):
+        assert white / electrons(channel, light, first_nm, last_nm) == pytest.approx(ratio, rel=0.03)
 
 
 def test_the_band_average_is_the_mean_of_the_linear_pieces():
@@ -123,8 +123,8 @@ def test_a_missing_csv_is_refused_with_its_name(tmp_path):
 FILTERS = "wavelength_nm,G,W\n400,0,0.9\n500,0.8,0.9\n600,0.4,0.9\n800,0.2,0.9\n"
 
 
-def curve(responses, letter="G"):
-    one = responses.curves[letter]
+def curve(responses, channel="G"):
+    one = responses.curves[channel]
     return one.wavelength_nm.tolist(), one.values.tolist()
 
 

@@ -121,7 +121,7 @@ def test_odd_sizes_read_the_mosaic_that_they_hold(cfa, shape, exact):
     for row, column in np.ndindex(shape):
         same = expected[row % len(tile), column % len(tile[0])]
         assert expected[row, column] == pytest.approx(same, rel=1e-6)
-    # each pixel within 6 standard deviations of its own letter's mean: 2e-9 a pixel
+    # each pixel within 6 standard deviations of its own channel's mean: 2e-9 a pixel
     assert np.all(np.abs(raw.electrons - expected) < 6 * np.sqrt(expected + 1) + raw.gain_e_per_dn)
 
 
@@ -148,7 +148,7 @@ def test_a_well_under_the_read_noise_still_gives_numbers(exact):
 
 @EXACT
 def test_a_response_of_zero_everywhere_reads_as_darkness_under_any_light(exact):
-    blind = Responses({letter: flat(0.0) for letter in "RGBW"})
+    blind = Responses({channel: flat(0.0) for channel in "RGBW"})
     sensor = replace(preset("low_noise"), responses=blind)
     raw = shoot(sensor, 1e9, (64, 64), exact)
     assert abs(raw.electrons.mean()) < 4 * raw.dark_noise_e / 64

@@ -111,7 +111,7 @@ def test_the_least_file_leaves_the_rest_at_its_defaults(tmp_path):
         ('bits = "14"\n' + LEAST + LENS, ("bits: '14'",)),
         ("window_nm = [400]\n" + LEAST + LENS, ("window_nm: [400]", "[shortest, longest]")),
         ('window_nm = ["a", "b"]\n' + LEAST + LENS, ("window_nm: ['a', 'b']",)),
-        ("window_nm = [700, 400]\n" + LEAST + LENS, ("window_nm: (700.0, 400.0)",)),
+        ("window_nm = [700, 400]\n" + LEAST + LENS, ("window_nm: [700, 400]",)),
         ('cfa = "bayr"\n' + LEAST + LENS, ("cfa: 'bayr'", "did you mean 'bayer'?")),
         ('cfa = ["RG", "B"]\n' + LEAST + LENS, ("cfa", "differ in length")),
         ("cfa = 3\n" + LEAST + LENS, ("cfa: 3",)),
@@ -153,8 +153,8 @@ def test_measured_responses_are_read_beside_the_file_with_all_that_it_states(tmp
         (both, read_csv(tmp_path / "curves.csv", range_nm=(400, 700), ir_cut=cut, quantum_efficiency=efficiency)),
         (numbers, read_csv(tmp_path / "curves.csv", range_nm=(400, 700), ir_cut=650.0, quantum_efficiency=0.5)),
     ):
-        for letter in "RGBW":
-            one, other = sensor.responses.curves[letter], curves.curves[letter]
+        for channel in "RGBW":
+            one, other = sensor.responses.curves[channel], curves.curves[channel]
             np.testing.assert_array_equal(one.wavelength_nm, other.wavelength_nm)
             np.testing.assert_array_equal(one.values, other.values)
     assert plain.responses.curves["W"].values.max() == 0.9

@@ -344,7 +344,7 @@ def test_full_pixels_of_weak_columns_count_as_saturated_too():
 
 def test_black_stands_five_sigmas_above_0_with_column_offsets_too():
     sensor = camera(read_noise_e=2.0, dsnu_e=3.0, column_offset_e=6.0)
-    assert 35.0 <= sensor.black_e < 35.0 + 1.1 * sensor.gain_e_per_dn
+    assert 35.0 <= sensor.black_dn * sensor.gain_e_per_dn < 35.0 + 1.1 * sensor.gain_e_per_dn
 
 
 # Refusals

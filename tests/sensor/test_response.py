@@ -45,8 +45,8 @@ def test_a_uniform_scene_gives_each_letter_its_closed_form(tile):
     electrons = expected(uniform(2e-3, 550.0, width_nm=10.0), sensor, 0.02)
     # irradiance x width x photons a joule x collecting area x time
     photons = 2e-3 * pi / (1 + 4 * 2.0**2) * 10.0 * (550e-9 / JOULES) * (9e-12 * 0.5) * 0.02
-    for letter in set("".join(tile)):
-        np.testing.assert_allclose(electrons[mask(tile, letter, (4, 6))], QE[letter] * photons, rtol=1e-12)
+    for channel in set("".join(tile)):
+        np.testing.assert_allclose(electrons[mask(tile, channel, (4, 6))], QE[channel] * photons, rtol=1e-12)
 
 
 def test_bands_add_up_each_with_its_own_wavelength_and_width():
@@ -127,8 +127,8 @@ def test_each_pixel_takes_its_own_letter_s_plane():
     image = form_image(radiance, sensor)
     planes, mosaic = channel_electrons(image, sensor, 0.01), expected_electrons(image, sensor, 0.01)
     assert planes.shape == (5, 7, 4)
-    for index, letter in enumerate("RGBW"):
-        here = mask(RGBW, letter, (5, 7))
+    for index, channel in enumerate("RGBW"):
+        here = mask(RGBW, channel, (5, 7))
         np.testing.assert_array_equal(mosaic[here], planes[here, index])
 
 

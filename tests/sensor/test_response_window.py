@@ -49,7 +49,7 @@ def test_the_shares_are_what_the_electrons_of_equal_energy_light_lose(low_nm, hi
         for seen in (equal_energy(380, 780, 1.0), equal_energy(low_nm, high_nm, 1.0))
     )
     shares = lost_shares(SENSOR, *bands(equal_energy(low_nm, high_nm)))
-    assert [shares[letter] for letter in "RGBW"] == pytest.approx(1 - cut / whole, abs=2e-4)
+    assert [shares[channel] for channel in "RGBW"] == pytest.approx(1 - cut / whole, abs=2e-4)
 
 
 def shoot(radiance, take=capture, **options):

@@ -60,8 +60,8 @@ def test_a_matched_density_gives_w_greens_electrons() -> None:
     green, white = neutral_response(("G", "W"), neutral_density(rgbw()))
     assert white == pytest.approx(green, rel=1e-12)
     assert 1 / 7 < share < 1 / 4  # the paper: W gathers about 6 times green's light
-    for letter in "RGB":
-        assert neutral_density(rgbw()).curves[letter] is rgbw().curves[letter]
+    for channel in "RGB":
+        assert neutral_density(rgbw()).curves[channel] is rgbw().curves[channel]
 
 
 @pytest.mark.parametrize("name", [*MOSAICS, *VARIATIONS])
@@ -88,11 +88,11 @@ def test_what_cannot_be_made_is_refused() -> None:
     with pytest.raises(InputError, match=r"cfa: 'rgbwnd' is unknown; .*did you mean 'rgbw_nd'"):
         vary(preset("low_noise"), "rgbwnd")
     with pytest.raises(InputError, match=r"responses: no curve of B; allowed: R, G, B and W; add it"):
-        complementary(Responses({letter: rgbw().curves[letter] for letter in "RG"}))
+        complementary(Responses({channel: rgbw().curves[channel] for channel in "RG"}))
     dim = Responses({"G": rgbw().curves["W"], "W": rgbw().curves["G"]})
     with pytest.raises(InputError, match=r"responses: W collects .* allowed: W more than G"):
         matched_transmittance(dim)
-    bright = {letter: Spectrum(np.array([400.0, 700.0]), np.array([0.6, 0.6])) for letter in "RGB"}
+    bright = {channel: Spectrum(np.array([400.0, 700.0]), np.array([0.6, 0.6])) for channel in "RGB"}
     with pytest.raises(InputError, match=r"responses: C reaches 1.2 electrons a photon"):
         complementary(Responses(bright))
 

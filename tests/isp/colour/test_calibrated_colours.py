@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isp.colour.calibrated_colours import MEAN_SRGB, MOMENTS_SRGB, UNTOLD, fit_of_calibration
+from isp.colour.calibrated_colours import MEAN_SRGB, MOMENTS_SRGB, UNEXPLAINED, fit_of_calibration
 from isp.colour.colour_fit import fit_colours, training
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
@@ -57,7 +57,7 @@ def test_without_noise_w_stays_out_of_the_colours() -> None:
     responses = preset("low_noise", "rgbw").responses.band_average(LETTERS, NM, WIDTH)
     signals, srgb = training(responses, NM, illuminant("D65").band_average(NM, WIDTH), SURFACES)
     row = np.linalg.solve(MOMENTS_SRGB, fit.cross[3])
-    assert np.sqrt(((signals[:, 3] - srgb @ row) ** 2).mean()) == pytest.approx(UNTOLD, rel=0.2)
+    assert np.sqrt(((signals[:, 3] - srgb @ row) ** 2).mean()) == pytest.approx(UNEXPLAINED, rel=0.2)
 
 
 def test_three_channels_need_no_more_than_their_matrix() -> None:

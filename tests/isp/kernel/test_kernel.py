@@ -12,7 +12,7 @@ from isp.settings import Settings
 from isp.similarity.guide import reliability, reliability_of_mean
 from rodcone.errors import InputError
 from rodcone.jit import backend
-from sensor.cfa import BAYER, RGBW, channels, letter_map
+from sensor.cfa import BAYER, RGBW, channel_map, channels
 from sensor.raw import RawImage
 
 RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
@@ -33,7 +33,7 @@ def random_scene(rng, tile):
     y, x = np.indices(shape)
     base = 1.0 + rng.uniform(0, 1) * np.sin(x / rng.uniform(1, 9) + y / rng.uniform(1, 9))
     base += rng.uniform(0, 3) * ((x // int(rng.integers(2, 12)) + y // int(rng.integers(2, 12))) % 2)
-    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(letter_map(tile, shape))
+    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(channel_map(tile, shape))
     level = 10.0 ** rng.uniform(-1.0, 5.0)
     electrons = np.minimum(rng.poisson(level * base * response), FULL) + rng.normal(0.0, 2.0, shape)
     return raw_image(electrons, tile)
@@ -114,7 +114,7 @@ def test_hard_frames_give_finite_results_within_the_range_of_the_samples(name, d
     """A weighted mean can't leave the range of its samples; single precision may by 1e-6. Warnings are errors."""
     electrons, black, gain = HARD_FRAMES[name]
     raw = raw_image(np.asarray(electrons, float), RGBW, black, gain)
-    letters, samples = letter_map(RGBW, raw.shape), raw.electrons
+    letters, samples = channel_map(RGBW, raw.shape), raw.electrons
     for sigma_s in (1e-3, 0.1, 8.0, 1e6, math.inf):
         result = reconstruct_with_noise(
             raw,
@@ -141,7 +141,7 @@ def test_hard_frames_give_finite_results_within_the_range_of_the_samples(name, d
 def test_nothing_beyond_the_frame_is_averaged(patch, white, settings):
     """Flat planes stay flat at the border, also where similarity counts for nothing."""
     flat = {"R": 30.0, "G": 900.0, "B": 300.0, "W": white}
-    raw = raw_image(np.vectorize(flat.get)(letter_map(RGBW, (17, 22))))
+    raw = raw_image(np.vectorize(flat.get)(channel_map(RGBW, (17, 22))))
     expected = [min(flat[letter], 65535 - BLACK) for letter in channels(RGBW)]
     np.testing.assert_allclose(
         reconstruct(raw, Settings(patch=patch, **settings)), np.broadcast_to(expected, (17, 22, 4)), rtol=1e-6
@@ -165,7 +165,7 @@ def test_a_pixel_without_a_similar_neighbour_keeps_its_sample_and_takes_the_near
         sum_weights(raw, Settings(patch=5, sigma_s=0.05)).largest.min() < -1000.0
     )  # every weight underflows by itself
     assert np.abs(reconstruct(raw, Settings(sigma_s=0.05, patch=5)) - exact).max() < 0.05
-    letters = letter_map(RGBW, raw.shape)
+    letters = channel_map(RGBW, raw.shape)
     for i, letter in enumerate(channels(RGBW)):
         here = letters[12:15, 12:15] == letter
         assert exact[12:15, 12:15, i][here] == pytest.approx(raw.electrons[12:15, 12:15][here], rel=1e-9)

@@ -19,8 +19,8 @@ def raw(cfa: Tile, shape: tuple[int, int] = (33, 38), level_e: float = 400.0, se
     """Poisson exposure with 2 e- of read noise: G at the level, R at a half, B at 0.4 of it."""
     rng = np.random.default_rng(seed)
     expected = np.zeros(shape)
-    for letter, share in (("R", 0.5), ("G", 1.0), ("B", 0.4)):
-        expected[mask(cfa, letter, shape)] = share * level_e
+    for channel, share in (("R", 0.5), ("G", 1.0), ("B", 0.4)):
+        expected[mask(cfa, channel, shape)] = share * level_e
     electrons = rng.poisson(expected) + 2.0 * rng.standard_normal(shape)
     return RawImage(np.rint(electrons + 100).astype(np.uint16), cfa, 100.0, 15_100.0, 1.0, 2.0, 0.0, 0.0, 0.01)
 

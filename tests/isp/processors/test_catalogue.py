@@ -9,7 +9,7 @@ from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
-from sensor.cfa import MOSAICS, RGBW, Tile, channels, letter_map
+from sensor.cfa import MOSAICS, RGBW, Tile, channel_map, channels
 from sensor.raw import RawImage
 from sensor.variations import VARIATIONS
 
@@ -39,8 +39,8 @@ def phases(tile: Tile) -> Iterator[Tile]:
 
 def grey(name: str, tile: Tile, level_e: np.ndarray) -> RawImage:
     """Noise-free exposure of a neutral scene whose green collects `level_e` (h, w), one electron a DN, black 100."""
-    letters = letter_map(tile, level_e.shape)
-    share = np.vectorize(neutral_of(name).get)(letters)
+    names = channel_map(tile, level_e.shape)
+    share = np.vectorize(neutral_of(name).get)(names)
     dn = np.clip(np.rint(level_e * share) + 100, 0, FULL_E + 100).astype(np.uint16)
     return RawImage(dn, tile, 100.0, FULL_E + 100, 1.0, 1.0, 1.0, 0.0, 0.01)
 
@@ -71,7 +71,7 @@ def test_a_grey_ramp_into_saturation_takes_no_colour(name: str) -> None:
     require_library(name)
     ramp = 5000.0 + 500.0 * np.indices((24, 80))[1]
     tile = tile_of(name)
-    balance = [neutral_of(name)[letter] for letter in channels(tile)]
+    balance = [neutral_of(name)[channel] for channel in channels(tile)]
     rgb = PROCESSORS[name].develop(grey(name, tile, ramp), IDENTITY, balance=balance).rgb
     assert np.abs(rgb - rgb[..., 1:2]).max() <= 500.0 * (1 + 1e-6)
     bright = rgb[:, -20:]
@@ -82,7 +82,7 @@ def test_a_grey_ramp_into_saturation_takes_no_colour(name: str) -> None:
 def test_bright_ends_at_greens_full_well_or_where_w_alone_is_the_luminance_at_w_s(name: str) -> None:
     require_library(name)
     tile = tile_of(name)
-    balance = [neutral_of(name)[letter] for letter in channels(tile)]
+    balance = [neutral_of(name)[channel] for channel in channels(tile)]
     rgb = PROCESSORS[name].develop(grey(name, tile, np.full((24, 24), 1e5)), IDENTITY, balance=balance).rgb
     ends_with_w = name in ("rgbw_sato", "cmyw_yamagami")
     assert rgb == pytest.approx(np.full((24, 24, 3), FULL_E / 5 if ends_with_w else FULL_E), rel=1e-5)
@@ -95,7 +95,7 @@ def test_nothing_beside_a_highlight_is_brighter_than_it(name: str) -> None:
     rows, columns = np.indices((32, 34))
     square = np.where((abs(rows - 16) < 7) & (abs(columns - 16) < 7), 1e5, 2000.0)
     tile = tile_of(name)
-    balance = [neutral_of(name)[letter] for letter in channels(tile)]
+    balance = [neutral_of(name)[channel] for channel in channels(tile)]
     rgb = PROCESSORS[name].develop(grey(name, tile, square), IDENTITY, balance=balance).rgb
     if name in ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami"):  # differences of colours from a luminance of their own
         assert luminance_of_srgb(rgb).max() <= FULL_E * (1 + 1e-6)
@@ -107,11 +107,11 @@ def test_nothing_beside_a_highlight_is_brighter_than_it(name: str) -> None:
 def test_a_given_balance_takes_the_place_of_gray_world(name: str) -> None:
     require_library(name)
     tile, unit = tile_of(name), PROCESSORS[name].unit
-    letters = channels(tile)
-    other = [neutral_of(name)[letter] * (2.0 if letter == "W" else 1.0) for letter in letters]
+    names = channels(tile)
+    other = [neutral_of(name)[channel] * (2.0 if channel == "W" else 1.0) for channel in names]
     level = PROCESSORS[name].develop(grey(name, tile, np.full((20, 20), 800.0)), IDENTITY, balance=other)
-    assert level.balance == dict.fromkeys(letters, "given")
-    assert unit in letters
+    assert level.balance == dict.fromkeys(names, "given")
+    assert unit in names
     # W given as twice as sensitive as it is: half the luminance where W is that, none of a change where it isn't
     expected = 400.0 if name in ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami") else 800.0
     assert level.rgb == pytest.approx(np.full((20, 20, 3), expected), rel=1e-5)

@@ -39,10 +39,8 @@ def test_malvars_filters_on_an_impulse(cfa: tuple[str, str]) -> None:
     # Malvar, He & Cutler 2004, Figure 2: green at the impulse's own red site is 4/8 of it, at the next red or blue
     # site of its row -1/8; green at the green sites beside it is their own sample.
     rows, columns = np.array([list(row) for row in cfa]), np.indices((16, 16))
-    letters = np.tile(rows, (8, 8))
-    y, x = next(
-        (y, x) for y, x in zip(*map(np.ravel, columns), strict=True) if letters[y, x] == "R" and y > 5 and x > 5
-    )
+    names = np.tile(rows, (8, 8))
+    y, x = next((y, x) for y, x in zip(*map(np.ravel, columns), strict=True) if names[y, x] == "R" and y > 5 and x > 5)
     mosaic = np.zeros((16, 16))
     mosaic[y, x] = 8.0
     green, blue = (malvar(mosaic, cfa)[..., index] for index in (1, 2))
@@ -78,6 +76,6 @@ def test_a_mosaic_is_balanced_to_greens_unit_and_held_beside_a_full_colour() -> 
 
 def test_other_tiles_are_refused() -> None:
     with pytest.raises(
-        InputError, match=r"^raw: mosaic \('RG', 'BW'\) is not Bayer; allowed here: .*; use another isp"
+        InputError, match=r"^raw: mosaic \('RG', 'BW'\) is not Bayer; allowed here: .*; use another processor"
     ):
         malvar(np.zeros((8, 8)), ("RG", "BW"))

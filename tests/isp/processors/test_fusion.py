@@ -12,7 +12,7 @@ from isp.processors.fusion import (
     with_luminance,
 )
 from rodcone.colour_spaces import luminance_of_srgb
-from sensor.cfa import RGBW, Tile, channels, letter_map
+from sensor.cfa import RGBW, Tile, channel_map, channels
 from sensor.curves import complementary, matched_transmittance, rgbw
 from sensor.raw import RawImage
 
@@ -21,9 +21,9 @@ BALANCE = [0.5, 1.0, 0.4, 5.0]
 
 
 def exposure(planes_e: dict[str, np.ndarray], cfa: Tile = RGBW, dark_e: float = 1.0) -> RawImage:
-    """Noise-free raw image in which each letter's sites read that letter's plane."""
+    """Noise-free raw image in which each channel's sites read that channel's plane."""
     shape = next(iter(planes_e.values())).shape
-    electrons = np.select([letter_map(cfa, shape) == letter for letter in planes_e], list(planes_e.values()))
+    electrons = np.select([channel_map(cfa, shape) == channel for channel in planes_e], list(planes_e.values()))
     dn = np.clip(np.rint(4 * electrons) + 100, 0, 60_100).astype(np.uint16)
     return RawImage(dn, cfa, 100.0, 60_100.0, 0.25, dark_e, 0.0, 0.0, 0.01)
 
@@ -53,11 +53,11 @@ def test_the_luminance_is_ws_in_full_bandwidth(name: str, white: float) -> None:
 def test_yamagamis_colour_differences_have_less_noise_than_satos() -> None:
     # Bilinear leaves a colour's own samples as they are: standard deviation 1 there. The tent averages 7.1 samples.
     rng = np.random.default_rng(3)
-    noisy = exposure({letter: 500 + 20 * rng.standard_normal((96, 96)) for letter in "RGBW"})
+    noisy = exposure({channel: 500 + 20 * rng.standard_normal((96, 96)) for channel in "RGBW"})
     sato, yamagami = (
         PROCESSORS[name].develop(noisy, np.eye(3), balance=[1, 1, 1, 1]).rgb for name in ("rgbw_sato", "rgbw_yamagami")
     )
-    blue_sites = letter_map(noisy.cfa, noisy.shape) == "B"
+    blue_sites = channel_map(noisy.cfa, noisy.shape) == "B"
     spread = [np.std((rgb[..., 2] - rgb[..., 0])[blue_sites]) for rgb in (sato, yamagami)]
     # at a B site Sato's B is a sample (1) and R the mean of two (1/2): sqrt(1.5) * 20; Yamagami's: sqrt(2 / 7.1) * 20
     assert spread[0] == pytest.approx(20 * np.sqrt(1.5), rel=0.1)
@@ -82,8 +82,8 @@ def test_kijima_gives_a_grey_scene_all_of_ws_detail() -> None:
     white = exposure({"R": 0.5 * flat, "G": flat, "B": 0.4 * flat, "W": 5 * level})
     rgb = PROCESSORS["rgbw_kijima"].develop(white, np.eye(3), balance=BALANCE).rgb
     plane = fill(white.electrons / 5, RGBW, "W")
-    for index, letter in enumerate("RGB"):
-        expected = plane + combine(np.where(letter_map(RGBW, (24, 24)) == letter, 500.0 - plane, 0.0), RGBW, letter)
+    for index, channel in enumerate("RGB"):
+        expected = plane + combine(np.where(channel_map(RGBW, (24, 24)) == channel, 500.0 - plane, 0.0), RGBW, channel)
         assert rgb[..., index] == pytest.approx(expected, rel=1e-9)
 
 
@@ -103,7 +103,7 @@ def test_a_density_of_its_own_is_what_the_default_neutral_of_yamagami_holds() ->
     shares = neutral_response(("R", "G", "B", "W")) / neutral_response(("G",))
     shares[3] *= matched_transmittance(rgbw())
     assert shares[3] == pytest.approx(1.0, rel=1e-12)
-    level = {letter: np.full((16, 16), 80.0 * share) for letter, share in zip("RGBW", shares, strict=True)}
+    level = {channel: np.full((16, 16), 80.0 * share) for channel, share in zip("RGBW", shares, strict=True)}
     picture = PROCESSORS["rgbw_yamagami"].develop(exposure(level, dark_e=1000.0), MATRIX)
     assert picture.balance == dict.fromkeys("RGBW", "calibrated")
     # half a DN is 0.125 e-, in B 0.4 when balanced, and 1.5 times that in the matrix
@@ -114,8 +114,8 @@ def test_complementary_colours_come_in_the_matrix_order_c_y_m() -> None:
     # Yellow is the unit, W (balanced to 1000) the luminance; with the identity each output shows its own column.
     level = {"C": np.full((16, 16), 900.0), "M": np.full((16, 16), 350.0), "Y": np.full((16, 16), 1000.0)}
     raw = exposure({**level, "W": np.full((16, 16), 5000.0)}, ("CM", "YW"))
-    letters = channels(raw.cfa)
-    assert letters == ("W", "C", "M", "Y")
+    names = channels(raw.cfa)
+    assert names == ("W", "C", "M", "Y")
     picture = PROCESSORS["cmyw_yamagami"].develop(raw, np.eye(3), balance=[5.0, 0.9, 0.7, 1.0])
     balanced = np.array([1000.0, 1000.0, 500.0])  # C, Y, M
     expected = balanced + (1000.0 - luminance_of_srgb(balanced))
@@ -125,7 +125,8 @@ def test_complementary_colours_come_in_the_matrix_order_c_y_m() -> None:
 
 def test_complementary_colours_in_the_dark_take_their_own_neutral() -> None:
     response = neutral_response(("W", "C", "M", "Y"), complementary(rgbw()))
-    level = {letter: np.full((16, 16), 80.0 * one / response[3]) for letter, one in zip("WCMY", response, strict=True)}
+    shares = zip("WCMY", response / response[3], strict=True)
+    level = {channel: np.full((16, 16), 80.0 * share) for channel, share in shares}
     picture = PROCESSORS["cmyw_yamagami"].develop(exposure(level, ("CM", "YW"), dark_e=1000.0), np.eye(3))
     assert picture.balance == dict.fromkeys("CMYW", "calibrated")
     assert picture.rgb == pytest.approx(np.full((16, 16, 3), 80.0), abs=0.3)
@@ -134,7 +135,7 @@ def test_complementary_colours_in_the_dark_take_their_own_neutral() -> None:
 def test_where_w_is_full_the_colours_keep_their_ratios_at_its_luminance() -> None:
     # W reads 15 000 e- at most: 3000 balanced. An orange of that and more luminance keeps its chromaticity.
     level = {"R": 5000.0, "G": 6000.0, "B": 800.0, "W": 40_000.0}
-    raw = exposure({letter: np.full((16, 16), one) for letter, one in level.items()})
+    raw = exposure({channel: np.full((16, 16), one) for channel, one in level.items()})
     orange = np.array([10_000.0, 6000.0, 2000.0])
     for name in ("rgbw_sato", "rgbw_yamagami"):
         rgb = PROCESSORS[name].develop(raw, np.eye(3), balance=BALANCE).rgb

@@ -32,7 +32,7 @@ def test_where_w_is_full_the_colours_stand_alone(cfa: Tile) -> None:
     values = np.rint(np.random.default_rng(1).uniform(100, 10_000, (24, 40)))
     values[:, :20][mask(cfa, "W", (24, 40))[:, :20]] = 15_000
     rgb = PROCESSORS["rgbw_gindele"].develop(raw(values, cfa), np.eye(3), balance=ONES).rgb
-    alone = np.stack([fill(values, cfa, letter) for letter in "RGB"], axis=-1)
+    alone = np.stack([fill(values, cfa, channel) for channel in "RGB"], axis=-1)
     np.testing.assert_allclose(rgb[:, : 19 + REACH - 1], alone[:, : 19 + REACH - 1], rtol=1e-12)
     np.testing.assert_allclose(rgb[:, 21 + REACH :], adams_planes(values, cfa)[:, 21 + REACH :], rtol=1e-12)
 
@@ -90,5 +90,5 @@ def test_the_smaller_gradient_wins_on_a_diagonal() -> None:
 
 
 def test_other_tiles_are_refused() -> None:
-    with pytest.raises(InputError, match=r"^cfa: .* is not 2x2 RGBW; allowed here: .*; use another isp"):
+    with pytest.raises(InputError, match=r"^cfa: .* is not 2x2 RGBW; allowed here: .*; use another processor"):
         luminance_plane(np.zeros((8, 8)), ("WGWR", "GWRW", "WBWG", "BWGW"))

@@ -271,7 +271,7 @@ def test_light_of_1e8_full_wells_and_more_saturates_and_nothing_more(full_well_e
 def test_light_beyond_single_precision_saturates_without_a_warning(light, crosstalk):
     sensor = replace(COUNTS, pixel=replace(COUNTS.pixel, crosstalk=crosstalk))
     weights = np.full((4, 3), 1e20)
-    weights[0] = 0.0  # a letter that doesn't see it
+    weights[0] = 0.0  # a channel that doesn't see it
     expected_e = expected_electrons_single(np.full((6, 8, 3), light), weights, sensor)
     assert not np.isnan(expected_e).any()
     dn = read_frame(expected_e, sensor, even((6, 8)), 0.01, 1)

@@ -15,15 +15,13 @@ from hypothesis import strategies as st
 
 from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
-from sensor.cfa import MOSAICS, RGBW, Tile, channels
+from sensor.cfa import MOSAICS, RGBW, Tile, channels, is_bayer, is_rgbw
 from sensor.raw import RawImage
 from sensor.raw_files.dng import (
     PRIVATE,
     PRIVATE_DATA,
     dng_tags,
     exif_tags,
-    is_bayer,
-    is_rgbw,
     rational,
     read_dng,
     write_dng,
@@ -93,8 +91,8 @@ def test_libraw_reads_every_phase_bit_for_bit(cfa: Tile, shape: tuple[int, int],
     write_dng(raw, tmp_path / "shot.dng")
     with rawpy.imread(str(tmp_path / "shot.dng")) as theirs:
         np.testing.assert_array_equal(theirs.raw_image, raw.dn)
-        letters = "RGBG" if is_bayer(cfa) else "RGBW"  # LibRaw counts a Bayer tile's second green as number 3
-        assert tuple("".join(letters[i] for i in row) for row in theirs.raw_pattern) == cfa
+        names = "RGBG" if is_bayer(cfa) else "RGBW"  # LibRaw counts a Bayer tile's second green as number 3
+        assert tuple("".join(names[i] for i in row) for row in theirs.raw_pattern) == cfa
         assert theirs.white_level == 2**14 - 1
         assert theirs.black_level_per_channel == [10, 10, 10, 10]
         gains = np.array(theirs.camera_whitebalance[: theirs.num_colors])

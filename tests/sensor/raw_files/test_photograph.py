@@ -92,7 +92,7 @@ def test_frames_are_turned_upright_as_libraw_turns_its_own_pictures(orientation:
         picture = theirs.postprocess(output_bps=16, no_auto_bright=True, gamma=(1, 1), half_size=False)
     assert picture.shape[:2] == raw.shape
     assert brightest_corner(picture[..., 1]) == brightest_corner(raw.dn)
-    # the letters are turned with the samples: each is found by its own level
+    # the channels are turned with the samples: each is found by its own level
     shares = np.select([np.indices(SHAPE).sum(0) % 2 == 1, np.indices(SHAPE)[0] % 2 == 0], [1.0, 0.5], 0.25)
     mosaic = read_raw(other_camera(tmp_path / "sites.dng", levels(8000.0 * shares), orientation=orientation))
     by_value = np.where(mosaic.electrons == 8000 * mosaic.gain_e_per_dn, "G", "R")

@@ -27,7 +27,7 @@ def colour(count: int) -> ColourCalibration:
 
 
 def exposure(cfa: Tile, shape: tuple[int, int] = (9, 11)) -> RawImage:
-    letters = channels(cfa)
+    names = channels(cfa)
     return RawImage(
         np.random.default_rng(1).integers(0, 2**16, shape, dtype=np.uint16),
         cfa,
@@ -39,7 +39,7 @@ def exposure(cfa: Tile, shape: tuple[int, int] = (9, 11)) -> RawImage:
         prnu=0.017,
         exposure_s=1e-3,
         camera="car camera",
-        colour=colour(len(letters)) if set("RGB") <= set(letters) else None,
+        colour=colour(len(names)) if set("RGB") <= set(names) else None,
     )
 
 

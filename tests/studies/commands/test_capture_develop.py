@@ -359,9 +359,8 @@ def test_as_shot_balance_keeps_the_light_s_colour_that_gray_world_takes_away(
     raw = negative(tmp_path / "shot.dng", cfa, 0.1, light="A")
     colour = calibrate(preset("low_noise", cfa), illuminant("D65"))
     write_raw(replace(raw, colour=colour), tmp_path / "shot.dng")  # balanced for daylight, taken under a lamp
-    signal = np.array([raw.electrons[mask(raw.cfa, letter, SHAPE)].mean() for letter in "RGB"])
-    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
-    orange = colour.to_srgb @ (signal / colour.neutral[:3] / full_e)
+    signal = np.array([raw.electrons[mask(raw.cfa, channel, SHAPE)].mean() for channel in "RGB"])
+    orange = colour.to_srgb @ (signal / colour.neutral[:3] / raw.full_well_e)
     for balance, source, expected in (("as-shot", "given", orange), ("gray-world", "gray world", np.full(3, 0.1))):
         out = tmp_path / f"{balance}.png"
         arguments = ["develop", str(tmp_path / "shot.dng"), "--ev", "1", "--white-balance", balance, "-o", str(out)]
@@ -388,9 +387,8 @@ def test_a_picture_in_display_p3_as_tiff_carries_its_profile(
     raw = negative(tmp_path / "shot.dng", share=0.1, light="A")
     colour = calibrate(preset("low_noise", "bayer"), illuminant("D65"))
     write_raw(replace(raw, colour=colour), tmp_path / "shot.dng")  # an orange wall, as above
-    signal = np.array([raw.electrons[mask(raw.cfa, letter, SHAPE)].mean() for letter in "RGB"])
-    full_e = (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn
-    orange = colour.to_srgb @ (signal / colour.neutral[:3] / full_e)
+    signal = np.array([raw.electrons[mask(raw.cfa, channel, SHAPE)].mean() for channel in "RGB"])
+    orange = colour.to_srgb @ (signal / colour.neutral[:3] / raw.full_well_e)
     out = tmp_path / "wide.tif"
     arguments = ["develop", str(tmp_path / "shot.dng"), "--encoding", "display-p3", "--bits", "16", "-o", str(out)]
     code, printed, _ = call([*arguments, "--ev", "0", "--white-balance", "as-shot", "--json"], capsys)

@@ -61,13 +61,13 @@ def both(value: object, other: object | None = None) -> dict[str, object]:
     return {PIXEL: value, OUTPUT: value if other is None else other}
 
 
-ROOTS = {letter: value**0.5 for letter, value in signal_ratios("D65").items()}
+ROOTS = {channel: value**0.5 for channel, value in signal_ratios("D65").items()}
 TIMES = {"R": 10.0, "G": 6.0, "B": 10.0}
 EVEN = dict.fromkeys("RGB", 1.0)
 
 
 def gains(ratios: dict[str, float]) -> dict[str, Gain]:
-    return {letter: Gain(ratio, 0.5, 0.5) for letter, ratio in ratios.items()}
+    return {channel: Gain(ratio, 0.5, 0.5) for channel, ratio in ratios.items()}
 
 
 SAME, SIX, ROOT = both(gains(EVEN)), both(gains(TIMES)), both(gains(ROOTS))

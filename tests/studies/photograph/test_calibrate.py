@@ -34,8 +34,8 @@ def camera(curves: dict[str, Spectrum], cfa: tuple[str, ...] = ("RG", "GB")) -> 
 def observer() -> SensorConfig:
     """Camera whose R, G, B count energy through the CIE 1931 observer: its signals are XYZ over one factor."""
     curves = {}
-    for letter, curve in zip("RGB", colour_matching_functions(), strict=True):
-        curves[letter] = Spectrum(curve.wavelength_nm, 0.1 * curve.values * 360.0 / curve.wavelength_nm)
+    for channel, curve in zip("RGB", colour_matching_functions(), strict=True):
+        curves[channel] = Spectrum(curve.wavelength_nm, 0.1 * curve.values * 360.0 / curve.wavelength_nm)
     return camera(curves)
 
 

@@ -1,4 +1,4 @@
-"""Tables of a sweep's figures: means and intervals by hand, electrons by letter, and what is refused."""
+"""Tables of a sweep's figures: means and intervals by hand, electrons by channel, and what is refused."""
 
 import json
 from dataclasses import fields, replace
