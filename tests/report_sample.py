@@ -14,8 +14,8 @@ from PIL import Image
 from sweep_sample import row
 
 from sensor.presets import preset
-from studies.pages.report_cells import over_seeds
 from studies.pages.report_data import ReportData, ReportLevel, ReportRender, ReportScene, ReportSensor
+from studies.pages.report_sweep import over_seeds
 from studies.pages.report_text import group_names, view_names
 from studies.sweep.row import Row
 

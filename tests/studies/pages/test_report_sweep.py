@@ -19,10 +19,9 @@ from hypothesis import strategies as st
 from rodcone.errors import InputError
 from studies.commands.cli import main
 from studies.pages.report import render_report
-from studies.pages.report_choice import chosen_conditions
 from studies.pages.report_data import ReportSensor
 from studies.pages.report_facts import fallbacks, sensor_of
-from studies.pages.report_sweep import ledger_results
+from studies.pages.report_sweep import chosen_conditions, ledger_results
 from studies.study.study import SceneChoice
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
