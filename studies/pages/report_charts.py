@@ -51,7 +51,6 @@ def group_charts(report: ReportData, metric: text.Metric) -> list[Chart]:
                 [stand_in if value is None else value for value in known],
                 [_line(report, own[slot :: len(names)], metric) for slot in range(len(names))],
                 shared=[*(cell.figures[metric.key] for cell in report.cells), *ends],
-                log_y=share,
                 percent=share,
                 rule=(MOST_SHARE, f"aim {text.percent(MOST_SHARE)}") if share else None,
             )

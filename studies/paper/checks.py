@@ -2,12 +2,10 @@
 
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Literal
-
-from rodcone.errors import InputError
+from typing import Literal, get_args
 
 Verdict = Literal["reproduced", "reproduced under a condition", "not reproduced"]
-VERDICTS: tuple[Verdict, ...] = ("reproduced", "reproduced under a condition", "not reproduced")
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 # What "about" may mean: a number given to one digit stands for a fifth more or less.
 ABOUT = 0.2
@@ -51,25 +49,15 @@ class Claim:
     text : str
         The statement.
     checks : tuple of ClaimCheck
-        One or more.
+        One or more, each under a condition of its own.
     note : str
         How the numbers were got, and what was ours to choose.
-
-    Raises
-    ------
-    InputError
-        Without a check, or for two of one condition.
     """
 
     where: str
     text: str
     checks: tuple[ClaimCheck, ...]
     note: str = ""
-
-    def __post_init__(self) -> None:
-        conditions = [check.condition for check in self.checks]
-        if not conditions or len(set(conditions)) != len(conditions):
-            raise InputError(f"claim {self.text!r}: checks {conditions!r} are not allowed; give some, each once")
 
     @property
     def verdict(self) -> Verdict:

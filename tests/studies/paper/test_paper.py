@@ -64,6 +64,9 @@ def test_claims_cover_the_figures_the_table_and_both_readings(paper: Paper) -> N
     assert len(paper.claims) == 26  # and as many rows in test_studies_paper_checks.py: a new claim needs one there
     places = {claim.where for claim in paper.claims}
     assert places >= {"Table 1", *(f"Figure {name}" for name in FIGURES)}
+    for claim in paper.claims:
+        conditions = [check.condition for check in claim.checks]
+        assert len(set(conditions)) == len(conditions) > 0, claim.text
     told = " ".join(check.condition for claim in paper.claims for check in claim.checks)
     assert all(reading in told for reading in READINGS)
 
