@@ -13,10 +13,8 @@ from sensor.config import SensorConfig
 from sensor.raw import RawImage
 from studies.metrics.truth import neutral_electrons
 from studies.pages.plots import picture_rows
-from studies.paper.camera import Image, View, develop, exposures, noise, quality_db
-from studies.paper.checks import Claim, at_least, at_most
-from studies.paper.page import PaperFigure
-from studies.paper.setup import READINGS, Setup, sensor_of, view
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most
+from studies.paper.setup import READINGS, Image, Setup, View, develop, exposures, noise, quality_db, sensor_of, view
 from studies.photograph.camera import colour_fit
 from studies.sweep.cells import Coordinates
 

@@ -14,11 +14,9 @@ from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import channels
 from sensor.raw import RawImage
 from studies.pages.plots import ORANGE, SIDE, STYLE, blank, show_picture
-from studies.paper.camera import Image, exposures
-from studies.paper.checks import Claim, at_least
+from studies.paper.claims import Claim, PaperFigure, at_least
 from studies.paper.numbers import MOONLIGHT_CD_M2
-from studies.paper.page import PaperFigure
-from studies.paper.setup import READINGS, Setup, sensor_of, view
+from studies.paper.setup import READINGS, Image, Setup, exposures, sensor_of, view
 from studies.sweep.cells import Coordinates
 
 PATCH = 5  # ours: the paper doesn't say

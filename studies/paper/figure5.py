@@ -13,10 +13,8 @@ from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from sensor.cfa import channels, mask
 from sensor.raw import RawImage
 from studies.pages.plots import picture_rows
-from studies.paper.camera import Image, View, develop, exposures, quality_db
-from studies.paper.checks import Claim, ClaimCheck, at_least
-from studies.paper.page import PaperFigure
-from studies.paper.setup import READINGS, Setup, sensor_of, view
+from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_least
+from studies.paper.setup import READINGS, Image, Setup, View, develop, exposures, quality_db, sensor_of, view
 from studies.sweep.cells import Coordinates
 
 LUMINANCE_CD_M2, EXPOSURE_S, PITCH_UM = 200.0, 0.066, 3

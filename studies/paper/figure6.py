@@ -11,11 +11,21 @@ from isp.substitution import SUBSTITUTION_SNR
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from sensor.raw import RawImage
 from studies.pages.plots import picture_rows
-from studies.paper.camera import Image, View, develop, exposures, noise, quality_db
-from studies.paper.checks import Claim, at_least, at_most, near
-from studies.paper.figure1b import shown
-from studies.paper.page import PaperFigure
-from studies.paper.setup import READINGS, Setup, sensor_of, swept, view
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, near
+from studies.paper.setup import (
+    READINGS,
+    Image,
+    Setup,
+    View,
+    develop,
+    exposures,
+    noise,
+    quality_db,
+    sensor_of,
+    shown,
+    swept,
+    view,
+)
 from studies.photograph.camera import colour_fit
 from studies.study.study import parse_exposure
 from studies.sweep.cells import Coordinates

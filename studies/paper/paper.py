@@ -12,16 +12,14 @@ from rodcone.files import replacing
 from studies.pages.plots import png_bytes, svg_text
 from studies.pages.results import environment
 from studies.paper.bilateral import bilateral_claims
-from studies.paper.checks import VERDICTS, Claim
-from studies.paper.figure1a import figure_1a
-from studies.paper.figure1b import figure_1b
+from studies.paper.claims import VERDICTS, Claim, PaperFigure, paper_page
+from studies.paper.figure1 import figure_1a, figure_1b
 from studies.paper.figure2 import figure_2
 from studies.paper.figure3 import figure_3
 from studies.paper.figure4 import figure_4
 from studies.paper.figure5 import figure_5
 from studies.paper.figure6 import figure_6
 from studies.paper.numbers import number_claims
-from studies.paper.page import PaperFigure, paper_page
 from studies.paper.setup import READINGS, Setup, Step, view
 
 Made = tuple[PaperFigure, tuple[Claim, ...]]

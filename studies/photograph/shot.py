@@ -79,11 +79,12 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
     # What is looked at, and the light that the camera's colours are set to.
     if opened is None:
         transport, light, notes = open_radiance_file(order.source, order.white_balance)
-        level = None if order.level is None else parse_level(order.level)[0], None
+        luminance_cd_m2 = None if order.level is None else parse_level(order.level)[0]
+        illuminance_lux = None
     else:
         light, notes = _light(order, opened.scene)
         notes += opened.notes
-        level = asked_level(opened.scene, order.level)
+        luminance_cd_m2, illuminance_lux = asked_level(opened.scene, order.level)
     colour = calibrate(sensor, light) if set("RGB") <= set(channels(sensor.cfa)) else None
     check_place(order.out)  # told before the render, not after
     if opened is not None:
@@ -97,7 +98,7 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
 
     # The exposure.
     step("exposure", 0.9)
-    radiance = transport.relight(luminance_cd_m2=level[0], illuminance_lux=level[1])
+    radiance = transport.relight(luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
     exposure_s = order.exposure_s
     if exposure_s is None:
         exposure_s = auto_exposure_s(form_image(radiance, sensor), sensor)

@@ -6,9 +6,8 @@ from math import inf, nan
 import pytest
 
 from studies.paper.bilateral import filter_claims
-from studies.paper.checks import Claim, ClaimCheck, about, at_least, at_most, near
-from studies.paper.figure1a import claims_1a
-from studies.paper.figure1b import claims_1b
+from studies.paper.claims import Claim, ClaimCheck, about, at_least, at_most, near
+from studies.paper.figure1 import claims_1a, claims_1b
 from studies.paper.figure2 import Gain, signal_claims, signal_ratios, snr_claims
 from studies.paper.figure3 import Stages, claims_3
 from studies.paper.figure4 import claims_4
