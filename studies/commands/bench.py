@@ -71,7 +71,7 @@ def _measured(task: Any, quiet: bool) -> dict[str, Any]:
     from importlib import metadata
 
     from rodcone.progress import progress
-    from studies.pages.results import environment
+    from studies.pages.environment import environment
     from studies.speed.points import stage_json
     from studies.speed.stages import STAGES, stages
 

@@ -27,7 +27,6 @@ from studies.pages.report_facts import (
     sensor_of,
 )
 from studies.pages.report_text import METRICS, group_names, view_names
-from studies.pages.results import DISPLAY_WHITE
 from studies.study.study import label
 from studies.sweep.database import FILE, last_study, read_ledger, rows
 from studies.sweep.prepare import PICTURES
@@ -41,7 +40,7 @@ SHOWN_BYTES = 8e6  # of pictures in a page, where their number isn't given: some
 SCATTERED = (*(metric.key for metric in METRICS), "snr_db", "saturated", "mc_share")
 
 
-def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[ReportData, dict[str, bytes]]:
+def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[ReportData, dict[str, bytes]]:
     """Values and pictures of a sweep, as `studies.pages.report.render_report` takes them.
 
     Parameters
@@ -94,7 +93,6 @@ def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[Repo
         environment=environment_of(made),
         configuration=configuration(study),
         exposure_rule=RULE.format(longest=study["longest_exposure_s"] * 1e3),
-        display_white=DISPLAY_WHITE,
         left_out=lenses_left_out(made, study["sensors"]),
         notes=(*fallbacks(made), *render_notes(made), *unmade),
         pictures_left_out=left_out,

@@ -1,6 +1,7 @@
 """Figure 1: (a) a dark half that drowns in noise beside a lit one, (b) pixels of 6 um and of 2 um."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from studies.pages.plots import picture_rows
 from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_least, at_most, near
 from studies.paper.flat import channel_e, decibels, light_of, shot_noise_alone, snr
 from studies.paper.setup import READINGS, TODAY, Setup, View, develop, exposures, sensor_of, shown, swept, view
-from studies.sweep.cells import Coordinates
 
 LARGE = "table1_output_6um"  # Figure 1(b)'s larger pixel, as cameras of the time had
 VISIBLE_NOISE_DB = 30.0  # the paper's measure: noise on a uniform field is visible below
@@ -65,12 +65,11 @@ def claims_1a(dark_db: Mapping[str, float], lit_db: Mapping[str, float]) -> tupl
 
 def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """The photograph under both readings, as it is and with its dark half made as bright as the other."""
-    seen = view(setup, "lit_and_shadowed", None, "lamp")
+    seen = replace(view(setup, "lit_and_shadowed", None, "lamp"), level=f"{LIT_CD_M2:g}cd/m2")
     rows, half = [], seen.radiance.shape[1] // 2
     for reading in READINGS:
         sensor = sensor_of(reading, "bayer")
-        at = Coordinates("lit_and_shadowed", "own", f"{LIT_CD_M2:g}cd/m2", "66ms", reading, "bayer", 0)
-        linear, _ = develop(exposures(seen, sensor, LONGEST_S, at, 1)[0], seen, sensor, "bayer")
+        linear, _ = develop(exposures(seen, reading, "66ms", "bayer")[0], seen, sensor, "bayer")
         raised = linear.copy()
         raised[:, :half] *= DARK_GAIN
         rows.append(

@@ -15,9 +15,8 @@ from sensor.raw import RawImage
 from studies.pages.plots import picture_rows
 from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_least
 from studies.paper.setup import READINGS, Image, Setup, View, develop, exposures, quality_db, sensor_of, view
-from studies.sweep.cells import Coordinates
 
-LUMINANCE_CD_M2, EXPOSURE_S, PITCH_UM = 200.0, 0.066, 3
+LUMINANCE_CD_M2, PITCH_UM = 200.0, 3
 PARTLY = (0.02, 0.98)  # share of W's pixels that may be full for "partly"
 WHOLE = 0.95  # correlation with the truth where W is full, for "whole": nine tenths of the variance
 # Early fusion: W enters before anything else (Sato 1983, Kijima 2007), or behind a neutral density (Yamagami 1994).
@@ -142,6 +141,5 @@ def _shoot(
 ) -> tuple[list[RawImage], list[Image]]:
     """Exposures and pictures of one processor."""
     sensor = sensor_of(reading, PROCESSORS[processor].mosaic, PITCH_UM)
-    at = Coordinates("still_life", "own", "200cd/m2", "66ms", f"{reading}_3um", processor, 0)
-    raws = exposures(seen, sensor, EXPOSURE_S, at, setup.seeds)
+    raws = exposures(seen, reading, "66ms", processor, count=setup.seeds, pitch_um=PITCH_UM)
     return raws, [develop(raw, seen, sensor, processor, **options)[0] for raw in raws]

@@ -9,7 +9,6 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 from isp.processors.catalogue import PROCESSORS
 from isp.substitution import SUBSTITUTION_SNR
 from rodcone.colour_spaces import decode_srgb, encode_srgb
-from sensor.raw import RawImage
 from studies.pages.plots import picture_rows
 from studies.paper.claims import Claim, PaperFigure, at_least, at_most, near
 from studies.paper.setup import (
@@ -27,8 +26,6 @@ from studies.paper.setup import (
     view,
 )
 from studies.photograph.camera import colour_fit
-from studies.study.study import parse_exposure
-from studies.sweep.cells import Coordinates
 from studies.sweep.row import Row
 
 LUMINANCE_CD_M2 = 25.0
@@ -152,19 +149,13 @@ def swap(setup: Setup, seen: View, reading: str) -> Swap:
     """Substitution at `DARKEST`, always against never, with the plain 3x3 matrix that the paper's camera has."""
     sensor = sensor_of(reading)
     matrix = colour_fit(sensor, PROCESSORS["interleaved"], seen.light).matrix()
-    raws = _raws(setup, seen, reading, DARKEST)
+    raws = exposures(seen, reading, DARKEST, count=setup.seeds)
     without, with_white = (
         [develop(raw, seen, sensor, matrix=matrix, substitution_snr=threshold)[0] for raw in raws]
         for threshold in (0.0, np.inf)
     )
     means = (rgb2lab(encode_srgb(np.mean(pictures, axis=0))) for pictures in (without, with_white))
     return Swap(noise(without) / noise(with_white), float(np.median(deltaE_ciede2000(*means))))
-
-
-def _raws(setup: Setup, seen: View, reading: str, exposure: str) -> list[RawImage]:
-    """The interleaved camera's exposures as the sweep's cells draw them."""
-    at = Coordinates("still_life", "own", "25cd/m2", exposure, reading, "interleaved", 0)
-    return exposures(seen, sensor_of(reading), parse_exposure(exposure) or 0.0, at, setup.seeds)
 
 
 def _of_sweep(setup: Setup, rows: Sequence[Row]) -> tuple[Outcome, Image]:
@@ -180,7 +171,7 @@ def _again(setup: Setup, seen: View, reading: str, exposure: str, threshold: flo
     """As `_of_sweep`, developed with another threshold of substitution."""
     made = [
         develop(raw, seen, sensor_of(reading), substitution_snr=threshold)
-        for raw in _raws(setup, seen, reading, exposure)
+        for raw in exposures(seen, reading, exposure, count=setup.seeds)
     ]
     pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in made]  # as the sweep's files hold them
     share = float(np.mean([bool(picture.substituted) for _, picture in made]))

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from rodcone.files import replacing
+from studies.pages.environment import environment
 from studies.pages.plots import png_bytes, svg_text
-from studies.pages.results import environment
 from studies.paper.bilateral import bilateral_claims
 from studies.paper.claims import VERDICTS, Claim, PaperFigure, paper_page
 from studies.paper.figure1 import figure_1a, figure_1b

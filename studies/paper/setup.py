@@ -30,7 +30,7 @@ from studies.metrics.quality import psnr_db
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.lit_scene import make_transport, open_choice
-from studies.study.study import RenderLimits, SceneChoice, Study
+from studies.study.study import OWN, RenderLimits, SceneChoice, Study, parse_exposure
 from studies.study.study_file import read_study
 from studies.sweep.cells import Coordinates, device_stream, exposure_stream
 from studies.sweep.export import read_rows
@@ -95,6 +95,8 @@ class View:
 
     Attributes
     ----------
+    scene, level : str
+        As a study names them.
     radiance : SpectralRadiance
     light : Light
         That the cameras' colours are set to.
@@ -102,6 +104,8 @@ class View:
         Luminance shown as white.
     """
 
+    scene: str
+    level: str
     radiance: SpectralRadiance
     light: Light
     white_cd_m2: float
@@ -138,9 +142,11 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
     transport, _ = make_transport(opened, study, model, folder, lambda share, _: setup.step(f"render {scene}", share))
     group = transport.groups[white or next(iter(transport.groups))]
     return View(
-        transport.relight(luminance_cd_m2=luminance_cd_m2),
-        light_in_bands(group.spectrum, transport.wavelength_nm, transport.width_nm),
-        shown_white_cd_m2(transport, luminance_cd_m2),
+        scene=scene,
+        level=OWN if luminance_cd_m2 is None else f"{luminance_cd_m2:g}cd/m2",
+        radiance=transport.relight(luminance_cd_m2=luminance_cd_m2),
+        light=light_in_bands(group.spectrum, transport.wavelength_nm, transport.width_nm),
+        white_cd_m2=shown_white_cd_m2(transport, luminance_cd_m2),
     )
 
 
@@ -164,14 +170,31 @@ def shown(setup: Setup, row: Row) -> Image:
         return np.asarray(file, dtype=np.float64) / 255
 
 
-def exposures(view: View, sensor: SensorConfig, exposure_s: float, at: Coordinates, seeds: int) -> list[RawImage]:
-    """Exposures by as many chips, drawn as a sweep draws the cells at these coordinates."""
-    expected_e = expected_electrons(form_image(view.radiance, sensor), sensor, exposure_s)
-    mosaic, made = PROCESSORS[at.processor].mosaic, []
-    for seed in range(seeds):
-        place = replace(at, seed=seed)
-        device = draw_device(sensor, expected_e.shape, device_stream(place, mosaic))
-        made.append(expose(expected_e, sensor, exposure_s, device, exposure_stream(place, mosaic), exact=True))
+def exposures(
+    seen: View, reading: str, exposure: str, processor: str = "interleaved", count: int = 1, pitch_um: int | None = None
+) -> list[RawImage]:
+    """Exposures by as many chips, drawn as a sweep draws its cells.
+
+    Parameters
+    ----------
+    seen : View
+    reading : str
+        Of Table 1; with `pitch_um` as `sensor_of`.
+    exposure : str
+        Time as a study writes it, such as ``20ms``.
+    processor : str
+        That is to develop them: it decides the mosaic.
+    count : int
+    pitch_um : int, optional
+    """
+    mosaic = PROCESSORS[processor].mosaic
+    sensor, exposure_s = sensor_of(reading, mosaic, pitch_um), parse_exposure(exposure) or 0.0
+    expected_e = expected_electrons(form_image(seen.radiance, sensor), sensor, exposure_s)
+    name, made = reading if pitch_um is None else f"{reading}_{pitch_um}um", []
+    for seed in range(count):
+        at = Coordinates(seen.scene, OWN, seen.level, exposure, name, processor, seed)
+        device = draw_device(sensor, expected_e.shape, device_stream(at, mosaic))
+        made.append(expose(expected_e, sensor, exposure_s, device, exposure_stream(at, mosaic), exact=True))
     return made
 
 

@@ -40,7 +40,14 @@ def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
     neutral, to_srgb, _, _ = _under(sensor, light)
     _, _, to_camera_a, to_xyz_a = _under(sensor, illuminant("A"))
     _, _, to_camera_d65, to_xyz_d65 = _under(sensor, illuminant("D65"))
-    return ColourCalibration(neutral, to_srgb, to_camera_a, to_camera_d65, to_xyz_a, to_xyz_d65)
+    return ColourCalibration(
+        neutral=neutral,
+        to_srgb=to_srgb,
+        xyz_to_camera_a=to_camera_a,
+        xyz_to_camera_d65=to_camera_d65,
+        camera_to_xyz_a=to_xyz_a,
+        camera_to_xyz_d65=to_xyz_d65,
+    )
 
 
 def iso_speed(sensor: SensorConfig) -> float | None:
@@ -68,12 +75,12 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     nm, width = light.wavelength_nm, light.width_nm
     electrons = electrons_per_irradiance(sensor, nm, width, 1.0)
     response = electrons / (photons_per_joule(nm) * width)  # inside the camera's window
-    letters = channels(sensor.cfa)
-    rgb = [letters.index(letter) for letter in "RGB"]
+    names = channels(sensor.cfa)
+    rgb = [names.index(channel) for channel in "RGB"]
     collected = electrons @ light.spectrum
     if not np.all(collected > 0):
         raise InputError(
-            f"responses: {letters[int(np.argmin(collected))]} collects nothing under the light, 380-780 nm; "
+            f"responses: {names[int(np.argmin(collected))]} collects nothing under the light, 380-780 nm; "
             "allowed: a channel that sees light; give another curve"
         )
     surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
@@ -86,8 +93,8 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     balanced = (surfaces * light.spectrum) @ electrons.T / collected
     from_srgb = fit_through_neutral(target, balanced)
     from_srgb[rgb] = np.linalg.inv(to_srgb)
-    neutral = collected / collected[letters.index("G")]
-    to_xyz = np.zeros((3, len(letters)))
+    neutral = collected / collected[names.index("G")]
+    to_xyz = np.zeros((3, len(names)))
     to_xyz[:, rgb] = np.linalg.inv(_srgb_of_xyz(D50_XYZ)) @ to_srgb  # D50: the connection space of DNG's ForwardMatrix
     return neutral, to_srgb, neutral[:, None] * from_srgb @ from_xyz, to_xyz
 

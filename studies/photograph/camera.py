@@ -20,9 +20,9 @@ def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> Colo
     """Fit of the processor's balanced colours, and the mosaic's other channels, under a light on the ColorChecker."""
     nm, width = light.wavelength_nm, light.width_nm
     surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker()])
-    letters = (*processor.colours, *(x for x in channels(sensor.cfa) if x not in processor.colours))
-    responses = sensor.responses.band_average(letters, nm, width)
-    return fit_colours(letters, responses, nm, light.spectrum, surfaces, width)
+    names = (*processor.colours, *(x for x in channels(sensor.cfa) if x not in processor.colours))
+    responses = sensor.responses.band_average(names, nm, width)
+    return fit_colours(names, responses, nm, light.spectrum, surfaces, width)
 
 
 def develop_to_scale(
@@ -79,4 +79,4 @@ def develop_to_scale(
 def mean_electrons(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> dict[str, float]:
     """Mean expected electrons of each channel's pixels."""
     shape = (expected_e.shape[0], expected_e.shape[1])
-    return {letter: float(expected_e[mask(sensor.cfa, letter, shape)].mean()) for letter in channels(sensor.cfa)}
+    return {name: float(expected_e[mask(sensor.cfa, name, shape)].mean()) for name in channels(sensor.cfa)}
