@@ -16,7 +16,6 @@ from studies.pages.duels import (
     LEVEL,
     METRICS,
     Contest,
-    Group,
     contests_of,
     duels,
     group_name,
@@ -71,6 +70,10 @@ def page_of(
 ) -> str:
     """Return the page's Markdown; parameters as `write_page`."""
     groups = groups_of(contests)
+    of_groups = [
+        (f"### {code(group_name(group, groups))}", [contest for contest in contests if contest.group == group])
+        for group in groups
+    ]
     ranked = sum(is_ranked(contest, camera) for contest in contests)
     worst = max((row.mc_share, contest.level) for contest in contests for rows in contest.rows.values() for row in rows)
     parts = [
@@ -89,13 +92,11 @@ def page_of(
         f"Positive: {code(camera)} is better. **Bold**: it is behind, and the whole interval is below 0. In brackets: "
         f"the interval holds 0. {MISSING}: not ranked.",
     ]
-    for group in groups:
-        of_group = [contest for contest in contests if contest.group == group]
-        parts += [f"### {group_text(group, groups)}", *(lead_table(metric, of_group, camera) for metric in METRICS)]
+    for title, of_group in of_groups:
+        parts += [title, *(lead_table(metric, of_group, camera) for metric in METRICS)]
     parts.append("## Every condition")
-    for group in groups:
-        of_group = [contest for contest in contests if contest.group == group]
-        parts += [f"### {group_text(group, groups)}: figures", level_table(of_group, camera)]
+    for title, of_group in of_groups:
+        parts += [f"{title}: figures", level_table(of_group, camera)]
     parts.append(
         "Means over seeds; the best of each column in bold. The render's own noise, which counts as texture, has at "
         f"most {percent(worst[0])} of the sensor's variance (at {level_text(worst[1])})."
@@ -106,11 +107,6 @@ def page_of(
 def code(text: str) -> str:
     """Write a name as Markdown's code, whatever is in it: in code no sign has a meaning but the backtick and |."""
     return "`" + " ".join(text.split()).replace("`", "'").replace("|", "\\|") + "`"
-
-
-def group_text(group: Group, groups: Sequence[Group]) -> str:
-    """Name a group as Markdown's code."""
-    return code(group_name(group, groups))
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

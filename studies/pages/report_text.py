@@ -123,11 +123,9 @@ def leader(metric: Metric, cells: Sequence[ReportCell]) -> tuple[ReportCell | No
 
 def view_names(scenes: Sequence[str], spectra: Sequence[str]) -> list[str]:
     """Return a title for each scene under each spectrum, of what varies; all are empty where there is one alone."""
-    several = len(scenes) > 1, len(spectra) > 1
-    return [
-        ", ".join(part for part, named in zip((scene, spectrum_name(spectrum)), several, strict=True) if named)
-        for scene, spectrum in product(scenes, spectra)
-    ]
+    scene_parts = [[scene] if len(scenes) > 1 else [] for scene in scenes]
+    spectrum_parts = [[spectrum_name(spectrum)] if len(spectra) > 1 else [] for spectrum in spectra]
+    return [", ".join(scene + spectrum) for scene, spectrum in product(scene_parts, spectrum_parts)]
 
 
 def group_names(sensors: Sequence[str], exposures: Sequence[str]) -> list[str]:

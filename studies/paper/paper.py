@@ -3,7 +3,6 @@
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from studies.paper.figure4 import figure_4
 from studies.paper.figure5 import figure_5
 from studies.paper.figure6 import figure_6
 from studies.paper.numbers import number_claims
-from studies.paper.setup import READINGS, Setup, Step, view
+from studies.paper.setup import READINGS, Setup, view
 
 Made = tuple[PaperFigure, tuple[Claim, ...]]
 
@@ -54,18 +53,16 @@ def make(setup: Setup) -> Paper:
     }
     made = []
     for index, (name, maker) in enumerate(makers.items()):
-        part = partial(_part, setup.step, name, index, len(makers))
-        part("begins", 0.0)
-        made.append(maker(replace(setup, step=part)))
+
+        def step(what: str, share: float, name: str = name, index: int = index) -> None:
+            setup.step(f"{name}: {what}", (index + share) / len(makers))
+
+        step("begins", 0.0)
+        made.append(maker(replace(setup, step=step)))
     numbers = number_claims(view(setup, "still_life", 1.0))
     claims = (*numbers, *(claim for _, own in made for claim in own), *bilateral_claims(tuple(READINGS)))
     facts = {"size": setup.size, "spp": setup.spp, "seeds": setup.seeds, "rodcone": metadata.version("rodcone")}
     return Paper(tuple(figure for figure, _ in made), claims, facts | {"environment": environment()})
-
-
-def _part(step: Step, name: str, index: int, count: int, what: str, share: float) -> None:
-    """Progress of one figure as part of the whole."""
-    step(f"{name}: {what}", (index + share) / count)
 
 
 def write(paper: Paper, folder: Path) -> Path:
