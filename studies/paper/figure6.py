@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from skimage.color import deltaE_ciede2000, rgb2lab
@@ -121,26 +122,21 @@ def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """
     rows = swept(setup, "6")
     seen = view(setup, "still_life", LUMINANCE_CD_M2)
-    bayer, interleaved, table = {}, {}, []
-    for reading, threshold in READINGS.items():
-        pictures: dict[str, list[tuple[str, Image]]] = {"bayer": [], "interleaved": []}
+    outcomes: dict[str, dict[str, Outcome]] = {"bayer": {}, "interleaved": {}}
+    table = []
+    for (reading, threshold), camera in product(READINGS.items(), outcomes):
+        pictures: list[tuple[str, Image]] = []
         for exposure in SUBSTITUTED:
-            kept = {
-                name: [row for row in rows if (row.sensor, row.exposure, row.processor) == (reading, exposure, name)]
-                for name in pictures
-            }
-            place = f"{reading}, {exposure}"
-            bayer[place], encoded = _of_sweep(setup, kept["bayer"])
-            pictures["bayer"].append((f"Bayer, {exposure}", encoded))
-            if threshold == SUBSTITUTION_SNR:
-                interleaved[place], encoded = _of_sweep(setup, kept["interleaved"])
+            if camera == "bayer" or threshold == SUBSTITUTION_SNR:
+                own = [row for row in rows if (row.sensor, row.exposure, row.processor) == (reading, exposure, camera)]
+                outcome, encoded = _of_sweep(setup, own)
             else:
-                interleaved[place], encoded = _again(setup, seen, reading, exposure, threshold)
-            words = "W's luminance" if interleaved[place].substituted else "interleaved"
-            pictures["interleaved"].append((f"{words}, {exposure}", encoded))
-        for own in pictures.values():
-            table.append([(f"{reading}: {own[0][0]}", own[0][1]), *own[1:]])
-    claims = claims_6(bayer, interleaved, {name: swap(setup, seen, name) for name in READINGS})
+                outcome, encoded = _again(setup, seen, reading, exposure, threshold)
+            outcomes[camera][f"{reading}, {exposure}"] = outcome
+            words = "Bayer" if camera == "bayer" else "W's luminance" if outcome.substituted else "interleaved"
+            pictures.append((f"{words}, {exposure}" if pictures else f"{reading}: {words}, {exposure}", encoded))
+        table.append(pictures)
+    claims = claims_6(**outcomes, swaps={name: swap(setup, seen, name) for name in READINGS})
     caption = "Bayer and interleaved with Table 1's pixel at 25 cd/m², by exposure time."
     return PaperFigure("6", caption, picture_rows(table)), claims
 
