@@ -79,7 +79,7 @@ class Duel:
 
 
 def contests_of(rows: Sequence[Row]) -> list[Contest]:
-    """Sort a sweep's rows by condition; within a group by luminance.
+    """Sort a sweep's rows by condition, and the conditions of a group by luminance.
 
     Raises
     ------

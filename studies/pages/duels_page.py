@@ -46,7 +46,7 @@ def write_page(rows: Sequence[Row], study: Mapping[str, Any], folder: Path, out:
     out : Path
         Ends in ``.md``; the figure goes beside it, ending in ``.svg``.
     camera : str
-        Whose leads and losses the page tells.
+        That the page compares with the others.
 
     Raises
     ------
@@ -243,8 +243,8 @@ def figure_of(contests: Sequence[Contest], camera: str) -> Figure | None:
     colours = dict.fromkeys(names, OTHERS) | ({most: GREEN} if most else {}) | {names[0]: ORANGE, camera: BLUE}
     columns, rows = min(len(charted), COLUMNS), -(-len(charted) // COLUMNS)
     figure = blank(columns * CHART[0], rows * CHART[1])
-    for place, of_group in enumerate(charted):
-        axes = figure.add_subplot(rows, columns, place + 1)
+    for index, of_group in enumerate(charted, 1):
+        axes = figure.add_subplot(rows, columns, index)
         light = [contest.luminance_cd_m2 for contest in of_group]
         for name, colour in colours.items():
             psnr_db = [contest.mean(name, PSNR) for contest in of_group]

@@ -121,5 +121,5 @@ def name_at_ends(axes: Axes, ends: Sequence[tuple[str, float, str]]) -> None:
     box = axes.transLimits
     high = CHART[1] * 0.7  # of the axes, about [points]
     wanted = [float(box.transform(axes.transScale.transform((1.0, y)))[1]) * high for _, y, _ in ends]
-    for (name, _, colour), place in zip(ends, spread(wanted, LABEL_GAP, 0.0, high), strict=True):
-        axes.text(1.02, place / high, name, color=colour, va="center", transform=axes.transAxes)
+    for (name, _, colour), height in zip(ends, spread(wanted, LABEL_GAP, 0.0, high), strict=True):
+        axes.text(1.02, height / high, name, color=colour, va="center", transform=axes.transAxes)

@@ -78,8 +78,8 @@ def viewer_data(report: ReportData) -> dict[str, Any]:
         cell_view(cell, report.levels[cell.level], condition) for condition in report.conditions for cell in condition
     ]
     views = []
-    for place, (scene, spectrum) in enumerate(product(report.scenes, report.spectra)):
-        first = report.by_group[place * len(report.sensors) * len(report.exposures)]
+    for index, (scene, spectrum) in enumerate(product(report.scenes, report.spectra)):
+        first = report.by_group[index * len(report.sensors) * len(report.exposures)]
         levels = zip(report.levels, first[:: len(report.cameras)], strict=True)
         views.append(
             {
@@ -192,15 +192,15 @@ def render_report(report: ReportData, pictures: Mapping[str, bytes]) -> str:
         aim=MOST_SHARE,
         of_pixels=OF_PIXELS,
         groups=data["groups"],
-        # Each scene under each spectrum: its title, the places of its groups, what names them within it, what is known.
+        # Each scene under each spectrum: its title, its groups' indices, their titles within it, its known metrics.
         views=[
             {
                 "name": name,
-                "groups": list(range(place * per_view, (place + 1) * per_view)),
+                "groups": list(range(index * per_view, (index + 1) * per_view)),
                 "titles": text.group_names([sensor.name for sensor in report.sensors], report.exposures),
-                "metrics": shown_metrics(report.cells[place * per_cells : (place + 1) * per_cells]),
+                "metrics": shown_metrics(report.cells[index * per_cells : (index + 1) * per_cells]),
             }
-            for place, name in enumerate(view_names)
+            for index, name in enumerate(view_names)
         ],
         # One row of charts for each group; empty where no cell has all of its seeds yet.
         charts=list(zip(*(group_charts(report, metric) for metric in metrics), strict=True))

@@ -105,9 +105,9 @@ def camera_name(camera: str) -> str:
 
 
 def leader(metric: Metric, cells: Sequence[ReportCell]) -> tuple[ReportCell | None, float]:
-    """Return the cell that is best in `metric` and its lead over the next; None where nothing is to be told apart.
+    """Return the cell that is best in `metric` and its lead over the next; None where none leads.
 
-    That is where the written numbers tie, or where the confidence intervals over seeds overlap. (A test of the
+    None leads where the written numbers tie, or where the confidence intervals over seeds overlap. (A test of the
     difference would find a lead in some cases in which 95 % intervals overlap: overlap is the stricter rule.)
     """
     found = ((value, cell) for cell in cells if (value := cell.figures[metric.key]) is not None and not isnan(value))

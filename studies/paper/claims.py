@@ -116,7 +116,7 @@ def range_text(check: ClaimCheck) -> str:
 
 
 def value_text(check: ClaimCheck) -> str:
-    """Number and unit, to as many digits as tell it from the end of its range that it is near to."""
+    """Number and unit, with enough digits to differ from a near end of its range."""
     for digits in range(3, 7):
         shown = text.significant(check.value, digits=digits)
         ends = [text.significant(end, digits=digits) for end in (check.low, check.high) if isfinite(end)]

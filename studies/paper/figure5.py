@@ -46,14 +46,14 @@ class Bright:
 
 
 def likeness(plane: Image, truth: Image, where: NDArray[np.bool_]) -> float:
-    """Correlation of two planes (h, w) over some pixels; 0 where either is even or there are none."""
+    """Correlation of two planes (h, w) over some pixels; 0 where either is constant or there are none."""
     if where.sum() < 2 or np.ptp(plane[where]) == 0 or np.ptp(truth[where]) == 0:
         return 0.0
     return float(np.corrcoef(plane[where], truth[where])[0, 1])
 
 
 def measure_bright(raw: RawImage, result: Image, seen: View) -> Bright:
-    """Judge one exposure and its result (h, w, 3), linear sRGB."""
+    """Measure one exposure and its result (h, w, 3), linear sRGB."""
     truth = luminance_of_srgb(seen.truth)
     white, colours = saturated_nearby(raw, "W"), saturated_nearby(raw, "RGB")
     alone = white & ~colours

@@ -110,7 +110,7 @@ def develop_file(
         raise unknown("encoding", encoding, ENCODINGS)
     if ev is not None:
         require_range("ev", ev, -40.0, 40.0, "give stops")
-    raw, told = open_raw(path)
+    raw, file_facts = open_raw(path)
     if raw.colour is None:
         raise InputError(f"{path}: it holds no colour calibration; allowed: a camera with R, G and B; capture with one")
     picture = develop(raw, processor=isp, white_balance=white_balance)
@@ -128,7 +128,7 @@ def develop_file(
         "saturated": float(raw.saturated.mean()),
         "defects": 0 if raw.defects is None else len(raw.defects),
         "encoding": encoding,
-        **told,
+        **file_facts,
     }
     return Developed(encode(linear * 2.0**stops, encoding), facts)
 

@@ -86,7 +86,7 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
         notes += opened.notes
         luminance_cd_m2, illuminance_lux = asked_level(opened.scene, order.level)
     colour = calibrate(sensor, light) if set("RGB") <= set(channels(sensor.cfa)) else None
-    check_place(order.out)  # told before the render, not after
+    check_place(order.out)  # before the render: it may take minutes
     if opened is not None:
         transport = render(
             opened.scene,
