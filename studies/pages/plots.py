@@ -47,29 +47,23 @@ STYLE: dict[Any, Any] = {  # Matplotlib's settings
 
 def svg_text(figure: Figure) -> str:
     """Write a figure as SVG, without a date and without a link to a document type."""
-    buffer = BytesIO()
-    _lay_out(figure)
-    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with rc_context(STYLE):
-        figure.savefig(buffer, format="svg", metadata=nothing)
-    text = buffer.getvalue().decode("utf-8")
+    text = _saved(figure, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type"))).decode("utf-8")
     return text[text.index("<svg") :]
 
 
 def png_bytes(figure: Figure) -> bytes:
     """Write a figure as PNG, two pixels a point."""
+    return _saved(figure, format="png", dpi=PNG_DPI, metadata={"Software": None})
+
+
+def _saved(figure: Figure, **options: Any) -> bytes:
+    """Lay a figure out once, since each further layout would move its parts a little, and write it."""
     buffer = BytesIO()
-    _lay_out(figure)
-    with rc_context(STYLE):
-        figure.savefig(buffer, format="png", dpi=PNG_DPI, metadata={"Software": None})
-    return buffer.getvalue()
-
-
-def _lay_out(figure: Figure) -> None:
-    """Lay a figure out once: each further layout would move its parts a little."""
     with rc_context(STYLE):
         figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+        figure.set_layout_engine("none")
+        figure.savefig(buffer, **options)
+    return buffer.getvalue()
 
 
 def blank(width: float, height: float) -> Figure:

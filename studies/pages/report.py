@@ -130,8 +130,7 @@ def leads(report: ReportData) -> list[tuple[str, int]]:
 
 def known_shares(cells: Sequence[ReportCell]) -> list[tuple[float, ReportCell]]:
     """Return the cells whose Monte Carlo share is known, the largest first."""
-    found = ((cell.figures["mc_share"], cell) for cell in cells)
-    known = [(share, cell) for share, cell in found if share is not None and isfinite(share)]
+    known = [(share, cell) for cell in cells if (share := cell.figures["mc_share"]) is not None and isfinite(share)]
     return sorted(known, key=lambda pair: -pair[0])
 
 

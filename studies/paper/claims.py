@@ -1,18 +1,15 @@
-"""Claims of the paper as checks with numbers, and the page "claim, computed, verdict": HTML without a script.
+"""Claims of the paper as checks with numbers, and how their page writes these.
 
 A verdict follows from the numbers and is never written by hand.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from matplotlib.figure import Figure
 
 from studies.pages import report_text as text
-from studies.pages.page import address, own_file, write_out
-from studies.pages.plots import svg_text
 
 Verdict = Literal["reproduced", "reproduced under a condition", "not reproduced"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
@@ -123,25 +120,3 @@ def value_text(check: ClaimCheck) -> str:
         if shown not in ends or check.value in (check.low, check.high):
             break
     return f"{shown}\N{NO-BREAK SPACE}{check.unit}" if check.unit else shown
-
-
-def paper_page(figures: Sequence[PaperFigure], claims: Sequence[Claim], facts: Mapping[str, Any]) -> str:
-    """Write the page.
-
-    Parameters
-    ----------
-    figures : sequence of PaperFigure
-    claims : sequence of Claim
-    facts : mapping
-        Set-up and versions, as `studies.paper.paper.Paper` has them.
-    """
-    return write_out(
-        "paper.html.j2",
-        figures=[(figure, address("svg+xml", svg_text(figure.drawing).encode())) for figure in figures],
-        claims=claims,
-        facts=facts,
-        verdicts=VERDICTS,
-        value_text=value_text,
-        range_text=range_text,
-        style=own_file("report.css") + own_file("paper.css"),
-    )

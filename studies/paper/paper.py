@@ -9,9 +9,10 @@ from typing import Any
 
 from rodcone.files import replacing
 from studies.pages.environment import environment
+from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import png_bytes, svg_text
 from studies.paper.bilateral import bilateral_claims
-from studies.paper.claims import VERDICTS, Claim, PaperFigure, paper_page
+from studies.paper.claims import VERDICTS, Claim, PaperFigure, range_text, value_text
 from studies.paper.figure1 import figure_1a, figure_1b
 from studies.paper.figure2 import figure_2
 from studies.paper.figure3 import figure_3
@@ -70,7 +71,17 @@ def write(paper: Paper, folder: Path) -> Path:
     files = {f"figure_{figure.name}.svg": svg_text(figure.drawing).encode() for figure in paper.figures}
     files |= {f"figure_{figure.name}.png": png_bytes(figure.drawing) for figure in paper.figures}
     files["paper.json"] = (json.dumps(as_json(paper), indent=1, allow_nan=False) + "\n").encode()
-    files["paper.html"] = paper_page(paper.figures, paper.claims, paper.facts).encode()
+    page = write_out(
+        "paper.html.j2",
+        figures=[(one, address("svg+xml", files[f"figure_{one.name}.svg"])) for one in paper.figures],
+        claims=paper.claims,
+        facts=paper.facts,
+        verdicts=VERDICTS,
+        value_text=value_text,
+        range_text=range_text,
+        style=own_file("report.css") + own_file("paper.css"),
+    )
+    files["paper.html"] = page.encode()
     with replacing(*(folder / name for name in files)) as places:
         for place, content in zip(places, files.values(), strict=True):
             place.write_bytes(content)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.calibrated_colours import fit_of_calibration
-from isp.colour.encoding import ENCODINGS, encode
+from isp.colour.encoding import encode
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import luminance_of_srgb
@@ -106,8 +106,6 @@ def develop_file(
     InputError
         For a file that can't be read, holds no colours, or whose mosaic the pipeline doesn't know.
     """
-    if encoding not in ENCODINGS:
-        raise unknown("encoding", encoding, ENCODINGS)
     if ev is not None:
         require_range("ev", ev, -40.0, 40.0, "give stops")
     raw, file_facts = open_raw(path)
