@@ -14,8 +14,8 @@ from PIL import Image
 from sweep_sample import row
 
 from sensor.presets import preset
-from studies.pages.report_cells import over_seeds
 from studies.pages.report_data import ReportData, ReportLevel, ReportRender, ReportScene, ReportSensor
+from studies.pages.report_sweep import over_seeds
 from studies.pages.report_text import group_names, view_names
 from studies.sweep.row import Row
 
@@ -113,7 +113,6 @@ def sample_report(change: Change = lambda made: made, levels: int = len(LEVELS),
         environment={"python": "3.11.7", "mitsuba": "3.9.1", "llvm": "libLLVM.so.23.1", "threads": "2"},
         configuration={"[render]": "size = 256, spp = 256"},
         exposure_rule="99th percentile of expected G at 80 % of the well, at most 66 ms",
-        display_white="White is the luminance of a perfect diffuser in the scene's brightest light.",
         left_out=("diffraction", "cos^4 falloff", "veiling glare"),
         notes=("No GPU answered: the LLVM engine ran on 2 threads.",),
         **axes,

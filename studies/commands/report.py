@@ -6,7 +6,7 @@ from rodcone.errors import require_whole
 from rodcone.files import replacing
 from studies.commands.console import OutOrNone
 from studies.pages.report import render_report
-from studies.pages.report_sweep import ledger_results
+from studies.pages.report_sweep import sweep_report
 from studies.sweep.results import overview, results_json
 
 FILE, RESULTS, OVERVIEW = "report.html", "results.json", "overview.png"
@@ -45,7 +45,7 @@ def write_results(folder: Path) -> Path:
     InputError, OSError
         As `write_report`.
     """
-    page = render_report(*ledger_results(folder)).encode()
+    page = render_report(*sweep_report(folder)).encode()
     files = {FILE: page, RESULTS: results_json(folder), OVERVIEW: overview(folder)}
     with replacing(*(folder / name for name in files)) as places:
         for place, content in zip(places, files.values(), strict=True):
@@ -59,11 +59,11 @@ def write_report(folder: Path, path: Path, pictures: int | None = None) -> Path:
     Raises
     ------
     InputError
-        As `studies.pages.report_sweep.ledger_results`.
+        As `studies.pages.report_sweep.sweep_report`.
     OSError
         Where the file can't be written.
     """
-    page = render_report(*ledger_results(folder, pictures))
+    page = render_report(*sweep_report(folder, pictures))
     with replacing(path) as (place,):
         place.write_text(page, "utf-8")
     return path

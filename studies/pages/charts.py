@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil, floor, isfinite, log10
 
+from matplotlib.ticker import MaxNLocator
+
 WIDTH, HEIGHT = 400.0, 240.0
 LEFT, RIGHT, TOP, BOTTOM = 58.0, 92.0, 14.0, 40.0
 # Two direct labels closer than this would overprint (12 px type).
@@ -95,14 +97,11 @@ def tick_text(value: float) -> str:
     return text.replace("-", "\N{MINUS SIGN}")
 
 
-def linear_ticks(low: float, high: float, count: int = 5) -> list[float]:
-    """Return about `count` round values that enclose `low`..`high`."""
-    span = (high - low) or max(abs(high), 1.0)
-    raw = span / count
-    power = 10.0 ** floor(log10(raw))
-    step = next(factor * power for factor in (1, 2, 2.5, 5, 10) if factor * power >= raw * 0.999)
-    first, last = floor(low / step + 1e-9), ceil(high / step - 1e-9)
-    return [round(step * index, 9) for index in range(first, max(last, first + 1) + 1)]
+def linear_ticks(low: float, high: float) -> list[float]:
+    """Return about five round values that enclose `low`..`high`."""
+    if low == high:
+        high = low + max(abs(low), 1.0)
+    return [round(float(tick), 9) for tick in MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)]
 
 
 def decades(low: float, high: float) -> list[float]:
@@ -123,15 +122,7 @@ def log_ticks(low: float, high: float) -> list[float]:
 
 def line_path(points: Sequence[ChartPoint | None]) -> str:
     """Join points with straight lines; a missing one leaves a gap."""
-    parts: list[str] = []
-    pen = "M"
-    for point in points:
-        if point is None:
-            pen = "M"
-            continue
-        parts.append(f"{pen}{point.x:g} {point.y:g}")
-        pen = "L"
-    return " ".join(parts)
+    return " ".join(f"{'L' if before else 'M'}{at.x:g} {at.y:g}" for before, at in pairwise([None, *points]) if at)
 
 
 def band_path(xs: Sequence[float], intervals: Sequence[tuple[float, float] | None], scale: Scale) -> str:
@@ -178,11 +169,12 @@ def _value_axis(values: Sequence[float], log: bool) -> tuple[Scale, list[float]]
 
 def _series(slot: int, line: ChartLine, order: Sequence[int], xs: Sequence[float], scale: Scale) -> Series:
     """Place one line's points, from left to right."""
-    placed: list[ChartPoint | None] = []
-    for index in order:
-        value = line.values[index]
-        known = value is not None and isfinite(value)
-        placed.append(ChartPoint(xs[index], scale.at(value or 0.0), line.texts[index]) if known else None)
+    placed = [
+        ChartPoint(xs[i], scale.at(value), line.texts[i])
+        if (value := line.values[i]) is not None and isfinite(value)
+        else None
+        for i in order
+    ]
     points = tuple(point for point in placed if point is not None)
     label = line.name if len(line.name) <= LABEL_LENGTH else line.name[: LABEL_LENGTH - 1] + "…"
     band = band_path([xs[i] for i in order], [line.intervals[i] for i in order], scale) if line.intervals else ""
@@ -195,7 +187,6 @@ def line_chart(
     x: Sequence[float],
     lines: Sequence[ChartLine],
     *,
-    log_y: bool = False,
     percent: bool = False,
     shared: Sequence[float | None] = (),
     rule: tuple[float, str] | None = None,
@@ -211,8 +202,8 @@ def line_chart(
         Positive positions, such as luminance in cd/m², one for each value of every line.
     lines : sequence of ChartLine
         What to draw; None and values that are not finite leave a gap.
-    log_y, percent : bool
-        Logarithmic value axis; ticks written as per cent.
+    percent : bool
+        Shares on a logarithmic axis whose ticks are written as per cent.
     shared : sequence of float or None
         Further values the value axis has to hold, so that neighbouring charts share one scale.
     rule : (value, text), optional
@@ -227,7 +218,7 @@ def line_chart(
     """
     ends = [end for line in lines for interval in line.intervals if interval for end in interval]
     given = [*(value for line in lines for value in line.values), *ends, *shared, rule[0] if rule else None]
-    scale, ticks = _value_axis([value for value in given if value is not None and isfinite(value)], log_y)
+    scale, ticks = _value_axis([value for value in given if value is not None and isfinite(value)], percent)
     # A margin of 40 % of the value keeps the outermost marks off the frame.
     across = Scale(min(x) / 1.4, max(x) * 1.4, LEFT, WIDTH - RIGHT, log=True)
     xs = [across.at(position) for position in x]

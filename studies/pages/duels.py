@@ -79,7 +79,7 @@ class Duel:
 
 
 def contests_of(rows: Sequence[Row]) -> list[Contest]:
-    """Sort a sweep's rows by condition; within a group by luminance.
+    """Sort a sweep's rows by condition, and the conditions of a group by luminance.
 
     Raises
     ------
@@ -88,25 +88,26 @@ def contests_of(rows: Sequence[Row]) -> list[Contest]:
         different versions, variants or engines.
     """
     require_alike(rows)
-    found: dict[tuple[Group, str], dict[str, dict[int, Row]]] = {}
-    for row in rows:
-        place = Group(row.scene, row.spectrum, row.exposure, row.sensor), row.level
-        found.setdefault(place, {}).setdefault(row.processor, {})[row.seed] = row
+    of_cells = {
+        (Group(row.scene, row.spectrum, row.exposure, row.sensor), row.level, row.processor, row.seed): row
+        for row in rows
+    }
     processors, seeds = dict.fromkeys(row.processor for row in rows), sorted({row.seed for row in rows})
     if len(seeds) < FEWEST_SEEDS:
         raise InputError(f"seeds: {seeds} is not allowed; give two or more, which an interval takes, and sweep again")
-    for (group, level), by_processor in found.items():
+    contests = []
+    for group, level in dict.fromkeys((group, level) for group, level, _, _ in of_cells):
+        by_processor = {}
         for name in processors:
-            if sorted(by_processor.get(name, {})) != seeds:
+            found = [of_cells.get((group, level, name, seed)) for seed in seeds]
+            by_processor[name] = tuple(row for row in found if row)
+            if None in found:
                 raise InputError(
                     f"cells: {name} on {group.scene} at {level} lacks seeds that others have; allowed: a whole sweep; "
                     "run the same rodcone sweep again, which makes what is missing"
                 )
-    contests = []
-    for (group, level), by_processor in found.items():
-        in_order = {name: tuple(by_processor[name][seed] for seed in seeds) for name in processors}
-        contests.append(Contest(group, level, next(iter(in_order.values()))[0].luminance_cd_m2, in_order))
-    groups = list(dict.fromkeys(contest.group for contest in contests))
+        contests.append(Contest(group, level, next(iter(by_processor.values()))[0].luminance_cd_m2, by_processor))
+    groups = groups_of(contests)
     return sorted(contests, key=lambda contest: (groups.index(contest.group), contest.luminance_cd_m2))
 
 

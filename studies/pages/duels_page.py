@@ -1,10 +1,13 @@
-"""The page of a camera beside its opponents: tables in Markdown, with the figure as SVG in a file of its own."""
+"""The page of a camera beside its opponents: tables in Markdown, and PSNR over light as SVG in a file of its own."""
 
 import json
 from collections.abc import Mapping, Sequence
 from math import isnan
 from pathlib import Path
 from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
 
 from rodcone.files import replacing
 from studies.pages.duels import (
@@ -13,7 +16,6 @@ from studies.pages.duels import (
     LEVEL,
     METRICS,
     Contest,
-    Group,
     contests_of,
     duels,
     group_name,
@@ -22,10 +24,13 @@ from studies.pages.duels import (
     opponents_of,
     snr_db,
 )
-from studies.pages.duels_figure import description, figure_of
-from studies.pages.plots import svg_text
+from studies.pages.plots import BLUE, CHART, GREEN, ORANGE, STYLE, blank, name_at_ends, plain_ticks, svg_text
 from studies.pages.report_text import DELTA_E, MISSING, NBSP, PSNR, Metric, fixed, level_text, percent, significant
 from studies.sweep.row import Row
+
+COLUMNS = 2  # charts beside each other
+FEWEST_LEVELS = 2  # that a curve takes
+OTHERS = "#9aa0a5"
 
 
 def write_page(rows: Sequence[Row], study: Mapping[str, Any], folder: Path, out: Path, camera: str) -> None:
@@ -41,7 +46,7 @@ def write_page(rows: Sequence[Row], study: Mapping[str, Any], folder: Path, out:
     out : Path
         Ends in ``.md``; the figure goes beside it, ending in ``.svg``.
     camera : str
-        Whose leads and losses the page tells.
+        That the page compares with the others.
 
     Raises
     ------
@@ -65,6 +70,10 @@ def page_of(
 ) -> str:
     """Return the page's Markdown; parameters as `write_page`."""
     groups = groups_of(contests)
+    of_groups = [
+        (f"### {code(group_name(group, groups))}", [contest for contest in contests if contest.group == group])
+        for group in groups
+    ]
     ranked = sum(is_ranked(contest, camera) for contest in contests)
     worst = max((row.mc_share, contest.level) for contest in contests for rows in contest.rows.values() for row in rows)
     parts = [
@@ -83,13 +92,11 @@ def page_of(
         f"Positive: {code(camera)} is better. **Bold**: it is behind, and the whole interval is below 0. In brackets: "
         f"the interval holds 0. {MISSING}: not ranked.",
     ]
-    for group in groups:
-        of_group = [contest for contest in contests if contest.group == group]
-        parts += [f"### {group_text(group, groups)}", *(lead_table(metric, of_group, camera) for metric in METRICS)]
+    for title, of_group in of_groups:
+        parts += [title, *(lead_table(metric, of_group, camera) for metric in METRICS)]
     parts.append("## Every condition")
-    for group in groups:
-        of_group = [contest for contest in contests if contest.group == group]
-        parts += [f"### {group_text(group, groups)}: figures", level_table(of_group, camera)]
+    for title, of_group in of_groups:
+        parts += [f"{title}: figures", level_table(of_group, camera)]
     parts.append(
         "Means over seeds; the best of each column in bold. The render's own noise, which counts as texture, has at "
         f"most {percent(worst[0])} of the sensor's variance (at {level_text(worst[1])})."
@@ -100,11 +107,6 @@ def page_of(
 def code(text: str) -> str:
     """Write a name as Markdown's code, whatever is in it: in code no sign has a meaning but the backtick and |."""
     return "`" + " ".join(text.split()).replace("`", "'").replace("|", "\\|") + "`"
-
-
-def group_text(group: Group, groups: Sequence[Group]) -> str:
-    """Name a group as Markdown's code."""
-    return code(group_name(group, groups))
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -207,3 +209,49 @@ def _both(contest: Contest, name: str) -> str:
 def _develop_s(contests: Sequence[Contest], name: str) -> float:
     times = sorted(row.develop_s for contest in contests for row in contest.rows[name])
     return times[len(times) // 2]
+
+
+def hardest(contests: Sequence[Contest], camera: str) -> str | None:
+    """Return the opponent that is ahead of the camera in PSNR most often; None where none ever is."""
+    lost = {
+        name: sum(duel.outcome == BEHIND for duel in duels(contests, camera, name, PSNR))
+        for name in opponents_of(contests, camera)
+    }
+    most = max(lost, key=lambda name: lost[name])
+    return most if lost[most] else None
+
+
+def description(contests: Sequence[Contest], camera: str) -> str:
+    """Say what the figure shows, for those who don't see it."""
+    most = hardest(contests, camera)
+    tail = f"and {most}, which is ahead of it most often" if most else "of which no other is ahead of it anywhere"
+    return f"PSNR over light for every processor: {camera}, {tail}"
+
+
+@rc_context(STYLE)
+def figure_of(contests: Sequence[Contest], camera: str) -> Figure | None:
+    """Draw the charts; None where no group has two levels.
+
+    The camera, the first of its opponents and the one that is ahead of it most often have colours, the others are grey.
+    """
+    groups = groups_of(contests)
+    of_groups = [[contest for contest in contests if contest.group == group] for group in groups]
+    charted = [of_group for of_group in of_groups if len(of_group) >= FEWEST_LEVELS]
+    if not charted:
+        return None
+    names, most = opponents_of(contests, camera), hardest(contests, camera)
+    colours = dict.fromkeys(names, OTHERS) | ({most: GREEN} if most else {}) | {names[0]: ORANGE, camera: BLUE}
+    columns, rows = min(len(charted), COLUMNS), -(-len(charted) // COLUMNS)
+    figure = blank(columns * CHART[0], rows * CHART[1])
+    for index, of_group in enumerate(charted, 1):
+        axes = figure.add_subplot(rows, columns, index)
+        light = [contest.luminance_cd_m2 for contest in of_group]
+        for name, colour in colours.items():
+            psnr_db = [contest.mean(name, PSNR) for contest in of_group]
+            axes.semilogx(light, psnr_db, color=colour, label=name, zorder=2.0 if colour == OTHERS else 3.0)
+        axes.set(
+            title=f"PSNR [dB], {group_name(of_group[0].group, groups)}", xlabel="cd/m²", xlim=(light[0], light[-1])
+        )
+        plain_ticks(axes)
+        name_at_ends(axes, [(name, of_group[-1].mean(name, PSNR), colour) for name, colour in colours.items()])
+    return figure

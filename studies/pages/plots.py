@@ -47,29 +47,23 @@ STYLE: dict[Any, Any] = {  # Matplotlib's settings
 
 def svg_text(figure: Figure) -> str:
     """Write a figure as SVG, without a date and without a link to a document type."""
-    buffer = BytesIO()
-    _lay_out(figure)
-    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with rc_context(STYLE):
-        figure.savefig(buffer, format="svg", metadata=nothing)
-    text = buffer.getvalue().decode("utf-8")
+    text = _saved(figure, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type"))).decode("utf-8")
     return text[text.index("<svg") :]
 
 
 def png_bytes(figure: Figure) -> bytes:
     """Write a figure as PNG, two pixels a point."""
+    return _saved(figure, format="png", dpi=PNG_DPI, metadata={"Software": None})
+
+
+def _saved(figure: Figure, **options: Any) -> bytes:
+    """Lay a figure out once, since each further layout would move its parts a little, and write it."""
     buffer = BytesIO()
-    _lay_out(figure)
-    with rc_context(STYLE):
-        figure.savefig(buffer, format="png", dpi=PNG_DPI, metadata={"Software": None})
-    return buffer.getvalue()
-
-
-def _lay_out(figure: Figure) -> None:
-    """Lay a figure out once: each further layout would move its parts a little."""
     with rc_context(STYLE):
         figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+        figure.set_layout_engine("none")
+        figure.savefig(buffer, **options)
+    return buffer.getvalue()
 
 
 def blank(width: float, height: float) -> Figure:
@@ -121,5 +115,5 @@ def name_at_ends(axes: Axes, ends: Sequence[tuple[str, float, str]]) -> None:
     box = axes.transLimits
     high = CHART[1] * 0.7  # of the axes, about [points]
     wanted = [float(box.transform(axes.transScale.transform((1.0, y)))[1]) * high for _, y, _ in ends]
-    for (name, _, colour), place in zip(ends, spread(wanted, LABEL_GAP, 0.0, high), strict=True):
-        axes.text(1.02, place / high, name, color=colour, va="center", transform=axes.transAxes)
+    for (name, _, colour), height in zip(ends, spread(wanted, LABEL_GAP, 0.0, high), strict=True):
+        axes.text(1.02, height / high, name, color=colour, va="center", transform=axes.transAxes)

@@ -17,7 +17,7 @@ SHARE = text.Metric("mc_share", "Monte Carlo share", 1, "", higher=False)
 class SpeedRow:
     """Mean seconds of a camera's steps for one sensor, its mean PSNR, and its lead over the fastest camera.
 
-    `judged` is the number of conditions that the means are over.
+    `conditions` is the number that the means are over.
     """
 
     sensor: str
@@ -26,7 +26,7 @@ class SpeedRow:
     develop_s: float | None
     psnr_db: float | None
     gain_db: float | None
-    judged: int
+    conditions: int
 
 
 def shown_metrics(cells: Sequence[ReportCell]) -> list[text.Metric]:
@@ -51,7 +51,6 @@ def group_charts(report: ReportData, metric: text.Metric) -> list[Chart]:
                 [stand_in if value is None else value for value in known],
                 [_line(report, own[slot :: len(names)], metric) for slot in range(len(names))],
                 shared=[*(cell.figures[metric.key] for cell in report.cells), *ends],
-                log_y=share,
                 percent=share,
                 rule=(MOST_SHARE, f"aim {text.percent(MOST_SHARE)}") if share else None,
             )
@@ -74,7 +73,7 @@ def _line(report: ReportData, cells: Sequence[ReportCell], metric: text.Metric) 
 def speed_rows(report: ReportData) -> list[SpeedRow]:
     """Return for each sensor and camera the mean seconds of a picture's steps and its mean PSNR.
 
-    PSNR is a mean over the conditions in which it is known for every camera of the sensor, so that all are judged on
+    PSNR is a mean over the conditions in which it is known for every camera of the sensor, so that all are compared on
     the same ones. Conditions that other variants or engines rendered or captured have rows of their own, whose sensor's
     name says so.
     """
@@ -99,16 +98,16 @@ def _made_with(condition: Sequence[ReportCell]) -> str:
 def _speed_of(sensor: str, conditions: Sequence[Sequence[ReportCell]]) -> list[SpeedRow]:
     """Rows of `speed_rows` for conditions with one cell of each camera."""
     psnrs = [[cell.figures["psnr_db"] for cell in condition] for condition in conditions]
-    judged = [values for values in psnrs if all(value is not None and isfinite(value) for value in values)]
+    compared = [values for values in psnrs if all(value is not None and isfinite(value) for value in values)]
     made = []
     for slot, cell in enumerate(conditions[0]):
         firsts = [condition[slot].first for condition in conditions]
         capture_s = _mean([first.capture_s if first else None for first in firsts])
         develop_s = _mean([first.develop_s if first else None for first in firsts])
-        made.append((cell.camera, capture_s, develop_s, _mean([values[slot] for values in judged])))
+        made.append((cell.camera, capture_s, develop_s, _mean([values[slot] for values in compared])))
     fastest_db = min(made, key=lambda row: float("inf") if row[2] is None else row[2])[3]
     gains = [None if psnr_db is None or fastest_db is None else psnr_db - fastest_db for *_, psnr_db in made]
-    return [SpeedRow(sensor, *row, gain, len(judged)) for row, gain in zip(made, gains, strict=True)]
+    return [SpeedRow(sensor, *row, gain, len(compared)) for row, gain in zip(made, gains, strict=True)]
 
 
 def speed_charts(rows: Sequence[SpeedRow]) -> list[Chart]:
@@ -124,9 +123,9 @@ def speed_charts(rows: Sequence[SpeedRow]) -> list[Chart]:
             for row, seconds in known
         ]
         lines = []
-        for place, (row, _) in enumerate(known):
-            values = [row.psnr_db if place == index else None for index in range(len(known))]
-            lines.append(ChartLine(text.camera_name(row.camera), values, [words[place]] * len(known)))
+        for slot, (row, _) in enumerate(known):
+            values = [row.psnr_db if slot == index else None for index in range(len(known))]
+            lines.append(ChartLine(text.camera_name(row.camera), values, [words[slot]] * len(known)))
         charts.append(
             line_chart(
                 f"PSNR over development time, {sensor}",

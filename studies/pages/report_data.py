@@ -138,7 +138,6 @@ class ReportData:
     environment: Mapping[str, str]
     configuration: Mapping[str, str]
     exposure_rule: str
-    display_white: str
     left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     pictures_left_out: str = ""

@@ -1,10 +1,12 @@
 """The report of a sweep: its rows as the values that `report` shows, and the pictures."""
 
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import metadata
 from io import BytesIO
 from itertools import product
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,7 @@ from PIL import Image
 
 from rodcone.errors import InputError
 from sensor.exposure import RULE
-from studies.pages.report_cells import over_seeds
-from studies.pages.report_choice import chosen_conditions
+from studies.metrics.confidence import mean_with_confidence
 from studies.pages.report_data import ReportCell, ReportData, ReportScene
 from studies.pages.report_facts import (
     configuration,
@@ -25,8 +26,7 @@ from studies.pages.report_facts import (
     render_of,
     sensor_of,
 )
-from studies.pages.report_text import group_names, view_names
-from studies.pages.results import DISPLAY_WHITE
+from studies.pages.report_text import METRICS, group_names, view_names
 from studies.study.study import label
 from studies.sweep.database import FILE, last_study, read_ledger, rows
 from studies.sweep.prepare import PICTURES
@@ -36,38 +36,11 @@ from studies.sweep.stored import read_whole
 
 SHOWN_BYTES = 8e6  # of pictures in a page, where their number isn't given: some 11 MB of HTML, which any browser takes
 
-
-@dataclass(frozen=True)
-class LastRun:
-    """What the last run of a sweep asked for, how many cells that is, what is made of it, and the seconds by stage."""
-
-    study: Mapping[str, Any]
-    stages: Mapping[str, float]
-    wanted: int
-    rows: tuple[Row, ...]
+# What seeds scatter: every figure of a row but its exposure and its electrons, which noise doesn't touch.
+SCATTERED = (*(metric.key for metric in METRICS), "snr_db", "saturated", "mc_share")
 
 
-def read_run(folder: Path) -> LastRun:
-    """Read the last run of a sweep.
-
-    Raises
-    ------
-    InputError
-        Where there is no results database, one of another version, or none of its cells is made yet, or they were made
-        by different versions, variants or engines.
-    """
-    if not (folder / FILE).is_file():
-        raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
-    with read_ledger(folder) as base:
-        found, wanted = rows(base), base.execute("SELECT count(*) FROM wanted").fetchone()[0]
-        run = last_study(base)
-    if not found or run is None:
-        raise InputError(f"{folder}: its last run has made no cell yet; run rodcone sweep, which goes on")
-    require_alike(found)
-    return LastRun(*run, wanted, tuple(found))
-
-
-def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[ReportData, dict[str, bytes]]:
+def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[ReportData, dict[str, bytes]]:
     """Values and pictures of a sweep, as `studies.pages.report.render_report` takes them.
 
     Parameters
@@ -80,20 +53,29 @@ def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[Repo
     Raises
     ------
     InputError
-        As `read_run`, and for a picture that is gone.
+        Where there is no results database, one of another version, none of the last run's cells is made yet, they were
+        made by different versions, variants or engines, or a picture is gone.
     """
-    run = read_run(folder)
-    study = run.study
+    if not (folder / FILE).is_file():
+        raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
+    with read_ledger(folder) as base:
+        made, wanted = rows(base), base.execute("SELECT count(*) FROM wanted").fetchone()[0]
+        run = last_study(base)
+    if not made or run is None:
+        raise InputError(f"{folder}: its last run has made no cell yet; run rodcone sweep, which goes on")
+    require_alike(made)
+    study, stages = run
+
     names = [label(choice["source"]) for choice in study["scenes"]]
-    of_views = {(row.scene, row.spectrum): row.truth for row in run.rows}
+    of_views = {(row.scene, row.spectrum): row.truth for row in made}
     truths = [of_views.get(view) for view in product(names, study["spectra"])]
-    cells = _cells(run, names)
+    cells = _cells(study, made, names)
     shown, left_out = _choose(folder, cells, study, most_pictures)
-    wanted = dict.fromkeys(name for name in (*truths, *(cell.picture for cell in shown)) if name)
-    pictures = {name: read_whole(folder / PICTURES, name) for name in wanted}
-    sizes = [_size(pictures, truths[place * len(study["spectra"])]) for place in range(len(names))]
-    missing = run.wanted - len(run.rows)
-    unmade = [f"{missing} of {run.wanted} cells are not made yet: rodcone sweep goes on with them."] if missing else []
+    files = dict.fromkeys(name for name in (*truths, *(cell.picture for cell in shown)) if name)
+    pictures = {name: read_whole(folder / PICTURES, name) for name in files}
+    sizes = [_size(pictures, truths[index * len(study["spectra"])]) for index in range(len(names))]
+    missing = wanted - len(made)
+    unmade = [f"{missing} of {wanted} cells are not made yet: rodcone sweep goes on with them."] if missing else []
     data = ReportData(
         rodcone=metadata.version("rodcone"),
         name=study["name"],
@@ -106,25 +88,23 @@ def ledger_results(folder: Path, most_pictures: int | None = None) -> tuple[Repo
         seeds=tuple(study["seeds"]),
         cells=tuple(shown),
         truths=tuple(truths),
-        renders=tuple(render_of(run.rows, name) for name in names),
-        stages=run.stages,
-        environment=environment_of(run.rows),
+        renders=tuple(render_of(made, name) for name in names),
+        stages=stages,
+        environment=environment_of(made),
         configuration=configuration(study),
         exposure_rule=RULE.format(longest=study["longest_exposure_s"] * 1e3),
-        display_white=DISPLAY_WHITE,
-        left_out=lenses_left_out(run.rows, study["sensors"]),
-        notes=(*fallbacks(run.rows), *render_notes(run.rows), *unmade),
+        left_out=lenses_left_out(made, study["sensors"]),
+        notes=(*fallbacks(made), *render_notes(made), *unmade),
         pictures_left_out=left_out,
     )
     return data, pictures
 
 
-def _cells(run: LastRun, names: Sequence[str]) -> list[ReportCell]:
+def _cells(study: Mapping[str, Any], made: Sequence[Row], names: Sequence[str]) -> list[ReportCell]:
     """Return a cell for each combination that was asked for; one that isn't made yet has no figure."""
-    study = run.study
     sensors = [label(name) for name in study["sensors"]]
-    found = {(r.scene, r.spectrum, r.sensor, r.exposure, r.level, r.processor, r.seed): r for r in run.rows}
-    light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in run.rows}
+    found = {(r.scene, r.spectrum, r.sensor, r.exposure, r.level, r.processor, r.seed): r for r in made}
+    light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in made}
     views = view_names(names, study["spectra"])
     in_view = group_names(sensors, study["exposures"])
     titles = [name + (f", {view}" if view else "") for view in views for name in in_view]
@@ -136,6 +116,49 @@ def _cells(run: LastRun, names: Sequence[str]) -> list[ReportCell]:
             in_both_units = light.get((*group[:2], level), (None, None))
             cells.append(over_seeds(of_seeds, title, study["levels"].index(level), camera, in_both_units))
     return cells
+
+
+def over_seeds(
+    rows: Sequence[Row | None], group: str, level: int, camera: str, light: tuple[float | None, float | None]
+) -> ReportCell:
+    """Return the cell of one picture under several seeds.
+
+    With several seeds a figure that is unknown or not finite for one of them is unknown; with one it stays as it is.
+
+    Parameters
+    ----------
+    rows : sequence of Row or None
+        One for each seed; None for one that isn't made yet.
+    group, level, camera
+        As `ReportCell`.
+    light : (float or None, float or None)
+        The level in cd/m^2 and in lux.
+    """
+    figures: dict[str, float | None] = {}
+    intervals: dict[str, tuple[float, float]] = {}
+    for key in SCATTERED:
+        values = [value for row in rows if row and (value := getattr(row, key)) is not None]
+        figures[key] = values[0] if len(rows) == len(values) == 1 else None
+        if len(rows) > 1 and len(values) == len(rows) and all(map(isfinite, values)):
+            estimate = mean_with_confidence(values)
+            figures[key], intervals[key] = estimate.mean, (estimate.low, estimate.high)
+    states = [row.substitution for row in rows if row is not None and row.substitution is not None]
+    balances = [json.loads(row.balance) for row in rows if row is not None]
+    fallen = {channel: how for balance in balances for channel, how in balance.items() if how == "calibrated"}
+    first = rows[0]
+    return ReportCell(
+        group=group,
+        level=level,
+        camera=camera,
+        luminance_cd_m2=light[0],
+        illuminance_lux=light[1],
+        first=first,
+        figures=figures,
+        intervals=intervals,
+        substitution=sum(states) / len(states) if len(states) == len(rows) else None,
+        balance=(balances[0] if first else {}) | fallen,
+        picture=first.picture if first else None,
+    )
 
 
 def _size(pictures: Mapping[str, bytes], name: str | None) -> tuple[int, int]:
@@ -164,3 +187,24 @@ def _choose(
         f"To keep the page small, pictures of {len(chosen)} of {count} conditions are in it, numbers of all; the "
         "others are files beside the results database, and rodcone report --pictures N puts more into the page."
     )
+
+
+def chosen_conditions(conditions: int, levels: int, most: int) -> set[int]:
+    """Choose conditions, of which `levels` in a row are one group: whole groups, so that the sliders work within them.
+
+    Groups lie evenly over all of them, the first among them; where not even one fits, its levels lie evenly, with
+    the darkest and the brightest.
+
+    Parameters
+    ----------
+    conditions, levels : int
+    most : int
+        1 or more.
+    """
+    if most >= conditions:
+        return set(range(conditions))
+    groups = conditions // levels
+    fitting = most // levels
+    if fitting:
+        return {place * groups // fitting * levels + level for place in range(fitting) for level in range(levels)}
+    return {round(place * (levels - 1) / max(most - 1, 1)) for place in range(most)}

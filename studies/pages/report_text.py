@@ -105,9 +105,9 @@ def camera_name(camera: str) -> str:
 
 
 def leader(metric: Metric, cells: Sequence[ReportCell]) -> tuple[ReportCell | None, float]:
-    """Return the cell that is best in `metric` and its lead over the next; None where nothing is to be told apart.
+    """Return the cell that is best in `metric` and its lead over the next; None where none leads.
 
-    That is where the written numbers tie, or where the confidence intervals over seeds overlap. (A test of the
+    None leads where the written numbers tie, or where the confidence intervals over seeds overlap. (A test of the
     difference would find a lead in some cases in which 95 % intervals overlap: overlap is the stricter rule.)
     """
     found = ((value, cell) for cell in cells if (value := cell.figures[metric.key]) is not None and not isnan(value))
@@ -123,11 +123,9 @@ def leader(metric: Metric, cells: Sequence[ReportCell]) -> tuple[ReportCell | No
 
 def view_names(scenes: Sequence[str], spectra: Sequence[str]) -> list[str]:
     """Return a title for each scene under each spectrum, of what varies; all are empty where there is one alone."""
-    several = len(scenes) > 1, len(spectra) > 1
-    return [
-        ", ".join(part for part, named in zip((scene, spectrum_name(spectrum)), several, strict=True) if named)
-        for scene, spectrum in product(scenes, spectra)
-    ]
+    scene_parts = [[scene] if len(scenes) > 1 else [] for scene in scenes]
+    spectrum_parts = [[spectrum_name(spectrum)] if len(spectra) > 1 else [] for spectrum in spectra]
+    return [", ".join(scene + spectrum) for scene, spectrum in product(scene_parts, spectrum_parts)]
 
 
 def group_names(sensors: Sequence[str], exposures: Sequence[str]) -> list[str]:

@@ -13,7 +13,7 @@ from isp.settings import Settings
 from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.readout import read_out
-from studies.paper.checks import Claim, at_most
+from studies.paper.claims import Claim, at_most
 from studies.paper.setup import sensor_of
 
 SIDE, REACH = 32, 10  # of the test frame, and the neighbourhood's, 21 x 21 [pixels]

@@ -14,10 +14,9 @@ from render.spectrum import Floats
 from sensor.curves import rgbw
 from sensor.readout import noise_variance
 from studies.pages.plots import BLUE, CHART, COLOURS, GREEN, INK, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks
-from studies.paper.checks import Claim, about, at_least
+from studies.paper.claims import Claim, PaperFigure, about, at_least
 from studies.paper.flat import channel_e, light_of, snr, without_prnu
 from studies.paper.numbers import MOONLIGHT_CD_M2
-from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, TODAY, sensor_of
 
 NM: Floats = np.arange(400.0, 701.0, 2.0)  # the paper's range

@@ -13,12 +13,9 @@ from sensor.config import SensorConfig
 from sensor.raw import RawImage
 from studies.metrics.truth import neutral_electrons
 from studies.pages.plots import picture_rows
-from studies.paper.camera import Image, View, develop, exposures, noise, quality_db
-from studies.paper.checks import Claim, at_least, at_most
-from studies.paper.page import PaperFigure
-from studies.paper.setup import READINGS, Setup, sensor_of, view
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most
+from studies.paper.setup import READINGS, Image, Setup, View, develop, exposures, noise, quality_db, sensor_of, view
 from studies.photograph.camera import colour_fit
-from studies.sweep.cells import Coordinates
 
 LUMINANCE_CD_M2, EXPOSURE_S = 2.5, 0.020  # low light: a tenth of Table 1's, at Figure 6's longest time
 GAIN_DB = 1.0  # a decibel is easily seen
@@ -82,8 +79,7 @@ def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     stages, rows = {}, []
     for reading, threshold in READINGS.items():
         sensor = sensor_of(reading)
-        at = Coordinates("still_life", "own", f"{LUMINANCE_CD_M2:g}cd/m2", "20ms", reading, "interleaved", 0)
-        raws = exposures(seen, sensor, EXPOSURE_S, at, setup.seeds)
+        raws = exposures(seen, reading, "20ms", count=setup.seeds)
         colour = [colour_image(raw, seen, sensor) for raw in raws]
         white = [white_image(raw, seen, sensor) for raw in raws]
         result = [develop(raw, seen, sensor, substitution_snr=threshold)[0] for raw in raws]

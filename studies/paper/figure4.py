@@ -14,12 +14,9 @@ from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import channels
 from sensor.raw import RawImage
 from studies.pages.plots import ORANGE, SIDE, STYLE, blank, show_picture
-from studies.paper.camera import Image, exposures
-from studies.paper.checks import Claim, at_least
+from studies.paper.claims import Claim, PaperFigure, at_least
 from studies.paper.numbers import MOONLIGHT_CD_M2
-from studies.paper.page import PaperFigure
-from studies.paper.setup import READINGS, Setup, sensor_of, view
-from studies.sweep.cells import Coordinates
+from studies.paper.setup import READINGS, Image, Setup, exposures, view
 
 PATCH = 5  # ours: the paper doesn't say
 ASIDE, AWAY = 4, 8  # pixels from the edge to x, and from x to y and to z: even, so that all lie alike in the tile
@@ -52,7 +49,7 @@ class Triplets:
 
 
 def edge_columns(truth: Image) -> NDArray[np.intp]:
-    """Column of each row (h,) at which luminance (h, w) crosses the midst of dark and bright."""
+    """Column of each row (h,) at which luminance (h, w) crosses the middle of dark and bright."""
     middle = (truth.min() + truth.max()) / 2
     return np.asarray((truth < middle).sum(axis=1), dtype=np.intp)  # the dark half is on the left
 
@@ -101,9 +98,7 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         seen = view(setup, "slanted_edge", level)
         columns = edge_columns(seen.radiance.luminance())
         for reading in READINGS:
-            at = Coordinates("slanted_edge", "own", f"{level:g}cd/m2", "20ms", reading, "interleaved", 0)
-            sensor = sensor_of(reading)
-            raw = exposures(seen, sensor, EXPOSURE_S, at, 1)[0]
+            raw = exposures(seen, reading, "20ms")[0]
             found = triplets(raw, columns)
             shares[f"{reading}, {name}"] = found.share
             if name == next(iter(LEVELS)):
@@ -131,12 +126,12 @@ def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Figure:
         shown = encode_srgb(np.repeat(np.clip((plane - low) / (high - low), 0.0, 1.0)[..., None] ** 2.2, 3, axis=-1))
         show_picture(axes["plane"], shown[top:, left:][:side, :side], reading)
         words = {"x": "x", "y": f"y, {found.to_y[middle]:.1f} away", "z": f"z, {found.to_z[middle]:.1f} away"}
-        for letter, down, across in (("x", 0, 0), ("y", AWAY, 0), ("z", 0, -AWAY)):
+        for name, down, across in (("x", 0, 0), ("y", AWAY, 0), ("z", 0, -AWAY)):
             i, j = row + down - PATCH // 2, column + across - PATCH // 2
             corner = j - left - 0.5, i - top - 0.5  # a pixel's middle has whole coordinates
             axes["plane"].add_patch(Rectangle(corner, PATCH, PATCH, fill=False, edgecolor=ORANGE, linewidth=1.6))
-            axes["plane"].text(*corner, letter, color=ORANGE, weight="bold", va="top")
-            show_picture(axes[letter], shown[i : i + PATCH, j : j + PATCH])
-            told = axes[letter].text(1.1, 0.5, words[letter], va="center", transform=axes[letter].transAxes)
-            told.set_in_layout(False)  # the empty column holds it
+            axes["plane"].text(*corner, name, color=ORANGE, weight="bold", va="top")
+            show_picture(axes[name], shown[i : i + PATCH, j : j + PATCH])
+            distance = axes[name].text(1.1, 0.5, words[name], va="center", transform=axes[name].transAxes)
+            distance.set_in_layout(False)  # the empty column holds it
     return figure

@@ -13,13 +13,10 @@ from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from sensor.cfa import channels, mask
 from sensor.raw import RawImage
 from studies.pages.plots import picture_rows
-from studies.paper.camera import Image, View, develop, exposures, quality_db
-from studies.paper.checks import Claim, ClaimCheck, at_least
-from studies.paper.page import PaperFigure
-from studies.paper.setup import READINGS, Setup, sensor_of, view
-from studies.sweep.cells import Coordinates
+from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_least
+from studies.paper.setup import READINGS, Image, Setup, View, develop, exposures, quality_db, sensor_of, view
 
-LUMINANCE_CD_M2, EXPOSURE_S, PITCH_UM = 200.0, 0.066, 3
+LUMINANCE_CD_M2, PITCH_UM = 200.0, 3
 PARTLY = (0.02, 0.98)  # share of W's pixels that may be full for "partly"
 WHOLE = 0.95  # correlation with the truth where W is full, for "whole": nine tenths of the variance
 # Early fusion: W enters before anything else (Sato 1983, Kijima 2007), or behind a neutral density (Yamagami 1994).
@@ -49,14 +46,14 @@ class Bright:
 
 
 def likeness(plane: Image, truth: Image, where: NDArray[np.bool_]) -> float:
-    """Correlation of two planes (h, w) over some pixels; 0 where either is even or there are none."""
+    """Correlation of two planes (h, w) over some pixels; 0 where either is constant or there are none."""
     if where.sum() < 2 or np.ptp(plane[where]) == 0 or np.ptp(truth[where]) == 0:
         return 0.0
     return float(np.corrcoef(plane[where], truth[where])[0, 1])
 
 
 def measure_bright(raw: RawImage, result: Image, seen: View) -> Bright:
-    """Judge one exposure and its result (h, w, 3), linear sRGB."""
+    """Measure one exposure and its result (h, w, 3), linear sRGB."""
     truth = luminance_of_srgb(seen.truth)
     white, colours = saturated_nearby(raw, "W"), saturated_nearby(raw, "RGB")
     alone = white & ~colours
@@ -144,6 +141,5 @@ def _shoot(
 ) -> tuple[list[RawImage], list[Image]]:
     """Exposures and pictures of one processor."""
     sensor = sensor_of(reading, PROCESSORS[processor].mosaic, PITCH_UM)
-    at = Coordinates("still_life", "own", "200cd/m2", "66ms", f"{reading}_3um", processor, 0)
-    raws = exposures(seen, sensor, EXPOSURE_S, at, setup.seeds)
+    raws = exposures(seen, reading, "66ms", processor, count=setup.seeds, pitch_um=PITCH_UM)
     return raws, [develop(raw, seen, sensor, processor, **options)[0] for raw in raws]

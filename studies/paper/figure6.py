@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from skimage.color import deltaE_ciede2000, rgb2lab
@@ -9,16 +10,23 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 from isp.processors.catalogue import PROCESSORS
 from isp.substitution import SUBSTITUTION_SNR
 from rodcone.colour_spaces import decode_srgb, encode_srgb
-from sensor.raw import RawImage
 from studies.pages.plots import picture_rows
-from studies.paper.camera import Image, View, develop, exposures, noise, quality_db
-from studies.paper.checks import Claim, at_least, at_most, near
-from studies.paper.figure1b import shown
-from studies.paper.page import PaperFigure
-from studies.paper.setup import READINGS, Setup, sensor_of, swept, view
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, near
+from studies.paper.setup import (
+    READINGS,
+    Image,
+    Setup,
+    View,
+    develop,
+    exposures,
+    noise,
+    quality_db,
+    sensor_of,
+    shown,
+    swept,
+    view,
+)
 from studies.photograph.camera import colour_fit
-from studies.study.study import parse_exposure
-from studies.sweep.cells import Coordinates
 from studies.sweep.row import Row
 
 LUMINANCE_CD_M2 = 25.0
@@ -114,26 +122,21 @@ def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """
     rows = swept(setup, "6")
     seen = view(setup, "still_life", LUMINANCE_CD_M2)
-    bayer, interleaved, table = {}, {}, []
-    for reading, threshold in READINGS.items():
-        pictures: dict[str, list[tuple[str, Image]]] = {"bayer": [], "interleaved": []}
+    outcomes: dict[str, dict[str, Outcome]] = {"bayer": {}, "interleaved": {}}
+    table = []
+    for (reading, threshold), camera in product(READINGS.items(), outcomes):
+        pictures: list[tuple[str, Image]] = []
         for exposure in SUBSTITUTED:
-            kept = {
-                name: [row for row in rows if (row.sensor, row.exposure, row.processor) == (reading, exposure, name)]
-                for name in pictures
-            }
-            place = f"{reading}, {exposure}"
-            bayer[place], encoded = _of_sweep(setup, kept["bayer"])
-            pictures["bayer"].append((f"Bayer, {exposure}", encoded))
-            if threshold == SUBSTITUTION_SNR:
-                interleaved[place], encoded = _of_sweep(setup, kept["interleaved"])
+            if camera == "bayer" or threshold == SUBSTITUTION_SNR:
+                own = [row for row in rows if (row.sensor, row.exposure, row.processor) == (reading, exposure, camera)]
+                outcome, encoded = _of_sweep(setup, own)
             else:
-                interleaved[place], encoded = _again(setup, seen, reading, exposure, threshold)
-            words = "W's luminance" if interleaved[place].substituted else "interleaved"
-            pictures["interleaved"].append((f"{words}, {exposure}", encoded))
-        for own in pictures.values():
-            table.append([(f"{reading}: {own[0][0]}", own[0][1]), *own[1:]])
-    claims = claims_6(bayer, interleaved, {name: swap(setup, seen, name) for name in READINGS})
+                outcome, encoded = _again(setup, seen, reading, exposure, threshold)
+            outcomes[camera][f"{reading}, {exposure}"] = outcome
+            words = "Bayer" if camera == "bayer" else "W's luminance" if outcome.substituted else "interleaved"
+            pictures.append((f"{words}, {exposure}" if pictures else f"{reading}: {words}, {exposure}", encoded))
+        table.append(pictures)
+    claims = claims_6(**outcomes, swaps={name: swap(setup, seen, name) for name in READINGS})
     caption = "Bayer and interleaved with Table 1's pixel at 25 cd/m², by exposure time."
     return PaperFigure("6", caption, picture_rows(table)), claims
 
@@ -142,19 +145,13 @@ def swap(setup: Setup, seen: View, reading: str) -> Swap:
     """Substitution at `DARKEST`, always against never, with the plain 3x3 matrix that the paper's camera has."""
     sensor = sensor_of(reading)
     matrix = colour_fit(sensor, PROCESSORS["interleaved"], seen.light).matrix()
-    raws = _raws(setup, seen, reading, DARKEST)
+    raws = exposures(seen, reading, DARKEST, count=setup.seeds)
     without, with_white = (
         [develop(raw, seen, sensor, matrix=matrix, substitution_snr=threshold)[0] for raw in raws]
         for threshold in (0.0, np.inf)
     )
     means = (rgb2lab(encode_srgb(np.mean(pictures, axis=0))) for pictures in (without, with_white))
     return Swap(noise(without) / noise(with_white), float(np.median(deltaE_ciede2000(*means))))
-
-
-def _raws(setup: Setup, seen: View, reading: str, exposure: str) -> list[RawImage]:
-    """The interleaved camera's exposures as the sweep's cells draw them."""
-    at = Coordinates("still_life", "own", "25cd/m2", exposure, reading, "interleaved", 0)
-    return exposures(seen, sensor_of(reading), parse_exposure(exposure) or 0.0, at, setup.seeds)
 
 
 def _of_sweep(setup: Setup, rows: Sequence[Row]) -> tuple[Outcome, Image]:
@@ -170,7 +167,7 @@ def _again(setup: Setup, seen: View, reading: str, exposure: str, threshold: flo
     """As `_of_sweep`, developed with another threshold of substitution."""
     made = [
         develop(raw, seen, sensor_of(reading), substitution_snr=threshold)
-        for raw in _raws(setup, seen, reading, exposure)
+        for raw in exposures(seen, reading, exposure, count=setup.seeds)
     ]
     pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in made]  # as the sweep's files hold them
     share = float(np.mean([bool(picture.substituted) for _, picture in made]))

@@ -1,7 +1,7 @@
 """The paper's numbers outside its figures: moonlight in photons, 30 dB, eight decades of light, and Table 1."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -11,24 +11,15 @@ from scenes.levels import DEMO_LEVELS
 from sensor.config import LensConfig
 from sensor.device import Device
 from sensor.readout import read_out
-from studies.paper.camera import View
-from studies.paper.checks import Claim, ClaimCheck, about, near
+from studies.paper.claims import Claim, ClaimCheck, about, near
 from studies.paper.flat import decibels, light_of, photons, shot_noise_alone
-from studies.paper.setup import READINGS, sensor_of
+from studies.paper.setup import READINGS, View, sensor_of
 
 MOONLIGHT_CD_M2 = DEMO_LEVELS[0].luminance_cd_m2
 FULL_SUN_LUX = 1e5  # as `DEMO_LEVELS`
 # A clear night without moon, airglow included: 0.002 lux (Schlyter, "Radiometry and photometry in astronomy", 2009).
 NIGHT_SKY_LUX = 2e-3
 FLAT_SIDE = 256  # of the uniform field that is read out [pixels]
-
-
-@dataclass(frozen=True)
-class Table:
-    """What Table 1 says of the well, twice [e-]."""
-
-    swing_e: float
-    full_well_e: float
 
 
 def moonlight_photons(first_nm: float, last_nm: float) -> float:
@@ -108,23 +99,19 @@ def range_claim(spans: Mapping[str, float]) -> Claim:
     )
 
 
-def table_claim(found: Mapping[str, Table]) -> Claim:
-    """Whether Table 1 agrees with itself; `found` by reading."""
+def table_claim(swing_wells: Mapping[str, float]) -> Claim:
+    """Whether Table 1 agrees with itself: the voltage swing [full wells] by reading."""
     return Claim(
         "Table 1",
         "The voltage swing is what a full well gives",
-        tuple(about(name, table.swing_e / table.full_well_e, 1.0, "× the well") for name, table in found.items()),
+        tuple(about(name, wells, 1.0, "× the well") for name, wells in swing_wells.items()),
         "1.08 V over 30 µV/e⁻ is 36 000 e⁻, the well 15 000 e⁻. Here the well clips; the swing is only reported.",
     )
-
-
-def tables() -> dict[str, Table]:
-    """Table 1 under each reading."""
-    pixels = {name: sensor_of(name).pixel for name in READINGS}
-    return {name: Table(pixel.swing_e, pixel.full_well_e) for name, pixel in pixels.items()}
 
 
 def number_claims(view: View) -> tuple[Claim, ...]:
     """All claims of this module; `view` is the scene whose range counts."""
     per_um2_s = {f"{low:g}-{high:g} nm": moonlight_photons(low, high) for low, high in ((400.0, 700.0), VISIBLE_NM)}
-    return *photon_claims(per_um2_s, measured_snr_db()), range_claim(range_spans(view)), table_claim(tables())
+    pixels = {name: sensor_of(name).pixel for name in READINGS}
+    swing_wells = {name: pixel.swing_e / pixel.full_well_e for name, pixel in pixels.items()}
+    return *photon_claims(per_um2_s, measured_snr_db()), range_claim(range_spans(view)), table_claim(swing_wells)

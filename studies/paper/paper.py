@@ -3,26 +3,24 @@
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from rodcone.files import replacing
+from studies.pages.environment import environment
+from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import png_bytes, svg_text
-from studies.pages.results import environment
 from studies.paper.bilateral import bilateral_claims
-from studies.paper.checks import VERDICTS, Claim
-from studies.paper.figure1a import figure_1a
-from studies.paper.figure1b import figure_1b
+from studies.paper.claims import VERDICTS, Claim, PaperFigure, range_text, value_text
+from studies.paper.figure1 import figure_1a, figure_1b
 from studies.paper.figure2 import figure_2
 from studies.paper.figure3 import figure_3
 from studies.paper.figure4 import figure_4
 from studies.paper.figure5 import figure_5
 from studies.paper.figure6 import figure_6
 from studies.paper.numbers import number_claims
-from studies.paper.page import PaperFigure, paper_page
-from studies.paper.setup import READINGS, Setup, Step, view
+from studies.paper.setup import READINGS, Setup, view
 
 Made = tuple[PaperFigure, tuple[Claim, ...]]
 
@@ -56,18 +54,16 @@ def make(setup: Setup) -> Paper:
     }
     made = []
     for index, (name, maker) in enumerate(makers.items()):
-        part = partial(_part, setup.step, name, index, len(makers))
-        part("begins", 0.0)
-        made.append(maker(replace(setup, step=part)))
+
+        def step(what: str, share: float, name: str = name, index: int = index) -> None:
+            setup.step(f"{name}: {what}", (index + share) / len(makers))
+
+        step("begins", 0.0)
+        made.append(maker(replace(setup, step=step)))
     numbers = number_claims(view(setup, "still_life", 1.0))
     claims = (*numbers, *(claim for _, own in made for claim in own), *bilateral_claims(tuple(READINGS)))
     facts = {"size": setup.size, "spp": setup.spp, "seeds": setup.seeds, "rodcone": metadata.version("rodcone")}
     return Paper(tuple(figure for figure, _ in made), claims, facts | {"environment": environment()})
-
-
-def _part(step: Step, name: str, index: int, count: int, what: str, share: float) -> None:
-    """Progress of one figure as part of the whole."""
-    step(f"{name}: {what}", (index + share) / count)
 
 
 def write(paper: Paper, folder: Path) -> Path:
@@ -75,7 +71,17 @@ def write(paper: Paper, folder: Path) -> Path:
     files = {f"figure_{figure.name}.svg": svg_text(figure.drawing).encode() for figure in paper.figures}
     files |= {f"figure_{figure.name}.png": png_bytes(figure.drawing) for figure in paper.figures}
     files["paper.json"] = (json.dumps(as_json(paper), indent=1, allow_nan=False) + "\n").encode()
-    files["paper.html"] = paper_page(paper.figures, paper.claims, paper.facts).encode()
+    page = write_out(
+        "paper.html.j2",
+        figures=[(one, address("svg+xml", files[f"figure_{one.name}.svg"])) for one in paper.figures],
+        claims=paper.claims,
+        facts=paper.facts,
+        verdicts=VERDICTS,
+        value_text=value_text,
+        range_text=range_text,
+        style=own_file("report.css") + own_file("paper.css"),
+    )
+    files["paper.html"] = page.encode()
     with replacing(*(folder / name for name in files)) as places:
         for place, content in zip(places, files.values(), strict=True):
             place.write_bytes(content)

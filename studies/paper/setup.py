@@ -1,35 +1,55 @@
-"""What the paper's figures share: sizes, seeds, one render a scene, sensors under both readings of Table 1."""
+"""What the figures share: cameras under both readings of Table 1, scenes rendered once, exposures and pictures."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
+import numpy as np
+import PIL.Image
+from numpy.typing import NDArray
+
+from isp.picture import Picture
+from isp.processors.catalogue import PROCESSORS
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL
+from render.radiance import SpectralRadiance
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_whole
+from sensor.capture import expose
 from sensor.config import SensorConfig
+from sensor.device import draw_device
+from sensor.optics import form_image
 from sensor.presets import preset
+from sensor.raw import RawImage
+from sensor.response import expected_electrons
 from sensor.variations import vary
 from studies.budget.model_plan import as_stated
-from studies.paper.camera import View, view_of
+from studies.metrics.quality import psnr_db
+from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
+from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.lit_scene import make_transport, open_choice
-from studies.study.study import RenderLimits, SceneChoice, Study
+from studies.study.study import OWN, RenderLimits, SceneChoice, Study, parse_exposure
 from studies.study.study_file import read_study
+from studies.sweep.cells import Coordinates, device_stream, exposure_stream
 from studies.sweep.export import read_rows
-from studies.sweep.prepare import RENDERS
+from studies.sweep.prepare import PICTURES, RENDERS
 from studies.sweep.row import Row
 from studies.sweep.run_sweep import sweep
 from studies.sweep.workers import InThisProcess, run
 
+Image = NDArray[np.float64]
 CONFIGS = Path(__file__).parent.parent / "configs"
-SWEEP = "sweep"  # folder of the ledger and of all renders, below the command's own
+SWEEP = "sweep"  # folder of the results database and of all renders, below the command's own
 # Readings of Table 1, each with the SNR under which W replaces the luminance (docs/decisions/0005).
 READINGS: Mapping[str, float] = MappingProxyType(
     {"table1_pixel": SUBSTITUTION_SNR_TABLE1_PIXEL, "table1_output": SUBSTITUTION_SNR}
 )
 TODAY = "low_noise"  # a pixel of today with Table 1's geometry, for comparison
 Step = Callable[[str, float], None]  # what is being done, and the share of it (0..1)
+# Samples over those of the setup: the dark half's own noise hides far more, and a constant environment needs few.
+_SPP_SHARE = {"lit_and_shadowed": 0.25, "slanted_edge": 0.25}
 
 
 @dataclass(frozen=True)
@@ -69,6 +89,33 @@ class Setup:
         require_whole("seeds", self.seeds, 2, 1000, "give 2 exposures or more: noise is their scatter")
 
 
+@dataclass(frozen=True)
+class View:
+    """What the cameras look at.
+
+    Attributes
+    ----------
+    scene, level : str
+        As a study names them.
+    radiance : SpectralRadiance
+    light : Light
+        That the cameras' colours are set to.
+    white_cd_m2 : float
+        Luminance shown as white.
+    """
+
+    scene: str
+    level: str
+    radiance: SpectralRadiance
+    light: Light
+    white_cd_m2: float
+
+    @property
+    def truth(self) -> Image:
+        """Linear sRGB of the noise-free scene, white 1, shape (h, w, 3)."""
+        return true_srgb(self.radiance, self.light, self.white_cd_m2)
+
+
 def sensor_of(reading: str, mosaic: str = "rgbw", pitch_um: int | None = None) -> SensorConfig:
     """Table 1's camera under one reading, or the figures' variation of it with pixels of 2, 3 or 6 um."""
     own = preset(reading)
@@ -77,10 +124,6 @@ def sensor_of(reading: str, mosaic: str = "rgbw", pitch_um: int | None = None) -
         other = preset(f"table1_output_{pitch_um}um")
         own = replace(other, pixel=replace(other.pixel, **noise))
     return vary(own, mosaic)
-
-
-# Samples over those of the setup: the dark half's own noise hides far more, and an even sky needs few.
-_SPP_SHARE = {"lit_and_shadowed": 0.25, "slanted_edge": 0.25}
 
 
 def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | None = None) -> View:
@@ -98,11 +141,17 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
     folder = setup.out / SWEEP / RENDERS  # the sweeps' own: one render serves them and this
     transport, _ = make_transport(opened, study, model, folder, lambda share, _: setup.step(f"render {scene}", share))
     group = transport.groups[white or next(iter(transport.groups))]
-    return view_of(transport, group.spectrum, luminance_cd_m2)
+    return View(
+        scene=scene,
+        level=OWN if luminance_cd_m2 is None else f"{luminance_cd_m2:g}cd/m2",
+        radiance=transport.relight(luminance_cd_m2=luminance_cd_m2),
+        light=light_in_bands(group.spectrum, transport.wavelength_nm, transport.width_nm),
+        white_cd_m2=shown_white_cd_m2(transport, luminance_cd_m2),
+    )
 
 
 def swept(setup: Setup, figure: str) -> list[Row]:
-    """Rows of a figure's study (`studies/configs/paper_*.toml`), swept at this size into the folder's ledger."""
+    """Rows of a figure's study (`studies/configs/paper_*.toml`), swept at this size into the results database."""
     study = read_study(CONFIGS / f"paper_{figure}.toml")
     study = replace(
         study,
@@ -113,3 +162,69 @@ def swept(setup: Setup, figure: str) -> list[Row]:
     plan = as_stated(study)
     sweep(study, folder, plan, partial(run, executor=InThisProcess()), setup.step)
     return read_rows(folder)
+
+
+def shown(setup: Setup, row: Row) -> Image:
+    """Picture of a row of `swept`, encoded sRGB (h, w, 3)."""
+    with PIL.Image.open(setup.out / SWEEP / PICTURES / row.picture) as file:
+        return np.asarray(file, dtype=np.float64) / 255
+
+
+def exposures(
+    seen: View, reading: str, exposure: str, processor: str = "interleaved", count: int = 1, pitch_um: int | None = None
+) -> list[RawImage]:
+    """Exposures by as many chips, drawn as a sweep draws its cells.
+
+    Parameters
+    ----------
+    seen : View
+    reading : str
+        Of Table 1; with `pitch_um` as `sensor_of`.
+    exposure : str
+        Time as a study writes it, such as ``20ms``.
+    processor : str
+        That is to develop them: it decides the mosaic.
+    count : int
+    pitch_um : int, optional
+    """
+    mosaic = PROCESSORS[processor].mosaic
+    sensor, exposure_s = sensor_of(reading, mosaic, pitch_um), parse_exposure(exposure) or 0.0
+    expected_e = expected_electrons(form_image(seen.radiance, sensor), sensor, exposure_s)
+    name, made = reading if pitch_um is None else f"{reading}_{pitch_um}um", []
+    for seed in range(count):
+        at = Coordinates(seen.scene, OWN, seen.level, exposure, name, processor, seed)
+        device = draw_device(sensor, expected_e.shape, device_stream(at, mosaic))
+        made.append(expose(expected_e, sensor, exposure_s, device, exposure_stream(at, mosaic), exact=True))
+    return made
+
+
+def develop(
+    raw: RawImage, view: View, sensor: SensorConfig, processor: str = "interleaved", **options: Any
+) -> tuple[Image, Picture]:
+    """Develop an exposure as `develop_to_scale` does, with the colours fitted under the view's light.
+
+    A ``matrix`` among the processor's `options` stands in place of the fit.
+    """
+    used = PROCESSORS[processor]
+    matrix = options.pop("matrix", None)
+    colours = colour_fit(sensor, used, view.light) if matrix is None else matrix
+    return develop_to_scale(raw, used, colours, sensor, view.light, view.white_cd_m2, **options)
+
+
+def noise(pictures: Sequence[Image]) -> float:
+    """Noise of a picture: standard deviation over exposures of its linear luminance, root mean square over pixels.
+
+    Blur and wrong colours have no part in it.
+
+    Parameters
+    ----------
+    pictures : sequence of (h, w, 3) float64
+        Linear sRGB, two or more exposures by different chips.
+    """
+    shown = np.stack([luminance_of_srgb(picture) for picture in pictures])
+    return float(np.sqrt(shown.var(axis=0, ddof=1).mean()))
+
+
+def quality_db(pictures: Sequence[Image], truth: Image) -> float:
+    """Mean PSNR of pictures against the truth [dB], both linear and encoded for it."""
+    return float(np.mean([psnr_db(encode_srgb(picture), encode_srgb(truth)) for picture in pictures]))

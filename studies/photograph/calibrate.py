@@ -40,7 +40,14 @@ def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
     neutral, to_srgb, _, _ = _under(sensor, light)
     _, _, to_camera_a, to_xyz_a = _under(sensor, illuminant("A"))
     _, _, to_camera_d65, to_xyz_d65 = _under(sensor, illuminant("D65"))
-    return ColourCalibration(neutral, to_srgb, to_camera_a, to_camera_d65, to_xyz_a, to_xyz_d65)
+    return ColourCalibration(
+        neutral=neutral,
+        to_srgb=to_srgb,
+        xyz_to_camera_a=to_camera_a,
+        xyz_to_camera_d65=to_camera_d65,
+        camera_to_xyz_a=to_xyz_a,
+        camera_to_xyz_d65=to_xyz_d65,
+    )
 
 
 def iso_speed(sensor: SensorConfig) -> float | None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.calibrated_colours import fit_of_calibration
-from isp.colour.encoding import ENCODINGS, encode
+from isp.colour.encoding import encode
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import luminance_of_srgb
@@ -105,11 +105,9 @@ def develop_file(
     InputError
         For a file that can't be read, holds no colours, or whose mosaic the pipeline doesn't know.
     """
-    if encoding not in ENCODINGS:
-        raise unknown("encoding", encoding, ENCODINGS)
     if ev is not None:
         require_range("ev", ev, -40.0, 40.0, "give stops")
-    raw, told = open_raw(path)
+    raw, file_facts = open_raw(path)
     if raw.colour is None:
         raise InputError(f"{path}: it holds no colour calibration; allowed: a camera with R, G and B; capture with one")
     picture = develop(raw, processor=isp, white_balance=white_balance)
@@ -126,7 +124,7 @@ def develop_file(
         "saturated": float(raw.saturated.mean()),
         "defects": 0 if raw.defects is None else len(raw.defects),
         "encoding": encoding,
-        **told,
+        **file_facts,
     }
     return Developed(encode(linear * 2.0**stops, encoding), facts)
 

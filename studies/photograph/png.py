@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.encoding import ENCODINGS
-from rodcone.errors import InputError, unknown
 from studies.photograph.icc import icc_profile
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -21,15 +20,7 @@ _P3_CODES = bytes([12, 13, 0, 1])
 
 
 def to_png(encoded: NDArray[np.float64], bits: int = 8, encoding: str = "srgb") -> bytes:
-    """PNG file (W3C PNG, 3rd edition) of an encoded picture (h, w, 3) in [0, 1].
-
-    Raises
-    ------
-    InputError
-        For other bits than 8 or 16, or an unknown encoding.
-    """
-    if bits not in (8, 16):
-        raise InputError(f"bits: {bits!r} is not allowed; give 8 or 16")
+    """PNG file (W3C PNG, 3rd edition) of an encoded picture (h, w, 3) in [0, 1]."""
     height, width = encoded.shape[:2]
     samples = np.rint(encoded * (2**bits - 1)).astype(f">u{bits // 8}")
     rows = np.frombuffer(samples.tobytes(), np.uint8).reshape(height, -1)
@@ -44,8 +35,6 @@ def to_png(encoded: NDArray[np.float64], bits: int = 8, encoding: str = "srgb") 
 
 
 def _colour_chunks(encoding: str) -> tuple[tuple[bytes, bytes], ...]:
-    if encoding not in ENCODINGS:
-        raise unknown("encoding", encoding, ENCODINGS)
     if encoding == "srgb":
         return ((b"sRGB", bytes([_PERCEPTUAL])),)
     title = ENCODINGS[encoding].title.encode("ascii") + b"\0\0"  # the name's end, and the one compression there is

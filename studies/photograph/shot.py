@@ -10,16 +10,13 @@ import numpy as np
 from isp.remosaic import remosaic
 from render.engine import render
 from render.illuminants import illuminant
-from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import is_radiance_file
 from render.scene import Scene
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
-from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_range, require_whole
 from rodcone.files import check_place
 from rodcone.memory import file_extent, memory, require_memory
-from sensor.calibration import ColourCalibration
 from sensor.capture import capture
 from sensor.cfa import channels, check_covers, is_rgbw
 from sensor.config import SensorConfig
@@ -27,7 +24,6 @@ from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image, left_out
 from sensor.presets import preset
-from sensor.raw import RawImage
 from sensor.raw_files.raw_file import check_ending, write_raw
 from studies.photograph.calibrate import calibrate, iso_speed
 from studies.study.levels import parse_level
@@ -78,29 +74,66 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
         Where the folder can't be written.
     """
     sensor, opened = _check(order)
+
+    # What is looked at, and the light that the camera's colours are set to.
     if opened is None:
         transport, light, notes = open_radiance_file(order.source, order.white_balance)
+        luminance_cd_m2 = None if order.level is None else parse_level(order.level)[0]
+        illuminance_lux = None
     else:
         light, notes = _light(order, opened.scene)
         notes += opened.notes
+        luminance_cd_m2, illuminance_lux = asked_level(opened.scene, order.level)
     colour = calibrate(sensor, light) if set("RGB") <= set(channels(sensor.cfa)) else None
-    check_place(order.out)  # told before the render, not after
+    check_place(order.out)  # before the render: it may take minutes
     if opened is not None:
-        transport = _render(order, opened, step)
+        transport = render(
+            opened.scene,
+            film_size(opened.size, order.size),
+            spp=order.spp,
+            seed=order.seed,
+            progress=lambda share, error: step(f"render, relative error {error:.3f}", 0.9 * share),
+        )
+
+    # The exposure.
     step("exposure", 0.9)
-    radiance = _lit(order, opened, transport)
-    raw = _expose(order, sensor, radiance, colour)
-    share = float(raw.saturated.mean())
-    if share > MOST_SATURATED:
+    radiance = transport.relight(luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
+    exposure_s = order.exposure_s
+    if exposure_s is None:
+        exposure_s = auto_exposure_s(form_image(radiance, sensor), sensor)
+    device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
+    raw = capture(radiance, sensor, exposure_s, device, np.random.default_rng([order.seed, _FRAME]))
+    name = Path(order.sensor).stem.encode("ascii", "replace").decode()
+    raw = replace(raw, camera=name, f_number=sensor.lens.f_number, iso=iso_speed(sensor), colour=colour)
+    saturated = float(raw.saturated.mean())
+    if saturated > MOST_SATURATED:
         notes += [
-            f"{share:.0%} of the pixels are saturated at {raw.exposure_s:g} s; give a shorter --exposure-s (seconds: "
-            "20 ms is 0.02), or leave it out"
+            f"{saturated:.0%} of the pixels are saturated at {raw.exposure_s:g} s; give a shorter --exposure-s "
+            "(seconds: 20 ms is 0.02), or leave it out"
         ]
+
+    # The files.
     bayer = remosaic(raw) if order.out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) else None
     paths = write_raw(raw, order.out)
     if bayer is not None:
         paths += write_raw(bayer, order.out.with_stem(order.out.stem + "_bayer"))
-    return Taken(paths, _facts(order, sensor, raw, radiance, paths), tuple(notes))
+    facts = {
+        "paths": [str(path) for path in paths],
+        "source": order.source,
+        "sensor": order.sensor,
+        "cfa": list(raw.cfa),
+        "size": list(raw.shape),
+        "seed": order.seed,
+        "exposure_s": raw.exposure_s,
+        "iso": raw.iso,
+        "engine": raw.engine,
+        "luminance_cd_m2": float(radiance.luminance().mean()),
+        "relative_mc_error": radiance.relative_mc_error,
+        "relative_level_error": radiance.relative_level_error,
+        "saturated": saturated,
+        "left_out": list(left_out(sensor)),
+    }
+    return Taken(paths, facts, tuple(notes))
 
 
 def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
@@ -140,53 +173,3 @@ def _light(order: Order, scene: Scene) -> tuple[Spectrum, list[str]]:
         return first.spectrum, []
     assumed = f"scene {scene.name}: light group {name!r} has colours of its own; white balance is set to {LIGHT}"
     return illuminant(LIGHT), [f"{assumed}, --white-balance sets it otherwise"]
-
-
-def _render(order: Order, opened: SceneFile, step: Step) -> Transport:
-    return render(
-        opened.scene,
-        film_size(opened.size, order.size),
-        spp=order.spp,
-        seed=order.seed,
-        progress=lambda share, error: step(f"render, relative error {error:.3f}", 0.9 * share),
-    )
-
-
-def _lit(order: Order, opened: SceneFile | None, transport: Transport) -> SpectralRadiance:
-    if opened is None:
-        return transport.relight(luminance_cd_m2=None if order.level is None else parse_level(order.level)[0])
-    luminance_cd_m2, illuminance_lux = asked_level(opened.scene, order.level)
-    return transport.relight(luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
-
-
-def _expose(
-    order: Order, sensor: SensorConfig, radiance: SpectralRadiance, colour: ColourCalibration | None
-) -> RawImage:
-    exposure_s = order.exposure_s
-    if exposure_s is None:
-        exposure_s = auto_exposure_s(form_image(radiance, sensor), sensor)
-    device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
-    raw = capture(radiance, sensor, exposure_s, device, np.random.default_rng([order.seed, _FRAME]))
-    name = Path(order.sensor).stem.encode("ascii", "replace").decode()
-    return replace(raw, camera=name, f_number=sensor.lens.f_number, iso=iso_speed(sensor), colour=colour)
-
-
-def _facts(
-    order: Order, sensor: SensorConfig, raw: RawImage, radiance: SpectralRadiance, paths: tuple[Path, ...]
-) -> dict[str, Any]:
-    return {
-        "paths": [str(path) for path in paths],
-        "source": order.source,
-        "sensor": order.sensor,
-        "cfa": list(raw.cfa),
-        "size": list(raw.shape),
-        "seed": order.seed,
-        "exposure_s": raw.exposure_s,
-        "iso": raw.iso,
-        "engine": raw.engine,
-        "luminance_cd_m2": float(radiance.luminance().mean()),
-        "relative_mc_error": radiance.relative_mc_error,
-        "relative_level_error": radiance.relative_level_error,
-        "saturated": float(raw.saturated.mean()),
-        "left_out": list(left_out(sensor)),
-    }

@@ -14,8 +14,7 @@ from rodcone.errors import InputError
 from studies.commands.cli import main
 from studies.pages import duels_page as opponents_page
 from studies.pages.duels import contests_of
-from studies.pages.duels_figure import figure_of, hardest
-from studies.pages.duels_page import code, duel_table, lead_table, level_table, page_of, write_page
+from studies.pages.duels_page import code, duel_table, figure_of, hardest, lead_table, level_table, page_of, write_page
 from studies.pages.plots import BLUE, ORANGE
 from studies.pages.report_text import PSNR
 from studies.study.study_file import read_study

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 import report_sample as SAMPLE
 
-from studies.pages.report_cells import SCATTERED, over_seeds
 from studies.pages.report_data import ReportCell
+from studies.pages.report_sweep import SCATTERED, over_seeds
 from studies.pages.report_text import exposure_name
 from studies.sweep.row import Row
 

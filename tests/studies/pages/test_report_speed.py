@@ -24,7 +24,7 @@ def test_the_gain_is_the_lead_over_the_fastest_camera() -> None:
         slow, fast = rows[sensor, "interleaved"], rows[sensor, "bayer"]
         assert (fast.gain_db, slow.gain_db) == (0.0, pytest.approx(3.0))
         assert (fast.develop_s, slow.develop_s) == (pytest.approx(0.03), pytest.approx(0.11))
-        assert fast.judged == slow.judged == 7
+        assert fast.conditions == slow.conditions == 7
 
 
 def test_a_condition_unknown_for_one_camera_counts_for_none() -> None:
@@ -34,7 +34,7 @@ def test_a_condition_unknown_for_one_camera_counts_for_none() -> None:
         return None if row.processor == "bayer" else replace(row, psnr_db=90.0)
 
     rows = [row for row in speed_rows(SAMPLE.sample_report(without)) if row.sensor.startswith("low_noise")]
-    assert [(row.psnr_db, row.judged) for row in rows] == [(23.0, 6), (20.0, 6)]
+    assert [(row.psnr_db, row.conditions) for row in rows] == [(23.0, 6), (20.0, 6)]
 
 
 def test_no_mean_is_over_conditions_that_other_engines_captured_or_other_variants_rendered() -> None:
@@ -51,7 +51,9 @@ def test_no_mean_is_over_conditions_that_other_engines_captured_or_other_variant
     for row in rows:
         slow = row.sensor.endswith(", render llvm_ad_spectral, capture numpy")
         assert slow or row.sensor.endswith(", capture llvm")
-        assert (row.capture_s, row.psnr_db, row.judged) == pytest.approx((0.2, 15.0, 2) if slow else (0.02, 20.0, 5))
+        assert (row.capture_s, row.psnr_db, row.conditions) == pytest.approx(
+            (0.2, 15.0, 2) if slow else (0.02, 20.0, 5)
+        )
     assert len(rows) == 2 * len(report.sensors)
     assert len(speed_charts(speed_rows(report))) == 2 * len(report.sensors)
 

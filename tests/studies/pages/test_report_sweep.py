@@ -19,10 +19,9 @@ from hypothesis import strategies as st
 from rodcone.errors import InputError
 from studies.commands.cli import main
 from studies.pages.report import render_report
-from studies.pages.report_choice import chosen_conditions
 from studies.pages.report_data import ReportSensor
 from studies.pages.report_facts import fallbacks, sensor_of
-from studies.pages.report_sweep import ledger_results
+from studies.pages.report_sweep import chosen_conditions, sweep_report
 from studies.study.study import SceneChoice
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
@@ -54,7 +53,7 @@ def copied(out: Path, place: Path) -> Path:
 
 
 def test_every_row_stands_in_the_report(out: Path) -> None:
-    report, pictures = ledger_results(out)
+    report, pictures = sweep_report(out)
     rows = {(r.scene, r.level, r.exposure, r.processor, r.seed): r for r in read_rows(out)}
     assert len(rows) == 2 * len(report.cells) == 32
     for cell in report.cells:
@@ -74,7 +73,7 @@ def test_every_row_stands_in_the_report(out: Path) -> None:
 
 
 def test_cells_come_by_scene_exposure_level_and_camera(out: Path) -> None:
-    report, _ = ledger_results(out)
+    report, _ = sweep_report(out)
     places = [(cell.first.scene, cell.first.exposure, cell.level, cell.camera) for cell in report.cells if cell.first]
     assert places == list(product(FILES, ("auto", "2ms"), (0, 1), ("interleaved", "bayer")))
     titles = [
@@ -84,7 +83,7 @@ def test_cells_come_by_scene_exposure_level_and_camera(out: Path) -> None:
 
 
 def test_the_page_holds_the_names_as_text_and_the_means_over_seeds(out: Path) -> None:
-    page = render_report(*ledger_results(out))
+    page = render_report(*sweep_report(out))
     title = re.search(r"<title>(.*?)</title>", page)
     assert title is not None
     assert unescape(title[1]).startswith(f"{NAME}: Interleaved RGBW and Bayer")
@@ -108,7 +107,7 @@ def test_the_page_holds_the_names_as_text_and_the_means_over_seeds(out: Path) ->
 
 
 def test_fewer_pictures_than_there_are_leave_whole_groups_and_say_so(out: Path) -> None:
-    results, pictures = ledger_results(out, 8)
+    results, pictures = sweep_report(out, 8)
     found = [cell.first for cell in results.cells if cell.picture]
     levels = {"1cd/m2": 0, "25cd/m2": 1}
     shown = {(row.scene, row.exposure, levels[row.level]) for row in found if row}
@@ -142,7 +141,7 @@ def test_cells_not_made_yet_are_dashes_and_the_page_says_how_many(out: Path, tmp
     with closing(sqlite3.connect(part / FILE)) as base, base:
         base.execute("DELETE FROM cells WHERE scene = ?", (FILES[1],))
         base.execute("DELETE FROM cells WHERE seed = 1 AND level = '1cd/m2' AND processor = 'bayer'")
-    results, pictures = ledger_results(part)
+    results, pictures = sweep_report(part)
     assert results.notes == ("18 of 32 cells are not made yet: rodcone sweep goes on with them.",)
     places = product(FILES, ("auto", "2ms"), (0, 1), ("interleaved", "bayer"))
     found = dict(zip(places, results.cells, strict=True))
@@ -173,16 +172,16 @@ def test_a_sensor_whose_file_is_gone_is_said_to_be() -> None:
 
 def test_what_is_no_sweep_or_has_lost_a_picture_is_one_line(out: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"holds no ledger\.sqlite"):
-        ledger_results(tmp_path)
+        sweep_report(tmp_path)
     part = copied(out, tmp_path)
     (part / "pictures").unlink()
     with pytest.raises(InputError, match=r"can't be read .*; run rodcone sweep again") as told:
-        ledger_results(part)
+        sweep_report(part)
     assert "\n" not in str(told.value)
     with closing(sqlite3.connect(part / FILE)) as base, base:
         base.execute("DELETE FROM cells")
     with pytest.raises(InputError, match="has made no cell yet"):
-        ledger_results(part)
+        sweep_report(part)
 
 
 def test_the_command_writes_the_page_whole_and_prints_its_path(
@@ -211,4 +210,4 @@ def test_a_picture_that_is_a_link_out_of_the_folder_is_not_read(out: Path, tmp_p
     picture.unlink()
     picture.symlink_to(tmp_path / "secret")
     with pytest.raises(InputError, match="does not lie in"):
-        ledger_results(tmp_path / "swept")
+        sweep_report(tmp_path / "swept")

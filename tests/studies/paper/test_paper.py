@@ -12,15 +12,13 @@ from PIL import Image
 
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from studies.commands.cli import main
-from studies.paper.camera import noise
-from studies.paper.checks import ClaimCheck, at_least, at_most
-from studies.paper.figure1b import gain_db
+from studies.paper.claims import ClaimCheck, at_least, at_most, range_text, value_text
+from studies.paper.figure1 import gain_db
 from studies.paper.figure4 import edge_columns
 from studies.paper.figure5 import likeness
 from studies.paper.numbers import moonlight_photons
-from studies.paper.page import range_text, value_text
 from studies.paper.paper import Paper, as_json, make, write
-from studies.paper.setup import READINGS, Setup, sensor_of
+from studies.paper.setup import READINGS, Setup, noise, sensor_of
 
 FIGURES = ["1a", "1b", "2", "3", "4", "5", "6"]
 
@@ -61,9 +59,12 @@ def test_page_is_self_contained_and_names_every_claim_with_its_verdict(paper: Pa
 
 
 def test_claims_cover_the_figures_the_table_and_both_readings(paper: Paper) -> None:
-    assert len(paper.claims) == 26  # and as many rows in test_studies_paper_checks.py: a new claim needs one there
+    assert len(paper.claims) == 26  # and as many rows in test_claims.py: a new claim needs one there
     places = {claim.where for claim in paper.claims}
     assert places >= {"Table 1", *(f"Figure {name}" for name in FIGURES)}
+    for claim in paper.claims:
+        conditions = [check.condition for check in claim.checks]
+        assert len(set(conditions)) == len(conditions) > 0, claim.text
     told = " ".join(check.condition for claim in paper.claims for check in claim.checks)
     assert all(reading in told for reading in READINGS)
 

@@ -18,7 +18,7 @@ import sweep_sample as SAMPLE
 
 from isp.processors.catalogue import PROCESSORS
 from rodcone.jit import backend
-from studies.pages.report_sweep import ledger_results
+from studies.pages.report_sweep import sweep_report
 from studies.photograph import clock
 from studies.photograph.clock import FIRST, OTHER, Clock, timed
 from studies.sweep import run_cell as cell_run
@@ -107,7 +107,7 @@ def test_the_reports_stages_add_up_to_the_runs_wall_clock(workers: int, work: Wo
     with pytest.raises(KeyboardInterrupt):
         SAMPLE.swept(study, out, ended)
     assert SAMPLE.swept(study, out, labelled).made == 2
-    stages = ledger_results(out)[0].stages
+    stages = sweep_report(out)[0].stages
     assert sum(stages.values()) == pytest.approx(work.now() - start)
     own = {"captures": 4 * 1.0, "develop bayer": 4 * 10.0, "metrics": 4 * 100.0}
     own |= {FIRST: work.now() - start - sum(own.values())}
@@ -128,7 +128,7 @@ def test_a_render_counts_once_however_many_cells_share_it(
 
     monkeypatch.setattr(module, "make_transport", slow)
     SAMPLE.swept(SAMPLE.small_study(tmp_path), tmp_path / "out")
-    stages = ledger_results(tmp_path / "out")[0].stages
+    stages = sweep_report(tmp_path / "out")[0].stages
     assert work.of("render") == stages["renders"] == 7.0
     assert [row.render_s for row in read_rows(tmp_path / "out")] == [7.0] * 4, "of the render that they share"
     assert sum(stages.values()) == pytest.approx(sum(seconds for _, seconds in work.done))

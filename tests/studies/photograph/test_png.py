@@ -3,11 +3,9 @@
 from io import BytesIO
 
 import numpy as np
-import pytest
 from PIL import Image
 
 from render.loader import mitsuba_module
-from rodcone.errors import InputError
 from studies.photograph.png import to_png
 
 RAMP = np.random.default_rng(5).random((7, 300, 3))
@@ -26,9 +24,3 @@ def test_sixteen_bits_are_read_back_by_mitsuba(tmp_path) -> None:
     picture = np.array(mitsuba_module().Bitmap(str(tmp_path / "picture.png")))
     assert picture.dtype == np.uint16
     np.testing.assert_array_equal(picture, np.rint(RAMP * 65535))
-
-
-@pytest.mark.parametrize("bits", [1, 12, 0])
-def test_other_bits_are_refused(bits: int) -> None:
-    with pytest.raises(InputError, match=rf"bits: {bits} is not allowed; give 8 or 16"):
-        to_png(RAMP, bits)

@@ -20,7 +20,7 @@ from rodcone.llvm import LIBLLVM
 from studies.budget.model_plan import Plan
 from studies.commands.cli import main
 from studies.pages.duels import contests_of
-from studies.pages.report_sweep import ledger_results
+from studies.pages.report_sweep import sweep_report
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import provenance
 from studies.sweep.cells import Cell
@@ -170,7 +170,7 @@ def test_cells_of_other_versions_are_made_anew_and_kept_where_that_is_asked_for(
     assert sorted(told) == ["1.9"] + 4 * [metadata.version("numpy")]
     assert {json.loads(row.versions)["numpy"] for row in read_rows(out)} == {metadata.version("numpy")}
     assert len(contests_of([replace(row, processor=name) for row in read_rows(out) for name in ("a", "b")])) == 2
-    assert ledger_results(out)[0].environment["numpy"] == metadata.version("numpy")
+    assert sweep_report(out)[0].environment["numpy"] == metadata.version("numpy")
     assert SAMPLE.swept(study, out).made == 0
     assert len(read_rows(out, everything=True)) == 4, "removed where it isn't asked for"
 
@@ -192,7 +192,7 @@ def test_a_report_or_ranking_over_mixed_cells_is_refused_in_one_line(tmp_path: P
     with open_ledger(out) as base:
         add(base, replace(found[-1], variant="llvm_ad_spectral"))
     with pytest.raises(InputError, match="Mitsuba variant"):
-        ledger_results(out)
+        sweep_report(out)
 
 
 IN_NUMPY = """
@@ -228,6 +228,6 @@ def test_a_folder_swept_without_a_backend_and_then_with_one_holds_no_mean_of_bot
     (fast,) = read_rows(out)
     assert (fast.development_engine, json.loads(fast.versions)["llvm"]) == ("llvm", versions()["llvm"])
     assert len(read_rows(out, everything=True)) == 2
-    environment = ledger_results(out)[0].environment
+    environment = sweep_report(out)[0].environment
     assert environment["engine of development"] == "llvm"
     assert environment["threads"] == str(fast.threads)

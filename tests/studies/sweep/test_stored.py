@@ -14,7 +14,7 @@ import sweep_sample as SAMPLE
 from rodcone.errors import InputError
 from studies.commands.cli import main
 from studies.pages.report import render_report
-from studies.pages.report_sweep import ledger_results
+from studies.pages.report_sweep import sweep_report
 from studies.study.lit_scene import open_all
 from studies.study.study import SceneChoice
 from studies.sweep.cells import Cell
@@ -82,7 +82,7 @@ def test_a_picture_that_is_cut_is_made_again(column: str, cells: int, cut: int, 
     content = path.read_bytes()
     path.write_bytes(content[:cut])
     with pytest.raises(InputError, match="isn't what was written"):
-        ledger_results(out)
+        sweep_report(out)
     assert SAMPLE.swept(study, out).made == cells
     assert SAMPLE.content(out) == before
     assert path.read_bytes() == content
@@ -194,9 +194,9 @@ def test_a_sweep_of_two_scenes_ended_in_its_first_gives_a_report_that_counts_all
     for made in range(1, 8):
         with pytest.raises(KeyboardInterrupt):
             SAMPLE.swept(study, out, ended)
-        results, pictures = ledger_results(out)
+        results, pictures = sweep_report(out)
         assert results.notes == (f"{8 - made} of 8 cells are not made yet: rodcone sweep goes on with them.",)
         assert render_report(results, pictures).lstrip().startswith("<!doctype html>")
         assert len(read_rows(out)) == made
     assert SAMPLE.swept(study, out).made == 1
-    assert ledger_results(out)[0].notes == ()
+    assert sweep_report(out)[0].notes == ()

@@ -1,4 +1,4 @@
-"""What a study found, as plain data: the content of `results.json`, and what the report shows."""
+"""What makes numbers in this process: versions, engines and machine, for pages and JSON."""
 
 from typing import Any
 
@@ -6,11 +6,9 @@ from render.loader import variant
 from rodcone.jit import backend
 from studies.sweep.provenance import machine, threads, versions
 
-DISPLAY_WHITE = "the scene's 99th percentile of luminance, visible lamps excluded, is shown at 90 % of white"
-
 
 def environment() -> dict[str, Any]:
-    """What makes numbers in this process."""
+    """Facts by name, as JSON holds them."""
     return {
         **versions(),
         "variant": variant(),

@@ -1,13 +1,18 @@
-"""Claims of the paper as checks with numbers; a verdict follows from them and is never written by hand."""
+"""Claims of the paper as checks with numbers, and how their page writes these.
+
+A verdict follows from the numbers and is never written by hand.
+"""
 
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Literal
+from typing import Literal, get_args
 
-from rodcone.errors import InputError
+from matplotlib.figure import Figure
+
+from studies.pages import report_text as text
 
 Verdict = Literal["reproduced", "reproduced under a condition", "not reproduced"]
-VERDICTS: tuple[Verdict, ...] = ("reproduced", "reproduced under a condition", "not reproduced")
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 # What "about" may mean: a number given to one digit stands for a fifth more or less.
 ABOUT = 0.2
@@ -51,25 +56,15 @@ class Claim:
     text : str
         The statement.
     checks : tuple of ClaimCheck
-        One or more.
+        One or more, each under a condition of its own.
     note : str
         How the numbers were got, and what was ours to choose.
-
-    Raises
-    ------
-    InputError
-        Without a check, or for two of one condition.
     """
 
     where: str
     text: str
     checks: tuple[ClaimCheck, ...]
     note: str = ""
-
-    def __post_init__(self) -> None:
-        conditions = [check.condition for check in self.checks]
-        if not conditions or len(set(conditions)) != len(conditions):
-            raise InputError(f"claim {self.text!r}: checks {conditions!r} are not allowed; give some, each once")
 
     @property
     def verdict(self) -> Verdict:
@@ -96,3 +91,32 @@ def at_least(condition: str, value: float, low: float, unit: str = "") -> ClaimC
 def at_most(condition: str, value: float, high: float, unit: str = "") -> ClaimCheck:
     """Check that a value is no more."""
     return ClaimCheck(condition, value, -inf, high, unit)
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure: the paper's number, its caption, and the drawing."""
+
+    name: str
+    caption: str
+    drawing: Figure
+
+
+def range_text(check: ClaimCheck) -> str:
+    """Where the claim holds, in words: ``at least 1``, ``9.04 to 10.04``, ``exactly 1``."""
+    low, high = (text.significant(value, digits=4) for value in (check.low, check.high))
+    if not isfinite(check.high):
+        return f"at least {low}"
+    if not isfinite(check.low):
+        return f"at most {high}"
+    return f"exactly {low}" if check.low == check.high else f"{low} to {high}"
+
+
+def value_text(check: ClaimCheck) -> str:
+    """Number and unit, with enough digits to differ from a near end of its range."""
+    for digits in range(3, 7):
+        shown = text.significant(check.value, digits=digits)
+        ends = [text.significant(end, digits=digits) for end in (check.low, check.high) if isfinite(end)]
+        if shown not in ends or check.value in (check.low, check.high):
+            break
+    return f"{shown}\N{NO-BREAK SPACE}{check.unit}" if check.unit else shown
