@@ -1,6 +1,7 @@
 """NumPy's arrays as Dr.Jit takes them quickest, and whole numbers divided exactly."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -19,15 +20,20 @@ def aligned(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
     return np.asarray(memory[start : start + size].view(dtype).reshape(shape))
 
 
-def upload(values: NDArray[Any]) -> Any:
-    """Evaluated Dr.Jit array of the same values and type, flat, over aligned memory."""
+def upload(values: NDArray[Any], *, copy_under: float = inf) -> Any:
+    """Evaluated Dr.Jit array of the same values and type, flat.
+
+    It lies over the values themselves where they are contiguous and aligned, or have `copy_under` bytes or more; else
+    over an aligned copy.
+    """
     jit = arrays()
     kinds = {"f4": jit.Float, "f8": jit.Float64, "u4": jit.UInt, "i4": jit.Int}
-    if values.ctypes.data % ALIGNMENT or not values.flags.c_contiguous:
-        copy = aligned(values.shape, values.dtype)
-        copy[...] = values
-        values = copy
-    return kinds[values.dtype.str[1:]](values.ravel())
+    flat = values.ravel()
+    if flat.ctypes.data % ALIGNMENT and flat.nbytes < copy_under:
+        copy = aligned(flat.shape, flat.dtype)
+        copy[:] = flat
+        flat = copy
+    return kinds[flat.dtype.str[1:]](flat)
 
 
 @dataclass(frozen=True)
