@@ -22,7 +22,7 @@ from rodcone.digests import digest, digest_file
 from rodcone.files import replacing
 from rodcone.jit import compiler_version
 
-ENGINE_VERSION = 4  # raise it with any change that moves a rendered value: older entries are then not used
+ENGINE_VERSION = 5  # raise it with any change that moves a rendered value: older entries are then not used
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _ARRAYS = ("radiance", "half_difference", "variance", "coverage")
 _MEANS = tuple(field.name for field in fields(PassMeans))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from render.error_estimates import SharedPaths
-from render.integrator.dense import LANES
+from render.integrator.dense import SPECTRUM_SIZE
 from render.level import PassMeans
 from render.loader import PART_BANDS, Film, Loaded, integrators, mitsuba_module, seen_directly
 from render.scene import Scene
@@ -21,7 +21,7 @@ METER_SPP = 16  # most samples a pixel and pass of its 64x64 film: 65 536 paths 
 
 
 @dataclass
-class Sums:
+class PassSums:
     """Running sums over passes, each weighed by its samples (Welford; West 1979); the only mutable state of a render.
 
     `mean`, `scatter` and `signed` have the shape (group, band, h, w). `seen` and `coverage` are as of `Transport`,
@@ -72,18 +72,18 @@ class Sums:
         return PassMeans(np.array(self.spp), np.array(self.uncovered), np.array(self.radiance), plane)
 
 
-def no_passes(scene: Scene, film: Film) -> Sums:
+def no_passes(scene: Scene, film: Film) -> PassSums:
     """Sums before the first pass."""
     bands = film.wavelength_nm.size
     mean, scatter, signed = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(3))
     seen = [np.zeros((bands if x.coloured else 1, *film.size), np.float32) for x in scene.groups.values()]
-    return Sums(mean, scatter, signed, seen, np.zeros(film.size, np.float32))
+    return PassSums(mean, scatter, signed, seen, np.zeros(film.size, np.float32))
 
 
-def sums_of(transport: Transport) -> Sums:
+def sums_of(transport: Transport) -> PassSums:
     """Sums that an earlier render stopped at, to go on from: its radiance to the bit."""
     means, samples = transport.pass_means, np.float32(transport.spp)
-    sums = Sums(
+    sums = PassSums(
         mean=transport.radiance.copy(),
         scatter=transport.variance * np.float32((transport.passes - 1) * transport.spp),
         signed=transport.half_difference * samples,
@@ -100,7 +100,7 @@ def sums_of(transport: Transport) -> Sums:
     return sums
 
 
-def add_pass(light_groups: list[Loaded], sums: Sums, film: Film, pass_spp: int, seed: int) -> None:
+def add_pass(light_groups: list[Loaded], sums: PassSums, film: Film, pass_spp: int, seed: int) -> None:
     """Render every group once more, with a seed of its own, and add it to the sums."""
     groups, bands = sums.mean.shape[:2]
     index, covered = sums.passes, 0.0
@@ -124,7 +124,7 @@ def add_pass(light_groups: list[Loaded], sums: Sums, film: Film, pass_spp: int, 
         sums.irradiance.append(irradiance)
 
 
-def _add(sums: Sums, groups: tuple[int, ...], bands: slice, scattered: Planes, seen: tuple[Planes, ...]) -> None:
+def _add(sums: PassSums, groups: tuple[int, ...], bands: slice, scattered: Planes, seen: tuple[Planes, ...]) -> None:
     """Add some bands of the pass whose samples were noted last."""
     weight, drawn = np.float32(sums.spp[-1]), np.float32(sums.drawn)
     deltas, radiances = [], []
@@ -193,7 +193,7 @@ def _bands(image: Planes, groups: int, width_nm: Floats) -> tuple[Planes, Planes
             "allowed: materials whose sampling doesn't depend on wavelength; replace it"
         )
     # Channel 0 is the film's own luminance; a group has its bands, filled up to a multiple of four.
-    filled = size + -size % LANES
+    filled = size + -size % SPECTRUM_SIZE
     bands, others = np.split(image[1:-1], [groups * filled])
     return bands.reshape(groups, filled, *image.shape[1:])[:, :size], others
 

@@ -79,7 +79,7 @@ def sensor_of(reading: str, mosaic: str = "rgbw", pitch_um: int | None = None) -
     return vary(own, mosaic)
 
 
-# Samples over those of the setup: the dark half's own noise hides far more, and an even sky needs few.
+# Samples over those of the setup: the dark half's own noise hides far more, and a constant environment needs few.
 _SPP_SHARE = {"lit_and_shadowed": 0.25, "slanted_edge": 0.25}
 
 
