@@ -88,7 +88,7 @@ def render(
     Warns
     -----
     UserWarning
-        Where data of a light with colours of its own end within the bands: it gives no light beyond.
+        Where data of a coloured light end within the bands: it gives no light beyond.
     """
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)

@@ -87,7 +87,7 @@ class Loaded:
     sample_lights : bool
         Whether directions are sampled towards lights.
     curves : tuple of Spectrum
-        Reflectances that are read from a table, row by row. None where lights have colours of their own: a line in them
+        Reflectances that are read from a table, row by row. None for coloured lights: a line in them
         would be met at few of the table's wavelengths.
     covering : mitsuba.Scene or None
         The same scene with a film of one band and lights of 1 whatever their colours: it shows what they cover. None
@@ -230,8 +230,3 @@ def integrators(
         if loaded.curves:
             made.tracer.prepare(offsets, reflectance_table(loaded.curves, centre + width * offsets[:, None]))
         yield part, made
-
-
-def seen_directly() -> Any:
-    """Integrator of the light that the camera sees directly, without LLVM or CUDA."""
-    return mitsuba_module().load_dict({"type": "path", "max_depth": 1})

@@ -9,7 +9,7 @@ import numpy as np
 from render.error_estimates import SharedPaths
 from render.integrator.dense import SPECTRUM_SIZE
 from render.level import PassMeans
-from render.loader import PART_BANDS, Film, Loaded, integrators, mitsuba_module, seen_directly
+from render.loader import PART_BANDS, Film, Loaded, integrators, mitsuba_module
 from render.scene import Scene
 from render.transport import Transport
 from rodcone.errors import InputError, one_line
@@ -53,12 +53,12 @@ class PassSums:
 
     @property
     def variance_factor(self) -> np.float32:
-        """What turns the scatter into the variance of the mean."""
+        """Factor from the scatter to the variance of the mean."""
         return np.float32(1 / ((self.passes - 1) * self.drawn))
 
     @property
     def shared(self) -> SharedPaths | None:
-        """How the errors of two groups go together."""
+        """Correlation of the errors of two groups that share paths."""
         if self.share is None or self.product is None:
             return None
         one, other = (np.sqrt(self.scatter[group]) for group in self.share)
@@ -67,7 +67,7 @@ class PassSums:
         return SharedPaths(self.share, np.clip(found, -1, 1, out=found))
 
     def pass_means(self) -> PassMeans:
-        """What each pass gives for levels."""
+        """Means over each pass, from which levels are computed."""
         plane = np.array(self.irradiance) if self.irradiance else None
         return PassMeans(np.array(self.spp), np.array(self.uncovered), np.array(self.radiance), plane)
 
@@ -107,7 +107,7 @@ def add_pass(light_groups: list[Loaded], sums: PassSums, film: Film, pass_spp: i
     radiance, irradiance = np.zeros((groups, bands)), np.zeros((groups, bands))
     sums.spp.append(pass_spp)
     for loaded in light_groups:
-        of_pass = pass_seed(seed, loaded.groups[0], index)
+        of_pass = int(np.random.SeedSequence([seed, loaded.groups[0], index]).generate_state(1)[0])
         for part, integrator in integrators(film, PART_BANDS, loaded, of_pass):
             scattered, seen, coverage = _camera_part(loaded, integrator, film.width_nm[part], pass_spp, of_pass)
             chosen = slice(int(part[0]), int(part[-1]) + 1)
@@ -155,7 +155,7 @@ def _camera_part(
     scattered : (group, band, h, w) float32
         Band averages without the light that is seen directly.
     seen : tuple of (band or 1, h, w) float32
-        Light that is seen directly, of each group: by band where it has colours of its own.
+        Light that is seen directly, of each group: by band where the group is coloured.
     coverage : (h, w) float32
         Share of the samples that meet a light first.
     """
@@ -164,10 +164,11 @@ def _camera_part(
     scattered, others = _bands(image, count, width_nm)
     shares, of_light = others[:count], others[count : count + width_nm.size]
     if loaded.covering is not None:  # without Dr.Jit renders of their own show the lights
-        image = _rendered(loaded.covering, loaded.covering.sensors()[0], seen_directly(), spp, seed)
+        seen_directly = mitsuba_module().load_dict({"type": "path", "max_depth": 1})
+        image = _rendered(loaded.covering, loaded.covering.sensors()[0], seen_directly, spp, seed)
         shares = _bands(image, 1, width_nm[:1])[0][0]
         if loaded.coloured:
-            image = _rendered(loaded.mi_scene, loaded.camera, seen_directly(), spp, seed)
+            image = _rendered(loaded.mi_scene, loaded.camera, seen_directly, spp, seed)
             of_light = _bands(image, 1, width_nm)[0][0]
     return scattered, (of_light if loaded.coloured else shares[:1], *shares[1:, None]), shares.sum(axis=0)
 
@@ -210,11 +211,6 @@ def _rendered(mi_scene: Any, sensor: Any, integrator: Any, spp: int, seed: int) 
     return np.ascontiguousarray(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
 
 
-def pass_seed(seed: int, group: int, index: int) -> int:
-    """Seed of one pass of one group, from its coordinates alone."""
-    return int(np.random.SeedSequence([seed, group, index]).generate_state(1)[0])
-
-
 def let_go(error: BaseException) -> None:
     """Free the refused scene, which the traceback holds: Dr.Jit compiles every live material into the next render."""
     cause: BaseException | None = error
@@ -225,7 +221,7 @@ def let_go(error: BaseException) -> None:
 
 
 def _root_cause(error: BaseException) -> BaseException:
-    """Error from under the layers that Dr.Jit wraps around it."""
+    """First cause of an error that Dr.Jit has wrapped."""
     while error.__cause__ or error.__context__:
         error = error.__cause__ or error.__context__ or error
     return error

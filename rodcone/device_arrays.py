@@ -1,4 +1,4 @@
-"""NumPy's arrays as Dr.Jit takes them quickest, and whole numbers divided exactly."""
+"""Aligned upload of NumPy arrays to Dr.Jit, and exact division of whole numbers."""
 
 from dataclasses import dataclass
 from math import inf
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rodcone.jit import arrays, dr
 
-ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel for memory that isn't aligned, and refuses it packet loads
+ALIGNMENT = 64  # bytes; for memory that isn't aligned Dr.Jit compiles another, slower kernel without packet loads
 
 
 def aligned(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
@@ -38,14 +38,14 @@ def upload(values: NDArray[Any], *, copy_under: float = inf) -> Any:
 
 @dataclass(frozen=True)
 class Divisor:
-    """A whole number to divide by: itself (UInt) and its inverse (Float64), by which CPUs multiply in vectors."""
+    """A whole number to divide by (UInt), and its inverse (Float64): CPUs multiply in vectors."""
 
     number: Any
     inverse: Any
 
 
 def divisor(number: int) -> Divisor:
-    """Divisor as data of the kernel: another number doesn't compile it anew."""
+    """Make a divisor that is data of the kernel, so that another number doesn't recompile it."""
     jit = arrays()
     return Divisor(dr.opaque(jit.UInt, number), dr.opaque(jit.Float64, 1 / number))
 
@@ -54,7 +54,7 @@ def divide(number: Any, by: Divisor) -> tuple[Any, Any]:
     """Quotient and remainder of whole numbers (UInt) under 2^31.
 
     Exact: number + 1/2 is at least half a step of 1/divisor from the next multiple, far above the rounding of its
-    double-precision quotient. The way through Int is the one that CPUs convert in vectors.
+    double-precision quotient. CPUs convert Int to Float64 in vectors, UInt they don't.
     """
     jit = arrays()
     quotient = jit.UInt(jit.Int((jit.Float64(jit.Int(number)) + 0.5) * by.inverse))

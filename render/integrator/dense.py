@@ -88,7 +88,7 @@ class Tracer:
         return [*names, "wavelength_dependent_choice"]
 
     def channels(self, scene: Any, sampler: Any, ray: Any, active: Any) -> list[Any]:
-        """Trace a path; gives its channels."""
+        """Trace a path and return its channels."""
         mi = self.mi
         wavelengths, step = self._wavelengths(sampler.next_1d(active))
         if self.meter:
@@ -226,7 +226,7 @@ class Tracer:
     def _bounce(
         self, scene: Any, sampler: Any, ray: Any, si: Any, go_on: Any, wavelengths: list[Any], step: Any
     ) -> tuple[list[Any], Any, list[Any], Any]:
-        """Light received from a sampled position on a lamp; then a sampled direction, its weights, and the mark."""
+        """Light received from a sampled position on a lamp; a sampled direction, its weights, and whether wavelength chose it."""
         mi, bsdf = self.mi, si.bsdf(ray)
         if not self.sample_lights:
             lobe, angle = sampler.next_1d(), sampler.next_2d()

@@ -216,7 +216,7 @@ def test_color_checker_patches_are_reflectance_times_sky_in_every_band():
         here = np.s_[:, top : top + pixels_of_patch, left : left + pixels_of_patch]
         seen, variance = made.radiance[0][here].astype(np.float64), made.variance[0][here].astype(np.float64)
         truth = reflectance.band_average(BANDS_NM, WIDTH_NM)
-        # Under a constant environment only the jitter within a band scatters; where a patch is grey, float32's rounding.
+        # Under a constant environment only the jitter within a band scatters; on a grey patch, float32's rounding.
         error = np.hypot(np.sqrt(variance.sum(axis=(1, 2))) / pixels_of_patch**2, 2e-6 * truth)
         z.append((seen.mean(axis=(1, 2)) - truth) / error)
     freedom = pixels_of_patch**2 * (PASSES - 1)
