@@ -147,14 +147,15 @@ def _load_group(scene: Scene, group: str, film: Film) -> Loaded:
     index, coloured = (list(scene.groups).index(group),), scene.groups[group].coloured
     if backend() == "numpy":
         covering = _load(scene, group, _covering(scene, group, film))
-        return Loaded(_load(scene, group, description), index, coloured, sample_lights=True, covering=covering)
+        mi_scene = _load(scene, group, description)
+        return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=True, covering=covering)
     matte = with_matte_surfaces(description)
     tabulated, curves = (matte, ()) if coloured else with_rows(matte)
     mi_scene = _load(scene, group, tabulated)
     # A constant environment is met in every direction: directions sampled for the surface alone leave less noise than a
     # mixture with ones sampled for the light, and half of the rays are saved.
     environment = [light.class_name() for light in mi_scene.emitters()] == ["ConstantBackgroundEmitter"]
-    return Loaded(mi_scene, index, coloured, not environment, curves)
+    return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=not environment, curves=curves)
 
 
 def _covering(scene: Scene, group: str, film: Film) -> Node:

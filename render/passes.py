@@ -68,8 +68,12 @@ class PassSums:
 
     def pass_means(self) -> PassMeans:
         """Means over each pass, from which levels are computed."""
-        plane = np.array(self.irradiance) if self.irradiance else None
-        return PassMeans(np.array(self.spp), np.array(self.uncovered), np.array(self.radiance), plane)
+        return PassMeans(
+            spp=np.array(self.spp),
+            uncovered=np.array(self.uncovered),
+            radiance=np.array(self.radiance),
+            irradiance=np.array(self.irradiance) if self.irradiance else None,
+        )
 
 
 def no_passes(scene: Scene, film: Film) -> PassSums:
@@ -77,7 +81,7 @@ def no_passes(scene: Scene, film: Film) -> PassSums:
     bands = film.wavelength_nm.size
     mean, scatter, signed = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(3))
     seen = [np.zeros((bands if x.coloured else 1, *film.size), np.float32) for x in scene.groups.values()]
-    return PassSums(mean, scatter, signed, seen, np.zeros(film.size, np.float32))
+    return PassSums(mean=mean, scatter=scatter, signed=signed, seen=seen, coverage=np.zeros(film.size, np.float32))
 
 
 def sums_of(transport: Transport) -> PassSums:

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import reduce
+from operator import getitem
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -139,7 +141,12 @@ class Scene:
         result: Node = _copy(self.geometry)
         for name, group in self.groups.items():
             for path in group.emitters:
-                _replace_emitter(result, path.split("/"), emission.get(name), group.coloured)
+                *way, key = path.split("/")
+                holder = reduce(getitem, way, result)
+                if name not in emission:
+                    del holder[key]
+                elif not group.coloured:
+                    holder[key][EMISSION_PARAMETER[holder[key]["type"]]] = emission[name]
         return result
 
 
@@ -233,14 +240,3 @@ def _copy(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _copy(item) for key, item in value.items()}
     return list(value) if isinstance(value, list) else value
-
-
-def _replace_emitter(node: Node, path: list[str], emission: Node | None, coloured: bool) -> None:
-    """Give the emitter at `path` its emission, or remove it; a coloured one keeps its own."""
-    *way, key = path
-    for step in way:
-        node = node[step]
-    if emission is None:
-        del node[key]
-    elif not coloured:
-        node[key][EMISSION_PARAMETER[node[key]["type"]]] = emission

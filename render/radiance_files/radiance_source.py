@@ -61,7 +61,12 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
         variance=variance if error else none,
         coverage=np.zeros(radiance.shape, np.float32),
         seen=(np.zeros((1, *radiance.shape), np.float32),),
-        pass_means=PassMeans(np.ones(1, np.int64), np.ones(1), planes.mean(axis=(2, 3), dtype=np.float64)[None], None),
+        pass_means=PassMeans(
+            spp=np.ones(1, np.int64),
+            uncovered=np.ones(1),
+            radiance=planes.mean(axis=(2, 3), dtype=np.float64)[None],
+            irradiance=None,
+        ),
         groups={name: LightGroup((), whole)},
         wavelength_nm=nm,
         width_nm=width,

@@ -34,7 +34,7 @@ class SceneFile:
 
 
 def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -> SceneFile:
-    """Build the scene: the first camera, groups of lights by id, a shape with an ``irradiancemeter`` as reference plane.
+    """Build the scene: its first camera, light groups by id, a shape with an ``irradiancemeter`` as reference plane.
 
     Lights belong to a group by their own id, or else their shape's, up to a colon: ``lamp:left`` and ``lamp:right``
     are dimmed together. One spectrum that differs over place or direction, or several in a group, make it `coloured`.
@@ -82,7 +82,9 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
     groups = light_groups(mi, name, geometry, _check_references(name, geometry))
     if not groups:
         raise InputError(f"scene {name}: it has no light; allowed: one emitter or more; add one")
-    return SceneFile(Scene(name, geometry, groups, planes[0] if planes else None, extend), size, tuple(notes))
+    plane = planes[0] if planes else None
+    scene = Scene(name=name, geometry=geometry, groups=groups, reference_plane=plane, extend=extend)
+    return SceneFile(scene, size, tuple(notes))
 
 
 def _kind(mi: Any, part: Any) -> str:
