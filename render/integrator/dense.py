@@ -226,7 +226,7 @@ class Tracer:
     def _bounce(
         self, scene: Any, sampler: Any, ray: Any, si: Any, go_on: Any, wavelengths: list[Any], step: Any
     ) -> tuple[list[Any], Any, list[Any], Any]:
-        """Light received from a sampled position on a lamp; next direction, its weights, whether wavelength chose it."""
+        """Light from a sampled position on a lamp; next direction, its weights, whether wavelength chose it."""
         mi, bsdf = self.mi, si.bsdf(ray)
         if not self.sample_lights:
             lobe, angle = sampler.next_1d(), sampler.next_2d()
