@@ -10,7 +10,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 @contextmanager
 def progress(file: TextIO) -> Iterator[Callable[[str, float], None]]:
-    """Show a bar on a terminal until the end; yields a function of what is being done and the share done (0..1)."""
+    """Show a bar on a terminal that vanishes at the end; gives what to call with what is done and a share (0..1)."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
