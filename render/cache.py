@@ -1,6 +1,6 @@
-"""Renders on disk, under the hash of all that determines them.
+"""Renders on disk, keyed by a hash of all that determines them.
 
-How far they were taken isn't in it, nor are the lights' spectra and powers: transport doesn't depend on them.
+The number of samples isn't in the key, nor are the lights' spectra and powers: transport doesn't depend on them.
 """
 
 import hashlib
@@ -16,22 +16,22 @@ import numpy as np
 from render.error_estimates import SharedPaths, relative_error
 from render.level import PassMeans
 from render.loader import Film, integrator_name, variant
-from render.scene import Node, Scene
+from render.scene import Node, Scene, walk
 from render.transport import Transport, emission
 from rodcone.digests import digest, digest_file
 from rodcone.files import replacing
 from rodcone.jit import compiler_version
 
-ENGINE_VERSION = 4  # raise it with any change that moves a rendered value: older entries are then not used
+ENGINE_VERSION = 5  # raise it with any change that moves a rendered value: older entries are then not used
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _ARRAYS = ("radiance", "half_difference", "variance", "coverage")
 _MEANS = tuple(field.name for field in fields(PassMeans))
 _VALUES = ("spp", "passes", "stopped_by", "seconds", "integrator", "variant")
-_NOT_IN_NAMES = re.compile(r"[^\w.-]+")  # separators of folders above all: entries stay in theirs
+_NOT_IN_NAMES = re.compile(r"[^\w.-]+")  # above all path separators: entries stay in their folder
 
 
 def load_transport(folder: Path, scene: Scene, film: Film, seed: int) -> Transport | None:
-    """Stored transport, or None where there is none that is whole: a SHA-256 digest begins the file.
+    """Stored transport, or None where there is no intact file: it begins with its SHA-256 digest.
 
     The digest tells damage by accident. Whoever writes to the folder on purpose is believed.
     """
@@ -83,7 +83,12 @@ def _path(folder: Path, scene: Scene, film: Film, seed: int) -> Path:
         [
             *(ENGINE_VERSION, integrator_name(), variant(), compiler_version()),
             *map(metadata.version, ("mitsuba", "drjit")),
-            *(scene.name, scene.geometry, scene.reference_plane, _file_digests(scene.geometry)),
+            *(
+                scene.name,
+                scene.geometry,
+                scene.reference_plane,
+                file_digests(scene.geometry),
+            ),
             [[name, group.emitters, group.coloured] for name, group in scene.groups.items()],
             *(film, seed),
         ]
@@ -91,12 +96,7 @@ def _path(folder: Path, scene: Scene, film: Film, seed: int) -> Path:
     return folder / f"{_NOT_IN_NAMES.sub('_', scene.name)}-{key}.npz"
 
 
-def _file_digests(node: Node) -> list[str]:
+def file_digests(geometry: Node) -> list[str]:
     """Content of the files (meshes, bitmaps) that a scene's dict names, in its order."""
-    digests = []
-    for key, value in node.items():
-        if isinstance(value, dict):
-            digests += _file_digests(value)
-        elif key == "filename" and Path(str(value)).is_file():
-            digests.append(digest_file(str(value)))
-    return digests
+    files = [str(part["filename"]) for _, part in walk(geometry) if "filename" in part]
+    return [digest_file(file) for file in files if Path(file).is_file()]

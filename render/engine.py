@@ -88,11 +88,11 @@ def render(
     Warns
     -----
     UserWarning
-        Where data of a light with colours of its own end within the bands: it gives no light beyond.
+        Where data of a coloured light end within the bands: it gives no light beyond.
     """
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
-    limits = Limits(spp, max_spp, noise, max_seconds, seed)
+    limits = Limits(spp=spp, max_spp=max_spp, noise=noise, max_seconds=max_seconds, seed=seed)
     earlier = _checked_earlier(resume, scene, film)
     if cache is not None:
         found = load_transport(Path(cache), scene, film, seed)
@@ -124,7 +124,7 @@ def _checked_film(
     nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)
     widths = band_widths(nm, width_nm)
     check_range(scene, float((nm - widths / 2).min()), float((nm + widths / 2).max()))
-    return Film((int(size[0]), int(size[1])), nm, widths, int(max_depth))
+    return Film(size=(int(size[0]), int(size[1])), wavelength_nm=nm, width_nm=widths, max_depth=int(max_depth))
 
 
 def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film) -> Transport | None:

@@ -8,7 +8,7 @@ import numpy as np
 from render.photometry import LUMINOUS_EFFICACY_LM_W, colour_matching_functions, luminance
 from render.spectrum import Spectrum, black_body, flat, line_spectrum
 from rodcone.errors import require_range, unknown
-from rodcone.tables import colour_science
+from rodcone.optional import colour_science
 
 # CIE 015:2018 tables as colour-science holds them, mostly in 5 nm steps. F11 stands for narrow-band fluorescent lamps,
 # HP1 is standard high-pressure sodium, LED-B3 a white LED of 4100 K, LED-RGB1 three LEDs, LED-V1 a violet-pumped one.

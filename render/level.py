@@ -2,7 +2,7 @@
 
 A lamp in view is thousands of times brighter than what it lights, and a few of its pixels would set the level. So the
 light that the camera sees directly is left out of the sum of light, and the part of the picture that it covers is left
-out of the area: the ratio knows no threshold, and has the same expectation at any size of one aspect ratio.
+out of the area: the ratio needs no threshold, and has the same expectation at any size of one aspect ratio.
 """
 
 from dataclasses import dataclass
@@ -103,9 +103,3 @@ class PassMeans:
         off = (per_pass * weights).sum(axis=(1, 2)) - value * area
         variance = float(share @ off**2) / (self.spp.size - 1)
         return float(np.sqrt(variance)) / float(share @ area) / value
-
-
-def one_picture(planes: NDArray[np.float32]) -> PassMeans:
-    """Means of a picture (group, band, h, w) that has no passes, and so no error estimate."""
-    mean = planes.mean(axis=(2, 3), dtype=np.float64)[None]
-    return PassMeans(np.ones(1, np.int64), np.ones(1), mean, None)

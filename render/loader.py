@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.integrator.dense import LANES, dense_path
+from render.integrator.dense import SPECTRUM_SIZE, dense_path
 from render.integrator.matte import matte_surface, with_matte_surfaces
 from render.integrator.reflectance_table import band_offsets, reflectance_table, with_rows
 from render.integrator.scattered_path import scattered_path
@@ -87,7 +87,7 @@ class Loaded:
     sample_lights : bool
         Whether directions are sampled towards lights.
     curves : tuple of Spectrum
-        Reflectances that are read from a table, row by row. None where lights have colours of their own: a line in them
+        Reflectances that are read from a table, row by row. None for coloured lights: a line in them
         would be met at few of the table's wavelengths.
     covering : mitsuba.Scene or None
         The same scene with a film of one band and lights of 1 whatever their colours: it shows what they cover. None
@@ -146,15 +146,16 @@ def _load_group(scene: Scene, group: str, film: Film) -> Loaded:
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
     index, coloured = (list(scene.groups).index(group),), scene.groups[group].coloured
     if backend() == "numpy":
-        covering = _load(scene, _covering(scene, group, film))
-        return Loaded(_load(scene, description), index, coloured, sample_lights=True, covering=covering)
+        covering = _load(scene, group, _covering(scene, group, film))
+        mi_scene = _load(scene, group, description)
+        return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=True, covering=covering)
     matte = with_matte_surfaces(description)
     tabulated, curves = (matte, ()) if coloured else with_rows(matte)
-    mi_scene = _load(scene, tabulated)
+    mi_scene = _load(scene, group, tabulated)
     # A constant environment is met in every direction: directions sampled for the surface alone leave less noise than a
     # mixture with ones sampled for the light, and half of the rays are saved.
     environment = [light.class_name() for light in mi_scene.emitters()] == ["ConstantBackgroundEmitter"]
-    return Loaded(mi_scene, index, coloured, not environment, curves)
+    return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=not environment, curves=curves)
 
 
 def _covering(scene: Scene, group: str, film: Film) -> Node:
@@ -170,9 +171,16 @@ def _covering(scene: Scene, group: str, film: Film) -> Node:
     return description
 
 
-def _load(scene: Scene, description: Node) -> Any:
+def _load(scene: Scene, group: str, description: Node) -> Any:
+    mi = mitsuba_module()
+    config = mi.parser.ParserConfig(variant())
+    # Merging meshes orders a scene's shapes anew at each load, and its lights with them. A path chooses a light by its
+    # number, so several keep their order only without.
+    config.merge_meshes = len(scene.groups[group].emitters) == 1
     try:
-        return mitsuba_module().load_dict(description)
+        state = mi.parser.parse_dict(config, description)
+        mi.parser.transform_all(config, state)
+        return mi.parser.instantiate(config, state)
     except RuntimeError as error:
         words = one_line(error)
         raise InputError(f"scene {scene.name}: Mitsuba can't load it: {words}; correct the description") from error
@@ -206,7 +214,7 @@ def integrators(
         return
     offsets = band_offsets(seed)
     for part in np.array_split(np.arange(count), -(-count // part_bands)):
-        padded = np.concatenate([part, np.full(-part.size % LANES, part[-1])])
+        padded = np.concatenate([part, np.full(-part.size % SPECTRUM_SIZE, part[-1])])
         centre, width = film.wavelength_nm[padded], film.width_nm[padded]
         made = mi.load_dict(
             {
@@ -223,8 +231,3 @@ def integrators(
         if loaded.curves:
             made.tracer.prepare(offsets, reflectance_table(loaded.curves, centre + width * offsets[:, None]))
         yield part, made
-
-
-def seen_directly() -> Any:
-    """Integrator of the light that the camera sees directly, without LLVM or CUDA."""
-    return mitsuba_module().load_dict({"type": "path", "max_depth": 1})

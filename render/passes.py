@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from render.error_estimates import SharedPaths
-from render.integrator.dense import LANES
+from render.integrator.dense import SPECTRUM_SIZE
 from render.level import PassMeans
-from render.loader import PART_BANDS, Film, Loaded, integrators, mitsuba_module, seen_directly
+from render.loader import PART_BANDS, Film, Loaded, integrators, mitsuba_module
 from render.scene import Scene
 from render.transport import Transport
 from rodcone.errors import InputError, one_line
@@ -21,7 +21,7 @@ METER_SPP = 16  # most samples a pixel and pass of its 64x64 film: 65 536 paths 
 
 
 @dataclass
-class Sums:
+class PassSums:
     """Running sums over passes, each weighed by its samples (Welford; West 1979); the only mutable state of a render.
 
     `mean`, `scatter` and `signed` have the shape (group, band, h, w). `seen` and `coverage` are as of `Transport`,
@@ -53,12 +53,12 @@ class Sums:
 
     @property
     def variance_factor(self) -> np.float32:
-        """What turns the scatter into the variance of the mean."""
+        """Factor from the scatter to the variance of the mean."""
         return np.float32(1 / ((self.passes - 1) * self.drawn))
 
     @property
     def shared(self) -> SharedPaths | None:
-        """How the errors of two groups go together."""
+        """Correlation of the errors of two groups that share paths."""
         if self.share is None or self.product is None:
             return None
         one, other = (np.sqrt(self.scatter[group]) for group in self.share)
@@ -67,23 +67,27 @@ class Sums:
         return SharedPaths(self.share, np.clip(found, -1, 1, out=found))
 
     def pass_means(self) -> PassMeans:
-        """What each pass gives for levels."""
-        plane = np.array(self.irradiance) if self.irradiance else None
-        return PassMeans(np.array(self.spp), np.array(self.uncovered), np.array(self.radiance), plane)
+        """Means over each pass, from which levels are computed."""
+        return PassMeans(
+            spp=np.array(self.spp),
+            uncovered=np.array(self.uncovered),
+            radiance=np.array(self.radiance),
+            irradiance=np.array(self.irradiance) if self.irradiance else None,
+        )
 
 
-def no_passes(scene: Scene, film: Film) -> Sums:
+def no_passes(scene: Scene, film: Film) -> PassSums:
     """Sums before the first pass."""
     bands = film.wavelength_nm.size
     mean, scatter, signed = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(3))
     seen = [np.zeros((bands if x.coloured else 1, *film.size), np.float32) for x in scene.groups.values()]
-    return Sums(mean, scatter, signed, seen, np.zeros(film.size, np.float32))
+    return PassSums(mean=mean, scatter=scatter, signed=signed, seen=seen, coverage=np.zeros(film.size, np.float32))
 
 
-def sums_of(transport: Transport) -> Sums:
+def sums_of(transport: Transport) -> PassSums:
     """Sums that an earlier render stopped at, to go on from: its radiance to the bit."""
     means, samples = transport.pass_means, np.float32(transport.spp)
-    sums = Sums(
+    sums = PassSums(
         mean=transport.radiance.copy(),
         scatter=transport.variance * np.float32((transport.passes - 1) * transport.spp),
         signed=transport.half_difference * samples,
@@ -100,14 +104,14 @@ def sums_of(transport: Transport) -> Sums:
     return sums
 
 
-def add_pass(light_groups: list[Loaded], sums: Sums, film: Film, pass_spp: int, seed: int) -> None:
+def add_pass(light_groups: list[Loaded], sums: PassSums, film: Film, pass_spp: int, seed: int) -> None:
     """Render every group once more, with a seed of its own, and add it to the sums."""
     groups, bands = sums.mean.shape[:2]
     index, covered = sums.passes, 0.0
     radiance, irradiance = np.zeros((groups, bands)), np.zeros((groups, bands))
     sums.spp.append(pass_spp)
     for loaded in light_groups:
-        of_pass = pass_seed(seed, loaded.groups[0], index)
+        of_pass = int(np.random.SeedSequence([seed, loaded.groups[0], index]).generate_state(1)[0])
         for part, integrator in integrators(film, PART_BANDS, loaded, of_pass):
             scattered, seen, coverage = _camera_part(loaded, integrator, film.width_nm[part], pass_spp, of_pass)
             chosen = slice(int(part[0]), int(part[-1]) + 1)
@@ -124,7 +128,7 @@ def add_pass(light_groups: list[Loaded], sums: Sums, film: Film, pass_spp: int, 
         sums.irradiance.append(irradiance)
 
 
-def _add(sums: Sums, groups: tuple[int, ...], bands: slice, scattered: Planes, seen: tuple[Planes, ...]) -> None:
+def _add(sums: PassSums, groups: tuple[int, ...], bands: slice, scattered: Planes, seen: tuple[Planes, ...]) -> None:
     """Add some bands of the pass whose samples were noted last."""
     weight, drawn = np.float32(sums.spp[-1]), np.float32(sums.drawn)
     deltas, radiances = [], []
@@ -155,7 +159,7 @@ def _camera_part(
     scattered : (group, band, h, w) float32
         Band averages without the light that is seen directly.
     seen : tuple of (band or 1, h, w) float32
-        Light that is seen directly, of each group: by band where it has colours of its own.
+        Light that is seen directly, of each group: by band where the group is coloured.
     coverage : (h, w) float32
         Share of the samples that meet a light first.
     """
@@ -164,10 +168,11 @@ def _camera_part(
     scattered, others = _bands(image, count, width_nm)
     shares, of_light = others[:count], others[count : count + width_nm.size]
     if loaded.covering is not None:  # without Dr.Jit renders of their own show the lights
-        image = _rendered(loaded.covering, loaded.covering.sensors()[0], seen_directly(), spp, seed)
+        seen_directly = mitsuba_module().load_dict({"type": "path", "max_depth": 1})
+        image = _rendered(loaded.covering, loaded.covering.sensors()[0], seen_directly, spp, seed)
         shares = _bands(image, 1, width_nm[:1])[0][0]
         if loaded.coloured:
-            image = _rendered(loaded.mi_scene, loaded.camera, seen_directly(), spp, seed)
+            image = _rendered(loaded.mi_scene, loaded.camera, seen_directly, spp, seed)
             of_light = _bands(image, 1, width_nm)[0][0]
     return scattered, (of_light if loaded.coloured else shares[:1], *shares[1:, None]), shares.sum(axis=0)
 
@@ -193,7 +198,7 @@ def _bands(image: Planes, groups: int, width_nm: Floats) -> tuple[Planes, Planes
             "allowed: materials whose sampling doesn't depend on wavelength; replace it"
         )
     # Channel 0 is the film's own luminance; a group has its bands, filled up to a multiple of four.
-    filled = size + -size % LANES
+    filled = size + -size % SPECTRUM_SIZE
     bands, others = np.split(image[1:-1], [groups * filled])
     return bands.reshape(groups, filled, *image.shape[1:])[:, :size], others
 
@@ -210,11 +215,6 @@ def _rendered(mi_scene: Any, sensor: Any, integrator: Any, spp: int, seed: int) 
     return np.ascontiguousarray(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
 
 
-def pass_seed(seed: int, group: int, index: int) -> int:
-    """Seed of one pass of one group, from its coordinates alone."""
-    return int(np.random.SeedSequence([seed, group, index]).generate_state(1)[0])
-
-
 def let_go(error: BaseException) -> None:
     """Free the refused scene, which the traceback holds: Dr.Jit compiles every live material into the next render."""
     cause: BaseException | None = error
@@ -225,7 +225,7 @@ def let_go(error: BaseException) -> None:
 
 
 def _root_cause(error: BaseException) -> BaseException:
-    """Error from under the layers that Dr.Jit wraps around it."""
+    """First cause of an error that Dr.Jit has wrapped."""
     while error.__cause__ or error.__context__:
         error = error.__cause__ or error.__context__ or error
     return error

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from render.spectrum import Spectrum
-from rodcone.tables import colour_science
+from rodcone.optional import colour_science
 from rodcone.types import Floats
 
 PLANCK_J_S = 6.62607015e-34  # exact, SI 2019

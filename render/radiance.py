@@ -64,7 +64,8 @@ class SpectralRadiance:
     @property
     def widths_nm(self) -> Floats:
         """Width of each band, shape (band,)."""
-        return band_widths(self.wavelength_nm, self.width_nm)
+        assert self.width_nm is not None  # since construction
+        return self.width_nm
 
     @property
     def shape(self) -> tuple[int, int]:

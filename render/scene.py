@@ -1,7 +1,9 @@
 """A scene as plain data: what `mitsuba.load_dict` takes, its light groups, and where illuminance is measured."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import reduce
+from operator import getitem
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,6 +14,7 @@ from rodcone.errors import InputError, one_line, unknown
 from rodcone.types import Floats
 
 Node: TypeAlias = dict[str, Any]
+Keys: TypeAlias = tuple[str, ...]  # keys from the scene to one of its parts
 
 # Emitter plug-ins whose light is one spectrum, and the parameter that holds it.
 EMISSION_PARAMETER = {
@@ -138,7 +141,12 @@ class Scene:
         result: Node = _copy(self.geometry)
         for name, group in self.groups.items():
             for path in group.emitters:
-                _replace_emitter(result, path.split("/"), emission.get(name), group.coloured)
+                *way, key = path.split("/")
+                holder = reduce(getitem, way, result)
+                if name not in emission:
+                    del holder[key]
+                elif not group.coloured:
+                    holder[key][EMISSION_PARAMETER[holder[key]["type"]]] = emission[name]
         return result
 
 
@@ -213,17 +221,18 @@ def _held(table: Spectrum) -> Spectrum:
     return Spectrum(far, np.interp(far, nm, table.values))
 
 
-def emitter_paths(node: Node, prefix: str = "") -> dict[str, str]:
-    """Path and type of each emitter in a scene's dict."""
-    found: dict[str, str] = {}
-    for key, value in node.items():
-        if not isinstance(value, dict):
-            continue
-        path, kind = f"{prefix}{key}", value.get("type")
-        if kind in (*EMISSION_PARAMETER, *COLOURED_EMITTERS, *_REFUSED_EMITTERS):
-            found[path] = str(kind)
-        found |= emitter_paths(value, f"{path}/")
-    return found
+def walk(node: Node, path: Keys = ()) -> Iterator[tuple[Keys, Node]]:
+    """Every part under a node with its keys from there, parents first."""
+    for key, child in node.items():
+        if isinstance(child, dict):
+            yield (*path, key), child
+            yield from walk(child, (*path, key))
+
+
+def emitter_paths(node: Node) -> dict[str, str]:
+    """Keys and type of each emitter in a scene's dict."""
+    kinds = (*EMISSION_PARAMETER, *COLOURED_EMITTERS, *_REFUSED_EMITTERS)
+    return {"/".join(path): part["type"] for path, part in walk(node) if part.get("type") in kinds}
 
 
 def _copy(value: Any) -> Any:
@@ -231,14 +240,3 @@ def _copy(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _copy(item) for key, item in value.items()}
     return list(value) if isinstance(value, list) else value
-
-
-def _replace_emitter(node: Node, path: list[str], emission: Node | None, coloured: bool) -> None:
-    """Give the emitter at `path` its emission, or remove it; a coloured one keeps its own."""
-    *way, key = path
-    for step in way:
-        node = node[step]
-    if emission is None:
-        del node[key]
-    elif not coloured:
-        node[key][EMISSION_PARAMETER[node[key]["type"]]] = emission

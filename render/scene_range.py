@@ -2,11 +2,13 @@
 
 import warnings
 from collections.abc import Container, Iterator
+from functools import reduce
+from operator import getitem
 
 import numpy as np
 
 from render.optical_constants import optical_constant
-from render.scene import Node, Scene, emitter_paths, table_of
+from render.scene import Node, Scene, emitter_paths, table_of, walk
 from render.spectrum import Spectrum
 from rodcone.errors import InputError
 from rodcone.types import Floats
@@ -38,16 +40,17 @@ def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:
 
 
 def warn_of_coloured_lights(scene: Scene, wavelength_nm: Floats, width_nm: Floats) -> None:
-    """Tell by a `UserWarning` where data of a light with colours of its own end within the bands."""
+    """Warn (`UserWarning`) where data of a coloured light end within the bands."""
     for path in (path for group in scene.groups.values() if group.coloured for path in group.emitters):
-        for part in _parts(scene.geometry, path.split("/")):
+        light: Node = reduce(getitem, path.split("/"), scene.geometry)
+        for part in (light, *(inner for _, inner in walk(light))):
             within_cie = Spectrum(np.array(CIE_NM), np.ones(2)) if part.get("type") in _EMISSION_WITHIN_CIE else None
             if table := within_cie or table_of(part):
                 warn_of_dark_ends(f"scene {scene.name}: light {path!r}", table, wavelength_nm, width_nm)
 
 
 def warn_of_dark_ends(light: str, spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) -> None:
-    """Tell by a `UserWarning` where a light's spectrum ends within the bands at a value other than 0."""
+    """Warn (`UserWarning`) where a light's spectrum ends within the bands at a value other than 0."""
     shortest, longest = (wavelength_nm - width_nm / 2).min(), (wavelength_nm + width_nm / 2).max()
     low, high = spectrum.wavelength_nm[[0, -1]]
     below = shortest < low - _SLACK_NM and spectrum.values[0] > 0
@@ -86,13 +89,3 @@ def _range_nm(node: Node) -> tuple[float, float] | None:
 def _named(scene: Node, name: str) -> Node:
     """Part that stands in the scene under an id; empty where there is none."""
     return next((x for key, x in scene.items() if isinstance(x, dict) and name in (key, x.get("id"))), {})
-
-
-def _parts(node: Node, path: list[str]) -> list[Node]:
-    """Node at a path, and all those within it."""
-    for key in path:
-        node = node[key]
-    found = [node]
-    for part in found:
-        found += [value for value in part.values() if isinstance(value, dict)]
-    return found

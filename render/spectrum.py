@@ -109,16 +109,11 @@ def line_bands(
         raise InputError(f"lines_nm: {lines.tolist()!r} is not inside {low:g} to {high:g}; widen range_nm")
     groups = np.split(lines, np.flatnonzero(np.diff(lines) >= 2 * LINE_REACH_NM) + 1) if lines.size else []
     cuts = np.array([edge for group in groups for edge in (group[0] - LINE_REACH_NM, group[-1] + LINE_REACH_NM)])
-    even = low + width_nm * np.arange(np.floor((high - low) / width_nm + 1e-9) + 1)
-    far = [edge for edge in (*even, high) if not cuts.size or _outside(edge, cuts)]
-    edges = np.unique([low, high, *cuts, *far])
+    even = np.append(low + width_nm * np.arange(np.floor((high - low) / width_nm + 1e-9) + 1), high)
+    near = np.abs(cuts[:, None] - even).min(axis=0, initial=np.inf) < 2 * LINE_REACH_NM
+    within = np.searchsorted(cuts, even) % 2 == 1
+    edges = np.unique([low, high, *cuts, *even[~near & ~within]])
     return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
-
-
-def _outside(edge: float, cuts: Floats) -> bool:
-    """Whether an even edge is at least 1 nm from every line's band, and not in one."""
-    near = np.abs(cuts - edge).min() < 2 * LINE_REACH_NM
-    return not near and np.searchsorted(cuts, edge) % 2 == 0
 
 
 def band_widths(wavelength_nm: ArrayLike, width_nm: ArrayLike | None = None) -> Floats:

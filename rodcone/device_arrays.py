@@ -1,6 +1,7 @@
-"""NumPy's arrays as Dr.Jit takes them quickest, and whole numbers divided exactly."""
+"""Aligned upload of NumPy arrays to Dr.Jit, and exact division of whole numbers."""
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from rodcone.jit import arrays, dr
 
-ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel for memory that isn't aligned, and refuses it packet loads
+ALIGNMENT = 64  # bytes; for memory that isn't aligned Dr.Jit compiles another, slower kernel without packet loads
 
 
 def aligned(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
@@ -19,27 +20,32 @@ def aligned(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
     return np.asarray(memory[start : start + size].view(dtype).reshape(shape))
 
 
-def upload(values: NDArray[Any]) -> Any:
-    """Evaluated Dr.Jit array of the same values and type, flat, over aligned memory."""
+def upload(values: NDArray[Any], *, copy_under: float = inf) -> Any:
+    """Evaluated Dr.Jit array of the same values and type, flat.
+
+    It lies over the values themselves where they are contiguous and aligned, or have `copy_under` bytes or more; else
+    over an aligned copy.
+    """
     jit = arrays()
     kinds = {"f4": jit.Float, "f8": jit.Float64, "u4": jit.UInt, "i4": jit.Int}
-    if values.ctypes.data % ALIGNMENT or not values.flags.c_contiguous:
-        copy = aligned(values.shape, values.dtype)
-        copy[...] = values
-        values = copy
-    return kinds[values.dtype.str[1:]](values.ravel())
+    flat = values.ravel()
+    if flat.ctypes.data % ALIGNMENT and flat.nbytes < copy_under:
+        copy = aligned(flat.shape, flat.dtype)
+        copy[:] = flat
+        flat = copy
+    return kinds[flat.dtype.str[1:]](flat)
 
 
 @dataclass(frozen=True)
 class Divisor:
-    """A whole number to divide by: itself (UInt) and its inverse (Float64), by which CPUs multiply in vectors."""
+    """A whole number to divide by (UInt), and its inverse (Float64): CPUs multiply in vectors."""
 
     number: Any
     inverse: Any
 
 
 def divisor(number: int) -> Divisor:
-    """Divisor as data of the kernel: another number doesn't compile it anew."""
+    """Make a divisor that is data of the kernel, so that another number doesn't recompile it."""
     jit = arrays()
     return Divisor(dr.opaque(jit.UInt, number), dr.opaque(jit.Float64, 1 / number))
 
@@ -48,7 +54,7 @@ def divide(number: Any, by: Divisor) -> tuple[Any, Any]:
     """Quotient and remainder of whole numbers (UInt) under 2^31.
 
     Exact: number + 1/2 is at least half a step of 1/divisor from the next multiple, far above the rounding of its
-    double-precision quotient. The way through Int is the one that CPUs convert in vectors.
+    double-precision quotient. CPUs convert Int to Float64 in vectors, UInt they don't.
     """
     jit = arrays()
     quotient = jit.UInt(jit.Int((jit.Float64(jit.Int(number)) + 0.5) * by.inverse))

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-_LENGTH = 32  # hexadecimal digits, 128 bits: two of a million cells meet with a chance of 1e-27
+_LENGTH = 32  # hexadecimal digits, 128 bits: two of a million cells collide with a chance of 1e-27
 
 
 def digest(value: Any) -> str:
     """Hash of plain data: numbers, texts, arrays, dataclasses, mappings and sequences of them."""
-    return digest_bytes(json.dumps(_plain(value), sort_keys=True).encode())
+    return digest_bytes(json.dumps(value, sort_keys=True, default=_plain).encode())
 
 
 def digest_bytes(*parts: bytes | memoryview) -> str:
@@ -32,12 +32,9 @@ def digest_file(path: str | Path) -> str:
 
 
 def _plain(value: Any) -> Any:
-    if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+    """What JSON holds in place of a value that it doesn't know."""
+    if is_dataclass(value):
+        return {field.name: getattr(value, field.name) for field in fields(value)}
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if value is None or isinstance(value, str | bool | int | float):
-        return value
+        return dict(value)
     return np.asarray(value).tolist()  # arrays, NumPy's scalars and Dr.Jit's matrices

@@ -6,7 +6,7 @@ from math import isfinite, nan
 from numbers import Real
 from typing import Any
 
-MOST_TOLD = 2000  # characters: what a file says about itself may fill megabytes
+MOST_TOLD = 2000  # characters; a quoted file may fill megabytes
 
 
 class InputError(ValueError):

@@ -12,12 +12,12 @@ from rodcone.errors import InputError
 
 @contextmanager
 def replacing(*paths: Path) -> Iterator[tuple[Path, ...]]:
-    """Give a place beside each path to write to; at the end each takes its name, in this order, on failure none does.
+    """Yield a temporary path beside each path; at the end they are renamed, in this order. On failure none is.
 
     Raises
     ------
     OSError
-        Where the folder of the first, which has to be that of all, is missing or can't be written; it names the path.
+        Where the folder, which has to be the same for all, is missing or can't be written; it names the first path.
     """
     with _folder_beside(paths[0]) as parts:
         places = tuple(Path(parts) / path.name for path in paths)
@@ -52,5 +52,5 @@ def inside(folder: Path, name: str) -> Path:
 def _folder_beside(path: Path) -> "tempfile.TemporaryDirectory[str]":
     try:
         return tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-")
-    except OSError as error:  # named after a folder that nobody asked for
+    except OSError as error:  # it names the temporary folder, which the user did not ask for
         raise OSError(error.errno, error.strerror, str(path)) from error

@@ -1,4 +1,4 @@
-"""Memory that a run needs and that is free, and the refusal where it isn't: the system would end it without a word."""
+"""Memory that a run needs, and a refusal where less is free: the system would kill the run without a message."""
 
 import resource
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ GB = 1e9
 # Bytes a pixel, counted from the arrays held at once; `tests/rodcone/test_memory.py` compares them with measured peaks.
 _TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
 _VIEW_ARRAYS = 7  # one pass's planes and their copies; later relit radiance, its halves, and an image forming
-_RENDER_BYTES = 120  # whatever the bands: the render's marks, a preview
+_RENDER_BYTES = 120  # for any number of bands: masks of the render, a preview
 _CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
 PROCESS_BYTES = 350e6  # libraries and compiled kernels
 _FILE_BANDS = 40  # of a picture file
@@ -126,7 +126,7 @@ def _groups(root: Path) -> Iterator[Limit]:
 
 
 def _group_limit(folder: Path, most_file: str, used_file: str, cache_key: str) -> Limit:
-    """Limit of one group; `ValueError` where it has none. Files that it merely holds in its cache are no use."""
+    """Limit of one group; `ValueError` where it has none. Cached files don't count as used."""
     most = int((folder / most_file).read_text())  # the word "max" without a limit
     used = int((folder / used_file).read_text())
     cached = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())[cache_key]

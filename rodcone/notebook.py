@@ -1,4 +1,4 @@
-"""How values show themselves in a notebook: a small picture and a few facts. Made only when they are shown."""
+"""Display of values in a notebook: a small picture and a table of facts, made only when they are shown."""
 
 from base64 import b64encode
 from collections.abc import Mapping
@@ -15,9 +15,9 @@ SIDE = 512  # most pixels of a shown picture's longer side
 
 
 def preview_png(linear: NDArray[np.floating]) -> bytes:
-    """PNG of a linear picture, (h, w, 3) sRGB or (h, w) grey, in its own scale; large ones lose pixels.
+    """PNG of a linear picture, (h, w, 3) sRGB or (h, w) grey, scaled by its own white; large ones are subsampled.
 
-    A look, no measurement: `rodcone.colour_spaces` adapts and encodes pictures that are compared.
+    For display alone: pictures that are compared are adapted and encoded by `rodcone.colour_spaces`.
     """
     from PIL import Image  # only here: most programs never show anything
 

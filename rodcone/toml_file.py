@@ -1,4 +1,4 @@
-"""Reading TOML, whose parser knows no limits: not of size, nor of nesting, nor of whole numbers."""
+"""Reading TOML with limits on size, nesting and whole numbers, which Python's parser lacks."""
 
 import re
 import tomllib

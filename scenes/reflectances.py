@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from render.spectrum import Floats, Spectrum
-from rodcone.tables import colour_science
+from rodcone.optional import colour_science
 
 LONGEST_NM = 1100.0  # as far as lights are known (`render.spectrum.flat`), beyond any response here
 _NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all materials keeps scenes quick to compile

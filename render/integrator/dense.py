@@ -12,7 +12,7 @@ from typing import Any
 from render.integrator.reflectance_table import TableReader
 from rodcone.jit import dr
 
-LANES = 4  # wavelengths of a spectral variant's `Spectrum`
+SPECTRUM_SIZE = 4  # wavelengths of a spectral variant's `Spectrum`
 RR_DEPTH = 5  # Russian roulette from this depth on, as Mitsuba's `path`
 # Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
 # lobes by wavelength and one path can't serve all bands.
@@ -88,7 +88,7 @@ class Tracer:
         return [*names, "wavelength_dependent_choice"]
 
     def channels(self, scene: Any, sampler: Any, ray: Any, active: Any) -> list[Any]:
-        """Trace a path; gives its channels."""
+        """Trace a path and return its channels."""
         mi = self.mi
         wavelengths, step = self._wavelengths(sampler.next_1d(active))
         if self.meter:
@@ -114,11 +114,11 @@ class Tracer:
         else:
             step = dr.minimum(mi.UInt32(sample * len(self.offsets)), len(self.offsets) - 1)
             offset = dr.gather(mi.Float, self.offsets, step)
-        lanes = [
+        bands = [
             dr.fma(offset, dr.opaque(mi.Float, width), dr.opaque(mi.Float, centre))
             for centre, width in zip(self.centres, self.widths, strict=True)
         ]
-        return [mi.Spectrum(*lanes[i : i + LANES]) for i in range(0, len(lanes), LANES)], step
+        return [mi.Spectrum(*bands[i : i + SPECTRUM_SIZE]) for i in range(0, len(bands), SPECTRUM_SIZE)], step
 
     def _start_on_meter(self, scene: Any, sampler: Any, ray: Any, wavelengths: list[Any]) -> tuple[Any, ...]:
         """Start of a path on the irradiance meter: a white matte surface whose lights are sampled as any other's.
@@ -226,7 +226,7 @@ class Tracer:
     def _bounce(
         self, scene: Any, sampler: Any, ray: Any, si: Any, go_on: Any, wavelengths: list[Any], step: Any
     ) -> tuple[list[Any], Any, list[Any], Any]:
-        """Light received from a sampled position on a lamp; then a sampled direction, its weights, and the mark."""
+        """Light from a sampled position on a lamp; next direction, its weights, whether wavelength chose it."""
         mi, bsdf = self.mi, si.bsdf(ray)
         if not self.sample_lights:
             lobe, angle = sampler.next_1d(), sampler.next_2d()

@@ -134,7 +134,8 @@ def read_exr(path: str | Path) -> SpectralRadiance:
         error = float(header.get(ERROR, 0.0))
         height, width = _extent(header, size)
         planes = _planes(path, list(bands), (height, width))
-        return SpectralRadiance(np.moveaxis(planes, 0, -1), centres, error, widths)
+        values = np.moveaxis(planes, 0, -1)
+        return SpectralRadiance(values, wavelength_nm=centres, relative_mc_error=error, width_nm=widths)
     except InputError as refused:
         raise InputError(f"{path}: {refused}") from None
     except (KeyError, TypeError, ValueError, OverflowError) as wrong:

@@ -1,4 +1,4 @@
-"""What a picture file may declare before memory is taken for it, and what its wavelengths say about bands."""
+"""Limits on the size that a picture file declares, checked before memory is allocated; bands from its wavelengths."""
 
 import warnings
 from pathlib import Path

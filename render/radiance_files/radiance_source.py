@@ -1,10 +1,10 @@
-"""Pictures from files where a rendered scene would stand."""
+"""Radiance from a file in place of a rendered scene."""
 
 from pathlib import Path
 
 import numpy as np
 
-from render.level import one_picture
+from render.level import PassMeans
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import read_exr
 from render.radiance_files.iset import read_iset_scene
@@ -61,7 +61,12 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
         variance=variance if error else none,
         coverage=np.zeros(radiance.shape, np.float32),
         seen=(np.zeros((1, *radiance.shape), np.float32),),
-        pass_means=one_picture(planes),
+        pass_means=PassMeans(
+            spp=np.ones(1, np.int64),
+            uncovered=np.ones(1),
+            radiance=planes.mean(axis=(2, 3), dtype=np.float64)[None],
+            irradiance=None,
+        ),
         groups={name: LightGroup((), whole)},
         wavelength_nm=nm,
         width_nm=width,

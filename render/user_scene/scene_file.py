@@ -69,7 +69,7 @@ def _parse(mi: Any, file: Path, trust: bool) -> Any:
         mi.parser.transform_upgrade(config, state)
     except RuntimeError as error:
         raise InputError(f"{reason(error)}; correct the file") from None
-    except UnicodeDecodeError:  # of an error that quotes a half of a letter, or a file of spectra
+    except UnicodeDecodeError:  # from a message that cuts a character in half, or a file of spectra
         raise InputError(f"{file}: Mitsuba can't read it, nor say why in UTF-8; correct the file") from None
     finally:
         if not trust:

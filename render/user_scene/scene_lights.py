@@ -1,12 +1,12 @@
 """The lights of a user's scene: their groups, and the spectrum of each as Mitsuba evaluates it."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from render.scene import EMISSION_PARAMETER, LightGroup, Node, table_of
+from render.scene import EMISSION_PARAMETER, Keys, LightGroup, Node, table_of, walk
 from render.spectrum import Spectrum, flat
 from render.user_scene.allowed_plugins import ALLOWED, SPECTRA
 from rodcone.errors import InputError, one_line
@@ -17,25 +17,15 @@ from rodcone.types import Floats
 # which makes 472, by fours.
 _GRID_NM: Floats = np.arange(360.0, 832.0)
 
-Path = tuple[str, ...]  # keys from the scene to one of its parts
-
 
 def reason(error: RuntimeError) -> str:
-    """Mitsuba's own words on one line, less the lines of its source."""
+    """Mitsuba's message on one line, without its source locations."""
     return re.sub(r"\[\w+\.cpp:\d+\] ", "", one_line(error))
 
 
 def type_of(part: Any) -> str:
     """Plug-in that a value in a scene's dict names; empty where it is a plain value."""
     return str(part["type"]) if isinstance(part, dict) else ""
-
-
-def walk(node: Node, path: Path = ()) -> Iterator[tuple[Path, Node]]:
-    """Every part under a node with its keys from there, parents first."""
-    for key, child in node.items():
-        if isinstance(child, dict):
-            yield (*path, key), child
-            yield from walk(child, (*path, key))
 
 
 def attach_area_lights(name: str, geometry: Node) -> None:
@@ -81,7 +71,7 @@ def light_groups(mi: Any, name: str, geometry: Node, parts: Mapping[str, Node]) 
     InputError
         For a spectrum that Mitsuba refuses.
     """
-    members: dict[str, list[tuple[Path, Node]]] = {}
+    members: dict[str, list[tuple[Keys, Node]]] = {}
     for path, node in walk(geometry):
         if node["type"] in ALLOWED["emitter"]:
             own = str(node.get("id") or geometry[path[0]].get("id") or path[0])
@@ -105,7 +95,7 @@ def _same(a: Spectrum | None, b: Spectrum | None) -> bool:
 
 
 def _emission(mi: Any, where: str, emitter: Node, parts: Mapping[str, Node]) -> Spectrum | None:
-    """Spectrum of an emitter, as Mitsuba evaluates it; None where it has colours of its own over place or direction."""
+    """Spectrum of an emitter, as Mitsuba evaluates it; None where its colour varies over position or direction."""
     if emitter["type"] not in EMISSION_PARAMETER:
         return None
     value: Any = emitter.get(EMISSION_PARAMETER[emitter["type"]])
@@ -122,7 +112,7 @@ def _emission(mi: Any, where: str, emitter: Node, parts: Mapping[str, Node]) -> 
 
 
 def _stated(value: Any) -> Spectrum | None:
-    """Spectrum that states its own points: taken as it is, since a line may lie between those of any grid."""
+    """Spectrum given by its own points, taken as it is: a line may lie between the points of any grid."""
     if type_of(value) == "uniform" and set(value) - {"type", "id"} == {"value"}:
         return flat(float(value["value"]))
     return table_of(value) if isinstance(value, dict) else None

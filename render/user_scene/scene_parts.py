@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from render.scene import Node, Scene
+from render.scene import Keys, Node, Scene, walk
 from render.user_scene.allowed_plugins import ALLOWED, CAMERAS, METER, kind_of
-from render.user_scene.scene_lights import Path, attach_area_lights, light_groups, type_of, walk
+from render.user_scene.scene_lights import attach_area_lights, light_groups, type_of
 from rodcone.errors import InputError, require_whole, unknown
 
 FILM_SIZE = 576, 768  # height and width of Mitsuba's films where a scene states none
@@ -34,7 +34,7 @@ class SceneFile:
 
 
 def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -> SceneFile:
-    """Build the scene: first camera, groups of lights by id, a shape with an ``irradiancemeter`` as reference plane.
+    """Build the scene: its first camera, light groups by id, a shape with an ``irradiancemeter`` as reference plane.
 
     Lights belong to a group by their own id, or else their shape's, up to a colon: ``lamp:left`` and ``lamp:right``
     are dimmed together. One spectrum that differs over place or direction, or several in a group, make it `coloured`.
@@ -82,7 +82,9 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
     groups = light_groups(mi, name, geometry, _check_references(name, geometry))
     if not groups:
         raise InputError(f"scene {name}: it has no light; allowed: one emitter or more; add one")
-    return SceneFile(Scene(name, geometry, groups, planes[0] if planes else None, extend), size, tuple(notes))
+    plane = planes[0] if planes else None
+    scene = Scene(name=name, geometry=geometry, groups=groups, reference_plane=plane, extend=extend)
+    return SceneFile(scene, size, tuple(notes))
 
 
 def _kind(mi: Any, part: Any) -> str:
@@ -110,7 +112,7 @@ def _check_references(name: str, geometry: Node) -> dict[str, Node]:
     """Parts by id and by dotted path, as Mitsuba names them; raises for references that can't be followed."""
     parts: dict[str, Node] = {}
     in_emitters: set[int] = set()
-    emitter: Path | None = None
+    emitter: Keys | None = None
     for path, node in walk(geometry):
         if node["type"] in (*CAMERAS, METER) and path != ("sensor",):
             raise InputError(f"scene {name}: {'/'.join(path)} is a sensor inside another part; place it in the scene")

@@ -67,7 +67,7 @@ def search_path(mi: Any, *folders: Path) -> Any:
 
 @dataclass
 class _Spent:
-    """What the files read so far have cost, all includes together."""
+    """Running totals of the files read so far, includes counted."""
 
     files: int = 0
     bytes: int = 0

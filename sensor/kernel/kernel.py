@@ -5,13 +5,13 @@ all cameras, keys and frame sizes (of one number of bands and channels). Draws d
 alone.
 """
 
-from dataclasses import dataclass
 from math import pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rodcone.device_arrays import ALIGNMENT, Divisor, aligned, divide, divisor, upload
 from rodcone.jit import arrays, dr
 from sensor.cfa import channel_map, channels, check_covers
 from sensor.config import SensorConfig
@@ -22,17 +22,8 @@ from sensor.readout import spread_charge
 
 BANDS_AT_ONCE = 8  # a CPU reads ahead in some dozen places; 40 at once take a third longer, and fight for its cache
 LARGEST = np.finfo(np.float32).max
-ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel, and a slower one, for memory that isn't aligned
 COPY_UNDER = 1 << 20  # bytes; large memory of NumPy's lies alike, which makes one more kernel and not one a pattern
 _FINITE_E = 1e30  # over any well; times any response in single precision's range
-
-
-@dataclass(frozen=True)
-class Divisor:
-    """A whole number to divide by: itself (UInt) and its inverse (Float64), which CPUs multiply by in vectors."""
-
-    number: Any
-    inverse: Any
 
 
 # Expected electrons
@@ -72,12 +63,12 @@ def expected_electrons_single(
     planes = _single(np.moveaxis(values, -1, 0).reshape(bands, -1))
     scalars = [[dr.opaque(jit.Float, float(weight)) for weight in row] for row in weights]
     tile = channel_map(sensor.cfa, (len(sensor.cfa), len(sensor.cfa[0])))
-    tile_channels = _upload(np.vectorize(channels(sensor.cfa).index)(tile).astype(np.uint32), jit.UInt)
-    tile_height, tile_width = _divisor(tile.shape[0]), _divisor(tile.shape[1])
+    tile_channels = upload(np.vectorize(channels(sensor.cfa).index)(tile).astype(np.uint32))
+    tile_height, tile_width = divisor(tile.shape[0]), divisor(tile.shape[1])
     result = np.empty(planes.shape[1], dtype=np.float32)
     for start, piece in _pieces(planes):
         pixel = dr.arange(jit.UInt, piece.shape[1]) + dr.opaque(jit.UInt, first_row * width + start)
-        row, column = position(pixel, _divisor(width))
+        row, column = divide(pixel, divisor(width))
         channel = tile_channel(tile_channels, tile_height, tile_width, row, column)
         electrons = dr.zeros(jit.Float, piece.shape[1])
         for first in range(0, bands, BANDS_AT_ONCE):
@@ -90,7 +81,7 @@ def expected_electrons_single(
 
 def tile_channel(tile_channels: Any, height: Divisor, width: Divisor, row: Any, column: Any) -> Any:
     """Number of each pixel's channel, UInt; `tile_channels` holds those of the tile's `height` x `width` pixels."""
-    cell = _modulo(row, height) * width.number + _modulo(column, width)
+    cell = divide(row, height)[1] * width.number + divide(column, width)[1]
     return dr.gather(arrays().UInt, tile_channels, cell)
 
 
@@ -145,7 +136,7 @@ def read_frame(
     jit, pixel = arrays(), sensor.pixel
     if pixel.crosstalk:
         expected_e = _single(spread_charge(np.minimum(expected_e, np.float64(LARGEST)), pixel.crosstalk))
-    row, column = position(dr.arange(jit.UInt, expected_e.size), _divisor(expected_e.shape[1]))
+    row, column = divide(dr.arange(jit.UInt, expected_e.size), divisor(expected_e.shape[1]))
     halves = dr.opaque(jit.UInt, key & 0xFFFFFFFF), dr.opaque(jit.UInt, key >> 32)
     words = philox((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), jit.UInt(0)), halves)
     shot, read = normal_pair(words[0], words[1])
@@ -155,18 +146,18 @@ def read_frame(
     dark_e = dr.opaque(jit.Float, pixel.dark_current_e_per_s * exposure_s)
     if device.hot is not None:
         hot_e = pixel.hot_pixel_dark_current_e_per_s * exposure_s
-        dark_e = dark_e + _upload(np.float32(hot_e) * device.hot, jit.Float)
-    light_e = dr.minimum(_upload(expected_e, jit.Float), _FINITE_E)
-    mean_e = dr.fma(light_e, jit.Float(_upload(device.photo_response, jit.Float64)), dark_e)
+        dark_e = dark_e + upload(np.float32(hot_e) * device.hot, copy_under=COPY_UNDER)
+    light_e = dr.minimum(upload(expected_e, copy_under=COPY_UNDER), _FINITE_E)
+    mean_e = dr.fma(light_e, jit.Float(upload(device.photo_response, copy_under=COPY_UNDER)), dark_e)
     most_e = dr.opaque(jit.Float, 2 * pixel.full_well_e + 1e4)
-    collected_e = poisson(dr.minimum(mean_e, most_e), shot, words[2:], _upload(alias_table(), jit.UInt))
+    collected_e = poisson(dr.minimum(mean_e, most_e), shot, words[2:], upload(alias_table()))
 
     # Double precision behind the well: whole electrons lie on the same DN as in the NumPy form.
     read_e = jit.Float64(dr.minimum(collected_e, dr.opaque(jit.Float, pixel.full_well_e)))
     if device.column_gain is not None:
-        read_e *= dr.gather(jit.Float64, _upload(device.column_gain, jit.Float64), column)
+        read_e *= dr.gather(jit.Float64, upload(device.column_gain), column)
     read_noise_e = dr.opaque(jit.Float64, pixel.read_noise_e) * jit.Float64(read)
-    read_e += _upload(device.dark_offset_e, jit.Float64) + read_noise_e
+    read_e += upload(device.dark_offset_e, copy_under=COPY_UNDER) + read_noise_e
     dn = read_e / dr.opaque(jit.Float64, sensor.gain_e_per_dn) + dr.opaque(jit.Float64, sensor.black_dn)
     dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(sensor.white_dn))))
     return np.asarray(dn.numpy().astype(np.uint16).reshape(expected_e.shape))
@@ -195,30 +186,6 @@ def normal_pair(first: Any, second: Any) -> tuple[Any, Any]:
     return radius * sine, radius * cosine
 
 
-# Arrays and whole numbers on the device
-
-
-def position(pixel: Any, width: Divisor) -> tuple[Any, Any]:
-    """Row and column of pixels that are numbered row by row from the frame's corner."""
-    row = _quotient(pixel, width)
-    return row, pixel - row * width.number
-
-
-def _divisor(number: int) -> Divisor:
-    jit = arrays()
-    return Divisor(dr.opaque(jit.UInt, number), dr.opaque(jit.Float64, 1 / number))
-
-
-def _quotient(number: Any, divisor: Divisor) -> Any:
-    """Whole quotient; exact, for half a step to the next whole number is far above the rounding of 2^31 / divisor."""
-    jit = arrays()
-    return jit.UInt(jit.Int((jit.Float64(jit.Int(number)) + 0.5) * divisor.inverse))
-
-
-def _modulo(number: Any, divisor: Divisor) -> Any:
-    return number - _quotient(number, divisor) * divisor.number
-
-
 def _single(values: NDArray[np.floating]) -> NDArray[np.float32]:
     """Values in single precision, bounded by its largest number."""
     if values.dtype == np.float32:
@@ -229,24 +196,7 @@ def _single(values: NDArray[np.floating]) -> NDArray[np.float32]:
 def _aligned_rows(planes: NDArray[np.float32]) -> NDArray[np.float32]:
     """Copy whose rows all start at a multiple of `ALIGNMENT`."""
     step = ALIGNMENT // planes.itemsize
-    padded = _aligned_empty((planes.shape[0], -(-planes.shape[1] // step) * step), planes.dtype)
+    padded = aligned((planes.shape[0], -(-planes.shape[1] // step) * step), planes.dtype)
     copy = padded[:, : planes.shape[1]]
     copy[:] = planes
     return copy
-
-
-def _aligned_empty(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
-    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
-    memory = np.empty(size + ALIGNMENT, dtype=np.uint8)
-    start = -memory.ctypes.data % ALIGNMENT
-    return np.asarray(memory[start : start + size].view(dtype).reshape(shape))
-
-
-def _upload(values: NDArray[Any], kind: Any) -> Any:
-    """Dr.Jit array over the values themselves where they are large or aligned, else over an aligned copy."""
-    flat = values.ravel()
-    if flat.ctypes.data % ALIGNMENT and flat.nbytes < COPY_UNDER:
-        copy = _aligned_empty(flat.shape, flat.dtype)
-        copy[:] = flat
-        flat = copy
-    return kind(flat)

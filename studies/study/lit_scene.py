@@ -1,12 +1,13 @@
 """A study's scene: opened, rendered once, and lit by the spectra that the study asks for."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from render.cache import file_digests
 from render.engine import render
 from render.illuminants import illuminant
 from render.photometry import luminance
@@ -225,15 +226,4 @@ def open_all(study: Study) -> dict[SceneChoice, OpenedScene]:
 
 def digest_scene(scene: Scene) -> str:
     """Hash of a scene, the meshes and bitmaps that it names by their content."""
-    return digest([scene, _contents(scene.geometry)])
-
-
-def _contents(node: Mapping[str, Any]) -> list[str]:
-    """Hashes of the files that a scene's dict names, in its order."""
-    found = []
-    for key, value in node.items():
-        if isinstance(value, Mapping):
-            found += _contents(value)
-        elif key == "filename" and Path(str(value)).is_file():
-            found.append(digest_file(str(value)))
-    return found
+    return digest([scene, file_digests(scene.geometry)])

@@ -168,7 +168,7 @@ SENSOR = (
     _fault(
         "kernel leaves PRNU out",
         "sensor/kernel/kernel.py",
-        "dr.fma(light_e, jit.Float(_upload(device.photo_response, jit.Float64)), dark_e)",
+        "dr.fma(light_e, jit.Float(upload(device.photo_response, copy_under=COPY_UNDER)), dark_e)",
         "light_e + dark_e",
         "sensor/kernel/test_kernel_frames",
         "sensor/kernel/test_kernel",

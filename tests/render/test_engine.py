@@ -22,7 +22,7 @@ from render.engine import render
 from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant
 from render.limits import PASSES
-from render.loader import mitsuba_module
+from render.loader import Film, load_groups, mitsuba_module
 from render.scene import LightGroup, Scene, spectrum_node
 from render.spectrum import Spectrum, flat
 from rodcone.errors import InputError
@@ -93,7 +93,7 @@ def wall():
     return render(noisy_wall(), SIZE, wavelength_nm=BANDS_NM, spp=128, seed=1)
 
 
-def test_a_wall_under_an_even_sky_is_exact():
+def test_a_wall_under_a_constant_environment_is_exact():
     made = render(load("flat_field"), SIZE, wavelength_nm=BANDS_NM, spp=8, seed=1)
     assert made.radiance == pytest.approx(np.full((1, 8, *SIZE), 0.5), rel=1e-6)
     assert made.irradiance == pytest.approx(np.full((1, 8), np.pi), rel=1e-5)
@@ -189,7 +189,7 @@ def test_a_rendered_wall_gives_the_analytic_electrons_within_the_stated_error(wa
         assert seen.std() / truth == pytest.approx(deviation_share, rel=bound(4) / np.sqrt(2 * seen.size))
 
 
-def test_the_reference_plane_under_an_even_sky_gets_pi_times_its_radiance(wall):
+def test_the_reference_plane_under_a_constant_environment_gets_pi_times_its_radiance(wall):
     # A mixture of directions sampled for the surface and for the sky: a sample scatters by less than its mean, and
     # 64x64 pixels have 8 passes of 16.
     assert wall.irradiance == pytest.approx(np.full((1, 8), np.pi), rel=bound(8) / np.sqrt(64 * 64 * 8 * 16))
@@ -216,7 +216,7 @@ def test_color_checker_patches_are_reflectance_times_sky_in_every_band():
         here = np.s_[:, top : top + pixels_of_patch, left : left + pixels_of_patch]
         seen, variance = made.radiance[0][here].astype(np.float64), made.variance[0][here].astype(np.float64)
         truth = reflectance.band_average(BANDS_NM, WIDTH_NM)
-        # Under an even sky the jitter within a band is all that scatters; where a patch is grey, float32's rounding.
+        # Under a constant environment only the jitter within a band scatters; on a grey patch, float32's rounding.
         error = np.hypot(np.sqrt(variance.sum(axis=(1, 2))) / pixels_of_patch**2, 2e-6 * truth)
         z.append((seen.mean(axis=(1, 2)) - truth) / error)
     freedom = pixels_of_patch**2 * (PASSES - 1)
@@ -312,6 +312,16 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
     for name in ("radiance", "variance", "half_difference", "irradiance", "coverage"):
         assert np.array_equal(getattr(one, name), getattr(again, name)), name
     assert not (one.radiance == other.radiance).any()
+
+
+def test_lamps_of_one_group_keep_their_order():
+    """Paths choose a lamp by its number: in another order of the lamps the same seed gives other bits."""
+    scene = load("lit_and_shadowed")
+    film = Film((4, 4), BANDS_NM, WIDTH_NM, 8)
+    for _ in range(3):
+        for loaded, side in zip(load_groups(scene, film), ("left", "right"), strict=True):
+            lamps = [emitter.get_shape().id() for emitter in loaded.mi_scene.emitters()]
+            assert lamps == [f"{side}_upper_lamp", f"{side}_lower_lamp"]
 
 
 def apart(scene):
@@ -575,7 +585,7 @@ def test_a_material_that_chooses_by_wavelength_is_refused(freed):
 
 
 @pytest.mark.parametrize("bsdf", [{"type": "dielectric", "int_ior": 1.5}, {"type": "dielectric", "int_ior": "bk7"}])
-def test_clear_glass_under_an_even_sky_is_as_bright_as_the_sky(bsdf):
+def test_clear_glass_is_as_bright_as_the_constant_environment_around_it(bsdf):
     made = render(ball_under_the_sky(bsdf), (6, 6), wavelength_nm=BANDS_NM, spp=64, max_depth=32)
     assert made.radiance == pytest.approx(np.ones((1, 8, 6, 6)), abs=0.02)  # paths end after 32 segments
     assert made.radiance.mean() == pytest.approx(1.0, abs=2e-3)

@@ -77,7 +77,8 @@ def test_a_wall_rendered_without_llvm_is_its_reflectance_within_the_stated_error
 
 
 def test_illuminance_without_llvm_is_pi_times_the_skys_radiance(fallback):
-    assert fallback["plane"] == pytest.approx([3.14159265] * 3, rel=0.02)  # specfilm scatters even under an even sky
+    # specfilm scatters even under a constant environment
+    assert fallback["plane"] == pytest.approx([3.14159265] * 3, rel=0.02)
 
 
 def test_a_render_without_llvm_keeps_its_stop_rule_and_seed(fallback):
@@ -113,7 +114,7 @@ def test_importing_mitsuba_first_works_or_warns_in_one_line(before):
 
 
 def test_stock_mitsuba_renders_the_infrared_too(fallback):
-    # the card around the chart reflects 0.2 of an even sky, but for what the chart's board hides from the first row
+    # the card around the chart reflects 0.2 of a constant environment, less what the board hides from the first row
     radiance, irradiance = fallback["far"]
     assert radiance == pytest.approx(0.2, rel=0.02)
     assert irradiance == pytest.approx(3.14159, rel=0.02)

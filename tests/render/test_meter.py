@@ -102,7 +102,7 @@ def test_a_small_sun_gives_its_solid_angle_times_the_cosine(degrees):
     assert_is(truth, sun, 1e-4)
 
 
-def test_an_even_sky_gives_pi_within_the_derived_error():
+def test_a_constant_environment_gives_pi_within_the_derived_error():
     # A lamp under the plate, which can't light it, takes half of the samples of lights. One of the sky (density a over
     # the sphere, half of which is below) and one of the cosine c (density b), weighted by the power heuristic: their
     # variance by the midpoint rule. Stratified samples scatter less.

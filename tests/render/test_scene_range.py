@@ -128,7 +128,7 @@ def test_a_table_that_only_a_light_refers_to_is_no_surface() -> None:
 def test_held_ends_go_on_in_the_picture(reflectance: Node, rows: bool) -> None:
     """Diffuse under collimated irradiance E at normal incidence: L = rho E / pi, rho averaged over each band."""
     scene = wall(matte(reflectance))
-    if not rows:  # a light of its own colour is evaluated wavelength by wavelength
+    if not rows:  # a coloured light is evaluated wavelength by wavelength
         sun = scene.geometry["sun"] | {"irradiance": uniform_node(1.0)}
         groups = {"sun": LightGroup(("sun",), flat(), coloured=True)}
         scene = Scene("wall", scene.geometry | {"sun": sun}, groups)
@@ -208,7 +208,7 @@ def test_a_table_that_is_none_is_refused_in_one_line(table: Node, words: str) ->
 
 
 def told(lights: Scene | Spectrum, low: float, high: float) -> list[str]:
-    """Warnings about a spectrum, or about a scene's lights of their own colour, for one band."""
+    """Warnings about a spectrum, or about a scene's coloured lights, for one band."""
     band = np.array([(low + high) / 2]), np.array([high - low])
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

@@ -14,7 +14,7 @@ from rodcone.colour_spaces import (
     xyz_from_xy,
     xyz_to_srgb,
 )
-from rodcone.tables import colour_science
+from rodcone.optional import colour_science
 
 
 def test_srgb_matrix_agrees_with_colour_science() -> None:

@@ -10,7 +10,7 @@ from render.engine import render
 from render.geometry import look_at, to_world
 from render.photometry import luminance
 from render.spectrum import Spectrum
-from rodcone.tables import colour_science
+from rodcone.optional import colour_science
 from scenes import lit_and_shadowed, night_street, still_life_outdoor
 from scenes.catalog import load
 

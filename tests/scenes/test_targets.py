@@ -21,8 +21,8 @@ PASSES = 8
 def test_every_pixel_and_band_of_the_furnace_is_one_within_its_error():
     made = render(load("furnace"), (16, 16), wavelength_nm=BANDS_NM, spp=256, seed=1)
     radiance, error = made.radiance[0].astype(np.float64), np.sqrt(made.variance[0].astype(np.float64))
-    # Under an even sky a path that leaves for it brings 1 whatever its direction: exact but where a path that meets
-    # ball and block again ends by chance.
+    # Under a constant environment a path that leaves for it brings 1 whatever its direction: exact but where a path
+    # that meets ball and block again ends by chance.
     sky = error.max(axis=0) < 1e-6
     assert 0.02 < (~sky).mean() < 0.5
     assert radiance[:, sky] == pytest.approx(np.ones((4, sky.sum())), abs=1e-6)

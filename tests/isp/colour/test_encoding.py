@@ -6,7 +6,7 @@ import pytest
 from isp.colour.encoding import ENCODINGS, encode
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
-from rodcone.tables import colour_science
+from rodcone.optional import colour_science
 
 COLOURS = np.random.default_rng(0).uniform(-0.1, 1.2, (40, 3))
 

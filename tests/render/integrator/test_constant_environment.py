@@ -1,4 +1,4 @@
-"""An even sky along the paths of another light: the same light as by itself, and an error that knows of both."""
+"""A constant environment along another light's paths: the same light as by itself, and an error that knows of both."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ ARRAYS = ("radiance", "variance", "half_difference", "irradiance")
 
 
 def courtyard():
-    """A corner of two coloured walls and a chequered floor with a glass ball, under a lamp and an even sky."""
+    """Two coloured walls and a chequered floor with a glass ball, under a lamp and a constant environment."""
     camera = {"type": "perspective", "fov": 40.0, "to_world": to_world(look_at((0.9, 0.9, 2.0), (0.2, 0.25, 0)))}
     lamp = panel(look_at((1.2, 1.6, 0.9), (0.3, 0.0, 0.2)), 0.04, 0.04, matte(grey(0.02)), emitter={"type": "area"})
     geometry = {

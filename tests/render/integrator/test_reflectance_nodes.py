@@ -80,8 +80,8 @@ PAINTS = {name: f'<bsdf type="diffuse" id="paint">{node}</bsdf>' for name, node 
     "blend": f'<bsdf type="blendbsdf" id="paint"><float name="weight" value="0.4"/><bsdf type="diffuse">{RGB}</bsdf>'
     f'<bsdf type="diffuse">{BITMAP}</bsdf></bsdf>',
 }
-# The second lamp as the first: one light group of one spectrum. Another: a group of its own colour, without rows.
-LAMPS = {"one spectrum": (3, 3), "own colour": (3, 1)}
+# The second lamp as the first: one light group of one spectrum. Another: a coloured group, without rows.
+LAMPS = {"one spectrum": (3, 3), "coloured": (3, 1)}
 COMPARISONS = len(PAINTS) * len(LAMPS) * BANDS_NM.size
 
 

@@ -91,7 +91,7 @@ def test_an_irradiance_meter_marks_the_plane_on_which_lux_are_meant(tmp_path: Pa
     opened = load_scene_file(write(tmp_path, CAMERA, wall, '<emitter type="constant" id="sky"/>'))
     assert opened.scene.reference_plane == "wall"
     transport = render(opened.scene, (1, 1), wavelength_nm=np.arange(420.0, 700.0, 80.0), spp=16)
-    np.testing.assert_allclose(transport.irradiance, np.pi, rtol=1e-5)  # E = pi L under an even sky
+    np.testing.assert_allclose(transport.irradiance, np.pi, rtol=1e-5)  # E = pi L under a constant environment
     # A light without size would be left out of what the meter reads, so the plane is left out instead.
     opened = load_scene_file(write(tmp_path, CAMERA, wall, SUN))
     assert opened.scene.reference_plane is None

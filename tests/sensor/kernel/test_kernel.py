@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from rodcone.device_arrays import divide, divisor
 from rodcone.jit import arrays, backend, dr
-from sensor.kernel.kernel import Divisor, normal_pair, philox, position, tile_channel, weighted_sum
+from sensor.kernel.kernel import normal_pair, philox, tile_channel, weighted_sum
 from sensor.random import philox as philox_numpy
 
 pytestmark = pytest.mark.skipif(backend() == "numpy", reason="Dr.Jit has neither LLVM nor CUDA here")
@@ -52,9 +53,9 @@ def test_each_pixel_takes_the_weights_of_its_own_cell(width, first):
     planes = np.random.default_rng(3).random((5, count), dtype=np.float32)
     weights = np.random.default_rng(4).random((4, 5))
     opaque = [[dr.opaque(jit.Float, float(w)) for w in row] for row in weights]
-    divisors = [Divisor(dr.opaque(jit.UInt, n), dr.opaque(jit.Float64, 1 / n)) for n in (2, tile_width, width)]
+    divisors = [divisor(n) for n in (2, tile_width, width)]
     pixel = dr.arange(jit.UInt, count) + dr.opaque(jit.UInt, first)
-    own = tile_channel(words(cells), *divisors[:2], *position(pixel, divisors[2]))
+    own = tile_channel(words(cells), *divisors[:2], *divide(pixel, divisors[2]))
     made = weighted_sum([jit.Float(plane) for plane in planes], opaque, own).numpy()
     row, column = np.divmod(first + np.arange(count), width)
     channel = cells[(row % 2) * tile_width + column % tile_width]

@@ -9,7 +9,7 @@ from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, flat
 from rodcone.errors import InputError
-from rodcone.tables import colour_science
+from rodcone.optional import colour_science
 from sensor.exposure import LONGEST_S, auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import low_noise, table1_output

@@ -184,7 +184,7 @@ def test_a_scene_that_cannot_be_read_is_told_before_the_first_is_rendered(tmp_pa
 def test_one_render_serves_all_spectra_and_a_finer_one_goes_on_from_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A grey wall under an even sky: 1 cd/m^2 of it is pi / 0.5 lux whatever the light's spectrum."""
+    """A grey wall under a constant environment: 1 cd/m^2 of it is pi / 0.5 lux whatever the light's spectrum."""
     asked: list[Any] = []
     make = sys.modules["studies.study.lit_scene"].render
     monkeypatch.setattr("studies.study.lit_scene.render", lambda *a, **k: asked.append(k["max_spp"]) or make(*a, **k))
