@@ -29,14 +29,14 @@ def opponents(
     from rodcone.errors import InputError
     from rodcone.files import check_place
     from studies.pages.duels_page import write_page
-    from studies.sweep.database import last_study, read_ledger
+    from studies.sweep.database import last_study, read_results
     from studies.sweep.export import read_rows
 
     if out.suffix != ".md":
         raise InputError(f"out: {str(out)!r} doesn't end in .md; allowed: that ending; write {out.stem}.md")
     check_place(out)
     rows = read_rows(folder)
-    with read_ledger(folder) as base:
+    with read_results(folder) as base:
         study, _ = last_study(base) or ({}, {})
     write_page(rows, study, folder, out, camera)
     print(out)

@@ -28,7 +28,7 @@ from studies.pages.report_facts import (
 from studies.pages.report_text import group_names, view_names
 from studies.pages.results import DISPLAY_WHITE
 from studies.study.study import label
-from studies.sweep.database import FILE, last_study, read_ledger, rows
+from studies.sweep.database import FILE, last_study, read_results, rows
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import require_alike
 from studies.sweep.row import Row
@@ -58,7 +58,7 @@ def read_run(folder: Path) -> LastRun:
     """
     if not (folder / FILE).is_file():
         raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
-    with read_ledger(folder) as base:
+    with read_results(folder) as base:
         found, wanted = rows(base), base.execute("SELECT count(*) FROM wanted").fetchone()[0]
         run = last_study(base)
     if not found or run is None:

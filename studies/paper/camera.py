@@ -1,7 +1,7 @@
 """A scene before the paper's cameras: exposed, developed, and how noisy the picture is."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,8 @@ from sensor.response import expected_electrons
 from studies.metrics.quality import psnr_db
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
-from studies.sweep.cells import Coordinates, device_stream, exposure_stream
+from studies.study.study import Condition
+from studies.sweep.cells import device_stream, exposure_stream
 
 Image = NDArray[np.float64]
 
@@ -57,14 +58,15 @@ def view_of(transport: Transport, light: Spectrum, luminance_cd_m2: float | None
     return View(radiance, light_in_bands(light, transport.wavelength_nm, transport.width_nm), white)
 
 
-def exposures(view: View, sensor: SensorConfig, exposure_s: float, at: Coordinates, seeds: int) -> list[RawImage]:
-    """Exposures by as many chips, drawn as a sweep draws the cells at these coordinates."""
+def exposures(
+    view: View, sensor: SensorConfig, exposure_s: float, at: Condition, seeds: int, mosaic: str = "rgbw"
+) -> list[RawImage]:
+    """Exposures by as many chips, drawn as a sweep draws the cells of this condition."""
     expected_e = expected_electrons(form_image(view.radiance, sensor), sensor, exposure_s)
-    mosaic, made = PROCESSORS[at.processor].mosaic, []
+    made = []
     for seed in range(seeds):
-        place = replace(at, seed=seed)
-        device = draw_device(sensor, expected_e.shape, device_stream(place, mosaic))
-        made.append(expose(expected_e, sensor, exposure_s, device, exposure_stream(place, mosaic), exact=True))
+        device = draw_device(sensor, expected_e.shape, device_stream(at.sensor, mosaic, seed))
+        made.append(expose(expected_e, sensor, exposure_s, device, exposure_stream(at, mosaic, seed), exact=True))
     return made
 
 

@@ -17,7 +17,7 @@ from studies.paper.checks import Claim, at_least, at_most
 from studies.paper.flat import decibels, snr
 from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, TODAY, Setup, sensor_of, view
-from studies.sweep.cells import Coordinates
+from studies.study.study import Condition, SceneChoice
 
 LARGE = "table1_output_6um"  # Figure 1(b)'s larger pixel, as cameras of the time had
 VISIBLE_NOISE_DB = 30.0  # the paper's measure: noise on a uniform field is visible below
@@ -66,8 +66,8 @@ def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     rows, half = [], seen.radiance.shape[1] // 2
     for reading in READINGS:
         sensor = sensor_of(reading, "bayer")
-        at = Coordinates("lit_and_shadowed", "own", f"{LIT_CD_M2:g}cd/m2", "66ms", reading, "bayer", 0)
-        linear, _ = develop(exposures(seen, sensor, LONGEST_S, at, 1)[0], seen, sensor, "bayer")
+        at = Condition(SceneChoice("lit_and_shadowed"), "own", f"{LIT_CD_M2:g}cd/m2", "66ms", reading)
+        linear, _ = develop(exposures(seen, sensor, LONGEST_S, at, 1, "bayer")[0], seen, sensor, "bayer")
         raised = linear.copy()
         raised[:, :half] *= DARK_GAIN
         rows.append(

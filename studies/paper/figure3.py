@@ -18,7 +18,7 @@ from studies.paper.checks import Claim, at_least, at_most
 from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, Setup, sensor_of, view
 from studies.photograph.camera import colour_fit
-from studies.sweep.cells import Coordinates
+from studies.study.study import Condition, SceneChoice
 
 LUMINANCE_CD_M2, EXPOSURE_S = 2.5, 0.020  # low light: a tenth of Table 1's, at Figure 6's longest time
 GAIN_DB = 1.0  # a decibel is easily seen
@@ -82,7 +82,7 @@ def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     stages, rows = {}, []
     for reading, threshold in READINGS.items():
         sensor = sensor_of(reading)
-        at = Coordinates("still_life", "own", f"{LUMINANCE_CD_M2:g}cd/m2", "20ms", reading, "interleaved", 0)
+        at = Condition(SceneChoice("still_life"), "own", f"{LUMINANCE_CD_M2:g}cd/m2", "20ms", reading)
         raws = exposures(seen, sensor, EXPOSURE_S, at, setup.seeds)
         colour = [colour_image(raw, seen, sensor) for raw in raws]
         white = [white_image(raw, seen, sensor) for raw in raws]

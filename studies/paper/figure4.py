@@ -19,7 +19,7 @@ from studies.paper.checks import Claim, at_least
 from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, Setup, sensor_of, view
-from studies.sweep.cells import Coordinates
+from studies.study.study import Condition, SceneChoice
 
 PATCH = 5  # ours: the paper doesn't say
 ASIDE, AWAY = 4, 8  # pixels from the edge to x, and from x to y and to z: even, so that all lie alike in the tile
@@ -101,7 +101,7 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         seen = view(setup, "slanted_edge", level)
         columns = edge_columns(seen.radiance.luminance())
         for reading in READINGS:
-            at = Coordinates("slanted_edge", "own", f"{level:g}cd/m2", "20ms", reading, "interleaved", 0)
+            at = Condition(SceneChoice("slanted_edge"), "own", f"{level:g}cd/m2", "20ms", reading)
             sensor = sensor_of(reading)
             raw = exposures(seen, sensor, EXPOSURE_S, at, 1)[0]
             found = triplets(raw, columns)

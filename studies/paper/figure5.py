@@ -17,7 +17,7 @@ from studies.paper.camera import Image, View, develop, exposures, quality_db
 from studies.paper.checks import Claim, ClaimCheck, at_least
 from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, Setup, sensor_of, view
-from studies.sweep.cells import Coordinates
+from studies.study.study import Condition, SceneChoice
 
 LUMINANCE_CD_M2, EXPOSURE_S, PITCH_UM = 200.0, 0.066, 3
 PARTLY = (0.02, 0.98)  # share of W's pixels that may be full for "partly"
@@ -144,6 +144,6 @@ def _shoot(
 ) -> tuple[list[RawImage], list[Image]]:
     """Exposures and pictures of one processor."""
     sensor = sensor_of(reading, PROCESSORS[processor].mosaic, PITCH_UM)
-    at = Coordinates("still_life", "own", "200cd/m2", "66ms", f"{reading}_3um", processor, 0)
-    raws = exposures(seen, sensor, EXPOSURE_S, at, setup.seeds)
+    at = Condition(SceneChoice("still_life"), "own", "200cd/m2", "66ms", f"{reading}_3um")
+    raws = exposures(seen, sensor, EXPOSURE_S, at, setup.seeds, PROCESSORS[processor].mosaic)
     return raws, [develop(raw, seen, sensor, processor, **options)[0] for raw in raws]

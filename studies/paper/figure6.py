@@ -17,8 +17,7 @@ from studies.paper.figure1b import shown
 from studies.paper.page import PaperFigure
 from studies.paper.setup import READINGS, Setup, sensor_of, swept, view
 from studies.photograph.camera import colour_fit
-from studies.study.study import parse_exposure
-from studies.sweep.cells import Coordinates
+from studies.study.study import Condition, SceneChoice, parse_exposure
 from studies.sweep.row import Row
 
 LUMINANCE_CD_M2 = 25.0
@@ -153,7 +152,7 @@ def swap(setup: Setup, seen: View, reading: str) -> Swap:
 
 def _raws(setup: Setup, seen: View, reading: str, exposure: str) -> list[RawImage]:
     """The interleaved camera's exposures as the sweep's cells draw them."""
-    at = Coordinates("still_life", "own", "25cd/m2", exposure, reading, "interleaved", 0)
+    at = Condition(SceneChoice("still_life"), "own", "25cd/m2", exposure, reading)
     return exposures(seen, sensor_of(reading), parse_exposure(exposure) or 0.0, at, setup.seeds)
 
 

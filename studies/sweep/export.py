@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rodcone.errors import InputError, unknown
 from rodcone.files import replacing
-from studies.sweep.database import COLUMNS, FILE, read_ledger, rows
+from studies.sweep.database import COLUMNS, FILE, read_results, rows
 from studies.sweep.row import Row
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def read_rows(folder: Path, everything: bool = False) -> list[Row]:
     """
     if not (folder / FILE).is_file():
         raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
-    with read_ledger(folder) as base:
+    with read_results(folder) as base:
         return rows(base, everything)
 
 

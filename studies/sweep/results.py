@@ -9,7 +9,7 @@ from typing import Any
 
 from PIL import Image
 
-from studies.sweep.database import last_study, read_ledger, rows
+from studies.sweep.database import last_study, read_results, rows
 from studies.sweep.prepare import PICTURES
 from studies.sweep.row import Row
 from studies.sweep.stored import read_whole
@@ -60,7 +60,7 @@ def overview(folder: Path) -> bytes:
 
 
 def _last_run(folder: Path) -> tuple[dict[str, Any], dict[str, float], list[Row]]:
-    with read_ledger(folder) as base:
+    with read_results(folder) as base:
         found, run = rows(base), last_study(base)
     if run is None or not found:
         raise AssertionError(f"{folder} holds no run of which a report was just made")

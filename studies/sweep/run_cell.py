@@ -26,7 +26,8 @@ from studies.metrics.target_figures import target_figures
 from studies.photograph.camera import develop_to_scale, mean_electrons
 from studies.photograph.clock import timed
 from studies.photograph.png import to_png
-from studies.sweep.cells import Cell, device_stream, exposure_stream, render_text
+from studies.study.study import label
+from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text
 from studies.sweep.provenance import machine, provenance, threads, told
 from studies.sweep.row import Row
 from studies.sweep.stored import is_whole, keep
@@ -61,12 +62,14 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     raw, linear, picture, seconds = _photograph(cell, expected_e)
     encoded = encode_srgb(linear)
     figures, measure_s, first_s = timed(
-        lambda: _figures(cell, linear, encoded, truth), "measure", cell.at.scene, raw.shape
+        lambda: _figures(cell, linear, encoded, truth), "measure", cell.condition.scene.source, raw.shape
     )
     seconds["first_s"] += first_s
     return Row(
         key=cell.key,
-        **vars(cell.at),
+        **labels(cell.condition),
+        processor=cell.processor,
+        seed=cell.seed,
         luminance_cd_m2=cell.luminance_cd_m2,
         illuminance_lux=cell.illuminance_lux,
         exposure_s=cell.exposure_s,
@@ -101,20 +104,21 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
 
 def _photograph(cell: Cell, expected_e: Image) -> tuple[RawImage, Image, Picture, dict[str, Any]]:
     """Raw image, linear sRGB in which white is 1, the processor's picture, and the seconds of both steps."""
-    at, sensor, shape = cell.at, cell.sensor, (expected_e.shape[0], expected_e.shape[1])
-    processor, engine = PROCESSORS[at.processor], cell.made_by.readout_engine
-    device = draw_device(sensor, shape, device_stream(at, processor.mosaic))
+    sensor, shape = cell.sensor, (expected_e.shape[0], expected_e.shape[1])
+    processor, engine = PROCESSORS[cell.processor], cell.made_by.readout_engine
+    device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
     raw, capture_s, first_capture_s = timed(
         lambda: expose(
-            *(expected_e, sensor, cell.exposure_s, device, exposure_stream(at, processor.mosaic)),
+            *(expected_e, sensor, cell.exposure_s, device),
+            exposure_stream(cell.condition, processor.mosaic, cell.seed),
             exact=engine == "numpy",
         ),
-        *("capture", engine, at.sensor, shape),
+        *("capture", engine, cell.condition.sensor, shape),
     )
     saturated = raw.saturated
     (linear, picture), develop_s, first_develop_s = timed(
         lambda: develop_to_scale(raw, processor, cell.colours, sensor, cell.light, cell.white_cd_m2),
-        *("develop", at.processor, shape, bool(saturated.any()), bool(saturated.all())),
+        *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),
     )
     first_s = first_capture_s + first_develop_s
     return raw, linear, picture, {"capture_s": capture_s, "develop_s": develop_s, "first_s": first_s}
@@ -124,7 +128,7 @@ def _figures(cell: Cell, linear: Image, encoded: Image, truth: TruePicture) -> d
     return {
         **vars(measure(encoded, truth.encoded, truth.lab)),
         **vars(appearance(linear, truth, cell.white_cd_m2)),
-        **vars(target_figures(cell.at.scene, linear, truth.linear)),
+        **vars(target_figures(label(cell.condition.scene.source), linear, truth.linear)),
     }
 
 
@@ -136,7 +140,7 @@ def limit_threads(most: int) -> None:
 
 
 def _check_provenance(cell: Cell) -> None:
-    own = told(provenance(cell.made_by.variant, cell.at.processor, exact=cell.made_by.readout_engine == "numpy"))
+    own = told(provenance(cell.made_by.variant, cell.processor, exact=cell.made_by.readout_engine == "numpy"))
     for name, asked in told(cell.made_by).items():
         if own.get(name) != asked:
             raise InputError(

@@ -18,7 +18,7 @@ from studies.photograph.clock import FIRST, Clock
 from studies.study.lit_scene import open_all
 from studies.study.study import Study, check, conditions
 from studies.sweep.cells import Cell
-from studies.sweep.database import add, done, forget_old, note_run, note_stages, open_ledger, want
+from studies.sweep.database import add, done, forget_old, note_run, note_stages, open_results, want
 from studies.sweep.prepare import PICTURES, Job, known_cells, scene_cells
 from studies.sweep.row import Row
 
@@ -97,7 +97,7 @@ def sweep(
     scenes = open_all(study)
     out.mkdir(parents=True, exist_ok=True)
     _clear(out)
-    with open_ledger(out) as base:
+    with open_results(out) as base:
         job = Job(study, plan, out, base, clock)
         run = _note(base, study)
         found = [known_cells(job, opened) for opened in scenes.values()]

@@ -20,10 +20,9 @@ from studies.metrics.patches import patch_masks
 from studies.study.study import OWN
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import require_alike
-from studies.sweep.row import Row
+from studies.sweep.row import AXES, Row
 from studies.sweep.stored import read_whole
 
-AXES = ("scene", "spectrum", "level", "exposure", "sensor", "processor")
 SAME = 1e-6  # below it a mean is none, and a half width, as a share of its mean, only sums in another order
 ELECTRONS = "electrons_"  # and a letter: mean electrons of its pixels
 CHARTS = {"pair_delta_e": ("metamers", pair_delta_e), "daylight_delta_e": ("color_checker", daylight_delta_e)}

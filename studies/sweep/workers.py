@@ -143,9 +143,10 @@ def run_in_processes(cells: Sequence[Cell], workers: int) -> Generator[Row, None
                 deaths.update(cell.key for cell in lost.cells)
                 given_up += [waiting.pop(cell.key) for cell in lost.cells if deaths[cell.key] >= MOST_DEATHS]
     if given_up:
+        first = given_up[0]
         raise InputError(
-            f"cells: {len(given_up)} ended their worker {MOST_DEATHS} times, the first at {given_up[0].at}; the others "
-            "are done; the memory may be short: give fewer --workers, or run again"
+            f"cells: {len(given_up)} ended their worker {MOST_DEATHS} times, the first {first.processor} of "
+            f"{first.condition}; the others are done; the memory may be short: give fewer --workers, or run again"
         )
 
 
