@@ -62,7 +62,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     raw, linear, picture, seconds = _photograph(cell, expected_e)
     encoded = encode_srgb(linear)
     figures, measure_s, first_s = timed(
-        lambda: _figures(cell, linear, encoded, truth), "measure", cell.condition.scene.source, raw.shape
+        lambda: _figures(cell, linear, encoded, truth), "measure", label(cell.condition.scene.source), raw.shape
     )
     seconds["first_s"] += first_s
     return Row(
@@ -113,7 +113,7 @@ def _photograph(cell: Cell, expected_e: Image) -> tuple[RawImage, Image, Picture
             exposure_stream(cell.condition, processor.mosaic, cell.seed),
             exact=engine == "numpy",
         ),
-        *("capture", engine, cell.condition.sensor, shape),
+        *("capture", engine, label(cell.condition.sensor), shape),
     )
     saturated = raw.saturated
     (linear, picture), develop_s, first_develop_s = timed(
