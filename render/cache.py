@@ -83,7 +83,7 @@ def _path(folder: Path, scene: Scene, film: Film, seed: int) -> Path:
         [
             *(ENGINE_VERSION, integrator_name(), variant(), compiler_version()),
             *map(metadata.version, ("mitsuba", "drjit")),
-            *(scene.name, scene.geometry, scene.reference_plane, _file_digests(scene.geometry)),
+            *(scene.name, scene.geometry, scene.reference_plane, file_digests(scene.geometry)),
             [[name, group.emitters, group.coloured] for name, group in scene.groups.items()],
             *(film, seed),
         ]
@@ -91,12 +91,12 @@ def _path(folder: Path, scene: Scene, film: Film, seed: int) -> Path:
     return folder / f"{_NOT_IN_NAMES.sub('_', scene.name)}-{key}.npz"
 
 
-def _file_digests(node: Node) -> list[str]:
+def file_digests(node: Node) -> list[str]:
     """Content of the files (meshes, bitmaps) that a scene's dict names, in its order."""
     digests = []
     for key, value in node.items():
         if isinstance(value, dict):
-            digests += _file_digests(value)
+            digests += file_digests(value)
         elif key == "filename" and Path(str(value)).is_file():
             digests.append(digest_file(str(value)))
     return digests

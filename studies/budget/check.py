@@ -81,12 +81,12 @@ def check_plan(
     """
     rows: list[CheckedCondition] = []
     seconds = {"planned": 0.0, "reference": 0.0}
-    other = replace(study, render=replace(study.render, seed=study.render.seed + REFERENCE_SEED))
     for choice, opened in open_all(study).items():
         made = {}
-        for name, model, of in (("planned", planned, study), ("reference", reference, other)):
+        for name, model, offset in (("planned", planned, 0), ("reference", reference, REFERENCE_SEED)):
             step(f"{choice.source}, {name}", len(rows) / len(planned.ledgers))
-            made[name], _ = make_transport(opened, of, model.renders.get(choice), cache, lambda share, error: None)
+            render = model.renders.get(choice)
+            made[name], _ = make_transport(opened, study, render, cache, lambda *_: None, seed_offset=offset)
             seconds[name] += made[name].seconds
         spp_over_reference = planned.renders[choice].spp / reference.renders[choice].spp if opened.scene else 0.0
         for row in planned.ledgers:
@@ -95,14 +95,11 @@ def check_plan(
                 true = model_electrons(made["reference"], row, reference.images[row.condition])
                 below = true < preset(row.condition.sensor).pixel.full_well_e
                 measured = float(np.sqrt(np.mean((expected - true)[below] ** 2))) if below.any() else 0.0
-                rows.append(CheckedCondition(row, predicted_difference_e(row, spp_over_reference), measured))
+                # The reference has noise of its own, of its samples and of its level.
+                rms_e = {term.name: term.rms_e for term in row.terms}
+                square = row.rms_e**2 + rms_e[MONTE_CARLO] ** 2 * spp_over_reference + rms_e[LEVEL] ** 2
+                rows.append(CheckedCondition(row, predicted_e=float(np.sqrt(square)), measured_e=measured))
     return BudgetCheck(tuple(rows), planned_s=seconds["planned"], reference_s=seconds["reference"])
-
-
-def predicted_difference_e(row: Ledger, spp_over_reference: float) -> float:
-    """RMS of the difference to a reference that has noise of its own [e-], of its samples and of its level."""
-    rms_e = {term.name: term.rms_e for term in row.terms}
-    return float(np.sqrt(row.rms_e**2 + rms_e[MONTE_CARLO] ** 2 * spp_over_reference + rms_e[LEVEL] ** 2))
 
 
 def model_electrons(transport: Transport, row: Ledger, model: ImageModel) -> NDArray[np.float64]:

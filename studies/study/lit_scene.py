@@ -1,12 +1,14 @@
 """A study's scene: opened, rendered once, and lit by the spectra that the study asks for."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from render.cache import file_digests
 from render.engine import render
 from render.illuminants import illuminant
 from render.photometry import luminance
@@ -64,25 +66,22 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         if choice.extend:
             raise InputError(f"scenes: extend for {choice.source}, a picture without surfaces; leave it out")
         check_radiance_file(choice.source, study.levels)
-        return OpenedScene(choice, None, (0, 0), digest([digest_file(choice.source), choice.light]))
+        identity = digest([digest_file(choice.source), choice.light])
+        return OpenedScene(choice=choice, scene=None, size=(0, 0), identity=identity)
     opened = open_scene(choice.source, extend=choice.extend, light=choice.light)
     scene = opened.scene
     for level in study.levels:
         asked_level(scene, level)
-    for spectrum in study.spectra:
-        _check_relit(scene, spectrum)
-    check_range(scene, *study.render.range_nm)
-    size = film_size(opened.size, study.render.size)
-    return OpenedScene(choice, scene, size, digest([digest_scene(scene), size]), tuple(opened.notes))
-
-
-def _check_relit(scene: Scene, spectrum: str) -> None:
-    for name, group in scene.groups.items():
+    for spectrum, (name, group) in product(study.spectra, scene.groups.items()):
         if spectrum != OWN and group.coloured:
             raise InputError(
                 f"spectra: {spectrum!r} can't relight group {name!r} of scene {scene.name}, whose lights have colours "
                 f"of their own; allowed: {OWN}; put the scene into a study of its own"
             )
+    check_range(scene, *study.render.range_nm)
+    size = film_size(opened.size, study.render.size)
+    identity = digest([digest_scene(scene), size])
+    return OpenedScene(choice=choice, scene=scene, size=size, identity=identity, notes=tuple(opened.notes))
 
 
 def make_transport(
@@ -92,6 +91,8 @@ def make_transport(
     cache: Path,
     progress: Progress,
     share: Callable[[Transport], float] | None = None,
+    *,
+    seed_offset: int = 0,
 ) -> tuple[Transport, tuple[str, ...]]:
     """Render a scene, or read a picture file, with what had to be assumed of the file.
 
@@ -103,6 +104,8 @@ def make_transport(
         Folder of renders: a coarser one is continued, a finer one is taken.
     share : callable, optional
         Noise variance of a render over the sensor's own, for a study with a `noise_share`.
+    seed_offset : int
+        Added to the study's seed, for a render that is independent of the study's own.
 
     Raises
     ------
@@ -120,7 +123,7 @@ def make_transport(
         "width_nm": model.width_nm,
         "max_spp": model.spp,  # in passes of 16 samples, so that a finer request goes on from a coarser one's
         "max_seconds": limits.max_seconds,
-        "seed": limits.seed,
+        "seed": limits.seed + seed_offset,
         "cache": cache,
         "progress": progress,
     }
@@ -219,21 +222,10 @@ def level_luminance(level: str, lux_per_cd_m2: float | None) -> float:
 
 
 def open_all(study: Study) -> dict[SceneChoice, OpenedScene]:
-    """Open every scene of a study; done before the first render, a fault in the last one is told at once."""
+    """Open every scene of a study: done before the first render, so that a fault in the last scene stops it at once."""
     return {choice: open_choice(choice, study) for choice in study.scenes}
 
 
 def digest_scene(scene: Scene) -> str:
     """Hash of a scene, the meshes and bitmaps that it names by their content."""
-    return digest([scene, _contents(scene.geometry)])
-
-
-def _contents(node: Mapping[str, Any]) -> list[str]:
-    """Hashes of the files that a scene's dict names, in its order."""
-    found = []
-    for key, value in node.items():
-        if isinstance(value, Mapping):
-            found += _contents(value)
-        elif key == "filename" and Path(str(value)).is_file():
-            found.append(digest_file(str(value)))
-    return found
+    return digest([scene, file_digests(scene.geometry)])

@@ -158,9 +158,9 @@ class Study:
         _check_numbers(self)
 
 
-def conditions(study: Study) -> list[Condition]:
-    """All combinations of scenes, spectra, levels, exposures and sensors, the last running fastest."""
-    axes = (study.scenes, study.spectra, study.levels, study.exposures, study.sensors)
+def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:
+    """All combinations of scenes (or of one alone), spectra, levels, exposures and sensors; the last varies fastest."""
+    axes = (study.scenes if scene is None else (scene,), study.spectra, study.levels, study.exposures, study.sensors)
     return [Condition(*place) for place in product(*axes)]
 
 

@@ -83,6 +83,8 @@ def read_results(folder: Path) -> Iterator[sqlite3.Connection]:
         Where it can't be read.
     """
     path = folder / FILE
+    if not path.is_file():
+        raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
     # SQLite reads the write-ahead log too, and makes one. Where the folder can't be written and has no log, nobody else
     # writes, and the file alone is read.
     still = not os.access(folder, os.W_OK) and not path.with_name(f"{FILE}-wal").exists()
@@ -229,12 +231,8 @@ def render_record(base: sqlite3.Connection, request: str) -> RenderRecord | None
     if values is None:
         return None
     stored = json.loads(values[1])
-    return RenderRecord(
-        content=stored["content"],
-        facts=RenderFacts(**stored["facts"]),
-        brightest_share=stored["brightest_share"],
-        notes=tuple(stored["notes"]),
-    )
+    facts = RenderFacts(**stored.pop("facts"))
+    return RenderRecord(facts=facts, notes=tuple(stored.pop("notes")), **stored)
 
 
 def note_render(base: sqlite3.Connection, request: str, record: RenderRecord) -> None:

@@ -110,15 +110,11 @@ def _request(job: Job, opened: OpenedScene) -> str:
 def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
     """The preset and the sensor as modelled of each frame: levels, exposures and seeds share it."""
     found = {}
-    for condition in _conditions(job, opened):
+    for condition in conditions(job.study, opened.choice):
         own, lens = preset(condition.sensor), job.plan.images[condition].lens
         for mosaic in mosaics(job.study):
             found[condition.spectrum, condition.sensor, lens, mosaic] = own, replace(vary(own, mosaic), lens=lens)
     return found
-
-
-def _conditions(job: Job, opened: OpenedScene) -> list[Condition]:
-    return [condition for condition in conditions(job.study) if condition.scene == opened.choice]
 
 
 def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: Transport) -> None:
@@ -150,7 +146,7 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
             if PROCESSORS[name].mosaic == imaged[-1]:
                 colours[imaged, name] = colours_under(frame.sensor, PROCESSORS[name], white_spectrum(opened, imaged[0]))
     cells = []
-    for condition in _conditions(job, opened):
+    for condition in conditions(job.study, opened.choice):
         lens = job.plan.images[condition].lens
         for name in job.study.processors:
             imaged = condition.spectrum, condition.sensor, lens, PROCESSORS[name].mosaic

@@ -7,7 +7,6 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from rodcone.colour_spaces import decode_srgb
@@ -23,16 +22,16 @@ from studies.sweep.provenance import require_alike
 from studies.sweep.row import AXES, Row
 from studies.sweep.stored import read_whole
 
-SAME = 1e-6  # below it a mean is none, and a half width, as a share of its mean, only sums in another order
-ELECTRONS = "electrons_"  # and a letter: mean electrons of its pixels
+SAME = 1e-6  # a mean below it is shown as 0; a half width below this share of its mean is rounding, and not shown
+ELECTRONS = "electrons_"  # and a channel: mean electrons of its pixels
 CHARTS = {"pair_delta_e": ("metamers", pair_delta_e), "daylight_delta_e": ("color_checker", daylight_delta_e)}
 TRUE_PAIRS = "true_pair_delta_e"  # of the light alone, whatever the camera
 FIGURES = tuple(one.name for one in fields(Row) if "float" in str(one.type) or one.name == "substitution")
 
 
 @dataclass(frozen=True)
-class Line:
-    """A line of a table: its place on the axes, and each figure's mean and 95 % interval's half width over the seeds.
+class TableLine:
+    """A line of a table: its values of the axes, and each figure's mean and 95 % interval's half width over the seeds.
 
     None stands for a figure that a cell lacks, and for the interval of one seed.
     """
@@ -44,7 +43,7 @@ class Line:
 
 def lines(
     rows: Sequence[Row], folder: Path, by: Sequence[str], show: Sequence[str], where: Mapping[str, str]
-) -> list[Line]:
+) -> list[TableLine]:
     """Lines of a table, in the study's order.
 
     Parameters
@@ -55,7 +54,7 @@ def lines(
     by : sequence of str
         Axes, some of `AXES`.
     show : sequence of str
-        Columns of the ledger that are numbers; ``electrons_W`` and the other letters; ``pair_delta_e``, the mean
+        Columns of the results that are numbers; ``electrons_W`` and the other channels; ``pair_delta_e``, the mean
         CIEDE2000 within the pairs of scene metamers; ``daylight_delta_e``, the mean between the ColorChecker's patches
         and their colours under D65; both are measured in the 8-bit pictures. ``true_pair_delta_e`` is what the CIE
         observer sees of the pairs.
@@ -82,30 +81,26 @@ def lines(
     if not groups:
         raise InputError(f"where: no cell has {dict(where)}; allowed: values of the study's axes; see rodcone export")
     for at, group in groups.items():
-        _check_alike(at, group)
+        for axis in AXES:
+            values = list(dict.fromkeys(getattr(row, axis) for row in group))
+            if len(values) > 1:
+                raise InputError(
+                    f"by: a line of {'/'.join(at) or 'all'} would be a mean over {axis} {', '.join(values)}; allowed: "
+                    f"over seeds alone; add {axis} to --by, or give --where {axis}={values[0]}"
+                )
     return [_line(at, group, folder, show) for at, group in groups.items()]
 
 
-def markdown(table: Sequence[Line], by: Sequence[str], show: Sequence[str]) -> str:
+def markdown(table: Sequence[TableLine], by: Sequence[str], show: Sequence[str]) -> str:
     """Table in Markdown; ``mean ± half width``, to three digits; no half width where the seeds don't differ."""
     cells = [[*by, *show], ["---"] * len(by) + ["---:"] * len(show)]
     for line in table:
-        figures = [_told(mean, half) for mean, half in zip(line.means, line.halves, strict=True)]
+        figures = [_mean_text(mean, half) for mean, half in zip(line.means, line.halves, strict=True)]
         cells.append([*(text.replace("|", "\\|") for text in line.at), *figures])
     return "\n".join(f"| {' | '.join(row)} |" for row in cells)
 
 
-def _check_alike(at: tuple[str, ...], group: Sequence[Row]) -> None:
-    for axis in AXES:
-        values = list(dict.fromkeys(getattr(row, axis) for row in group))
-        if len(values) > 1:
-            raise InputError(
-                f"by: a line of {'/'.join(at) or 'all'} would be a mean over {axis} {', '.join(values)}; allowed: over "
-                f"seeds alone; add {axis} to --by, or give --where {axis}={values[0]}"
-            )
-
-
-def _line(at: tuple[str, ...], group: Sequence[Row], folder: Path, show: Sequence[str]) -> Line:
+def _line(at: tuple[str, ...], group: Sequence[Row], folder: Path, show: Sequence[str]) -> TableLine:
     means: list[float | None] = []
     halves: list[float | None] = []
     for name in show:
@@ -115,7 +110,7 @@ def _line(at: tuple[str, ...], group: Sequence[Row], folder: Path, show: Sequenc
         means.append(float(np.mean(values)) if whole else None)
         interval = mean_with_confidence(values) if whole and len(values) > 1 else None
         halves.append(None if interval is None else interval.high - interval.mean)
-    return Line(at, tuple(means), tuple(halves))
+    return TableLine(at, tuple(means), tuple(halves))
 
 
 def _figure(row: Row, name: str, folder: Path) -> float | None:
@@ -130,16 +125,12 @@ def _figure(row: Row, name: str, folder: Path) -> float | None:
         raise InputError(f"show: {name} is known of scene {scene}, not of {row.scene}; leave it out, or give --where")
     if name == TRUE_PAIRS:
         return float(true_pair_delta_e(TWINS_UNDER if row.spectrum == OWN else row.spectrum).mean())
-    picture = _linear(read_whole(folder / PICTURES, row.picture))
+    with Image.open(BytesIO(read_whole(folder / PICTURES, row.picture))) as file:
+        picture = decode_srgb(np.asarray(file.convert("RGB"), dtype=np.float64) / 255)
     return float(measure(picture, patch_masks(load(scene), (picture.shape[0], picture.shape[1]))).mean())
 
 
-def _linear(content: bytes) -> NDArray[np.float64]:
-    with Image.open(BytesIO(content)) as picture:
-        return decode_srgb(np.asarray(picture.convert("RGB"), dtype=np.float64) / 255)
-
-
-def _told(mean: float | None, half: float | None) -> str:
+def _mean_text(mean: float | None, half: float | None) -> str:
     if mean is None:
         return "-"
     if abs(mean) < SAME:

@@ -81,7 +81,10 @@ def run(
     try:
         while True:
             for cell in islice(waiting, at_once - len(running)):
-                running[_submitted(executor, call, cell, running)] = cell
+                try:
+                    running[executor.submit(call, cell)] = cell
+                except BrokenExecutor as error:
+                    raise WorkerLostError([*running.values(), cell]) from error
             if not running:
                 return
             yield from _finished(running)
@@ -94,13 +97,6 @@ def run(
     finally:
         for future in running:
             future.cancel()
-
-
-def _submitted(executor: Executor, call: Any, cell: Cell, running: dict[Future[Row], Cell]) -> Future[Row]:
-    try:
-        return executor.submit(call, cell)
-    except BrokenExecutor as error:
-        raise WorkerLostError([*running.values(), cell]) from error
 
 
 def _finished(running: dict[Future[Row], Cell]) -> Iterator[Row]:
