@@ -13,7 +13,7 @@ from dataclasses import asdict, fields
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, get_type_hints
 
 from rodcone.digests import digest
 from rodcone.errors import InputError, one_line
@@ -39,7 +39,6 @@ COLUMNS = tuple(field.name for field in fields(Row))
 _COLUMNS = ", ".join(f"cells.{name}" for name in (*COLUMNS, "digest"))
 _REAL = {name for name in COLUMNS if _HINTS[name] in (float, float | None)}
 _TEXT = partial(str, encoding="utf-8", errors="replace")  # of bytes that have changed; the digest then tells
-Found = TypeVar("Found")
 _CREATE = (
     "CREATE TABLE cells ("
     + ", ".join(f"{name} {_TYPES[_HINTS[name]]}" + (" PRIMARY KEY" if name == "key" else "") for name in COLUMNS)
@@ -160,8 +159,8 @@ def add(base: sqlite3.Connection, row: Row) -> None:
 def done(base: sqlite3.Connection, pictures: Path, keys: Iterable[str]) -> set[str]:
     """Which of these cells have an undamaged row and undamaged pictures, which a power cut may have taken."""
     asked = set(keys)
-    found = [_row(values) for values in base.execute(f"SELECT {_COLUMNS} FROM cells") if values[0] in asked]
-    return {row.key for row in found if row and is_whole(pictures / row.picture) and is_whole(pictures / row.truth)}
+    found = (row for row in _sound_rows(base) if row.key in asked)
+    return {row.key for row in found if is_whole(pictures / row.picture) and is_whole(pictures / row.truth)}
 
 
 def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
@@ -177,12 +176,12 @@ def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
         if everything
         else f"SELECT {_COLUMNS} FROM wanted JOIN cells USING (key) ORDER BY place"
     )
-    return [_whole(_row(values), f"row {values[0]!r}") for values in base.execute(chosen)]
+    return [Row(*_require_sound(values, f"row {values[0]!r}")) for values in base.execute(chosen)]
 
 
 def last_study(base: sqlite3.Connection) -> tuple[dict[str, Any], dict[str, float]] | None:
     """Study of the last run, and the seconds by stage of all runs of it; None before there is one."""
-    found = [_whole(_sealed(values), "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
+    found = [_require_sound(values, "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
     if not found:
         return None
     study, seconds = found[-1][2], dict[str, float]()
@@ -207,8 +206,7 @@ def forget_old(base: sqlite3.Connection) -> None:
     """
     place = attrgetter(*AXES, "seed")
     new = {place(row): (row.variant, row.versions) for row in rows(base)}
-    found = filter(None, map(_row, base.execute(f"SELECT {_COLUMNS} FROM cells")))
-    old = [(row.key,) for row in found if new.get(place(row), made := (row.variant, row.versions)) != made]
+    old = [(row.key,) for row in _sound_rows(base) if new.get(place(row), made := (row.variant, row.versions)) != made]
     base.executemany("DELETE FROM cells WHERE key = ?", old)
 
 
@@ -227,10 +225,9 @@ def note_stages(base: sqlite3.Connection, run: int, stages: Mapping[str, float])
 def render_record(base: sqlite3.Connection, request: str) -> RenderRecord | None:
     """Record of a render that was asked for before; None where there is none, or a damaged one."""
     found = base.execute("SELECT * FROM renders WHERE request = ?", (request,)).fetchone()
-    values = None if found is None else _sealed(found)
-    if values is None:
+    if found is None or not _is_sound(found):
         return None
-    stored = json.loads(values[1])
+    stored = json.loads(found[1])
     facts = RenderFacts(**stored.pop("facts"))
     return RenderRecord(facts=facts, notes=tuple(stored.pop("notes")), **stored)
 
@@ -246,17 +243,17 @@ def _put(base: sqlite3.Connection, table: str, values: list[Any]) -> int:
     return int(done.lastrowid or 0)
 
 
-def _sealed(values: tuple[Any, ...]) -> tuple[Any, ...] | None:
-    """Values without the digest at their end; None where the digest is another's."""
-    return values[:-1] if digest(values[:-1]) == values[-1] else None
+def _is_sound(values: tuple[Any, ...]) -> bool:
+    """Whether the digest at the end is that of the values before it."""
+    return bool(digest(values[:-1]) == values[-1])
 
 
-def _row(values: tuple[Any, ...]) -> Row | None:
-    whole = _sealed(values)
-    return None if whole is None else Row(*whole)
-
-
-def _whole(found: Found | None, what: str) -> Found:
-    if found is None:
+def _require_sound(values: tuple[Any, ...], what: str) -> tuple[Any, ...]:
+    if not _is_sound(values):
         raise InputError(f"results: {what} isn't what was written (damaged); run rodcone sweep again, which makes it")
-    return found
+    return values[:-1]
+
+
+def _sound_rows(base: sqlite3.Connection) -> list[Row]:
+    """All rows but the damaged ones."""
+    return [Row(*values[:-1]) for values in base.execute(f"SELECT {_COLUMNS} FROM cells") if _is_sound(values)]

@@ -110,6 +110,3 @@ class Row:
 
 
 AXES = ("scene", "spectrum", "level", "exposure", "sensor", "processor")
-TIME_AND_HOST = (
-    "render_s", "capture_s", "develop_s", "measure_s", "first_s", "threads", "finished", "host", "machine", "worker",
-)  # fmt: skip
