@@ -23,7 +23,7 @@ KERNEL = "kernel"
 class Term:
     """One approximation's error: RMS over pixels below saturation [e-], and its square over the noise variance.
 
-    `modelled` terms cost what they would if they were left out, and count nothing.
+    A `modelled` term states what leaving it out would cost, and adds nothing to the total.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Ledger:
-    """What the planned model of one condition and mosaic is predicted to be off.
+    """Predicted error of the planned model of one condition and mosaic.
 
     Attributes
     ----------

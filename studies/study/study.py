@@ -99,7 +99,7 @@ class LensTerms:
 
 @dataclass(frozen=True)
 class BudgetShares:
-    """Shares of the sensor's own noise variance that a plan's approximations may add: together, and Monte Carlo's."""
+    """Noise variance that a plan's approximations may add, over the sensor's own: together, and Monte Carlo's."""
 
     total: float = 0.10
     monte_carlo: float = 0.03
@@ -107,7 +107,7 @@ class BudgetShares:
 
 @dataclass(frozen=True)
 class Condition:
-    """What light meets which chip for how long: all that decides the expected electrons but for the mosaic.
+    """A place in the study's grid: all that decides the expected electrons but for the mosaic.
 
     Attributes
     ----------

@@ -133,6 +133,6 @@ def _first_fault(error: ClassValidationError) -> str:
     elif isinstance(fault, InputError):
         words = str(fault)
     else:
-        words = "what stands there is not a table; allowed: a table of keys; see rodcone new study"
+        words = "the value is not a table; allowed: a table of keys; see rodcone new study"
     where = [note.name for note in getattr(fault, "__notes__", []) if isinstance(note, AttributeValidationNote)]
     return f"{where[0]}: {words}" if where else words

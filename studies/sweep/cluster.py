@@ -52,7 +52,7 @@ def on_cluster(address: str, patience_s: float = PATIENCE_S) -> Iterator[Callabl
 
 
 def _run(client: Any, address: str, slots: int, threads: int, cells: Sequence[Cell]) -> Rows:
-    """Run cells, two in each worker's hands."""
+    """Run cells; each worker holds two, so that it never waits for the next."""
     from distributed import KilledWorker
 
     executor = client.get_executor(pure=False)
@@ -66,7 +66,7 @@ def _run(client: Any, address: str, slots: int, threads: int, cells: Sequence[Ce
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep dask's tracebacks off stderr: what they mean is told in one line."""
+    """Keep dask's tracebacks off stderr: `on_cluster` raises one line in their place."""
     import distributed  # noqa: F401 - now: its import sets the levels
 
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
@@ -119,7 +119,7 @@ def _client(address: str, patience_s: float) -> Any:
 
 
 def _check_encryption(address: str) -> None:
-    """Raise `InputError` where dask's settings for TLS don't fit the address: it would say so in a traceback."""
+    """Raise `InputError` where dask's settings for TLS don't fit the address; dask itself ends in a traceback."""
     from distributed.security import Security
 
     try:
