@@ -16,7 +16,7 @@ from studies.budget.model_plan import Plan, as_stated
 from studies.study.study import SceneChoice, Study
 from studies.sweep.cells import Cell
 from studies.sweep.database import COLUMNS, FILE
-from studies.sweep.row import TIME_AND_HOST, Row
+from studies.sweep.row import Row
 from studies.sweep.run_sweep import Runner, Swept, sweep
 from studies.sweep.workers import InThisProcess, run
 
@@ -25,6 +25,9 @@ RENDER = (
     '"relative_level_error": null, "first_nm": 390.0, "last_nm": 770.0, "width_nm": 20.0, "brightest_share": null, '
     '"notes": []}'
 )
+TIME_AND_HOST = (
+    "render_s", "capture_s", "develop_s", "measure_s", "first_s", "threads", "finished", "host", "machine", "worker",
+)  # fmt: skip
 ROW = Row(
     key="00ff",
     scene="desk, lit.exr",

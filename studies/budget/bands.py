@@ -49,11 +49,10 @@ def groups_of(width_nm: Floats, count: int) -> list[NDArray[np.intp]]:
     return made
 
 
-def wide_bands(transport: Transport | SpectralRadiance, groups: Sequence[NDArray[np.intp]]) -> tuple[Floats, Floats]:
+def wide_bands(nm: Floats, width_nm: Floats, groups: Sequence[NDArray[np.intp]]) -> tuple[Floats, Floats]:
     """Centres and widths of merged bands."""
-    width_nm = transport.width_nm if transport.width_nm is not None else np.zeros(0)
-    first = np.array([transport.wavelength_nm[g[0]] - width_nm[g[0]] / 2 for g in groups])
-    last = np.array([transport.wavelength_nm[g[-1]] + width_nm[g[-1]] / 2 for g in groups])
+    first = np.array([nm[group[0]] - width_nm[group[0]] / 2 for group in groups])
+    last = np.array([nm[group[-1]] + width_nm[group[-1]] / 2 for group in groups])
     return (first + last) / 2, last - first
 
 
@@ -62,7 +61,7 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
 
     The variance is that of bands which rise and fall together: the most that it can be.
     """
-    nm, width_nm = wide_bands(transport, groups)
+    nm, width_nm = wide_bands(transport.wavelength_nm, transport.width_nm, groups)
     matrix, means = _means(transport.width_nm, groups), transport.pass_means
     return replace(
         transport,
@@ -84,7 +83,7 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
 
 def merge_radiance(radiance: SpectralRadiance, groups: Sequence[NDArray[np.intp]]) -> SpectralRadiance:
     """Radiance averaged over wide bands: what bands that follow light and scene within themselves would hold."""
-    nm, width_nm = wide_bands(radiance, groups)
+    nm, width_nm = wide_bands(radiance.wavelength_nm, radiance.widths_nm, groups)
     values = radiance.values @ _means(radiance.widths_nm, groups).T.astype(radiance.values.dtype)
     return SpectralRadiance(values, nm, radiance.relative_mc_error, width_nm, signed=radiance.signed)
 

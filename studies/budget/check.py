@@ -1,6 +1,6 @@
-"""The error budget held to its word: the planned model's expected electrons against the reference's."""
+"""A check of the error budget: the planned model's expected electrons against the reference's."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger
 from studies.budget.model_plan import Plan
 from studies.study.lit_scene import level_luminance, make_transport, open_all, under
 from studies.study.model import ImageModel
-from studies.study.study import Condition, SceneChoice, Study
+from studies.study.study import Study
 
 REFERENCE_SEED = 1 << 33  # added to the study's: the reference's render is independent of plan and pilot
 
@@ -26,7 +26,7 @@ Step = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
-class Checked:
+class CheckedCondition:
     """Prediction and measurement of one condition and mosaic: RMS of the difference over pixels below saturation [e-].
 
     The prediction holds the reference's own Monte Carlo noise, which no model of it leaves out.
@@ -38,10 +38,10 @@ class Checked:
 
 
 @dataclass(frozen=True)
-class Check:
+class BudgetCheck:
     """All of a study's conditions, and the seconds that the renders of each model took."""
 
-    rows: tuple[Checked, ...]
+    rows: tuple[CheckedCondition, ...]
     planned_s: float
     reference_s: float
 
@@ -56,26 +56,20 @@ class Check:
         return float(np.median([row.predicted_e / row.measured_e for row in self.rows if row.measured_e > 0]))
 
 
-def check_json(check: Check) -> dict[str, Any]:
+def check_json(check: BudgetCheck) -> dict[str, Any]:
     """Totals, and prediction and measurement of each condition."""
     rows = [
         asdict(row.ledger.condition)
         | {"mosaic": row.ledger.mosaic, "predicted_e": row.predicted_e, "measured_e": row.measured_e}
         for row in check.rows
     ]
-    return {
-        "conditions": len(rows),
-        "covered": check.covered,
-        "median_ratio": check.median_ratio,
-        "planned_s": check.planned_s,
-        "reference_s": check.reference_s,
-        "rows": rows,
-    }
+    totals = {"conditions": len(rows), "covered": check.covered, "median_ratio": check.median_ratio}
+    return totals | {"planned_s": check.planned_s, "reference_s": check.reference_s, "rows": rows}
 
 
 def check_plan(
     study: Study, planned: Plan, reference: Plan, *, cache: Path, step: Step = lambda what, share: None
-) -> Check:
+) -> BudgetCheck:
     """Render both models with independent seeds and compare expected electrons; no sensor noise.
 
     Parameters
@@ -85,42 +79,32 @@ def check_plan(
     cache : Path
         Folder of renders.
     """
-    rows: list[Checked] = []
-    seconds = np.zeros(2)
-    other = replace(study, render=replace(study.render, seed=study.render.seed + REFERENCE_SEED))
+    rows: list[CheckedCondition] = []
+    seconds = {"planned": 0.0, "reference": 0.0}
     for choice, opened in open_all(study).items():
-        made = []
-        for which, (model, of) in enumerate(((planned, study), (reference, other))):
-            step(f"{choice.source}, {('planned', 'reference')[which]}", len(rows) / len(planned.ledgers))
-            transport, _ = make_transport(opened, of, model.renders.get(choice), cache, lambda share, error: None)
-            seconds[which] += transport.seconds
-            made.append(transport)
-        rows += _compare(choice, planned, reference, made[0], made[1])
-    return Check(tuple(rows), float(seconds[0]), float(seconds[1]))
-
-
-def _compare(
-    choice: SceneChoice, planned: Plan, reference: Plan, ours: Transport, theirs: Transport
-) -> Iterator[Checked]:
-    for row in planned.ledgers:
-        if row.condition.scene == choice:
-            expected = model_electrons(ours, row, planned.images[row.condition])
-            true = model_electrons(theirs, row, reference.images[row.condition])
-            below = true < preset(row.condition.sensor).pixel.full_well_e
-            measured = float(np.sqrt(np.mean((expected - true)[below] ** 2))) if below.any() else 0.0
-            more = planned.renders[choice].spp / reference.renders[choice].spp if choice in planned.renders else 0.0
-            yield Checked(row, predicted_difference_e(row, more), measured)
-
-
-def predicted_difference_e(row: Ledger, spp_over_reference: float) -> float:
-    """RMS of the difference to a reference that has noise of its own [e-], of its samples and of its level."""
-    rms_e = {term.name: term.rms_e for term in row.terms}
-    return float(np.sqrt(row.rms_e**2 + rms_e[MONTE_CARLO] ** 2 * spp_over_reference + rms_e[LEVEL] ** 2))
+        made = {}
+        for name, model, offset in (("planned", planned, 0), ("reference", reference, REFERENCE_SEED)):
+            step(f"{choice.source}, {name}", len(rows) / len(planned.ledgers))
+            render = model.renders.get(choice)
+            made[name], _ = make_transport(opened, study, render, cache, lambda *_: None, seed_offset=offset)
+            seconds[name] += made[name].seconds
+        spp_over_reference = planned.renders[choice].spp / reference.renders[choice].spp if opened.scene else 0.0
+        for row in planned.ledgers:
+            if row.condition.scene == choice:
+                expected = model_electrons(made["planned"], row, planned.images[row.condition])
+                true = model_electrons(made["reference"], row, reference.images[row.condition])
+                below = true < preset(row.condition.sensor).pixel.full_well_e
+                measured = float(np.sqrt(np.mean((expected - true)[below] ** 2))) if below.any() else 0.0
+                # The reference has noise of its own, of its samples and of its level.
+                rms_e = {term.name: term.rms_e for term in row.terms}
+                square = row.rms_e**2 + rms_e[MONTE_CARLO] ** 2 * spp_over_reference + rms_e[LEVEL] ** 2
+                rows.append(CheckedCondition(row, predicted_e=float(np.sqrt(square)), measured_e=measured))
+    return BudgetCheck(tuple(rows), planned_s=seconds["planned"], reference_s=seconds["reference"])
 
 
 def model_electrons(transport: Transport, row: Ledger, model: ImageModel) -> NDArray[np.float64]:
     """Expected electrons (h, w) of a condition and mosaic under a model of render, lens and readout."""
-    condition: Condition = row.condition
+    condition = row.condition
     lit = under(transport, condition.spectrum)
     level = level_luminance(condition.level, lit.illuminance_lux(1.0))
     sensor = replace(vary(preset(condition.sensor), row.mosaic), lens=model.lens)

@@ -1,9 +1,10 @@
 """The cheapest model within the stated share of the sensor's noise variance."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import ceil
+from operator import itemgetter
 
 from studies.budget.ledger import KERNEL, Weighed
 from studies.study.study import BudgetShares, Condition
@@ -46,36 +47,24 @@ def choose(rows: Sequence[Weighed], sizes: dict[int, int], shares: BudgetShares,
     by_condition: dict[Condition, list[Weighed]] = {}
     for row in rows:
         by_condition.setdefault(row.condition, []).append(row)
-    best: tuple[float, Choice] | None = None
+    choices: list[tuple[float, Choice]] = []
     for count, bands in sizes.items():
-        cost, left_out = 0.0, {}
-        for condition, some in by_condition.items():
-            found = _cheapest_lens(some, count, bands, shares)
-            if found is None:
-                break
-            cost, left_out[condition] = cost + found[0], found[1]
-        if len(left_out) < len(by_condition):
+        lenses = {condition: _cheapest_lens(some, count, bands, shares) for condition, some in by_condition.items()}
+        found = {condition: lens for condition, lens in lenses.items() if lens is not None}
+        if len(found) < len(by_condition):
             continue
-        wanted = wanted_spp(rows, count, left_out, shares)
-        spp = min(max(wanted, FIRST_SPP), most_spp)
-        cost += render_ns(bands, spp)
-        if best is None or cost < best[0]:
-            best = cost, Choice(count, spp, wanted, left_out)
-    if best is None:
-        raise AssertionError("the finest bands with everything modelled have no error")
-    return best[1]
-
-
-def wanted_spp(
-    rows: Iterable[Weighed], count: int, left_out: Mapping[Condition, frozenset[str]], shares: BudgetShares
-) -> int:
-    """Samples a pixel that bring Monte Carlo noise under its share in every condition."""
-    return ceil(
-        max(
-            row.monte_carlo(count, 1, left_out[row.condition]) / (shares.monte_carlo * row.noise_variance)
-            for row in rows
+        left_out = {condition: out for condition, (_, out) in found.items()}
+        # Samples a pixel that bring Monte Carlo noise under its share in every condition.
+        wanted = ceil(
+            max(
+                row.monte_carlo(count, 1, left_out[row.condition]) / (shares.monte_carlo * row.noise_variance)
+                for row in rows
+            )
         )
-    )
+        spp = min(max(wanted, FIRST_SPP), most_spp)
+        cost = sum(lens_ns for lens_ns, _ in found.values()) + render_ns(bands, spp)
+        choices.append((cost, Choice(count=count, spp=spp, wanted_spp=wanted, left_out=left_out)))
+    return min(choices, key=itemgetter(0))[1]
 
 
 def render_ns(bands: int, spp: int) -> float:
@@ -92,16 +81,16 @@ def _cheapest_lens(
     rows: Sequence[Weighed], count: int, bands: int, shares: BudgetShares
 ) -> tuple[float, frozenset[str]] | None:
     """Cost, and the terms of lens and kernel left out; None where the bands alone are too much."""
+
+    def fits(row: Weighed, left_out: Iterable[str]) -> bool:
+        total_e = sum(row.bands[count]) + sum({**row.lens, KERNEL: row.kernel}[name] for name in left_out)
+        return total_e**2 <= (shares.total - shares.monte_carlo) * row.noise_variance
+
     names = [*rows[0].lens, KERNEL]
     found = [
         (image_ns(bands, set(names) - set(out)), frozenset(out))
         for some in range(len(names) + 1)
         for out in combinations(names, some)
-        if all(_fits(row, count, out, shares) for row in rows)
+        if all(fits(row, out) for row in rows)
     ]
     return min(found, key=lambda each: (each[0], sorted(each[1])), default=None)
-
-
-def _fits(row: Weighed, count: int, left_out: Iterable[str], shares: BudgetShares) -> bool:
-    total_e = sum(row.bands[count]) + sum({**row.lens, KERNEL: row.kernel}[name] for name in left_out)
-    return total_e**2 <= (shares.total - shares.monte_carlo) * row.noise_variance

@@ -1,7 +1,7 @@
 """The error budget's ledger: each approximation in electrons, and as a share of the sensor's own noise variance."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ KERNEL = "kernel"
 class Term:
     """One approximation's error: RMS over pixels below saturation [e-], and its square over the noise variance.
 
-    `modelled` terms cost what they would if they were left out, and count nothing.
+    A `modelled` term states what leaving it out would cost, and adds nothing to the total.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Ledger:
-    """What the planned model of one condition and mosaic is predicted to be off.
+    """Predicted error of the planned model of one condition and mosaic.
 
     Attributes
     ----------
@@ -133,29 +133,24 @@ def weigh(
     scale = level_cd_m2 * exposure_s
     expected_e = scale * found.full.mean(axis=0)
     below = expected_e < sensor.pixel.full_well_e
-    if not below.any():  # all saturated: no error reaches the raw image
-        counts = dict.fromkeys(found.bands, 0.0)
-        bands = dict.fromkeys(found.bands, (0.0, 0.0))
-        none = Weighed(condition, mosaic, exposure_s, 1.0, 0.0, 0.0, counts, 0.0, bands, {}, 0.0)
-        return replace(none, lens=dict.fromkeys(found.lens, 0.0))
-    own = noise_variance(expected_e, sensor, exposure_s)[below].mean()
+    # Where every pixel is saturated no error reaches the raw image: each is 0, of a variance of 1.
+    own = _mean(noise_variance(expected_e, sensor, exposure_s)[below]) or 1.0
     blurred, sharp = found.blurred**2 * pilot.spp, found.sharp**2 * pilot.spp
     signal = np.maximum(found.full.mean(axis=0), np.finfo(np.float64).tiny)
     # Wavelengths are stratified within a pass; what light a path carries is independent of its wavelength.
     spread = sharp.mean(axis=0) / signal**2 + 1 / pilot.pass_spp
-    square = float((expected_e[below] ** 2).mean())
     return Weighed(
-        condition,
-        mosaic,
-        exposure_s,
-        float(own),
+        condition=condition,
+        mosaic=mosaic,
+        exposure_s=exposure_s,
+        noise_variance=own,
         blurred=scale**2 * _upper(blurred[:, below], NOISE_MARGIN),
         sharp=scale**2 * _upper(sharp[:, below], NOISE_MARGIN),
         jitter={n: scale**2 * _upper((some.jitter * spread)[below], NOISE_MARGIN) for n, some in found.bands.items()},
-        level=square * pilot.level,
+        level=_mean(expected_e[below] ** 2) * pilot.level,
         bands={n: (scale * _rms(b.response, below), scale * _rms(b.light, below)) for n, b in found.bands.items()},
         lens={name: scale * _rms(pair, below) for name, pair in found.lens.items()},
-        kernel=float(np.sqrt(np.mean(kernel_rms_e(expected_e, max(found.bands))[below] ** 2))),
+        kernel=float(np.sqrt(_mean(kernel_rms_e(expected_e, max(found.bands))[below] ** 2))),
     )
 
 
@@ -173,13 +168,13 @@ def ledger(weighed: Weighed, count: int, spp: int, left_out: frozenset[str]) -> 
         terms.append(Term(name, rms_e, rms_e**2 / own, modelled=optional and name not in left_out))
     square = monte_carlo + level + sum(term.rms_e for term in terms if not term.modelled) ** 2
     return Ledger(
-        weighed.condition,
-        weighed.mosaic,
-        weighed.exposure_s,
-        own**0.5,
-        (*random, *terms),
-        square**0.5,
-        square / own,
+        condition=weighed.condition,
+        mosaic=weighed.mosaic,
+        exposure_s=weighed.exposure_s,
+        noise_e=own**0.5,
+        terms=(*random, *terms),
+        rms_e=square**0.5,
+        share=square / own,
     )
 
 
@@ -189,5 +184,9 @@ def _rms(pair: Pair, below: NDArray[np.bool_]) -> float:
 
 
 def _upper(values: NDArray[np.float64], margin: float) -> float:
-    """Mean over pixels (last axis) and so many standard errors of it."""
-    return float(values.mean() + margin * values.std() / np.sqrt(values.shape[-1]))
+    """Mean over pixels (last axis) and so many standard errors of it; 0 without pixels."""
+    return float(values.mean() + margin * values.std() / np.sqrt(values.shape[-1])) if values.size else 0.0
+
+
+def _mean(values: NDArray[np.float64]) -> float:
+    return float(values.mean()) if values.size else 0.0

@@ -15,13 +15,13 @@ from sensor.presets import preset
 from sensor.variations import vary
 from studies.budget.bands import counts, fine_bands, groups_of, wide_bands
 from studies.budget.choice import choose
-from studies.budget.ledger import KERNEL, Ledger, PilotNoise, Weighed, ledger, weigh
+from studies.budget.ledger import KERNEL, PilotNoise, Weighed, ledger, weigh
 from studies.budget.model_plan import Plan
 from studies.budget.terms import LENS_TERMS, effects, horizontal_view_deg
 from studies.study.lit_scene import OpenedScene, level_luminance, open_all, under, white_spectrum
 from studies.study.model import ImageModel, RenderModel, unit_exposure_s
 from studies.study.radiance_file import open_radiance_file
-from studies.study.study import OWN, Condition, Study, conditions, mosaics, parse_exposure
+from studies.study.study import OWN, Study, conditions, mosaics, parse_exposure
 
 PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels a picture is no smoother, so no effect is smaller
 PILOT_SEED = 1 << 32  # added to the study's seed: the pilot is no part of a render, and the cache keeps them apart
@@ -34,13 +34,16 @@ Groups = Mapping[int, Sequence[NDArray[np.intp]]]
 
 @dataclass(frozen=True)
 class Pilot:
-    """A scene rendered small with few samples, in fine bands, and the choices of wider ones."""
+    """A scene rendered small with few samples, in fine bands, and the choices of wider ones. A picture file is one."""
 
     opened: OpenedScene
     transport: Transport
     groups: Groups
-    rendered: bool
-    view_deg: float
+
+    @property
+    def rendered(self) -> bool:
+        """Whether it is a render, and no picture file."""
+        return self.opened.scene is not None
 
 
 def plan(study: Study, *, cache: Path | None = None, step: Step = lambda what, share: None) -> Plan:
@@ -72,15 +75,18 @@ def plan(study: Study, *, cache: Path | None = None, step: Step = lambda what, s
         sizes = {count: len(groups) for count, groups in pilot.groups.items()}
         choice = choose(rows, sizes, study.budget, study.render.spp if pilot.rendered else 0)
         if pilot.rendered:
-            nm, width_nm = wide_bands(pilot.transport, pilot.groups[choice.count])
+            nm, width_nm = wide_bands(
+                pilot.transport.wavelength_nm, pilot.transport.width_nm, pilot.groups[choice.count]
+            )
             renders[opened.choice] = RenderModel(tuple(nm.tolist()), tuple(width_nm.tolist()), choice.spp)
         for row in rows:
             left_out = choice.left_out[row.condition]
-            lens = full_lens(study, preset(row.condition.sensor).lens, pilot.view_deg)
+            lens = full_lens(study, preset(row.condition.sensor).lens, opened)
             without = {field: 0.0 for name, field in LENS_TERMS.items() if name in left_out}
             images[row.condition] = ImageModel(replace(lens, **without), exact=KERNEL not in left_out)
             ledgers.append(ledger(row, choice.count, choice.spp, left_out))
-    return Plan(renders=renders, images=images, shares=_worst(ledgers), ledgers=tuple(ledgers))
+    shares = {row.condition: row.share for row in sorted(ledgers, key=lambda row: row.share)}  # the worst mosaic's
+    return Plan(renders=renders, images=images, shares=shares, ledgers=tuple(ledgers))
 
 
 def reference_plan(study: Study) -> Plan:
@@ -91,10 +97,8 @@ def reference_plan(study: Study) -> Plan:
             nm, width_nm = fine_bands(_spectra(opened, study), study.render.range_nm)
             spp = min(REFERENCE_SAMPLES * study.render.spp, 1 << 16)
             renders[opened.choice] = RenderModel(tuple(nm.tolist()), tuple(width_nm.tolist()), spp)
-        for condition in conditions(study):
-            if condition.scene == opened.choice:
-                lens = full_lens(study, preset(condition.sensor).lens, _view_deg(opened))
-                images[condition] = ImageModel(lens)
+        for condition in conditions(study, opened.choice):
+            images[condition] = ImageModel(full_lens(study, preset(condition.sensor).lens, opened))
     return Plan(renders=renders, images=images)
 
 
@@ -106,7 +110,7 @@ def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> 
     if opened.scene is None:
         transport = open_radiance_file(opened.choice.source, opened.choice.light)[0]
         single = [np.array([band]) for band in range(transport.wavelength_nm.size)]
-        return Pilot(opened, transport, {len(single): single}, False, 0.0)
+        return Pilot(opened, transport, {len(single): single})
     nm, width_nm = fine_bands(_spectra(opened, study), study.render.range_nm)
     scale = min(1.0, PILOT_SIDE / max(opened.size))
     size = max(1, round(opened.size[0] * scale)), max(1, round(opened.size[1] * scale))
@@ -119,24 +123,20 @@ def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> 
         max_spp=min(study.render.spp, FULL_PASSES_SPP),
         cache=cache,
     )
-    groups = {count: groups_of(width_nm, count) for count in counts(width_nm)}
-    return Pilot(opened, transport, groups, True, _view_deg(opened))
+    return Pilot(opened, transport, {count: groups_of(width_nm, count) for count in counts(width_nm)})
 
 
-def full_lens(study: Study, lens: LensConfig, view_deg: float) -> LensConfig:
-    """Lens of the reference: what the sensor's own states, and what it leaves out as the study states it."""
-    asked = study.lens
-    view = view_deg if asked.horizontal_view_deg is None else asked.horizontal_view_deg
+def full_lens(study: Study, lens: LensConfig, opened: OpenedScene) -> LensConfig:
+    """Lens of the reference: what the sensor's own states, and what it leaves out as study and scene state it."""
+    asked, view = study.lens, study.lens.horizontal_view_deg
+    if view is None:
+        view = 0.0 if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
     return replace(
         lens,
         diffraction=lens.diffraction or asked.diffraction,
         veiling_glare=lens.veiling_glare or asked.veiling_glare,
         horizontal_view_deg=lens.horizontal_view_deg or view,
     )
-
-
-def _view_deg(opened: OpenedScene) -> float:
-    return 0.0 if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
 
 
 def _spectra(opened: OpenedScene, study: Study) -> list[Spectrum]:
@@ -156,9 +156,9 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
             auto_s = unit_exposure_s(lit.relight(luminance_cd_m2=1.0), preset(name))
             for mosaic in mosaics(study):
                 sensor = vary(preset(name), mosaic)
-                found = effects(lit, sensor, full_lens(study, sensor.lens, pilot.view_deg), pilot.groups, rng)
-                for condition in conditions(study):
-                    if (condition.scene, condition.spectrum, condition.sensor) == (pilot.opened.choice, spectrum, name):
+                found = effects(lit, sensor, full_lens(study, sensor.lens, pilot.opened), pilot.groups, rng)
+                for condition in conditions(study, pilot.opened.choice):
+                    if (condition.spectrum, condition.sensor) == (spectrum, name):
                         level = level_luminance(condition.level, lux)
                         exposure_s = parse_exposure(condition.exposure)
                         if exposure_s is None:
@@ -167,17 +167,9 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
 
 
 def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:
-    """What Monte Carlo noise the pilot has; a picture file tells none."""
+    """Monte Carlo noise of the pilot; a picture file states none."""
     if not pilot.rendered:
         return PilotNoise(spp=0, pass_spp=1, level=0.0)
     fewer = lit.coverage.size / (pilot.opened.size[0] * pilot.opened.size[1])
     error = lit.level().relative_error or 0.0
     return PilotNoise(spp=lit.spp, pass_spp=lit.spp // lit.passes, level=error**2 * lit.spp * fewer)
-
-
-def _worst(ledgers: Sequence[Ledger]) -> dict[Condition, float]:
-    """Largest share over the mosaics of each condition."""
-    shares: dict[Condition, float] = {}
-    for row in ledgers:
-        shares[row.condition] = max(row.share, shares.get(row.condition, 0.0))
-    return shares

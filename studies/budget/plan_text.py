@@ -1,6 +1,6 @@
 """A plan in words: what was chosen, why, and the ledger as a table and as JSON."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict
 from html import escape
 from typing import Any
@@ -11,14 +11,15 @@ from studies.budget.choice import image_ns, render_ns
 from studies.budget.ledger import KERNEL, MONTE_CARLO, Ledger, Term
 from studies.budget.model_plan import Plan
 from studies.budget.terms import LENS_TERMS
-from studies.study.model import ImageModel
 from studies.study.study import SceneChoice, Study, label
-
-EVERYTHING = (*LENS_TERMS, KERNEL)
 
 
 def plan_json(study: Study, plan: Plan, reference: Plan) -> dict[str, Any]:
     """Everything that a plan holds, as JSON takes it."""
+    images = {
+        condition: {field: getattr(model.lens, field) for field in LENS_TERMS.values()} | {"exact": model.exact}
+        for condition, model in plan.images.items()
+    }
     return {
         "study": study.name,
         "budget": asdict(study.budget),
@@ -31,22 +32,18 @@ def plan_json(study: Study, plan: Plan, reference: Plan) -> dict[str, Any]:
             }
             for scene, model in plan.renders.items()
         ],
-        "conditions": [asdict(row) | {"image": _image_json(plan.images[row.condition])} for row in plan.ledgers],
+        "conditions": [asdict(row) | {"image": images[row.condition]} for row in plan.ledgers],
     }
-
-
-def _image_json(model: ImageModel) -> dict[str, Any]:
-    return {field: getattr(model.lens, field) for field in LENS_TERMS.values()} | {"exact": model.exact}
 
 
 def plan_table(plan: Plan) -> Table:
     """The worse mosaic of each condition, a term a column: share of the noise variance, in brackets if modelled."""
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("condition", "noise, e-", "off, e-", "together", *(term.name for term in plan.ledgers[0].terms)):
+    for name in _head(plan):
         table.add_column(name, justify="left" if name == "condition" else "right", overflow="fold")
-    for row in _worse_mosaics(plan.ledgers):
-        cells = [f"{row.noise_e:.3g}", f"{row.rms_e:.2g}", _percent(row.share), *(_cell(term) for term in row.terms)]
-        table.add_row(_name(row), *cells)
+    for condition in plan.images:
+        rows = [row for row in plan.ledgers if row.condition == condition]
+        table.add_row(*_cells(max(rows, key=lambda row: row.share)))
     return table
 
 
@@ -54,17 +51,20 @@ def plan_html(plan: Plan) -> str:
     """The ledger as a table for a notebook: a row a condition and mosaic, a column a term."""
     if not plan.ledgers:
         return f"<p>Plan of {len(plan.renders)} renders and {len(plan.images)} images, without a budget</p>"
-    head = ("condition", "noise, e⁻", "off, e⁻", "together", *(term.name for term in plan.ledgers[0].terms))
-    rows = [
-        (_name(row), f"{row.noise_e:.3g}", f"{row.rms_e:.2g}", _percent(row.share), *map(_cell, row.terms))
-        for row in plan.ledgers
-    ]
-    cells = ["".join(f"<{tag}>{escape(text)}</{tag}>" for text in row) for tag, row in _tagged(head, rows)]
-    return f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+    head = "".join(f"<th>{escape(name)}</th>" for name in _head(plan))
+    rows = ("".join(f"<td>{escape(text)}</td>" for text in _cells(row)) for row in plan.ledgers)
+    return f"<table>{''.join(f'<tr>{row}</tr>' for row in (head, *rows))}</table>"
 
 
-def _tagged(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[tuple[str, Sequence[str]]]:
-    return [("th", head), *(("td", row) for row in rows)]
+def _head(plan: Plan) -> list[str]:
+    return ["condition", "noise, e-", "off, e-", "together", *(term.name for term in plan.ledgers[0].terms)]
+
+
+def _cells(row: Ledger) -> list[str]:
+    of = row.condition
+    condition = (label(of.scene.source), of.spectrum, of.level, f"{row.exposure_s * 1e3:.3g}ms", of.sensor, row.mosaic)
+    terms = [f"({_percent(term.share)})" if term.modelled else _percent(term.share) for term in row.terms]
+    return [" ".join(condition), f"{row.noise_e:.3g}", f"{row.rms_e:.2g}", _percent(row.share), *terms]
 
 
 def reasons(study: Study, plan: Plan, reference: Plan) -> Iterator[str]:
@@ -88,7 +88,7 @@ def reasons(study: Study, plan: Plan, reference: Plan) -> Iterator[str]:
                 f"{label(scene.source)}: Monte Carlo noise reaches {_percent(noise.share)} in the worst condition; "
                 f"{wanted:.2g} samples would keep the aim, and render.spp allows {study.render.spp}"
             )
-    for name in EVERYTHING:
+    for name in (*LENS_TERMS, KERNEL):
         rows = [(row, term) for row in plan.ledgers for term in row.terms if term.name == name]
         out = [term.share for _, term in rows if not term.modelled]
         kept = [term.share for _, term in rows if term.modelled]
@@ -120,25 +120,6 @@ def cost_over_reference(plan: Plan, reference: Plan, scene: SceneChoice) -> floa
                 cost += image_ns(bands, [*kept, KERNEL] if image.exact else kept)
         costs.append(cost)
     return costs[0] / costs[1]
-
-
-def _worse_mosaics(rows: Sequence[Ledger]) -> list[Ledger]:
-    found: dict[Any, Ledger] = {}
-    for row in rows:
-        if row.condition not in found or row.share > found[row.condition].share:
-            found[row.condition] = row
-    return list(found.values())
-
-
-def _name(row: Ledger) -> str:
-    of = row.condition
-    return " ".join(
-        (label(of.scene.source), of.spectrum, of.level, f"{row.exposure_s * 1e3:.3g}ms", of.sensor, row.mosaic)
-    )
-
-
-def _cell(term: Term) -> str:
-    return f"({_percent(term.share)})" if term.modelled else _percent(term.share)
 
 
 def _percent(share: float) -> str:

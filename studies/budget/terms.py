@@ -172,16 +172,16 @@ def _band_errors(
 def _jitter(
     halves: Sequence[SpectralRadiance], sensor: SensorConfig, groups: Sequence[NDArray[np.intp]]
 ) -> NDArray[np.float64]:
-    """Variance over the places within all wide bands at once: a path draws one offset for all of them."""
-    places = max(len(group) for group in groups)
-    if places == 1:
+    """Variance over the positions within all wide bands at once: a path draws one offset for all of them."""
+    positions = max(len(group) for group in groups)
+    if positions == 1:
         return np.zeros(halves[0].shape)
     values = np.maximum(halves[0].values + halves[1].values, 0) / 2
     drawn = []
-    for place in range(places):
+    for position in range(positions):
         chosen = np.zeros_like(values)
         for group in groups:
-            index = group[place * len(group) // places]
+            index = group[position * len(group) // positions]
             chosen[..., group] = values[..., [index]]
         drawn.append(SpectralRadiance(chosen, halves[0].wavelength_nm, 0.0, halves[0].width_nm))
     return np.asarray(_electrons(drawn, sensor).var(axis=0))

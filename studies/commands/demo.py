@@ -9,7 +9,7 @@ from studies.budget.model_plan import as_stated
 from studies.commands.console import Flag, Out, Several
 from studies.commands.sweep import check_memory, make_all
 from studies.photograph.clock import Clock
-from studies.study.study import SceneChoice, check
+from studies.study.study import SceneChoice
 from studies.study.study_file import read_study
 from studies.sweep.workers import InThisProcess, run
 
@@ -72,7 +72,6 @@ def demo(
         seeds=(seed,),
         render=replace(study.render, **{name: value for name, value in changed.items() if value is not None}),
     )
-    check(study)
     check_memory(study, out, reference=False, workers=1, force=force)
     runner = partial(run, executor=InThisProcess())
     _, report = make_all(study, out, lambda step: as_stated(study), runner, clock=clock)

@@ -5,7 +5,7 @@ from pathlib import Path
 from rodcone.files import check_place
 from studies.commands.console import Out, require_ending
 from studies.pages.duels_page import write_page
-from studies.sweep.database import last_study, read_ledger
+from studies.sweep.database import last_study, read_results
 from studies.sweep.export import read_rows
 
 
@@ -32,7 +32,7 @@ def opponents(
     require_ending(out, ".md")
     check_place(out)
     rows = read_rows(folder)
-    with read_ledger(folder) as base:
+    with read_results(folder) as base:
         study, _ = last_study(base) or ({}, {})
     write_page(rows, study, folder, out, camera)
     print(out)

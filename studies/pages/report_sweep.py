@@ -28,7 +28,7 @@ from studies.pages.report_facts import (
 )
 from studies.pages.report_text import METRICS, group_names, view_names
 from studies.study.study import label
-from studies.sweep.database import FILE, last_study, read_ledger, rows
+from studies.sweep.database import last_study, read_results, rows
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import require_alike
 from studies.sweep.row import Row
@@ -56,9 +56,7 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         Where there is no results database, one of another version, none of the last run's cells is made yet, they were
         made by different versions, variants or engines, or a picture is gone.
     """
-    if not (folder / FILE).is_file():
-        raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
-    with read_ledger(folder) as base:
+    with read_results(folder) as base:
         made, wanted = rows(base), base.execute("SELECT count(*) FROM wanted").fetchone()[0]
         run = last_study(base)
     if not made or run is None:

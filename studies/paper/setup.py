@@ -30,9 +30,9 @@ from studies.metrics.quality import psnr_db
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.lit_scene import make_transport, open_choice
-from studies.study.study import OWN, RenderLimits, SceneChoice, Study, parse_exposure
+from studies.study.study import OWN, Condition, RenderLimits, SceneChoice, Study, parse_exposure
 from studies.study.study_file import read_study
-from studies.sweep.cells import Coordinates, device_stream, exposure_stream
+from studies.sweep.cells import device_stream, exposure_stream
 from studies.sweep.export import read_rows
 from studies.sweep.prepare import PICTURES, RENDERS
 from studies.sweep.row import Row
@@ -190,11 +190,14 @@ def exposures(
     mosaic = PROCESSORS[processor].mosaic
     sensor, exposure_s = sensor_of(reading, mosaic, pitch_um), parse_exposure(exposure) or 0.0
     expected_e = expected_electrons(form_image(seen.radiance, sensor), sensor, exposure_s)
-    name, made = reading if pitch_um is None else f"{reading}_{pitch_um}um", []
+    name = reading if pitch_um is None else f"{reading}_{pitch_um}um"
+    condition = Condition(scene=SceneChoice(seen.scene), spectrum=OWN, level=seen.level, exposure=exposure, sensor=name)
+    made = []
     for seed in range(count):
-        at = Coordinates(seen.scene, OWN, seen.level, exposure, name, processor, seed)
-        device = draw_device(sensor, expected_e.shape, device_stream(at, mosaic))
-        made.append(expose(expected_e, sensor, exposure_s, device, exposure_stream(at, mosaic), exact=True))
+        device = draw_device(sensor, expected_e.shape, device_stream(name, mosaic, seed))
+        made.append(
+            expose(expected_e, sensor, exposure_s, device, exposure_stream(condition, mosaic, seed), exact=True)
+        )
     return made
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -65,25 +66,22 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         if choice.extend:
             raise InputError(f"scenes: extend for {choice.source}, a picture without surfaces; leave it out")
         check_radiance_file(choice.source, study.levels)
-        return OpenedScene(choice, None, (0, 0), digest([digest_file(choice.source), choice.light]))
+        identity = digest([digest_file(choice.source), choice.light])
+        return OpenedScene(choice=choice, scene=None, size=(0, 0), identity=identity)
     opened = open_scene(choice.source, extend=choice.extend, light=choice.light)
     scene = opened.scene
     for level in study.levels:
         asked_level(scene, level)
-    for spectrum in study.spectra:
-        _check_relit(scene, spectrum)
-    check_range(scene, *study.render.range_nm)
-    size = film_size(opened.size, study.render.size)
-    return OpenedScene(choice, scene, size, digest([digest_scene(scene), size]), tuple(opened.notes))
-
-
-def _check_relit(scene: Scene, spectrum: str) -> None:
-    for name, group in scene.groups.items():
+    for spectrum, (name, group) in product(study.spectra, scene.groups.items()):
         if spectrum != OWN and group.coloured:
             raise InputError(
                 f"spectra: {spectrum!r} can't relight group {name!r} of scene {scene.name}, whose lights have colours "
                 f"of their own; allowed: {OWN}; put the scene into a study of its own"
             )
+    check_range(scene, *study.render.range_nm)
+    size = film_size(opened.size, study.render.size)
+    identity = digest([digest_scene(scene), size])
+    return OpenedScene(choice=choice, scene=scene, size=size, identity=identity, notes=tuple(opened.notes))
 
 
 def make_transport(
@@ -93,6 +91,8 @@ def make_transport(
     cache: Path,
     progress: Progress,
     share: Callable[[Transport], float] | None = None,
+    *,
+    seed_offset: int = 0,
 ) -> tuple[Transport, tuple[str, ...]]:
     """Render a scene, or read a picture file, with what had to be assumed of the file.
 
@@ -104,6 +104,8 @@ def make_transport(
         Folder of renders: a coarser one is continued, a finer one is taken.
     share : callable, optional
         Noise variance of a render over the sensor's own, for a study with a `noise_share`.
+    seed_offset : int
+        Added to the study's seed, for a render that is independent of the study's own.
 
     Raises
     ------
@@ -121,7 +123,7 @@ def make_transport(
         "width_nm": model.width_nm,
         "max_spp": model.spp,  # in passes of 16 samples, so that a finer request goes on from a coarser one's
         "max_seconds": limits.max_seconds,
-        "seed": limits.seed,
+        "seed": limits.seed + seed_offset,
         "cache": cache,
         "progress": progress,
     }
@@ -220,7 +222,7 @@ def level_luminance(level: str, lux_per_cd_m2: float | None) -> float:
 
 
 def open_all(study: Study) -> dict[SceneChoice, OpenedScene]:
-    """Open every scene of a study; done before the first render, a fault in the last one is told at once."""
+    """Open every scene of a study: done before the first render, so that a fault in the last scene stops it at once."""
     return {choice: open_choice(choice, study) for choice in study.scenes}
 
 

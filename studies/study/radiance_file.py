@@ -44,6 +44,6 @@ def open_radiance_file(path: str | Path, light: str | None) -> tuple[Transport, 
     if radiance.relative_mc_error:
         assumed.append(
             f"{name}: it states a relative Monte Carlo error of {radiance.relative_mc_error:.3f}, "
-            "which no share of the sensor's noise tells"
+            "which the Monte Carlo share leaves out"
         )
     return as_transport(radiance), spectrum, assumed

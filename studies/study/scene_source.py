@@ -28,7 +28,7 @@ def open_scene(source: str, trust: bool = False, extend: str | None = None, ligh
     Raises
     ------
     InputError
-        For an unknown name, a scene file that isn't allowed, trust in a scene by name, or a light for a file.
+        For an unknown name, a scene file that isn't allowed, `trust` for a catalogue scene, or `light` for a file.
     """
     if Path(source).suffix.lower() == ".xml":
         if light is not None:

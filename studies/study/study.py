@@ -1,7 +1,6 @@
 """A study: scenes, spectra, levels, exposures, sensors, processors and seeds, of which every combination is a cell."""
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
@@ -25,7 +24,7 @@ AUTO = "auto"  # the exposure by `sensor.exposure.auto_exposure_s`
 # A light whose table ends short of the bands, at no more than this share of its peak, is taken as dark from there on;
 # white LEDs of the CIE end at 780 nm with 0.6 to 5 %.
 _RUN_OUT = 0.01
-_FILES = (".xml", ".exr", ".mat", ".toml")
+FILES = (".xml", ".exr", ".mat", ".toml")  # endings of values that name a file
 _TIME = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+)\s*(us|ms|s)\s*$")
 _SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
 
@@ -50,7 +49,7 @@ class SceneChoice:
 
 @dataclass(frozen=True)
 class RenderLimits:
-    """How the scenes are rendered: the most that a plan may ask for, and what is done without one.
+    """How the scenes are rendered: the most that a plan may ask for, and the values used without a plan.
 
     Attributes
     ----------
@@ -100,7 +99,7 @@ class LensTerms:
 
 @dataclass(frozen=True)
 class BudgetShares:
-    """Shares of the sensor's own noise variance that a plan's approximations may add: together, and Monte Carlo's."""
+    """Noise variance that a plan's approximations may add, over the sensor's own: together, and Monte Carlo's."""
 
     total: float = 0.10
     monte_carlo: float = 0.03
@@ -108,7 +107,7 @@ class BudgetShares:
 
 @dataclass(frozen=True)
 class Condition:
-    """What light meets which chip for how long: all that decides the expected electrons but for the mosaic.
+    """A place in the study's grid: all that decides the expected electrons but for the mosaic.
 
     Attributes
     ----------
@@ -132,7 +131,13 @@ class Condition:
 
 @dataclass(frozen=True)
 class Study:
-    """Axes of a sweep, and how its pictures are made. Every combination of the seven axes is a cell."""
+    """Axes of a sweep, and how its pictures are made. Every combination of the seven axes is a cell.
+
+    Raises
+    ------
+    InputError
+        For whatever isn't allowed and can be told without opening the scenes.
+    """
 
     scenes: tuple[SceneChoice, ...]
     levels: tuple[str, ...]
@@ -147,10 +152,15 @@ class Study:
     lens: LensTerms = field(default_factory=LensTerms)
     budget: BudgetShares = field(default_factory=BudgetShares)
 
+    def __post_init__(self) -> None:
+        _check_axes(self)
+        _check_cameras(self)
+        _check_numbers(self)
 
-def conditions(study: Study) -> list[Condition]:
-    """All combinations of scenes, spectra, levels, exposures and sensors, the last running fastest."""
-    axes = (study.scenes, study.spectra, study.levels, study.exposures, study.sensors)
+
+def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:
+    """All combinations of scenes (or of one alone), spectra, levels, exposures and sensors; the last varies fastest."""
+    axes = (study.scenes if scene is None else (scene,), study.spectra, study.levels, study.exposures, study.sensors)
     return [Condition(*place) for place in product(*axes)]
 
 
@@ -160,9 +170,9 @@ def mosaics(study: Study) -> tuple[str, ...]:
 
 
 def label(value: Any) -> str:
-    """Name of a value of an axis in ledger and seeds: a file's own name without its folder, else the value as it is."""
+    """Name of a value of an axis in rows and seeds: a file's name without its folder, any other value as it is."""
     text = str(value)
-    return Path(text).name if Path(text).suffix.lower() in _FILES else text
+    return Path(text).name if Path(text).suffix.lower() in FILES else text
 
 
 def parse_exposure(text: str) -> float | None:
@@ -183,38 +193,38 @@ def parse_exposure(text: str) -> float | None:
     return seconds
 
 
-def check(study: Study) -> None:
-    """Raise `InputError` for whatever in a study can be told without opening its scenes."""
-    axes: dict[str, Sequence[Any]] = {
-        name: getattr(study, name)
-        for name in ("scenes", "spectra", "levels", "exposures", "sensors", "processors", "seeds")
-    }
-    for name, values in axes.items():
+def _check_axes(study: Study) -> None:
+    """Check that each axis has values of its own, and that levels, times, seeds and lights are known."""
+    for name in ("scenes", "spectra", "levels", "exposures", "sensors", "processors", "seeds"):
+        values = getattr(study, name)
         labels = [label(value.source if isinstance(value, SceneChoice) else value) for value in values]
         if not labels or len(set(labels)) != len(labels):
             raise InputError(
                 f"{name}: {labels!r} is not allowed; give one or more, each once, files under names of their own"
             )
-    for spectrum in study.spectra:
-        if spectrum != OWN:
-            illuminant(spectrum)
-            _check_relit(study, spectrum)
-            _check_known(spectrum, study.render.range_nm)
     for level in study.levels:
         parse_level(level)
     for exposure in study.exposures:
         parse_exposure(exposure)
-    _check_names(study)
     for seed in study.seeds:
         require_whole("seeds", seed, 0, 2**63 - 1, "give whole numbers")
-    _check_numbers(study)
-
-
-def _check_names(study: Study) -> None:
-    """Lights of scenes, processors, and sensors with the mosaics that these take."""
     for scene in study.scenes:
         if scene.light is not None:
             illuminant(scene.light)
+    _check_range(study.render.range_nm)
+    for spectrum in study.spectra:
+        if spectrum != OWN:
+            _check_known(spectrum, study.render.range_nm)
+            for scene in study.scenes:
+                if is_radiance_file(scene.source):
+                    raise InputError(
+                        f"spectra: {spectrum!r} can't relight {scene.source}, a picture whose light is in it; "
+                        f"allowed: {OWN}; put the scene into a study of its own"
+                    )
+
+
+def _check_cameras(study: Study) -> None:
+    """Check processors, and sensors with the mosaics that these take."""
     for name in study.processors:
         if name not in PROCESSORS:
             raise unknown("processors", name, PROCESSORS)
@@ -228,20 +238,31 @@ def _check_names(study: Study) -> None:
             vary(own, mosaic)
 
 
-def _check_relit(study: Study, spectrum: str) -> None:
-    for scene in study.scenes:
-        if is_radiance_file(scene.source):
-            raise InputError(
-                f"spectra: {spectrum!r} can't relight {scene.source}, a picture whose light is in it; "
-                f"allowed: {OWN}; put the scene into a study of its own"
-            )
+def _check_numbers(study: Study) -> None:
+    limits, lens, budget = study.render, study.lens, study.budget
+    require_range("longest_exposure_s", study.longest_exposure_s, 1e-9, 1e6, "give seconds above 0")
+    if limits.size is not None:
+        require_whole("render.size", limits.size, 16, 8192, "give the picture's longer side in pixels")
+    require_range("render.band_nm", limits.band_nm, 1.0, 100.0, "give nanometres")
+    require_whole("render.spp", limits.spp, 1, 1 << 16, "give samples per pixel")
+    require_whole("render.seed", limits.seed, 0, 2**31, "give a whole number")
+    if limits.max_seconds is not None:
+        require_range("render.max_seconds", limits.max_seconds, 1e-3, 1e7, "give seconds")
+    if limits.noise_share is not None:
+        require_range("render.noise_share", limits.noise_share, 1e-6, 1e3, "give a share of the noise variance: 0.03")
+    require_range("lens.diffraction", lens.diffraction, 0.0, 100.0, "give 1 for an ideal lens, 0 for none")
+    require_range("lens.veiling_glare", lens.veiling_glare, 0.0, 1.0, "give a fraction, 0 for none")
+    if lens.horizontal_view_deg is not None:
+        require_range("lens.horizontal_view_deg", lens.horizontal_view_deg, 0.0, 175.0, "give degrees, 0 for none")
+    require_range("budget.total", budget.total, 1e-6, 1e3, "give a share of the noise variance: 10 % is 0.1")
+    require_range("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total")
 
 
 def _check_known(spectrum: str, range_nm: tuple[float, float]) -> None:
-    """Raise `InputError` where a light is not known as far as a study renders beyond 380-780 nm."""
+    """Raise `InputError` for an unknown light, or one not known as far as a study renders beyond 380-780 nm."""
+    light = illuminant(spectrum)
     if range_nm[0] >= VISIBLE_NM[0] and range_nm[1] <= VISIBLE_NM[1]:
         return
-    light = illuminant(spectrum)
     ends = zip(light.wavelength_nm[[0, -1]], light.values[[0, -1]], (range_nm[0], -range_nm[1]), (1, -1), strict=True)
     short = [nm for nm, value, asked, sign in ends if sign * nm > asked and value > _RUN_OUT * light.values.max()]
     if short or lines_nm(spectrum):
@@ -260,24 +281,3 @@ def _check_range(range_nm: tuple[float, ...]) -> None:
         )
     if range_nm[1] - range_nm[0] < LEAST_RANGE_NM:
         raise InputError(f"render.range_nm: {list(range_nm)!r} is less than {LEAST_RANGE_NM:g} nm; widen it")
-
-
-def _check_numbers(study: Study) -> None:
-    require_range("longest_exposure_s", study.longest_exposure_s, 1e-9, 1e6, "give seconds above 0")
-    limits, lens, budget = study.render, study.lens, study.budget
-    if limits.size is not None:
-        require_whole("render.size", limits.size, 16, 8192, "give the picture's longer side in pixels")
-    _check_range(limits.range_nm)
-    require_range("render.band_nm", limits.band_nm, 1.0, 100.0, "give nanometres")
-    require_whole("render.spp", limits.spp, 1, 1 << 16, "give samples per pixel")
-    require_whole("render.seed", limits.seed, 0, 2**31, "give a whole number")
-    if limits.max_seconds is not None:
-        require_range("render.max_seconds", limits.max_seconds, 1e-3, 1e7, "give seconds")
-    if limits.noise_share is not None:
-        require_range("render.noise_share", limits.noise_share, 1e-6, 1e3, "give a share of the noise variance: 0.03")
-    require_range("lens.diffraction", lens.diffraction, 0.0, 100.0, "give 1 for an ideal lens, 0 for none")
-    require_range("lens.veiling_glare", lens.veiling_glare, 0.0, 1.0, "give a fraction, 0 for none")
-    if lens.horizontal_view_deg is not None:
-        require_range("lens.horizontal_view_deg", lens.horizontal_view_deg, 0.0, 175.0, "give degrees, 0 for none")
-    require_range("budget.total", budget.total, 1e-6, 1e3, "give a share of the noise variance: 10 % is 0.1")
-    require_range("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total")

@@ -1,18 +1,18 @@
-"""Studies as TOML files: read strictly, so that a misspelt key can't go unnoticed for a night of computing."""
+"""Studies as TOML files, read strictly: a misspelt key is an error, not a night of computing lost."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
 from cattrs import AttributeValidationNote, ClassValidationError, Converter, ForbiddenExtraKeysError
+from cattrs.gen import make_dict_structure_fn
 
 from rodcone.errors import InputError, one_line, require_whole, unknown
 from rodcone.toml_file import parse_toml, read_toml
-from studies.study.study import SceneChoice, Study, check
+from studies.study.study import FILES, SceneChoice, Study
 
 MOST_SEEDS = 100_000
-_FILES = (".xml", ".exr", ".mat", ".toml")  # values that name a file beside the study's
 
 
 def read_study(path: str | Path, changes: Sequence[str] = ()) -> Study:
@@ -39,29 +39,17 @@ def read_study(path: str | Path, changes: Sequence[str] = ()) -> Study:
     try:
         for change in changes:
             _set(content, change)
-        study = _beside(study_of(content), Path(path).parent)
-        check(study)
-    except InputError as error:
-        raise InputError(f"study {str(path)!r}: {error}") from error
-    return study
-
-
-def study_of(content: Mapping[str, Any]) -> Study:
-    """Study of a TOML file's content, its values not checked beyond their types; ``seeds = 3`` are seeds 0, 1 and 2.
-
-    Raises
-    ------
-    InputError
-        For an unknown key, a missing one, or a value of another type.
-    """
-    seeds = content.get("seeds")
-    if isinstance(seeds, int) and not isinstance(seeds, bool):
-        require_whole("seeds", seeds, 1, MOST_SEEDS, "give how many, from 0 on, or a list such as [7]")
-        content = {**content, "seeds": list(range(seeds))}
-    try:
+        seeds = content.get("seeds")
+        if isinstance(seeds, int) and not isinstance(seeds, bool):
+            require_whole("seeds", seeds, 1, MOST_SEEDS, "give how many, from 0 on, or a list such as [7]")
+            content["seeds"] = list(range(seeds))
+        for axis in ("scenes", "sensors"):
+            content |= {axis: _beside(content[axis], Path(path).parent)} if axis in content else {}
         return _CONVERTER.structure(content, Study)
     except ClassValidationError as error:
-        raise _told(error) from error
+        raise InputError(f"study {str(path)!r}: {_first_fault(error)}") from error
+    except InputError as error:
+        raise InputError(f"study {str(path)!r}: {error}") from error
 
 
 def _set(content: dict[str, Any], change: str) -> None:
@@ -82,14 +70,13 @@ def _set(content: dict[str, Any], change: str) -> None:
     table[last] = value
 
 
-def _beside(study: Study, folder: Path) -> Study:
-    """Study whose files are found from anywhere."""
-
-    def place(name: str) -> str:
-        return str(folder / name) if Path(name).suffix.lower() in _FILES else name
-
-    scenes = tuple(replace(scene, source=place(scene.source)) for scene in study.scenes)
-    return replace(study, scenes=scenes, sensors=tuple(place(name) for name in study.sensors))
+def _beside(value: Any, folder: Path) -> Any:
+    """Value of an axis in which files are found from anywhere: their names are those of files in the study's folder."""
+    if isinstance(value, list):
+        return [_beside(each, folder) for each in value]
+    if isinstance(value, dict) and "source" in value:
+        return value | {"source": _beside(value["source"], folder)}
+    return str(folder / value) if isinstance(value, str) and Path(value).suffix.lower() in FILES else value
 
 
 def _strict(kind: type, allowed: tuple[type, ...], words: str) -> Callable[[Any, Any], Any]:
@@ -109,14 +96,14 @@ def _scene(value: Any, _: Any) -> SceneChoice:
         return SceneChoice(value)
     if not isinstance(value, dict):
         raise InputError(f"{value!r} is not a scene; give a name, a file, or {{ source = NAME, light = LIGHT }}")
-    return _TABLE_CONVERTER.structure(value, SceneChoice)
+    return _scene_of_table(value, SceneChoice)
 
 
-def _axis(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+def _axis(kind: Any) -> Callable[[Any, Any], Any]:
     """Hook for a tuple, in which one value stands for a list of one."""
     item = get_args(kind)[0]
     return lambda value, _: tuple(
-        converter.structure(each, item) for each in (value if isinstance(value, list) else [value])
+        _CONVERTER.structure(each, item) for each in (value if isinstance(value, list) else [value])
     )
 
 
@@ -125,33 +112,27 @@ def _is_tuple(kind: Any) -> bool:
     return origin is tuple
 
 
-def _converter() -> Converter:
-    made = Converter(forbid_extra_keys=True)
-    made.register_structure_hook(str, _strict(str, (str,), "a text in quotes"))
-    made.register_structure_hook(int, _strict(int, (int,), "a whole number"))
-    made.register_structure_hook(float, _strict(float, (int, float), "a number"))
-    made.register_structure_hook_factory(_is_tuple, lambda kind: _axis(kind, made))
-    return made
-
-
-_TABLE_CONVERTER = _converter()
-_CONVERTER = _converter()
+_CONVERTER = Converter(forbid_extra_keys=True)
+_CONVERTER.register_structure_hook(str, _strict(str, (str,), "a text in quotes"))
+_CONVERTER.register_structure_hook(int, _strict(int, (int,), "a whole number"))
+_CONVERTER.register_structure_hook(float, _strict(float, (int, float), "a number"))
+_CONVERTER.register_structure_hook_factory(_is_tuple, _axis)
+_scene_of_table = make_dict_structure_fn(SceneChoice, _CONVERTER, _cattrs_forbid_extra_keys=True)
 _CONVERTER.register_structure_hook(SceneChoice, _scene)
 
 
-def _told(error: ClassValidationError) -> InputError:
-    """First fault on one line; an unknown key comes with the one that was likely meant."""
+def _first_fault(error: ClassValidationError) -> str:
+    """Words for the first fault; for an unknown key with the one that was likely meant."""
     fault = min(error.exceptions, key=lambda each: not isinstance(each, ForbiddenExtraKeysError))
     if isinstance(fault, ForbiddenExtraKeysError):
-        return unknown("key", sorted(fault.extra_fields)[0], [field.name for field in fields(fault.cl)])
+        return str(unknown("key", sorted(fault.extra_fields)[0], [field.name for field in fields(fault.cl)]))
     if isinstance(fault, KeyError):
-        return InputError(f"key {fault.args[0]!r} is missing; add it, or see rodcone new study")
+        return f"key {fault.args[0]!r} is missing; add it, or see rodcone new study"
+    if isinstance(fault, ClassValidationError):
+        words = _first_fault(fault)
+    elif isinstance(fault, InputError):
+        words = str(fault)
+    else:
+        words = "the value is not a table; allowed: a table of keys; see rodcone new study"
     where = [note.name for note in getattr(fault, "__notes__", []) if isinstance(note, AttributeValidationNote)]
-    told = _told(fault) if isinstance(fault, ClassValidationError) else _type_fault(fault)
-    return InputError(f"{where[0]}: {told}" if where else str(told))
-
-
-def _type_fault(fault: BaseException) -> str:
-    if isinstance(fault, InputError):
-        return str(fault)
-    return "what stands there is not a table; allowed: a table of keys; see rodcone new study"
+    return f"{where[0]}: {words}" if where else words

@@ -1,8 +1,9 @@
-"""Cells of a study: one picture each, with all that decides it, a key of that, and random streams by coordinates."""
+"""Cells of a study: one picture each, all that decides it, its key, and the random streams of its noise."""
 
 import json
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,19 +15,6 @@ from studies.study.levels import parse_level
 from studies.study.lit_scene import RenderFacts
 from studies.study.study import Condition, label, parse_exposure
 from studies.sweep.provenance import Provenance
-
-
-@dataclass(frozen=True)
-class Coordinates:
-    """Place of a cell in its study, as the user wrote it; files by their own names."""
-
-    scene: str
-    spectrum: str
-    level: str
-    exposure: str
-    sensor: str
-    processor: str
-    seed: int
 
 
 @dataclass(frozen=True)
@@ -66,7 +54,9 @@ class Cell:
     ----------
     key : str
         Hash of all that decides the picture.
-    at : Coordinates
+    condition : Condition
+    processor : str
+    seed : int
     luminance_cd_m2 : float
         Mean scene luminance.
     illuminance_lux : float or None
@@ -75,24 +65,26 @@ class Cell:
     sensor : SensorConfig
         With the processor's mosaic and the lens that is modelled.
     made_by : Provenance
-        Of the process that asks; one that can't make it so refuses.
+        Of the process that asks; a worker with other versions or engines refuses the cell.
     colours : ColourFit
         Of the processor's balanced planes, under the scene's light.
     light : Light
     white_cd_m2 : float
         Luminance shown as white.
     electrons, half_difference, truth : Path
-        As `studies.sweep.frames.Frame` holds them.
+        As `studies.sweep.frames.UnitFrame` holds them.
     pictures : Path
         Folder that the picture goes to, under the hash of its content.
     render : RenderRecord
-        For the ledger.
+        For the row.
     budget_share : float or None
         Share of the noise variance that a plan predicts for its approximations.
     """
 
     key: str
-    at: Coordinates
+    condition: Condition
+    processor: str
+    seed: int
     luminance_cd_m2: float
     illuminance_lux: float | None
     exposure_s: float
@@ -109,37 +101,38 @@ class Cell:
     budget_share: float | None = None
 
 
-def coordinates(condition: Condition, processor: str, seed: int) -> Coordinates:
-    """Coordinates of a condition's cell, files under their names."""
-    scene, sensor = label(condition.scene.source), label(condition.sensor)
-    return Coordinates(scene, condition.spectrum, condition.level, condition.exposure, sensor, processor, seed)
+def labels(condition: Condition) -> dict[str, Any]:
+    """Scene, spectrum, level, exposure and sensor as a row names them: a file by its name, without its folder."""
+    return vars(condition) | {"scene": label(condition.scene.source), "sensor": label(condition.sensor)}
 
 
 def cell_key(
-    at: Coordinates,
+    condition: Condition,
+    processor: str,
+    seed: int,
     frame: str,
     luminance_cd_m2: float,
     exposure_s: float,
     colours: ColourFit,
     made_by: Provenance,
 ) -> str:
-    """Key of a cell: its coordinates, which seed its noise, and all that its picture is made from."""
-    return digest([astuple(at), frame, luminance_cd_m2, exposure_s, colours, made_by])
+    """Key of a cell: its place in the study, which decides its noise, and all that its picture is made from."""
+    return digest([labels(condition), processor, seed, frame, luminance_cd_m2, exposure_s, colours, made_by])
 
 
-def device_stream(at: Coordinates, mosaic: str) -> np.random.Generator:
+def device_stream(sensor: str, mosaic: str, seed: int) -> np.random.Generator:
     """Stream of a chip's fixed patterns: they belong to the sensor, its mosaic and the seed, not to the exposure."""
-    return _stream("device", at.sensor, mosaic, at.seed)
+    return _stream("device", label(sensor), mosaic, seed)
 
 
-def exposure_stream(at: Coordinates, mosaic: str) -> np.random.Generator:
+def exposure_stream(condition: Condition, mosaic: str, seed: int) -> np.random.Generator:
     """Stream of one exposure's noise; processors of the same mosaic develop the same exposure.
 
-    It depends on names and values alone, not on their places in the study: another level more leaves the others' noise.
+    It depends on names and values alone, not on their order in the study: one level more leaves the others' noise.
     """
-    value, unit = parse_level(at.level)
-    exposure = parse_exposure(at.exposure)
-    return _stream("exposure", at.scene, at.spectrum, value, unit, exposure, at.sensor, mosaic, at.seed)
+    names, (value, unit) = labels(condition), parse_level(condition.level)
+    exposure = parse_exposure(condition.exposure)
+    return _stream("exposure", names["scene"], condition.spectrum, value, unit, exposure, names["sensor"], mosaic, seed)
 
 
 def _stream(*parts: object) -> np.random.Generator:

@@ -1,9 +1,7 @@
-"""Cells on a cluster of `dask.distributed` (extra ``cluster``): the same cells, the same ledger."""
+"""Cells on a cluster of `dask.distributed` (extra ``cluster``): the same cells and rows as in one process."""
 
 import logging
 import os
-import socket
-import time
 import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -22,24 +20,22 @@ from studies.sweep.provenance import versions
 from studies.sweep.row import Row
 from studies.sweep.workers import cores, run
 
-TRIM = (
-    "MALLOC_TRIM_THRESHOLD_"  # as `distributed` sets it, NumPy takes twice the processor time: pages go back and forth
-)
+# As `distributed` sets it, NumPy takes twice the processor time: pages go back to the system and come again.
+TRIM = "MALLOC_TRIM_THRESHOLD_"
 PATIENCE_S = 30.0  # for scheduler and workers to answer
-RETRY_S = 0.2
 Rows = Generator[Row, None, None]
 
 
 @contextmanager
 def on_cluster(address: str, patience_s: float = PATIENCE_S) -> Iterator[Callable[[Sequence[Cell]], Rows]]:
-    """Connect to a scheduler and give what runs cells on its workers; a worker that dies is dask's to replace.
+    """Connect to a scheduler and give a function that runs cells on its workers; dask replaces a worker that dies.
 
     Parameters
     ----------
     address : str
         Of the scheduler: ``tcp://127.0.0.1:8786``, or ``tls://...`` with dask's own settings for TLS.
     patience_s : float
-        How long to wait for it.
+        How long to wait for it: a batch job may start its scheduler a moment before its sweep.
 
     Raises
     ------
@@ -56,7 +52,7 @@ def on_cluster(address: str, patience_s: float = PATIENCE_S) -> Iterator[Callabl
 
 
 def _run(client: Any, address: str, slots: int, threads: int, cells: Sequence[Cell]) -> Rows:
-    """Run cells, two in each worker's hands."""
+    """Run cells; each worker holds two, so that it never waits for the next."""
     from distributed import KilledWorker
 
     executor = client.get_executor(pure=False)
@@ -70,7 +66,7 @@ def _run(client: Any, address: str, slots: int, threads: int, cells: Sequence[Ce
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep dask's tracebacks off stderr: what they mean is told in one line."""
+    """Keep dask's tracebacks off stderr: `on_cluster` raises one line in their place."""
     import distributed  # noqa: F401 - now: its import sets the levels
 
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
@@ -85,25 +81,21 @@ def _quiet() -> Iterator[None]:
 
 
 def check_address(address: str) -> None:
-    """Raise `InputError` for what is no scheduler's address; warn where cells would travel an open network in clear."""
+    """Raise `InputError` for no scheduler's address; warn where cells would travel an open network unencrypted."""
     parts = urlsplit(address)
-    if parts.scheme not in ("tcp", "tls") or not parts.hostname or not _port(parts):
+    try:
+        complete = parts.scheme in ("tcp", "tls") and parts.hostname and parts.port
+    except ValueError:  # the port is not a number, or beyond 65535
+        complete = False
+    if not complete:
         raise InputError(
             f"cluster: {address!r} is not an address; allowed: tcp://HOST:PORT or tls://HOST:PORT of a dask scheduler"
         )
-    if parts.scheme == "tcp" and not _is_loopback(parts.hostname):
+    if parts.scheme == "tcp" and not _is_loopback(str(parts.hostname)):
         warnings.warn(
             f"{address} is no loopback address: whoever reaches it can run code as you; see docs/studies.md for tls://",
             stacklevel=2,
         )
-
-
-def _port(parts: Any) -> int | None:
-    try:
-        port: int | None = parts.port
-    except ValueError:  # not a number, or beyond 65535
-        return None
-    return port
 
 
 def _is_loopback(host: str) -> bool:
@@ -118,7 +110,6 @@ def _client(address: str, patience_s: float) -> Any:
 
     _check_encryption(address)
     try:
-        _wait_for_port(address, patience_s)
         return Client(address, timeout=patience_s, set_as_default=False)
     except OSError as error:
         raise InputError(
@@ -128,7 +119,7 @@ def _client(address: str, patience_s: float) -> Any:
 
 
 def _check_encryption(address: str) -> None:
-    """Raise `InputError` where dask's settings for TLS don't fit the address: it would say so in a traceback."""
+    """Raise `InputError` where dask's settings for TLS don't fit the address; dask itself ends in a traceback."""
     from distributed.security import Security
 
     try:
@@ -145,19 +136,6 @@ def _check_encryption(address: str) -> None:
         )
     if address.startswith("tcp:") and security.require_encryption:
         raise InputError(f"cluster: {address} is in clear and dask's settings require encryption; write tls://")
-
-
-def _wait_for_port(address: str, patience_s: float) -> None:
-    """Wait until something listens: a batch job starts its scheduler a moment before its sweep."""
-    parts, until = urlsplit(address), time.monotonic() + patience_s
-    while True:
-        try:
-            socket.create_connection((str(parts.hostname), int(parts.port or 0)), timeout=patience_s).close()
-            return
-        except OSError:
-            if time.monotonic() > until:
-                raise
-        time.sleep(RETRY_S)
 
 
 def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:

@@ -1,6 +1,7 @@
 """The version of the code that decides a picture: part of every cell's key."""
 
 import ast
+import threading
 from importlib import metadata
 from pathlib import Path
 
@@ -11,6 +12,7 @@ _WHOLE = ("rodcone", "render", "scenes", "sensor", "isp")  # beside `studies`, a
 # Of `studies` what making a frame and running a cell import; the other modules only ask, store and show.
 _DECIDING = ("studies.sweep.run_cell", "studies.sweep.frames")
 _CODE = (".py", ".toml", ".csv")
+_PARSING = threading.Lock()  # CPython 3.11 counts the depth of all threads' parsing as one, and fails
 
 
 def code_version(root: Path = ROOT) -> str:
@@ -30,7 +32,9 @@ def deciding_modules(root: Path = ROOT) -> list[Path]:
         if not path.is_file() or path in found:  # a package, which decides nothing, or a name within a module
             continue
         found.add(path)
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        with _PARSING:
+            tree = ast.parse(path.read_text("utf-8"))
+        for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "studies":
                 waiting += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
             elif isinstance(node, ast.Import):

@@ -1,6 +1,6 @@
-"""The ledger of a sweep: an SQLite file with a row a cell. A row stands whole or not at all, whatever ends the run.
+"""The results database of a sweep: an SQLite file with a row for each cell, written whole or not at all.
 
-What is read back for its values ends in its digest: SQLite itself doesn't notice a number that has changed.
+Each row ends in its digest: SQLite itself doesn't notice a number that has changed.
 """
 
 import errno
@@ -8,17 +8,18 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import asdict, fields
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, get_type_hints
 
 from rodcone.digests import digest
 from rodcone.errors import InputError, one_line
 from studies.study.lit_scene import RenderFacts
-from studies.sweep.cells import Coordinates, RenderRecord
-from studies.sweep.row import Row
+from studies.sweep.cells import RenderRecord
+from studies.sweep.row import AXES, Row
 from studies.sweep.stored import is_whole
 
 VERSION = 4  # of the tables; raise it with any change to them
@@ -26,19 +27,21 @@ APPLICATION_ID = 0x726F6463  # "rodc": tells this file from other SQLite files
 FILE = "ledger.sqlite"
 _DAMAGED = (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_TOOBIG)
 _WAIT_S = 30.0  # for another process that writes: a row takes milliseconds
-_TYPES: dict[Any, str] = {str: "TEXT NOT NULL", int: "INTEGER NOT NULL", float: "REAL NOT NULL"}
-_OPTIONAL: dict[Any, str] = {float | None: "REAL", int | None: "INTEGER"}
+_TYPES: dict[Any, str] = {
+    str: "TEXT NOT NULL",
+    int: "INTEGER NOT NULL",
+    float: "REAL NOT NULL",
+    float | None: "REAL",
+    int | None: "INTEGER",
+}
 _HINTS = get_type_hints(Row)
 COLUMNS = tuple(field.name for field in fields(Row))
 _COLUMNS = ", ".join(f"cells.{name}" for name in (*COLUMNS, "digest"))
 _REAL = {name for name in COLUMNS if _HINTS[name] in (float, float | None)}
-_TEXT = partial(str, encoding="utf-8", errors="replace")  # a row whose bytes have changed is told by its digest
-Found = TypeVar("Found")
+_TEXT = partial(str, encoding="utf-8", errors="replace")  # of bytes that have changed; the digest then tells
 _CREATE = (
     "CREATE TABLE cells ("
-    + ", ".join(
-        f"{name} {(_TYPES | _OPTIONAL)[_HINTS[name]]}" + (" PRIMARY KEY" if name == "key" else "") for name in COLUMNS
-    )
+    + ", ".join(f"{name} {_TYPES[_HINTS[name]]}" + (" PRIMARY KEY" if name == "key" else "") for name in COLUMNS)
     + ", digest TEXT NOT NULL) STRICT",
     # What the last run asks for, in the study's order; of a scene that isn't rendered yet the keys aren't known. The
     # cells of earlier runs stay in `cells`.
@@ -50,59 +53,73 @@ _CREATE = (
 
 
 @contextmanager
-def open_ledger(folder: Path) -> Iterator[sqlite3.Connection]:
-    """Open the ledger of a folder, or make it.
+def open_results(folder: Path) -> Iterator[sqlite3.Connection]:
+    """Open the results database of a folder, or make it.
 
     Raises
     ------
     InputError
-        For a file that is no ledger, or one of another version.
+        For a file that is no results database, or one of another version.
     OSError
         Where the file or the disk can't be written; it names the path.
     """
     path = folder / FILE
-    with _told(path):
-        base = sqlite3.connect(path, timeout=_WAIT_S, isolation_level=None)
-        base.text_factory = _TEXT
-        try:
-            _prepare(base, path)
-            _check_whole(base, path)
-            yield base
-        finally:
-            base.close()
+    with _connected(path, "mode=rwc") as base:
+        _prepare(base, path)
+        _check_whole(base, path)
+        yield base
 
 
 @contextmanager
-def read_ledger(folder: Path) -> Iterator[sqlite3.Connection]:
-    """Open the ledger of a folder to read from it alone; a sweep may go on writing to it.
+def read_results(folder: Path) -> Iterator[sqlite3.Connection]:
+    """Open the results database of a folder to read from it alone; a sweep may go on writing to it.
 
     Raises
     ------
     InputError
-        For a file that is no ledger, one of another version, or a damaged one.
+        For a file that is no results database, one of another version, or a damaged one.
     OSError
         Where it can't be read.
     """
     path = folder / FILE
-    # Beside what can't be written no log can be, which a reader otherwise looks into; and no other process writes.
+    if not path.is_file():
+        raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
+    # SQLite reads the write-ahead log too, and makes one. Where the folder can't be written and has no log, nobody else
+    # writes, and the file alone is read.
     still = not os.access(folder, os.W_OK) and not path.with_name(f"{FILE}-wal").exists()
-    with _told(path):
-        address = f"{path.resolve().as_uri()}?mode=ro{'&immutable=1' if still else ''}"
-        base = sqlite3.connect(address, timeout=_WAIT_S, isolation_level=None, uri=True)
-        base.text_factory = _TEXT
-        try:
-            if not _has_tables(base, path):
-                raise InputError(f"{path}: it is no ledger (it is empty); run the sweep again in another folder")
-            _check_whole(base, path)
+    with _connected(path, "mode=ro&immutable=1" if still else "mode=ro") as base:
+        if not _has_tables(base, path):
+            raise InputError(f"{path}: it is no results database (it is empty); run the sweep again in another folder")
+        _check_whole(base, path)
+        yield base
+
+
+@contextmanager
+def _connected(path: Path, options: str) -> Iterator[sqlite3.Connection]:
+    """Connect, and turn SQLite's errors into those that the command line prints as one line."""
+    address = f"{path.resolve().as_uri()}?{options}"
+    try:
+        with closing(sqlite3.connect(address, timeout=_WAIT_S, isolation_level=None, uri=True)) as base:
+            base.text_factory = _TEXT
             yield base
-        finally:
-            base.close()
+    except UnicodeDecodeError as error:  # SQLite quotes the damaged file in its message
+        raise InputError(f"{path}: it is no results database (its names are no text); move it away") from error
+    except sqlite3.DatabaseError as error:
+        code = getattr(error, "sqlite_errorcode", None)
+        if code is None:  # an error in our statement, not in the file
+            raise
+        if code & 0xFF in _DAMAGED:
+            raise InputError(
+                f"{path}: it is no results database ({error}); move it away, or choose another folder"
+            ) from error
+        number = errno.ENOSPC if code == sqlite3.SQLITE_FULL else errno.EIO
+        raise OSError(number, str(error), str(path)) from error
 
 
 def _check_whole(base: sqlite3.Connection, path: Path) -> None:
     found = base.execute("PRAGMA integrity_check(1)").fetchone()[0]
     if found != "ok":
-        raise InputError(f"{path}: it is no whole ledger ({one_line(found)}); run the sweep again in another folder")
+        raise InputError(f"{path}: it is damaged ({one_line(found)}); run the sweep again in another folder")
 
 
 def _prepare(base: sqlite3.Connection, path: Path) -> None:
@@ -120,34 +137,17 @@ def _prepare(base: sqlite3.Connection, path: Path) -> None:
 
 
 def _has_tables(base: sqlite3.Connection, path: Path) -> bool:
-    """Whether a ledger of this version is there; `InputError` for anything else that is."""
+    """Whether the file holds tables of this version; `InputError` for any other tables."""
     tables = base.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
     version, owner = (base.execute(f"PRAGMA {name}").fetchone()[0] for name in ("user_version", "application_id"))
     if tables and owner != APPLICATION_ID:
-        raise InputError(f"{path}: it is no ledger of rodcone; allowed: one, or none; choose another folder with --out")
+        raise InputError(f"{path}: it is no results database of rodcone; choose another folder with --out")
     if tables and version != VERSION:
         raise InputError(
             f"{path}: it has version {version}, this rodcone reads {VERSION}; allowed: that version; sweep again into "
             "another folder with --out, or export this one with the rodcone that wrote it"
         )
     return bool(tables)
-
-
-@contextmanager
-def _told(path: Path) -> Iterator[None]:
-    """Turn SQLite's errors into those that the command line tells in one line."""
-    try:
-        yield
-    except UnicodeDecodeError as error:  # in an error that quotes the file
-        raise InputError(f"{path}: it is no ledger (its names are no text); move it away") from error
-    except sqlite3.DatabaseError as error:
-        code = getattr(error, "sqlite_errorcode", None)
-        if code is None:  # a fault of ours, not of the file's
-            raise
-        if code & 0xFF in _DAMAGED:
-            raise InputError(f"{path}: it is no ledger ({error}); move it away, or choose another folder") from error
-        number = errno.ENOSPC if code == sqlite3.SQLITE_FULL else errno.EIO
-        raise OSError(number, str(error), str(path)) from error
 
 
 def add(base: sqlite3.Connection, row: Row) -> None:
@@ -157,15 +157,14 @@ def add(base: sqlite3.Connection, row: Row) -> None:
 
 
 def done(base: sqlite3.Connection, pictures: Path, keys: Iterable[str]) -> set[str]:
-    """Which of these cells have a whole row, and whole pictures: a power cut may have taken these."""
+    """Which of these cells have an undamaged row and undamaged pictures, which a power cut may have taken."""
     asked = set(keys)
-    found = [_row(values) for values in base.execute(f"SELECT {_COLUMNS} FROM cells") if values[0] in asked]
-    pairs = [(row.key, pictures / row.picture, pictures / row.truth) for row in found if row is not None]
-    return {key for key, picture, truth in pairs if is_whole(picture) and is_whole(truth)}
+    found = (row for row in _sound_rows(base) if row.key in asked)
+    return {row.key for row in found if is_whole(pictures / row.picture) and is_whole(pictures / row.truth)}
 
 
 def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
-    """Rows of the cells that the last run asked for, in the study's order; with `everything` all that there are.
+    """Rows of the cells that the last run asked for, in the study's order; with `everything` all rows.
 
     Raises
     ------
@@ -177,12 +176,12 @@ def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
         if everything
         else f"SELECT {_COLUMNS} FROM wanted JOIN cells USING (key) ORDER BY place"
     )
-    return [_whole(_row(values), f"row {values[0]!r}") for values in base.execute(chosen)]
+    return [Row(*_require_sound(values, f"row {values[0]!r}")) for values in base.execute(chosen)]
 
 
 def last_study(base: sqlite3.Connection) -> tuple[dict[str, Any], dict[str, float]] | None:
     """Study of the last run, and the seconds by stage of all runs of it; None before there is one."""
-    found = [_whole(_sealed(values), "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
+    found = [_require_sound(values, "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
     if not found:
         return None
     study, seconds = found[-1][2], dict[str, float]()
@@ -193,7 +192,7 @@ def last_study(base: sqlite3.Connection) -> tuple[dict[str, Any], dict[str, floa
 
 
 def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:
-    """Note which cells the run under way asks for, in place of what was noted before; None where not known yet."""
+    """Note which cells this run asks for, in place of the last run's; None where a key is not known yet."""
     base.execute("BEGIN IMMEDIATE")
     base.execute("DELETE FROM wanted")
     base.executemany("INSERT INTO wanted (key) VALUES (?)", ((key,) for key in keys))
@@ -201,18 +200,18 @@ def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:
 
 
 def forget_old(base: sqlite3.Connection) -> None:
-    """Remove the rows of what the run under way has made anew with other versions, or from another variant's render.
+    """Remove earlier rows of cells that this run has made anew with other versions or another variant's render.
 
-    The backend counts among the versions; engines that differ alone are another plan's.
+    The backend counts among the versions; a row that differs in its engines alone is another plan's.
     """
-    new = {_place(row): (row.variant, row.versions) for row in rows(base)}
-    found = [row for row in map(_row, base.execute(f"SELECT {_COLUMNS} FROM cells")) if row is not None]
-    old = [(row.key,) for row in found if new.get(_place(row), made := (row.variant, row.versions)) != made]
+    place = attrgetter(*AXES, "seed")
+    new = {place(row): (row.variant, row.versions) for row in rows(base)}
+    old = [(row.key,) for row in _sound_rows(base) if new.get(place(row), made := (row.variant, row.versions)) != made]
     base.executemany("DELETE FROM cells WHERE key = ?", old)
 
 
 def note_run(base: sqlite3.Connection, started: str, host: str, study: str) -> int:
-    """Note a run: when, where, of what; gives its number."""
+    """Note when and where a run of a study began; returns its number."""
     return _put(base, "runs", [started, host, study, "{}"])
 
 
@@ -224,22 +223,17 @@ def note_stages(base: sqlite3.Connection, run: int, stages: Mapping[str, float])
 
 
 def render_record(base: sqlite3.Connection, request: str) -> RenderRecord | None:
-    """What was found about a render that was asked for before; None too where it isn't what was written."""
+    """Record of a render that was asked for before; None where there is none, or a damaged one."""
     found = base.execute("SELECT * FROM renders WHERE request = ?", (request,)).fetchone()
-    values = None if found is None else _sealed(found)
-    if values is None:
+    if found is None or not _is_sound(found):
         return None
-    stored = json.loads(values[1])
-    return RenderRecord(
-        content=stored["content"],
-        facts=RenderFacts(**stored["facts"]),
-        brightest_share=stored["brightest_share"],
-        notes=tuple(stored["notes"]),
-    )
+    stored = json.loads(found[1])
+    facts = RenderFacts(**stored.pop("facts"))
+    return RenderRecord(facts=facts, notes=tuple(stored.pop("notes")), **stored)
 
 
 def note_render(base: sqlite3.Connection, request: str, record: RenderRecord) -> None:
-    """Keep what was found about a render."""
+    """Keep the record of a render."""
     _put(base, "renders", [request, json.dumps(asdict(record))])
 
 
@@ -249,21 +243,17 @@ def _put(base: sqlite3.Connection, table: str, values: list[Any]) -> int:
     return int(done.lastrowid or 0)
 
 
-def _sealed(values: tuple[Any, ...]) -> tuple[Any, ...] | None:
-    """Values without the digest at their end; None where it isn't theirs."""
-    return values[:-1] if digest(values[:-1]) == values[-1] else None
+def _is_sound(values: tuple[Any, ...]) -> bool:
+    """Whether the digest at the end is that of the values before it."""
+    return bool(digest(values[:-1]) == values[-1])
 
 
-def _row(values: tuple[Any, ...]) -> Row | None:
-    whole = _sealed(values)
-    return None if whole is None else Row(*whole)
+def _require_sound(values: tuple[Any, ...], what: str) -> tuple[Any, ...]:
+    if not _is_sound(values):
+        raise InputError(f"results: {what} isn't what was written (damaged); run rodcone sweep again, which makes it")
+    return values[:-1]
 
 
-def _whole(found: Found | None, what: str) -> Found:
-    if found is None:
-        raise InputError(f"ledger: {what} isn't what was written (damaged); run rodcone sweep again, which makes it")
-    return found
-
-
-def _place(row: Row) -> Coordinates:
-    return Coordinates(*(getattr(row, field.name) for field in fields(Coordinates)))
+def _sound_rows(base: sqlite3.Connection) -> list[Row]:
+    """All rows but the damaged ones."""
+    return [Row(*values[:-1]) for values in base.execute(f"SELECT {_COLUMNS} FROM cells") if _is_sound(values)]

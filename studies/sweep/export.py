@@ -1,4 +1,4 @@
-"""A ledger's rows as CSV, Parquet (extra ``parquet``) or a pandas table (extra ``pandas``)."""
+"""A sweep's rows as CSV, Parquet (extra ``parquet``) or a pandas table (extra ``pandas``)."""
 
 import csv
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rodcone.errors import InputError, unknown
 from rodcone.files import replacing
-from studies.sweep.database import COLUMNS, FILE, read_ledger, rows
+from studies.sweep.database import COLUMNS, read_results, rows
 from studies.sweep.row import Row
 
 if TYPE_CHECKING:
@@ -25,11 +25,9 @@ def read_rows(folder: Path, everything: bool = False) -> list[Row]:
     Raises
     ------
     InputError
-        Where there is no ledger, or one of another version.
+        Where there is no results database, or one of another version.
     """
-    if not (folder / FILE).is_file():
-        raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
-    with read_ledger(folder) as base:
+    with read_results(folder) as base:
         return rows(base, everything)
 
 
@@ -74,15 +72,11 @@ def write_table(table: Sequence[Row], path: Path) -> None:
         if path.suffix == ".csv":
             place.write_text(to_csv(table), "utf-8", newline="")
         else:
-            _write_parquet(table, place)
+            import pyarrow
+            import pyarrow.parquet
 
-
-def _write_parquet(table: Sequence[Row], path: Path) -> None:
-    import pyarrow
-    import pyarrow.parquet
-
-    columns: dict[str, list[Any]] = {name: [getattr(row, name) for row in table] for name in COLUMNS}
-    pyarrow.parquet.write_table(pyarrow.table(columns), path)
+            columns: dict[str, list[Any]] = {name: [getattr(row, name) for row in table] for name in COLUMNS}
+            pyarrow.parquet.write_table(pyarrow.table(columns), place)
 
 
 def _harmless(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""What all cells of one scene share, made once and kept as files: the truth, and electrons per cd/m^2 and second.
+"""Files that all cells of one scene share, made once: the truth, and electrons per cd/m^2 and second.
 
 Light is linear: a mosaic's expected electrons at any level and exposure are those at 1 cd/m^2 and 1 s times both. So a
 cell reads one (h, w) array from its path, whatever the number of bands, and no array goes through a scheduler.
@@ -31,7 +31,7 @@ from studies.sweep.stored import is_whole, keep
 
 
 @dataclass(frozen=True)
-class Frame:
+class UnitFrame:
     """A lit scene on a sensor, at a mean luminance of 1 cd/m^2 and an exposure of 1 s.
 
     Attributes
@@ -75,8 +75,8 @@ def frame_key(render: str, opened: OpenedScene, spectrum: str, preset: SensorCon
     return digest([render, opened.identity, spectrum, versions(), preset, sensor])
 
 
-def read_frame(folder: Path, key: str, sensor: SensorConfig) -> Frame | None:
-    """Frame made earlier, None where it or a file that it names isn't whole: it is made again."""
+def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None:
+    """Frame made earlier; None where it or a file that it names is missing or damaged, so that it is made again."""
     try:
         stored = json.loads((folder / f"{key}.json").read_text("utf-8"))
     except (OSError, ValueError):
@@ -88,7 +88,7 @@ def read_frame(folder: Path, key: str, sensor: SensorConfig) -> Frame | None:
     if not all(is_whole(path) for path in files.values()):
         return None
     light = Light(**{name: np.array(values, float) for name, values in facts.pop("light").items()})
-    return Frame(key=key, sensor=sensor, light=light, **facts, **files)
+    return UnitFrame(key=key, sensor=sensor, light=light, **facts, **files)
 
 
 def make_frames(

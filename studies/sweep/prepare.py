@@ -1,11 +1,10 @@
-"""From a study to its cells: one render a scene, what its cells share as files, and a cell for every combination."""
+"""From a study to its cells: one render a scene, the files that its cells share, and a cell for every combination."""
 
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,36 +13,22 @@ from isp.processors.catalogue import PROCESSORS
 from render.transport import Transport
 from rodcone.digests import digest, digest_bytes
 from rodcone.jit import backend
-from sensor.config import SensorConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.budget.budget import render_share
 from studies.budget.model_plan import Plan
 from studies.metrics.truth import light_in_bands
 from studies.photograph.clock import Clock
-from studies.study.lit_scene import (
-    OpenedScene,
-    level_luminance,
-    make_transport,
-    render_facts,
-    under,
-    white_spectrum,
-)
-from studies.study.model import ImageModel
-from studies.study.study import Condition, Study, conditions, parse_exposure
-from studies.sweep.cells import Cell, RenderRecord, cell_key, coordinates
+from studies.study.lit_scene import OpenedScene, level_luminance, make_transport, render_facts, under, white_spectrum
+from studies.study.study import Condition, Study, conditions, mosaics, parse_exposure
+from studies.sweep.cells import Cell, RenderRecord, cell_key
 from studies.sweep.database import note_render, render_record
-from studies.sweep.frames import (
-    Frame,
-    colours_under,
-    frame_key,
-    make_frames,
-    read_frame,
-)
+from studies.sweep.frames import UnitFrame, colours_under, frame_key, make_frames, read_frame
 from studies.sweep.provenance import provenance, versions
 
 Progress = Callable[[float, float], None]
-RENDERS, FRAMES, PICTURES = "renders", "frames", "pictures"  # folders beside the ledger
+RENDERS, FRAMES, PICTURES = "renders", "frames", "pictures"  # folders beside the results database
 FELL_BACK = (
     "Neither LLVM nor CUDA answered: stock path + specfilm rendered in scalar_spectral, captures and the "
     "reconstruction ran their NumPy forms.",
@@ -52,7 +37,7 @@ FELL_BACK = (
 
 @dataclass(frozen=True)
 class Job:
-    """A study being swept: with which plan, into which folder, noted in which ledger, its time taken by which clock."""
+    """A study being swept, its plan, the folder and the results database it goes to, and the clock of the run."""
 
     study: Study
     plan: Plan
@@ -61,26 +46,18 @@ class Job:
     clock: Clock = field(default_factory=Clock)
 
 
+Imaged = tuple[str, str, LensConfig, str]  # spectrum, sensor, modelled lens and mosaic: what a frame belongs to
 Sensors = tuple[SensorConfig, SensorConfig]
 
 
-class Variant(NamedTuple):
-    """What a scene is imaged with."""
-
-    spectrum: str
-    sensor: str
-    processor: str
-    model: ImageModel
-
-
 def known_cells(job: Job, opened: OpenedScene) -> list[Cell] | None:
-    """Cells of one scene in the study's order; None where it isn't rendered yet, or what they share isn't whole."""
+    """Cells of one scene in the study's order; None before its render, or where a shared file is damaged."""
     record = render_record(job.base, _request(job, opened))
     return None if record is None else _cells(job, opened, record)
 
 
 def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]:
-    """Cells of one scene in the study's order; renders only where something that they share is missing.
+    """Cells of one scene in the study's order; it is rendered only where a file that they share is missing.
 
     Raises
     ------
@@ -114,11 +91,10 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
 def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> float:
     """Largest `render_share` of the study's sensors in its brightest light: where a render's noise shows most."""
     study, shares = job.study, []
-    for variant in _variants(job, opened):
-        lit = under(transport, variant.spectrum)
+    for (spectrum, *_), (_, sensor) in _imaged(job, opened).items():
+        lit = under(transport, spectrum)
         lux = lit.illuminance_lux(1.0)
         brightest = max(level_luminance(level, lux) for level in study.levels)
-        _, sensor = _sensors(variant)
         shares += [
             render_share(lit, sensor, brightest, study.longest_exposure_s, parse_exposure(exposure))
             for exposure in study.exposures
@@ -131,24 +107,14 @@ def _request(job: Job, opened: OpenedScene) -> str:
     return digest([*asked, backend(), versions()])
 
 
-def _variants(job: Job, opened: OpenedScene) -> list[Variant]:
-    """What the scene is imaged with, each once: levels, exposures and seeds share it."""
-    made = (
-        Variant(condition.spectrum, condition.sensor, name, job.plan.images[condition])
-        for condition in _conditions(job, opened)
-        for name in job.study.processors
-    )
-    return list(dict.fromkeys(made))
-
-
-def _conditions(job: Job, opened: OpenedScene) -> Iterator[Condition]:
-    return (condition for condition in conditions(job.study) if condition.scene == opened.choice)
-
-
-def _sensors(variant: Variant) -> Sensors:
-    """Preset of a variant, and the sensor that is modelled."""
-    own = preset(variant.sensor)
-    return own, replace(vary(own, PROCESSORS[variant.processor].mosaic), lens=variant.model.lens)
+def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
+    """The preset and the sensor as modelled of each frame: levels, exposures and seeds share it."""
+    found = {}
+    for condition in conditions(job.study, opened.choice):
+        own, lens = preset(condition.sensor), job.plan.images[condition].lens
+        for mosaic in mosaics(job.study):
+            found[condition.spectrum, condition.sensor, lens, mosaic] = own, replace(vary(own, mosaic), lens=lens)
+    return found
 
 
 def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: Transport) -> None:
@@ -156,39 +122,37 @@ def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: 
     folder = job.out / FRAMES
     folder.mkdir(parents=True, exist_ok=True)
     for spectrum in job.study.spectra:
-        wanted = {
-            key: sensors
-            for variant, key, sensors in _keyed(job, opened, record)
-            if variant.spectrum == spectrum and read_frame(folder, key, sensors[1]) is None
+        keyed = {
+            frame_key(record.content, opened, spectrum, *sensors): sensors
+            for (under_spectrum, *_), sensors in _imaged(job, opened).items()
+            if under_spectrum == spectrum
         }
+        wanted = {key: sensors for key, sensors in keyed.items() if read_frame(folder, key, sensors[1]) is None}
         if wanted:
             light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
             make_frames(folder, under(transport, spectrum), light, wanted)
 
 
-def _keyed(job: Job, opened: OpenedScene, record: RenderRecord) -> Iterator[tuple[Variant, str, Sensors]]:
-    """Each variant with its frame's key, its preset and the sensor as modelled."""
-    for variant in _variants(job, opened):
-        sensors = _sensors(variant)
-        yield variant, frame_key(record.content, opened, variant.spectrum, *sensors), sensors
-
-
 def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | None:
     """Cells of a scene whose files stand; None where one is missing."""
-    shared: dict[Variant, tuple[Frame, ColourFit]] = {}
-    for variant, key, (_, sensor) in _keyed(job, opened, record):
-        frame = read_frame(job.out / FRAMES, key, sensor)
+    frames, colours = dict[Imaged, UnitFrame](), dict[tuple[Imaged, str], ColourFit]()
+    for imaged, sensors in _imaged(job, opened).items():
+        key = frame_key(record.content, opened, imaged[0], *sensors)
+        frame = read_frame(job.out / FRAMES, key, sensors[1])
         if frame is None:
             return None
-        white = white_spectrum(opened, variant.spectrum)
-        shared[variant] = frame, colours_under(sensor, PROCESSORS[variant.processor], white)
-    return [
-        _cell(job, condition, name, seed, record, *shared[Variant(condition.spectrum, condition.sensor, name, model)])
-        for condition in _conditions(job, opened)
-        for model in (job.plan.images[condition],)
-        for name in job.study.processors
-        for seed in job.study.seeds
-    ]
+        frames[imaged] = frame
+        for name in job.study.processors:
+            if PROCESSORS[name].mosaic == imaged[-1]:
+                colours[imaged, name] = colours_under(frame.sensor, PROCESSORS[name], white_spectrum(opened, imaged[0]))
+    cells = []
+    for condition in conditions(job.study, opened.choice):
+        lens = job.plan.images[condition].lens
+        for name in job.study.processors:
+            imaged = condition.spectrum, condition.sensor, lens, PROCESSORS[name].mosaic
+            for seed in job.study.seeds:
+                cells.append(_cell(job, condition, name, seed, record, frames[imaged], colours[imaged, name]))
+    return cells
 
 
 def _cell(
@@ -197,17 +161,18 @@ def _cell(
     processor: str,
     seed: int,
     record: RenderRecord,
-    frame: Frame,
+    frame: UnitFrame,
     colours: ColourFit,
 ) -> Cell:
-    at = coordinates(condition, processor, seed)
     luminance = level_luminance(condition.level, frame.lux_per_cd_m2)
     asked_s = parse_exposure(condition.exposure)
     exposure_s = min(job.study.longest_exposure_s, frame.auto_s / luminance) if asked_s is None else asked_s
     made_by = provenance(record.facts.variant, processor, exact=job.plan.images[condition].exact)
     return Cell(
-        key=cell_key(at, frame.key, luminance, exposure_s, colours, made_by),
-        at=at,
+        key=cell_key(condition, processor, seed, frame.key, luminance, exposure_s, colours, made_by),
+        condition=condition,
+        processor=processor,
+        seed=seed,
         luminance_cd_m2=luminance,
         illuminance_lux=None if frame.lux_per_cd_m2 is None else luminance * frame.lux_per_cd_m2,
         exposure_s=exposure_s,

@@ -1,4 +1,4 @@
-"""What makes a cell's numbers: the render's variant, engines and versions. Cells that differ in it don't mix."""
+"""Where a cell's numbers come from: the render's variant, engines and versions. Cells that differ are not averaged."""
 
 import json
 import platform
@@ -18,7 +18,7 @@ _PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "scikit-image", "colour-scien
 
 @dataclass(frozen=True)
 class Provenance:
-    """What makes a cell.
+    """Variant, engines and versions that make a cell.
 
     Attributes
     ----------
@@ -37,12 +37,12 @@ class Provenance:
 
 
 def provenance(variant: str, processor: str, exact: bool) -> Provenance:
-    """What makes a cell in this process; `exact` as `studies.study.model.ImageModel`."""
+    """Provenance of a cell made in this process; `exact` as `studies.study.model.ImageModel`."""
     return Provenance(
-        variant,
-        "numpy" if exact else backend(),
-        backend() if PROCESSORS[processor].on_backend else "numpy",
-        json.dumps(versions(processor), sort_keys=True),
+        variant=variant,
+        readout_engine="numpy" if exact else backend(),
+        development_engine=backend() if PROCESSORS[processor].on_backend else "numpy",
+        versions=json.dumps(versions(processor), sort_keys=True),
     )
 
 
@@ -67,7 +67,7 @@ def threads() -> int:
 
 
 def told(made_by: Provenance) -> dict[str, str]:
-    """Each fact of it by its name in words."""
+    """Variant, engines and versions by their names in words."""
     return {
         "Mitsuba variant": made_by.variant,
         "engine of captures": made_by.readout_engine,
@@ -77,8 +77,8 @@ def told(made_by: Provenance) -> dict[str, str]:
 
 
 def made_by(row: Row) -> Provenance:
-    """What made a ledger's row."""
-    return Provenance(*(getattr(row, field.name) for field in fields(Provenance)))
+    """Provenance of a row."""
+    return Provenance(**{field.name: getattr(row, field.name) for field in fields(Provenance)})
 
 
 def require_alike(rows: Sequence[Row]) -> None:

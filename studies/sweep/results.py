@@ -4,12 +4,13 @@ import json
 from dataclasses import asdict
 from importlib import metadata
 from io import BytesIO
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from PIL import Image
 
-from studies.sweep.database import last_study, read_ledger, rows
+from studies.sweep.database import last_study, read_results, rows
 from studies.sweep.prepare import PICTURES
 from studies.sweep.row import Row
 from studies.sweep.stored import read_whole
@@ -21,16 +22,15 @@ _JSON_COLUMNS = ("render", "lens", "balance", "mean_electrons", "versions")
 def results_json(folder: Path) -> bytes:
     """Study, seconds by stage and rows of a sweep's last run, as a JSON file.
 
-    A row has the columns of the ledger (`studies.sweep.row.Row`), those that are JSON as objects; a number that isn't
-    finite is null.
+    A row has the columns of `studies.sweep.row.Row`, those in JSON as objects; a number that isn't finite is null.
     """
     study, stages, found = _last_run(folder)
-    results = {
-        "rodcone": metadata.version("rodcone"),
-        "study": study,
-        "stages": stages,
-        "rows": [_as_json(row) for row in found],
-    }
+    made = []
+    for row in found:
+        values = asdict(row)
+        values |= {name: None for name, value in values.items() if isinstance(value, float) and not isfinite(value)}
+        made.append(values | {name: json.loads(values[name]) for name in _JSON_COLUMNS})
+    results = {"rodcone": metadata.version("rodcone"), "study": study, "stages": stages, "rows": made}
     return (json.dumps(results, indent=1, allow_nan=False) + "\n").encode()
 
 
@@ -60,18 +60,8 @@ def overview(folder: Path) -> bytes:
 
 
 def _last_run(folder: Path) -> tuple[dict[str, Any], dict[str, float], list[Row]]:
-    with read_ledger(folder) as base:
+    with read_results(folder) as base:
         found, run = rows(base), last_study(base)
     if run is None or not found:
         raise AssertionError(f"{folder} holds no run of which a report was just made")
     return *run, found
-
-
-def _as_json(row: Row) -> dict[str, Any]:
-    """Row as JSON takes it."""
-    values = {name: _finite(value) for name, value in asdict(row).items()}
-    return values | {name: json.loads(values[name]) for name in _JSON_COLUMNS}
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not abs(value) < float("inf") else value

@@ -1,18 +1,18 @@
-"""One row of a sweep's ledger: a cell, its figures, and what made them."""
+"""One row of a sweep's results: a cell, its figures, and the versions and engines that made them."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Row:
-    """What the ledger holds of a cell. Times and what made it alone differ from run to run.
+    """What the results database holds of a cell. From run to run only times and the columns of its maker differ.
 
     Attributes
     ----------
     key : str
         Of `Cell`.
     scene ... seed
-        Of `studies.sweep.cells.Coordinates`.
+        Where the cell lies in its study; scene and sensor files by their names.
     luminance_cd_m2, illuminance_lux, exposure_s : float
         The level in both units (lux where the scene states a plane), and the time.
     spp, bands : int
@@ -109,6 +109,4 @@ class Row:
     worker: int
 
 
-TIME_AND_HOST = (
-    "render_s", "capture_s", "develop_s", "measure_s", "first_s", "threads", "finished", "host", "machine", "worker",
-)  # fmt: skip
+AXES = ("scene", "spectrum", "level", "exposure", "sensor", "processor")

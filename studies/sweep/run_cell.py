@@ -6,19 +6,16 @@ import threading
 from datetime import UTC, datetime
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.capture import expose
 from sensor.device import draw_device
-from sensor.raw import RawImage
 from studies.budget.budget import monte_carlo_share
 from studies.metrics.appearance import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure
@@ -26,7 +23,7 @@ from studies.metrics.target_figures import target_figures
 from studies.photograph.camera import develop_to_scale, mean_electrons
 from studies.photograph.clock import timed
 from studies.photograph.png import to_png
-from studies.sweep.cells import Cell, device_stream, exposure_stream, render_text
+from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text
 from studies.sweep.provenance import machine, provenance, threads, told
 from studies.sweep.row import Row
 from studies.sweep.stored import is_whole, keep
@@ -55,18 +52,43 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     if most_threads is not None:
         limit_threads(most_threads)
     truth, truth_png = _truth(cell.truth)
-    light = cell.luminance_cd_m2 * cell.exposure_s  # the frame's electrons are those at 1 cd/m^2 and 1 s
+    sensor, processor, engine = cell.sensor, PROCESSORS[cell.processor], cell.made_by.readout_engine
+    names = labels(cell.condition)
+    # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
+    light = cell.luminance_cd_m2 * cell.exposure_s
     expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
     error_e = _array(cell.half_difference) * light
-    raw, linear, picture, seconds = _photograph(cell, expected_e)
-    encoded = encode_srgb(linear)
-    figures, measure_s, first_s = timed(
-        lambda: _figures(cell, linear, encoded, truth), "measure", cell.at.scene, raw.shape
+    shape = (expected_e.shape[0], expected_e.shape[1])
+    device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
+    raw, capture_s, first_capture_s = timed(
+        lambda: expose(
+            *(expected_e, sensor, cell.exposure_s, device),
+            exposure_stream(cell.condition, processor.mosaic, cell.seed),
+            exact=engine == "numpy",
+        ),
+        *("capture", engine, names["sensor"], shape),
     )
-    seconds["first_s"] += first_s
+    # Develop to linear sRGB in which white is 1.
+    saturated = raw.saturated
+    (linear, picture), develop_s, first_develop_s = timed(
+        lambda: develop_to_scale(raw, processor, cell.colours, sensor, cell.light, cell.white_cd_m2),
+        *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),
+    )
+    encoded = encode_srgb(linear)
+    # Measure.
+    figures, measure_s, first_measure_s = timed(
+        lambda: {
+            **vars(measure(encoded, truth.encoded, truth.lab)),
+            **vars(appearance(linear, truth, cell.white_cd_m2)),
+            **vars(target_figures(names["scene"], linear, truth.linear)),
+        },
+        *("measure", names["scene"], raw.shape),
+    )
     return Row(
         key=cell.key,
-        **vars(cell.at),
+        **names,
+        processor=cell.processor,
+        seed=cell.seed,
         luminance_cd_m2=cell.luminance_cd_m2,
         illuminance_lux=cell.illuminance_lux,
         exposure_s=cell.exposure_s,
@@ -76,12 +98,12 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         lens=json.dumps(vars(cell.sensor.lens)),
         budget_share=cell.budget_share,
         **figures,
-        mc_share=monte_carlo_share(error_e, expected_e, cell.sensor, cell.exposure_s),
+        mc_share=monte_carlo_share(error_e, expected_e, sensor, cell.exposure_s),
         snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),
-        saturated=float(raw.saturated.mean()),
+        saturated=float(saturated.mean()),
         balance=json.dumps(dict(picture.balance)),
-        mean_electrons=json.dumps(mean_electrons(cell.sensor, expected_e)),
+        mean_electrons=json.dumps(mean_electrons(sensor, expected_e)),
         variant=cell.made_by.variant,
         readout_engine=raw.engine,
         development_engine=picture.engine,
@@ -89,8 +111,10 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         picture=keep(cell.pictures, to_png(encoded), ".png"),
         truth=keep(cell.pictures, truth_png, ".png"),
         render_s=cell.render.facts.seconds,
+        capture_s=capture_s,
+        develop_s=develop_s,
         measure_s=measure_s,
-        **seconds,
+        first_s=first_capture_s + first_develop_s + first_measure_s,
         threads=threads(),
         finished=datetime.now(UTC).isoformat(timespec="milliseconds"),
         host=platform.node(),
@@ -99,44 +123,15 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     )
 
 
-def _photograph(cell: Cell, expected_e: Image) -> tuple[RawImage, Image, Picture, dict[str, Any]]:
-    """Raw image, linear sRGB in which white is 1, the processor's picture, and the seconds of both steps."""
-    at, sensor, shape = cell.at, cell.sensor, (expected_e.shape[0], expected_e.shape[1])
-    processor, engine = PROCESSORS[at.processor], cell.made_by.readout_engine
-    device = draw_device(sensor, shape, device_stream(at, processor.mosaic))
-    raw, capture_s, first_capture_s = timed(
-        lambda: expose(
-            *(expected_e, sensor, cell.exposure_s, device, exposure_stream(at, processor.mosaic)),
-            exact=engine == "numpy",
-        ),
-        *("capture", engine, at.sensor, shape),
-    )
-    saturated = raw.saturated
-    (linear, picture), develop_s, first_develop_s = timed(
-        lambda: develop_to_scale(raw, processor, cell.colours, sensor, cell.light, cell.white_cd_m2),
-        *("develop", at.processor, shape, bool(saturated.any()), bool(saturated.all())),
-    )
-    first_s = first_capture_s + first_develop_s
-    return raw, linear, picture, {"capture_s": capture_s, "develop_s": develop_s, "first_s": first_s}
-
-
-def _figures(cell: Cell, linear: Image, encoded: Image, truth: TruePicture) -> dict[str, Any]:
-    return {
-        **vars(measure(encoded, truth.encoded, truth.lab)),
-        **vars(appearance(linear, truth, cell.white_cd_m2)),
-        **vars(target_figures(cell.at.scene, linear, truth.linear)),
-    }
-
-
 @cache
 def limit_threads(most: int) -> None:
-    """Give Dr.Jit in this process so many threads; on the LLVM backend alone does it matter."""
+    """Set Dr.Jit's number of threads in this process; only the LLVM backend has any."""
     if backend() == "llvm":
         dr.set_thread_count(most)
 
 
 def _check_provenance(cell: Cell) -> None:
-    own = told(provenance(cell.made_by.variant, cell.at.processor, exact=cell.made_by.readout_engine == "numpy"))
+    own = told(provenance(cell.made_by.variant, cell.processor, exact=cell.made_by.readout_engine == "numpy"))
     for name, asked in told(cell.made_by).items():
         if own.get(name) != asked:
             raise InputError(

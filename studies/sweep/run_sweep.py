@@ -1,9 +1,8 @@
-"""A sweep: every cell of a study that the ledger doesn't hold yet, made and noted."""
+"""A sweep: makes every cell of a study that the results database lacks, and stores it there."""
 
 import json
 import platform
 import shutil
-import sqlite3
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing, suppress
@@ -16,16 +15,15 @@ from isp.processors.catalogue import require_libraries
 from studies.budget.model_plan import Plan
 from studies.photograph.clock import FIRST, Clock
 from studies.study.lit_scene import open_all
-from studies.study.study import Study, check, conditions
+from studies.study.study import Study, conditions
 from studies.sweep.cells import Cell
-from studies.sweep.database import add, done, forget_old, note_run, note_stages, open_ledger, want
+from studies.sweep.database import add, done, forget_old, note_run, note_stages, open_results, want
 from studies.sweep.prepare import PICTURES, Job, known_cells, scene_cells
 from studies.sweep.row import Row
 
 Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
-Runner = Callable[
-    [Sequence[Cell]], Generator[Row, None, None]
-]  # such as `partial(studies.sweep.workers.run_in_processes, workers=4)`
+# Such as `partial(studies.sweep.workers.run_in_processes, workers=4)`.
+Runner = Callable[[Sequence[Cell]], Generator[Row, None, None]]
 LEFT_S = 3600.0  # after which a temporary file has no writer any more: writing one takes seconds
 RENDER_SHARE = 0.5  # of the progress bar that a scene's render takes; how long it takes isn't known before
 
@@ -37,9 +35,9 @@ class Swept:
     Attributes
     ----------
     out : Path
-        Folder of the ledger.
+        Folder of the results.
     cells, made : int
-        Cells of the study, and how many of them this run made; the others stood in the ledger.
+        Cells of the study, and how many of them this run made; the others were stored before.
     seconds : float
         Of the whole run.
     notes : tuple of str
@@ -63,10 +61,10 @@ def sweep(
     keep_old: bool = False,
     clock: Clock | None = None,
 ) -> Swept:
-    """Make the missing cells of a study and note each in the ledger of a folder.
+    """Make the missing cells of a study and store each in the results database of a folder.
 
-    Whatever ends it (Ctrl-C, a kill, a full disk), the next call goes on with the cells that are missing then. Cells
-    that other versions, another variant or other engines made are made anew.
+    After Ctrl-C, a kill or a full disk the next call goes on with the cells that are still missing. Cells that other
+    versions, another variant or other engines made are made anew.
 
     Parameters
     ----------
@@ -86,20 +84,20 @@ def sweep(
     Raises
     ------
     InputError
-        For whatever in the study isn't allowed, before anything is rendered.
+        For a scene that can't be opened or a library that is missing, before anything is rendered.
     OSError
         Where the folder can't be written, or the disk is full.
     """
     clock = clock or Clock()
-    check(study)
     for name in study.processors:
         require_libraries(name)
     scenes = open_all(study)
     out.mkdir(parents=True, exist_ok=True)
     _clear(out)
-    with open_ledger(out) as base:
+    with open_results(out) as base:
         job = Job(study, plan, out, base, clock)
-        run = _note(base, study)
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        run = note_run(base, now, platform.node(), json.dumps(asdict(study)))
         found = [known_cells(job, opened) for opened in scenes.values()]
         count = len(conditions(study)) * len(study.processors) * len(study.seeds) // len(scenes)
         keys: list[Sequence[str | None]] = [
@@ -124,7 +122,7 @@ def sweep(
 
 
 def _clear(out: Path) -> None:
-    """Remove what a killed run had begun to write; another that is at work now has begun less than that ago."""
+    """Remove files that a killed run left half written; younger ones may belong to a run that is at work now."""
     for pattern in (".part-*", "*.part"):  # of `rodcone.files.replacing` and `render.cache.save_transport`
         for path in list(out.rglob(pattern)):
             with suppress(OSError):  # another sweep may clear it too
@@ -133,7 +131,7 @@ def _clear(out: Path) -> None:
 
 
 def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step) -> int:
-    """Make cells, note each as it comes and the time taken so far; gives their number."""
+    """Make cells, store each as it comes with the time taken so far; returns their number."""
     began, made = time.perf_counter(), 0
     seconds, workers = dict[str, float](), set[tuple[str, int]]()
     with closing(runner(missing)) as rows:
@@ -145,7 +143,8 @@ def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step
                 seconds[name] = seconds.get(name, 0.0) + value
             note_stages(job.base, run, job.clock.stages(_on_the_clock(seconds, len(workers))))
             left_s = (time.perf_counter() - began) / made * (len(missing) - made)
-            part(f"cell {made} of {len(missing)}, {duration(left_s)} left", _after_render(made / len(missing)))
+            share = RENDER_SHARE + (1 - RENDER_SHARE) * made / len(missing)
+            part(f"cell {made} of {len(missing)}, {duration(left_s)} left", share)
     for name, value in _on_the_clock(seconds, len(workers)).items():
         job.clock.add(name, value)
     return made
@@ -157,17 +156,8 @@ def _steps(row: Row) -> dict[str, float]:
 
 
 def _on_the_clock(seconds: Mapping[str, float], workers: int) -> dict[str, float]:
-    """Seconds of work as they pass on the clock: workers, of whom each takes its own time, work at once."""
+    """Seconds of work as wall time: the workers work at the same time."""
     return {name: value / workers for name, value in seconds.items()}
-
-
-def _rendering(part: Step) -> Callable[[float, float], None]:
-    return lambda share, error: part(f"render, relative error {error:.3f}", RENDER_SHARE * share)
-
-
-def _note(base: sqlite3.Connection, study: Study) -> int:
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    return note_run(base, now, platform.node(), json.dumps(asdict(study)))
 
 
 def _part(step: Step, index: int, count: int) -> Step:
@@ -176,8 +166,8 @@ def _part(step: Step, index: int, count: int) -> Step:
     return lambda what, share: step(words + what, (index + share) / count)
 
 
-def _after_render(share: float) -> float:
-    return RENDER_SHARE + (1 - RENDER_SHARE) * share
+def _rendering(part: Step) -> Callable[[float, float], None]:
+    return lambda share, error: part(f"render, relative error {error:.3f}", RENDER_SHARE * share)
 
 
 def duration(seconds: float) -> str:

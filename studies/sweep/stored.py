@@ -1,4 +1,4 @@
-"""Files named by the digest of their content: how a sweep keeps arrays and pictures, and tells damage on reading.
+"""Files named by the digest of their content: how a sweep keeps arrays and pictures, and notices damage on reading.
 
 Against accidents, not intent: bit rot, files cut short, runs that were killed.
 """
@@ -12,7 +12,7 @@ from rodcone.files import inside, replacing
 
 
 def keep(folder: Path, content: bytes | memoryview, ending: str) -> str:
-    """Write a file under the digest of its content, whole or not at all; gives its name below the folder."""
+    """Write a file under the digest of its content, whole or not at all; returns its name below the folder."""
     name = digest_bytes(content)
     place = folder / name[:2] / f"{name}{ending}"
     place.parent.mkdir(parents=True, exist_ok=True)

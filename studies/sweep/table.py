@@ -7,7 +7,6 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from rodcone.colour_spaces import decode_srgb
@@ -20,10 +19,9 @@ from studies.metrics.patches import patch_masks
 from studies.study.study import OWN
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import require_alike
-from studies.sweep.row import Row
+from studies.sweep.row import AXES, Row
 from studies.sweep.stored import read_whole
 
-AXES = ("scene", "spectrum", "level", "exposure", "sensor", "processor")
 SAME = 1e-6  # below it a mean is none, and a half width, as a share of its mean, only sums in another order
 ELECTRONS = "electrons_"  # and a channel: mean electrons of its pixels
 CHARTS = {"pair_delta_e": ("metamers", pair_delta_e), "daylight_delta_e": ("color_checker", daylight_delta_e)}
@@ -32,8 +30,8 @@ FIGURES = tuple(one.name for one in fields(Row) if "float" in str(one.type) or o
 
 
 @dataclass(frozen=True)
-class Line:
-    """A line of a table: its place on the axes, and each figure's mean and 95 % interval's half width over the seeds.
+class TableLine:
+    """A line of a table: its values of the axes, and each figure's mean and 95 % interval's half width over the seeds.
 
     None stands for a figure that a cell lacks, and for the interval of one seed.
     """
@@ -45,7 +43,7 @@ class Line:
 
 def lines(
     rows: Sequence[Row], folder: Path, by: Sequence[str], show: Sequence[str], where: Mapping[str, str]
-) -> list[Line]:
+) -> list[TableLine]:
     """Lines of a table, in the study's order.
 
     Parameters
@@ -83,30 +81,26 @@ def lines(
     if not groups:
         raise InputError(f"where: no cell has {dict(where)}; allowed: values of the study's axes; see rodcone export")
     for at, group in groups.items():
-        _check_alike(at, group)
+        for axis in AXES:
+            values = list(dict.fromkeys(getattr(row, axis) for row in group))
+            if len(values) > 1:
+                raise InputError(
+                    f"by: a line of {'/'.join(at) or 'all'} would be a mean over {axis} {', '.join(values)}; allowed: "
+                    f"over seeds alone; add {axis} to --by, or give --where {axis}={values[0]}"
+                )
     return [_line(at, group, folder, show) for at, group in groups.items()]
 
 
-def markdown(table: Sequence[Line], by: Sequence[str], show: Sequence[str]) -> str:
+def markdown(table: Sequence[TableLine], by: Sequence[str], show: Sequence[str]) -> str:
     """Table in Markdown; ``mean ± half width``, to three digits; no half width where the seeds don't differ."""
     cells = [[*by, *show], ["---"] * len(by) + ["---:"] * len(show)]
     for line in table:
-        figures = [_told(mean, half) for mean, half in zip(line.means, line.halves, strict=True)]
+        figures = [_mean_text(mean, half) for mean, half in zip(line.means, line.halves, strict=True)]
         cells.append([*(text.replace("|", "\\|") for text in line.at), *figures])
     return "\n".join(f"| {' | '.join(row)} |" for row in cells)
 
 
-def _check_alike(at: tuple[str, ...], group: Sequence[Row]) -> None:
-    for axis in AXES:
-        values = list(dict.fromkeys(getattr(row, axis) for row in group))
-        if len(values) > 1:
-            raise InputError(
-                f"by: a line of {'/'.join(at) or 'all'} would be a mean over {axis} {', '.join(values)}; allowed: over "
-                f"seeds alone; add {axis} to --by, or give --where {axis}={values[0]}"
-            )
-
-
-def _line(at: tuple[str, ...], group: Sequence[Row], folder: Path, show: Sequence[str]) -> Line:
+def _line(at: tuple[str, ...], group: Sequence[Row], folder: Path, show: Sequence[str]) -> TableLine:
     means: list[float | None] = []
     halves: list[float | None] = []
     for name in show:
@@ -116,7 +110,7 @@ def _line(at: tuple[str, ...], group: Sequence[Row], folder: Path, show: Sequenc
         means.append(float(np.mean(values)) if whole else None)
         interval = mean_with_confidence(values) if whole and len(values) > 1 else None
         halves.append(None if interval is None else interval.high - interval.mean)
-    return Line(at, tuple(means), tuple(halves))
+    return TableLine(at, tuple(means), tuple(halves))
 
 
 def _figure(row: Row, name: str, folder: Path) -> float | None:
@@ -131,16 +125,12 @@ def _figure(row: Row, name: str, folder: Path) -> float | None:
         raise InputError(f"show: {name} is known of scene {scene}, not of {row.scene}; leave it out, or give --where")
     if name == TRUE_PAIRS:
         return float(true_pair_delta_e(TWINS_UNDER if row.spectrum == OWN else row.spectrum).mean())
-    picture = _linear(read_whole(folder / PICTURES, row.picture))
+    with Image.open(BytesIO(read_whole(folder / PICTURES, row.picture))) as file:
+        picture = decode_srgb(np.asarray(file.convert("RGB"), dtype=np.float64) / 255)
     return float(measure(picture, patch_masks(load(scene), (picture.shape[0], picture.shape[1]))).mean())
 
 
-def _linear(content: bytes) -> NDArray[np.float64]:
-    with Image.open(BytesIO(content)) as picture:
-        return decode_srgb(np.asarray(picture.convert("RGB"), dtype=np.float64) / 255)
-
-
-def _told(mean: float | None, half: float | None) -> str:
+def _mean_text(mean: float | None, half: float | None) -> str:
     if mean is None:
         return "-"
     if abs(mean) < SAME:

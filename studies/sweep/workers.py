@@ -1,4 +1,4 @@
-"""Cells on any executor, and on a pool of processes that outlives the death of any of them."""
+"""Cells on any executor, and on a pool of processes that is made anew when one of them dies."""
 
 import multiprocessing
 import os
@@ -20,14 +20,14 @@ from studies.sweep.cells import Cell
 from studies.sweep.row import Row
 from studies.sweep.run_cell import run_cell
 
-LEAVE_S = 10.0  # that a worker without work may take to end; libraries let go of threads and memory
-MOST_DEATHS = 3  # of workers with the same cell in their hands, before it is given up: the last two times alone
+LEAVE_S = 10.0  # time for an idle worker to end, while libraries release threads and memory
+MOST_DEATHS = 3  # a cell is given up after it was held by so many workers that died; the last two ran it alone
 # What BLAS libraries and OpenMP read at their import: set before a worker starts.
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 
 
 class WorkerLostError(RuntimeError):
-    """A worker died; `cells` were in the executor's hands."""
+    """A worker died while the executor held `cells`."""
 
     def __init__(self, cells: Sequence[Cell]) -> None:
         super().__init__("a worker died")
@@ -57,7 +57,7 @@ def run(
 ) -> Generator[Row, None, None]:
     """Run cells on an executor and give their rows as they come, in no order.
 
-    Ctrl-C takes no further cells, waits for those that run and gives their rows, then raises.
+    After Ctrl-C no further cell is started; the rows of those that run are still given, then it is raised.
 
     Parameters
     ----------
@@ -81,7 +81,10 @@ def run(
     try:
         while True:
             for cell in islice(waiting, at_once - len(running)):
-                running[_submitted(executor, call, cell, running)] = cell
+                try:
+                    running[executor.submit(call, cell)] = cell
+                except BrokenExecutor as error:
+                    raise WorkerLostError([*running.values(), cell]) from error
             if not running:
                 return
             yield from _finished(running)
@@ -96,15 +99,8 @@ def run(
             future.cancel()
 
 
-def _submitted(executor: Executor, call: Any, cell: Cell, running: dict[Future[Row], Cell]) -> Future[Row]:
-    try:
-        return executor.submit(call, cell)
-    except BrokenExecutor as error:
-        raise WorkerLostError([*running.values(), cell]) from error
-
-
 def _finished(running: dict[Future[Row], Cell]) -> Iterator[Row]:
-    """Rows of the next cells that are done; a fault among these comes after them."""
+    """Rows of the cells that finished next; an error among them is raised after the rows."""
     ready, _ = wait(running, return_when=FIRST_COMPLETED)
     for future in [future for future in ready if future.exception() is None]:
         del running[future]
@@ -119,9 +115,9 @@ def _finished(running: dict[Future[Row], Cell]) -> Iterator[Row]:
 def run_in_processes(cells: Sequence[Cell], workers: int) -> Generator[Row, None, None]:
     """Run cells on spawned processes; a pool in which one died is made anew.
 
-    The cells that it had in its hands are run again, after all others and one by one: where the memory was short they
-    now have all of it, and a cell that ends its worker by itself is told from its neighbours. Dr.Jit, BLAS and OpenMP
-    get cores / workers threads in each process.
+    The cells that a broken pool held are run again, after all others and one by one: where memory was short each now
+    has all of it, and the cell that ends its worker is told apart from its neighbours. Dr.Jit, BLAS and OpenMP get
+    cores / workers threads in each process.
 
     Raises
     ------
@@ -143,9 +139,10 @@ def run_in_processes(cells: Sequence[Cell], workers: int) -> Generator[Row, None
                 deaths.update(cell.key for cell in lost.cells)
                 given_up += [waiting.pop(cell.key) for cell in lost.cells if deaths[cell.key] >= MOST_DEATHS]
     if given_up:
+        first = given_up[0]
         raise InputError(
-            f"cells: {len(given_up)} ended their worker {MOST_DEATHS} times, the first at {given_up[0].at}; the others "
-            "are done; the memory may be short: give fewer --workers, or run again"
+            f"cells: {len(given_up)} ended their worker {MOST_DEATHS} times, the first {first.processor} of "
+            f"{first.condition}; the others are done; the memory may be short: give fewer --workers, or run again"
         )
 
 
@@ -190,7 +187,7 @@ def _inherited(threads: int) -> Iterator[None]:
 
 
 def _begin() -> None:
-    """In a new worker: where the parent is killed it ends too."""
+    """Make a new worker end when its parent is killed."""
     threading.Thread(target=_leave_with_parent, daemon=True).start()
 
 

@@ -804,8 +804,8 @@ ACCOUNTING = (
     _fault(
         "capture and develop seconds swapped",
         "studies/sweep/run_cell.py",
-        '{"capture_s": capture_s, "develop_s": develop_s,',
-        '{"capture_s": develop_s, "develop_s": capture_s,',
+        "capture_s=capture_s,\n        develop_s=develop_s,",
+        "capture_s=develop_s,\n        develop_s=capture_s,",
         *_ACCOUNTS,
     ),
     _fault(

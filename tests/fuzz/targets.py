@@ -30,7 +30,7 @@ from sensor.raw_files.raw_file import write_raw
 from sensor.raw_files.raw_tiff import read_tiff
 from sensor.raw_files.tiff import CFA, text, write_mosaic
 from studies.study.study_file import read_study
-from studies.sweep.database import add, open_ledger, want
+from studies.sweep.database import add, open_results, want
 from studies.sweep.export import read_rows
 from studies.sweep.row import Row
 
@@ -319,7 +319,7 @@ def _row(key: str) -> Row:
 
 def _ledger_samples() -> list[Sample]:
     def write(folder: Path) -> None:
-        with open_ledger(folder) as base:
+        with open_results(folder) as base:
             for number in range(20):
                 add(base, _row(str(number)))
             want(base, map(str, range(20)))

@@ -27,7 +27,7 @@ from studies.metrics.patches import patch_masks
 from studies.metrics.truth import light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import mean_electrons
 from studies.study.lit_scene import level_luminance, open_choice, under
-from studies.study.study import RenderLimits, SceneChoice, Study, check
+from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep.frames import colours_under
 
 LIGHTS = ("D65", "moonlight", "A", "LED-B3", "sodium_high", "sodium_low")
@@ -104,7 +104,6 @@ def test_under_low_pressure_sodium_all_colours_collapse_and_under_d65_none_do() 
 
 def test_a_study_renders_the_range_that_it_asks_for() -> None:
     far = Study((SceneChoice("color_checker"),), ("1lux",), render=RenderLimits(range_nm=(380.0, 1070.0)))
-    check(far)
     (model,) = as_stated(far).renders.values()
     edges = np.array(model.wavelength_nm) - np.array(model.width_nm) / 2
     assert edges[0] == 380.0

@@ -1,6 +1,7 @@
 """What rows and results state of how pictures were made, counted another way: paths, arrays, wells."""
 
 import json
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from rodcone.jit import backend
 from sensor.presets import low_noise
 from studies.study import quiet_render
 from studies.study.study import RenderLimits, SceneChoice, Study
-from studies.sweep.database import open_ledger, rows
+from studies.sweep.database import open_results, rows
 from studies.sweep.results import results_json
 
 
@@ -21,8 +22,8 @@ def test_bands_and_samples_are_those_of_the_stored_render(tmp_path: Path) -> Non
     limits = RenderLimits(size=16, spp=17, band_nm=50.0)
     study = Study((SceneChoice("flat_field"),), ("1cd/m2",), processors=("bayer",), render=limits)
     swept(study, tmp_path)
-    (stored,) = (tmp_path / "renders").iterdir()
-    with np.load(stored) as render, open_ledger(tmp_path) as base:
+    (stored,) = (tmp_path / "renders").iterdir()  # 32 bytes of digest go before NumPy's file
+    with np.load(BytesIO(stored.read_bytes()[32:])) as render, open_results(tmp_path) as base:
         (row,) = rows(base)
         assert row.bands == render["radiance"].shape[1] == 8
         assert row.spp == render["pass_spp"].sum()
@@ -40,7 +41,7 @@ def test_an_automatic_exposure_fills_the_well_or_ends_at_the_longest(tmp_path: P
         render=limits,
     )
     swept(study, tmp_path)
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         bright, dark = sorted(rows(base), key=lambda row: -row.luminance_cd_m2)
     well = low_noise("bayer").pixel.full_well_e
     assert max(json.loads(bright.mean_electrons).values()) == pytest.approx(0.8 * well, rel=0.05)

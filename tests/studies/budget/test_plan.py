@@ -9,7 +9,7 @@ import pytest
 
 from sensor.presets import preset
 from studies.budget import plan as planning
-from studies.budget.check import Check, check_plan
+from studies.budget.check import BudgetCheck, check_plan
 from studies.budget.model_plan import Plan
 from studies.budget.plan import plan, reference_plan
 from studies.budget.plan_text import cost_over_reference, reasons
@@ -178,7 +178,7 @@ STUDIES = (
 )
 
 
-def checked(study: Study, cache: Path) -> Check:
+def checked(study: Study, cache: Path) -> BudgetCheck:
     return check_plan(study, plan(study), reference_plan(study), cache=cache)
 
 

@@ -81,7 +81,7 @@ def test_a_number_of_seeds_counts_from_0_and_a_list_names_them(
         (["seeds=true"], "seeds: True is not a whole number"),
         (["render.spp=1.5"], "render: spp: 1.5 is not a whole number"),
         (["name=3"], "name: 3 is not a text in quotes"),
-        (["render=3"], "render: what stands there is not a table"),
+        (["render=3"], "render: the value is not a table"),
         (["scenes=[3]"], "3 is not a scene"),
         (["sensors.x=3"], "'sensors' of 'sensors.x' is not a table"),
         (["spp"], "write KEY=VALUE"),

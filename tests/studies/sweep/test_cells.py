@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from isp.colour.colour_fit import ColourFit
+from rodcone.digests import digest
 from studies.study.study import Condition, SceneChoice
-from studies.sweep.cells import Coordinates, cell_key, coordinates, device_stream, exposure_stream
+from studies.sweep.cells import cell_key, device_stream, exposure_stream, labels
 from studies.sweep.provenance import Provenance
 
-AT = Coordinates("still_life", "own", "25cd/m2", "10ms", "low_noise", "interleaved", 0)
+AT = Condition(SceneChoice("still_life"), "own", "25cd/m2", "10ms", "low_noise")
 
 
 def draws(stream: np.random.Generator) -> list[int]:
@@ -18,48 +19,54 @@ def draws(stream: np.random.Generator) -> list[int]:
 
 
 def test_a_stream_is_the_same_for_the_same_coordinates_and_writing() -> None:
-    assert draws(exposure_stream(AT, "rgbw")) == draws(exposure_stream(AT, "rgbw"))
+    assert draws(exposure_stream(AT, "rgbw", 0)) == draws(exposure_stream(AT, "rgbw", 0))
     spelt = replace(AT, level="25.0 cd/m2", exposure="0.01s")
-    assert draws(exposure_stream(AT, "rgbw")) == draws(exposure_stream(spelt, "rgbw"))
+    assert draws(exposure_stream(AT, "rgbw", 0)) == draws(exposure_stream(spelt, "rgbw", 0))
 
 
 @pytest.mark.parametrize(
     "change",
     [
-        {"scene": "flat_field"},
+        {"scene": SceneChoice("flat_field")},
         {"spectrum": "A"},
         {"level": "25lux"},
         {"exposure": "auto"},
         {"sensor": "table1_output"},
-        {"seed": 1},
     ],
 )
 def test_each_coordinate_gives_an_exposure_noise_of_its_own(change: dict[str, object]) -> None:
     other = replace(AT, **change)  # type: ignore[arg-type]
-    assert draws(exposure_stream(AT, "rgbw")) != draws(exposure_stream(other, "rgbw"))
+    assert draws(exposure_stream(AT, "rgbw", 0)) != draws(exposure_stream(other, "rgbw", 0))
 
 
-def test_processors_of_one_mosaic_develop_the_same_exposure() -> None:
-    other = replace(AT, processor="another")
-    assert draws(exposure_stream(AT, "rgbw")) == draws(exposure_stream(other, "rgbw"))
-    assert draws(exposure_stream(AT, "rgbw")) != draws(exposure_stream(AT, "bayer"))
+def test_seed_and_mosaic_give_an_exposure_noise_of_their_own() -> None:
+    assert draws(exposure_stream(AT, "rgbw", 0)) != draws(exposure_stream(AT, "rgbw", 1))
+    assert draws(exposure_stream(AT, "rgbw", 0)) != draws(exposure_stream(AT, "bayer", 0))
 
 
 def test_fixed_patterns_belong_to_sensor_mosaic_and_seed_alone() -> None:
-    elsewhere = replace(AT, scene="flat_field", spectrum="A", level="1lux", exposure="1s", processor="another")
-    assert draws(device_stream(AT, "rgbw")) == draws(device_stream(elsewhere, "rgbw"))
-    assert draws(device_stream(AT, "rgbw")) != draws(device_stream(AT, "bayer"))
-    assert draws(device_stream(AT, "rgbw")) != draws(device_stream(replace(AT, seed=1), "rgbw"))
-    assert draws(device_stream(AT, "rgbw")) != draws(device_stream(replace(AT, sensor="x"), "rgbw"))
-    assert draws(device_stream(AT, "rgbw")) != draws(exposure_stream(AT, "rgbw"))
+    streams = [("low_noise", "rgbw", 0), ("low_noise", "bayer", 0), ("low_noise", "rgbw", 1), ("x", "rgbw", 0)]
+    drawn = [draws(device_stream(*place)) for place in streams]
+    assert len({tuple(each) for each in drawn}) == 4
+    assert draws(device_stream("low_noise", "rgbw", 0)) == drawn[0]
+    assert drawn[0] != draws(exposure_stream(AT, "rgbw", 0))
+
+
+def test_streams_are_those_of_the_first_release() -> None:
+    """The digests of the coordinates as a row names them; another order or spelling would draw other pictures."""
+    named = replace(AT, scene=SceneChoice("/a/desk.exr", "A"), sensor="/b/mine.toml")
+    exposed = digest(["exposure", "desk.exr", "own", 25.0, "cd/m2", 0.01, "mine.toml", "rgbw", 7])
+    chip = digest(["device", "mine.toml", "rgbw", 7])
+    assert draws(exposure_stream(named, "rgbw", 7)) == draws(np.random.default_rng(int(exposed, 16)))
+    assert draws(device_stream("/b/mine.toml", "rgbw", 7)) == draws(np.random.default_rng(int(chip, 16)))
 
 
 def test_a_key_changes_with_each_thing_that_decides_a_picture() -> None:
     fit = ColourFit(("R", "G", "B"), np.ones(3), np.eye(3), np.eye(3))
     other_fit = replace(fit, mean=np.array([1.0, 1.0, np.nextafter(1.0, 2.0)]))
     made_by = Provenance("llvm_ad_spectral", "llvm", "numpy", "{}")
-    given = (AT, "frame", 25.0, 0.01, fit, made_by)
-    others = (replace(AT, seed=1), "other", 25.1, 0.011, other_fit)
+    given = (AT, "bayer", 0, "frame", 25.0, 0.01, fit, made_by)
+    others = (replace(AT, level="1lux"), "interleaved", 1, "other", 25.1, 0.011, other_fit)
     keys = [cell_key(*given)]
     for place, other in enumerate(others):
         changed = list(given)
@@ -67,11 +74,16 @@ def test_a_key_changes_with_each_thing_that_decides_a_picture() -> None:
         keys.append(cell_key(*changed))  # type: ignore[arg-type]
     for field in ("variant", "readout_engine", "development_engine", "versions"):
         keys.append(cell_key(*given[:-1], replace(made_by, **{field: "another"})))  # type: ignore[arg-type]
-    assert len(set(keys)) == 1 + 5 + 4
+    assert len(set(keys)) == 1 + 7 + 4
     assert cell_key(*given) == keys[0]
 
 
-def test_coordinates_name_files_without_their_folder() -> None:
+def test_a_row_names_files_without_their_folder() -> None:
     condition = Condition(SceneChoice("/a/desk.exr"), "own", "1cd/m2", "auto", "/b/mine.toml")
-    made = coordinates(condition, "bayer", 7)
-    assert made == Coordinates("desk.exr", "own", "1cd/m2", "auto", "mine.toml", "bayer", 7)
+    assert labels(condition) == {
+        "scene": "desk.exr",
+        "spectrum": "own",
+        "level": "1cd/m2",
+        "exposure": "auto",
+        "sensor": "mine.toml",
+    }

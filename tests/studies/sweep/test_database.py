@@ -1,4 +1,4 @@
-"""The ledger: whole rows, a version that is checked, and one line for a full disk or a foreign file."""
+"""The results database: whole rows, a version that is checked, and one line for a full disk or a foreign file."""
 
 import errno
 import json
@@ -22,8 +22,8 @@ from studies.sweep.database import (
     note_render,
     note_run,
     note_stages,
-    open_ledger,
-    read_ledger,
+    open_results,
+    read_results,
     render_record,
     rows,
     want,
@@ -32,20 +32,20 @@ from studies.sweep.stored import keep
 
 
 def test_rows_outlive_the_connection_and_a_key_stands_once(tmp_path: Path) -> None:
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         add(base, ROW)
         add(base, replace(ROW, ssim=0.5))
         add(base, replace(ROW, key="1"))
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         assert rows(base, everything=True) == [replace(ROW, ssim=0.5), replace(ROW, key="1")]
         assert rows(base) == []  # none were asked for
 
 
 def test_a_second_process_reads_while_the_first_is_open(tmp_path: Path) -> None:
-    with open_ledger(tmp_path) as writer:
+    with open_results(tmp_path) as writer:
         add(writer, ROW)
         assert writer.execute("PRAGMA journal_mode").fetchone()[0] == "wal"
-        with open_ledger(tmp_path) as reader:
+        with open_results(tmp_path) as reader:
             assert rows(reader, everything=True) == [ROW]
 
 
@@ -56,7 +56,7 @@ def test_a_row_counts_as_done_only_with_whole_pictures(column: str, tmp_path: Pa
     (tmp_path / kept["cut"]).write_bytes(b"a")
     (tmp_path / kept["empty"]).write_bytes(b"")
     (tmp_path / kept["flipped"]).write_bytes(b"a picture glipped")
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         for name, place in {**kept, "gone": "00/00.png", "unasked": kept["whole"]}.items():
             files = {"picture": kept["whole"], "truth": kept["whole"]} | {column: place}
             add(base, replace(ROW, key=name, **files))
@@ -66,7 +66,7 @@ def test_a_row_counts_as_done_only_with_whole_pictures(column: str, tmp_path: Pa
 
 
 def test_what_the_last_run_wants_takes_the_place_of_the_ones_before(tmp_path: Path) -> None:
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         for key in ("a", "b", "c"):
             add(base, replace(ROW, key=key))
         want(base, ["a", "missing", "b"])
@@ -77,7 +77,7 @@ def test_what_the_last_run_wants_takes_the_place_of_the_ones_before(tmp_path: Pa
 def test_renders_and_runs_are_noted(tmp_path: Path) -> None:
     facts = RenderFacts("dense", "llvm_ad_spectral", 1.5, 64, 8, "samples", 0.01, None, 20, 390.0, 770.0, 20.0)
     record = RenderRecord("content", facts, 0.02, ("assumed",))
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         assert render_record(base, "request") is None
         note_render(base, "request", replace(record, content="coarser"))
         note_render(base, "request", record)
@@ -87,7 +87,7 @@ def test_renders_and_runs_are_noted(tmp_path: Path) -> None:
 
 
 def test_the_last_study_comes_with_the_seconds_of_all_its_runs(tmp_path: Path) -> None:
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         assert last_study(base) is None
         for study, seconds in (('{"a": 1}', 1.0), ('{"b": 1}', 10.0), ('{"a": 1}', 100.0)):
             run = note_run(base, "2026-01-01T00:00:00+00:00", "here", study)
@@ -102,7 +102,7 @@ def test_the_last_study_comes_with_the_seconds_of_all_its_runs(tmp_path: Path) -
 
 def test_what_is_made_anew_is_forgotten_and_what_was_not_asked_for_stays(tmp_path: Path) -> None:
     other = {"numpy": "2.4.5", "rodcone": "0.1.0+abc"}
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         add(base, replace(ROW, key="new"))
         add(base, replace(ROW, key="old versions", versions=json.dumps(other)))
         add(base, replace(ROW, key="old variant", variant="scalar_spectral"))
@@ -119,14 +119,14 @@ def test_what_is_made_anew_is_forgotten_and_what_was_not_asked_for_stays(tmp_pat
     [
         (f"PRAGMA user_version = {VERSION + 1}", f"it has version {VERSION + 1}, this rodcone reads {VERSION}"),
         ("PRAGMA user_version = 0", "it has version 0"),
-        ("PRAGMA application_id = 0", "it is no ledger of rodcone"),
+        ("PRAGMA application_id = 0", "it is no results database of rodcone"),
     ],
 )
 def test_another_version_is_refused_and_left_as_it_is(change: str, words: str, tmp_path: Path) -> None:
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         add(base, ROW)
         base.execute(change)
-    with pytest.raises(InputError, match=words), open_ledger(tmp_path):
+    with pytest.raises(InputError, match=words), open_results(tmp_path):
         pass
     with sqlite3.connect(tmp_path / FILE) as base:
         assert base.execute("SELECT key FROM cells").fetchall() == [(ROW.key,)]
@@ -135,7 +135,7 @@ def test_another_version_is_refused_and_left_as_it_is(change: str, words: str, t
 
 def test_a_file_that_is_no_database_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(b"notes of mine " * 100)
-    with pytest.raises(InputError, match="it is no ledger"), open_ledger(tmp_path):
+    with pytest.raises(InputError, match="it is no results database"), open_results(tmp_path):
         pass
     assert (tmp_path / FILE).read_bytes() == b"notes of mine " * 100
 
@@ -145,7 +145,7 @@ def test_a_full_disk_is_told_as_such_and_the_rows_before_it_stand(tmp_path: Path
 
     def fill() -> None:
         nonlocal kept
-        with open_ledger(tmp_path) as base:
+        with open_results(tmp_path) as base:
             pages = base.execute("PRAGMA page_count").fetchone()[0]
             base.execute(f"PRAGMA max_page_count = {pages + 8}")  # SQLite's own "database or disk is full"
             while kept < 1000:
@@ -157,30 +157,30 @@ def test_a_full_disk_is_told_as_such_and_the_rows_before_it_stand(tmp_path: Path
     assert told.value.errno == errno.ENOSPC
     assert told.value.filename == str(tmp_path / FILE)
     assert 0 < kept < 1000
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         assert [row.key for row in rows(base, everything=True)] == [f"{place:04}" for place in range(kept)]
 
 
 def test_reading_changes_nothing_and_sees_what_a_sweep_writes_meanwhile(tmp_path: Path) -> None:
-    with open_ledger(tmp_path) as writer:
+    with open_results(tmp_path) as writer:
         add(writer, ROW)
-        with read_ledger(tmp_path) as reader:
+        with read_results(tmp_path) as reader:
             assert rows(reader, everything=True) == [ROW]
             add(writer, replace(ROW, key="1"))
             assert len(rows(reader, everything=True)) == 2
             with pytest.raises(sqlite3.OperationalError, match="readonly"):
                 reader.execute("DELETE FROM cells")
     before = (tmp_path / FILE).read_bytes()
-    with read_ledger(tmp_path) as reader:
+    with read_results(tmp_path) as reader:
         assert len(rows(reader, everything=True)) == 2
     assert (tmp_path / FILE).read_bytes() == before
 
 
-def test_a_ledger_that_nobody_can_write_to_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with open_ledger(tmp_path) as base:
+def test_results_that_nobody_can_write_to_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open_results(tmp_path) as base:
         add(base, ROW)
     monkeypatch.setattr("studies.sweep.database.os.access", lambda *_: False)  # root may write anywhere
-    with read_ledger(tmp_path) as reader:
+    with read_results(tmp_path) as reader:
         assert rows(reader, everything=True) == [ROW]
     assert [path.name for path in tmp_path.iterdir()] == [FILE]  # no log beside it
 
@@ -188,31 +188,31 @@ def test_a_ledger_that_nobody_can_write_to_is_read(tmp_path: Path, monkeypatch: 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("DROP TABLE cells", "it is no ledger"),
+        ("DROP TABLE cells", "it is no results database"),
         ("UPDATE cells SET picture = '/etc/passwd'", "isn't what was written"),
         ("UPDATE cells SET ssim = -0.125", "row '00ff' isn't what was written"),
     ],
 )
 def test_what_a_sweep_never_writes_is_refused(change: str, words: str, tmp_path: Path) -> None:
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         add(base, ROW)
         base.execute(change)
-    with pytest.raises(InputError, match=words), read_ledger(tmp_path) as base:
+    with pytest.raises(InputError, match=words), read_results(tmp_path) as base:
         rows(base, everything=True)
 
 
 def test_bytes_that_changed_on_the_disk_are_noticed(tmp_path: Path) -> None:
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         add(base, replace(ROW, host="hostname of mine"))
     content = (tmp_path / FILE).read_bytes()
     (tmp_path / FILE).write_bytes(content.replace(b"hostname of mine", b"hostname of mime"))
-    with pytest.raises(InputError, match="isn't what was written"), read_ledger(tmp_path) as base:
+    with pytest.raises(InputError, match="isn't what was written"), read_results(tmp_path) as base:
         rows(base, everything=True)
 
 
 @pytest.mark.parametrize("content", [b"", b"SQLite format 3\0" + bytes(500)])
-def test_a_file_without_tables_is_no_ledger_to_read(content: bytes, tmp_path: Path) -> None:
+def test_a_file_without_tables_is_no_results_database(content: bytes, tmp_path: Path) -> None:
     (tmp_path / FILE).write_bytes(content)
-    with pytest.raises(InputError, match="it is no"), read_ledger(tmp_path):
+    with pytest.raises(InputError, match="it is no"), read_results(tmp_path):
         pass
     assert (tmp_path / FILE).read_bytes() == content

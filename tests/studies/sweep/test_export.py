@@ -11,7 +11,7 @@ import pytest
 from sweep_sample import ROW
 
 from rodcone.errors import InputError
-from studies.sweep.database import COLUMNS, add, open_ledger, want
+from studies.sweep.database import COLUMNS, add, open_results, want
 from studies.sweep.export import read_rows, to_csv, to_pandas, write_table
 
 
@@ -43,7 +43,7 @@ def test_parquet_and_pandas_hold_the_same_values(tmp_path: Path) -> None:
 
 
 def test_rows_come_from_the_ledger_in_the_studys_order_or_all(tmp_path: Path) -> None:
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         for key in ("a", "b", "c"):
             add(base, replace(ROW, key=key))
         want(base, ["c", "a"])

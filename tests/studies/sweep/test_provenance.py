@@ -24,7 +24,7 @@ from studies.pages.report_sweep import sweep_report
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import provenance
 from studies.sweep.cells import Cell
-from studies.sweep.database import add, open_ledger
+from studies.sweep.database import add, open_results
 from studies.sweep.export import read_rows
 from studies.sweep.provenance import Provenance, versions
 from studies.sweep.row import Row
@@ -93,12 +93,12 @@ from rodcone.jit import dr, arrays, backend
 sys.path.insert(0, sys.argv[1])
 import sweep_sample as SAMPLE
 from studies.sweep.run_cell import run_cell
-from studies.sweep.database import open_ledger
+from studies.sweep.database import open_results
 from studies.study.lit_scene import open_all
 from studies.sweep.prepare import Job, scene_cells
 folder = Path(sys.argv[2])
 study = SAMPLE.small_study(folder, processors=("interleaved",), levels=("1cd/m2",), seeds=(0,))
-with open_ledger(folder) as base:
+with open_results(folder) as base:
     job = Job(study, SAMPLE.stated(study), folder, base)
     cells = [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
 threads = lambda: len(os.listdir("/proc/self/task"))
@@ -189,7 +189,7 @@ def test_a_report_or_ranking_over_mixed_cells_is_refused_in_one_line(tmp_path: P
         with pytest.raises(InputError, match=words) as told:
             contests_of(mixed)
         assert "\n" not in str(told.value)
-    with open_ledger(out) as base:
+    with open_results(out) as base:
         add(base, replace(found[-1], variant="llvm_ad_spectral"))
     with pytest.raises(InputError, match="Mitsuba variant"):
         sweep_report(out)

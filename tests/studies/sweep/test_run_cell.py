@@ -35,7 +35,7 @@ from studies.study.lit_scene import open_all
 from studies.study.model import ImageModel
 from studies.study.study import RenderLimits, SceneChoice, conditions
 from studies.sweep.cells import Cell, device_stream, exposure_stream
-from studies.sweep.database import open_ledger
+from studies.sweep.database import open_results
 from studies.sweep.prepare import Job, scene_cells
 from studies.sweep.run_cell import run_cell
 from studies.sweep.stored import keep
@@ -44,13 +44,13 @@ from studies.sweep.stored import keep
 def made(folder: Path, plan: Plan | None = None, **changes: Any) -> list[Cell]:
     """Cells of the small study, their shared files made."""
     study = SAMPLE.small_study(folder, **changes)
-    with open_ledger(folder) as base:
+    with open_results(folder) as base:
         job = Job(study, plan or SAMPLE.stated(study), folder, base)
         return [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
 
 
 def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
-    cell = next(cell for cell in made(tmp_path) if cell.at.level == "25cd/m2")
+    cell = next(cell for cell in made(tmp_path) if cell.condition.level == "25cd/m2")
     row = run_cell(cell)
 
     transport = as_transport(load_radiance(tmp_path / "scene.exr"))
@@ -65,8 +65,8 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     fine = light_in_bands(illuminant("E"), nm, width)
     responses = sensor.responses.band_average(("R", "G", "B"), nm, width)
     colours = fit_colours(("R", "G", "B"), responses, nm, fine.spectrum, surfaces, width)
-    device = draw_device(sensor, radiance.shape, device_stream(cell.at, "bayer"))
-    raw = read_out(expected_e, sensor, device, exposure_s, exposure_stream(cell.at, "bayer"))
+    device = draw_device(sensor, radiance.shape, device_stream(cell.condition.sensor, "bayer", cell.seed))
+    raw = read_out(expected_e, sensor, device, exposure_s, exposure_stream(cell.condition, "bayer", cell.seed))
     neutral = neutral_electrons(sensor, light, exposure_s)
     white = float(np.percentile(radiance.luminance(), 99.0, method="inverted_cdf")) / 0.9
     linear = picture_bayer(raw, colours, neutral=neutral).rgb / (neutral[1] * white)

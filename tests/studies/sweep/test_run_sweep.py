@@ -29,7 +29,7 @@ from studies.budget.budget import monte_carlo_share
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import run_cell as cell_run
 from studies.sweep.cells import Cell
-from studies.sweep.database import open_ledger, rows
+from studies.sweep.database import open_results, rows
 from studies.sweep.row import Row
 from studies.sweep.run_sweep import LEFT_S
 from studies.sweep.workers import run, run_in_processes
@@ -49,7 +49,7 @@ def test_every_cell_gets_a_row_in_the_studys_order_and_a_second_run_makes_none(t
     study = small_study(tmp_path)
     first = swept(study, tmp_path / "out")
     assert (first.cells, first.made) == (4, 4)
-    with open_ledger(tmp_path / "out") as base:
+    with open_results(tmp_path / "out") as base:
         found = [(row.level, row.seed, row.luminance_cd_m2) for row in rows(base)]
     assert found == [("1cd/m2", 0, 1.0), ("1cd/m2", 1, 1.0), ("25cd/m2", 0, 25.0), ("25cd/m2", 1, 25.0)]
     before = content(tmp_path / "out")
@@ -125,7 +125,7 @@ def test_a_full_disk_leaves_nothing_half_done_and_the_next_run_goes_on(
 
 
 def rows_of(out: Path) -> list[Row]:
-    with open_ledger(out) as base:
+    with open_results(out) as base:
         return rows(base)
 
 
@@ -195,7 +195,7 @@ def test_one_render_serves_all_spectra_and_a_finer_one_goes_on_from_it(
     assert swept(study, tmp_path).made == 4
     assert swept(study, tmp_path).made == 0
     assert asked == [16]
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         table = rows(base)
         for row in table:
             assert row.illuminance_lux == pytest.approx(row.luminance_cd_m2 * 2 * 3.141593, rel=1e-5)
@@ -212,7 +212,7 @@ def test_a_finer_request_goes_on_from_the_coarser_render_and_makes_its_cells_ane
     finer = replace(study, render=replace(limits, spp=64))
     assert [swept(each, tmp_path / "out").made for each in (study, finer, study)] == [1, 1, 0]
     assert len(list((tmp_path / "out" / "renders").iterdir())) == 1
-    with open_ledger(tmp_path / "out") as base:
+    with open_results(tmp_path / "out") as base:
         assert [row.spp for row in rows(base)] == [16]  # what the last run asked for
         coarse, fine = sorted(rows(base, everything=True), key=lambda row: row.spp)
     assert (coarse.spp, fine.spp) == (16, 64)
@@ -284,7 +284,7 @@ def until_more_than(count: int, out: Path) -> None:
     """Wait until the ledger holds more cells, or has them all."""
     for _ in range(600):
         if (out / "ledger.sqlite").exists():
-            with open_ledger(out) as base:
+            with open_results(out) as base:
                 if count == 200 or len(rows(base, everything=True)) > count:
                     return
         time.sleep(0.05)
@@ -324,7 +324,7 @@ def test_killed_at_ten_random_moments_and_gone_on_with_is_as_never_killed(worker
             time.sleep(0.1)
         assert running_in(process.pid) == []
         if (tmp_path / "out" / "ledger.sqlite").exists():
-            with open_ledger(tmp_path / "out") as base:
+            with open_results(tmp_path / "out") as base:
                 grew.append(len(rows(base, everything=True)))
     print("cells in the ledger after each kill:", grew)
     assert half_pictures(tmp_path / "out") == []

@@ -15,7 +15,7 @@ from rodcone.errors import InputError
 from studies.study.lit_scene import open_all
 from studies.sweep import workers
 from studies.sweep.cells import Cell
-from studies.sweep.database import open_ledger
+from studies.sweep.database import open_results
 from studies.sweep.prepare import Job, scene_cells
 from studies.sweep.workers import InThisProcess, WorkerLostError, run, run_in_processes
 
@@ -46,7 +46,7 @@ class Breaking(Executor):
 @pytest.fixture
 def cells(tmp_path: Path) -> list[Cell]:
     study = SAMPLE.small_study(tmp_path)
-    with open_ledger(tmp_path) as base:
+    with open_results(tmp_path) as base:
         job = Job(study, SAMPLE.stated(study), tmp_path, base)
         return [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
 
@@ -82,7 +82,7 @@ def test_a_cell_that_ends_its_worker_is_given_up_and_all_others_are_made(
     monkeypatch.setattr(workers, "MOST_DEATHS", 2)
     deadly = replace(cells[1], colours=Deadly())  # type: ignore[arg-type]
     made = []
-    with pytest.raises(InputError, match=r"1 ended their worker 2 times, the first at Coordinates\(") as told:
+    with pytest.raises(InputError, match=r"1 ended their worker 2 times, the first bayer of Condition\(") as told:
         made.extend(row.key for row in run_in_processes([cells[0], deadly, *cells[2:]], 1))
     assert sorted(made) == sorted(cell.key for cell in (cells[0], *cells[2:]))
     assert "\n" not in str(told.value)
