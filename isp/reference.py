@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
-from isp.planes import Plane, fill, guide_mosaic, planes
+from isp.planes import Plane, fill, guide_mosaic
 from isp.settings import DEFAULTS, WINDOW, Reconstruction, Settings
 from isp.similarity.guide import reliability, saturated_fraction
 from isp.similarity.interpolation import certainty
@@ -36,7 +36,7 @@ class _Inputs:
 
 
 @dataclass(frozen=True)
-class Sums:
+class ReferenceSums:
     """Sums over y for each (x, channel), in units of exp(largest log weight so far)."""
 
     largest: Plane
@@ -58,6 +58,7 @@ def reconstruct_reference(raw: RawImage, settings: Settings = DEFAULTS) -> NDArr
     InputError
         As `reconstruct`.
     """
+    settings.check_reaches(raw.cfa)
     return np.asarray(reference_with_noise(raw, settings).estimate, dtype=np.float64)
 
 
@@ -67,12 +68,11 @@ def reference_with_noise(raw: RawImage, settings: Settings = DEFAULTS) -> Recons
     return Reconstruction(sums.value / sums.weight, sums.square / sums.weight**2, "numpy")
 
 
-def sum_weights(raw: RawImage, settings: Settings) -> Sums:
+def sum_weights(raw: RawImage, settings: Settings) -> ReferenceSums:
     """Sums of eqs. (1) and (3) in float64, one offset of the neighbourhood after the other."""
-    settings.check_reaches(raw.cfa)
     inputs = _inputs(raw, settings)
     shape = (*raw.shape, len(inputs.h))
-    sums = Sums(np.full(shape, -np.inf), np.zeros(shape), np.zeros(shape), np.zeros(shape))
+    sums = ReferenceSums(np.full(shape, -np.inf), np.zeros(shape), np.zeros(shape), np.zeros(shape))
     reach = range(-settings.reach, settings.reach + 1)
     for row in (d for d in reach if abs(d) < raw.shape[0]):
         for column in (d for d in reach if abs(d) < raw.shape[1]):
@@ -81,27 +81,26 @@ def sum_weights(raw: RawImage, settings: Settings) -> Sums:
 
 
 def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
-    names, half = channels(raw.cfa), settings.patch // 2
-    in_noise = settings.distance == "noise"
+    names, half, in_noise = channels(raw.cfa), settings.patch // 2, settings.distance == "noise"
     noise = noise_distances(raw.cfa, settings.patch, settings.reach)
+    mosaic = guide_mosaic(raw.electrons, raw, settings.distance)
+    h = np.stack([fill(mosaic, raw.cfa, name) for name in names])
+    trust = np.ones(raw.shape)
+    if in_noise:
+        light_e = fill(raw.electrons, raw.cfa, "W") if "W" in names else raw.electrons
+        trust = np.asarray(reliability(light_e, raw.dark_noise_e, WINDOW) * certainty(mosaic, raw.cfa, settings.patch))
     return _Inputs(
         electrons=raw.electrons,
         channel=np.argmax([mask(raw.cfa, name, raw.shape) for name in names], axis=0),
-        h=np.pad(planes(raw, settings.distance), ((0, 0), (half, half), (half, half)), mode="reflect"),
+        h=np.pad(h, ((0, 0), (half, half), (half, half)), mode="reflect"),
         alpha=saturated_fraction(raw),
-        reliability=_reliability(raw, settings) if in_noise else np.ones(raw.shape),
+        reliability=trust,
         noise=noise if in_noise else [np.zeros_like(table) for table in noise],
         white=names.index("W") if "W" in names else None,
     )
 
 
-def _reliability(raw: RawImage, settings: Settings) -> Plane:
-    light_e = fill(raw.electrons, raw.cfa, "W") if "W" in channels(raw.cfa) else raw.electrons
-    mosaic = guide_mosaic(raw.electrons, raw, settings.distance)
-    return np.asarray(reliability(light_e, raw.dark_noise_e, WINDOW) * certainty(mosaic, raw.cfa, settings.patch))
-
-
-def _add_offset(sums: Sums, inputs: _Inputs, settings: Settings, offset: tuple[int, int]) -> None:
+def _add_offset(sums: ReferenceSums, inputs: _Inputs, settings: Settings, offset: tuple[int, int]) -> None:
     """Add y = x + offset to the sums of each x whose y lies in the frame."""
     shape = inputs.electrons.shape
     x = tuple(np.arange(max(-d, 0), size - max(d, 0)) for d, size in zip(offset, shape, strict=True))
@@ -134,7 +133,7 @@ def _distance(
     return np.asarray(np.maximum(total - noise[np.ix_(x[0] % noise.shape[0], x[1] % noise.shape[1])], 0.0))
 
 
-def _accumulate(sums: Sums, at: tuple[NDArray[np.intp], ...], log_weight: Plane, value: Plane) -> None:
+def _accumulate(sums: ReferenceSums, at: tuple[NDArray[np.intp], ...], log_weight: Plane, value: Plane) -> None:
     """Add one weighted sample to the sums of eqs. (1) and (3); the largest weight stays 1, so W_y is never 0."""
     largest = np.maximum(sums.largest[at], log_weight)
     old, new = np.exp(sums.largest[at] - largest), np.exp(log_weight - largest)

@@ -50,6 +50,12 @@ def divisor(number: int) -> Divisor:
     return Divisor(dr.opaque(jit.UInt, number), dr.opaque(jit.Float64, 1 / number))
 
 
+def tile_cell(pixel: Any, width: Divisor, tile: tuple[Divisor, Divisor]) -> Any:
+    """Number of each pixel's cell in a tile of (height, width) that is repeated over a picture; row by row, both."""
+    row, column = divide(pixel, width)
+    return divide(row, tile[0])[1] * tile[1].number + divide(column, tile[1])[1]
+
+
 def divide(number: Any, by: Divisor) -> tuple[Any, Any]:
     """Quotient and remainder of whole numbers (UInt) under 2^31.
 

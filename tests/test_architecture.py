@@ -15,8 +15,12 @@ SCRIPTS = sorted(path for name in ("tests", "benchmarks") for path in (ROOT / na
 TEXTS = {".py", ".md", ".toml", ".yaml", ".yml", ".cff", ".html", ".j2", ".css", ".js", ".json", ".csv", ".txt", ""}
 
 MOST_MODULE_LINES = 300
-MOST_FUNCTION_LINES = 100
 LONG_MODULES = {"render/integrator/dense.py"}  # one algorithm, read from top to bottom
+MOST_FUNCTION_LINES, MOST_WITHOUT_SECTIONS = 100, 50
+MOST_MODULES_A_FOLDER = 20
+ONE_A_THING = ("scenes", "studies/commands", "studies/paper")  # a scene, a command, a figure: as many as there are
+MOST_PARAMETERS = 8
+MORE_PARAMETERS = {"render/engine.py:render"}  # a name of README and tutorials, whose calls go on
 
 # Who alone may import a library, and why.
 SOLE_IMPORTERS = {
@@ -93,22 +97,75 @@ def test_no_module_binds_a_packages_bare_name() -> None:
     )
 
 
+def functions(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield node
+
+
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_modules_and_functions_are_small(path: Path) -> None:
-    source = path.read_text("utf-8")
-    lines = len(source.splitlines())
+def test_a_module_can_be_read_in_one_go(path: Path) -> None:
+    lines = len(path.read_text("utf-8").splitlines())
     assert lines <= MOST_MODULE_LINES or name_of(path) in LONG_MODULES, (
-        f"{name_of(path)} has {lines} lines; split it at {MOST_MODULE_LINES}: a module should be read in one go"
+        f"{name_of(path)} has {lines} lines; split it at {MOST_MODULE_LINES} where it holds two things"
     )
-    long = [
-        f"{node.name} ({code_lines(node)})"
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and code_lines(node) > MOST_FUNCTION_LINES
-    ]
-    assert not long, (
-        f"{name_of(path)}: {long} have more than {MOST_FUNCTION_LINES} lines without docstring; "
-        "small pure functions can be tested against closed forms one by one"
-    )
+
+
+@pytest.mark.parametrize("path", MODULES, ids=name_of)
+def test_a_long_function_has_sections(path: Path) -> None:
+    lines = path.read_text("utf-8").splitlines()
+    for node in functions(path):
+        length, indent = code_lines(node), " " * (node.col_offset + 4)
+        assert length <= MOST_FUNCTION_LINES, f"{name_of(path)}: {node.name} has {length} lines without its docstring"
+        sections = [line for line in lines[node.lineno : node.end_lineno] if line.startswith(f"{indent}# ")]
+        assert length <= MOST_WITHOUT_SECTIONS or len(sections) >= 2, (
+            f"{name_of(path)}: {node.name} has {length} lines; over {MOST_WITHOUT_SECTIONS} comments divide it into "
+            "sections, so that a reader finds his place"
+        )
+
+
+def test_a_folder_can_be_taken_in_at_a_glance() -> None:
+    folders = {path.parent for path in MODULES}
+    counts = {
+        name_of(folder): len([path for path in folder.glob("*.py") if path.stem != "__init__"]) for folder in folders
+    }
+    wrong = {name: count for name, count in counts.items() if count > MOST_MODULES_A_FOLDER and name not in ONE_A_THING}
+    assert not wrong, f"{wrong}: more than {MOST_MODULES_A_FOLDER} modules; which of them belong together?"
+
+
+def test_functions_take_few_parameters() -> None:
+    wrong = []
+    for path in MODULES:
+        for node in functions(path):
+            taken = node.args
+            count = len([*taken.posonlyargs, *taken.args, *taken.kwonlyargs])
+            if (
+                count > MOST_PARAMETERS
+                and f"{name_of(path)}:{node.name}" not in MORE_PARAMETERS
+                and path.parent.name != "commands"
+            ):
+                wrong.append(f"{name_of(path)}:{node.name} ({count})")
+    assert not wrong, f"{wrong}: more than {MOST_PARAMETERS} parameters; pass values that belong together as one"
+
+
+def test_a_public_class_has_a_name_of_its_own() -> None:
+    found: dict[str, list[str]] = {}
+    for path in MODULES:
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found.setdefault(node.name, []).append(name_of(path))
+    twice = {name: places for name, places in found.items() if len(places) > 1}
+    assert not twice, f"{twice}: a reader who meets the name must know which it is"
+
+
+@pytest.mark.parametrize("path", [path for path in MODULES if path.name == "__init__.py"], ids=name_of)
+def test_a_package_defines_nothing(path: Path) -> None:
+    """Beside its docstring it re-exports names that written code imports; late where that would load too much."""
+    body = ast.parse(path.read_text("utf-8")).body
+    allowed = (ast.ImportFrom, ast.Import, ast.Assign, ast.AnnAssign, ast.FunctionDef, ast.Expr)
+    assert [node for node in body if not isinstance(node, allowed)] == []
+    names = {node.name for node in body if isinstance(node, ast.FunctionDef)}
+    assert names <= {"__getattr__", "__dir__"}
 
 
 def test_no_absolute_path_of_a_machine() -> None:

@@ -47,7 +47,7 @@ class Shape:
 
 
 @dataclass(frozen=True)
-class Sums:
+class KernelSums:
     """What the threads of a strip give, Dr.Jit arrays [phase, row, column].
 
     In phase (a, b) the strip's pixel (r, c) stands at row r + a and column c + b, for blocks to begin at whole blocks.
@@ -73,7 +73,7 @@ class Sums:
     columns: Any
 
 
-def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Sums) -> Any:
+def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: KernelSums) -> Any:
     """Start the threads; says which of them hold a pixel whose sums are too small for the fixed scale."""
     patch, (down, across), count = shape.patch, shape.tile, dr.width(threads.row)
     dense = shape.guide == "W"
@@ -91,7 +91,12 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Sums)
     own = jit.UInt(threads.plane)
     planes = {"W": [inputs.white], "channel": [own], "mixed": [own, inputs.white]}[shape.guide]
     first_packets = [plane * inputs.plane_packets for plane in planes]
-    below = {i: i * inputs.row_packets for i in window}
+    pair, step = inputs.packet_rows, inputs.packet_columns
+    lines = sorted({i // pair for i in window})  # of packets
+    below = {line: line * inputs.row_packets for line in lines}
+    # x as y is counted, in packets: (row + a) / pair, (column + b) / step for phase (a, b), whole numbers
+    a, b = threads.phase // across % pair, threads.phase % step
+    x_packet = jit.UInt(x_row + a) // pair * inputs.row_packets + jit.UInt(x_column + b) // step
     # A list of offsets a phase, or a phase and cell: phase * cells + cell
     offsets = jit.UInt(threads.phase if dense else threads.phase * (down * across) + threads.cell)
     first_entry, entries = offsets * inputs.length, dr.gather(jit.UInt, inputs.counts, offsets)
@@ -119,24 +124,26 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Sums)
 
     def add_offset(k: Any, totals: list[Any]) -> tuple[Any, list[Any]]:
         """Add the samples at y = x + d for offset k of the list."""
-        row, column, log_spatial, *noise = load(inputs.entries, first_entry + k, inputs.entry_values, 3 + noises)
-        y_row, y_column = jit.UInt(x_row + jit.Int(row)), jit.UInt(x_column + jit.Int(column))
-        y = y_row * inputs.row_packets + y_column // (across if dense else 1)  # packet
+        steps, log_spatial, *noise = load(inputs.entries, first_entry + k, inputs.entry_values, 2 + noises)
+        y = x_packet + dr.reinterpret_array(jit.UInt, steps)  # packet
         distances, samples = list[list[Any]](), dict[int, list[Any]]()
         for n, (first_packet, patches) in enumerate(zip(first_packets, patches_at_x, strict=True)):
             patches_at_y = {}
-            for i in window:
-                needed = under + block if n == 0 and i in rows else under  # every plane's packets have the samples
-                values = load(inputs.packets, first_packet + y + below[i], inputs.packet_values, needed)
-                patches_at_y[i] = values[:under]
-                samples.setdefault(i, values[under:])
+            for line in lines:
+                own_rows = range(line * pair, (line + 1) * pair)
+                # Every plane's packets have the samples.
+                needed = pair * (under + block) if n == 0 and any(i in rows for i in own_rows) else pair * under
+                values = load(inputs.packets, first_packet + y + below[line], inputs.packet_values, needed)
+                for j, i in enumerate(own_rows):
+                    patches_at_y[i] = values[j * under : (j + 1) * under]
+                    samples.setdefault(i, values[pair * under + j * block :][:block])
             # A noise distance for each cell of y, or for each plane.
             less = [noise[r % down * across + c % across if dense else n] for r, c in pixels]
             distances.append(squared_distances(patches, patches_at_y, less, pixels, patch))
         beta_squared = distances[0]
         if shape.guide == "mixed":
-            lines = {r: load(inputs.alpha, y + below[r], inputs.alpha_values, block) for r in rows}
-            beta_squared = mixed_squares(distances[0], distances[1], [lines[r][c] for r, c in pixels])
+            alpha = {r: load(inputs.alpha, y + below[r], inputs.alpha_values, block) for r in rows}
+            beta_squared = mixed_squares(distances[0], distances[1], [alpha[r][c] for r, c in pixels])
         if not shape.running:
             log_spatial = log_spatial + HEADROOM
         log_weights = [dr.fma(-v, beta, log_spatial) for v, beta in zip(inverse_variance, beta_squared, strict=True)]
@@ -146,9 +153,13 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Sums)
     start = [tuple(dr.full(jit.Float, value, count) for value in start_sums(shape.running, shape.noise))] * len(pixels)
     _, totals = dr.while_loop((jit.UInt(0), start), lambda k, _: k < entries, add_offset)
 
-    failed = dr.full(jit.Bool, False, count) if shape.running else _failed(jit, totals, pixels, threads, inputs)
+    # What is stored first is evaluated first: a pixel's sample is used as soon as it is loaded. Were the weights asked
+    # for before the means, the samples of the whole block would wait in memory.
     targets = _store(jit, totals, pixels, threads, shape, sums)
-    dr.eval(failed, targets)  # all at once, for the loop to run once
+    failed = dr.zeros(jit.Bool, count)
+    if not shape.running:
+        dr.scatter(failed, _failed(jit, totals, pixels, threads, inputs), dr.arange(jit.UInt, count))
+    dr.eval(targets, failed)  # all at once, for the loop to run once
     return failed
 
 
@@ -163,7 +174,7 @@ def _failed(jit: Any, totals: list[Any], pixels: list[tuple[int, int]], threads:
 
 
 def _store(
-    jit: Any, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, shape: Shape, sums: Sums
+    jit: Any, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, shape: Shape, sums: KernelSums
 ) -> list[Any]:
     """Store what the loop has summed up; what is stored into is returned, not evaluated yet."""
     targets = [sums.weight, sums.mean] + [sums.noise_gain] * shape.noise + [sums.unit] * shape.running

@@ -17,10 +17,11 @@
     A row:      h0 h1 h2 h3 h4 h5 ...  of a plane,  s0 s1 s2 s3 s4 s5 ...  samples
     Packets:    |h0 h1 h2 h3 s0 s1 s2 s3|h2 h3 h4 h5 s2 s3 s4 s5| ...      (block 4 wide, patch 1, every 2nd column)
 
-A packet is one load: all that a thread reads of a row of y, the plane under the patches of its block and the block's
-samples. At x, which a thread reads once, planes are read pixel by pixel. The addresses:
+A packet holds all that a thread reads of a row of y: the plane under the patches of its block, and the block's samples.
+Where W guides it holds two rows (h of both, then s of both), which is a line of the cache. At x, which a thread reads
+once, planes are read pixel by pixel. The addresses, with `packet_step` = (down, across):
     pixel   (row - top) * stride + column - left
-    packet  (row - top) * row_packets + (column - left) / step        step: `packet_step`
+    packet  (row - top) / down * row_packets + (column - left) / across
 
 Planes are stored half a patch early: where a pixel stands, its patch begins. Beyond the frame they go on by reflection
 for half a patch and are OUTSIDE further on. Nothing in a strip depends on where the strip begins or ends.
@@ -33,16 +34,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.kernel.accumulate import LEAST_INVERSE_VARIANCE, OUTSIDE
-from isp.kernel.schedule import Guide, Pattern, Threads, list_offsets
+from isp.kernel.schedule import Guide, Pattern, list_offsets
 from isp.planes import fill, guide_mosaic
 from isp.settings import WINDOW, Settings
 from isp.similarity.guide import fraction_of_full, reliability, saturation_dn
 from isp.similarity.interpolation import certainty
+from rodcone.device_arrays import aligned, upload
 from rodcone.jit import dr
 from sensor.raw import RawImage
 
 STRIP_BYTES = 600_000_000  # of all that a strip takes: one and a half megapixels of RGBW
-ALIGNMENT = 64  # bytes; Dr.Jit compiles another kernel for memory that isn't aligned, and refuses it packet loads
 
 Array = NDArray[Any]
 Span = tuple[int, int]  # the first of some rows or columns, and past the last
@@ -92,6 +93,8 @@ class Inputs:
         Of `isp.kernel.schedule.list_offsets`.
     length : UInt
         Entries that a list has room for.
+    packet_rows, packet_columns : int
+        Of `packet_step`.
     packet_values, alpha_values, entry_values : int
         Floats of a packet, of one of alpha, and of an entry.
     top, left : Int
@@ -111,6 +114,8 @@ class Inputs:
     entries: Any
     counts: Any
     length: Any
+    packet_rows: int
+    packet_columns: int
     packet_values: int
     alpha_values: int
     entry_values: int
@@ -196,76 +201,63 @@ def lay_out(
     channels = [number for number in range(len(pattern.channels)) if guide != "W" or number == pattern.white]
     samples = _window(strip.samples[own], start, (size[0], size[1] + block), 0, 0.0)
 
-    # Packets: a row of a plane under the patches of a block, then the block's samples.
-    row_packets = size[1] // packet_step(pattern, guide)
-    under = block + settings.patch - 1
-    planes = aligned((len(channels), *size))
-    packets = aligned((len(channels), size[0], row_packets, packet_width(under + block)))
+    # Packets: one or two rows of a plane under the patches of a block, then as many of the block's samples.
+    down, across = packet_step(pattern, guide)
+    row_packets, under = size[1] // across, block + settings.patch - 1
+    planes = aligned((len(channels), *size), np.float32)
+    packets = aligned((len(channels), size[0] // down, row_packets, packet_width(down * (under + block))), np.float32)
     for number, plane, target in zip(channels, planes, packets, strict=True):
         filled = fill(strip.guide[own], pattern.cfa, pattern.channels[number])
         early = start[0] - half, start[1] - half
         wide = _window(filled, early, (size[0], size[1] + under), half, OUTSIDE)
         plane[:] = wide[:, : size[1]]
-        _put_packets(target[..., :under], wide, packet_step(pattern, guide))
-        _put_packets(target[..., under : under + block], samples, packet_step(pattern, guide))
+        for k in range(down):
+            _put_packets(target[..., k * under : (k + 1) * under], wide[k::down], across)
+            first = down * under + k * block
+            _put_packets(target[..., first : first + block], samples[k::down], across)
     alpha = None
     if guide != "W" and strip.alpha is not None:
-        shares = _window(strip.alpha[own], start, (size[0], size[1] + block), 0, 0.0)
-        alpha = aligned((size[0], row_packets, packet_width(block)))
-        _put_packets(alpha[..., :block], shares, packet_step(pattern, guide))
+        alpha = aligned((size[0], row_packets, packet_width(block)), np.float32)
+        _put_packets(alpha[..., :block], _window(strip.alpha[own], start, (size[0], size[1] + block), 0, 0.0), across)
 
     offsets, counts = list_offsets(pattern, settings, guide)
-    entries = np.zeros((*offsets.shape[:2], packet_width(offsets.shape[2])), np.float32)
-    entries[..., : offsets.shape[2]] = offsets
+    entries = np.zeros((*offsets.shape[:2], packet_width(offsets.shape[2] - 1)), np.float32)
+    steps = offsets[..., 0] // down * row_packets + offsets[..., 1] // across  # packets from x to y
+    entries[..., 0] = steps.astype(np.int32).view(np.float32)
+    entries[..., 1 : offsets.shape[2] - 1] = offsets[..., 2:]
+    shares = {} if alpha is None else {"alpha": alpha}
+    inverse_variance = _window(strip.inverse_variance[own], start, size, 0, 0.0)
+    read = {"planes": planes, "inverse_variance": inverse_variance, "packets": packets, "entries": entries}
+    numbers = {
+        "length": entries.shape[1],
+        "stride": size[1],
+        "row_packets": row_packets,
+        "plane_size": size[0] * size[1],
+        "plane_packets": packets.shape[1] * row_packets,
+        "white": channels.index(pattern.white) if pattern.white is not None else 0,
+        "height": strip.shape[0],
+        "width": strip.shape[1],
+    }
     return Inputs(
-        planes=upload(jit, planes),
-        inverse_variance=upload(jit, _window(strip.inverse_variance[own], start, size, 0, 0.0)),
-        packets=upload(jit, packets),
-        alpha=None if alpha is None else upload(jit, alpha),
-        entries=upload(jit, entries),
-        counts=upload(jit, counts),
-        length=dr.opaque(jit.UInt, entries.shape[1]),
+        **{"alpha": None} | {name: upload(values) for name, values in {**read, **shares, "counts": counts}.items()},
+        **{name: dr.opaque(jit.UInt, number) for name, number in numbers.items()},
+        top=dr.opaque(jit.Int, top),
+        left=dr.opaque(jit.Int, left),
+        packet_rows=down,
+        packet_columns=across,
         packet_values=packets.shape[3],
         alpha_values=packet_width(block),
         entry_values=entries.shape[2],
-        top=dr.opaque(jit.Int, top),
-        left=dr.opaque(jit.Int, left),
-        stride=dr.opaque(jit.UInt, size[1]),
-        row_packets=dr.opaque(jit.UInt, row_packets),
-        plane_size=dr.opaque(jit.UInt, size[0] * size[1]),
-        plane_packets=dr.opaque(jit.UInt, size[0] * row_packets),
-        white=dr.opaque(jit.UInt, channels.index(pattern.white) if pattern.white is not None else 0),
-        height=dr.opaque(jit.UInt, strip.shape[0]),
-        width=dr.opaque(jit.UInt, strip.shape[1]),
     )
 
 
-def packet_step(pattern: Pattern, guide: Guide) -> int:
-    """Columns from one packet to the next: with guide W all y of a block begin at the tile's first column."""
-    return pattern.tile[1] if guide == "W" else 1
+def packet_step(pattern: Pattern, guide: Guide) -> tuple[int, int]:
+    """Rows in a packet, and columns from one packet to the next.
 
-
-def upload_threads(jit: Any, threads: Threads) -> Threads:
-    """Threads with Dr.Jit arrays."""
-    return Threads(**{name: upload(jit, values) for name, values in vars(threads).items()})
-
-
-def upload(jit: Any, values: Array) -> Any:
-    """Evaluated Dr.Jit array of the same type, in aligned memory."""
-    kinds = {"f": jit.Float, "u": jit.UInt, "i": jit.Int}
-    if values.ctypes.data % ALIGNMENT:
-        memory = aligned(values.shape, values.dtype)
-        memory[:] = values
-        values = memory
-    return kinds[values.dtype.kind](values.ravel())
-
-
-def aligned(shape: tuple[int, ...], kind: Any = np.float32) -> Array:
-    """Empty array that Dr.Jit takes as it is."""
-    size = int(np.prod(shape)) * np.dtype(kind).itemsize
-    memory = np.empty(size + ALIGNMENT, dtype=np.uint8)
-    start = -memory.ctypes.data % ALIGNMENT
-    return np.asarray(memory[start : start + size].view(kind).reshape(shape))
+    With guide W all y of a block begin at the tile's first cell: at its first column, and at an even row where the
+    tile's height is even. Two rows of planes and samples are then one line of the cache.
+    """
+    return (2 if pattern.tile[0] % 2 == 0 else 1, pattern.tile[1]) if guide == "W" else (1, 1)
 
 
 def _surroundings(
@@ -295,6 +287,8 @@ def _window(values: Array, start: tuple[int, int], size: tuple[int, int], reflec
 
 
 def _put_packets(target: Array, rows: Array, step: int) -> None:
-    """target[i, p, k] = rows[i, step * p + k]."""
-    for k in range(target.shape[2]):
-        target[..., k] = rows[:, k : k + step * target.shape[1] : step]
+    """target[i, p, k] = rows[i, step * p + k], a few rows at a time, which stay in the cache."""
+    for first in range(0, len(target), 16):
+        part, source = target[first : first + 16], rows[first : first + 16]
+        for k in range(target.shape[2]):
+            part[..., k] = source[:, k : k + step * target.shape[1] : step]

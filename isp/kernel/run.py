@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.kernel.accumulate import HEADROOM
-from isp.kernel.kernel import Shape, Sums, launch
-from isp.kernel.layout import Inputs, Span, cut_strip, lay_out, strip_rows, upload_threads
+from isp.kernel.kernel import KernelSums, Shape, launch
+from isp.kernel.layout import Inputs, Span, cut_strip, lay_out, strip_rows
 from isp.kernel.schedule import Guide, Pattern, Threads, list_threads, make_pattern
 from isp.settings import Settings
+from rodcone.device_arrays import upload
 from rodcone.jit import arrays, dr
 from sensor.raw import RawImage
 
@@ -34,7 +35,7 @@ class Started:
     """A strip whose kernels run: rows of the frame, where their sums go, and the launches."""
 
     rows: Span
-    sums: Sums
+    sums: KernelSums
     launches: list[Launch]
 
 
@@ -79,13 +80,13 @@ def _start(jit: Any, raw: RawImage, rows: Span, pattern: Pattern, settings: Sett
                 running=False,
                 noise=noise,
             )
-            threads = upload_threads(jit, work[guide])
+            threads = Threads(**{name: upload(values) for name, values in vars(work[guide]).items()})
             failed = launch(jit, inputs, threads, shape, sums)
             launches.append(Launch(inputs=inputs, threads=threads, shape=shape, failed=failed))
     return Started(rows=rows, sums=sums, launches=launches)
 
 
-def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern, *, noise: bool) -> Sums:
+def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern, *, noise: bool) -> KernelSums:
     """Room for what the blocks of all phases give; at the fixed scale they leave the unit as it is."""
     # Whole blocks that cover the strip and the tile - 1 rows and columns by which phases begin early.
     size = [
@@ -93,7 +94,7 @@ def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern, *, noise: bo
         for length, tile, block in zip((rows[1] - rows[0], width), pattern.tile, pattern.block, strict=True)
     ]
     count = len(pattern.cells) * size[0] * size[1]
-    return Sums(
+    return KernelSums(
         weight=dr.empty(jit.Float, count),
         unit=dr.full(jit.Float, -HEADROOM, count),
         mean=dr.empty(jit.Float, count),

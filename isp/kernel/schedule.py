@@ -187,7 +187,7 @@ def _threads(
     ends: tuple[int, int],
     guide: Guide,
 ) -> Threads:
-    """Threads of all phases for the chosen blocks and cells, without those that hold no pixel to reconstruct."""
+    """Threads of the chosen blocks and cells, line by line of blocks; none that holds no pixel to reconstruct."""
     (down, across), parts = pattern.tile, [np.empty((5, 0), np.int32)]
     for chosen, cells in shares:
         first = [line[at] for line, at in zip(lines, np.nonzero(chosen), strict=True)]
@@ -201,5 +201,8 @@ def _threads(
                 part[2], part[3] = cell, pattern.cells[cell]
                 part[4] = number
                 parts.append(part)
-    row, column, cell_of, plane, phases = np.concatenate(parts, axis=1)
+    together = np.concatenate(parts, axis=1)
+    # Line by line of blocks, all phases of a line in turn: what they read is still in the cache.
+    line = (together[0] + together[4] // across) // pattern.block[0]
+    row, column, cell_of, plane, phases = together[:, np.argsort(line, kind="stable")]
     return Threads(row=row, column=column, cell=cell_of, plane=plane, phase=phases)

@@ -114,12 +114,14 @@ def plan_for(sensor: SensorConfig, exposure_s: float = 0.01, levels: int = 55, f
 
 def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Characterisation:
     """Run the procedure on any chip; `sensor` gives the well to aim at and the values to compare with."""
+    # Frames
     dark = take_stack(expose, 0.0, plan.exposure_s, plan.frames)
     bright = take_stack(expose, 0.5 * sensor.pixel.full_well_e, plan.exposure_s, plan.frames)
     full = take_stack(expose, 2 * sensor.pixel.full_well_e, plan.exposure_s, 2)
     transfer = take_transfer(expose, plan.light_e, plan.exposure_s)
     slopes = dark_slopes(expose, plan.dark_times_s)
 
+    # Estimates
     saturation_e = float(transfer.light_e[np.argmax(transfer.variance_dn2)])
     dark_mean_dn = float(dark.mean_dn.mean())
     gain = emva.gain(transfer, dark, saturation_e)
@@ -147,6 +149,7 @@ def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Charact
         ("greatest SNR", "dB", (_decibels(sqrt(saturation_e)), 0.0)),
         ("linearity error", "1", (linear_error, 0.0)),
     )
+    # What a reader has to know
     notes = [
         "light is set in electrons: quantum efficiency is 1",
         "saturation is where the temporal variance peaks, under the well where PRNU spreads the clipping; the dynamic "

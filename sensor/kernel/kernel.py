@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.device_arrays import ALIGNMENT, Divisor, aligned, divide, divisor, upload
+from rodcone.device_arrays import ALIGNMENT, aligned, divide, divisor, tile_cell, upload
 from rodcone.jit import arrays, dr
 from sensor.cfa import channel_map, channels, check_covers
 from sensor.config import SensorConfig
@@ -64,12 +64,11 @@ def expected_electrons_single(
     scalars = [[dr.opaque(jit.Float, float(weight)) for weight in row] for row in weights]
     tile = channel_map(sensor.cfa, (len(sensor.cfa), len(sensor.cfa[0])))
     tile_channels = upload(np.vectorize(channels(sensor.cfa).index)(tile).astype(np.uint32))
-    tile_height, tile_width = divisor(tile.shape[0]), divisor(tile.shape[1])
+    tile_size = divisor(tile.shape[0]), divisor(tile.shape[1])
     result = np.empty(planes.shape[1], dtype=np.float32)
     for start, piece in _pieces(planes):
         pixel = dr.arange(jit.UInt, piece.shape[1]) + dr.opaque(jit.UInt, first_row * width + start)
-        row, column = divide(pixel, divisor(width))
-        channel = tile_channel(tile_channels, tile_height, tile_width, row, column)
+        channel = dr.gather(jit.UInt, tile_channels, tile_cell(pixel, divisor(width), tile_size))
         electrons = dr.zeros(jit.Float, piece.shape[1])
         for first in range(0, bands, BANDS_AT_ONCE):
             some = np.s_[first : first + BANDS_AT_ONCE]
@@ -77,12 +76,6 @@ def expected_electrons_single(
             dr.eval(electrons, channel)
         result[start : start + piece.shape[1]] = electrons.numpy()
     return result.reshape(height, width)
-
-
-def tile_channel(tile_channels: Any, height: Divisor, width: Divisor, row: Any, column: Any) -> Any:
-    """Number of each pixel's channel, UInt; `tile_channels` holds those of the tile's `height` x `width` pixels."""
-    cell = divide(row, height)[1] * width.number + divide(column, width)[1]
-    return dr.gather(arrays().UInt, tile_channels, cell)
 
 
 def weighted_sum(planes: list[Any], weights: list[list[Any]], channel: Any) -> Any:
@@ -95,7 +88,7 @@ def weighted_sum(planes: list[Any], weights: list[list[Any]], channel: Any) -> A
     weights : list of lists of Float
         One value for each channel and band.
     channel : UInt
-        As `tile_channel` gives it.
+        Number of each pixel's channel, UInt.
     """
     # The sums of all channels are taken, then one is chosen: reading the bands takes longer than the arithmetic.
     sums = []

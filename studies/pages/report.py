@@ -161,6 +161,7 @@ def render_report(report: ReportData, pictures: Mapping[str, bytes]) -> str:
     str
         HTML that needs no other file and may fetch none.
     """
+    # What several parts of the page show
     data = viewer_data(report)
     metrics = shown_metrics(report.cells)
     speed = speed_rows(report)
@@ -168,6 +169,7 @@ def render_report(report: ReportData, pictures: Mapping[str, bytes]) -> str:
     per_view, per_cells = len(data["groups"]) // len(view_names), len(report.cells) // len(view_names)
     addresses = {name: address("png", picture) for name, picture in pictures.items()}
     script = own_file("report.js")
+    # The page
     return write_out(
         "report.html.j2",
         style=own_file("report.css"),

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from rodcone.device_arrays import divide, divisor
+from rodcone.device_arrays import divisor, tile_cell
 from rodcone.jit import arrays, backend, dr
-from sensor.kernel.kernel import normal_pair, philox, tile_channel, weighted_sum
+from sensor.kernel.kernel import normal_pair, philox, weighted_sum
 from sensor.random import philox as philox_numpy
 
 pytestmark = pytest.mark.skipif(backend() == "numpy", reason="Dr.Jit has neither LLVM nor CUDA here")
@@ -55,7 +55,7 @@ def test_each_pixel_takes_the_weights_of_its_own_cell(width, first):
     opaque = [[dr.opaque(jit.Float, float(w)) for w in row] for row in weights]
     divisors = [divisor(n) for n in (2, tile_width, width)]
     pixel = dr.arange(jit.UInt, count) + dr.opaque(jit.UInt, first)
-    own = tile_channel(words(cells), *divisors[:2], *divide(pixel, divisors[2]))
+    own = dr.gather(jit.UInt, words(cells), tile_cell(pixel, divisors[2], (divisors[0], divisors[1])))
     made = weighted_sum([jit.Float(plane) for plane in planes], opaque, own).numpy()
     row, column = np.divmod(first + np.arange(count), width)
     channel = cells[(row % 2) * tile_width + column % tile_width]
