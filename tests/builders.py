@@ -9,6 +9,26 @@ from numpy.typing import ArrayLike, NDArray
 from render.level import PassMeans
 from render.scene import LightGroup
 from render.transport import Transport
+from sensor.cfa import BAYER, RGBW, Tile
+from sensor.raw import RawImage
+
+BAYER_PHASES: list[Tile] = [BAYER, ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
+RGBW_PHASES: list[Tile] = [RGBW, ("GR", "WB"), ("BW", "RG"), ("WB", "GR")]
+RGBW_4X4: Tile = ("RWGW", "WBWG", "GWBW", "WGWR")  # W on a checkerboard, each colour on diagonals
+
+
+def raw_image(dn: ArrayLike, cfa: Tile = RGBW, **changes: Any) -> RawImage:
+    """Raw image of `dn` as uint16: one electron a DN, black 100, full well 15 000 e-, read noise and DSNU 1 e-."""
+    calibration = {
+        "black_dn": 100.0,
+        "white_dn": 15_100.0,
+        "gain_e_per_dn": 1.0,
+        "read_noise_e": 1.0,
+        "dsnu_e": 1.0,
+        "prnu": 0.0,
+        "exposure_s": 0.01,
+    }
+    return RawImage(dn=np.asarray(dn).astype(np.uint16), cfa=cfa, **{**calibration, **changes})
 
 
 def transport_of(

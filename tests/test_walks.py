@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders import raw_image
 from walks import Stay, visits, walk
 
 MOST_OF_RAW = 31  # with both engines
@@ -65,19 +66,8 @@ def test_radiance_makes_few_stays_on_its_way_through_capture(walked):
 def test_a_stay_is_a_call_with_the_value_into_another_module():
     """Three functions are given the mosaic, one of them in a loop; the fourth isn't."""
     from sensor import cfa
-    from sensor.raw import RawImage
 
-    raw = RawImage(
-        dn=np.full((4, 4), 100, np.uint16),
-        cfa=cfa.RGBW,
-        black_dn=64,
-        white_dn=4095,
-        gain_e_per_dn=1.0,
-        read_noise_e=2.0,
-        dsnu_e=1.0,
-        prnu=0.01,
-        exposure_s=0.01,
-    )
+    raw = raw_image(np.full((4, 4), 100), black_dn=64, white_dn=4095, read_noise_e=2.0, prnu=0.01)
 
     def run() -> None:
         for _ in range(3):

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from builders import raw_image
 from numpy.typing import NDArray
 
 from isp.bilinear import bilinear
@@ -58,16 +59,15 @@ def chart(cfa: str, light: str) -> tuple[RawImage, Image]:
     for index, channel in enumerate(channels(sensor.cfa)):
         plane = np.kron(electrons[:, index].reshape(ROWS, COLUMNS), np.ones((SIDE, SIDE)))
         mosaic[mask(sensor.cfa, channel, shape)] = plane[mask(sensor.cfa, channel, shape)]
-    raw = RawImage(
-        np.rint(mosaic / sensor.gain_e_per_dn + sensor.black_dn).astype(np.uint16),
+    raw = raw_image(
+        np.rint(mosaic / sensor.gain_e_per_dn + sensor.black_dn),
         sensor.cfa,
-        sensor.black_dn,
-        sensor.white_dn,
-        sensor.gain_e_per_dn,
-        sensor.pixel.read_noise_e,
-        sensor.pixel.dsnu_e,
-        sensor.pixel.prnu,
-        0.01,
+        black_dn=sensor.black_dn,
+        white_dn=sensor.white_dn,
+        gain_e_per_dn=sensor.gain_e_per_dn,
+        read_noise_e=sensor.pixel.read_noise_e,
+        dsnu_e=sensor.pixel.dsnu_e,
+        prnu=sensor.pixel.prnu,
         colour=calibrate(sensor, illuminant(light)),
     )
     return raw, electrons

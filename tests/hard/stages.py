@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from builders import raw_image
 from hard.case import Image, Margin, worse, worst_of
 from hard.chain import to_picture
 from hard.light import at_level, transport
@@ -30,7 +31,6 @@ from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import camera_equation, form_image
 from sensor.presets import low_noise
 from sensor.random import NoiseTerm, philox
-from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance, expected_electrons
 
 ROUNDING = 2.0**-24  # u: half a step of single precision
@@ -179,8 +179,8 @@ def _reconstructed(at: Parameters) -> Found:
     response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(channel_map(RGBW, (side, side)))
     full_e, black = 15_000.0, 100.0
     electrons = np.minimum(rng.poisson(at["level_e"] * edges * response), full_e) + rng.normal(0, 2.0, (side, side))
-    dn = np.clip(np.rint(electrons + black), 0, 65_535).astype(np.uint16)
-    raw = RawImage(dn, RGBW, black, black + full_e, 1.0, 2.0, 0.0, 0.0, 0.01)
+    dn = np.clip(np.rint(electrons + black), 0, 65_535)
+    raw = raw_image(dn, black_dn=black, white_dn=black + full_e, read_noise_e=2.0, dsnu_e=0.0)
     settings = Settings(neighbourhood=9, sigma_s=at["sigma_s"])
     sums = sum_weights(raw, settings)
     double = sums.value / sums.weight

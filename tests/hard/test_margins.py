@@ -4,18 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import raw_image
 from hard.case import Margin, worse, worst_of
 from hard.invariants_raw import allowed_errors, bias
 from hard.invariants_symmetry import cut, mirrored
 
 from isp.bilinear import bilinear
-from sensor.cfa import channel_map
-from sensor.raw import RawImage
+from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map
 
 
-def raw_image(shape, tile=("RG", "BW"), seed=0):
-    dn = np.random.default_rng(seed).integers(0, 900, shape).astype(np.uint16)
-    return RawImage(dn, tile, 10.0, 1000.0, 1.0, 1.0, 0.0, 0.0, 0.01, defects=np.array([[0, 1], [2, 0]]))
+def exposure(shape, tile=RGBW, seed=0):
+    dn = np.random.default_rng(seed).integers(0, 900, shape)
+    return raw_image(dn, tile, black_dn=10.0, white_dn=1000.0, dsnu_e=0.0, defects=np.array([[0, 1], [2, 0]]))
 
 
 def test_the_margin_is_taken_where_error_over_allowed_is_largest():
@@ -29,11 +29,11 @@ def test_the_margin_is_taken_where_error_over_allowed_is_largest():
     assert worse(Margin(2.0, 4.0, "a"), Margin(1.0, 1.0, "b")).unit == "b"
 
 
-@pytest.mark.parametrize("tile", [("RG", "BW"), ("RG", "GB"), ("WGWR", "GWRW", "WBWG", "BWGW"), ("RGB",)])
+@pytest.mark.parametrize("tile", [RGBW, BAYER, MOSAICS["rgbw_4x4"], ("RGB",)])
 @pytest.mark.parametrize("shape", [(8, 12), (5, 7), (4, 9)])
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_mirrored_frame_holds_each_sample_under_its_own_letter_and_each_defect_at_its_place(tile, shape, axis):
-    raw = raw_image(shape, tile)
+    raw = exposure(shape, tile)
     turned = mirrored(raw, axis)
     assert np.array_equal(turned.dn, np.flip(raw.dn, axis))
     assert np.array_equal(channel_map(turned.cfa, shape), np.flip(channel_map(raw.cfa, shape), axis))
@@ -43,12 +43,12 @@ def test_a_mirrored_frame_holds_each_sample_under_its_own_letter_and_each_defect
 
 
 def test_a_cut_frame_begins_at_the_next_phase_of_the_mosaic():
-    raw = raw_image((6, 7))
+    raw = exposure((6, 7))
     part = cut(raw)
     assert np.array_equal(channel_map(part.cfa, (5, 6)), channel_map(raw.cfa, (6, 7))[1:, 1:])
     assert np.array_equal(part.dn, raw.dn[1:, 1:])
     assert part.defects is None
-    bayer = replace(raw, cfa=("RG", "GB"), defects=None)
+    bayer = replace(raw, cfa=BAYER, defects=None)
     order = [("R", "G", "B").index(channel) for channel in ("R", "G", "B")]
     assert bilinear(cut(bayer))[2:-2, 2:-2] == pytest.approx(bilinear(bayer)[3:-2, 3:-2][..., order], rel=1e-12)
 

@@ -4,23 +4,23 @@ from itertools import product
 
 import numpy as np
 import pytest
+from builders import BAYER_PHASES, raw_image
 
 from isp.bilinear import bilinear
+from sensor.cfa import BAYER, MOSAICS
 from sensor.raw import RawImage
-
-PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
 
 
 def raw(dn: np.ndarray, cfa: tuple[str, ...]) -> RawImage:
-    return RawImage(dn.astype(np.uint16), cfa, 0.0, 65535.0, 1.0, 2.0, 1.0, 0.0, 0.01)
+    return raw_image(dn, cfa, black_dn=0.0, white_dn=65535.0, read_noise_e=2.0)
 
 
-@pytest.mark.parametrize(("cfa", "shape"), list(product(PHASES, [(2, 2), (7, 9), (12, 10)])))
+@pytest.mark.parametrize(("cfa", "shape"), list(product(BAYER_PHASES, [(2, 2), (7, 9), (12, 10)])))
 def test_flat_field_stays_flat_to_the_border(cfa: tuple[str, ...], shape: tuple[int, int]) -> None:
     assert bilinear(raw(np.full(shape, 1000), cfa)) == pytest.approx(np.full((*shape, 3), 1000.0), rel=1e-12)
 
 
-@pytest.mark.parametrize("cfa", PHASES)
+@pytest.mark.parametrize("cfa", BAYER_PHASES)
 def test_ramp_is_reproduced_in_the_interior(cfa: tuple[str, ...]) -> None:
     rows, columns = np.indices((12, 14))
     ramp = 10 * rows + 4 * columns + 100
@@ -30,20 +30,20 @@ def test_ramp_is_reproduced_in_the_interior(cfa: tuple[str, ...]) -> None:
 def test_red_impulse_spreads_with_quarter_weights() -> None:
     dn = np.zeros((8, 8))
     dn[4, 4] = 800  # a red site of RG/GB
-    red = bilinear(raw(dn, ("RG", "GB")))[3:6, 3:6, 0]
+    red = bilinear(raw(dn, BAYER))[3:6, 3:6, 0]
     assert red == pytest.approx(800 * np.array([[0.25, 0.5, 0.25], [0.5, 1.0, 0.5], [0.25, 0.5, 0.25]]))
 
 
 def test_green_impulse_reaches_its_four_neighbours() -> None:
     dn = np.zeros((8, 8))
     dn[4, 3] = 800  # a green site of RG/GB
-    green = bilinear(raw(dn, ("RG", "GB")))[3:6, 2:5, 1]
+    green = bilinear(raw(dn, BAYER))[3:6, 2:5, 1]
     assert green == pytest.approx(800 * np.array([[0.0, 0.25, 0.0], [0.25, 1.0, 0.25], [0.0, 0.25, 0.0]]))
 
 
 def test_samples_at_unequal_distance_weigh_by_a_tent() -> None:
     """On a tile of two by two all samples within reach lie equally far; on four by four the nearest weigh most."""
-    cfa, generator = ("WGWR", "GWRW", "WBWG", "BWGW"), np.random.default_rng(3)
+    cfa, generator = MOSAICS["rgbw_4x4"], np.random.default_rng(3)
     image = raw(generator.integers(1, 60_000, (12, 12)), cfa)
     red = bilinear(image)[..., 0]
     for row, column in product(range(4, 8), range(4, 8)):

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import raw_image
 
 from isp.defects import mend
 from isp.remosaic import remosaic
 from rodcone.errors import InputError
+from sensor.cfa import BAYER, RGBW
 from sensor.device import draw_device
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -16,12 +18,12 @@ from sensor.readout import read_out
 
 def frame(dn: np.ndarray, cfa: tuple[str, ...], defects: list[tuple[int, int]]) -> RawImage:
     places = np.array(defects) if defects else None
-    return RawImage(dn.astype(np.uint16), cfa, 10.0, 1000.0, 1.0, 1.0, 0.0, 0.0, 0.01, defects=places)
+    return raw_image(dn, cfa, black_dn=10.0, white_dn=1000.0, dsnu_e=0.0, defects=places)
 
 
 def test_a_pixel_takes_the_median_of_its_letters_neighbours_and_the_list_is_gone() -> None:
     dn = np.arange(100).reshape(10, 10)
-    raw = frame(dn, ("RG", "BW"), [(4, 4)])
+    raw = frame(dn, RGBW, [(4, 4)])
     mended = mend(raw)
     assert mended.defects is None
     assert mended.dn[4, 4] == 44  # of 22 24 26 42 46 62 64 66: the mean of 42 and 46
@@ -34,9 +36,9 @@ def test_bayers_diagonal_greens_count() -> None:
     dn = np.zeros((8, 8))
     dn[[3, 3, 5, 5], [2, 4, 2, 4]] = 100  # greens of the other rows
     dn[[2, 2, 2, 4, 4, 6, 6, 6], [1, 3, 5, 1, 5, 1, 3, 5]] = 80
-    assert mend(frame(dn, ("RG", "GB"), [(4, 3)])).dn[4, 3] == 80  # eight of 80, four of 100
+    assert mend(frame(dn, BAYER, [(4, 3)])).dn[4, 3] == 80  # eight of 80, four of 100
     dn[[2, 2, 2, 6], [1, 3, 5, 1]] = 100
-    assert mend(frame(dn, ("RG", "GB"), [(4, 3)])).dn[4, 3] == 100
+    assert mend(frame(dn, BAYER, [(4, 3)])).dn[4, 3] == 100
 
 
 def test_a_corner_and_a_cluster_look_further() -> None:
@@ -44,17 +46,17 @@ def test_a_corner_and_a_cluster_look_further() -> None:
     cluster = [(row, column) for row in range(3) for column in range(3)]
     for place in cluster:
         dn[place] = 1000
-    np.testing.assert_array_equal(mend(frame(dn, ("RG", "BW"), cluster)).dn, np.full((12, 12), 50))
+    np.testing.assert_array_equal(mend(frame(dn, RGBW, cluster)).dn, np.full((12, 12), 50))
 
 
 def test_a_letter_without_a_sound_sample_reads_black() -> None:
     dn = np.full((2, 2), 500)
-    mended = mend(frame(dn, ("RG", "BW"), [(1, 1)]))
+    mended = mend(frame(dn, RGBW, [(1, 1)]))
     np.testing.assert_array_equal(mended.dn, [[500, 500], [500, 10]])
 
 
 def test_a_frame_without_a_list_stays_the_same_object() -> None:
-    raw = frame(np.zeros((4, 4)), ("RG", "BW"), [])
+    raw = frame(np.zeros((4, 4)), RGBW, [])
     assert mend(raw) is raw
 
 
@@ -77,7 +79,7 @@ def test_a_simulated_chip_lists_its_hot_pixels_and_mending_takes_them_out(cfa: s
 def test_a_remosaiced_frame_holds_no_hot_pixel_and_no_list() -> None:
     dn = np.full((24, 24), 310)
     dn[8, 9], dn[8, 8] = 1000, 900
-    raw = frame(dn, ("RG", "BW"), [(8, 8), (8, 9)])
+    raw = frame(dn, RGBW, [(8, 8), (8, 9)])
     bayer = remosaic(raw)
     assert bayer.defects is None
     assert np.abs(bayer.dn.astype(int) - 310).max() <= 1
@@ -86,10 +88,10 @@ def test_a_remosaiced_frame_holds_no_hot_pixel_and_no_list() -> None:
 @pytest.mark.parametrize("places", [[(0, 8)], [(-1, 0)], [(0, 0, 0)], [(0.5, 1.0)], [["a", "b"]]])
 def test_a_list_that_does_not_fit_the_frame_is_refused(places: object) -> None:
     with pytest.raises(InputError, match=r"^defects: .* is not allowed; give rows and columns inside \(8, 8\)"):
-        frame(np.zeros((8, 8)), ("RG", "BW"), places)  # type: ignore[arg-type]
+        frame(np.zeros((8, 8)), RGBW, places)  # type: ignore[arg-type]
 
 
 def test_a_list_is_kept_in_the_frames_order_each_once() -> None:
-    raw = frame(np.zeros((8, 8)), ("RG", "BW"), [(3, 1), (0, 2), (3, 1)])
+    raw = frame(np.zeros((8, 8)), RGBW, [(3, 1), (0, 2), (3, 1)])
     assert raw.defects is not None
     np.testing.assert_array_equal(raw.defects, [(0, 2), (3, 1)])

@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, raw_image
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.kernel.schedule import list_threads, make_pattern
@@ -15,18 +16,14 @@ from isp.similarity.noise_distance import noise_distances
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.cfa import BAYER, RGBW, channel_map, channels
-from sensor.raw import RawImage
 
-RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
-RGBW_PHASES = [("RG", "BW"), ("GR", "WB"), ("BW", "RG"), ("WB", "GR")]
-BAYER_PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
 BLACK, FULL = 100.0, 4000.0
 EXP2_ERROR = 1.6e-4  # of a ratio of two weights: each is right to 7.5e-5 (isp.kernel.accumulate), and rounded
 
 
-def raw_image(electrons, tile=RGBW, read_noise_e=2.0):
-    dn = np.clip(np.round(electrons + BLACK), 0, 65535).astype(np.uint16)
-    return RawImage(dn, tile, BLACK, BLACK + FULL, 1.0, read_noise_e, 0.0, 0.0, 0.01)
+def exposure(electrons, tile=RGBW, read_noise_e=2.0):
+    dn = np.clip(np.round(electrons + BLACK), 0, 65535)
+    return raw_image(dn, tile, black_dn=BLACK, white_dn=BLACK + FULL, read_noise_e=read_noise_e, dsnu_e=0.0)
 
 
 def scene(shape, level, tile=RGBW, seed=0):
@@ -36,13 +33,13 @@ def scene(shape, level, tile=RGBW, seed=0):
     base = 1.0 + 0.5 * np.sin(x / 3.0) * np.cos(y / 5.0) + 0.8 * ((x // 7 + y // 9) % 2)
     response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(channel_map(tile, shape))
     electrons = np.minimum(rng.poisson(level * base * response), FULL)
-    return raw_image(electrons + rng.normal(0.0, 2.0, shape), tile)
+    return exposure(electrons + rng.normal(0.0, 2.0, shape), tile)
 
 
 @pytest.mark.parametrize("function", [reconstruct, reconstruct_reference])
 @pytest.mark.parametrize("tile", RGBW_PHASES + BAYER_PHASES)
 def test_flat_field_stays_flat_to_the_border(tile, function):
-    result = function(raw_image(np.full((11, 14), 900.0), tile))
+    result = function(exposure(np.full((11, 14), 900.0), tile))
     assert result.shape == (11, 14, len(channels(tile)))
     assert np.abs(result / 900.0 - 1.0).max() < 1e-6
 
@@ -54,7 +51,7 @@ def test_without_similarity_an_impulse_is_the_spatial_weight_in_closed_form(tile
     electrons = np.zeros(shape)
     electrons[place] = height
     result = reconstruct_with_noise(
-        raw_image(electrons, tile), Settings(sigma_d=sigma_d, sigma_s=math.inf, neighbourhood=9)
+        exposure(electrons, tile), Settings(sigma_d=sigma_d, sigma_s=math.inf, neighbourhood=9)
     )
     letters = channel_map(tile, shape)
     for i, letter in enumerate(channels(tile)):
@@ -200,7 +197,7 @@ def half_saturated(turns=0):
     """Bright left, saturated right, or turned: wide enough for threads of every guide, away from the border too."""
     electrons = np.random.default_rng(4).uniform(3000.0, 3900.0, (42, 130))
     electrons[:, 80:] = FULL
-    return raw_image(np.rot90(electrons, turns))
+    return exposure(np.rot90(electrons, turns))
 
 
 @pytest.mark.parametrize("turns", [0, 1, 2, 3])
@@ -255,7 +252,7 @@ EXTREME_FRAMES = {
 @pytest.mark.parametrize("sigma", [1e-3, 1e6, math.inf])
 @pytest.mark.parametrize("name", EXTREME_FRAMES)
 def test_extreme_input_gives_finite_results_within_the_range_of_the_samples(name, sigma, function):
-    raw = raw_image(EXTREME_FRAMES[name])
+    raw = exposure(EXTREME_FRAMES[name])
     for sigma_d, sigma_s in ((sigma, 4.0), (6.0, sigma), (sigma, sigma)):
         if function == "reference":
             result = reference_with_noise(raw, Settings(patch=5, sigma_d=sigma_d, sigma_s=sigma_s))
@@ -304,12 +301,12 @@ def test_with_a_tiny_sigma_the_result_lies_among_the_samples_that_tie_for_the_be
 )
 def test_bad_parameters_are_one_line_of_advice(wrong, message, function):
     with pytest.raises(InputError, match=message) as caught:
-        function(raw_image(np.zeros((6, 6))), Settings(**wrong))
+        function(exposure(np.zeros((6, 6))), Settings(**wrong))
     assert "\n" not in str(caught.value)
 
 
 def test_a_wide_tile_needs_a_wide_neighbourhood():
-    raw = raw_image(np.full((4, 4), 300.0), RGBW_4X4)
+    raw = exposure(np.full((4, 4), 300.0), RGBW_4X4)
     with pytest.raises(InputError, match="odd numbers from 7"):
         reconstruct(raw, Settings(neighbourhood=5))
     assert np.abs(reconstruct(raw, Settings(neighbourhood=7)) / 300.0 - 1.0).max() < 1e-6

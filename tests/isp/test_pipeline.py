@@ -5,18 +5,17 @@ from itertools import product
 
 import numpy as np
 import pytest
+from builders import BAYER_PHASES, RGBW_PHASES, raw_image
 
 from isp.pipeline import develop_bayer, develop_interleaved, picture_bayer, picture_interleaved
 from isp.settings import DEFAULTS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend
-from sensor.cfa import Tile, channels, mask
+from sensor.cfa import BAYER, RGBW, Tile, channels, mask
 from sensor.raw import RawImage
 
 IDENTITY = np.eye(3)
-RGBW_PHASES = [("RG", "BW"), ("GR", "WB"), ("BW", "RG"), ("WB", "GR")]
-BAYER_PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
 
 
 def raw(cfa: Tile, levels_e: dict[str, float], shape: tuple[int, int] = (32, 32), noise_e: float = 0.0) -> RawImage:
@@ -25,8 +24,7 @@ def raw(cfa: Tile, levels_e: dict[str, float], shape: tuple[int, int] = (32, 32)
     for channel in channels(cfa):
         electrons[mask(cfa, channel, shape)] = levels_e[channel]
     electrons += noise_e * np.random.default_rng(0).standard_normal(shape)
-    dn = np.clip(np.rint(electrons + 100), 0, 15_100).astype(np.uint16)
-    return RawImage(dn, cfa, 100.0, 15_100.0, 1.0, max(noise_e, 1.0), 1.0, 0.0, 0.01)
+    return raw_image(np.clip(np.rint(electrons + 100), 0, 15_100), cfa, read_noise_e=max(noise_e, 1.0))
 
 
 @pytest.mark.parametrize(("cfa", "shape"), list(product(RGBW_PHASES, [(30, 33), (32, 32)])))
@@ -44,28 +42,28 @@ def test_bayer_flat_field_stays_flat_to_the_border(cfa: Tile, shape: tuple[int, 
 def test_both_pipelines_agree_on_a_flat_field() -> None:
     levels = {"R": 300, "G": 800, "B": 250, "W": 4000}
     matrix = np.array([[1.6, -0.5, -0.1], [-0.2, 1.4, -0.2], [0.0, -0.5, 1.5]])
-    ours = develop_interleaved(raw(("RG", "BW"), levels), matrix)
-    theirs = develop_bayer(raw(("RG", "GB"), levels), matrix)
+    ours = develop_interleaved(raw(RGBW, levels), matrix)
+    theirs = develop_bayer(raw(BAYER, levels), matrix)
     assert ours.rgb.mean(axis=(0, 1)) == pytest.approx(theirs.rgb.mean(axis=(0, 1)), rel=1e-5)
 
 
 def test_interleaved_says_which_engine_ran() -> None:
-    assert picture_interleaved(raw(("RG", "BW"), dict.fromkeys("RGBW", 100.0)), IDENTITY).engine == backend()
+    assert picture_interleaved(raw(RGBW, dict.fromkeys("RGBW", 100.0)), IDENTITY).engine == backend()
 
 
 def test_substitution_follows_its_threshold() -> None:
-    image = raw(("RG", "BW"), {"R": 10, "G": 20, "B": 8, "W": 100}, noise_e=20.0)
+    image = raw(RGBW, {"R": 10, "G": 20, "B": 8, "W": 100}, noise_e=20.0)
     picture = picture_interleaved(image, IDENTITY)
     assert picture.snr is not None
     assert picture.snr < 4.95
     assert picture.substituted is True
     assert picture_interleaved(image, IDENTITY, substitution_snr=0.0).substituted is False
-    bright = raw(("RG", "BW"), {"R": 500, "G": 1000, "B": 400, "W": 5000})
+    bright = raw(RGBW, {"R": 500, "G": 1000, "B": 400, "W": 5000})
     assert picture_interleaved(bright, IDENTITY).substituted is False
 
 
 def test_substitution_lowers_luminance_noise_a_lot() -> None:
-    image = raw(("RG", "BW"), {"R": 10, "G": 20, "B": 8, "W": 100}, (96, 96), noise_e=20.0)
+    image = raw(RGBW, {"R": 10, "G": 20, "B": 8, "W": 100}, (96, 96), noise_e=20.0)
     small = replace(DEFAULTS, neighbourhood=5)
     noisy = luminance_of_srgb(picture_interleaved(image, IDENTITY, substitution_snr=0.0, settings=small).rgb).std()
     clean = luminance_of_srgb(picture_interleaved(image, IDENTITY, settings=small).rgb).std()
@@ -73,14 +71,14 @@ def test_substitution_lowers_luminance_noise_a_lot() -> None:
 
 
 def test_dark_frame_is_balanced_by_calibration_and_says_so() -> None:
-    image = raw(("RG", "BW"), {"R": 0.0, "G": 0.1, "B": 0.0, "W": 0.5}, noise_e=20.0)
+    image = raw(RGBW, {"R": 0.0, "G": 0.1, "B": 0.0, "W": 0.5}, noise_e=20.0)
     picture = picture_interleaved(image, IDENTITY)
     assert set(picture.balance.values()) == {"calibrated"}
     assert np.all(np.isfinite(picture.rgb))
 
 
 def test_clipped_highlight_stays_neutral() -> None:
-    image = raw(("RG", "GB"), {"R": 500, "G": 1000, "B": 400})
+    image = raw(BAYER, {"R": 500, "G": 1000, "B": 400})
     image.dn[8:16, 8:16] = 15_100
     patch = develop_bayer(image, IDENTITY).rgb[10:14, 10:14]
     assert patch == pytest.approx(np.full((4, 4, 3), 15_000.0), rel=1e-9)
@@ -88,8 +86,8 @@ def test_clipped_highlight_stays_neutral() -> None:
 
 def test_saturated_w_does_not_shift_the_colours_balance() -> None:
     # Grey on average; W saturates on the reddish half alone, which has to count all the same.
-    image = raw(("RG", "BW"), {"R": 1000, "G": 3000, "B": 1500, "W": 9000})
-    image.dn[:, :16] = raw(("RG", "BW"), {"R": 2000, "G": 3000, "B": 900, "W": 15_000}).dn[:, :16]
+    image = raw(RGBW, {"R": 1000, "G": 3000, "B": 1500, "W": 9000})
+    image.dn[:, :16] = raw(RGBW, {"R": 2000, "G": 3000, "B": 900, "W": 15_000}).dn[:, :16]
     picture = picture_interleaved(image, IDENTITY)
     assert picture.rgb.mean(axis=(0, 1)) == pytest.approx([3000.0] * 3, rel=1e-4)
 
@@ -97,15 +95,15 @@ def test_saturated_w_does_not_shift_the_colours_balance() -> None:
 @pytest.mark.parametrize("develop", [develop_interleaved, picture_interleaved])
 def test_wrong_mosaic_is_refused(develop: object) -> None:
     with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: .*; use the other camera's pipeline"):
-        develop(raw(("RG", "GB"), {"R": 1, "G": 1, "B": 1}), IDENTITY)  # type: ignore[operator]
+        develop(raw(BAYER, {"R": 1, "G": 1, "B": 1}), IDENTITY)  # type: ignore[operator]
     with pytest.raises(InputError, match=r"^raw: mosaic"):
-        picture_bayer(raw(("RG", "BW"), dict.fromkeys("RGBW", 1.0)), IDENTITY)
+        picture_bayer(raw(RGBW, dict.fromkeys("RGBW", 1.0)), IDENTITY)
 
 
 def test_a_given_balance_takes_the_place_of_gray_world() -> None:
     matrix = np.array([[1.5, -0.5, 0.0], [0.0, 1.0, 0.0], [0.25, -0.25, 1.0]])
-    four = raw(("RG", "BW"), {"R": 500, "G": 1000, "B": 400, "W": 5000})
-    three = raw(("RG", "GB"), {"R": 500, "G": 1000, "B": 400})
+    four = raw(RGBW, {"R": 500, "G": 1000, "B": 400, "W": 5000})
+    three = raw(BAYER, {"R": 500, "G": 1000, "B": 400})
     # response 1 : 2 : 1 (: 4): R and B doubled, so that balanced signals are 1000, 1000 and 800
     expected = [1000.0, 1000.0, 800.0]
     for picture, names in (
@@ -117,7 +115,7 @@ def test_a_given_balance_takes_the_place_of_gray_world() -> None:
 
 
 def test_a_picture_is_its_linear_rgb_to_numpy() -> None:
-    linear = develop_bayer(raw(("RG", "GB"), {"R": 500, "G": 1000, "B": 400}, (16, 18)), IDENTITY)
+    linear = develop_bayer(raw(BAYER, {"R": 500, "G": 1000, "B": 400}, (16, 18)), IDENTITY)
     assert linear.shape == (16, 18, 3)
     assert np.asarray(linear) is linear.rgb
     assert np.asarray(linear, dtype=np.float32).dtype == np.float32
@@ -127,7 +125,7 @@ def test_a_picture_is_its_linear_rgb_to_numpy() -> None:
 
 
 def test_wrong_matrix_or_neutral_is_refused() -> None:
-    image = raw(("RG", "GB"), {"R": 1, "G": 1, "B": 1})
+    image = raw(BAYER, {"R": 1, "G": 1, "B": 1})
     with pytest.raises(InputError, match=r"^matrix: shape \(2, 3\)"):
         develop_bayer(image, np.ones((2, 3)))
     with pytest.raises(InputError, match=r"^neutral: \[1.0, 0.0, 1.0\]"):
@@ -139,7 +137,7 @@ def test_wrong_matrix_or_neutral_is_refused() -> None:
 def test_gray_world_leaves_saturated_pixels_out() -> None:
     """The right half is a brighter neutral whose green is full: counted, it would take green for weaker than it is."""
     shape, levels = (32, 64), {"R": 500.0, "G": 1000.0, "B": 400.0}
-    left = raw(("RG", "GB"), levels, shape)
-    bright = raw(("RG", "GB"), {channel: 30 * value for channel, value in levels.items()}, shape)
+    left = raw(BAYER, levels, shape)
+    bright = raw(BAYER, {channel: 30 * value for channel, value in levels.items()}, shape)
     picture = picture_bayer(replace(left, dn=np.where(np.arange(64) < 32, left.dn, bright.dn)), IDENTITY)
     assert picture.rgb[:, :28] == pytest.approx(np.full((32, 28, 3), 1000.0), rel=1e-9)

@@ -4,23 +4,14 @@ from itertools import product
 
 import numpy as np
 import pytest
+from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES
 
 from isp.anscombe import LEAST_PRNU, stabilise
 from isp.planes import fill, tent_radius, tent_weights
 from sensor.cfa import BAYER, RGBW, channels, mask
 
-RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
 SPARSE = ("RGGG", "GGGG", "GGGG", "GGGG")
-PHASES = [
-    ("RG", "BW"),
-    ("GR", "WB"),
-    ("BW", "RG"),
-    ("WB", "GR"),
-    ("RG", "GB"),
-    ("GR", "BG"),
-    ("GB", "RG"),
-    ("BG", "GR"),
-]
+PHASES = RGBW_PHASES + BAYER_PHASES
 
 
 @pytest.mark.parametrize("tile", [*PHASES, RGBW_4X4, SPARSE, ("RGBW",), ("R", "W")])

@@ -4,14 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import RGBW_PHASES, raw_image
 
 from isp.remosaic import bayer_tile, remosaic
 from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile, channel_map, channels, is_bayer, mask
+from sensor.cfa import BAYER, MOSAICS, RGBW, Tile, channel_map, channels, is_bayer, mask
 from sensor.raw import RawImage
 
-PHASES = [("RG", "BW"), ("GR", "WB"), ("BW", "RG"), ("WB", "GR"), ("RW", "GB"), ("RB", "GW"), ("WG", "BR")]
+PHASES = [*RGBW_PHASES, ("RW", "GB"), ("RB", "GW"), ("WG", "BR")]
 LEVELS_E = {"R": 500.0, "G": 1000.0, "B": 400.0, "W": 5000.0}
 
 
@@ -21,8 +22,7 @@ def raw(cfa: Tile, scene: dict[str, np.ndarray]) -> RawImage:
     electrons = np.zeros(shape)
     for channel in channels(cfa):
         electrons[mask(cfa, channel, shape)] = scene[channel][mask(cfa, channel, shape)]
-    dn = np.rint(electrons + 100).astype(np.uint16)
-    return RawImage(dn, cfa, 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
+    return raw_image(np.rint(electrons + 100), cfa)
 
 
 def flat(shape: tuple[int, int] = (33, 40)) -> dict[str, np.ndarray]:
@@ -69,7 +69,7 @@ def test_a_ramp_is_sampled_where_the_new_pixel_lies(cfa: Tile, axis: int) -> Non
 
 
 def test_saturated_frames_stay_within_the_converter() -> None:
-    made = remosaic(raw(("RG", "BW"), {channel: np.full((16, 16), 15_000.0) for channel in "RGBW"}))
+    made = remosaic(raw(RGBW, {channel: np.full((16, 16), 15_000.0) for channel in "RGBW"}))
     assert set(made.dn.ravel().tolist()) == {15_100}
     assert made.saturated.all()
 
@@ -77,13 +77,13 @@ def test_saturated_frames_stay_within_the_converter() -> None:
 def test_calibration_goes_along_without_white() -> None:
     eye = np.eye(4, 3)
     colour = ColourCalibration(np.array([0.5, 1.0, 0.4, 4.9]), np.eye(3), eye, eye, eye.T, eye.T)
-    made = remosaic(replace(raw(("RG", "BW"), flat()), colour=colour, iso=50.0))
+    made = remosaic(replace(raw(RGBW, flat()), colour=colour, iso=50.0))
     assert made.colour is not None
     np.testing.assert_array_equal(made.colour.neutral, [0.5, 1.0, 0.4])
     assert (made.colour.camera_to_xyz_a.shape, made.iso, made.black_dn) == ((3, 3), 50.0, 100.0)
 
 
-@pytest.mark.parametrize("cfa", [("RG", "GB"), ("WGWR", "GWRW", "WBWG", "BWGW")])
+@pytest.mark.parametrize("cfa", [BAYER, MOSAICS["rgbw_4x4"]])
 def test_other_mosaics_are_refused(cfa: Tile) -> None:
     with pytest.raises(InputError, match=r"cfa: .* can't become Bayer; allowed: 2x2 with R, G, B and W"):
         remosaic(raw(cfa, flat()))

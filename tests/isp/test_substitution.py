@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from builders import raw_image
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,8 +14,7 @@ from sensor.raw import RawImage
 
 
 def raw(level_e: float, read_noise_e: float = 3.0) -> RawImage:
-    dn = np.full((16, 16), level_e + 100).astype(np.uint16)
-    return RawImage(dn, ("RG", "BW"), 100.0, 10_100.0, 1.0, read_noise_e, 4.0, 0.0, 0.01)
+    return raw_image(np.full((16, 16), level_e + 100), white_dn=10_100.0, read_noise_e=read_noise_e, dsnu_e=4.0)
 
 
 def test_frame_snr_is_green_over_the_noise_of_one_sample() -> None:

@@ -4,12 +4,12 @@ from io import BytesIO
 
 import numpy as np
 import pytest
+from builders import raw_image
 from PIL import Image
 
 from isp.picture import Picture
 from render.radiance import SpectralRadiance
 from rodcone.notebook import SIDE, WHITE_AT, html_of, preview_png
-from sensor.raw import RawImage
 
 
 def pixels(png: bytes) -> np.ndarray:
@@ -54,7 +54,7 @@ def test_radiance_shows_its_colour_and_luminance() -> None:
 def test_a_raw_image_shows_electrons_above_black() -> None:
     dn = np.full((8, 8), 64, np.uint16)
     dn[2, 3] = 1064
-    raw = RawImage(dn, ("RG", "BW"), 64.0, 16383.0, 2.0, 1.0, 1.0, 0.01, 0.01)
+    raw = raw_image(dn, black_dn=64.0, white_dn=16383.0, gain_e_per_dn=2.0, prnu=0.01)
     shown = pixels(raw._repr_png_())
     assert shown[2, 3] == 255
     assert np.count_nonzero(shown) == 1

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
+from builders import RGBW_4X4
 
 from rodcone.errors import InputError
 from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map, channels, check_covers, check_tile, mask, tile_of
-
-RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
 
 
 def test_the_paper_s_tile_is_r_g_over_b_w_with_its_first_row_on_top():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from builders import raw_image
 
 from isp.colour.colour_fit import LEAST_SIGNAL, ColourFit, fit_colours, fit_matrix, relative_noise, training
 from render.illuminants import illuminant
@@ -69,8 +70,7 @@ def test_the_noisier_the_colours_the_more_w_decides(fit: ColourFit) -> None:
 
 
 def frame(level_e: float, read_noise_e: float = 3.0) -> RawImage:
-    dn = np.full((16, 16), level_e + 100).astype(np.uint16)
-    return RawImage(dn, ("RG", "BW"), 100.0, 10_100.0, 1.0, read_noise_e, 4.0, 0.0, 0.01)
+    return raw_image(np.full((16, 16), level_e + 100), white_dn=10_100.0, read_noise_e=read_noise_e, dsnu_e=4.0)
 
 
 def test_relative_noise_in_closed_form(fit: ColourFit) -> None:

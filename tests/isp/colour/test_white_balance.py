@@ -2,14 +2,10 @@
 
 import numpy as np
 import pytest
+from builders import raw_image
 
 from isp.colour.white_balance import WhiteBalance, neutral_response
 from rodcone.errors import InputError
-from sensor.raw import RawImage
-
-
-def raw(dn: np.ndarray) -> RawImage:
-    return RawImage(dn.astype(np.uint16), ("RG", "BW"), 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
 
 
 def test_neutral_response_has_the_published_electron_ratios() -> None:
@@ -23,8 +19,8 @@ def test_pixels_near_a_full_colour_do_not_count_and_none_left_means_calibrated_g
     dn[0, 0] = dn[15, 0] = 15_100  # red sites and blue ones: the tile's reach is one pixel
     planes[:2, :2] = planes[14:, :2] = 1e6
     balance = WhiteBalance(neutral=np.array([1.0, 2.0, 1.0, 8.0]))
-    assert balance.gains(raw(dn), planes)[0] == pytest.approx([2.0, 1.0, 2.5, 0.2], rel=1e-12)
-    factors, sources = balance.gains(raw(np.full((16, 16), 15_100)), planes)
+    assert balance.gains(raw_image(dn), planes)[0] == pytest.approx([2.0, 1.0, 2.5, 0.2], rel=1e-12)
+    factors, sources = balance.gains(raw_image(np.full((16, 16), 15_100)), planes)
     assert factors == pytest.approx([2.0, 1.0, 2.0, 0.25], rel=1e-12)
     assert sources == dict.fromkeys("RGBW", "calibrated")
 
@@ -32,20 +28,20 @@ def test_pixels_near_a_full_colour_do_not_count_and_none_left_means_calibrated_g
 def test_w_that_is_full_everywhere_takes_the_calibrated_gain_and_leaves_the_colours_alone() -> None:
     dn = np.tile([[600, 1100], [500, 15_100]], (8, 8))
     planes = np.broadcast_to([500.0, 1000.0, 400.0, 15_000.0], (16, 16, 4))
-    factors, sources = WhiteBalance(neutral=np.array([1.0, 2.0, 1.0, 8.0])).gains(raw(dn), planes)
+    factors, sources = WhiteBalance(neutral=np.array([1.0, 2.0, 1.0, 8.0])).gains(raw_image(dn), planes)
     assert factors == pytest.approx([2.0, 1.0, 2.5, 0.25], rel=1e-12)
     assert sources == {**dict.fromkeys("RGB", "gray world"), "W": "calibrated"}
 
 
 def test_a_given_response_decides_alone() -> None:
-    image = raw(np.full((8, 8), 1100))
+    image = raw_image(np.full((8, 8), 1100))
     factors, sources = WhiteBalance.of(image, [7, 7, 7, 7], [1, 2, 1, 4]).gains(image, np.ones((8, 8, 4)))
     assert factors.tolist() == [2.0, 1.0, 2.0, 0.5]
     assert sources == dict.fromkeys("RGBW", "given")
 
 
 def test_a_value_is_taken_as_it_is_and_a_wrong_response_refused() -> None:
-    image, value = raw(np.full((8, 8), 1100)), WhiteBalance()
+    image, value = raw_image(np.full((8, 8), 1100)), WhiteBalance()
     assert WhiteBalance.of(image, None, value) is value
     for name, pair in (("neutral", ([1, 2, 3], None)), ("balance", (None, [1, 2, 3, -1]))):
         with pytest.raises(InputError, match=rf"^{name}: .* is not allowed; give a positive response for each of"):

@@ -1,10 +1,12 @@
 """The kernel beside the float64 reference over many inputs, and where numbers are extreme."""
 
 import math
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
+from builders import RGBW_4X4, raw_image
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.reference import reconstruct_reference, sum_weights
@@ -13,18 +15,23 @@ from isp.similarity.guide import reliability, reliability_of_mean
 from rodcone.errors import InputError
 from rodcone.jit import backend
 from sensor.cfa import BAYER, RGBW, channel_map, channels
-from sensor.raw import RawImage
 
-RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
 BLACK, FULL = 100.0, 4000.0
 
 needs_kernel = pytest.mark.skipif(backend() == "numpy", reason="without Dr.Jit the reference would meet itself")
 
 
-def raw_image(electrons, tile=RGBW, black=BLACK, gain=1.0, read_noise_e=2.0):
+def exposure(electrons, tile=RGBW, black=BLACK, gain=1.0, read_noise_e=2.0):
     """Mosaic that reads `electrons` (of gain 1) over black; electrons scale with the gain."""
-    dn = np.clip(np.round(electrons + black), 0, 65535).astype(np.uint16)
-    return RawImage(dn, tile, black, black + FULL, gain, read_noise_e * gain, 0.0, 0.0, 0.01)
+    return raw_image(
+        np.clip(np.round(electrons + black), 0, 65535),
+        tile,
+        black_dn=black,
+        white_dn=black + FULL,
+        gain_e_per_dn=gain,
+        read_noise_e=read_noise_e * gain,
+        dsnu_e=0.0,
+    )
 
 
 def random_scene(rng, tile):
@@ -36,7 +43,7 @@ def random_scene(rng, tile):
     response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(channel_map(tile, shape))
     level = 10.0 ** rng.uniform(-1.0, 5.0)
     electrons = np.minimum(rng.poisson(level * base * response), FULL) + rng.normal(0.0, 2.0, shape)
-    return raw_image(electrons, tile)
+    return exposure(electrons, tile)
 
 
 def assert_single_precision(raw, settings):
@@ -113,7 +120,7 @@ HARD_FRAMES = hard_frames()
 def test_hard_frames_give_finite_results_within_the_range_of_the_samples(name, distance):
     """A weighted mean can't leave the range of its samples; single precision may by 1e-6. Warnings are errors."""
     electrons, black, gain = HARD_FRAMES[name]
-    raw = raw_image(np.asarray(electrons, float), RGBW, black, gain)
+    raw = exposure(np.asarray(electrons, float), RGBW, black, gain)
     letters, samples = channel_map(RGBW, raw.shape), raw.electrons
     for sigma_s in (1e-3, 0.1, 8.0, 1e6, math.inf):
         result = reconstruct_with_noise(
@@ -141,7 +148,7 @@ def test_hard_frames_give_finite_results_within_the_range_of_the_samples(name, d
 def test_nothing_beyond_the_frame_is_averaged(patch, white, settings):
     """Flat planes stay flat at the border, also where similarity counts for nothing."""
     flat = {"R": 30.0, "G": 900.0, "B": 300.0, "W": white}
-    raw = raw_image(np.vectorize(flat.get)(channel_map(RGBW, (17, 22))))
+    raw = exposure(np.vectorize(flat.get)(channel_map(RGBW, (17, 22))))
     expected = [min(flat[letter], 65535 - BLACK) for letter in channels(RGBW)]
     np.testing.assert_allclose(
         reconstruct(raw, Settings(patch=patch, **settings)), np.broadcast_to(expected, (17, 22, 4)), rtol=1e-6
@@ -152,14 +159,14 @@ def test_nothing_beyond_the_frame_is_averaged(patch, white, settings):
 @pytest.mark.parametrize("shape", [(2, 2), (3, 9), (9, 3), (2, 30), (30, 2)])
 @pytest.mark.parametrize("tile", [("RW",), ("R", "W")])
 def test_frames_may_be_smaller_than_a_patch_and_than_a_packet(shape, tile):
-    raw = raw_image(np.random.default_rng(6).uniform(0.0, FULL / 2, shape), tile)
+    raw = exposure(np.random.default_rng(6).uniform(0.0, FULL / 2, shape), tile)
     settings = Settings(patch=7, neighbourhood=3)
     assert np.abs(reconstruct(raw, settings) - reconstruct_reference(raw, settings)).max() < 1e-4 * FULL
 
 
 @needs_kernel
 def test_a_pixel_without_a_similar_neighbour_keeps_its_sample_and_takes_the_nearest_of_the_others():
-    raw = raw_image(HARD_FRAMES["no similar neighbour"][0])
+    raw = exposure(HARD_FRAMES["no similar neighbour"][0])
     exact = reconstruct_reference(raw, Settings(sigma_s=0.05, patch=5))
     assert (
         sum_weights(raw, Settings(patch=5, sigma_s=0.05)).largest.min() < -1000.0
@@ -175,7 +182,7 @@ def test_a_pixel_without_a_similar_neighbour_keeps_its_sample_and_takes_the_near
 def test_the_raw_distance_is_the_papers_in_electrons(function):
     # Two levels of every band, 40 e- apart: a patch of 25 differs by 5 x 40 in W alone.
     electrons = np.where(np.arange(40) < 20, 300.0, 340.0) * np.ones((24, 40))
-    raw = raw_image(electrons)
+    raw = exposure(electrons)
     apart = function(raw, Settings(distance="raw", patch=5, sigma_s=20.0, sigma_d=math.inf, neighbourhood=9))
     mixed = function(raw, Settings(distance="raw", patch=5, sigma_s=2000.0, sigma_d=math.inf, neighbourhood=9))
     assert apart[:, 16] == pytest.approx(300.0, abs=0.01)
@@ -184,7 +191,7 @@ def test_the_raw_distance_is_the_papers_in_electrons(function):
     # reached, all at 300; from x = 19, half a patch from the edge, closed forms would need the planes between.
     same = function(raw, Settings(distance="raw", patch=5, sigma_s=200.0, sigma_d=math.inf, neighbourhood=9))
     assert same[:, 10] == pytest.approx(300.0, rel=2e-4)
-    scaled = RawImage(raw.dn, RGBW, BLACK, BLACK + FULL, 3.0, 6.0, 0.0, 0.0, 0.01)
+    scaled = replace(raw, gain_e_per_dn=3.0, read_noise_e=6.0)
     tripled = function(scaled, Settings(distance="raw", patch=5, sigma_s=600.0, sigma_d=math.inf, neighbourhood=9))
     assert tripled == pytest.approx(3.0 * same, rel=2e-4)
 
@@ -206,8 +213,8 @@ def test_reliability_takes_the_mean_of_the_patch_reflected_at_the_border():
 @pytest.mark.parametrize("function", [reconstruct, reconstruct_reference])
 def test_in_the_dark_similarity_falls_back_to_the_distance_weight(function):
     rng = np.random.default_rng(3)
-    dark = raw_image(rng.normal(0.0, 30.0, (20, 22)), read_noise_e=30.0)
-    bright = raw_image(rng.poisson(900.0, (20, 22)), read_noise_e=2.0)
+    dark = exposure(rng.normal(0.0, 30.0, (20, 22)), read_noise_e=30.0)
+    bright = exposure(rng.poisson(900.0, (20, 22)), read_noise_e=2.0)
     for raw, least, most in ((dark, 0.0, 0.02), (bright, 0.05, 1.0)):
         spatial = function(raw, Settings(patch=5, sigma_s=math.inf))
         alike = function(raw, Settings(patch=5, sigma_s=2.0))
@@ -217,4 +224,4 @@ def test_in_the_dark_similarity_falls_back_to_the_distance_weight(function):
 
 def test_an_unknown_distance_is_refused():
     with pytest.raises(InputError, match="distance: 'noisy' is unknown; allowed: noise, raw; did you mean 'noise'"):
-        reconstruct(raw_image(np.zeros((6, 6))), Settings(distance="noisy"))
+        reconstruct(exposure(np.zeros((6, 6))), Settings(distance="noisy"))

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from builders import RGBW_4X4, raw_image
 from scipy.ndimage import convolve1d
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
@@ -16,9 +17,6 @@ from isp.settings import WINDOW, Settings
 from isp.similarity.guide import saturated_fraction
 from rodcone.jit import backend
 from sensor.cfa import BAYER, RGBW
-from sensor.raw import RawImage
-
-RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
 
 pytestmark = pytest.mark.skipif(backend() == "numpy", reason="strips serve the kernel alone")
 
@@ -30,7 +28,7 @@ def frame(tile, shape=(85, 61)):
     level[40:52, 20:33] = 1e5
     level[:9, :9] = 0.0
     dn = np.round(np.minimum(rng.poisson(level), 4000) + rng.normal(100.0, 2.0, shape))
-    return RawImage(dn.astype(np.uint16), tile, 100.0, 4100.0, 1.0, 2.0, 0.0, 0.0, 0.01)
+    return raw_image(dn, tile, white_dn=4100.0, read_noise_e=2.0, dsnu_e=0.0)
 
 
 @pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4])
@@ -51,7 +49,7 @@ def test_the_height_of_strips_changes_no_bit(tile, sigma_s, monkeypatch):
 def test_alpha_around_full_samples_is_alpha_of_the_frame(place, tile):
     dn = np.full((64, 200), 500, np.uint16)
     dn[max(place[0] - 1, 0) : place[0] + 2, max(place[1] - 1, 0) : place[1] + 2] = 4100
-    raw = RawImage(dn, tile, 100.0, 4100.0, 1.0, 2.0, 0.0, 0.0, 0.01)
+    raw = raw_image(dn, tile, white_dn=4100.0, read_noise_e=2.0, dsnu_e=0.0)
     strip = cut_strip(raw, (0, 64), make_pattern(tile), Settings(patch=5))
     saturated = (fill((dn == 4100).astype(np.float32), tile, "W") > 0.0).astype(float)
     box = np.ones(WINDOW)

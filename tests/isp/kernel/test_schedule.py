@@ -4,15 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from builders import RGBW_4X4, raw_image
 
 from isp.kernel.schedule import list_offsets, list_threads, make_pattern
 from isp.settings import Settings
 from isp.similarity.guide import saturated_fraction
 from isp.similarity.noise_distance import noise_distances
 from sensor.cfa import BAYER, RGBW
-from sensor.raw import RawImage
 
-RGBW_4X4 = ("RWGW", "WBWG", "GWBW", "WGWR")
 TILES = [RGBW, ("WB", "GR"), BAYER, ("GB", "RG"), RGBW_4X4, ("RGBW",), ("R", "W"), ("RGB", "WWR", "GBW"), ("W",)]
 SETTINGS = Settings(neighbourhood=9, patch=3, sigma_d=2.0, sigma_s=8.0)
 
@@ -60,7 +59,7 @@ def test_threads_meet_each_pixel_once_in_every_phase(tile, rows):
     rows = rows[0] // block[0] * block[0], rows[1]
     dn = np.random.default_rng(2).integers(100, 3000, shape).astype(np.uint16)
     dn[10:22, 15:32] = 4000
-    raw = RawImage(dn, tile, 100.0, 4000.0, 1.0, 2.0, 0.0, 0.0, 0.01)
+    raw = raw_image(dn, tile, white_dn=4000.0, read_noise_e=2.0, dsnu_e=0.0)
     alpha = saturated_fraction(raw, 3) if pattern.white is not None else None
     visits = np.zeros((down * across, *shape), int)
     for guide, threads in list_threads(pattern, shape, rows, alpha, 0, reach).items():

@@ -4,15 +4,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from builders import BAYER_PHASES, raw_image
 
 from isp.interleaved import reconstruct
 from isp.processors import bayer_denoised
 from isp.processors.bayer_denoised import bm3d_mosaic
 from isp.processors.catalogue import PROCESSORS
-from sensor.cfa import Tile, mask
+from sensor.cfa import BAYER, Tile, mask
 from sensor.raw import RawImage
-
-PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
 
 
 def raw(cfa: Tile, shape: tuple[int, int] = (33, 38), level_e: float = 400.0, seed: int = 1) -> RawImage:
@@ -22,17 +21,17 @@ def raw(cfa: Tile, shape: tuple[int, int] = (33, 38), level_e: float = 400.0, se
     for channel, share in (("R", 0.5), ("G", 1.0), ("B", 0.4)):
         expected[mask(cfa, channel, shape)] = share * level_e
     electrons = rng.poisson(expected) + 2.0 * rng.standard_normal(shape)
-    return RawImage(np.rint(electrons + 100).astype(np.uint16), cfa, 100.0, 15_100.0, 1.0, 2.0, 0.0, 0.0, 0.01)
+    return raw_image(np.rint(electrons + 100), cfa, read_noise_e=2.0, dsnu_e=0.0)
 
 
 def test_non_local_means_are_those_of_the_interleaved_camera() -> None:
-    image = raw(("RG", "GB"))
+    image = raw(BAYER)
     planes = np.asarray(reconstruct(image), dtype=np.float64)
     picture = PROCESSORS["bayer_nlm"].develop(image, np.eye(3), balance=[0.5, 1.0, 0.4])
     assert picture.rgb == pytest.approx(planes / [0.5, 1.0, 0.4], rel=1e-12)
 
 
-@pytest.mark.parametrize("cfa", PHASES)
+@pytest.mark.parametrize("cfa", BAYER_PHASES)
 @pytest.mark.parametrize("shape", [(33, 38), (70, 64)])
 def test_a_denoiser_that_does_nothing_gives_the_mosaic_back(
     cfa: Tile, shape: tuple[int, int], monkeypatch: pytest.MonkeyPatch

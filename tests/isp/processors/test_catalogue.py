@@ -1,15 +1,17 @@
 """Every processor alike: flat fields in every phase, highlights, balance, defects, and what is refused."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import raw_image
 
 from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
-from sensor.cfa import MOSAICS, RGBW, Tile, channel_map, channels
+from sensor.cfa import BAYER, MOSAICS, RGBW, Tile, channel_map, channels
 from sensor.raw import RawImage
 from sensor.variations import VARIATIONS
 
@@ -41,8 +43,7 @@ def grey(name: str, tile: Tile, level_e: np.ndarray) -> RawImage:
     """Noise-free exposure of a neutral scene whose green collects `level_e` (h, w), one electron a DN, black 100."""
     names = channel_map(tile, level_e.shape)
     share = np.vectorize(neutral_of(name).get)(names)
-    dn = np.clip(np.rint(level_e * share) + 100, 0, FULL_E + 100).astype(np.uint16)
-    return RawImage(dn, tile, 100.0, FULL_E + 100, 1.0, 1.0, 1.0, 0.0, 0.01)
+    return raw_image(np.clip(np.rint(level_e * share) + 100, 0, FULL_E + 100), tile, white_dn=FULL_E + 100)
 
 
 def require_library(name: str) -> None:
@@ -123,7 +124,7 @@ def test_listed_defects_are_mended_before_any_processor_sees_them(name: str) -> 
     raw = grey(name, tile_of(name), np.full((20, 20), 800.0))
     places = np.array([(0, 0), (7, 8), (7, 9), (19, 19)])
     raw.dn[tuple(places.T)] = 15_100
-    listed = RawImage(raw.dn, raw.cfa, 100.0, FULL_E + 100, 1.0, 1.0, 1.0, 0.0, 0.01, defects=places)
+    listed = replace(raw, defects=places)
     rgb = PROCESSORS[name].develop(listed, IDENTITY).rgb
     assert rgb == pytest.approx(np.full((20, 20, 3), 800.0), rel=1e-5)
     assert np.abs(PROCESSORS[name].develop(raw, IDENTITY).rgb - 800.0).max() > 200.0
@@ -131,8 +132,8 @@ def test_listed_defects_are_mended_before_any_processor_sees_them(name: str) -> 
 
 @pytest.mark.parametrize("name", PROCESSORS)
 def test_another_mosaic_is_refused_in_one_line(name: str) -> None:
-    other = ("RC", "CC") if name.startswith("bayer") else ("RG", "GB")
-    raw = RawImage(np.full((16, 16), 500, np.uint16), other, 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
+    other = MOSAICS["rccc"] if name.startswith("bayer") else BAYER
+    raw = raw_image(np.full((16, 16), 500), other)
     with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: ") as error:
         PROCESSORS[name].develop(raw, IDENTITY)
     assert "\n" not in str(error.value)

@@ -2,21 +2,21 @@
 
 import numpy as np
 import pytest
+from builders import BAYER_PHASES, raw_image
 
 from isp.colour.white_balance import WhiteBalance
 from isp.processors.demosaic import malvar, menon
 from isp.processors.mosaic import balance_mosaic
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
-from sensor.raw import RawImage
+from sensor.cfa import BAYER, RGBW
 
 pytest.importorskip("colour_demosaicing", reason="rodcone[opponents] is not installed")
 
-PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
 NAMES = {malvar: "demosaicing_CFA_Bayer_Malvar2004", menon: "demosaicing_CFA_Bayer_Menon2007"}
 
 
-@pytest.mark.parametrize("cfa", PHASES)
+@pytest.mark.parametrize("cfa", BAYER_PHASES)
 @pytest.mark.parametrize("demosaic", NAMES)
 def test_the_interior_is_the_librarys(demosaic, cfa: tuple[str, str]) -> None:
     mosaic = np.random.default_rng(3).uniform(0, 1000, (41, 44))
@@ -34,7 +34,7 @@ def test_more_reflection_changes_nothing(demosaic) -> None:
     np.testing.assert_allclose(demosaic(mosaic, ("GB", "RG")), more, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("cfa", PHASES)
+@pytest.mark.parametrize("cfa", BAYER_PHASES)
 def test_malvars_filters_on_an_impulse(cfa: tuple[str, str]) -> None:
     # Malvar, He & Cutler 2004, Figure 2: green at the impulse's own red site is 4/8 of it, at the next red or blue
     # site of its row -1/8; green at the green sites beside it is their own sample.
@@ -49,7 +49,7 @@ def test_malvars_filters_on_an_impulse(cfa: tuple[str, str]) -> None:
 
 
 @pytest.mark.parametrize("demosaic", NAMES)
-@pytest.mark.parametrize("cfa", PHASES)
+@pytest.mark.parametrize("cfa", BAYER_PHASES)
 def test_a_grey_ramp_is_reproduced(demosaic, cfa: tuple[str, str]) -> None:
     rows, columns = np.indices((40, 42))
     ramp = 10.0 * rows + 4.0 * columns
@@ -61,7 +61,7 @@ def test_a_mosaic_is_balanced_to_greens_unit_and_held_beside_a_full_colour() -> 
     dn = np.tile(np.array([[600, 1100], [1100, 500]], np.uint16), (4, 4))
     dn[4, 5] = 15_100  # a green; beside it a red that reads 1.5 full wells when balanced
     dn[4, 4] = 100 + 11_250
-    raw = RawImage(dn, ("RG", "GB"), 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
+    raw = raw_image(dn, BAYER)
     mosaic, sources = balance_mosaic(raw, raw.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
     assert sources == dict.fromkeys("RGB", "given")
     expected = np.full((8, 8), 1000.0)
@@ -69,7 +69,7 @@ def test_a_mosaic_is_balanced_to_greens_unit_and_held_beside_a_full_colour() -> 
     assert mosaic == pytest.approx(expected)
     far = raw.dn.copy()
     far[4, 4], far[0, 0] = 600, 11_350  # as bright a red, with no full sample beside it, is a red lamp and stays one
-    lamp = RawImage(far, ("RG", "GB"), 100.0, 15_100.0, 1.0, 1.0, 1.0, 0.0, 0.01)
+    lamp = raw_image(far, BAYER)
     mosaic, _ = balance_mosaic(lamp, lamp.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
     assert mosaic[0, 0] == pytest.approx(22_500.0)
 
@@ -78,4 +78,4 @@ def test_other_tiles_are_refused() -> None:
     with pytest.raises(
         InputError, match=r"^raw: mosaic \('RG', 'BW'\) is not Bayer; allowed here: .*; use another processor"
     ):
-        malvar(np.zeros((8, 8)), ("RG", "BW"))
+        malvar(np.zeros((8, 8)), RGBW)

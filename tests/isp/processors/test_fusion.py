@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from builders import raw_image
 
 from isp.colour.white_balance import neutral_response
 from isp.planes import fill
@@ -24,8 +25,8 @@ def exposure(planes_e: dict[str, np.ndarray], cfa: Tile = RGBW, dark_e: float = 
     """Noise-free raw image in which each channel's sites read that channel's plane."""
     shape = next(iter(planes_e.values())).shape
     electrons = np.select([channel_map(cfa, shape) == channel for channel in planes_e], list(planes_e.values()))
-    dn = np.clip(np.rint(4 * electrons) + 100, 0, 60_100).astype(np.uint16)
-    return RawImage(dn, cfa, 100.0, 60_100.0, 0.25, dark_e, 0.0, 0.0, 0.01)
+    dn = np.clip(np.rint(4 * electrons) + 100, 0, 60_100)
+    return raw_image(dn, cfa, white_dn=60_100.0, gain_e_per_dn=0.25, read_noise_e=dark_e, dsnu_e=0.0)
 
 
 def grey(level_e: np.ndarray, cfa: Tile = RGBW, white: float = 5.0) -> RawImage:

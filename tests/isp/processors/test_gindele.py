@@ -4,30 +4,30 @@ from itertools import product
 
 import numpy as np
 import pytest
+from builders import RGBW_PHASES, raw_image
 
 from isp.planes import fill
 from isp.processors.catalogue import PROCESSORS
 from isp.processors.gindele import REACH, adams_planes, luminance_plane
 from rodcone.errors import InputError
-from sensor.cfa import Tile, mask
+from sensor.cfa import RGBW, Tile, mask
 from sensor.raw import RawImage
 
-PHASES = [("RG", "BW"), ("GR", "WB"), ("BW", "RG"), ("WB", "GR")]
 ONES = [1.0, 1.0, 1.0, 1.0]
 
 
-def raw(values: np.ndarray, cfa: Tile = ("RG", "BW")) -> RawImage:
-    return RawImage(np.rint(values).astype(np.uint16), cfa, 0.0, 15_000.0, 1.0, 1.0, 0.0, 0.0, 0.01)
+def raw(values: np.ndarray, cfa: Tile = RGBW) -> RawImage:
+    return raw_image(np.rint(values), cfa, black_dn=0.0, white_dn=15_000.0, dsnu_e=0.0)
 
 
-@pytest.mark.parametrize("cfa", PHASES)
+@pytest.mark.parametrize("cfa", RGBW_PHASES)
 def test_where_nothing_saturates_it_is_the_first_interpolation(cfa: Tile) -> None:
     values = np.rint(np.random.default_rng(0).uniform(100, 10_000, (21, 24)))
     picture = PROCESSORS["rgbw_gindele"].develop(raw(values, cfa), np.eye(3), balance=ONES)
     np.testing.assert_allclose(picture.rgb, adams_planes(values, cfa), rtol=1e-12)
 
 
-@pytest.mark.parametrize("cfa", PHASES)
+@pytest.mark.parametrize("cfa", RGBW_PHASES)
 def test_where_w_is_full_the_colours_stand_alone(cfa: Tile) -> None:
     values = np.rint(np.random.default_rng(1).uniform(100, 10_000, (24, 40)))
     values[:, :20][mask(cfa, "W", (24, 40))[:, :20]] = 15_000
@@ -41,19 +41,19 @@ def test_a_sites_own_detail_is_added_as_a_quarter_of_its_laplacian() -> None:
     # one red sample of 4: 2 * 4 / 4 in W there, on both diagonals alike; two sites away the other diagonal is smoother
     mosaic = np.zeros((20, 20))
     mosaic[8, 8] = 4.0
-    white = luminance_plane(mosaic, ("RG", "BW"))
+    white = luminance_plane(mosaic, RGBW)
     assert white[8, 8] == 2.0
     assert white[[6, 6, 10, 10], [6, 10, 6, 10]] == pytest.approx(np.zeros(4))
 
 
-@pytest.mark.parametrize("cfa", PHASES)
+@pytest.mark.parametrize("cfa", RGBW_PHASES)
 def test_more_reflection_changes_nothing(cfa: Tile) -> None:
     mosaic = np.random.default_rng(2).uniform(100, 1000, (19, 22))
     more = luminance_plane(np.pad(mosaic, 8, mode="reflect"), cfa)[8:-8, 8:-8]
     np.testing.assert_allclose(luminance_plane(mosaic, cfa), more, rtol=1e-12)
 
 
-@pytest.mark.parametrize("cfa", PHASES)
+@pytest.mark.parametrize("cfa", RGBW_PHASES)
 def test_a_grey_ramp_is_reproduced_in_any_direction(cfa: Tile) -> None:
     rows, columns = np.indices((22, 25))
     ramp = 1000.0 + 7.0 * rows - 11.0 * columns
@@ -63,7 +63,7 @@ def test_a_grey_ramp_is_reproduced_in_any_direction(cfa: Tile) -> None:
     assert adams_planes(ramp, cfa)[inside] == pytest.approx(np.repeat(ramp[inside][..., None], 3, 2), abs=1e-9)
 
 
-@pytest.mark.parametrize(("cfa", "axis"), list(product(PHASES, (0, 1))))
+@pytest.mark.parametrize(("cfa", "axis"), list(product(RGBW_PHASES, (0, 1))))
 def test_w_beside_its_sites_is_taken_along_a_straight_edge_not_across(cfa: Tile, axis: int) -> None:
     # A grey edge along an axis, once its diagonal sites know W: those beside W's own have two neighbours on their side
     # of the edge and, across it, one on each; the Laplacian is as large across. So nothing is blurred there.
@@ -84,9 +84,9 @@ def test_the_smaller_gradient_wins_on_a_diagonal() -> None:
     # a grey edge along the falling diagonal: W at the sites diagonal to W's own comes from their own side
     rows, columns = np.indices((20, 20))
     edge = np.where(rows - columns < 0, 100.0, 900.0)
-    opposite = mask(("RG", "BW"), "R", (20, 20))
+    opposite = mask(RGBW, "R", (20, 20))
     opposite[:4], opposite[-4:], opposite[:, :4], opposite[:, -4:] = False, False, False, False  # reflection bends it
-    np.testing.assert_array_equal(luminance_plane(edge, ("RG", "BW"))[opposite], edge[opposite])
+    np.testing.assert_array_equal(luminance_plane(edge, RGBW)[opposite], edge[opposite])
 
 
 def test_other_tiles_are_refused() -> None:

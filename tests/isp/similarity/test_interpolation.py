@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from builders import raw_image
 
 from isp.interleaved import reconstruct
 from isp.planes import fill, tent_weights
 from isp.similarity.interpolation import certainty, interpolation_variance, opposite_pairs
-from sensor.cfa import MOSAICS, channels
-from sensor.raw import RawImage
+from sensor.cfa import MOSAICS, RGBW, channels
 
-RGBW = MOSAICS["rgbw"]
 TILES = list(MOSAICS.values())
 
 
@@ -103,6 +102,6 @@ def test_a_neutral_edge_between_samples_gets_no_coloured_fringe(start):
     """All letters see the same step. Trusting the distances, each colour chooses a side: half the step between them."""
     tile = tuple(row[start[1] :] + row[: start[1]] for row in RGBW[start[0] :] + RGBW[: start[0]])
     electrons = np.where(np.arange(32) < 15, 400.0, 4000.0) * np.ones((24, 32))
-    raw = RawImage(electrons.astype(np.uint16), tile, 0.0, 60000.0, 1.0, 2.0, 0.0, 0.0, 0.01)
+    raw = raw_image(electrons, tile, black_dn=0.0, white_dn=60000.0, read_noise_e=2.0, dsnu_e=0.0)
     spread = np.ptp(reconstruct(raw), axis=2)[8:-8]
     assert spread.max() < 0.2 * 3600.0

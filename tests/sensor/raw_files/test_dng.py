@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from builders import BAYER_PHASES, RGBW_PHASES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
-from sensor.cfa import MOSAICS, RGBW, Tile, channels, is_bayer, is_rgbw
+from sensor.cfa import BAYER, MOSAICS, RGBW, Tile, channels, is_bayer, is_rgbw
 from sensor.raw import RawImage
 from sensor.raw_files.dng import (
     PRIVATE,
@@ -29,9 +30,6 @@ from sensor.raw_files.dng import (
 from sensor.raw_files.tiff import CFA, EXIF, write_mosaic
 
 rawpy = pytest.importorskip("rawpy", reason="rawpy (LibRaw) is not installed")
-
-BAYER_PHASES = [("RG", "GB"), ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
-RGBW_PHASES = [("RG", "BW"), ("GR", "WB"), ("BW", "RG"), ("WB", "GR")]
 
 
 def colour(count: int) -> ColourCalibration:
@@ -48,7 +46,7 @@ def colour(count: int) -> ColourCalibration:
     )
 
 
-def exposure(cfa: Tile = ("RG", "GB"), shape: tuple[int, int] = (30, 41), bits: int = 14) -> RawImage:
+def exposure(cfa: Tile = BAYER, shape: tuple[int, int] = (30, 41), bits: int = 14) -> RawImage:
     dn = np.random.default_rng(bits).integers(0, 2**bits, shape, dtype=np.uint16)
     dn.flat[:2] = 0, 2**bits - 1
     return RawImage(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from builders import raw_image
 from PIL import Image
 
 from isp.colour.encoding import encode
@@ -295,16 +296,15 @@ def negative(path: Path, cfa: str = "bayer", share: float = 0.25, light: str = "
     sensor = preset("low_noise", cfa)
     expected = expected_electrons(form_image(wall(light=light), sensor), sensor, 0.02)
     expected *= share * sensor.pixel.full_well_e / expected[mask(sensor.cfa, "G", SHAPE)].mean()
-    raw = RawImage(
-        np.rint(np.minimum(expected, 15_000) / sensor.gain_e_per_dn + sensor.black_dn).astype(np.uint16),
+    raw = raw_image(
+        np.rint(np.minimum(expected, 15_000) / sensor.gain_e_per_dn + sensor.black_dn),
         sensor.cfa,
-        sensor.black_dn,
-        sensor.white_dn,
-        sensor.gain_e_per_dn,
-        1.5,
-        1.0,
-        0.01,
-        0.02,
+        black_dn=sensor.black_dn,
+        white_dn=sensor.white_dn,
+        gain_e_per_dn=sensor.gain_e_per_dn,
+        read_noise_e=1.5,
+        prnu=0.01,
+        exposure_s=0.02,
         colour=calibrate(sensor, illuminant(light)),
     )
     write_raw(raw, path)
