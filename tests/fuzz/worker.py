@@ -80,9 +80,15 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
     if event in _FORBIDDEN and not (event == "subprocess.Popen" and arguments[0] in _own_programs):
         raise OutsideError(f"{event} {arguments!r:.300}")
     if (event == "open" and isinstance(arguments[2], int) and arguments[2] & _WRITING) or event in _CHANGING:
-        path = str(arguments[0])
-        if path != os.devnull and not os.path.realpath(path).startswith(tuple(_inside)):
+        path = os.path.realpath(os.path.join(_folder_of(event, arguments), str(arguments[0])))
+        if path != os.devnull and not path.startswith(tuple(_inside)):
             raise OutsideError(f"{event} {arguments!r:.300}")
+
+
+def _folder_of(event: str, arguments: tuple[Any, ...]) -> str:
+    """The folder that a relative path is told from: `os.remove` and `os.rmdir` may name it by an open file."""
+    number = arguments[-1] if event in ("os.remove", "os.rmdir") else -1
+    return os.readlink(f"/proc/self/fd/{number}") if number >= 0 else ""
 
 
 @contextmanager
