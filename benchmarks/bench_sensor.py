@@ -3,8 +3,8 @@
 Run ``python benchmarks/bench_sensor.py``. It prints the environment, the first capture of a fresh process with an empty
 kernel cache (compilation included), then for each size and light the medians of rounds in turn: ``capture``; reading
 the bands' memory once, which nothing can undercut; and NumPy's `Generator.poisson` alone on the same means, which the
-whole is measured against. Before that, the largest memory of two fresh processes (``--memory`` runs these alone): 24
-megapixels taken from strips, and the picture behind a lens that diffracts, beside the size of its bands. NumPy's
+whole is measured against. Before that, the largest memory of a fresh process (``--memory`` runs it alone) that images a
+picture behind a lens that diffracts, beside the size of its bands. NumPy's
 sampler runs on one thread, and the capture's two or more get less of a CPU that others use too: trust the ratios of
 processor time. `rodcone bench` measures the exact readout and the lens.
 """
@@ -14,7 +14,7 @@ import resource
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ from environment import beside, in_turn, print_environment, seconds_of
 
 from render.radiance import SpectralRadiance
 from rodcone.jit import backend
-from sensor.capture import capture, capture_strips
+from sensor.capture import capture
 from sensor.device import draw_device
 from sensor.optics import form_image
 from sensor.presets import preset
@@ -78,21 +78,6 @@ def peak_gb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9
 
 
-def strips_memory() -> None:
-    """Time and memory of 24 megapixels whose radiance is made strip by strip."""
-    shape, rows = (4000, 6000), 100
-    sensor, part = preset("low_noise"), scene(rows, LIGHTS["a lit room"])
-    device = draw_device(sensor, shape, np.random.default_rng(1))
-
-    def strips() -> Iterator[SpectralRadiance]:
-        for _ in range(shape[0] // rows):
-            values = np.tile(np.moveaxis(part.values, -1, 0), (1, 1, shape[1] // rows))
-            yield SpectralRadiance(np.moveaxis(values, 0, -1), NM)
-
-    wall, cpu = seconds_of(lambda: capture_strips(strips(), sensor, EXPOSURE_S, device, np.random.default_rng(2)))
-    print(f"24 megapixels from strips of {rows} rows: {wall:.1f} s, processor {cpu:.1f} s, at most {peak_gb():.2f} GB")
-
-
 def lens_memory() -> None:
     """Memory of an image behind a lens that diffracts, over that of the bands it is made from."""
     sensor, radiance = preset("low_noise"), scene(1024, LIGHTS["a lit room"])
@@ -106,8 +91,7 @@ def lens_memory() -> None:
 
 
 def memory() -> None:
-    for part in ("--strips", "--lens"):
-        subprocess.run([sys.executable, __file__, part], check=True)
+    subprocess.run([sys.executable, __file__, "--lens"], check=True)
 
 
 def main() -> None:
@@ -125,7 +109,7 @@ def main() -> None:
             print("\n".join("  " + beside(name, times, NUMPY) for name in times), flush=True)
 
 
-PARTS = {"--first-call": first_call, "--strips": strips_memory, "--lens": lens_memory, "--memory": memory}
+PARTS = {"--first-call": first_call, "--lens": lens_memory, "--memory": memory}
 
 if __name__ == "__main__":
     PARTS.get(" ".join(sys.argv[1:]), main)()

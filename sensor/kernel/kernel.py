@@ -33,7 +33,6 @@ def expected_electrons_single(
     values: NDArray[np.floating],
     weights: NDArray[np.float64],
     sensor: SensorConfig,
-    first_row: int = 0,
 ) -> NDArray[np.float32]:
     """Expected photo-electrons behind each pixel's own filter, in single precision.
 
@@ -44,8 +43,6 @@ def expected_electrons_single(
     weights : (channel, band) float64
         Electrons per unit of `values`, as `sensor.response.electrons_per_irradiance` gives them.
     sensor : SensorConfig
-    first_row : int
-        Row of the frame that `values` starts with.
 
     Returns
     -------
@@ -67,7 +64,7 @@ def expected_electrons_single(
     tile_size = divisor(tile.shape[0]), divisor(tile.shape[1])
     result = np.empty(planes.shape[1], dtype=np.float32)
     for start, piece in _pieces(planes):
-        pixel = dr.arange(jit.UInt, piece.shape[1]) + dr.opaque(jit.UInt, first_row * width + start)
+        pixel = dr.arange(jit.UInt, piece.shape[1]) + dr.opaque(jit.UInt, start)
         channel = dr.gather(jit.UInt, tile_channels, tile_cell(pixel, divisor(width), tile_size))
         electrons = dr.zeros(jit.Float, piece.shape[1])
         for first in range(0, bands, BANDS_AT_ONCE):

@@ -14,7 +14,7 @@ from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum
 from rodcone.errors import InputError
 from rodcone.jit import backend
-from sensor.capture import capture, capture_strips, expose
+from sensor.capture import capture, expose
 from sensor.curves import Responses
 from sensor.device import draw_device
 from sensor.optics import form_image
@@ -106,48 +106,14 @@ def test_a_radiance_with_nan_never_becomes_a_picture():
         SpectralRadiance(values, NM)
 
 
-def shoot(radiance, sensor, seed=3, exact=False, take=capture, **options):
+def shoot(radiance, sensor, seed=3, exact=False, **options):
     device = draw_device(sensor, (33, 48), np.random.default_rng(2))
-    return take(radiance, sensor, 0.02, device, np.random.default_rng(seed), exact=exact, **options)
-
-
-def strips(radiance, *heights):
-    ends = np.cumsum(heights)
-    return [SpectralRadiance(radiance.values[end - n : end], NM) for n, end in zip(heights, ends, strict=True)]
+    return capture(radiance, sensor, 0.02, device, np.random.default_rng(seed), exact=exact, **options)
 
 
 def test_the_raw_image_names_what_drew_it():
     assert shoot(scene(), preset("low_noise")).engine == backend()
     assert shoot(scene(), preset("low_noise"), exact=True).engine == "numpy"
-
-
-@pytest.mark.parametrize("view_deg", [0.0, 60.0])
-@pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize("mosaic", ["rgbw", "rgbw_4x4"])
-def test_a_picture_in_strips_is_the_whole_picture_bit_for_bit(mosaic, exact, view_deg):
-    sensor = preset("low_noise", mosaic)
-    sensor = replace(sensor, lens=replace(sensor.lens, horizontal_view_deg=view_deg))
-    planes = np.moveaxis(np.ascontiguousarray(np.moveaxis(scene().values, -1, 0)), 0, -1)
-    for radiance in (scene(), SpectralRadiance(planes, NM)):
-        whole = shoot(radiance, sensor, exact=exact)
-        for heights in ((33,), (4, 29), (5, 7, 21), (16, 17)):
-            parts = shoot(iter(strips(radiance, *heights)), sensor, exact=exact, take=capture_strips)
-            np.testing.assert_array_equal(parts.dn, whole.dn)
-
-
-@pytest.mark.parametrize("heights", [(), (20,), (20, 14), (33, 2)])
-def test_strips_that_do_not_make_the_frame_are_refused(heights):
-    tall = scene(shape=(40, 48))
-    with pytest.raises(InputError, match=r"radiance: a frame of \(\d+, 48\) is not the device's \(33, 48\)"):
-        shoot(strips(tall, *heights), preset("low_noise"), take=capture_strips)
-
-
-@pytest.mark.parametrize("term", ["diffraction", "defocus_um", "veiling_glare"])
-def test_strips_behind_a_lens_that_spreads_light_are_refused(term):
-    sensor = preset("low_noise")
-    sensor = replace(sensor, lens=replace(sensor.lens, **{term: 0.5}))
-    with pytest.raises(InputError, match="lens: diffraction, defocus or veiling_glare reach beyond a strip"):
-        shoot(strips(scene(), 33), sensor, take=capture_strips)
 
 
 def mean_electrons(radiance, sensor, frames, **options):

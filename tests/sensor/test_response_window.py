@@ -8,7 +8,7 @@ import pytest
 from render.radiance import SpectralRadiance
 from render.spectrum import flat
 from rodcone.errors import InputError
-from sensor.capture import capture, capture_strips
+from sensor.capture import capture
 from sensor.curves import Responses
 from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
@@ -52,16 +52,14 @@ def test_the_shares_are_what_the_electrons_of_equal_energy_light_lose(low_nm, hi
     assert [shares[channel] for channel in "RGBW"] == pytest.approx(1 - cut / whole, abs=2e-4)
 
 
-def shoot(radiance, take=capture, **options):
+def shoot(radiance, **options):
     device = draw_device(SENSOR, radiance.shape, np.random.default_rng(1))
-    given = [radiance] if take is capture_strips else radiance
-    return take(given, SENSOR, 0.01, device, np.random.default_rng(2), **options)
+    return capture(radiance, SENSOR, 0.01, device, np.random.default_rng(2), **options)
 
 
 DOORS = {
     "capture": shoot,
     "exact capture": lambda radiance: shoot(radiance, exact=True),
-    "strips": lambda radiance: shoot(radiance, capture_strips),
     "expected electrons": lambda radiance: expected_electrons(form_image(radiance, SENSOR), SENSOR, 0.01),
     "auto exposure": lambda radiance: auto_exposure_s(form_image(radiance, SENSOR), SENSOR),
 }
