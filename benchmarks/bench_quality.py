@@ -92,13 +92,7 @@ class MeasuredShot:
 
 def open_stage(name: str, max_spp: int) -> RenderedScene:
     scene = load(name)
-    transport = render(
-        scene,
-        (SIZE, SIZE),
-        wavelength_nm=WAVELENGTH_NM,
-        max_spp=max_spp,
-        cache=OUT / "renders",
-    )
+    transport = render(scene, (SIZE, SIZE), wavelength_nm=WAVELENGTH_NM, max_spp=max_spp, cache=OUT / "renders")
     spectrum = next(iter(scene.groups.values())).spectrum
     light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
     radiance = transport.relight(luminance_cd_m2=1.0)

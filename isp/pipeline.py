@@ -11,14 +11,7 @@ from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish, require_letters
 from isp.settings import DEFAULTS, Settings
 from isp.similarity.guide import saturated_fraction
-from isp.substitution import (
-    COLOUR_ERROR,
-    OCTAVES,
-    SUBSTITUTION_SNR,
-    green_snr,
-    matrix_with_white,
-    substitution_weight,
-)
+from isp.substitution import COLOUR_ERROR, OCTAVES, SUBSTITUTION_SNR, green_snr, matrix_with_white, substitution_weight
 from sensor.raw import RawImage
 
 

@@ -83,12 +83,7 @@ def _path(folder: Path, scene: Scene, film: Film, seed: int) -> Path:
         [
             *(ENGINE_VERSION, integrator_name(), variant(), compiler_version()),
             *map(metadata.version, ("mitsuba", "drjit")),
-            *(
-                scene.name,
-                scene.geometry,
-                scene.reference_plane,
-                file_digests(scene.geometry),
-            ),
+            *(scene.name, scene.geometry, scene.reference_plane, file_digests(scene.geometry)),
             [[name, group.emitters, group.coloured] for name, group in scene.groups.items()],
             *(film, seed),
         ]

@@ -46,11 +46,7 @@ class SharedPaths:
 
 
 def relative_error(
-    emitted: Floats,
-    radiance: Planes,
-    variance: Planes,
-    factor: float = 1.0,
-    shared: SharedPaths | None = None,
+    emitted: Floats, radiance: Planes, variance: Planes, factor: float = 1.0, shared: SharedPaths | None = None
 ) -> float:
     """Median over pixels and bands of standard error over mean, the variance pooled over 3x3 pixels; dark values out.
 

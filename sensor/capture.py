@@ -59,6 +59,7 @@ def capture(
     UserWarning
         Where the bands don't fill the camera's window: what each channel loses.
     """
+    expected_e: NDArray[np.floating]
     if exact or backend() == "numpy":
         image = form_image(radiance, sensor, samples_per_pixel)
         _check_frame(image.values, device)

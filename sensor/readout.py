@@ -144,11 +144,7 @@ def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposu
 
 
 def as_raw(
-    dn: NDArray[np.uint16],
-    sensor: SensorConfig,
-    exposure_s: float,
-    engine: str,
-    hot: NDArray[np.bool_] | None = None,
+    dn: NDArray[np.uint16], sensor: SensorConfig, exposure_s: float, engine: str, hot: NDArray[np.bool_] | None = None
 ) -> RawImage:
     """Raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels."""
     pixel = sensor.pixel

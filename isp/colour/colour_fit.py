@@ -214,11 +214,7 @@ def _band_last(name: str, values: ArrayLike, bands: int) -> Floats:
 
 
 def relative_noise(
-    raw: RawImage,
-    estimate: NDArray[np.floating],
-    noise_gain: NDArray[np.floating],
-    gains: Floats,
-    fit: ColourFit,
+    raw: RawImage, estimate: NDArray[np.floating], noise_gain: NDArray[np.floating], gains: Floats, fit: ColourFit
 ) -> Floats:
     """Noise variance of a frame's balanced channels, as `ColourFit.matrix` takes it.
 

@@ -7,13 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.colour_spaces import (
-    DISPLAY_P3_PRIMARIES_XY,
-    SRGB_PRIMARIES_XY,
-    SRGB_TO_XYZ,
-    encode_srgb,
-    rgb_to_xyz,
-)
+from rodcone.colour_spaces import DISPLAY_P3_PRIMARIES_XY, SRGB_PRIMARIES_XY, SRGB_TO_XYZ, encode_srgb, rgb_to_xyz
 from rodcone.errors import unknown
 
 

@@ -9,14 +9,7 @@ mosaics with a tile of this size. Loading is what costs: at y whole rows are loa
 from dataclasses import dataclass
 from typing import Any
 
-from isp.kernel.accumulate import (
-    HEADROOM,
-    LEAST_WEIGHT,
-    add_samples,
-    mixed_squares,
-    squared_distances,
-    start_sums,
-)
+from isp.kernel.accumulate import HEADROOM, LEAST_WEIGHT, add_samples, mixed_squares, squared_distances, start_sums
 from isp.kernel.layout import Inputs
 from isp.kernel.schedule import Guide, Threads
 from rodcone.jit import dr

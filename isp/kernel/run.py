@@ -73,12 +73,7 @@ def _start(jit: Any, raw: RawImage, rows: Span, pattern: Pattern, settings: Sett
         inputs = lay_out(jit, strip, region, pattern, settings, chosen[0])
         for guide in chosen:
             shape = Shape(
-                tile=pattern.tile,
-                block=pattern.block,
-                patch=settings.patch,
-                guide=guide,
-                running=False,
-                noise=noise,
+                tile=pattern.tile, block=pattern.block, patch=settings.patch, guide=guide, running=False, noise=noise
             )
             threads = Threads(**{name: upload(values) for name, values in vars(work[guide]).items()})
             failed = launch(jit, inputs, threads, shape, sums)

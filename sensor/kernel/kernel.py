@@ -30,9 +30,7 @@ _FINITE_E = 1e30  # over any well; times any response in single precision's rang
 
 
 def expected_electrons_single(
-    values: NDArray[np.floating],
-    weights: NDArray[np.float64],
-    sensor: SensorConfig,
+    values: NDArray[np.floating], weights: NDArray[np.float64], sensor: SensorConfig
 ) -> NDArray[np.float32]:
     """Expected photo-electrons behind each pixel's own filter, in single precision.
 
@@ -158,12 +156,7 @@ def philox(counter: tuple[Any, ...], key: tuple[Any, Any]) -> tuple[Any, ...]:
     (c0, c1, c2, c3), (k0, k1) = counter, key
     first, second = (arrays().UInt(int(multiplier)) for multiplier in MULTIPLIERS)
     for _ in range(ROUNDS):
-        c0, c1, c2, c3 = (
-            dr.mul_hi(c2, second) ^ c1 ^ k0,
-            c2 * second,
-            dr.mul_hi(c0, first) ^ c3 ^ k1,
-            c0 * first,
-        )
+        c0, c1, c2, c3 = (dr.mul_hi(c2, second) ^ c1 ^ k0, c2 * second, dr.mul_hi(c0, first) ^ c3 ^ k1, c0 * first)
         k0, k1 = k0 + WEYL[0], k1 + WEYL[1]
     return c0, c1, c2, c3
 

@@ -72,7 +72,8 @@ def reasons(study: Study, plan: Plan, reference: Plan) -> Iterator[str]:
     budget = study.budget
     yield (
         f"Budget: {_percent(budget.total)} of the sensor's own noise variance, {_percent(budget.monte_carlo)} of it "
-        "for Monte Carlo noise. Shares are upper estimates from a pilot render; in brackets: if left out."
+        "for Monte Carlo noise. Shares are upper estimates from a pilot render; in brackets what is modelled would cost "
+        "if it were left out."
     )
     for scene, model in plan.renders.items():
         widths = sorted({round(width, 1) for width in model.width_nm})
@@ -88,16 +89,6 @@ def reasons(study: Study, plan: Plan, reference: Plan) -> Iterator[str]:
                 f"{label(scene.source)}: Monte Carlo noise reaches {_percent(noise.share)} in the worst condition; "
                 f"{wanted:.2g} samples would keep the aim, and render.spp allows {study.render.spp}"
             )
-    for name in (*LENS_TERMS, KERNEL):
-        rows = [(row, term) for row in plan.ledgers for term in row.terms if term.name == name]
-        out = [term.share for _, term in rows if not term.modelled]
-        kept = [term.share for _, term in rows if term.modelled]
-        if out:
-            what = "the exact readout" if name == KERNEL else name
-            yield f"{what}: left out of {len(out)} of {len(rows)} images, where it costs at most {_percent(max(out))}"
-        if kept:
-            why = "beyond the budget" if min(kept) > budget.total else "as other terms or another mosaic need its room"
-            yield f"{name}: modelled in {len(kept)}, where leaving it out costs from {_percent(min(kept))} on, {why}"
 
 
 def worst(plan: Plan, scene: SceneChoice, name: str) -> Term:

@@ -65,7 +65,19 @@ def capture(
         Print one JSON object with the paths and facts of the exposure instead of the paths.
     """
     order = Order(
-        source, out, sensor, cfa, exposure_s, level, white_balance, size, spp, seed, trust_scene, extend, force
+        source=source,
+        out=out,
+        sensor=sensor,
+        cfa=cfa,
+        exposure_s=exposure_s,
+        level=level,
+        white_balance=white_balance,
+        size=size,
+        spp=spp,
+        seed=seed,
+        trust=trust_scene,
+        extend=extend,
+        force=force,
     )
     with progress(sys.stderr) as step:
         taken = take(order, step)

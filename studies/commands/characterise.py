@@ -1,10 +1,10 @@
 """The command `rodcone characterise`."""
 
 import json as notation
-from math import isfinite
 from typing import Any
 
 from rodcone.files import check_place, replacing
+from rodcone.json_values import finite
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
@@ -53,7 +53,7 @@ def characterise(
         with replacing(out) as (place,):
             place.write_text(transfer_svg(found, f"{preset}, characterised after EMVA 1288"), "utf-8")
     if json:
-        print(notation.dumps(_facts(found), allow_nan=False))
+        print(notation.dumps(finite(_facts(found)), allow_nan=False))
         return
     # The last column is measured less configured in standard errors; a figure without an error has none.
     rows = []
@@ -75,14 +75,9 @@ def _facts(found: Characterisation) -> dict[str, Any]:
         "linearity_share": found.linearity_share,
     }
     return {
-        "figures": [{name: _finite(value) for name, value in vars(figure).items()} for figure in found.figures],
-        "series": {name: [_finite(value) for value in values.tolist()] for name, values in series.items()},
+        "figures": [vars(figure) for figure in found.figures],
+        "series": {name: values.tolist() for name, values in series.items()},
         "dark_mean_dn": found.dark_mean_dn,
         "dark_variance_dn2": found.dark_variance_dn2,
         "notes": list(found.notes),
     }
-
-
-def _finite(value: Any) -> Any:
-    """Return None for NaN and infinity, which JSON lacks."""
-    return None if isinstance(value, float) and not isfinite(value) else value

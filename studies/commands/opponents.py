@@ -5,17 +5,10 @@ from pathlib import Path
 from rodcone.files import check_place
 from studies.commands.console import Out, require_ending
 from studies.pages.duels_page import write_page
-from studies.sweep.database import last_study, read_results
-from studies.sweep.export import read_rows
+from studies.sweep.database import last_run
 
 
-def opponents(
-    folder: Path,
-    /,
-    *,
-    out: Out = Path("opponents.md"),
-    camera: str = "interleaved",
-) -> None:
+def opponents(folder: Path, /, *, out: Out = Path("opponents.md"), camera: str = "interleaved") -> None:
     """Write a page on one camera beside the other processors of a sweep, its losses included; prints its path.
 
     Every number is computed from the results database; the figure is an SVG file of the page's name.
@@ -31,8 +24,6 @@ def opponents(
     """
     require_ending(out, ".md")
     check_place(out)
-    rows = read_rows(folder)
-    with read_results(folder) as base:
-        study, _ = last_study(base) or ({}, {})
-    write_page(rows, study, folder, out, camera)
+    run = last_run(folder)
+    write_page(run.rows, run.study, folder, out, camera)
     print(out)

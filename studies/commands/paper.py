@@ -10,14 +10,7 @@ from studies.paper.paper import as_json, make, write
 from studies.paper.setup import Setup
 
 
-def paper(
-    *,
-    out: Out = Path("out/paper"),
-    size: int = 192,
-    spp: int = 256,
-    seeds: int = 4,
-    json: Flag = False,
-) -> None:
+def paper(*, out: Out = Path("out/paper"), size: int = 192, spp: int = 256, seeds: int = 4, json: Flag = False) -> None:
     """Compute the figures and claims of Parmar & Wandell 2009 and check each claim; prints the page's path.
 
     Parameters

@@ -18,13 +18,7 @@ from studies.study.study_file import read_study
 
 
 def plan(
-    study: Path,
-    /,
-    *,
-    set: Several = None,
-    check: Flag = False,
-    cache: Path | None = None,
-    json: Flag = False,
+    study: Path, /, *, set: Several = None, check: Flag = False, cache: Path | None = None, json: Flag = False
 ) -> None:
     """Compute a study's error budget and choose the cheapest model within it.
 

@@ -12,13 +12,7 @@ from studies.sweep.results import overview, results_json
 FILE, RESULTS, OVERVIEW = "report.html", "results.json", "overview.png"
 
 
-def report(
-    folder: Path,
-    /,
-    *,
-    out: OutOrNone = None,
-    pictures: int | None = None,
-) -> None:
+def report(folder: Path, /, *, out: OutOrNone = None, pictures: int | None = None) -> None:
     """Write the report of a sweep as one self-contained HTML file; prints its path.
 
     Parameters

@@ -112,13 +112,7 @@ def check_memory(study: Study, out: Path, *, reference: bool, workers: int, forc
 
 
 def make_all(
-    study: Study,
-    out: Path,
-    planned: Callable[[Step], Plan],
-    runner: Runner,
-    *,
-    keep_old: bool = False,
-    clock: Clock,
+    study: Study, out: Path, planned: Callable[[Step], Plan], runner: Runner, *, keep_old: bool = False, clock: Clock
 ) -> tuple[Swept, Path]:
     """Sweep a study into a folder and write its report there; says on stderr how far it is and what it had to assume.
 
@@ -145,11 +139,7 @@ def make_all(
 
 
 def export(
-    folder: Path,
-    /,
-    *,
-    out: Out,
-    everything: Annotated[bool, Parameter(name="--all", negative="")] = False,
+    folder: Path, /, *, out: Out, everything: Annotated[bool, Parameter(name="--all", negative="")] = False
 ) -> None:
     """Write the cells of a sweep as a table, a row a cell; prints its path.
 

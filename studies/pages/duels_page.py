@@ -25,7 +25,7 @@ from studies.pages.duels import (
     snr_db,
 )
 from studies.pages.plots import BLUE, CHART, GREEN, ORANGE, STYLE, blank, name_at_ends, plain_ticks, svg_text
-from studies.pages.report_text import DELTA_E, MISSING, NBSP, PSNR, Metric, fixed, level_text, percent, significant
+from studies.pages.report_text import DELTA_E, MISSING, PSNR, Metric, fixed, level_text, percent, significant
 from studies.sweep.row import Row
 
 COLUMNS = 2  # charts beside each other
@@ -87,7 +87,7 @@ def page_of(
         duel_table(contests, camera),
         "Conditions by the outcome of the 95 % interval over seeds, and the leads' range: below 0 "
         f"{code(camera)} is behind. Times are medians over all pictures, in units of {code(camera)}'s, on the machine "
-        f"of the sweep. {scatter(contests, camera)}",
+        "of the sweep.",
         "## Lead in every condition",
         f"Positive: {code(camera)} is better. **Bold**: it is behind, and the whole interval is below 0. In brackets: "
         f"the interval holds 0. {MISSING}: not ranked.",
@@ -173,18 +173,6 @@ def level_table(of_group: Sequence[Contest], camera: str) -> str:
             # whole decibels, 0 without a sign
             rows.append([f"*{words}*", *(fixed(value if isnan(value) else round(value), 0) for value in values)])
     return table(["PSNR [dB], ΔE2000", *(level_text(contest.level) for contest in of_group)], rows)
-
-
-def scatter(contests: Sequence[Contest], camera: str) -> str:
-    """Say how wide the leads' intervals are; empty where nothing is ranked."""
-    parts = []
-    for metric in METRICS:
-        found = [duel for name in opponents_of(contests, camera) for duel in duels(contests, camera, name, metric)]
-        halves = sorted((duel.lead.high - duel.lead.low) / 2 for duel in found)
-        if halves:
-            middle, most = (significant(half, digits=2) for half in (halves[len(halves) // 2], halves[-1]))
-            parts.append(f"{metric.name} ±{NBSP}{middle} (at most {most})")
-    return f"Half the interval of a lead, in the median: {'; '.join(parts)}." if parts else ""
 
 
 def _lead_head(metric: Metric) -> str:

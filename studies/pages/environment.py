@@ -9,10 +9,4 @@ from studies.sweep.provenance import machine, threads, versions
 
 def environment() -> dict[str, Any]:
     """Facts by name, as JSON holds them."""
-    return {
-        **versions(),
-        "variant": variant(),
-        "engine": backend(),
-        "threads": threads(),
-        "machine": machine(),
-    }
+    return {**versions(), "variant": variant(), "engine": backend(), "threads": threads(), "machine": machine()}

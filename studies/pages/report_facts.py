@@ -40,17 +40,6 @@ def _further(row: Row) -> dict[str, Any]:
     return facts
 
 
-def fallbacks(rows: Sequence[Row]) -> list[str]:
-    """Say where neither LLVM nor CUDA answered; versions name the one that did."""
-    versions = [json.loads(row.versions) for row in rows]
-    if all(one.get("llvm") != "none" or "cuda" in one for one in versions):
-        return []
-    return [
-        "Neither LLVM nor CUDA answered: scenes were rendered in scalar_spectral, and captures and reconstruction ran "
-        "in NumPy."
-    ]
-
-
 def level_of(text: str) -> ReportLevel:
     """Return a level as the study asks for it."""
     return NAMED.get(text) or ReportLevel(level_text(text), "asked for by the study")

@@ -12,14 +12,12 @@ from typing import Any
 
 from PIL import Image
 
-from rodcone.errors import InputError
 from sensor.exposure import RULE
 from studies.metrics.confidence import mean_with_confidence
 from studies.pages.report_data import ReportCell, ReportData, ReportScene
 from studies.pages.report_facts import (
     configuration,
     environment_of,
-    fallbacks,
     lenses_left_out,
     level_of,
     render_notes,
@@ -28,7 +26,7 @@ from studies.pages.report_facts import (
 )
 from studies.pages.report_text import METRICS, group_names, view_names
 from studies.study.study import label
-from studies.sweep.database import last_study, read_results, rows
+from studies.sweep.database import last_run
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import require_alike
 from studies.sweep.row import Row
@@ -56,13 +54,9 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         Where there is no results database, one of another version, none of the last run's cells is made yet, they were
         made by different versions, variants or engines, or a picture is gone.
     """
-    with read_results(folder) as base:
-        made, wanted = rows(base), base.execute("SELECT count(*) FROM wanted").fetchone()[0]
-        run = last_study(base)
-    if not made or run is None:
-        raise InputError(f"{folder}: its last run has made no cell yet; run rodcone sweep, which goes on")
+    run = last_run(folder)
+    study, made = run.study, run.rows
     require_alike(made)
-    study, stages = run
 
     names = [label(choice["source"]) for choice in study["scenes"]]
     of_views = {(row.scene, row.spectrum): row.truth for row in made}
@@ -72,8 +66,8 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
     files = dict.fromkeys(name for name in (*truths, *(cell.picture for cell in shown)) if name)
     pictures = {name: read_whole(folder / PICTURES, name) for name in files}
     sizes = [_size(pictures, truths[index * len(study["spectra"])]) for index in range(len(names))]
-    missing = wanted - len(made)
-    unmade = [f"{missing} of {wanted} cells are not made yet: rodcone sweep goes on with them."] if missing else []
+    missing = run.wanted - len(made)
+    unmade = [f"{missing} of {run.wanted} cells are not made yet: rodcone sweep goes on with them."] if missing else []
     data = ReportData(
         rodcone=metadata.version("rodcone"),
         name=study["name"],
@@ -87,12 +81,12 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         cells=tuple(shown),
         truths=tuple(truths),
         renders=tuple(render_of(made, name) for name in names),
-        stages=stages,
+        stages=run.stages,
         environment=environment_of(made),
         configuration=configuration(study),
         exposure_rule=RULE.format(longest=study["longest_exposure_s"] * 1e3),
         left_out=lenses_left_out(made, study["sensors"]),
-        notes=(*fallbacks(made), *render_notes(made), *unmade),
+        notes=(*render_notes(made), *unmade),
         pictures_left_out=left_out,
     )
     return data, pictures

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rodcone.files import replacing
+from rodcone.json_values import finite
 from studies.pages.environment import environment
 from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import png_bytes, svg_text
@@ -95,18 +96,10 @@ def as_json(paper: Paper) -> dict[str, Any]:
             "where": claim.where,
             "claim": claim.text,
             "verdict": claim.verdict,
-            "checks": [
-                {name: _finite(value) for name, value in asdict(check).items()} | {"holds": check.holds}
-                for check in claim.checks
-            ],
+            "checks": [finite(asdict(check)) | {"holds": check.holds} for check in claim.checks],
             "note": claim.note,
         }
         for claim in paper.claims
     ]
     count = {verdict: sum(claim.verdict == verdict for claim in paper.claims) for verdict in VERDICTS}
     return {**paper.facts, "verdicts": count, "claims": claims}
-
-
-def _finite(value: float | str) -> float | str | None:
-    """Number as JSON has it: none for what isn't finite."""
-    return value if isinstance(value, str) or abs(value) < float("inf") else None

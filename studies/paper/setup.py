@@ -153,11 +153,7 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
 def swept(setup: Setup, figure: str) -> list[Row]:
     """Rows of a figure's study (`studies/configs/paper_*.toml`), swept at this size into the results database."""
     study = read_study(CONFIGS / f"paper_{figure}.toml")
-    study = replace(
-        study,
-        seeds=tuple(range(setup.seeds)),
-        render=RenderLimits(setup.size, setup.band_nm, setup.spp),
-    )
+    study = replace(study, seeds=tuple(range(setup.seeds)), render=RenderLimits(setup.size, setup.band_nm, setup.spp))
     folder = setup.out / SWEEP
     plan = as_stated(study)
     sweep(study, folder, plan, partial(run, executor=InThisProcess()), setup.step)

@@ -1,7 +1,6 @@
 """Cells on a cluster of `dask.distributed` (extra ``cluster``): the same cells and rows as in one process."""
 
 import logging
-import os
 import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -20,8 +19,6 @@ from studies.sweep.provenance import versions
 from studies.sweep.row import Row
 from studies.sweep.workers import cores, run
 
-# As `distributed` sets it, NumPy takes twice the processor time: pages go back to the system and come again.
-TRIM = "MALLOC_TRIM_THRESHOLD_"
 PATIENCE_S = 30.0  # for scheduler and workers to answer
 Rows = Generator[Row, None, None]
 
@@ -150,7 +147,7 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
         if count != 1:
             raise InputError(f"cluster: {worker} has {count} threads; allowed: 1; start dask worker with --nthreads 1")
     try:
-        theirs, found, trim = (client.run(ask) for ask in (_what_computes, cores, _trim_threshold))
+        theirs, found = client.run(_what_computes), client.run(cores)
     except ImportError as error:
         raise InputError(f"cluster: a worker lacks rodcone ({one_line(error)}); install it there") from error
     for worker, its in theirs.items():
@@ -160,19 +157,9 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
                 f"cluster: {worker} runs {other[0]} {its.get(other[0])}, this is {_what_computes()[other[0]]}; "
                 "install the same, start it again"
             )
-    if any(trim.values()):
-        warnings.warn(
-            f"cluster: workers run with {TRIM}={max(filter(None, trim.values()))}, which costs NumPy up to twice the "
-            "time; start them with the settings of: rodcone new cluster -o dask.yaml",
-            stacklevel=2,
-        )
     on_host = Counter(urlsplit(worker).hostname for worker in found)
     return len(found), max(1, min(count // on_host[urlsplit(worker).hostname] for worker, count in found.items()))
 
 
 def _what_computes() -> dict[str, str]:
     return {**versions(), "engine": backend()}
-
-
-def _trim_threshold() -> str | None:
-    return os.environ.get(TRIM)

@@ -7,9 +7,10 @@ import errno
 import json
 import os
 import sqlite3
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
@@ -50,6 +51,16 @@ _CREATE = (
     "CREATE TABLE runs (started TEXT NOT NULL, host TEXT NOT NULL, study TEXT NOT NULL, stages TEXT NOT NULL, "
     "digest TEXT NOT NULL) STRICT",
 )
+
+
+@dataclass(frozen=True)
+class LastRun:
+    """What a folder holds of the last run: its study, its seconds by stage, how many cells it wants, the rows made."""
+
+    study: dict[str, Any]
+    stages: dict[str, float]
+    wanted: int
+    rows: list[Row]
 
 
 @contextmanager
@@ -179,16 +190,25 @@ def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
     return [Row(*_require_sound(values, f"row {values[0]!r}")) for values in base.execute(chosen)]
 
 
-def last_study(base: sqlite3.Connection) -> tuple[dict[str, Any], dict[str, float]] | None:
-    """Study of the last run, and the seconds by stage of all runs of it; None before there is one."""
-    found = [_require_sound(values, "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
-    if not found:
-        return None
-    study, seconds = found[-1][2], dict[str, float]()
-    for stages in (json.loads(run[3]) for run in found if run[2] == study):
-        for name, value in stages.items():
-            seconds[name] = seconds.get(name, 0.0) + value
-    return json.loads(study), seconds
+def last_run(folder: Path) -> LastRun:
+    """Study and rows of a folder's last run, and the seconds by stage of all runs of this study.
+
+    Raises
+    ------
+    InputError
+        As `read_results`, where a row isn't what was written, and where the last run has made no cell yet.
+    OSError
+        Where the file can't be read.
+    """
+    with read_results(folder) as base:
+        runs = [_require_sound(values, "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
+        made, wanted = rows(base), base.execute("SELECT count(*) FROM wanted").fetchone()[0]
+    if not runs or not made:
+        raise InputError(f"{folder}: its last run has made no cell yet; run rodcone sweep, which goes on")
+    study, seconds = runs[-1][2], Counter[str]()
+    for stages in (json.loads(run[3]) for run in runs if run[2] == study):
+        seconds.update(stages)
+    return LastRun(json.loads(study), dict(seconds), wanted, made)
 
 
 def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:

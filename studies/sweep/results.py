@@ -1,18 +1,15 @@
 """The last run of a sweep as files: its rows as JSON, and an overview of its pictures."""
 
 import json
-from dataclasses import asdict
 from importlib import metadata
 from io import BytesIO
-from math import isfinite
 from pathlib import Path
-from typing import Any
 
 from PIL import Image
 
-from studies.sweep.database import last_study, read_results, rows
+from rodcone.json_values import finite
+from studies.sweep.database import last_run
 from studies.sweep.prepare import PICTURES
-from studies.sweep.row import Row
 from studies.sweep.stored import read_whole
 
 GAP = 4  # pixels between the pictures of a sheet
@@ -24,13 +21,11 @@ def results_json(folder: Path) -> bytes:
 
     A row has the columns of `studies.sweep.row.Row`, those in JSON as objects; a number that isn't finite is null.
     """
-    study, stages, found = _last_run(folder)
-    made = []
-    for row in found:
-        values = asdict(row)
-        values |= {name: None for name, value in values.items() if isinstance(value, float) and not isfinite(value)}
+    run, made = last_run(folder), []
+    for row in run.rows:
+        values = finite(vars(row))
         made.append(values | {name: json.loads(values[name]) for name in _JSON_COLUMNS})
-    results = {"rodcone": metadata.version("rodcone"), "study": study, "stages": stages, "rows": made}
+    results = {"rodcone": metadata.version("rodcone"), "study": run.study, "stages": run.stages, "rows": made}
     return (json.dumps(results, indent=1, allow_nan=False) + "\n").encode()
 
 
@@ -39,29 +34,21 @@ def overview(folder: Path) -> bytes:
 
     A column for each level, a row for each sensor and processor; what isn't made yet is left white.
     """
-    study, _, found = _last_run(folder)
-    first = found[0]
+    run = last_run(folder)
+    first = run.rows[0]
     shown = {
         (row.sensor, row.processor, row.level): row.picture
-        for row in found
+        for row in run.rows
         if (row.scene, row.spectrum, row.exposure, row.seed)
         == (first.scene, first.spectrum, first.exposure, first.seed)
     }
     lines = list(dict.fromkeys((sensor, processor) for sensor, processor, _ in shown))
     with Image.open(BytesIO(read_whole(folder / PICTURES, first.picture))) as picture:
         width, height = picture.width + GAP, picture.height + GAP
-    sheet = Image.new("RGB", (len(study["levels"]) * width - GAP, len(lines) * height - GAP), "white")
+    sheet = Image.new("RGB", (len(run.study["levels"]) * width - GAP, len(lines) * height - GAP), "white")
     for (sensor, processor, level), name in shown.items():
         with Image.open(BytesIO(read_whole(folder / PICTURES, name))) as picture:
-            sheet.paste(picture, (study["levels"].index(level) * width, lines.index((sensor, processor)) * height))
+            sheet.paste(picture, (run.study["levels"].index(level) * width, lines.index((sensor, processor)) * height))
     file = BytesIO()
     sheet.save(file, "PNG")
     return file.getvalue()
-
-
-def _last_run(folder: Path) -> tuple[dict[str, Any], dict[str, float], list[Row]]:
-    with read_results(folder) as base:
-        found, run = rows(base), last_study(base)
-    if run is None or not found:
-        raise AssertionError(f"{folder} holds no run of which a report was just made")
-    return *run, found

@@ -883,13 +883,7 @@ NONSENSE = (
         "return self.dn >= self.white_dn",
         "sensor/test_raw",
     ),
-    _fault(
-        "black level rounded down",
-        "sensor/config.py",
-        "ceil(least - 1e-9)",
-        "int(least)",
-        "sensor/test_config",
-    ),
+    _fault("black level rounded down", "sensor/config.py", "ceil(least - 1e-9)", "int(least)", "sensor/test_config"),
     _fault(
         "raw image of NaN",
         "sensor/raw.py",

@@ -199,8 +199,6 @@ FRAME_CASES = (
     ),
     Case("mosaic_turned", "the mosaic begins at W, the other at GB", lambda: _mosaic(("WB", "GR"), "bayer_gbrg")),
     Case(
-        "mosaic_4x4",
-        "a tile of 4 × 4, half of it W",
-        lambda: _mosaic(("WGWR", "GWRW", "WBWG", "BWGW"), "bayer_bggr"),
+        "mosaic_4x4", "a tile of 4 × 4, half of it W", lambda: _mosaic(("WGWR", "GWRW", "WBWG", "BWGW"), "bayer_bggr")
     ),
 )

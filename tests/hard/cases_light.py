@@ -124,11 +124,7 @@ LIGHT_CASES = (
         "1e-4 cd/m² for 66 ms, read noise 153 e⁻ and DSNU 200 e⁻",
         lambda: Situation(at_level(STARLIGHT_CD_M2), table1_pixel(), 0.066),
     ),
-    Case(
-        "starlight_1h",
-        "1e-4 cd/m² for an hour",
-        lambda: Situation(at_level(STARLIGHT_CD_M2), exposure_s=3600.0),
-    ),
+    Case("starlight_1h", "1e-4 cd/m² for an hour", lambda: Situation(at_level(STARLIGHT_CD_M2), exposure_s=3600.0)),
     Case("moonlight_table1", "0.036 cd/m² for 66 ms", lambda: Situation(at_level(0.036), table1_pixel(), 0.066)),
     Case("one_photon", "0.01 e⁻ a pixel, a pixel without noise", lambda: _exactly(0.01)),
     Case(

@@ -47,11 +47,7 @@ PICTURE_CASES = (
     ),
     Case("texture", "a random level over 10^3 at every pixel", lambda: Situation(_texture())),
     Case("texture_patch_5", "the same, patches of 5 × 5", lambda: Situation(_texture(), develop={"patch": 5})),
-    Case(
-        "balance_1e6",
-        "channels balanced over a range of 10^6",
-        lambda: _settings(balance=(1e-3, 1.0, 1e3, 1.0)),
-    ),
+    Case("balance_1e6", "channels balanced over a range of 10^6", lambda: _settings(balance=(1e-3, 1.0, 1e3, 1.0))),
     Case(
         "substitution",
         "W gives the luminance of pure noise",

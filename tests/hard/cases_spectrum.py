@@ -84,10 +84,6 @@ SPECTRUM_CASES = (
     Case("one_band", "one band of 400 nm", lambda: Situation(in_bands((580.0,), (400.0,)))),
     Case("one_narrow_band", "one band of 1 nm at 555 nm", lambda: Situation(_one_narrow())),
     Case(
-        "bands_401",
-        "401 bands, 1 nm each: a render of its own",
-        lambda: Situation(_fine()),
-        _parts_add,
-        "bands add up",
+        "bands_401", "401 bands, 1 nm each: a render of its own", lambda: Situation(_fine()), _parts_add, "bands add up"
     ),
 )

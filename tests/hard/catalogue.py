@@ -13,14 +13,7 @@ from hard.invariants_electrons import linear, monotone, reciprocal, shifted
 from hard.invariants_raw import bounded, pictures_unbiased, raw_unbiased
 from hard.invariants_symmetry import equivariant
 
-CASES: tuple[Case, ...] = (
-    *LIGHT_CASES,
-    *SPECTRUM_CASES,
-    *EXPOSURE_CASES,
-    *PIXEL_CASES,
-    *FRAME_CASES,
-    *PICTURE_CASES,
-)
+CASES: tuple[Case, ...] = (*LIGHT_CASES, *SPECTRUM_CASES, *EXPOSURE_CASES, *PIXEL_CASES, *FRAME_CASES, *PICTURE_CASES)
 
 # In the order of the chain. The first line of each docstring stands on the page.
 INVARIANTS: Mapping[str, Measure] = MappingProxyType(

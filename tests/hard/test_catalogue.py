@@ -24,8 +24,7 @@ BY_NAME = {case.name: case for case in CASES}
 
 @needs_kernel
 @pytest.mark.parametrize(
-    "case",
-    [pytest.param(case, id=case.name, marks=() if case.name in QUICK else pytest.mark.slow) for case in CASES],
+    "case", [pytest.param(case, id=case.name, marks=() if case.name in QUICK else pytest.mark.slow) for case in CASES]
 )
 def test_a_hard_case_keeps_its_invariants_but_for_exactly_its_known_limits(case):
     assert unexpected(run_case(case)) == []

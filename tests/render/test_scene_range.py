@@ -150,10 +150,7 @@ def test_a_held_metal_goes_on_at_its_last_index() -> None:
 def test_holding_leaves_the_scene_and_its_lights_as_they_were() -> None:
     lamp = {"type": "rectangle", "emitter": {"type": "area", "radiance": EVEN}}
     geometry = wall(matte(EVEN)).geometry | {"lamp": lamp}
-    groups = {
-        "sun": LightGroup(("sun",), flat()),
-        "lamp": LightGroup(("lamp/emitter",), flat(), coloured=True),
-    }
+    groups = {"sun": LightGroup(("sun",), flat()), "lamp": LightGroup(("lamp/emitter",), flat(), coloured=True)}
     held = Scene("wall", geometry, groups, extend="hold")
     assert held.geometry["lamp"] == lamp
     assert geometry["wall"]["bsdf"]["bsdf"]["reflectance"] == EVEN

@@ -13,15 +13,7 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker
 from sensor.cfa import MOSAICS, RGBW, channels
-from sensor.curves import (
-    Responses,
-    complementary,
-    matched_transmittance,
-    neutral_density,
-    read_csv,
-    read_curve,
-    rgbw,
-)
+from sensor.curves import Responses, complementary, matched_transmittance, neutral_density, read_csv, read_curve, rgbw
 from sensor.presets import preset
 from sensor.variations import VARIATIONS, vary
 from studies.commands import new as new_command

@@ -7,11 +7,7 @@ from builders import raw_image
 from isp.colour.white_balance import neutral_response
 from isp.planes import fill
 from isp.processors.catalogue import PROCESSORS
-from isp.processors.fusion import (
-    MATCHED_RADIUS,
-    combine,
-    with_luminance,
-)
+from isp.processors.fusion import MATCHED_RADIUS, combine, with_luminance
 from rodcone.colour_spaces import luminance_of_srgb
 from sensor.cfa import RGBW, Tile, channel_map, channels
 from sensor.curves import complementary, matched_transmittance, rgbw

@@ -50,8 +50,7 @@ REFLECTANCES = {
         '<string name="values" value="0.2, 0.8, 0.4"/>',
     ),
     "irregular": plugin(
-        "irregular",
-        '<string name="wavelengths" value="370, 500, 790"/><string name="values" value="0.2, 0.7, 0.3"/>',
+        "irregular", '<string name="wavelengths" value="370, 500, 790"/><string name="values" value="0.2, 0.7, 0.3"/>'
     ),
     "points": POINTS.format("reflectance"),
     "file": '<spectrum name="reflectance" filename="r.spd"/>',
@@ -155,13 +154,7 @@ def test_each_kind_of_reflectance_renders_as_in_stock_mitsuba(paint: str, lamps:
     assert [bool(unit.curves) for unit in load_groups(opened.scene, film)] == [rows]
     made = [
         render(
-            opened.scene,
-            opened.size,
-            wavelength_nm=BANDS_NM,
-            width_nm=WIDTH_NM,
-            max_depth=DEPTH,
-            spp=SPP,
-            seed=seed,
+            opened.scene, opened.size, wavelength_nm=BANDS_NM, width_nm=WIDTH_NM, max_depth=DEPTH, spp=SPP, seed=seed
         )
         for seed in range(DRAWS)
     ]

@@ -210,12 +210,7 @@ def test_reflectances_of_the_authors_and_colour_science_are_refused(samples: Pat
 
 def test_channels_in_any_order_and_unit_are_put_in_the_order_of_wavelength(tmp_path: Path) -> None:
     """Light of 499 654.0966... GHz has c / f = 600 nm."""
-    channels = {
-        "S0.0,7um": plane(7),
-        "S0.499654,0966666667GHz": plane(6),
-        "S0.5e-7m": plane(5),
-        "Z": plane(99),
-    }
+    channels = {"S0.0,7um": plane(7), "S0.499654,0966666667GHz": plane(6), "S0.5e-7m": plane(5), "Z": plane(99)}
     path = write_by_hand(tmp_path / "a.exr", channels)
     read = read_exr(path)
     assert read.wavelength_nm == pytest.approx([500.0, 600.0, 700.0], rel=1e-12)

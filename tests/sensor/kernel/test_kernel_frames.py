@@ -90,14 +90,6 @@ def test_read_only_memory_is_read_and_left_alone():
     )
 
 
-def test_rows_that_start_within_the_tile_take_the_frame_s_letters():
-    values, sensor = irradiance((12, 10)), SensorConfig(PIXEL, LensConfig(2.8), cfa=("RG", "GB", "WW"))
-    weights = electrons_per_irradiance(sensor, NM, np.full(NM.size, 10.0), 0.01)
-    whole = expected_electrons_single(values, weights, sensor)
-    for first in (1, 2, 5):
-        np.testing.assert_array_equal(expected_electrons_single(values[first:], weights, sensor, first), whole[first:])
-
-
 # Shot noise
 
 

@@ -18,15 +18,7 @@ from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
 from sensor.cfa import BAYER, MOSAICS, RGBW, Tile, channels, is_bayer, is_rgbw
 from sensor.raw import RawImage
-from sensor.raw_files.dng import (
-    PRIVATE,
-    PRIVATE_DATA,
-    dng_tags,
-    exif_tags,
-    rational,
-    read_dng,
-    write_dng,
-)
+from sensor.raw_files.dng import PRIVATE, PRIVATE_DATA, dng_tags, exif_tags, rational, read_dng, write_dng
 from sensor.raw_files.tiff import CFA, EXIF, write_mosaic
 
 rawpy = pytest.importorskip("rawpy", reason="rawpy (LibRaw) is not installed")

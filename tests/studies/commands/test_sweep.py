@@ -157,11 +157,7 @@ def test_ctrl_c_says_what_is_kept_and_exits_with_130(study: Path, tmp_path: Path
     command = [sys.executable, "-c", "from studies.commands.cli import main; main()", "sweep", str(study)]
     options = ["-o", str(tmp_path / "out"), "--workers", "2", "--as-stated", "--set", f"seeds={list(range(400))}"]
     process = subprocess.Popen(
-        [*command, *options],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
+        [*command, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     for _ in range(600):
         if any((tmp_path / "out" / "pictures").rglob("*.png")):

@@ -152,8 +152,7 @@ def test_the_command_makes_the_page_of_a_sweep(tmp_path: Path, capsys: pytest.Ca
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
-    [(["absent"], "holds no ledger.sqlite"), (["absent", "-o", "page.html"], "write page.md")],
+    ("arguments", "words"), [(["absent"], "holds no ledger.sqlite"), (["absent", "-o", "page.html"], "write page.md")]
 )
 def test_bad_input_is_one_line_and_writes_nothing(
     arguments: list[str], words: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: Any

@@ -20,7 +20,7 @@ from rodcone.errors import InputError
 from studies.commands.cli import main
 from studies.pages.report import render_report
 from studies.pages.report_data import ReportSensor
-from studies.pages.report_facts import fallbacks, sensor_of
+from studies.pages.report_facts import sensor_of
 from studies.pages.report_sweep import chosen_conditions, sweep_report
 from studies.study.study import SceneChoice
 from studies.sweep.database import FILE
@@ -151,14 +151,6 @@ def test_cells_not_made_yet_are_dashes_and_the_page_says_how_many(out: Path, tmp
     page = render_report(results, pictures)
     assert results.notes[0] in page
     assert re.search(r"\b(nan|None)\b", unescape(re.sub(r"base64,[^\"]*", "", page))) is None
-
-
-def test_a_machine_on_which_neither_llvm_nor_cuda_answered_is_told() -> None:
-    made = [SAMPLE.row("bayer", 0, versions=json.dumps({"llvm": llvm, **cuda})) for llvm, cuda in (
-        ("23.1", {}), ("none", {"cuda": "12.8"}), ("none", {}))]  # fmt: skip
-    assert fallbacks(made[:2]) == []
-    (note,) = fallbacks(made)
-    assert all(part in note for part in ("LLVM", "CUDA", "scalar_spectral", "captures", "reconstruction", "NumPy"))
 
 
 def test_a_sensor_whose_file_is_gone_is_said_to_be() -> None:

@@ -15,10 +15,11 @@ from studies.sweep.cells import RenderRecord
 from studies.sweep.database import (
     FILE,
     VERSION,
+    LastRun,
     add,
     done,
     forget_old,
-    last_study,
+    last_run,
     note_render,
     note_run,
     note_stages,
@@ -88,16 +89,19 @@ def test_renders_and_runs_are_noted(tmp_path: Path) -> None:
 
 def test_the_last_study_comes_with_the_seconds_of_all_its_runs(tmp_path: Path) -> None:
     with open_results(tmp_path) as base:
-        assert last_study(base) is None
+        add(base, ROW)
+        want(base, [ROW.key, None])
+        with pytest.raises(InputError, match="has made no cell yet"):
+            last_run(tmp_path)
         for study, seconds in (('{"a": 1}', 1.0), ('{"b": 1}', 10.0), ('{"a": 1}', 100.0)):
             run = note_run(base, "2026-01-01T00:00:00+00:00", "here", study)
             note_stages(base, run, {"renders": 99.0})
             note_stages(base, run, {"renders": seconds, "other": 0.5})
         note_run(base, "2026-01-01T00:00:00+00:00", "here", '{"a": 1}')  # killed before its first cell
-        assert last_study(base) == ({"a": 1}, {"renders": 101.0, "other": 1.0})
+        assert last_run(tmp_path) == LastRun({"a": 1}, {"renders": 101.0, "other": 1.0}, 2, [ROW])
         base.execute("UPDATE runs SET stages = replace(stages, '100.0', '900.0')")
         with pytest.raises(InputError, match="isn't what was written"):
-            last_study(base)
+            last_run(tmp_path)
 
 
 def test_what_is_made_anew_is_forgotten_and_what_was_not_asked_for_stays(tmp_path: Path) -> None:
