@@ -72,8 +72,8 @@ def reasons(study: Study, plan: Plan, reference: Plan) -> Iterator[str]:
     budget = study.budget
     yield (
         f"Budget: {_percent(budget.total)} of the sensor's own noise variance, {_percent(budget.monte_carlo)} of it "
-        "for Monte Carlo noise. Shares are upper estimates from a pilot render; in brackets what is modelled would cost "
-        "if it were left out."
+        "for Monte Carlo noise. Shares are upper estimates from a pilot render; in brackets, what is modelled would "
+        "cost if it were left out."
     )
     for scene, model in plan.renders.items():
         widths = sorted({round(width, 1) for width in model.width_nm})
