@@ -9,7 +9,7 @@ from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.kernel.kernel import expected_electrons_single, read_frame
-from sensor.optics import camera_equation, falloff, form_image, spreads
+from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.raw import RawImage
 from sensor.readout import read_out
 from sensor.response import electrons_per_irradiance, expected_electrons
@@ -59,21 +59,24 @@ def capture(
     UserWarning
         Where the bands don't fill the camera's window: what each channel loses.
     """
+    numpy_runs, scaled = exact or backend() == "numpy", samples_per_pixel == 1 and not spreads(sensor.lens)
+    light: SpectralRadiance | SpectralIrradiance = radiance
+    if numpy_runs or not scaled:
+        light = form_image(radiance, sensor, samples_per_pixel)
+    if light.values.shape[:2] != device.shape:
+        raise InputError(
+            f"radiance: a frame of {light.values.shape[:2]} is not the device's {device.shape}; "
+            "draw the device with the frame's shape"
+        )
     expected_e: NDArray[np.floating]
-    if exact or backend() == "numpy":
-        image = form_image(radiance, sensor, samples_per_pixel)
-        _check_frame(image.values, device)
-        expected_e = expected_electrons(image, sensor, exposure_s)
-    elif samples_per_pixel > 1 or spreads(sensor.lens):
-        image = form_image(radiance, sensor, samples_per_pixel)
-        _check_frame(image.values, device)
-        weights = electrons_per_irradiance(sensor, image.wavelength_nm, image.widths_nm, exposure_s)
-        expected_e = expected_electrons_single(image.values, weights, sensor)
-    else:  # the lens only scales: no image is formed, the bands are read once
-        _check_frame(radiance.values, device)
-        weights = electrons_per_irradiance(sensor, radiance.wavelength_nm, radiance.widths_nm, exposure_s)
-        expected_e = expected_electrons_single(radiance.values, weights * camera_equation(sensor.lens), sensor)
-        if sensor.lens.horizontal_view_deg:
+    if isinstance(light, SpectralIrradiance) and numpy_runs:
+        expected_e = expected_electrons(light, sensor, exposure_s)
+    else:
+        # A lens that only scales light forms no image: its factors go to the weights and to the electrons.
+        weights = electrons_per_irradiance(sensor, light.wavelength_nm, light.widths_nm, exposure_s)
+        weights = weights * camera_equation(sensor.lens) if scaled else weights
+        expected_e = expected_electrons_single(light.values, weights, sensor)
+        if scaled and sensor.lens.horizontal_view_deg:
             expected_e *= falloff(sensor.lens, device.shape).astype(expected_e.dtype)
     return expose(expected_e, sensor, exposure_s, device, rng, exact=exact)
 
@@ -107,11 +110,3 @@ def expose(
     if exact or backend() == "numpy":
         return read_out(expected_e, sensor, device, exposure_s, rng)
     return read_out(expected_e, sensor, device, exposure_s, rng, draw=read_frame, engine=backend())
-
-
-def _check_frame(values: NDArray[np.floating], device: Device) -> None:
-    if values.shape[:2] != device.shape:
-        raise InputError(
-            f"radiance: a frame of {values.shape[:2]} is not the device's {device.shape}; "
-            "draw the device with the frame's shape"
-        )
