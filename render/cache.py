@@ -6,6 +6,7 @@ The number of samples isn't in the key, nor are the lights' spectra and powers: 
 import hashlib
 import json
 import re
+from collections.abc import Mapping
 from dataclasses import fields
 from importlib import metadata
 from pathlib import Path
@@ -13,16 +14,17 @@ from typing import Any
 
 import numpy as np
 
+from render.combine import emission
 from render.error_estimates import SharedPaths, relative_error
-from render.level import PassMeans
+from render.level import Irradiance, PassMeans
 from render.loader import Film, integrator_name, variant
 from render.scene import Node, Scene, walk
-from render.transport import Transport, emission
+from render.transport import Transport
 from rodcone.digests import digest, digest_file
 from rodcone.files import replacing
 from rodcone.jit import compiler_version
 
-ENGINE_VERSION = 5  # raise it with any change that moves a rendered value: older entries are then not used
+ENGINE_VERSION = 6  # raise it with any change that moves a rendered value: older entries are then not used
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _ARRAYS = ("radiance", "half_difference", "variance", "coverage")
 _MEANS = tuple(field.name for field in fields(PassMeans))
@@ -35,15 +37,8 @@ def load_transport(folder: Path, scene: Scene, film: Film, seed: int) -> Transpo
 
     The digest tells damage by accident. Whoever writes to the folder on purpose is believed.
     """
-    try:
-        with _path(folder, scene, film, seed).open("rb") as file:
-            stated = file.read(_DIGEST_BYTES)
-            if hashlib.file_digest(file, "sha256").digest() != stated:
-                return None
-            file.seek(_DIGEST_BYTES)
-            with np.load(file) as entry:
-                arrays = dict(entry)
-    except OSError:
+    arrays = _read(_path(folder, scene, film, seed))
+    if arrays is None:
         return None
     values, lights = json.loads(str(arrays["values"])), emission(scene.groups, film.wavelength_nm, film.width_nm)
     shared = SharedPaths(tuple(values["shared"]), arrays["correlation"]) if values["shared"] else None
@@ -51,7 +46,7 @@ def load_transport(folder: Path, scene: Scene, film: Film, seed: int) -> Transpo
         **{name: arrays[name] for name in _ARRAYS},
         **{name: values[name] for name in _VALUES},
         seen=tuple(arrays[f"seen_{index}"] for index in range(len(scene.groups))),
-        pass_means=PassMeans(**{name: arrays.get(f"pass_{name}") for name in _MEANS}),  # type: ignore[arg-type]
+        pass_means=PassMeans(**{name: arrays[f"pass_{name}"] for name in _MEANS}),
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,
         width_nm=film.width_nm,
@@ -62,26 +57,56 @@ def load_transport(folder: Path, scene: Scene, film: Film, seed: int) -> Transpo
 
 def save_transport(folder: Path, scene: Scene, film: Film, seed: int, transport: Transport) -> None:
     """Store a transport; readers see the whole file or none."""
-    folder.mkdir(parents=True, exist_ok=True)
     shared = transport.shared
     arrays: dict[str, Any] = {name: np.ascontiguousarray(getattr(transport, name)) for name in _ARRAYS}
     arrays |= {f"seen_{index}": planes for index, planes in enumerate(transport.seen)}
-    arrays |= {f"pass_{name}": x for name, x in vars(transport.pass_means).items() if x is not None}
+    arrays |= {f"pass_{name}": x for name, x in vars(transport.pass_means).items()}
     arrays |= {"correlation": shared.correlation} if shared else {}
     values = {name: getattr(transport, name) for name in _VALUES} | {"shared": shared.groups if shared else None}
-    with replacing(_path(folder, scene, film, seed)) as (place,), place.open("w+b") as file:
+    _write(_path(folder, scene, film, seed), arrays | {"values": np.array(json.dumps(values))})
+
+
+def load_irradiance(folder: Path, scene: Scene, film: Film, seed: int) -> Irradiance | None:
+    """Stored irradiance of the reference plane, or None where there is no intact file."""
+    arrays = _read(_path(folder, scene, film, seed, "meter"))
+    return None if arrays is None else Irradiance(**arrays)
+
+
+def save_irradiance(folder: Path, scene: Scene, film: Film, seed: int, irradiance: Irradiance) -> None:
+    """Store an irradiance beside the renders."""
+    _write(_path(folder, scene, film, seed, "meter"), vars(irradiance))
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    """Arrays of a file, None where it is missing or isn't what was written."""
+    try:
+        with path.open("rb") as file:
+            stated = file.read(_DIGEST_BYTES)
+            if hashlib.file_digest(file, "sha256").digest() != stated:
+                return None
+            file.seek(_DIGEST_BYTES)
+            with np.load(file) as entry:
+                return dict(entry)
+    except OSError:
+        return None
+
+
+def _write(path: Path, arrays: Mapping[str, Any]) -> None:
+    """Write arrays behind their digest; readers see the whole file or none."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as (place,), place.open("w+b") as file:
         file.write(bytes(_DIGEST_BYTES))
-        np.savez(file, values=np.array(json.dumps(values)), **arrays)
+        np.savez(file, **arrays)
         file.seek(_DIGEST_BYTES)
         content = hashlib.file_digest(file, "sha256").digest()
         file.seek(0)
         file.write(content)
 
 
-def _path(folder: Path, scene: Scene, film: Film, seed: int) -> Path:
+def _path(folder: Path, scene: Scene, film: Film, seed: int, kind: str = "render") -> Path:
     key = digest(
         [
-            *(ENGINE_VERSION, integrator_name(), variant(), compiler_version()),
+            *(ENGINE_VERSION, kind, integrator_name(), variant(), compiler_version()),
             *map(metadata.version, ("mitsuba", "drjit")),
             *(scene.name, scene.geometry, scene.reference_plane, file_digests(scene.geometry)),
             [[name, group.emitters, group.coloured] for name, group in scene.groups.items()],

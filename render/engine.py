@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from render.cache import load_transport, save_transport
+from render.combine import emission
 from render.error_estimates import relative_error
+from render.level import Irradiance
 from render.limits import Limits
 from render.loader import Film, integrator_name, load_groups, samples_drawn, variant
+from render.meter import Meter
 from render.passes import add_pass, let_go, no_passes, sums_of
 from render.scene import Scene
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
-from render.transport import Transport, emission
+from render.transport import Transport
 from rodcone.errors import InputError, require_whole
 
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
@@ -93,12 +97,17 @@ def render(
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
     limits = Limits(spp=spp, max_spp=max_spp, noise=noise, max_seconds=max_seconds, seed=seed)
+    meter: Callable[[], Irradiance] | None = None
+    if scene.reference_plane:
+        meter = Meter(scene, film, seed, None if cache is None else Path(cache))
     earlier = _checked_earlier(resume, scene, film)
     if cache is not None:
         found = load_transport(Path(cache), scene, film, seed)
         earlier = max((x for x in (earlier, found) if x), key=lambda x: x.spp, default=None)
-    if earlier is not None and limits.met_by(earlier):
-        return earlier
+    if earlier is not None:
+        meter = earlier.meter or meter  # it may have measured already
+        if limits.met_by(earlier):
+            return replace(earlier, meter=meter)
     try:
         transport = _render(scene, film, limits, earlier, progress or (lambda done, error: None))
     except InputError as error:
@@ -106,7 +115,7 @@ def render(
         raise
     if cache is not None:
         save_transport(Path(cache), scene, film, seed, transport)
-    return transport
+    return replace(transport, meter=meter)
 
 
 def _checked_film(

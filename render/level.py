@@ -23,7 +23,7 @@ class Level:
     value : float
         Mean luminance [cd m^-2], or illuminance [lux].
     relative_error : float or None
-        Monte Carlo standard error over the value; None with fewer than two passes.
+        Monte Carlo standard error over the value; None where it isn't known.
     """
 
     value: float
@@ -42,14 +42,11 @@ class PassMeans:
         Part of the picture in which no light is seen directly.
     radiance : (pass, group, band) float64
         Mean over the picture, without the light that is seen directly.
-    irradiance : (pass, group, band) float64 or None
-        Mean on the reference plane.
     """
 
     spp: NDArray[np.int64]
     uncovered: Floats
     radiance: Floats
-    irradiance: Floats | None
 
     def mean_radiance(self) -> Floats:
         """Mean radiance of what is no light, shape (group, band).
@@ -66,18 +63,6 @@ class PassMeans:
             )
         return np.average(self.radiance, axis=0, weights=self.spp) / uncovered
 
-    def mean_irradiance(self) -> Floats:
-        """Irradiance on the reference plane, shape (group, band).
-
-        Raises
-        ------
-        InputError
-            Where the scene states no plane.
-        """
-        if self.irradiance is None:
-            raise InputError("illuminance_lux: the scene states no reference plane; give luminance_cd_m2 instead")
-        return np.average(self.irradiance, axis=0, weights=self.spp)
-
     def luminance_level(self, weights: Floats) -> Level:
         """Mean luminance of what is no light.
 
@@ -87,19 +72,32 @@ class PassMeans:
             Luminance of a radiance of 1 times the emission.
         """
         value = float((weights * self.mean_radiance()).sum())
-        return Level(value, self._relative_error(self.radiance, self.uncovered, weights, value))
-
-    def illuminance_level(self, weights: Floats) -> Level:
-        """Illuminance on the reference plane; `weights` as of `luminance_level`."""
-        value = float((weights * self.mean_irradiance()).sum())
-        assert self.irradiance is not None
-        return Level(value, self._relative_error(self.irradiance, np.ones(self.spp.size), weights, value))
-
-    def _relative_error(self, per_pass: Floats, area: Floats, weights: Floats, value: float) -> float | None:
-        """Standard error of a ratio of sums over passes (linearised; Cochran, "Sampling Techniques", 2.11)."""
         if self.spp.size < 2 or value <= 0:
-            return None
+            return Level(value, None)
+        # Standard error of a ratio of sums over passes (linearised; Cochran, "Sampling Techniques", 2.11).
         share = self.spp / self.spp.sum()
-        off = (per_pass * weights).sum(axis=(1, 2)) - value * area
+        off = (self.radiance * weights).sum(axis=(1, 2)) - value * self.uncovered
         variance = float(share @ off**2) / (self.spp.size - 1)
-        return float(np.sqrt(variance)) / float(share @ area) / value
+        return Level(value, float(np.sqrt(variance)) / float(share @ self.uncovered) / value)
+
+
+@dataclass(frozen=True)
+class Irradiance:
+    """Irradiance on the reference plane at unit spectral emission.
+
+    Attributes
+    ----------
+    mean : (group, band) float64
+    covariance : (group x band, group x band) float64
+        Of the means' Monte Carlo errors.
+    """
+
+    mean: Floats
+    covariance: Floats
+
+    def level(self, weights: Floats) -> Level:
+        """Illuminance; `weights` as of `PassMeans.luminance_level`."""
+        value, flat = float((weights * self.mean).sum()), weights.ravel()
+        if value <= 0:
+            return Level(value, None)
+        return Level(value, float(np.sqrt(flat @ self.covariance @ flat)) / value)

@@ -124,21 +124,24 @@ def integrator_name() -> str:
     return "path + specfilm" if backend() == "numpy" else "dense path (all bands along each path)"
 
 
-def load_groups(scene: Scene, film: Film) -> list[Loaded]:
-    """Load what is rendered one after the other: each light group, and a constant environment along with the first."""
+def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Loaded]:
+    """Load what is rendered one after the other: each light group, and a constant environment along with the first.
+
+    With `metered` the reference plane carries an irradiance meter.
+    """
     names = list(scene.groups)
     carried = [] if backend() == "numpy" or len(names) == 1 else [x for x in names if scene.is_environment(x)][:1]
-    loaded = [_load_group(scene, name, film) for name in names if name not in carried]
+    loaded = [_load_group(scene, name, film, metered) for name in names if name not in carried]
     if carried:
         loaded[0] = replace(loaded[0], groups=(*loaded[0].groups, names.index(carried[0])))
     return loaded
 
 
-def _load_group(scene: Scene, group: str, film: Film) -> Loaded:
+def _load_group(scene: Scene, group: str, film: Film, metered: bool) -> Loaded:
     """Load a scene with one light group at unit spectral emission (or its own colours)."""
     description = scene.lit({group: uniform_node(1.0)})
     description["sensor"] = {**description["sensor"], "film": _recorder(film, film.size), "sampler": _SAMPLER}
-    if scene.reference_plane:
+    if metered and scene.reference_plane:
         if backend() == "numpy":
             scene.check_meter()
         recorder = _recorder(film, (METER_PIXELS, METER_PIXELS))

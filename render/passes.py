@@ -16,9 +16,6 @@ from rodcone.errors import InputError, one_line
 from rodcone.jit import backend
 from rodcone.types import Floats, Planes
 
-METER_BANDS = 4  # traced together by the irradiance meter: its film is small, and its kernel another one to compile
-METER_SPP = 16  # most samples a pixel and pass of its 64x64 film: 65 536 paths a pass for one number a band
-
 
 @dataclass
 class PassSums:
@@ -26,7 +23,7 @@ class PassSums:
 
     `mean`, `scatter` and `signed` have the shape (group, band, h, w). `seen` and `coverage` are as of `Transport`,
     times the samples. `product` (band, h, w) is the scatter's counterpart of two groups that `share` their paths.
-    `spp`, `uncovered`, `radiance` and `irradiance` hold a value a pass, as `PassMeans`.
+    `spp`, `uncovered` and `radiance` hold a value a pass, as `PassMeans`.
     """
 
     mean: Planes
@@ -39,7 +36,6 @@ class PassSums:
     spp: list[int] = field(default_factory=list)
     uncovered: list[float] = field(default_factory=list)
     radiance: list[Floats] = field(default_factory=list)
-    irradiance: list[Floats] = field(default_factory=list)
 
     @property
     def passes(self) -> int:
@@ -68,12 +64,7 @@ class PassSums:
 
     def pass_means(self) -> PassMeans:
         """Means over each pass, from which levels are computed."""
-        return PassMeans(
-            spp=np.array(self.spp),
-            uncovered=np.array(self.uncovered),
-            radiance=np.array(self.radiance),
-            irradiance=np.array(self.irradiance) if self.irradiance else None,
-        )
+        return PassMeans(spp=np.array(self.spp), uncovered=np.array(self.uncovered), radiance=np.array(self.radiance))
 
 
 def no_passes(scene: Scene, film: Film) -> PassSums:
@@ -96,7 +87,6 @@ def sums_of(transport: Transport) -> PassSums:
         spp=means.spp.tolist(),
         uncovered=means.uncovered.tolist(),
         radiance=list(means.radiance),
-        irradiance=[] if means.irradiance is None else list(means.irradiance),
     )
     if shared := transport.shared:
         one, other = (np.sqrt(sums.scatter[group]) for group in shared.groups)
@@ -108,7 +98,7 @@ def add_pass(light_groups: list[Loaded], sums: PassSums, film: Film, pass_spp: i
     """Render every group once more, with a seed of its own, and add it to the sums."""
     groups, bands = sums.mean.shape[:2]
     index, covered = sums.passes, 0.0
-    radiance, irradiance = np.zeros((groups, bands)), np.zeros((groups, bands))
+    radiance = np.zeros((groups, bands))
     sums.spp.append(pass_spp)
     for loaded in light_groups:
         of_pass = int(np.random.SeedSequence([seed, loaded.groups[0], index]).generate_state(1)[0])
@@ -120,12 +110,8 @@ def add_pass(light_groups: list[Loaded], sums: PassSums, film: Film, pass_spp: i
             if part[0] == 0:  # every part of the bands sees the same paths
                 sums.coverage += np.float32(pass_spp) * coverage
                 covered += float(coverage.mean(dtype=np.float64))
-        if loaded.meter is not None:
-            irradiance[list(loaded.groups)] = _irradiance(loaded, film, min(pass_spp, METER_SPP), of_pass)
     sums.uncovered.append(1 - covered)
     sums.radiance.append(radiance)
-    if any(loaded.meter is not None for loaded in light_groups):
-        sums.irradiance.append(irradiance)
 
 
 def _add(sums: PassSums, groups: tuple[int, ...], bands: slice, scattered: Planes, seen: tuple[Planes, ...]) -> None:
@@ -164,30 +150,20 @@ def _camera_part(
         Share of the samples that meet a light first.
     """
     count = len(loaded.groups)
-    image = _rendered(loaded.mi_scene, loaded.camera, integrator, spp, seed)
-    scattered, others = _bands(image, count, width_nm)
+    image = rendered(loaded.mi_scene, loaded.camera, integrator, spp, seed)
+    scattered, others = band_planes(image, count, width_nm)
     shares, of_light = others[:count], others[count : count + width_nm.size]
     if loaded.covering is not None:  # without Dr.Jit renders of their own show the lights
         seen_directly = mitsuba_module().load_dict({"type": "path", "max_depth": 1})
-        image = _rendered(loaded.covering, loaded.covering.sensors()[0], seen_directly, spp, seed)
-        shares = _bands(image, 1, width_nm[:1])[0][0]
+        image = rendered(loaded.covering, loaded.covering.sensors()[0], seen_directly, spp, seed)
+        shares = band_planes(image, 1, width_nm[:1])[0][0]
         if loaded.coloured:
-            image = _rendered(loaded.mi_scene, loaded.camera, seen_directly, spp, seed)
-            of_light = _bands(image, 1, width_nm)[0][0]
+            image = rendered(loaded.mi_scene, loaded.camera, seen_directly, spp, seed)
+            of_light = band_planes(image, 1, width_nm)[0][0]
     return scattered, (of_light if loaded.coloured else shares[:1], *shares[1:, None]), shares.sum(axis=0)
 
 
-def _irradiance(loaded: Loaded, film: Film, spp: int, seed: int) -> Floats:
-    """Irradiance on the reference plane, shape (group, band); summed in float64, so that threads don't change it."""
-    means = []
-    for part, integrator in integrators(film, METER_BANDS, loaded, seed, meter=True):
-        image = _rendered(loaded.mi_scene, loaded.meter, integrator, spp, seed)
-        means.append(_bands(image, len(loaded.groups), film.width_nm[part])[0].mean(axis=(2, 3), dtype=np.float64))
-    # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
-    return np.concatenate(means, axis=1) * (1 if backend() == "numpy" else np.pi)
-
-
-def _bands(image: Planes, groups: int, width_nm: Floats) -> tuple[Planes, Planes]:
+def band_planes(image: Planes, groups: int, width_nm: Floats) -> tuple[Planes, Planes]:
     """Band averages (group, band, h, w) of a rendered part, and the channels after them."""
     size = width_nm.size
     if backend() == "numpy":  # specfilm integrates over the band
@@ -203,7 +179,7 @@ def _bands(image: Planes, groups: int, width_nm: Floats) -> tuple[Planes, Planes
     return bands.reshape(groups, filled, *image.shape[1:])[:, :size], others
 
 
-def _rendered(mi_scene: Any, sensor: Any, integrator: Any, spp: int, seed: int) -> Planes:
+def rendered(mi_scene: Any, sensor: Any, integrator: Any, spp: int, seed: int) -> Planes:
     """Channels of a picture, shape (channel, h, w)."""
     try:
         image = mitsuba_module().render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)

@@ -1,22 +1,22 @@
 """Light transport of a scene, rendered once; any spectrum, power and level of its lights afterwards."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from render.combine import combine, emission
 from render.error_estimates import SharedPaths, relative_error, within_band_error
 from render.illuminants import illuminant
-from render.level import Level, PassMeans
+from render.level import Irradiance, Level, PassMeans
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.scene_range import warn_of_dark_ends
 from render.spectrum import Spectrum
 from rodcone.errors import InputError, require_keys, require_range
-from rodcone.jit import arrays, backend, dr
 from rodcone.notebook import html_of
 from rodcone.types import Floats, Planes
 
@@ -55,6 +55,8 @@ class Transport:
         Error reached under the scene's own lights: median over pixels and bands of standard error over mean.
     shared : SharedPaths or None
         Two groups whose errors are correlated, since a constant environment is rendered along with another group.
+    meter : callable or None
+        Gives the irradiance on the scene's reference plane, traced at its first call; None without a plane.
     """
 
     radiance: Planes
@@ -74,11 +76,12 @@ class Transport:
     variant: str
     relative_mc_error: float = 0.0
     shared: SharedPaths | None = None
+    meter: Callable[[], Irradiance] | None = None
 
     @property
     def irradiance(self) -> Floats | None:
         """On the scene's reference plane at unit spectral emission, shape (group, band); None without a plane."""
-        return None if self.pass_means.irradiance is None else self.pass_means.mean_irradiance()
+        return None if self.meter is None else self.meter().mean
 
     def relight(
         self,
@@ -99,7 +102,7 @@ class Transport:
         luminance_cd_m2 : float, optional
             Mean luminance to reach of what is no light (`level`); all groups are scaled together.
         illuminance_lux : float, optional
-            Illuminance to reach on the scene's reference plane; the same.
+            Illuminance to reach on the scene's reference plane; the same. The first call that asks for it traces it.
 
         Returns
         -------
@@ -121,7 +124,7 @@ class Transport:
         emitted = self._emission(spectra, powers)
         coefficients, level_error = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         return SpectralRadiance(
-            values=np.moveaxis(_combine(coefficients, self.radiance), 0, -1),
+            values=np.moveaxis(combine(coefficients, self.radiance), 0, -1),
             wavelength_nm=self.wavelength_nm,
             relative_mc_error=relative_error(coefficients, self.radiance, self.variance, shared=self.shared),
             width_nm=self.width_nm,
@@ -144,7 +147,7 @@ class Transport:
         """
         emitted = self._emission(spectra, powers)
         coefficients, _ = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
-        values, difference = _combine(coefficients, self.radiance), _combine(coefficients, self.half_difference)
+        values, difference = combine(coefficients, self.radiance), combine(coefficients, self.half_difference)
         even, odd = (
             SpectralRadiance(np.moveaxis(half, 0, -1), self.wavelength_nm, width_nm=self.width_nm, signed=True)
             for half in (values + difference, values - difference)
@@ -154,7 +157,7 @@ class Transport:
     def relight_variance(self, *, luminance_cd_m2: float) -> Planes:
         """Monte Carlo variance of `relight` at a level of the scene's own lights, shape (band, h, w)."""
         coefficients = self._own_at(luminance_cd_m2)
-        independent = _combine(coefficients**2, self.variance)
+        independent = combine(coefficients**2, self.variance)
         if self.shared is None:
             return independent
         return np.asarray(np.maximum(independent + self.shared.term(coefficients, self.variance), np.float32(0)))
@@ -186,9 +189,9 @@ class Transport:
 
     def illuminance_lux(self, luminance_cd_m2: float) -> float | None:
         """Illuminance on the reference plane at a mean luminance under the scene's own lights; None without a plane."""
-        if self.pass_means.irradiance is None:
+        if self.meter is None:
             return None
-        return self.pass_means.illuminance_level(self._luminance_weights(self._own_at(luminance_cd_m2))).value
+        return self.meter().level(self._luminance_weights(self._own_at(luminance_cd_m2))).value
 
     def mean_radiance(self, *, luminance_cd_m2: float) -> Floats:
         """Mean radiance of what is no light, at a level of the scene's own lights, shape (band,)."""
@@ -261,7 +264,9 @@ class Transport:
             asked, present = luminance_cd_m2, self.pass_means.luminance_level(weights)
         elif illuminance_lux is not None:
             require_range("illuminance_lux", illuminance_lux, 0.0, 1e15, "give an illuminance of 0 or more")
-            asked, present = illuminance_lux, self.pass_means.illuminance_level(weights)
+            if self.meter is None:
+                raise InputError("illuminance_lux: the scene states no reference plane; give luminance_cd_m2 instead")
+            asked, present = illuminance_lux, self.meter().level(weights)
         else:
             return emitted, None
         if present.value <= 0:
@@ -271,30 +276,3 @@ class Transport:
     def _luminance_weights(self, emitted: Floats) -> Floats:
         """Luminance of a transport of 1 in each group and band, shape (group, band)."""
         return emitted * luminance(np.eye(self.wavelength_nm.size), self.wavelength_nm, self.width_nm)
-
-
-def emission(lights: Mapping[str, LightGroup], wavelength_nm: Floats, width_nm: Floats) -> Floats:
-    """Spectral emission of each group, band averages, shape (group, band)."""
-    return np.array([x.spectrum.band_average(wavelength_nm, width_nm) * x.power for x in lights.values()])
-
-
-def _combine(coefficients: Floats, planes: Planes) -> Planes:
-    """Sum over groups, shape (band, h, w): in float64, rounded once; every value is read once."""
-    groups, bands, height, width = planes.shape
-    pixels = height * width
-    flat = planes.reshape(groups, bands, pixels)
-    if backend() == "numpy":
-        result = np.empty((bands, pixels), dtype=np.float32)
-        for band in range(bands):
-            result[band] = coefficients[:, band] @ flat[:, band].astype(np.float64)
-        return result.reshape(bands, height, width)
-    types = arrays()
-    sums, index = dr.empty(types.Float, bands * pixels), dr.arange(types.UInt, pixels)
-    for band in range(bands):  # a kernel each, all of one code; arrays of the host are read where they are
-        total = types.Float64(0)
-        for group in range(groups):
-            factor = dr.opaque(types.Float64, float(coefficients[group, band]))
-            total = dr.fma(types.Float64(types.Float(flat[group, band])), factor, total)
-        dr.scatter(sums, types.Float(total), index + dr.opaque(types.UInt, band * pixels), mode=dr.ReduceMode.Permute)
-        dr.eval(sums)
-    return np.asarray(sums.numpy()).reshape(bands, height, width)

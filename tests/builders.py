@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from render.level import PassMeans
+from render.level import Irradiance, PassMeans
 from render.scene import LightGroup
 from render.transport import Transport
 from sensor.cfa import BAYER, RGBW, Tile
@@ -52,8 +52,8 @@ def transport_of(
         spp=np.full(8, 8),
         uncovered=np.full(8, 1 - seen.sum(axis=0).mean(dtype=np.float64)),
         radiance=np.repeat(scattered[None], 8, axis=0),
-        irradiance=None if irradiance is None else np.repeat(irradiance[None], 8, axis=0),
     )
+    measured = None if irradiance is None else Irradiance(irradiance, np.zeros((irradiance.size,) * 2))
     facts = {"stopped_by": "samples", "seconds": 1.0, "integrator": "none", "variant": "none", "spp": 64, "passes": 8}
     errors = {name: np.zeros((given, bands, *size), np.float32) for name in ("half_difference", "variance")}
     return Transport(
@@ -65,6 +65,7 @@ def transport_of(
             "groups": dict(groups),
             "wavelength_nm": np.asarray(wavelength_nm, np.float64),
             "width_nm": np.asarray(width_nm, np.float64),
+            "meter": None if measured is None else lambda: measured,
             **errors,
             **facts,
             **changes,

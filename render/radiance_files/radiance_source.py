@@ -62,10 +62,7 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
         coverage=np.zeros(radiance.shape, np.float32),
         seen=(np.zeros((1, *radiance.shape), np.float32),),
         pass_means=PassMeans(
-            spp=np.ones(1, np.int64),
-            uncovered=np.ones(1),
-            radiance=planes.mean(axis=(2, 3), dtype=np.float64)[None],
-            irradiance=None,
+            spp=np.ones(1, np.int64), uncovered=np.ones(1), radiance=planes.mean(axis=(2, 3), dtype=np.float64)[None]
         ),
         groups={name: LightGroup((), whole)},
         wavelength_nm=nm,

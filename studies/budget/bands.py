@@ -59,7 +59,8 @@ def wide_bands(nm: Floats, width_nm: Floats, groups: Sequence[NDArray[np.intp]])
 def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) -> Transport:
     """Transport in wide bands, of the same paths.
 
-    The variance is that of bands which rise and fall together: the most that it can be.
+    The variance is that of bands which rise and fall together: the most that it can be. The irradiance meter, whose
+    bands are the fine ones, is left out.
     """
     nm, width_nm = wide_bands(transport.wavelength_nm, transport.width_nm, groups)
     matrix, means = _means(transport.width_nm, groups), transport.pass_means
@@ -69,11 +70,8 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
         half_difference=_merge(matrix, transport.half_difference),
         variance=_merge(matrix, np.sqrt(np.maximum(transport.variance, 0.0))) ** 2,
         seen=tuple(planes if len(planes) == 1 else _merge(matrix, planes[None])[0] for planes in transport.seen),
-        pass_means=replace(
-            means,
-            radiance=means.radiance @ matrix.T,
-            irradiance=None if means.irradiance is None else means.irradiance @ matrix.T,
-        ),
+        pass_means=replace(means, radiance=means.radiance @ matrix.T),
+        meter=None,
         wavelength_nm=nm,
         width_nm=width_nm,
         shared=transport.shared

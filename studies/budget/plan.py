@@ -18,7 +18,7 @@ from studies.budget.choice import choose
 from studies.budget.ledger import KERNEL, PilotNoise, Weighed, ledger, weigh
 from studies.budget.model_plan import Plan
 from studies.budget.terms import LENS_TERMS, effects, horizontal_view_deg
-from studies.study.lit_scene import OpenedScene, level_luminance, open_all, under, white_spectrum
+from studies.study.lit_scene import OpenedScene, level_luminance, lux_per_cd_m2, open_all, under, white_spectrum
 from studies.study.model import ImageModel, RenderModel, unit_exposure_s
 from studies.study.radiance_file import open_radiance_file
 from studies.study.study import OWN, Study, conditions, mosaics, parse_exposure
@@ -150,7 +150,7 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
     rng = np.random.default_rng([study.render.seed, PILOT_SEED])
     for spectrum in study.spectra:
         lit = under(pilot.transport, spectrum)
-        lux = lit.illuminance_lux(1.0)
+        lux = lux_per_cd_m2(lit, study.levels)
         noise = _pilot_noise(pilot, lit)
         for name in study.sensors:
             auto_s = unit_exposure_s(lit.relight(luminance_cd_m2=1.0), preset(name))

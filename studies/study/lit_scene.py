@@ -1,6 +1,6 @@
 """A study's scene: opened, rendered once, and lit by the spectra that the study asks for."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -209,6 +209,16 @@ def white_spectrum(opened: OpenedScene, spectrum: str) -> Spectrum:
         return illuminant(opened.choice.light or LIGHT)
     first = next(iter(opened.scene.groups.values()))
     return illuminant(LIGHT) if first.coloured else first.spectrum
+
+
+def lux_per_cd_m2(lit: Transport, levels: Sequence[str]) -> float | None:
+    """Illuminance of the reference plane at 1 cd/m^2; None without a plane, and where no level is in lux."""
+    return lit.illuminance_lux(1.0) if in_lux(levels) else None
+
+
+def in_lux(levels: Sequence[str]) -> bool:
+    """Whether a level is in lux: the illuminance is then traced, which takes its time."""
+    return any(parse_level(level)[1] == "lux" for level in levels)
 
 
 def level_luminance(level: str, lux_per_cd_m2: float | None) -> float:

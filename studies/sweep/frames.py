@@ -5,7 +5,7 @@ cell reads one (h, w) array from its path, whatever the number of bands, and no 
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -24,7 +24,7 @@ from sensor.optics import form_image
 from sensor.response import expected_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
-from studies.study.lit_scene import OpenedScene
+from studies.study.lit_scene import OpenedScene, in_lux, lux_per_cd_m2
 from studies.study.model import unit_exposure_s
 from studies.sweep.provenance import versions
 from studies.sweep.stored import is_whole, keep
@@ -44,7 +44,7 @@ class UnitFrame:
     white_cd_m2 : float
         Luminance shown as white.
     lux_per_cd_m2 : float or None
-        Illuminance of the reference plane; None without one.
+        Illuminance of the reference plane; None without one, and where no level is in lux.
     auto_s : float
         Auto exposure there, without a longest time [s].
     truth : Path
@@ -67,12 +67,14 @@ class UnitFrame:
     half_difference: Path
 
 
-def frame_key(render: str, opened: OpenedScene, spectrum: str, preset: SensorConfig, sensor: SensorConfig) -> str:
+def frame_key(
+    render: str, opened: OpenedScene, spectrum: str, levels: Sequence[str], preset: SensorConfig, sensor: SensorConfig
+) -> str:
     """Key of a frame: the render's content, the scene's own lights, the spectrum, and what computes it.
 
-    The preset sets the exposure; the sensor is as it is modelled.
+    The preset sets the exposure; the sensor is as it is modelled. Of the levels it counts whether one is in lux.
     """
-    return digest([render, opened.identity, spectrum, versions(), preset, sensor])
+    return digest([render, opened.identity, spectrum, in_lux(levels), versions(), preset, sensor])
 
 
 def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None:
@@ -92,7 +94,11 @@ def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None
 
 
 def make_frames(
-    folder: Path, transport: Transport, light: Light, wanted: Mapping[str, tuple[SensorConfig, SensorConfig]]
+    folder: Path,
+    transport: Transport,
+    light: Light,
+    wanted: Mapping[str, tuple[SensorConfig, SensorConfig]],
+    levels: Sequence[str],
 ) -> None:
     """Make and keep the frames of one lit scene.
 
@@ -104,13 +110,15 @@ def make_frames(
         That the cameras' colours are set to.
     wanted : mapping of str to (SensorConfig, SensorConfig)
         By key: the preset, whose auto exposure it is whatever mosaic and lens it gets, and the sensor as modelled.
+    levels : sequence of str
+        Of the study.
     """
     views = (transport.relight(luminance_cd_m2=1.0), *transport.relight_halves(luminance_cd_m2=1.0))
     white = shown_white_cd_m2(transport, 1.0)
     scene = {
         "light": {name: value.tolist() for name, value in vars(light).items()},
         "white_cd_m2": white,
-        "lux_per_cd_m2": transport.illuminance_lux(1.0),
+        "lux_per_cd_m2": lux_per_cd_m2(transport, levels),
         "truth": keep(folder, _npy(true_srgb(views[0], light, white)), ".npy"),
     }
     for key, (preset, sensor) in wanted.items():

@@ -20,7 +20,15 @@ from studies.budget.budget import render_share
 from studies.budget.model_plan import Plan
 from studies.metrics.truth import light_in_bands
 from studies.photograph.clock import Clock
-from studies.study.lit_scene import OpenedScene, level_luminance, make_transport, render_facts, under, white_spectrum
+from studies.study.lit_scene import (
+    OpenedScene,
+    level_luminance,
+    lux_per_cd_m2,
+    make_transport,
+    render_facts,
+    under,
+    white_spectrum,
+)
 from studies.study.study import Condition, Study, conditions, mosaics, parse_exposure
 from studies.sweep.cells import Cell, RenderRecord, cell_key
 from studies.sweep.database import note_render, render_record
@@ -93,7 +101,7 @@ def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> flo
     study, shares = job.study, []
     for (spectrum, *_), (_, sensor) in _imaged(job, opened).items():
         lit = under(transport, spectrum)
-        lux = lit.illuminance_lux(1.0)
+        lux = lux_per_cd_m2(lit, study.levels)
         brightest = max(level_luminance(level, lux) for level in study.levels)
         shares += [
             render_share(lit, sensor, brightest, study.longest_exposure_s, parse_exposure(exposure))
@@ -123,21 +131,21 @@ def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: 
     folder.mkdir(parents=True, exist_ok=True)
     for spectrum in job.study.spectra:
         keyed = {
-            frame_key(record.content, opened, spectrum, *sensors): sensors
+            frame_key(record.content, opened, spectrum, job.study.levels, *sensors): sensors
             for (under_spectrum, *_), sensors in _imaged(job, opened).items()
             if under_spectrum == spectrum
         }
         wanted = {key: sensors for key, sensors in keyed.items() if read_frame(folder, key, sensors[1]) is None}
         if wanted:
             light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
-            make_frames(folder, under(transport, spectrum), light, wanted)
+            make_frames(folder, under(transport, spectrum), light, wanted, job.study.levels)
 
 
 def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | None:
     """Cells of a scene whose files stand; None where one is missing."""
     frames, colours = dict[Imaged, UnitFrame](), dict[tuple[Imaged, str], ColourFit]()
     for imaged, sensors in _imaged(job, opened).items():
-        key = frame_key(record.content, opened, imaged[0], *sensors)
+        key = frame_key(record.content, opened, imaged[0], job.study.levels, *sensors)
         frame = read_frame(job.out / FRAMES, key, sensors[1])
         if frame is None:
             return None

@@ -312,8 +312,8 @@ LIGHT = (
     _fault(
         "variance scales as the light",
         "render/transport.py",
-        "_combine(coefficients**2, self.variance)",
-        "_combine(coefficients, self.variance)",
+        "combine(coefficients**2, self.variance)",
+        "combine(coefficients, self.variance)",
         "render/test_transport",
         "render/test_error_estimates",
     ),

@@ -21,8 +21,8 @@ from isp.interleaved import reconstruct
 from isp.planes import fill
 from isp.reference import sum_weights
 from isp.settings import SIGMA_S, Settings
+from render.combine import emission
 from render.spectrum import band_widths
-from render.transport import emission
 from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import RGBW, channel_map, channels
 from sensor.config import LensConfig, SensorConfig

@@ -4,11 +4,14 @@ Each light is at unit emission, as the engine renders it. Random ones are compar
 test may fail at most `FALSE_ALARM` of the time, over all its comparisons; seeds are fixed.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 from scipy.stats import t as student
 
+from render import meter
 from render.engine import render
 from render.geometry import look_at, to_world
 from render.scene import LightGroup, Scene
@@ -24,17 +27,21 @@ pytestmark = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA he
 FALSE_ALARM = 1e-5
 BANDS_NM = np.arange(430.0, 780.0, 100.0)  # four bands fill 380-780 nm
 SIDE_M = 0.5
-PATHS = 64 * 64 * 16  # of 16 samples a pixel of the meter
+PATHS = 64 * 64 * 2 * 16  # however many samples the picture has
 
 
-def metered(lights, seed=0, spp=16, **more):
-    """Irradiance on a square plate that faces up, shape (band,), under lights at unit emission."""
+def metered_scene(lights, **more):
+    """Square plate that faces up, under lights at unit emission."""
     camera = {"type": "perspective", "fov": 20.0, "to_world": to_world(look_at((0, 2, 2), (0, 0, 0)))}
     plate = panel(floor(0, 0, 0), SIDE_M, SIDE_M, matte(grey(0.5)))
     paths = tuple(f"{name}/emitter" if "emitter" in node else name for name, node in lights.items())
     geometry = {"type": "scene", "sensor": camera, "plate": plate, **lights, **more}
-    scene = Scene("meter", geometry, {"lights": LightGroup(paths, flat())}, reference_plane="plate")
-    return render(scene, (1, 1), wavelength_nm=BANDS_NM, spp=spp, seed=seed).irradiance[0]
+    return Scene("meter", geometry, {"lights": LightGroup(paths, flat())}, reference_plane="plate")
+
+
+def metered(lights, seed=0, **more):
+    """Irradiance on the plate, shape (band,)."""
+    return render(metered_scene(lights, **more), (1, 1), wavelength_nm=BANDS_NM, spp=1, seed=seed).irradiance[0]
 
 
 def from_seeds(light, count):
@@ -55,15 +62,15 @@ def assert_is(truth, light, finest):
 @pytest.mark.parametrize("degrees", [0.0, 35.0, 60.0, 89.0])
 def test_a_beam_gives_the_cosine_of_its_angle(degrees):
     down = [np.sin(np.radians(degrees)), -np.cos(np.radians(degrees)), 0.0]
-    seen = metered({"beam": {"type": "directional", "direction": down}}, spp=2)
+    seen = metered({"beam": {"type": "directional", "direction": down}})
     assert seen == pytest.approx(np.full(4, np.cos(np.radians(degrees))), rel=1e-4 if degrees > 80 else 1e-6)
 
 
 def test_a_beam_from_behind_and_a_beam_behind_a_shade_give_nothing():
     up, down = ({"beam": {"type": "directional", "direction": [0.3, y, 0.0]}} for y in (1.0, -1.0))
-    assert not metered(up, spp=2).any()
+    assert not metered(up).any()
     shade = panel(floor(0, 0.5, 0), 2.0, 2.0, matte(grey(0.0)))
-    assert not metered(down, spp=2, shade=shade).any()
+    assert not metered(down, shade=shade).any()
 
 
 @pytest.mark.parametrize("height_m", [0.1, 3.0])
@@ -112,11 +119,11 @@ def test_a_constant_environment_gives_pi_within_the_derived_error():
     first, second = light.mean() / 4, (2 * c * cosine).mean()  # density of c over the hemisphere: 1, and 2 c
     assert first + second == pytest.approx(1.0, abs=1e-9)
     variance = (light**2).mean() / 4 - first**2 + (2 * c * cosine**2).mean() - second**2
-    error = np.sqrt(variance / (8 * PATHS))
+    error = np.sqrt(variance / PATHS)
     lamp = disk(floor(0, -1, 0), 0.1, matte(grey(0.0)), emitter={"type": "area"})
     for seen in (
-        metered({"sky": {"type": "constant"}, "lamp": lamp}, seed=3, spp=128),
-        metered({"sky": {"type": "constant"}}, seed=3, spp=128),  # may take a shorter way, of less error
+        metered({"sky": {"type": "constant"}, "lamp": lamp}, seed=3),
+        metered({"sky": {"type": "constant"}}, seed=3),  # may take a shorter way, of less error
     ):
         assert seen / np.pi == pytest.approx(np.ones(4), abs=norm.isf(FALSE_ALARM / 2 / 2) * error)
     assert error < 6e-4
@@ -135,13 +142,68 @@ def hidden_by(wall, point):
     return np.mean((y - point[1]) * far / squared**2) / np.pi * (right - left) * (top - bottom)
 
 
+def lit_plate(**options):
+    scene = load("flat_field")
+    return render(scene, (2, 3), wavelength_nm=BANDS_NM, spp=1, **options)
+
+
+@pytest.fixture
+def loads(monkeypatch):
+    """Counts how often a scene is loaded with its meter, from outside of what traces it."""
+    made = []
+    original = meter.load_groups
+    monkeypatch.setattr(meter, "load_groups", lambda *given, **how: made.append(given) or original(*given, **how))
+    return made
+
+
+def test_nothing_is_traced_before_lux_are_asked_for_and_then_once(loads):
+    made = lit_plate()
+    made.relight(luminance_cd_m2=3.0)
+    made.level()
+    assert not loads
+    made.relight(illuminance_lux=3.0)
+    made.relight(illuminance_lux=30.0)
+    replace(made, groups=dict(made.groups)).illuminance_lux(1.0)
+    assert len(loads) == 1
+    lit_plate(resume=made).illuminance_lux(1.0)
+    assert len(loads) == 1, "a result that is gone on from keeps what it measured"
+
+
+def test_a_folder_of_renders_keeps_the_irradiance(tmp_path, loads):
+    made = lit_plate(cache=tmp_path)
+    renders = set(tmp_path.iterdir())
+    first = made.irradiance
+    (kept,) = set(tmp_path.iterdir()) - renders
+    other_size = render(load("flat_field"), (5, 4), wavelength_nm=BANDS_NM, spp=2, cache=tmp_path)
+    assert np.array_equal(first, other_size.irradiance)
+    assert np.array_equal(first, lit_plate(cache=tmp_path).irradiance)
+    assert len(loads) == 1
+    kept.write_bytes(kept.read_bytes()[:-1])
+    assert np.array_equal(first, lit_plate(cache=tmp_path).irradiance)
+    assert len(loads) == 2, "a damaged file is made again"
+
+
+def test_the_error_told_is_the_scatter_over_seeds():
+    """The mean of the squared errors told, over the variance of 24 seeds: a ratio of chi-squared to its expectation."""
+    count, lights = 24, {"point": {"type": "point", "position": [0.1, 0.3, 0.0]}, "sky": {"type": "constant"}}
+    scene = metered_scene(lights)
+    levels = [
+        render(scene, (1, 1), wavelength_nm=BANDS_NM, spp=1, seed=seed).meter().level(np.full((1, 4), 0.25))
+        for seed in range(count)
+    ]
+    values = np.array([level.value for level in levels])
+    told = np.mean([(level.relative_error * level.value) ** 2 for level in levels])
+    low, high = (chi2.ppf(tail, count - 1) / (count - 1) for tail in (FALSE_ALARM / 2, 1 - FALSE_ALARM / 2))
+    assert low < values.var(ddof=1) / told < high
+
+
 @pytest.mark.slow
 def test_sun_and_sky_light_the_garden_table_as_the_scene_states():
     scene = load("still_life_outdoor")
     kept = {key: scene.geometry[key] for key in ("type", "sensor", "meter_card", "wall", "sun", "sky")}
     black = {key: kept[key] | {"bsdf": matte(grey(0.0))} for key in ("meter_card", "wall")}  # no light but from above
     scene = Scene("garden", kept | black, scene.groups, reference_plane="meter_card")
-    made = render(scene, (1, 1), wavelength_nm=BANDS_NM, spp=1024)
+    made = render(scene, (1, 1), wavelength_nm=BANDS_NM, spp=1)
     card, height, bearing = np.array([-0.22, 0.0002, 0.50]), *np.radians([41.8, 62.0])
     towards = np.array([-np.sin(bearing) * np.cos(height), np.sin(height), np.cos(bearing) * np.cos(height)])
     # The sun is aimed at the middle of the table, half a metre off: 3 per mille in distance and angle.
@@ -149,7 +211,7 @@ def test_sun_and_sky_light_the_garden_table_as_the_scene_states():
     distance = np.linalg.norm(way)
     share = (100.0 / distance) ** 2 * (way @ towards) / distance * way[1] / distance
     lux = {name: made.irradiance[i] * made.groups[name].power for i, name in enumerate(("sun", "sky"))}
-    # From seeds: the sun is sure to 1e-5 in the test above, the sky to 4e-4 over eight passes.
+    # From seeds: the sun is sure to 1e-5 in the test above, the sky to 4e-4.
     assert lux["sun"] == pytest.approx(np.full(4, still_life_outdoor.SUN_BEAM_LUX * share), rel=1e-3)
     assert share == pytest.approx(np.sin(height), rel=0.01)
     open_sky = 1 - hidden_by((-6.0, 6.0, 0.0002, 2.46, -0.52), card)

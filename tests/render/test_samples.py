@@ -14,6 +14,7 @@ from scenes.catalog import load, names
 pytestmark = pytest.mark.skipif(backend() == "numpy", reason="counts the wavefronts of Dr.Jit")
 
 SIZE = (3, 4)
+METER_PATHS = 64 * 64 * 2 * 16  # of a light group: its film, in two halves of 16 samples
 BANDS = {"wavelength_nm": [450.0, 550.0, 650.0], "width_nm": 100.0}
 
 
@@ -40,7 +41,9 @@ def test_every_scene_tells_the_samples_it_drew(name, plane, paths):
     assert drawn(paths, units) == made.spp == made.pass_means.spp.sum()
     assert made.passes == made.pass_means.spp.size
     assert 17 <= made.spp <= MOST_ROUNDING * 17
-    assert bool(paths.pop("meter", 0)) == (scene.reference_plane is not None)
+    assert "meter" not in paths, "nobody asked for an illuminance"
+    assert (made.irradiance is not None) == plane
+    assert paths.pop("meter", 0) == plane * units * METER_PATHS
 
 
 @pytest.mark.parametrize("asked", [1, 2, 3, 4, 5, 7, 9, 11, 13, 17, 23, 33, 41, 67, 100, 128, 136, 512, 1000])

@@ -1,0 +1,85 @@
+"""Irradiance on a scene's reference plane: traced once, and only when an illuminance is asked for."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from render.cache import load_irradiance, save_irradiance
+from render.level import Irradiance
+from render.loader import METER_PIXELS, Film, Loaded, integrators, load_groups
+from render.passes import band_planes, let_go, rendered
+from render.scene import Scene
+from rodcone.errors import InputError
+from rodcone.jit import backend
+from rodcone.types import Planes
+
+METER_BANDS = 4  # traced together: as quick as all at once, and a kernel that compiles sooner
+HALF_SPP = (
+    16  # samples a pixel of its film in each half: 2^17 paths for one number a band, sure to a part in a thousand
+)
+
+
+@dataclass(frozen=True)
+class Meter:
+    """Traces the irradiance of a scene at its first call, and keeps it.
+
+    Attributes
+    ----------
+    scene : Scene
+        With a reference plane.
+    film : Film
+        Its bands and depth count, its size doesn't.
+    seed : int
+    folder : Path, optional
+        Of renders: an irradiance traced before is taken from it.
+    """
+
+    scene: Scene
+    film: Film
+    seed: int
+    folder: Path | None = None
+
+    def __call__(self) -> Irradiance:
+        """Irradiance of the plane."""
+        return self._irradiance
+
+    @cached_property
+    def _irradiance(self) -> Irradiance:
+        film = replace(self.film, size=(METER_PIXELS, METER_PIXELS))
+        found = None if self.folder is None else load_irradiance(self.folder, self.scene, film, self.seed)
+        if found is not None:
+            return found
+        try:
+            made = _measured(self.scene, film, self.seed)
+        except InputError as error:
+            let_go(error)
+            raise
+        if self.folder is not None:
+            save_irradiance(self.folder, self.scene, film, self.seed, made)
+        return made
+
+
+def _measured(scene: Scene, film: Film, seed: int) -> Irradiance:
+    """Trace two halves with seeds of their own; summed in float64, so that threads don't change it."""
+    shape = (2, len(scene.groups), film.wavelength_nm.size, *film.size)
+    halves = np.zeros(shape, np.float32)
+    for loaded in load_groups(scene, film, metered=True):
+        for half in range(2):
+            of_half = int(np.random.SeedSequence([seed, loaded.groups[0], half]).generate_state(2)[1])
+            halves[half, list(loaded.groups)] = _half(loaded, film, of_half)
+    # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
+    factor = 1.0 if backend() == "numpy" else np.pi
+    even, odd = (half.reshape(-1, METER_PIXELS**2).astype(np.float64) * factor for half in halves)
+    error = (even - odd) / 2 / METER_PIXELS**2
+    return Irradiance(((even + odd) / 2).mean(axis=1).reshape(shape[1:3]), error @ error.T)
+
+
+def _half(loaded: Loaded, film: Film, seed: int) -> Planes:
+    """Irradiance of each of the film's pixels, (group, band, h, w)."""
+    parts = []
+    for part, integrator in integrators(film, METER_BANDS, loaded, seed, meter=True):
+        image = rendered(loaded.mi_scene, loaded.meter, integrator, HALF_SPP, seed)
+        parts.append(band_planes(image, len(loaded.groups), film.width_nm[part])[0])
+    return np.concatenate(parts, axis=1)
