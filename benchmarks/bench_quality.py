@@ -115,7 +115,7 @@ class SceneAndSensor:
     def exposed(
         self, camera: ProcessorCamera, level: float, exposure: float | str
     ) -> tuple[NDArray[np.float64], float]:
-        """Expected electrons, and the exposure [s]; a letter: auto exposure by this channel."""
+        """Expected electrons, and the exposure [s]; a channel: auto exposure by this channel."""
         if camera.name not in self._images:
             self._images[camera.name] = form_image(self.stage.radiance, camera.sensor)
         image = self._images[camera.name]
@@ -135,11 +135,11 @@ class SceneAndSensor:
         linear, picture = develop_to_scale(raw, processor, camera.colours, camera.sensor, stage.light, white, **options)
         return MeasuredShot(raw, picture, measure(encode_srgb(linear), stage.truth))
 
-    def snr_db(self, name: str, letter: str, level: float, seconds: float) -> float:
-        """Median SNR of a letter's pixels, in expectation: shot noise and dark noise."""
+    def snr_db(self, name: str, channel: str, level: float, seconds: float) -> float:
+        """Median SNR of a channel's pixels, in expectation: shot noise and dark noise."""
         camera = self.camera(name, 0)
         electrons, _ = self.exposed(camera, level, seconds)
-        signal = electrons[mask(camera.sensor.cfa, letter, electrons.shape)]
+        signal = electrons[mask(camera.sensor.cfa, channel, electrons.shape)]
         raw = expose(electrons, camera.sensor, seconds, camera.device, np.random.default_rng(0), exact=True)
         return float(20 * np.log10(np.median(signal / np.sqrt(signal + raw.dark_noise_e**2))))
 

@@ -31,7 +31,7 @@ from sensor.curves import rgbw
 
 SCENES = ("cornell_box", "still_life_outdoor", "color_checker")
 BANDS = (4, 8, 16, 32, 64)
-LETTERS = ("R", "G", "B", "W")
+CHANNELS = ("R", "G", "B", "W")
 DEPTH = 8
 CURVE_NM = np.arange(380.0, 781.0, 5.0)
 Draw = Callable[[int], NDArray[np.float64]]  # seed -> (channel, h, w)
@@ -69,20 +69,20 @@ def boxes(nm: NDArray[np.float64]) -> dict[str, dict[str, Any]]:
 
 
 def responses() -> dict[str, dict[str, Any]]:
-    """Electrons per joule of each letter, as `specfilm` takes them."""
+    """Electrons per joule of each channel, as `specfilm` takes them."""
     ends = {"wavelength_min": float(CURVE_NM[0]), "wavelength_max": float(CURVE_NM[-1])}
-    curves = {letter: rgbw().curves[letter].band_average(CURVE_NM, 5.0) for letter in LETTERS}
+    curves = {channel: rgbw().curves[channel].band_average(CURVE_NM, 5.0) for channel in CHANNELS}
     scale = photons_per_joule(CURVE_NM) / photons_per_joule(550.0)
     return {
         f"letter_{x}": {"type": "regular", **ends, "values": ",".join(map(repr, (curves[x] * scale).tolist()))}
-        for x in LETTERS
+        for x in CHANNELS
     }
 
 
 def into_channels(draw: Draw, nm: NDArray[np.float64]) -> Draw:
     """Wide channels summed from bands."""
     width_nm = np.full(nm.size, nm[1] - nm[0])
-    weights = rgbw().band_average(LETTERS, nm, width_nm) * width_nm
+    weights = rgbw().band_average(CHANNELS, nm, width_nm) * width_nm
     weights = weights * photons_per_joule(nm) / photons_per_joule(550.0)
     return lambda seed: np.tensordot(weights, draw(seed), axes=1)
 

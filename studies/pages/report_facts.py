@@ -13,7 +13,7 @@ from sensor.presets import preset
 from studies.pages.report_data import ReportLevel, ReportRender, ReportSensor
 from studies.pages.report_text import level_text
 from studies.study.study import label
-from studies.sweep.provenance import made_by, told
+from studies.sweep.provenance import in_words, made_by
 from studies.sweep.row import Row
 
 NAMED = {level.name: ReportLevel(level.name, level.source) for level in DEMO_LEVELS}
@@ -57,7 +57,7 @@ def environment_of(rows: Sequence[Row]) -> dict[str, str]:
     """Return what made the rows, whichever run did: versions, variants and engines, threads, machines."""
     found: dict[str, dict[str, None]] = {}
     for row in rows:
-        for name, value in {**told(made_by(row)), "threads": str(row.threads), "machine": row.machine}.items():
+        for name, value in {**in_words(made_by(row)), "threads": str(row.threads), "machine": row.machine}.items():
             found.setdefault(name, {})[value] = None
     return {name: "; ".join(values) for name, values in found.items()}
 

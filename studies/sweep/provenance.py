@@ -66,7 +66,7 @@ def threads() -> int:
     return int(dr.thread_count()) if backend() == "llvm" else 1
 
 
-def told(made_by: Provenance) -> dict[str, str]:
+def in_words(made_by: Provenance) -> dict[str, str]:
     """Variant, engines and versions by their names in words."""
     return {
         "Mitsuba variant": made_by.variant,
@@ -94,7 +94,7 @@ def require_alike(rows: Sequence[Row]) -> None:
             "engine of captures": (row.scene, row.spectrum, row.level, row.exposure, row.sensor),
             "engine of development": (row.processor,),
         }
-        for name, value in told(made_by(row)).items():
+        for name, value in in_words(made_by(row)).items():
             first = found.setdefault((name, *of.get(name, ())), value)
             if first != value:
                 raise InputError(

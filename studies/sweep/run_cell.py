@@ -24,7 +24,7 @@ from studies.photograph.camera import develop_to_scale, mean_electrons
 from studies.photograph.clock import timed
 from studies.photograph.png import to_png
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text
-from studies.sweep.provenance import machine, provenance, threads, told
+from studies.sweep.provenance import in_words, machine, provenance, threads
 from studies.sweep.row import Row
 from studies.sweep.stored import is_whole, keep
 
@@ -131,8 +131,8 @@ def limit_threads(most: int) -> None:
 
 
 def _check_provenance(cell: Cell) -> None:
-    own = told(provenance(cell.made_by.variant, cell.processor, exact=cell.made_by.readout_engine == "numpy"))
-    for name, asked in told(cell.made_by).items():
+    own = in_words(provenance(cell.made_by.variant, cell.processor, exact=cell.made_by.readout_engine == "numpy"))
+    for name, asked in in_words(cell.made_by).items():
         if own.get(name) != asked:
             raise InputError(
                 f"worker on {platform.node()}: its {name} is {own.get(name)}, the sweep's is {asked}; allowed: the "

@@ -846,8 +846,8 @@ ACCOUNTING = (
     _fault(
         "versions of the process that asks for the report",
         "studies/pages/report_facts.py",
-        "{**told(made_by(row)), ",
-        '{**told(made_by(row)), "numpy": "2", ',
+        "{**in_words(made_by(row)), ",
+        '{**in_words(made_by(row)), "numpy": "2", ',
         "studies/sweep/test_provenance",
     ),
     _fault(
