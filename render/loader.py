@@ -1,17 +1,12 @@
 """From a `Scene` to Mitsuba objects: variant, film, and the scene at unit emission."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, reduce
 from operator import getitem
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from render.integrator.dense import SPECTRUM_SIZE, dense_path
 from render.integrator.matte import matte_surface, with_matte_surfaces
-from render.integrator.reflectance_table import band_offsets, reflectance_table, with_rows
+from render.integrator.reflectance_table import with_rows
 from render.integrator.scattered_path import scattered_path
 from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node
 from render.spectrum import Spectrum
@@ -26,8 +21,8 @@ METER_PIXELS = 64  # film of the irradiance meter, each side
 # number: 40 bands of `still_life_outdoor`, 96x96, 16 samples, take 0.89 s of processor time in two parts and 0.69 s in
 # one, and compile in 5 and 12 s.
 PART_BANDS = 40
-_SAMPLER = {"type": "multijitter"}  # 8.7 times less error than "independent" under sun and sky at 64 samples, as fast
-_METER_SAMPLER = _SAMPLER | {"seed": 1}  # Mitsuba makes equal objects one: they would share a count
+# Without Dr.Jit, whose paths have points of their own: the samples of a pass are drawn independently, as many as asked.
+_SAMPLER = {"type": "independent"}
 _VARIANTS = {"cuda": "cuda_ad_spectral", "llvm": "llvm_ad_spectral", "numpy": "scalar_spectral"}
 
 
@@ -48,7 +43,6 @@ def mitsuba_module() -> Any:
     if backend() == "numpy":
         mi.register_integrator("scatteredpath", scattered_path(mi))
     else:
-        mi.register_integrator("densepath", dense_path(mi))
         mi.register_bsdf("matte", matte_surface(mi))
     return mi
 
@@ -101,6 +95,10 @@ class Loaded:
     curves: tuple[Spectrum, ...] = ()
     covering: Any = None
 
+    def channels(self, bands: int) -> int:
+        """Channels of a path in so many bands (`render.integrator.dense.Tracer.camera`), about."""
+        return (bands + 4) * (len(self.groups) + self.coloured)
+
     @property
     def camera(self) -> Any:
         """Mitsuba's sensor."""
@@ -110,13 +108,6 @@ class Loaded:
     def meter(self) -> Any | None:
         """Mitsuba's irradiance meter on the reference plane, if the scene states one."""
         return next(iter(self.mi_scene.sensors()[1:]), None)
-
-
-def samples_drawn(spp: int) -> int:
-    """Samples a pixel that Mitsuba's stratified sampler draws where so many are asked for: it fills a grid."""
-    sampler = mitsuba_module().load_dict(_SAMPLER)
-    sampler.set_sample_count(spp)
-    return int(sampler.sample_count())
 
 
 def integrator_name() -> str:
@@ -145,7 +136,7 @@ def _load_group(scene: Scene, group: str, film: Film, metered: bool) -> Loaded:
         if backend() == "numpy":
             scene.check_meter()
         recorder = _recorder(film, (METER_PIXELS, METER_PIXELS))
-        meter = {"type": "irradiancemeter", "film": recorder, "sampler": _METER_SAMPLER}
+        meter = {"type": "irradiancemeter", "film": recorder, "sampler": _SAMPLER | {"seed": 1}}
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
     index, coloured = (list(scene.groups).index(group),), scene.groups[group].coloured
     if backend() == "numpy":
@@ -201,36 +192,6 @@ def _recorder(film: Film, size: tuple[int, int]) -> Node:
     return node
 
 
-def integrators(
-    film: Film, part_bands: int, loaded: Loaded, seed: int, meter: bool = False
-) -> Iterator[tuple[NDArray[np.int64], Any]]:
-    """Indices of some bands and their integrator, which together give all bands in order.
-
-    With Dr.Jit each has at most `part_bands` (a multiple of four), their numbers as even as can be: parts of one size
-    share a kernel. A part is filled up to a multiple of four by repeating its last band. The seed decides where in the
-    bands the paths' wavelengths lie.
-    """
-    mi, count = mitsuba_module(), film.wavelength_nm.size
-    if backend() == "numpy":
-        plug_in = "path" if meter else "scatteredpath"
-        yield np.arange(count), mi.load_dict({"type": plug_in, "max_depth": film.max_depth})
-        return
-    offsets = band_offsets(seed)
-    for part in np.array_split(np.arange(count), -(-count // part_bands)):
-        padded = np.concatenate([part, np.full(-part.size % SPECTRUM_SIZE, part[-1])])
-        centre, width = film.wavelength_nm[padded], film.width_nm[padded]
-        made = mi.load_dict(
-            {
-                "type": "densepath",
-                "max_depth": film.max_depth,
-                "meter": meter,
-                "coloured": loaded.coloured,
-                "sample_lights": loaded.sample_lights,
-                "environment": len(loaded.groups) > 1,
-                "wavelength_nm": ",".join(map(repr, centre.tolist())),
-                "width_nm": ",".join(map(repr, width.tolist())),
-            }
-        )
-        if loaded.curves:
-            made.tracer.prepare(offsets, reflectance_table(loaded.curves, centre + width * offsets[:, None]))
-        yield part, made
+def stock_integrator(plug_in: str, film: Film) -> Any:
+    """Integrator of Mitsuba's own, for renders without Dr.Jit."""
+    return mitsuba_module().load_dict({"type": plug_in, "max_depth": film.max_depth})

@@ -1,8 +1,8 @@
 """What each approximation does to a picture, in electrons, found on a small pilot render.
 
 Everything is linear in light and time, so it is found once for 1 cd/m^2 and 1 s and scaled. Each effect is computed
-from the pilot's even and from its odd passes: the product of the two has the effect's square as its mean, free of Monte
-Carlo noise. That noise is drawn anew from the scatter of the passes, and goes through the lens as the light does.
+from the pilot's even and from its odd half: the product of the two has the effect's square as its mean, free of Monte
+Carlo noise. That noise is drawn anew from the variance, and goes through the lens as the light does.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ from sensor.optics import form_image
 from sensor.response import expected_electrons
 from studies.budget.bands import merge_radiance, merge_transport
 
-Pair = NDArray[np.float64]  # (2, h, w): from even and from odd passes [e- per cd/m^2 and s]
+Pair = NDArray[np.float64]  # (2, h, w): from the even and from the odd half [e- per cd/m^2 and s]
 
 DIFFRACTION = "diffraction"
 LENS_TERMS = {DIFFRACTION: "diffraction", "veiling glare": "veiling_glare", "cos^4": "horizontal_view_deg"}

@@ -121,7 +121,7 @@ def make_transport(
     asked: dict[str, Any] = {
         "wavelength_nm": model.wavelength_nm,
         "width_nm": model.width_nm,
-        "max_spp": model.spp,  # in passes of 16 samples, so that a finer request goes on from a coarser one's
+        "max_spp": model.spp,
         "max_seconds": limits.max_seconds,
         "seed": limits.seed + seed_offset,
         "cache": cache,
@@ -144,7 +144,7 @@ class RenderFacts:
     ----------
     integrator, variant, stopped_by : str
     seconds : float
-    spp, passes, bands : int
+    spp, bands : int
     relative_mc_error, relative_level_error : float or None
         Of the lit scene, as `render.radiance.SpectralRadiance`.
     first_nm, last_nm, width_nm : float
@@ -155,7 +155,6 @@ class RenderFacts:
     variant: str
     seconds: float
     spp: int
-    passes: int
     stopped_by: str
     relative_mc_error: float | None
     relative_level_error: float | None
@@ -172,7 +171,6 @@ def render_facts(transport: Transport, radiance: SpectralRadiance) -> RenderFact
         variant=transport.variant,
         seconds=transport.seconds,
         spp=transport.spp,
-        passes=transport.passes,
         stopped_by=transport.stopped_by,
         relative_mc_error=radiance.relative_mc_error,
         relative_level_error=radiance.relative_level_error,

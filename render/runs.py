@@ -1,0 +1,306 @@
+"""Runs of two sequences of points over a scene, and their means: the picture, and half the difference as its error.
+
+Each pixel has two sequences of its own, independent of each other: the even and the odd half. A run draws the next
+points of both. They are added in chunks, whose limits follow from their place in the sequence alone, so that a render
+that was stopped anywhere and goes on has the bits of one go.
+"""
+
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from render.error_estimates import relative_error, shared_paths, variance_of
+from render.integrator.dense import SPECTRUM_SIZE, Tracer
+from render.integrator.points import Points, pixel_keys
+from render.level import SceneMeans
+from render.limits import MOST_POINTS, chunk_from
+from render.loader import PART_BANDS, Film, Loaded, mitsuba_module, stock_integrator
+from render.scene import Scene
+from render.transport import Transport
+from rodcone.errors import InputError, one_line
+from rodcone.jit import arrays, backend, dr
+from rodcone.types import Floats, Planes
+
+MOST_FLOATS = 1 << 23  # of all channels of a launch, 32 MiB: as many threads as that allows
+BLOCK = 1 << 16  # pixels whose errors are summed in double precision at once
+
+
+@dataclass
+class Means:
+    """Means over the points so far, at unit spectral emission; the only mutable state of a render.
+
+    Attributes
+    ----------
+    count : int
+        Points of each half.
+    radiance, difference : (group, band, h, w) float32
+        All light, and half the difference of the halves.
+    seen, seen_difference : list of (1 or band, h, w) float32
+        Light that is seen directly, of each group.
+    coverage, coverage_difference : (h, w) float32
+        Share of the paths that meet a light first.
+    shared : (int, int) or None
+        Groups that are rendered along the same paths.
+    """
+
+    count: int
+    radiance: Planes
+    difference: Planes
+    seen: list[Planes]
+    seen_difference: list[Planes]
+    coverage: Planes
+    coverage_difference: Planes
+    shared: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True)
+class Span:
+    """Points from `start` on: `chunks` chunks of `chunk` points."""
+
+    start: int
+    chunk: int
+    chunks: int
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What a light group gives in some chunks: the leading axes of all arrays are (half, chunk).
+
+    Attributes
+    ----------
+    radiance : (2, chunk, group, band, h, w) float32
+    seen : tuple of (2, chunk, 1 or band, h, w) float32
+    coverage : (2, chunk, h, w) float32
+    """
+
+    radiance: Planes
+    seen: tuple[Planes, ...]
+    coverage: Planes
+
+
+def no_means(scene: Scene, film: Film) -> Means:
+    """Means before the first run."""
+    bands = film.wavelength_nm.size
+    radiance, difference = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(2))
+    seen, seen_difference = (
+        [np.zeros((bands if x.coloured else 1, *film.size), np.float32) for x in scene.groups.values()]
+        for _ in range(2)
+    )
+    coverage, coverage_difference = (np.zeros(film.size, np.float32) for _ in range(2))
+    return Means(0, radiance, difference, seen, seen_difference, coverage, coverage_difference)
+
+
+def means_of(transport: Transport) -> Means:
+    """Means that an earlier render stopped at, to go on from: the same bits."""
+    return Means(
+        count=transport.spp // 2,
+        radiance=transport.radiance.copy(),
+        difference=transport.half_difference.copy(),
+        seen=[planes.copy() for planes in transport.seen],
+        seen_difference=[planes.copy() for planes in transport.seen_difference],
+        coverage=transport.coverage.copy(),
+        coverage_difference=transport.coverage_difference.copy(),
+        shared=transport.shared.groups if transport.shared else None,
+    )
+
+
+def error_of(lights: Floats, means: Means) -> float:
+    """Relative Monte Carlo error so far, under lights (group, band)."""
+    variance = variance_of(means.difference)
+    shared = shared_paths(means.shared, means.difference, variance) if means.shared else None
+    return relative_error(lights, means.radiance, variance, shared)
+
+
+def estimates_of(lights: Floats, means: Means) -> dict[str, Any]:
+    """What a `Transport` tells of its own errors, from the means: fields by name."""
+    variance = variance_of(means.difference)
+    shared = shared_paths(means.shared, means.difference, variance) if means.shared else None
+    return {
+        "variance": variance,
+        "shared": shared,
+        "relative_mc_error": relative_error(lights, means.radiance, variance, shared),
+        "scene_means": _scene_means(means),
+    }
+
+
+def _scene_means(means: Means) -> SceneMeans:
+    """Means over the picture of what is no light; pixels are independent of each other."""
+    groups, bands, *size = means.radiance.shape
+    scattered, errors = np.empty((groups, bands)), []
+    for group in range(groups):
+        light = means.radiance[group] - means.seen[group]
+        scattered[group] = light.mean(axis=(1, 2), dtype=np.float64)
+        errors.append((means.difference[group] - means.seen_difference[group]).reshape(bands, -1))
+    error = np.concatenate([*errors, -means.coverage_difference.reshape(1, -1)])
+    covariance = np.zeros((len(error),) * 2)
+    for first in range(0, error.shape[1], BLOCK):
+        part = error[:, first : first + BLOCK].astype(np.float64)
+        covariance += part @ part.T
+    uncovered = 1 - float(means.coverage.mean(dtype=np.float64))
+    return SceneMeans(scattered, uncovered, covariance / (size[0] * size[1]) ** 2)
+
+
+def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, seed: int) -> None:
+    """Draw the points from `means.count` on, before `stop` and as many as a launch holds, and add them.
+
+    Ctrl-C and errors leave the means as they were before a chunk of all groups.
+    """
+    start, chunk = means.count, chunk_from(means.count)
+    threads = MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size) for loaded in light_groups)
+    fitting = max(1, threads // (film.size[0] * film.size[1] * chunk))
+    alike = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
+    chunks = min(alike, -(-(stop - start) // chunk))
+    drawn = [_drawn(loaded, film, Span(start, chunk, chunks), threads, seed) for loaded in light_groups]
+    if len(light_groups[0].groups) == 2:
+        means.shared = light_groups[0].groups[0], light_groups[0].groups[1]
+    for index in range(chunks):
+        weight = np.float32(chunk / (means.count + chunk))
+        # Each light group is found by paths of its own: together they cover the sum of what each does.
+        covered = np.sum([of_group.coverage[:, index] for of_group in drawn], axis=0)
+        _add(means.coverage, means.coverage_difference, covered, weight)
+        for loaded, of_group in zip(light_groups, drawn, strict=True):
+            for slot, group in enumerate(loaded.groups):
+                _add(means.radiance[group], means.difference[group], of_group.radiance[:, index, slot], weight)
+                _add(means.seen[group], means.seen_difference[group], of_group.seen[slot][:, index], weight)
+        means.count += chunk
+
+
+def _add(mean: Planes, difference: Planes, halves: Planes, weight: np.float32) -> None:
+    """Add both halves' means over a chunk, in place."""
+    even, odd = halves
+    mean += ((even + odd) / 2 - mean) * weight
+    difference += ((even - odd) / 2 - difference) * weight
+
+
+def seed_of(*coordinates: int) -> int:
+    """Seed of 32 bits from the render's own and what it is for."""
+    return int(np.random.SeedSequence(coordinates).generate_state(1)[0])
+
+
+def _drawn(loaded: Loaded, film: Film, span: Span, threads: int, seed: int) -> Drawn:
+    """Draw a span of both halves of one light group's paths."""
+    halves = []
+    for half in range(2):
+        own_seed, parts = seed_of(seed, loaded.groups[0], half), []
+        for part in np.array_split(np.arange(film.wavelength_nm.size), -(-film.wavelength_nm.size // PART_BANDS)):
+            bands = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
+            if backend() == "numpy":
+                parts.append(_by_mitsuba(loaded, bands, span, own_seed))
+            else:
+                tracer = Tracer(mitsuba_module(), loaded, bands, own_seed)
+                image = traced(partial(tracer.camera, film.size), film.size, span, threads, own_seed)
+                scattered, others = bands_apart(image, len(loaded.groups), part.size)
+                shares, own = np.split(others, [len(loaded.groups)], axis=1)
+                parts.append((scattered, shares, own[:, : part.size]))
+        # All parts of the bands see the same paths: what knows no band is taken from the first.
+        scattered = np.concatenate([part[0] for part in parts], axis=2)
+        shares = parts[0][1]
+        seen = [shares[:, slot, None] for slot in range(len(loaded.groups))]
+        if loaded.coloured:
+            seen[0] = np.concatenate([part[2] for part in parts], axis=1)
+        for slot, planes in enumerate(seen):
+            scattered[:, slot] += planes
+        halves.append((scattered, seen, shares.sum(axis=1)))
+    return Drawn(
+        radiance=np.stack([half[0] for half in halves]),
+        seen=tuple(np.stack(both) for both in zip(*(half[1] for half in halves), strict=True)),
+        coverage=np.stack([half[2] for half in halves]),
+    )
+
+
+def traced(
+    trace: Callable[[Any, Points], list[Any]], size: tuple[int, int], span: Span, threads: int, seed: int
+) -> Planes:
+    """Means over each chunk of the channels that a tracer gives, shape (channel, chunk, h, w)."""
+    jit, pixels, samples = arrays(), size[0] * size[1], span.chunk * span.chunks
+    most = max(1, threads // samples)
+    blocks = []
+    for first in range(0, pixels, most):
+        count = min(most, pixels - first)
+        thread = dr.arange(jit.UInt, count * samples)
+        within = thread // dr.opaque(jit.UInt, samples)
+        index = thread - within * dr.opaque(jit.UInt, samples) + dr.opaque(jit.UInt, span.start)
+        pixel = within + dr.opaque(jit.UInt, first)
+        try:
+            channels = trace(pixel, Points(mitsuba_module(), index, pixel_keys(mitsuba_module(), pixel, seed)))
+            dr.eval(channels)
+        except RuntimeError as error:
+            cause = _root_cause(error)
+            if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
+                raise
+            raise InputError(f"scene: Mitsuba can't render it: {one_line(cause)}; correct the description") from None
+        sums = [dr.block_sum(channel, span.chunk) if span.chunk > 1 else channel for channel in channels]
+        dr.eval(sums)
+        blocks.append(np.stack([values.numpy().reshape(count, span.chunks).T for values in sums]))
+    planes = np.concatenate(blocks, axis=2).reshape(-1, span.chunks, *size)
+    return np.asarray(planes * np.float32(1 / span.chunk))
+
+
+def bands_apart(image: Planes, groups: int, bands: int) -> tuple[Planes, Planes]:
+    """Channels of a tracer apart: bands (chunk, group, band, h, w), and those after them (chunk, channel, h, w).
+
+    Raises
+    ------
+    InputError
+        Where a material chose by wavelength.
+    """
+    if image[-1].any():
+        raise InputError(
+            "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
+            "allowed: materials whose sampling doesn't depend on wavelength; replace it"
+        )
+    filled = bands + -bands % SPECTRUM_SIZE
+    scattered, others = np.split(image[:-1], [groups * filled])
+    scattered = scattered.reshape(groups, filled, *image.shape[1:])[:, :bands]
+    return np.moveaxis(scattered, 2, 0).copy(), np.moveaxis(others, 1, 0)
+
+
+def _by_mitsuba(loaded: Loaded, film: Film, span: Span, seed: int) -> tuple[Planes, Planes, Planes]:
+    """Bands, shares of lights seen directly and their own bands without Dr.Jit: a chunk is a pass with its own seed."""
+    chunks = []
+    for index in range(span.chunks):
+        of_chunk = seed_of(seed, span.start + index * span.chunk)
+        draw = partial(by_stock, spp=span.chunk, seed=of_chunk)
+        seen_directly = mitsuba_module().load_dict({"type": "path", "max_depth": 1})
+        scattered = draw(loaded.mi_scene, loaded.camera, stock_integrator("scatteredpath", film)) / film_width(film)
+        # Renders of their own show the lights.
+        shares = draw(loaded.covering, loaded.covering.sensors()[0], seen_directly) / film_width(film)[:1]
+        own = scattered[:0]
+        if loaded.coloured:
+            own = draw(loaded.mi_scene, loaded.camera, seen_directly) / film_width(film)
+        chunks.append((scattered[None], shares, own))
+    return tuple(np.stack(arrays_of) for arrays_of in zip(*chunks, strict=True))  # type: ignore[return-value]
+
+
+def by_stock(mi_scene: Any, sensor: Any, integrator: Any, *, spp: int, seed: int) -> Planes:
+    """Render by an integrator of Mitsuba's, shape (channel, h, w)."""
+    try:
+        image = mitsuba_module().render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
+    except RuntimeError as error:
+        raise InputError(f"scene: Mitsuba can't render it: {one_line(error)}; correct the description") from None
+    return np.ascontiguousarray(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
+
+
+def film_width(film: Film) -> Planes:
+    """Width of each band, for specfilm, which integrates over the band: (band, 1, 1)."""
+    return film.width_nm.astype(np.float32)[:, None, None]
+
+
+def _root_cause(error: BaseException) -> BaseException:
+    """First cause of an error that Dr.Jit has wrapped."""
+    while error.__cause__ or error.__context__:
+        error = error.__cause__ or error.__context__ or error
+    return error
+
+
+def let_go(error: BaseException) -> None:
+    """Free the refused scene, which the traceback holds: Dr.Jit compiles every live material into the next render."""
+    cause: BaseException | None = error
+    while cause:
+        if cause.__traceback__ and cause.__traceback__.tb_next:
+            traceback.clear_frames(cause.__traceback__.tb_next)
+        cause.__traceback__, cause = None, cause.__cause__ or cause.__context__
