@@ -25,8 +25,11 @@ from rodcone.errors import InputError, one_line
 from rodcone.jit import arrays, backend, dr
 from rodcone.types import Floats, Planes
 
-MOST_FLOATS = 1 << 23  # of all channels of a launch, 32 MiB: as many threads as that allows
+MOST_FLOATS = 1 << 24  # of all channels of a launch, 64 MiB: as many threads as that allows
 BLOCK = 1 << 16  # pixels whose errors are summed in double precision at once
+
+
+Halves = tuple[Planes, Planes]  # the even and the odd one
 
 
 @dataclass
@@ -68,18 +71,19 @@ class Span:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What a light group gives in some chunks: the leading axes of all arrays are (half, chunk).
+    """What a light group gives in some chunks, both halves of each.
 
     Attributes
     ----------
-    radiance : (2, chunk, group, band, h, w) float32
-    seen : tuple of (2, chunk, 1 or band, h, w) float32
-    coverage : (2, chunk, h, w) float32
+    radiance : pair of (chunk, group, band, h, w) float32
+    seen : tuple of pairs of (chunk, 1 or band, h, w) float32
+        For each group.
+    coverage : pair of (chunk, h, w) float32
     """
 
-    radiance: Planes
-    seen: tuple[Planes, ...]
-    coverage: Planes
+    radiance: Halves
+    seen: tuple[Halves, ...]
+    coverage: Halves
 
 
 def no_means(scene: Scene, film: Film) -> Means:
@@ -147,7 +151,7 @@ def _scene_means(means: Means) -> SceneMeans:
 def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, seed: int) -> None:
     """Draw the points from `means.count` on, before `stop` and as many as a launch holds, and add them.
 
-    Ctrl-C and errors leave the means as they were before a chunk of all groups.
+    An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
     """
     start, chunk = means.count, chunk_from(means.count)
     threads = MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size) for loaded in light_groups)
@@ -160,20 +164,24 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
     for index in range(chunks):
         weight = np.float32(chunk / (means.count + chunk))
         # Each light group is found by paths of its own: together they cover the sum of what each does.
-        covered = np.sum([of_group.coverage[:, index] for of_group in drawn], axis=0)
-        _add(means.coverage, means.coverage_difference, covered, weight)
+        even, odd = (sum(of_group.coverage[half][index] for of_group in drawn) for half in range(2))
+        _add(means.coverage, means.coverage_difference, np.asarray(even), np.asarray(odd), weight)
         for loaded, of_group in zip(light_groups, drawn, strict=True):
             for slot, group in enumerate(loaded.groups):
-                _add(means.radiance[group], means.difference[group], of_group.radiance[:, index, slot], weight)
-                _add(means.seen[group], means.seen_difference[group], of_group.seen[slot][:, index], weight)
+                even, odd = (half[index, slot] for half in of_group.radiance)
+                _add(means.radiance[group], means.difference[group], even, odd, weight)
+                even, odd = (half[index] for half in of_group.seen[slot])
+                _add(means.seen[group], means.seen_difference[group], even, odd, weight)
         means.count += chunk
 
 
-def _add(mean: Planes, difference: Planes, halves: Planes, weight: np.float32) -> None:
-    """Add both halves' means over a chunk, in place."""
-    even, odd = halves
-    mean += ((even + odd) / 2 - mean) * weight
-    difference += ((even - odd) / 2 - difference) * weight
+def _add(mean: Planes, difference: Planes, even: Planes, odd: Planes, weight: np.float32) -> None:
+    """Add both halves' means over a chunk, in place: m += ((a + b) / 2 - m) w, d += ((a - b) / 2 - d) w."""
+    for planes, twice in ((mean, even + odd), (difference, even - odd)):
+        step = np.multiply(twice, np.float32(0.5), out=twice)
+        np.subtract(step, planes, out=step)
+        np.multiply(step, weight, out=step)
+        np.add(planes, step, out=planes)
 
 
 def seed_of(*coordinates: int) -> int:
@@ -197,7 +205,7 @@ def _drawn(loaded: Loaded, film: Film, span: Span, threads: int, seed: int) -> D
                 shares, own = np.split(others, [len(loaded.groups)], axis=1)
                 parts.append((scattered, shares, own[:, : part.size]))
         # All parts of the bands see the same paths: what knows no band is taken from the first.
-        scattered = np.concatenate([part[0] for part in parts], axis=2)
+        scattered = parts[0][0] if len(parts) == 1 else np.concatenate([part[0] for part in parts], axis=2)
         shares = parts[0][1]
         seen = [shares[:, slot, None] for slot in range(len(loaded.groups))]
         if loaded.coloured:
@@ -205,39 +213,42 @@ def _drawn(loaded: Loaded, film: Film, span: Span, threads: int, seed: int) -> D
         for slot, planes in enumerate(seen):
             scattered[:, slot] += planes
         halves.append((scattered, seen, shares.sum(axis=1)))
-    return Drawn(
-        radiance=np.stack([half[0] for half in halves]),
-        seen=tuple(np.stack(both) for both in zip(*(half[1] for half in halves), strict=True)),
-        coverage=np.stack([half[2] for half in halves]),
-    )
+    even, odd = halves
+    return Drawn(radiance=(even[0], odd[0]), seen=tuple(zip(even[1], odd[1], strict=True)), coverage=(even[2], odd[2]))
 
 
 def traced(
     trace: Callable[[Any, Points], list[Any]], size: tuple[int, int], span: Span, threads: int, seed: int
 ) -> Planes:
-    """Means over each chunk of the channels that a tracer gives, shape (channel, chunk, h, w)."""
-    jit, pixels, samples = arrays(), size[0] * size[1], span.chunk * span.chunks
+    """Means over each chunk of the channels that a tracer gives, shape (chunk, channel, h, w)."""
+    jit, mi, pixels, samples = arrays(), mitsuba_module(), size[0] * size[1], span.chunk * span.chunks
     most = max(1, threads // samples)
-    blocks = []
+    means: Planes | None = None
     for first in range(0, pixels, most):
         count = min(most, pixels - first)
-        thread = dr.arange(jit.UInt, count * samples)
-        within = thread // dr.opaque(jit.UInt, samples)
-        index = thread - within * dr.opaque(jit.UInt, samples) + dr.opaque(jit.UInt, span.start)
-        pixel = within + dr.opaque(jit.UInt, first)
+        # thread = (number of the chunk x count + number of the pixel) x chunk + number of the point within the chunk
+        thread, length = dr.arange(jit.UInt, count * samples), dr.opaque(jit.UInt, span.chunk)
+        sums_before, in_block = thread // length, dr.opaque(jit.UInt, count)
+        number = sums_before // in_block
+        pixel = sums_before - number * in_block + dr.opaque(jit.UInt, first)
+        index = thread - sums_before * length + number * length + dr.opaque(jit.UInt, span.start)
         try:
-            channels = trace(pixel, Points(mitsuba_module(), index, pixel_keys(mitsuba_module(), pixel, seed)))
+            channels = trace(pixel, Points(mi, index, pixel_keys(mi, pixel, seed)))
             dr.eval(channels)
         except RuntimeError as error:
             cause = _root_cause(error)
             if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
                 raise
             raise InputError(f"scene: Mitsuba can't render it: {one_line(cause)}; correct the description") from None
-        sums = [dr.block_sum(channel, span.chunk) if span.chunk > 1 else channel for channel in channels]
-        dr.eval(sums)
-        blocks.append(np.stack([values.numpy().reshape(count, span.chunks).T for values in sums]))
-    planes = np.concatenate(blocks, axis=2).reshape(-1, span.chunks, *size)
-    return np.asarray(planes * np.float32(1 / span.chunk))
+        if means is None:
+            means = np.empty((span.chunks, len(channels), pixels), np.float32)
+        for slot, channel in enumerate(channels):
+            total = dr.block_sum(channel, span.chunk) if span.chunk > 1 else channel
+            means[:, slot, first : first + count] = total.numpy().reshape(span.chunks, count)
+    assert means is not None
+    if span.chunk > 1:
+        means *= np.float32(1 / span.chunk)
+    return means.reshape(span.chunks, -1, *size)
 
 
 def bands_apart(image: Planes, groups: int, bands: int) -> tuple[Planes, Planes]:
@@ -248,15 +259,14 @@ def bands_apart(image: Planes, groups: int, bands: int) -> tuple[Planes, Planes]
     InputError
         Where a material chose by wavelength.
     """
-    if image[-1].any():
+    if image[:, -1].any():
         raise InputError(
             "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
             "allowed: materials whose sampling doesn't depend on wavelength; replace it"
         )
     filled = bands + -bands % SPECTRUM_SIZE
-    scattered, others = np.split(image[:-1], [groups * filled])
-    scattered = scattered.reshape(groups, filled, *image.shape[1:])[:, :bands]
-    return np.moveaxis(scattered, 2, 0).copy(), np.moveaxis(others, 1, 0)
+    scattered, others = np.split(image[:, :-1], [groups * filled], axis=1)
+    return scattered.reshape(len(image), groups, filled, *image.shape[2:])[:, :, :bands], others
 
 
 def _by_mitsuba(loaded: Loaded, film: Film, span: Span, seed: int) -> tuple[Planes, Planes, Planes]:
