@@ -6,7 +6,6 @@ that was stopped anywhere and goes on has the bits of one go.
 """
 
 import traceback
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -14,15 +13,14 @@ from typing import Any
 import numpy as np
 
 from render.error_estimates import relative_error, shared_paths, variance_of
-from render.integrator.dense import SPECTRUM_SIZE, Tracer
-from render.integrator.points import Points, pixel_keys
+from render.integrator.dense import Tracer
 from render.level import SceneMeans
 from render.limits import MOST_POINTS, chunk_from
 from render.loader import PART_BANDS, Film, Loaded, mitsuba_module, stock_integrator
 from render.scene import Scene
 from render.transport import Transport
-from rodcone.errors import InputError, one_line
-from rodcone.jit import arrays, backend, dr
+from render.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
+from rodcone.jit import backend
 from rodcone.types import Floats, Planes
 
 MOST_FLOATS = 1 << 24  # of all channels of a launch, 64 MiB: as many threads as that allows
@@ -58,15 +56,6 @@ class Means:
     coverage: Planes
     coverage_difference: Planes
     shared: tuple[int, int] | None = None
-
-
-@dataclass(frozen=True)
-class Span:
-    """Points from `start` on: `chunks` chunks of `chunk` points."""
-
-    start: int
-    chunk: int
-    chunks: int
 
 
 @dataclass(frozen=True)
@@ -184,11 +173,6 @@ def _add(mean: Planes, difference: Planes, even: Planes, odd: Planes, weight: np
         np.add(planes, step, out=planes)
 
 
-def seed_of(*coordinates: int) -> int:
-    """Seed of 32 bits from the render's own and what it is for."""
-    return int(np.random.SeedSequence(coordinates).generate_state(1)[0])
-
-
 def _drawn(loaded: Loaded, film: Film, span: Span, threads: int, seed: int) -> Drawn:
     """Draw a span of both halves of one light group's paths."""
     halves = []
@@ -217,58 +201,6 @@ def _drawn(loaded: Loaded, film: Film, span: Span, threads: int, seed: int) -> D
     return Drawn(radiance=(even[0], odd[0]), seen=tuple(zip(even[1], odd[1], strict=True)), coverage=(even[2], odd[2]))
 
 
-def traced(
-    trace: Callable[[Any, Points], list[Any]], size: tuple[int, int], span: Span, threads: int, seed: int
-) -> Planes:
-    """Means over each chunk of the channels that a tracer gives, shape (chunk, channel, h, w)."""
-    jit, mi, pixels, samples = arrays(), mitsuba_module(), size[0] * size[1], span.chunk * span.chunks
-    most = max(1, threads // samples)
-    means: Planes | None = None
-    for first in range(0, pixels, most):
-        count = min(most, pixels - first)
-        # thread = (number of the chunk x count + number of the pixel) x chunk + number of the point within the chunk
-        thread, length = dr.arange(jit.UInt, count * samples), dr.opaque(jit.UInt, span.chunk)
-        sums_before, in_block = thread // length, dr.opaque(jit.UInt, count)
-        number = sums_before // in_block
-        pixel = sums_before - number * in_block + dr.opaque(jit.UInt, first)
-        index = thread - sums_before * length + number * length + dr.opaque(jit.UInt, span.start)
-        try:
-            channels = trace(pixel, Points(mi, index, pixel_keys(mi, pixel, seed)))
-            dr.eval(channels)
-        except RuntimeError as error:
-            cause = _root_cause(error)
-            if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
-                raise
-            raise InputError(f"scene: Mitsuba can't render it: {one_line(cause)}; correct the description") from None
-        if means is None:
-            means = np.empty((span.chunks, len(channels), pixels), np.float32)
-        for slot, channel in enumerate(channels):
-            total = dr.block_sum(channel, span.chunk) if span.chunk > 1 else channel
-            means[:, slot, first : first + count] = total.numpy().reshape(span.chunks, count)
-    assert means is not None
-    if span.chunk > 1:
-        means *= np.float32(1 / span.chunk)
-    return means.reshape(span.chunks, -1, *size)
-
-
-def bands_apart(image: Planes, groups: int, bands: int) -> tuple[Planes, Planes]:
-    """Channels of a tracer apart: bands (chunk, group, band, h, w), and those after them (chunk, channel, h, w).
-
-    Raises
-    ------
-    InputError
-        Where a material chose by wavelength.
-    """
-    if image[:, -1].any():
-        raise InputError(
-            "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
-            "allowed: materials whose sampling doesn't depend on wavelength; replace it"
-        )
-    filled = bands + -bands % SPECTRUM_SIZE
-    scattered, others = np.split(image[:, :-1], [groups * filled], axis=1)
-    return scattered.reshape(len(image), groups, filled, *image.shape[2:])[:, :, :bands], others
-
-
 def _by_mitsuba(loaded: Loaded, film: Film, span: Span, seed: int) -> tuple[Planes, Planes, Planes]:
     """Bands, shares of lights seen directly and their own bands without Dr.Jit: a chunk is a pass with its own seed."""
     chunks = []
@@ -284,27 +216,6 @@ def _by_mitsuba(loaded: Loaded, film: Film, span: Span, seed: int) -> tuple[Plan
             own = draw(loaded.mi_scene, loaded.camera, seen_directly) / film_width(film)
         chunks.append((scattered[None], shares, own))
     return tuple(np.stack(arrays_of) for arrays_of in zip(*chunks, strict=True))  # type: ignore[return-value]
-
-
-def by_stock(mi_scene: Any, sensor: Any, integrator: Any, *, spp: int, seed: int) -> Planes:
-    """Render by an integrator of Mitsuba's, shape (channel, h, w)."""
-    try:
-        image = mitsuba_module().render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
-    except RuntimeError as error:
-        raise InputError(f"scene: Mitsuba can't render it: {one_line(error)}; correct the description") from None
-    return np.ascontiguousarray(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
-
-
-def film_width(film: Film) -> Planes:
-    """Width of each band, for specfilm, which integrates over the band: (band, 1, 1)."""
-    return film.width_nm.astype(np.float32)[:, None, None]
-
-
-def _root_cause(error: BaseException) -> BaseException:
-    """First cause of an error that Dr.Jit has wrapped."""
-    while error.__cause__ or error.__context__:
-        error = error.__cause__ or error.__context__ or error
-    return error
 
 
 def let_go(error: BaseException) -> None:

@@ -209,7 +209,7 @@ def test_a_ledger_counts_no_noise_as_an_effect() -> None:
     assert row.lens["diffraction"] < 0.5 * 1e-3 * some.lens["diffraction"][0].std()
 
 
-def test_monte_carlo_draws_have_the_passes_scatter() -> None:
+def test_monte_carlo_draws_have_the_stated_variance() -> None:
     """Draws are plus or minus one standard error, so that a plain lens shows exactly that; diffraction evens it out."""
     some = found(transport(even(), noise=0.05), diffraction=1.0)
     signal = found(transport(even())).full.mean(axis=0)
