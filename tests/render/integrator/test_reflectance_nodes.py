@@ -23,7 +23,7 @@ pytestmark = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA he
 
 FALSE_ALARM, CAUGHT = 1e-4, 0.04
 BANDS_NM, WIDTH_NM, DEPTH = np.array([420.0, 500.0, 600.0, 720.0]), 60.0, 4
-DRAWS, SPP = 8, 324
+DRAWS, SPP = 8, 576
 
 PICTURE = '<string name="filename" value="p.png"/>'
 BITMAP = f'<texture name="reflectance" type="bitmap">{PICTURE}</texture>'
