@@ -188,7 +188,13 @@ def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ..
     # A constant environment is met in every direction: directions sampled for the surface alone leave less noise than a
     # mixture with ones sampled for the light, and half of the rays are saved.
     environment = [light.class_name() for light in mi_scene.emitters()] == ["ConstantBackgroundEmitter"]
-    return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=not environment, curves=() if coloured else curves)
+    return Loaded(
+        mi_scene=mi_scene,
+        groups=index,
+        coloured=coloured,
+        sample_lights=not environment,
+        curves=() if coloured else curves,
+    )
 
 
 def _covering(scene: Scene, group: str, film: Film) -> Node:
