@@ -73,8 +73,7 @@ def render(
     resume : Transport, optional
         An earlier result of the same scene, size, bands, depth and seed to go on from; its passes are kept.
     progress : callable, optional
-        Called with the share done and the error so far: first with an infinite error, since loading and compiling come
-        before the first passes, then after each pair of them.
+        Called after each pair of passes with the share done and the error so far.
 
     Returns
     -------
@@ -147,7 +146,6 @@ def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film) -> Tra
 
 def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None, progress: Progress) -> Transport:
     start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
-    progress(limits.share(earlier.spp, earlier.relative_mc_error, earlier.seconds) if earlier else 0.0, np.inf)
     sums = sums_of(earlier) if earlier else no_passes(scene, film)
     pass_spp = limits.pass_spp(samples_drawn, sums.spp)
     loaded = load_groups(scene, film)

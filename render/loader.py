@@ -13,9 +13,8 @@ from render.integrator.dense import SPECTRUM_SIZE, dense_path
 from render.integrator.matte import matte_surface, with_matte_surfaces
 from render.integrator.reflectance_table import band_offsets, reflectance_table, with_rows
 from render.integrator.scattered_path import scattered_path
-from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node
+from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node, walk
 from render.spectrum import Spectrum
-from render.user_scene.allowed_plugins import kind_of
 from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError, one_line
 from rodcone.jit import backend
@@ -141,27 +140,32 @@ def load_groups(scene: Scene, film: Film) -> list[Loaded]:
 
 
 def _with_common_shapes(scene: Scene) -> Scene:
-    """Load the shapes that belong to no light once, for all groups' scenes to hold.
+    """Load the shapes that belong to no light once, for all groups' scenes to hold, and the surfaces of lamps.
 
     Dr.Jit traces every live surface and shape at each call, whichever scene it is in: with copies for each group,
     tracing took as many times longer as there are groups.
     """
     mi = mitsuba_module()
     lit = {path.split("/")[0] for group in scene.groups.values() for path in group.emitters}
-    own = {"sensor", scene.reference_plane, *lit}
-    common = [
-        key
-        for key, node in scene.geometry.items()
-        if isinstance(node, dict) and key not in own and _is_plain_shape(mi, node["type"])
-    ]
-    unlit = {key: node for key, node in scene.lit({}).items() if key not in own}
-    shapes = _load(scene, unlit, merge_meshes=True).shapes()
-    rest = {key: node for key, node in scene.geometry.items() if key not in common}
-    return replace(scene, geometry=rest | dict(zip(common, shapes, strict=False)))  # merged meshes are fewer
+    parts = scene.geometry.items()
+    unlit = {x: part for x, part in parts if x not in {scene.reference_plane, *lit} and _is(part, mi.ObjectType.Shape)}
+    shapes = _load(scene, {"type": "scene", **unlit}, merge_meshes=True).shapes()
+    rest = {x: part for x, part in parts if x not in unlit}
+    for x in [x for x in rest if x in lit]:
+        surfaces = {name: part for name, part in rest[x].items() if _is(part, mi.ObjectType.BSDF)}
+        rest[x] = rest[x] | {name: _load(scene, part) for name, part in surfaces.items()}
+    return replace(scene, geometry=rest | dict(zip(unlit, shapes, strict=False)))  # merged meshes are fewer
 
 
-def _is_plain_shape(mi: Any, kind: str) -> bool:
-    return kind not in ("ref", "shapegroup", "instance") and kind_of(mi, kind) == "shape"
+def _is(part: Any, kind: Any) -> bool:
+    """Whether a part of a scene's dict is of a kind of Mitsuba's, and nothing refers from it or to it."""
+    if not isinstance(part, dict) or part["type"] == "shapegroup":
+        return False
+    if any(node.get("type") == "ref" for _, node in walk({"": part})):
+        return False
+    mi = mitsuba_module()
+    own = {"matte": mi.ObjectType.BSDF}  # a plug-in written in Python, whose kind Mitsuba doesn't tell
+    return bool(kind == (own.get(part["type"]) or mi.PluginManager.instance().plugin_type(part["type"])))
 
 
 def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ...]) -> Loaded:
