@@ -128,7 +128,8 @@ def load_groups(scene: Scene, film: Film) -> list[Loaded]:
     """Load what is rendered one after the other: each light group, and a constant environment along with the first."""
     names = list(scene.groups)
     carried = [] if backend() == "numpy" or len(names) == 1 else [x for x in names if scene.is_environment(x)][:1]
-    apart, curves = [name for name in names if name not in carried], ()
+    apart = [name for name in names if name not in carried]
+    curves: tuple[Spectrum, ...] = ()
     if backend() != "numpy":
         geometry, curves = with_rows(with_matte_surfaces(scene.geometry))
         scene = replace(scene, geometry=geometry, extend=None)  # held ends are in the geometry by now
