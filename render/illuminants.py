@@ -107,8 +107,11 @@ def daylight(cct_k: float) -> Spectrum:
         For a temperature outside that range, in which the formula holds.
     """
     require_range("illuminant: daylight [K]", cct_k, 4000.0, 25_000.0, "below it give a black body such as 3000K")
-    cubic = (-4.607e9, 2.9678e6, 99.11, 0.244063) if cct_k <= 7000.0 else (-2.0064e9, 1.9018e6, 247.48, 0.23704)
-    x = cubic[0] / cct_k**3 + cubic[1] / cct_k**2 + cubic[2] / cct_k + cubic[3]
+    t = np.float64(cct_k)  # rounded as colour-science rounds, whose bits scenes have been known by
+    if t <= 7000.0:
+        x = -4.607e9 / t**3 + 2.9678e6 / t**2 + 0.09911 * 10**3 / t + 0.244063
+    else:
+        x = -2.0064e9 / t**3 + 1.9018e6 / t**2 + 0.24748 * 10**3 / t + 0.23704
     y = -3.0 * x**2 + 2.87 * x - 0.275
     m = 0.0241 + 0.2562 * x - 0.7341 * y
     m1 = (-1.3515 - 1.7703 * x + 5.9114 * y) / m
