@@ -8,7 +8,7 @@ from typing import Any
 from render.integrator.matte import matte_surface, with_matte_surfaces
 from render.integrator.reflectance_table import with_rows
 from render.integrator.scattered_path import scattered_path
-from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node
+from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node, walk
 from render.spectrum import Spectrum
 from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError, one_line
@@ -122,14 +122,52 @@ def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Load
     """
     names = list(scene.groups)
     carried = [] if backend() == "numpy" or len(names) == 1 else [x for x in names if scene.is_environment(x)][:1]
-    loaded = [_load_group(scene, name, film, metered) for name in names if name not in carried]
+    apart = [name for name in names if name not in carried]
+    curves: tuple[Spectrum, ...] = ()
+    if backend() != "numpy":
+        geometry, curves = with_rows(with_matte_surfaces(scene.geometry))
+        scene = replace(scene, geometry=geometry, extend=None)  # held ends are in the geometry by now
+        scene = _with_common_shapes(scene) if len(apart) > 1 else scene
+    loaded = [_load_group(scene, name, film, curves, metered) for name in apart]
     if carried:
         loaded[0] = replace(loaded[0], groups=(*loaded[0].groups, names.index(carried[0])))
     return loaded
 
 
-def _load_group(scene: Scene, group: str, film: Film, metered: bool) -> Loaded:
-    """Load a scene with one light group at unit spectral emission (or its own colours)."""
+def _with_common_shapes(scene: Scene) -> Scene:
+    """Load the shapes that belong to no light once, for all groups' scenes to hold, and the surfaces of lamps.
+
+    Dr.Jit traces every live surface and shape at each call, whichever scene it is in: with copies for each group,
+    tracing took as many times longer as there are groups.
+    """
+    mi = mitsuba_module()
+    lit = {path.split("/")[0] for group in scene.groups.values() for path in group.emitters}
+    parts = scene.geometry.items()
+    unlit = {x: part for x, part in parts if x not in {scene.reference_plane, *lit} and _is(part, mi.ObjectType.Shape)}
+    shapes = _load(scene, {"type": "scene", **unlit}, merge_meshes=True).shapes()
+    rest = {x: part for x, part in parts if x not in unlit}
+    for x in [x for x in rest if x in lit]:
+        surfaces = {name: part for name, part in rest[x].items() if _is(part, mi.ObjectType.BSDF)}
+        rest[x] = rest[x] | {name: _load(scene, part) for name, part in surfaces.items()}
+    return replace(scene, geometry=rest | dict(zip(unlit, shapes, strict=False)))  # merged meshes are fewer
+
+
+def _is(part: Any, kind: Any) -> bool:
+    """Whether a part of a scene's dict is of a kind of Mitsuba's, and nothing refers from it or to it."""
+    if not isinstance(part, dict) or part["type"] == "shapegroup":
+        return False
+    if any(node.get("type") == "ref" for _, node in walk({"": part})):
+        return False
+    mi = mitsuba_module()
+    own = {"matte": mi.ObjectType.BSDF}  # a plug-in written in Python, whose kind Mitsuba doesn't tell
+    return bool(kind == (own.get(part["type"]) or mi.PluginManager.instance().plugin_type(part["type"])))
+
+
+def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ...], metered: bool) -> Loaded:
+    """Load a scene with one light group at unit spectral emission (or its own colours).
+
+    `curves` are those of the table that the scene's matte surfaces name the rows of.
+    """
     description = scene.lit({group: uniform_node(1.0)})
     description["sensor"] = {**description["sensor"], "film": _recorder(film, film.size), "sampler": _SAMPLER}
     if metered and scene.reference_plane:
@@ -140,16 +178,22 @@ def _load_group(scene: Scene, group: str, film: Film, metered: bool) -> Loaded:
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
     index, coloured = (list(scene.groups).index(group),), scene.groups[group].coloured
     if backend() == "numpy":
-        covering = _load(scene, group, _covering(scene, group, film))
-        mi_scene = _load(scene, group, description)
+        covering = _load(scene, _covering(scene, group, film))
+        mi_scene = _load(scene, description)
         return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=True, covering=covering)
-    matte = with_matte_surfaces(description)
-    tabulated, curves = (matte, ()) if coloured else with_rows(matte)
-    mi_scene = _load(scene, group, tabulated)
+    # Merging meshes orders a scene's shapes anew at each load, and its lights with them. A path chooses a light by its
+    # number, so several keep their order only without.
+    mi_scene = _load(scene, description, merge_meshes=len(scene.groups[group].emitters) == 1)
     # A constant environment is met in every direction: directions sampled for the surface alone leave less noise than a
     # mixture with ones sampled for the light, and half of the rays are saved.
     environment = [light.class_name() for light in mi_scene.emitters()] == ["ConstantBackgroundEmitter"]
-    return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=not environment, curves=curves)
+    return Loaded(
+        mi_scene=mi_scene,
+        groups=index,
+        coloured=coloured,
+        sample_lights=not environment,
+        curves=() if coloured else curves,
+    )
 
 
 def _covering(scene: Scene, group: str, film: Film) -> Node:
@@ -165,12 +209,10 @@ def _covering(scene: Scene, group: str, film: Film) -> Node:
     return description
 
 
-def _load(scene: Scene, group: str, description: Node) -> Any:
+def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> Any:
     mi = mitsuba_module()
     config = mi.parser.ParserConfig(variant())
-    # Merging meshes orders a scene's shapes anew at each load, and its lights with them. A path chooses a light by its
-    # number, so several keep their order only without.
-    config.merge_meshes = len(scene.groups[group].emitters) == 1
+    config.merge_meshes = merge_meshes
     try:
         state = mi.parser.parse_dict(config, description)
         mi.parser.transform_all(config, state)

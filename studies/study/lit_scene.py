@@ -102,6 +102,8 @@ def make_transport(
         None for a picture file.
     cache : Path
         Folder of renders: a coarser one is continued, a finer one is taken.
+    progress : callable
+        As of `render.engine.render`; called before it with an infinite error, since the first passes may compile.
     share : callable, optional
         Noise variance of a render over the sensor's own, for a study with a `noise_share`.
     seed_offset : int
@@ -118,6 +120,7 @@ def make_transport(
         transport, _, assumed = open_radiance_file(opened.choice.source, opened.choice.light)
         return transport, tuple(assumed)
     limits = study.render
+    progress(0.0, np.inf)
     asked: dict[str, Any] = {
         "wavelength_nm": model.wavelength_nm,
         "width_nm": model.width_nm,
