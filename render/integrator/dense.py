@@ -141,7 +141,7 @@ class Tracer:
             density = dr.maximum(surface.to_local(ds.d).z, 0.0) * dr.inv_pi
             factor = density * dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, density))
             arriving = self._arriving(ds, sampled, surface, wavelengths)
-            received = [mi.Spectrum(dr.select(dr.any(sampled != 0), value * factor, 0.0)) for value in arriving]
+            received = [mi.Spectrum(dr.select(ds.pdf != 0, value * factor, 0.0)) for value in arriving]
         out = mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
         onward = surface.spawn_ray(surface.to_world(out))
         density = mi.warp.square_to_cosine_hemisphere_pdf(out)
@@ -235,7 +235,7 @@ class Tracer:
         lit = go_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         si.wavelengths = wavelengths[0]
         ds, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
-        lit &= (ds.pdf != 0) & dr.any(light != 0)
+        lit &= ds.pdf != 0  # 0 also in shadow; a light may be dark at the first wavelengths and shine at others
         lobe, angle = sampler.next_1d(), sampler.next_2d()
         values, pdf, sample, weights, by_wavelength = dr.dispatch(
             bsdf, self._scattered, si, si.to_local(ds.d), lobe, angle, wavelengths, step
