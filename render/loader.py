@@ -1,5 +1,6 @@
 """From a `Scene` to Mitsuba objects: variant, film, and the scene at unit emission."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, reduce
@@ -13,7 +14,7 @@ from render.integrator.dense import SPECTRUM_SIZE, dense_path
 from render.integrator.matte import matte_surface, with_matte_surfaces
 from render.integrator.reflectance_table import band_offsets, reflectance_table, with_rows
 from render.integrator.scattered_path import scattered_path
-from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node
+from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node, walk
 from render.spectrum import Spectrum
 from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError, one_line
@@ -53,6 +54,12 @@ def mitsuba_module() -> Any:
     return mi
 
 
+def mitsuba_words(error: BaseException) -> str:
+    """Mitsuba's message on one line, without its source locations, and of an object's long description its name."""
+    without_places = re.sub(r"\[\w+\.cpp:\d+\] ", "", one_line(error))
+    return re.sub(r'\[ name = ("[^"]*"),.* \]', r" \1", without_places)
+
+
 @dataclass(frozen=True)
 class Film:
     """What the film records: its size, bands and the deepest path.
@@ -86,6 +93,8 @@ class Loaded:
         Whether emission depends on wavelength; at unit emission it is evaluated once.
     sample_lights : bool
         Whether directions are sampled towards lights.
+    hair : tuple of str
+        Paths of the surfaces whose sampling depends on wavelength: of stock Mitsuba's only ``hair`` (found by trying).
     curves : tuple of Spectrum
         Reflectances that are read from a table, row by row. None for coloured lights: a line in them
         would be met at few of the table's wavelengths.
@@ -98,6 +107,7 @@ class Loaded:
     groups: tuple[int, ...]
     coloured: bool
     sample_lights: bool
+    hair: tuple[str, ...] = ()
     curves: tuple[Spectrum, ...] = ()
     covering: Any = None
 
@@ -155,7 +165,14 @@ def _load_group(scene: Scene, group: str, film: Film) -> Loaded:
     # A constant environment is met in every direction: directions sampled for the surface alone leave less noise than a
     # mixture with ones sampled for the light, and half of the rays are saved.
     environment = [light.class_name() for light in mi_scene.emitters()] == ["ConstantBackgroundEmitter"]
-    return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=not environment, curves=curves)
+    return Loaded(
+        mi_scene=mi_scene,
+        groups=index,
+        coloured=coloured,
+        sample_lights=not environment,
+        hair=tuple("/".join(path) for path, node in walk(scene.geometry) if node.get("type") == "hair"),
+        curves=curves,
+    )
 
 
 def _covering(scene: Scene, group: str, film: Film) -> Node:
@@ -182,7 +199,7 @@ def _load(scene: Scene, group: str, description: Node) -> Any:
         mi.parser.transform_all(config, state)
         return mi.parser.instantiate(config, state)
     except RuntimeError as error:
-        words = one_line(error)
+        words = mitsuba_words(error)
         raise InputError(f"scene {scene.name}: Mitsuba can't load it: {words}; correct the description") from error
 
 

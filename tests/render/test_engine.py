@@ -580,8 +580,8 @@ def test_a_refused_scene_does_not_spoil_the_next_render_while_its_error_is_kept(
 def test_a_material_that_chooses_by_wavelength_is_refused(freed):
     hair = {"type": "hair", "eumelanin": 1.0}  # picks lobes by the attenuation of the path's first wavelengths
     text = complaint(render, ball_under_the_sky(hair), (6, 6), wavelength_nm=BANDS_NM, spp=16)
-    assert text.startswith("scene: a material chooses where light goes by wavelength")
-    assert "allowed: materials whose sampling doesn't depend on wavelength; replace it" in text
+    assert text.startswith("scene: ball/bsdf of type 'hair' chooses where light goes by wavelength")
+    assert "allowed: materials whose sampling doesn't depend on it; replace it, nearest to hair: principled" in text
 
 
 @pytest.mark.parametrize("bsdf", [{"type": "dielectric", "int_ior": 1.5}, {"type": "dielectric", "int_ior": "bk7"}])
