@@ -93,8 +93,6 @@ class Loaded:
         Whether emission depends on wavelength; at unit emission it is evaluated once.
     sample_lights : bool
         Whether directions are sampled towards lights.
-    hair : tuple of str
-        Paths of the surfaces whose sampling depends on wavelength: of stock Mitsuba's only ``hair`` (found by trying).
     curves : tuple of Spectrum
         Reflectances that are read from a table, row by row. None for coloured lights: a line in them
         would be met at few of the table's wavelengths.
@@ -107,7 +105,6 @@ class Loaded:
     groups: tuple[int, ...]
     coloured: bool
     sample_lights: bool
-    hair: tuple[str, ...] = ()
     curves: tuple[Spectrum, ...] = ()
     covering: Any = None
 
@@ -136,6 +133,12 @@ def integrator_name() -> str:
 
 def load_groups(scene: Scene, film: Film) -> list[Loaded]:
     """Load what is rendered one after the other: each light group, and a constant environment along with the first."""
+    hair = ["/".join(path) for path, node in walk(scene.geometry) if node.get("type") == "hair"]
+    if hair and backend() != "numpy" and film.wavelength_nm.size > SPECTRUM_SIZE:
+        raise InputError(
+            f"scene {scene.name}: {', '.join(hair)} of type 'hair' chooses where light goes by wavelength; allowed: "
+            f"{SPECTRUM_SIZE} bands a render; replace it, nearest: principled or roughplastic"
+        )
     names = list(scene.groups)
     carried = [] if backend() == "numpy" or len(names) == 1 else [x for x in names if scene.is_environment(x)][:1]
     loaded = [_load_group(scene, name, film) for name in names if name not in carried]
@@ -165,14 +168,7 @@ def _load_group(scene: Scene, group: str, film: Film) -> Loaded:
     # A constant environment is met in every direction: directions sampled for the surface alone leave less noise than a
     # mixture with ones sampled for the light, and half of the rays are saved.
     environment = [light.class_name() for light in mi_scene.emitters()] == ["ConstantBackgroundEmitter"]
-    return Loaded(
-        mi_scene=mi_scene,
-        groups=index,
-        coloured=coloured,
-        sample_lights=not environment,
-        hair=tuple("/".join(path) for path, node in walk(scene.geometry) if node.get("type") == "hair"),
-        curves=curves,
-    )
+    return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=not environment, curves=curves)
 
 
 def _covering(scene: Scene, group: str, film: Film) -> Node:

@@ -165,7 +165,7 @@ def _camera_part(
     """
     count = len(loaded.groups)
     image = _rendered(loaded.mi_scene, loaded.camera, integrator, spp, seed)
-    scattered, others = _bands(image, count, width_nm, loaded.hair)
+    scattered, others = _bands(image, count, width_nm)
     shares, of_light = others[:count], others[count : count + width_nm.size]
     if loaded.covering is not None:  # without Dr.Jit renders of their own show the lights
         seen_directly = mitsuba_module().load_dict({"type": "path", "max_depth": 1})
@@ -182,22 +182,20 @@ def _irradiance(loaded: Loaded, film: Film, spp: int, seed: int) -> Floats:
     means = []
     for part, integrator in integrators(film, METER_BANDS, loaded, seed, meter=True):
         image = _rendered(loaded.mi_scene, loaded.meter, integrator, spp, seed)
-        bands, _ = _bands(image, len(loaded.groups), film.width_nm[part], loaded.hair)
-        means.append(bands.mean(axis=(2, 3), dtype=np.float64))
+        means.append(_bands(image, len(loaded.groups), film.width_nm[part])[0].mean(axis=(2, 3), dtype=np.float64))
     # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
     return np.concatenate(means, axis=1) * (1 if backend() == "numpy" else np.pi)
 
 
-def _bands(image: Planes, groups: int, width_nm: Floats, hair: tuple[str, ...] = ()) -> tuple[Planes, Planes]:
+def _bands(image: Planes, groups: int, width_nm: Floats) -> tuple[Planes, Planes]:
     """Band averages (group, band, h, w) of a rendered part, and the channels after them."""
     size = width_nm.size
     if backend() == "numpy":  # specfilm integrates over the band
         return (image[:size] / width_nm.astype(np.float32)[:, None, None])[None], image[size:]
     if image[-1].any():
-        surfaces = f"{', '.join(hair)} of type 'hair'" if hair else "a material"
         raise InputError(
-            f"scene: {surfaces} chooses where light goes by wavelength; allowed: materials whose sampling doesn't "
-            "depend on it; replace it, nearest to hair: principled or roughplastic"
+            "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
+            "allowed: materials whose sampling doesn't depend on wavelength; replace it"
         )
     # Channel 0 is the film's own luminance; a group has its bands, filled up to a multiple of four.
     filled = size + -size % SPECTRUM_SIZE
