@@ -15,7 +15,7 @@ from rodcone.jit import dr
 SPECTRUM_SIZE = 4  # wavelengths of a spectral variant's `Spectrum`
 RR_DEPTH = 5  # Russian roulette from this depth on, as Mitsuba's `path`
 # Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
-# lobes by wavelength and one path can't serve all bands.
+# lobes by wavelength and one path can't serve all bands. Under the horizon `measured` gives densities below 0.
 PDF_TOLERANCE = 1e-3
 
 
@@ -262,7 +262,7 @@ class Tracer:
         _, pdf, sample, _ = drawn[0]
         chosen = _differs(sample, [other for _, _, other, _ in drawn[1:]])
         for _, other_pdf, _, _ in drawn[1:]:
-            chosen |= abs(other_pdf - pdf) > PDF_TOLERANCE * pdf
+            chosen |= abs(other_pdf - pdf) > PDF_TOLERANCE * abs(pdf)
         return [value for value, *_ in drawn], pdf, sample, [weight for *_, weight in drawn], chosen
 
     def _sampled(
@@ -284,7 +284,7 @@ def _differs(sample: Any, others: list[Any]) -> Any:
     """Whether the BSDF sampled another way at other wavelengths."""
     chosen = dr.zeros(dr.mask_t(sample.pdf))
     for other in others:
-        chosen |= abs(other.pdf - sample.pdf) > PDF_TOLERANCE * sample.pdf
+        chosen |= abs(other.pdf - sample.pdf) > PDF_TOLERANCE * abs(sample.pdf)
         chosen |= other.sampled_component != sample.sampled_component
     return chosen
 

@@ -6,6 +6,7 @@ with probability `FALSE_ALARM` at most (Bonferroni); seeds are fixed. A bias of 
 of ten.
 """
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,7 @@ SURFACES = {
         "normalmap",
         f'<texture name="normalmap" type="bitmap">{PICTURE}<boolean name="raw" value="true"/></texture>{RED_CLOTH}',
     ),
+    "measured": paint("measured", '<string name="filename" value="m.bsdf"/>'),
     "two sides": paint("twosided", RED_CLOTH + '<bsdf type="plastic"/>'),
 }
 # The second lamp as the first: one light group of one spectrum. Another: a coloured group, without rows.
@@ -187,6 +189,7 @@ def write_scene(folder: Path, paint: str, lights: str, camera: str = PERSPECTIVE
     grid = np.random.default_rng(6).uniform(0.2, 0.8, (4, 4, 4, 3)).astype("<f4")
     head = b"VOL\x03" + np.array([1, 4, 4, 4, 3], "<i4").tobytes() + np.array([0, 0, 0, 1, 1, 1], "<f4").tobytes()
     (folder / "v.vol").write_bytes(head + grid.tobytes())
+    write_measured(folder / "m.bsdf")
     (folder / "r.spd").write_text("370 0.2\n500 0.7\n790 0.3\n")
     (folder / "q.ply").write_text(
         "ply\nformat ascii 1.0\nelement vertex 4\n"
@@ -203,6 +206,24 @@ def write_scene(folder: Path, paint: str, lights: str, camera: str = PERSPECTIVE
         f"{lights}{BLACK_ROOM}</scene>"
     )
     return path
+
+
+def write_measured(path: Path) -> None:
+    """Made-up measured surface in the tensor file of Dupuy and Jakob (2018): even in angle of the half vector."""
+    fields = {name: np.ones((1, 4, 8, 8), np.float32) for name in ("vndf", "luminance")}
+    fields |= {name: np.ones((8, 8), np.float32) for name in ("ndf", "sigma")}
+    fields |= {"theta_i": np.linspace(0, 1.5, 4, dtype=np.float32), "phi_i": np.zeros(1, np.float32)}
+    fields |= {"wavelengths": np.linspace(360, 830, 6, dtype=np.float32)}
+    fields |= {"spectra": np.random.default_rng(7).uniform(0.1, 0.5, (1, 4, 6, 8, 8)).astype(np.float32)}
+    fields |= {"jacobian": np.ones(1, np.uint8), "description": np.frombuffer(b"made up", np.uint8)}
+    head, body = b"tensor_file\0\1\0" + struct.pack("<I", len(fields)), b""
+    first = len(head) + sum(13 + len(name) + 8 * values.ndim for name, values in fields.items())
+    for name, values in fields.items():
+        kind = {"u": 1, "f": 10}[values.dtype.kind]
+        head += struct.pack("<H", len(name)) + name.encode()
+        head += struct.pack(f"<HBQ{values.ndim}Q", values.ndim, kind, first + len(body), *values.shape)
+        body += values.tobytes()
+    path.write_bytes(head + body)
 
 
 def stock(path: Path) -> np.ndarray:
