@@ -499,6 +499,11 @@ def test_a_trusted_scene_may_load_native_code_and_files_from_anywhere(tmp_path: 
     assert str(tmp_path / "mine") in loaded_libraries()
 
 
+def test_what_is_not_simulated_is_refused_in_a_trusted_scene_too(tmp_path: Path) -> None:
+    told = refusal(write(tmp_path, CAMERA, SUN, MEDIUM), trust=True)  # inside a shape
+    assert "medium 'interior' of type 'homogeneous' is refused" in told
+
+
 def test_files_of_a_trusted_scene_are_looked_for_in_the_folders_of_its_paths(tmp_path: Path) -> None:
     """Mesh, bitmap, spectrum, include: each in a folder beside the scene; the last <path> goes first."""
     for name, height in (("models", 1), ("later", 2), ("a", 9)):
