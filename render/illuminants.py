@@ -9,6 +9,7 @@ from render.photometry import LUMINOUS_EFFICACY_LM_W, colour_matching_functions,
 from render.published_spectra import published_spectra
 from render.spectrum import Spectrum, black_body, flat, line_spectrum
 from rodcone.errors import require_range, unknown
+from rodcone.optional import quietly_imported
 
 # CIE 015:2018 tables in 5 nm steps. F11 stands for narrow-band fluorescent lamps,
 # HP1 is standard high-pressure sodium, LED-B3 a white LED of 4100 K, LED-RGB1 three LEDs, LED-V1 a violet-pumped one.
@@ -54,7 +55,8 @@ def illuminant(name: str) -> Spectrum:
     Parameters
     ----------
     name : str
-        One of `names()`; or ``3000K``, a black body; or ``D7000K``, daylight of that temperature.
+        One of `names()`; or ``3000K``, a black body; or ``D7000K``, daylight of that temperature; or what
+        colour-science calls another of its lights, such as ``FL3.12``, whose import takes 2 s.
 
     Raises
     ------
@@ -68,7 +70,10 @@ def illuminant(name: str) -> Spectrum:
         require_range("illuminant: black body [K]", kelvin, 800.0, 1e6, "cooler ones hardly glow")
         return unit_luminance(black_body(kelvin))
     if name not in names():
-        raise unknown("illuminant", name, (*names(), "temperature such as 3000K"))
+        others = quietly_imported("colour").SDS_ILLUMINANTS
+        if name not in others:
+            raise unknown("illuminant", name, (*names(), "temperature such as 3000K"))
+        return unit_luminance(Spectrum(others[name].wavelengths, others[name].values))
     if name in _LINES:
         return _unit_lines(*_LINES[name])
     return unit_luminance(_smooth(name))

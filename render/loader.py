@@ -1,10 +1,12 @@
 """From a `Scene` to Mitsuba objects: variant, film, and the scene at unit emission."""
 
+import re
 from dataclasses import dataclass, replace
 from functools import cache, reduce
 from operator import getitem
 from typing import Any
 
+from render.integrator.dense import SPECTRUM_SIZE
 from render.integrator.matte import matte_surface, with_matte_surfaces
 from render.integrator.reflectance_table import with_rows
 from render.integrator.scattered_path import scattered_path
@@ -45,6 +47,12 @@ def mitsuba_module() -> Any:
     else:
         mi.register_bsdf("matte", matte_surface(mi))
     return mi
+
+
+def mitsuba_words(error: BaseException) -> str:
+    """Mitsuba's message on one line, without its source locations, and of an object's long description its name."""
+    without_places = re.sub(r"\[\w+\.cpp:\d+\] ", "", one_line(error))
+    return re.sub(r'\[ name = ("[^"]*"),.* \]', r" \1", without_places)
 
 
 @dataclass(frozen=True)
@@ -120,6 +128,12 @@ def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Load
 
     With `metered` the reference plane carries an irradiance meter.
     """
+    hair = ["/".join(path) for path, node in walk(scene.geometry) if node.get("type") == "hair"]
+    if hair and backend() != "numpy" and film.wavelength_nm.size > SPECTRUM_SIZE:
+        raise InputError(
+            f"scene {scene.name}: {', '.join(hair)} of type 'hair' chooses where light goes by wavelength; allowed: "
+            f"{SPECTRUM_SIZE} bands a render; replace it, nearest: principled or roughplastic"
+        )
     names = list(scene.groups)
     carried = [] if backend() == "numpy" or len(names) == 1 else [x for x in names if scene.is_environment(x)][:1]
     apart = [name for name in names if name not in carried]
@@ -218,7 +232,7 @@ def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> Any
         mi.parser.transform_all(config, state)
         return mi.parser.instantiate(config, state)
     except RuntimeError as error:
-        words = one_line(error)
+        words = mitsuba_words(error)
         raise InputError(f"scene {scene.name}: Mitsuba can't load it: {words}; correct the description") from error
 
 

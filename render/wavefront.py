@@ -8,8 +8,8 @@ import numpy as np
 
 from render.integrator.dense import SPECTRUM_SIZE
 from render.integrator.points import Points, pixel_keys
-from render.loader import Film, mitsuba_module
-from rodcone.errors import InputError, one_line
+from render.loader import Film, mitsuba_module, mitsuba_words
+from rodcone.errors import InputError
 from rodcone.jit import arrays, dr
 from rodcone.types import Planes
 
@@ -50,7 +50,9 @@ def traced(
             cause = _root_cause(error)
             if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
                 raise
-            raise InputError(f"scene: Mitsuba can't render it: {one_line(cause)}; correct the description") from None
+            raise InputError(
+                f"scene: Mitsuba can't render it: {mitsuba_words(cause)}; correct the description"
+            ) from None
         if means is None:
             means = np.empty((span.chunks, len(channels), pixels), np.float32)
         for slot, channel in enumerate(channels):
@@ -85,7 +87,7 @@ def by_stock(mi_scene: Any, sensor: Any, integrator: Any, *, spp: int, seed: int
     try:
         image = mitsuba_module().render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
     except RuntimeError as error:
-        raise InputError(f"scene: Mitsuba can't render it: {one_line(error)}; correct the description") from None
+        raise InputError(f"scene: Mitsuba can't render it: {mitsuba_words(error)}; correct the description") from None
     return np.ascontiguousarray(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
 
 

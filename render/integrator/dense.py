@@ -18,7 +18,7 @@ from rodcone.jit import dr
 SPECTRUM_SIZE = 4  # wavelengths of a spectral variant's `Spectrum`
 RR_DEPTH = 5  # Russian roulette from this depth on, as Mitsuba's `path`
 # Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
-# lobes by wavelength and one path can't serve all bands.
+# lobes by wavelength and one path can't serve all bands. Under the horizon `measured` gives densities below 0.
 PDF_TOLERANCE = 1e-3
 
 
@@ -128,7 +128,7 @@ class Tracer:
             density = dr.maximum(surface.to_local(ds.d).z, 0.0) * dr.inv_pi
             factor = density * dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, density))
             arriving = self._arriving(ds, sampled, surface, wavelengths)
-            received = [mi.Spectrum(dr.select(dr.any(sampled != 0), value * factor, 0.0)) for value in arriving]
+            received = [mi.Spectrum(dr.select(ds.pdf != 0, value * factor, 0.0)) for value in arriving]
         out = mi.warp.square_to_cosine_hemisphere(direction)
         onward = surface.spawn_ray(surface.to_world(out))
         density = mi.warp.square_to_cosine_hemisphere_pdf(out)
@@ -226,7 +226,7 @@ class Tracer:
         lit = go_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         si.wavelengths = wavelengths[0]
         ds, light = scene.sample_emitter_direction(si, towards_light, True, lit)
-        lit &= (ds.pdf != 0) & dr.any(light != 0)
+        lit &= ds.pdf != 0  # 0 also in shadow; a light may be dark at the first wavelengths and shine at others
         values, pdf, sample, weights, by_wavelength = dr.dispatch(
             bsdf, self._scattered, si, si.to_local(ds.d), lobe, angle, wavelengths, step
         )
@@ -252,7 +252,7 @@ class Tracer:
         _, pdf, sample, _ = drawn[0]
         chosen = _differs(sample, [other for _, _, other, _ in drawn[1:]])
         for _, other_pdf, _, _ in drawn[1:]:
-            chosen |= abs(other_pdf - pdf) > PDF_TOLERANCE * pdf
+            chosen |= abs(other_pdf - pdf) > PDF_TOLERANCE * abs(pdf)
         return [value for value, *_ in drawn], pdf, sample, [weight for *_, weight in drawn], chosen
 
     def _sampled(
@@ -274,7 +274,7 @@ def _differs(sample: Any, others: list[Any]) -> Any:
     """Whether the BSDF sampled another way at other wavelengths."""
     chosen = dr.zeros(dr.mask_t(sample.pdf))
     for other in others:
-        chosen |= abs(other.pdf - sample.pdf) > PDF_TOLERANCE * sample.pdf
+        chosen |= abs(other.pdf - sample.pdf) > PDF_TOLERANCE * abs(sample.pdf)
         chosen |= other.sampled_component != sample.sampled_component
     return chosen
 

@@ -15,7 +15,7 @@ from rich.text import Text
 from studies.commands.console import print_table
 
 PACKAGES = ("scenes", "render", "sensor", "isp", "studies")
-NEEDED = ("mitsuba", "drjit", "numpy", "scipy", "OpenEXR", "scikit-image", "flip-evaluator")
+NEEDED = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR", "scikit-image", "flip-evaluator")
 LLVM_WHEEL = "karellen-llvm-core"
 FALLBACK = (
     "numpy: neither CUDA nor LLVM answers, so stock path + specfilm renders in scalar_spectral, "

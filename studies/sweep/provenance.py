@@ -13,7 +13,7 @@ from rodcone.jit import backend, compiler_version, dr
 from studies.sweep.code_version import code_version
 from studies.sweep.row import Row
 
-_PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "scikit-image", "flip-evaluator")
+_PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "scikit-image", "colour-science", "flip-evaluator")
 
 
 @dataclass(frozen=True)

@@ -592,8 +592,12 @@ def test_a_refused_scene_does_not_spoil_the_next_render_while_its_error_is_kept(
 
 
 @only_dense
-def test_a_material_that_chooses_by_wavelength_is_refused(freed):
+def test_a_material_that_chooses_by_wavelength_is_refused(freed, monkeypatch):
     hair = {"type": "hair", "eumelanin": 1.0}  # picks lobes by the attenuation of the path's first wavelengths
+    text = complaint(render, ball_under_the_sky(hair), (6, 6), wavelength_nm=BANDS_NM, spp=16)
+    assert text.startswith("scene ball: ball/bsdf of type 'hair' chooses where light goes by wavelength")
+    assert "allowed: 4 bands a render; replace it, nearest: principled or roughplastic" in text
+    monkeypatch.setattr("render.loader.walk", lambda node: ())  # as a plug-in that isn't known by its name
     text = complaint(render, ball_under_the_sky(hair), (6, 6), wavelength_nm=BANDS_NM, spp=16)
     assert text.startswith("scene: a material chooses where light goes by wavelength")
     assert "allowed: materials whose sampling doesn't depend on wavelength; replace it" in text

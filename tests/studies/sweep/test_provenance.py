@@ -40,7 +40,7 @@ def inexact(plan: Plan) -> Plan:
 
 def test_versions_are_those_that_the_modules_tell_themselves() -> None:
     found = versions()
-    own = {"scikit-image": "skimage"}
+    own = {"scikit-image": "skimage", "colour-science": "colour"}
     for name in ("numpy", "scipy", "mitsuba", "drjit", *own):
         assert found[name] == import_module(own.get(name, name)).__version__
     assert found["rodcone"].startswith(metadata.version("rodcone") + "+")
