@@ -71,7 +71,7 @@ def illuminant(name: str) -> Spectrum:
         return unit_luminance(black_body(kelvin))
     if name not in names():
         others = quietly_imported("colour").SDS_ILLUMINANTS
-        if name not in others:
+        if name not in list(others):  # colour-science takes any case
             raise unknown("illuminant", name, (*names(), "temperature such as 3000K"))
         return unit_luminance(Spectrum(others[name].wavelengths, others[name].values))
     if name in _LINES:

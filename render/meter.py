@@ -8,11 +8,11 @@ import numpy as np
 
 from render.cache import load_irradiance, save_irradiance
 from render.integrator.dense import Tracer
+from render.integrator.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
 from render.level import Irradiance
 from render.loader import METER_PIXELS, Film, Loaded, load_groups, mitsuba_module, stock_integrator
 from render.runs import let_go
 from render.scene import Scene
-from render.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
 from rodcone.errors import InputError
 from rodcone.jit import backend
 from rodcone.types import Planes

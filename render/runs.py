@@ -14,12 +14,12 @@ import numpy as np
 
 from render.error_estimates import relative_error, shared_paths, variance_of
 from render.integrator.dense import Tracer
+from render.integrator.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
 from render.level import SceneMeans
 from render.limits import MOST_POINTS, chunk_from
 from render.loader import PART_BANDS, Film, Loaded, mitsuba_module, stock_integrator
 from render.scene import Scene
 from render.transport import Transport
-from render.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
 from rodcone.jit import backend
 from rodcone.types import Floats, Planes
 

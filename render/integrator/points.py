@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from rodcone.jit import arrays, dr
+from rodcone.jit import dr
 
 LOG2_POINTS = 15
 DIMENSIONS = 34  # of the sequence; paths that need more get independent numbers
@@ -34,10 +34,9 @@ def _sequence() -> NDArray[np.uint32]:
 
 
 @cache
-def _on_device() -> Any:
+def _on_device(mi: Any) -> Any:
     """The sequence in memory of Dr.Jit's own: a kernel reads NumPy's, which may be aligned or not, by other code."""
-    number = arrays().UInt
-    sequence = number(_sequence()) ^ dr.opaque(number, 0)
+    sequence = mi.UInt32(_sequence()) ^ dr.opaque(mi.UInt32, 0)
     dr.eval(sequence)
     return sequence
 
@@ -58,7 +57,7 @@ class Points:
 
     def __init__(self, mi: Any, index: Any, key: Any) -> None:
         self.mi, self.index, self.key = mi, index, key
-        self.sequence = _on_device()
+        self.sequence = _on_device(mi)
 
     def at(self, dimension: Any) -> Any:
         """Number in [0, 1) of each thread's point in a dimension, 0 or more."""

@@ -680,8 +680,8 @@ RENDERS = (
     _fault(
         "a version left out",
         "studies/sweep/provenance.py",
-        '"scikit-image", "flip-evaluator"',
-        '"flip-evaluator"',
+        '"scikit-image", "colour-science"',
+        '"scikit-image"',
         "studies/sweep/test_provenance",
     ),
     _fault(

@@ -10,7 +10,7 @@ from render.integrator.dense import SPECTRUM_SIZE
 from render.integrator.points import Points, pixel_keys
 from render.loader import Film, mitsuba_module, mitsuba_words
 from rodcone.errors import InputError
-from rodcone.jit import arrays, dr
+from rodcone.jit import dr
 from rodcone.types import Planes
 
 
@@ -32,17 +32,17 @@ def traced(
     trace: Callable[[Any, Points], list[Any]], size: tuple[int, int], span: Span, threads: int, seed: int
 ) -> Planes:
     """Means over each chunk of the channels that a tracer gives, shape (chunk, channel, h, w)."""
-    jit, mi, pixels, samples = arrays(), mitsuba_module(), size[0] * size[1], span.chunk * span.chunks
+    mi, pixels, samples = mitsuba_module(), size[0] * size[1], span.chunk * span.chunks
     most = max(1, threads // samples)
     means: Planes | None = None
     for first in range(0, pixels, most):
         count = min(most, pixels - first)
         # thread = (number of the chunk x count + number of the pixel) x chunk + number of the point within the chunk
-        thread, length = dr.arange(jit.UInt, count * samples), dr.opaque(jit.UInt, span.chunk)
-        sums_before, in_block = thread // length, dr.opaque(jit.UInt, count)
+        thread, length = dr.arange(mi.UInt32, count * samples), dr.opaque(mi.UInt32, span.chunk)
+        sums_before, in_block = thread // length, dr.opaque(mi.UInt32, count)
         number = sums_before // in_block
-        pixel = sums_before - number * in_block + dr.opaque(jit.UInt, first)
-        index = thread - sums_before * length + number * length + dr.opaque(jit.UInt, span.start)
+        pixel = sums_before - number * in_block + dr.opaque(mi.UInt32, first)
+        index = thread - sums_before * length + number * length + dr.opaque(mi.UInt32, span.start)
         try:
             channels = trace(pixel, Points(mi, index, pixel_keys(mi, pixel, seed)))
             dr.eval(channels)
