@@ -16,7 +16,7 @@ import numpy as np
 
 from render.combine import emission
 from render.error_estimates import SharedPaths, relative_error
-from render.level import Irradiance, PassMeans
+from render.level import Irradiance, SceneMeans
 from render.loader import Film, integrator_name, variant
 from render.scene import Node, Scene, walk
 from render.transport import Transport
@@ -24,11 +24,11 @@ from rodcone.digests import digest, digest_file
 from rodcone.files import replacing
 from rodcone.jit import compiler_version
 
-ENGINE_VERSION = 6  # raise it with any change that moves a rendered value: older entries are then not used
+ENGINE_VERSION = 7  # raise it with any change that moves a rendered value: older entries are then not used
 _DIGEST_BYTES = hashlib.sha256().digest_size
-_ARRAYS = ("radiance", "half_difference", "variance", "coverage")
-_MEANS = tuple(field.name for field in fields(PassMeans))
-_VALUES = ("spp", "passes", "stopped_by", "seconds", "integrator", "variant")
+_ARRAYS = ("radiance", "half_difference", "variance", "coverage", "coverage_difference")
+_MEANS = tuple(field.name for field in fields(SceneMeans))
+_VALUES = ("spp", "stopped_by", "seconds", "integrator", "variant")
 _NOT_IN_NAMES = re.compile(r"[^\w.-]+")  # above all path separators: entries stay in their folder
 
 
@@ -46,11 +46,12 @@ def load_transport(folder: Path, scene: Scene, film: Film, seed: int) -> Transpo
         **{name: arrays[name] for name in _ARRAYS},
         **{name: values[name] for name in _VALUES},
         seen=tuple(arrays[f"seen_{index}"] for index in range(len(scene.groups))),
-        pass_means=PassMeans(**{name: arrays[f"pass_{name}"] for name in _MEANS}),
+        seen_difference=tuple(arrays[f"seen_difference_{index}"] for index in range(len(scene.groups))),
+        scene_means=SceneMeans(**{name: arrays[f"mean_{name}"] for name in _MEANS}),
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,
         width_nm=film.width_nm,
-        relative_mc_error=relative_error(lights, arrays["radiance"], arrays["variance"], shared=shared),
+        relative_mc_error=relative_error(lights, arrays["radiance"], arrays["variance"], shared),
         shared=shared,
     )
 
@@ -60,7 +61,8 @@ def save_transport(folder: Path, scene: Scene, film: Film, seed: int, transport:
     shared = transport.shared
     arrays: dict[str, Any] = {name: np.ascontiguousarray(getattr(transport, name)) for name in _ARRAYS}
     arrays |= {f"seen_{index}": planes for index, planes in enumerate(transport.seen)}
-    arrays |= {f"pass_{name}": x for name, x in vars(transport.pass_means).items()}
+    arrays |= {f"seen_difference_{index}": planes for index, planes in enumerate(transport.seen_difference)}
+    arrays |= {f"mean_{name}": x for name, x in vars(transport.scene_means).items()}
     arrays |= {"correlation": shared.correlation} if shared else {}
     values = {name: getattr(transport, name) for name in _VALUES} | {"shared": shared.groups if shared else None}
     _write(_path(folder, scene, film, seed), arrays | {"values": np.array(json.dumps(values))})

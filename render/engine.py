@@ -1,4 +1,4 @@
-"""Rendering a scene's transport: independent passes, their scatter as the error, and the rule that stops them."""
+"""Rendering a scene's transport: two halves, their difference as the error, and the rule that stops it."""
 
 import signal
 import threading
@@ -14,12 +14,11 @@ from numpy.typing import ArrayLike
 
 from render.cache import load_transport, save_transport
 from render.combine import emission
-from render.error_estimates import relative_error
 from render.level import Irradiance
 from render.limits import Limits
-from render.loader import Film, integrator_name, load_groups, samples_drawn, variant
+from render.loader import Film, integrator_name, load_groups, variant
 from render.meter import Meter
-from render.passes import add_pass, let_go, no_passes, sums_of
+from render.runs import add_run, error_of, estimates_of, let_go, means_of, no_means
 from render.scene import Scene
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
@@ -48,7 +47,7 @@ def render(
     """Render each light group of a scene at unit spectral emission.
 
     Stops at whichever comes first of `spp` (or `max_spp`), `noise` and `max_seconds`; with none of them after 64
-    samples a pixel. Ctrl-C ends it after the passes under way and keeps them; a second one gives up.
+    samples a pixel. Ctrl-C ends it after the run under way and keeps it; a second one gives up.
 
     Parameters
     ----------
@@ -59,15 +58,15 @@ def render(
         Band centres and widths; 40 bands of 10 nm over 380-780 nm by default. `render.spectrum.line_bands` gives
         emission lines bands of their own.
     spp : int, optional
-        Samples a pixel, in eight passes or some more; rounded up by a fifth at most to what an even number of passes
-        and the stratified sampler can hold (below 5, to the next even number). `Transport.spp` holds the samples drawn.
+        Samples a pixel, in two independent halves; rounded up by an eighth at most. `Transport.spp` holds the samples
+        drawn.
     max_spp : int, optional
-        The same as a ceiling beside `noise` or `max_seconds`: in passes of 16 or fewer.
+        The same as a ceiling beside `noise` or `max_seconds`.
     noise : float, optional
         Relative Monte Carlo error (median over pixels and bands, variance pooled over 3x3 pixels, scene's own lights)
-        to reach, estimated from eight passes on.
+        to reach, looked at from 16 samples on at powers of two and half-way between.
     max_seconds : float, optional
-        Time to keep, earlier calls' included; at least two passes are made.
+        Time to keep, earlier calls' included; at least one run is made.
     max_depth : int
         Longest path in segments; 2 is direct light.
     seed : int
@@ -75,9 +74,9 @@ def render(
     cache : path, optional
         Folder of renders. A stored one that is fine enough is returned, a coarser one continued, a damaged one ignored.
     resume : Transport, optional
-        An earlier result of the same scene, size, bands, depth and seed to go on from; its passes are kept.
+        An earlier result of the same scene, size, bands, depth and seed to go on from: to the bits of one go.
     progress : callable, optional
-        Called after each pair of passes with the share done and the error so far.
+        Called after each run with the share done and the error so far (infinite before the first look).
 
     Returns
     -------
@@ -155,45 +154,37 @@ def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film) -> Tra
 
 def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None, progress: Progress) -> Transport:
     start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
-    sums = sums_of(earlier) if earlier else no_passes(scene, film)
-    pass_spp = limits.pass_spp(samples_drawn, sums.spp)
+    means = means_of(earlier) if earlier else no_means(scene, film)
     loaded = load_groups(scene, film)
     lights, stopped_by = emission(scene.groups, film.wavelength_nm, film.width_nm), None
+    error, look = np.inf, limits.next_look(means.count)
     with _interrupt_noted() as interrupted:
         while stopped_by is None:
-            for _ in range(2):  # two by two, so that even and odd halves stay equal
-                pass_start = time.perf_counter()
-                add_pass(loaded, sums, film, pass_spp, limits.seed)
+            run_start = time.perf_counter()
+            add_run(loaded, means, film, look, limits.seed)
+            if means.count >= look:
+                error, look = error_of(lights, means), limits.next_look(means.count)
             now = time.perf_counter()
-            error = relative_error(lights, sums.mean, sums.scatter, float(sums.variance_factor), sums.shared)
-            progress(limits.share(sums.drawn, error, now - start), error)
-            # The second of a pair compiles nothing: its time is that of the next ones.
-            stopped_by = limits.stop(sums.drawn, sums.passes, error, now - start, now - pass_start)
+            progress(limits.share(means.count, error, now - start), error)
+            stopped_by = limits.stop(means.count, error, now - start, now - run_start)
             if stopped_by is None and interrupted():
                 stopped_by = "interrupt"
-    # The sums become the result in place: they are used up.
-    shared, samples = sums.shared, np.float32(sums.drawn)
-    sums.scatter *= sums.variance_factor
-    for planes in (sums.signed, sums.coverage, *sums.seen):
-        np.divide(planes, samples, out=planes)
     return Transport(
-        radiance=sums.mean,
-        half_difference=sums.signed,
-        variance=sums.scatter,
-        coverage=np.minimum(sums.coverage, np.float32(1)),  # each group is found by paths of its own
-        seen=tuple(sums.seen),
-        pass_means=sums.pass_means(),
+        radiance=means.radiance,
+        half_difference=means.difference,
+        coverage=means.coverage,
+        coverage_difference=means.coverage_difference,
+        seen=tuple(means.seen),
+        seen_difference=tuple(means.seen_difference),
+        **estimates_of(lights, means),
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,
         width_nm=film.width_nm,
-        spp=sums.drawn,
-        passes=sums.passes,
+        spp=2 * means.count,
         stopped_by=stopped_by,
         seconds=time.perf_counter() - start,
         integrator=integrator_name(),
         variant=variant(),
-        relative_mc_error=relative_error(lights, sums.mean, sums.scatter, shared=shared),
-        shared=shared,
     )
 
 

@@ -45,37 +45,49 @@ class SharedPaths:
         return np.asarray(factor * self.correlation * np.sqrt(variance[one]) * np.sqrt(variance[other]))
 
 
-def relative_error(
-    emitted: Floats, radiance: Planes, variance: Planes, factor: float = 1.0, shared: SharedPaths | None = None
-) -> float:
-    """Median over pixels and bands of standard error over mean, the variance pooled over 3x3 pixels; dark values out.
+def pooled(planes: Planes) -> Planes:
+    """Means over 3x3 pixels, of the last two axes; at the picture's edge the nearest pixels count again."""
+    # Sums of nine: a running sum would leave a rounding of its brightest pixel behind.
+    wide = np.pad(planes, [(0, 0)] * (planes.ndim - 2) + [(1, 1), (1, 1)], mode="edge")
+    rows = wide[..., :-2, :] + wide[..., 1:-1, :] + wide[..., 2:, :]
+    return np.asarray((rows[..., :-2] + rows[..., 1:-1] + rows[..., 2:]) / planes.dtype.type(9))
 
-    Pooling steadies an estimate that has few passes behind it.
+
+def variance_of(difference: Planes) -> Planes:
+    """Variance of a mean of two halves, from half their difference: its square, pooled over 3x3 pixels.
+
+    One difference has one degree of freedom; bands share their paths, and add none.
+    """
+    return pooled(np.square(difference))
+
+
+def shared_paths(groups: tuple[int, int], difference: Planes, variance: Planes) -> SharedPaths:
+    """Correlation of the errors of two groups, from half the difference of the halves (group, band, h, w)."""
+    one, other = groups
+    both = np.sqrt(variance[one]) * np.sqrt(variance[other])
+    product = pooled(difference[one] * difference[other])
+    found = np.divide(product, both, out=np.zeros_like(both), where=both > 0)
+    return SharedPaths(groups, np.clip(found, -1, 1, out=found))
+
+
+def relative_error(emitted: Floats, radiance: Planes, variance: Planes, shared: SharedPaths | None = None) -> float:
+    """Median over pixels and bands of standard error over mean; dark values out.
 
     Parameters
     ----------
     emitted : (group, band) float64
     radiance, variance : (group, band, h, w) float32
-    factor : float
-        On the variance.
     shared : SharedPaths, optional
         Groups whose errors are correlated.
     """
     rows, columns = _spread(radiance.shape[2:])
-    last_row, last_column = radiance.shape[2] - 1, radiance.shape[3] - 1
-    squares = emitted[:, :, None, None] ** 2
-    pooled = np.zeros((radiance.shape[1], rows.size, columns.size))
-    for down in (-1, 0, 1):
-        for right in (-1, 0, 1):
-            around = np.clip(rows + down, 0, last_row)[:, None], np.clip(columns + right, 0, last_column)
-            neighbour = variance[:, :, around[0], around[1]]
-            pooled += (squares * neighbour).sum(axis=0)
-            if shared:
-                part = replace(shared, correlation=shared.correlation[:, around[0], around[1]])
-                pooled += part.term(emitted, neighbour)
-    values = (emitted[:, :, None, None] * radiance[:, :, rows[:, None], columns]).sum(axis=0)
+    chosen = np.s_[..., rows[:, None], columns]
+    total = (emitted[:, :, None, None] ** 2 * variance[chosen]).sum(axis=0)
+    if shared:
+        total += replace(shared, correlation=shared.correlation[chosen]).term(emitted, variance[chosen])
+    values = (emitted[:, :, None, None] * radiance[chosen]).sum(axis=0)
     lit = values > 0
-    return float(np.median(np.sqrt(np.maximum(pooled[lit], 0.0) * factor / 9) / values[lit])) if lit.any() else 0.0
+    return float(np.median(np.sqrt(np.maximum(total[lit], 0.0)) / values[lit])) if lit.any() else 0.0
 
 
 def within_band_error(

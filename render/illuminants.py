@@ -6,11 +6,12 @@ from functools import cache
 import numpy as np
 
 from render.photometry import LUMINOUS_EFFICACY_LM_W, colour_matching_functions, luminance
+from render.published_spectra import published_spectra
 from render.spectrum import Spectrum, black_body, flat, line_spectrum
 from rodcone.errors import require_range, unknown
-from rodcone.optional import colour_science
+from rodcone.optional import quietly_imported
 
-# CIE 015:2018 tables as colour-science holds them, mostly in 5 nm steps. F11 stands for narrow-band fluorescent lamps,
+# CIE 015:2018 tables in 5 nm steps. F11 stands for narrow-band fluorescent lamps,
 # HP1 is standard high-pressure sodium, LED-B3 a white LED of 4100 K, LED-RGB1 three LEDs, LED-V1 a violet-pumped one.
 _TABULATED = {
     **{name: name for name in ("A", "D50", "D55", "D65", "D75")},
@@ -54,7 +55,8 @@ def illuminant(name: str) -> Spectrum:
     Parameters
     ----------
     name : str
-        One of `names()`; or ``3000K``, a black body; or ``D7000K``, daylight of that temperature.
+        One of `names()`; or ``3000K``, a black body; or ``D7000K``, daylight of that temperature; or what
+        colour-science calls another of its lights, such as ``FL3.12``, whose import takes 2 s.
 
     Raises
     ------
@@ -68,7 +70,10 @@ def illuminant(name: str) -> Spectrum:
         require_range("illuminant: black body [K]", kelvin, 800.0, 1e6, "cooler ones hardly glow")
         return unit_luminance(black_body(kelvin))
     if name not in names():
-        raise unknown("illuminant", name, (*names(), "temperature such as 3000K"))
+        others = quietly_imported("colour").SDS_ILLUMINANTS
+        if name not in list(others):  # colour-science takes any case
+            raise unknown("illuminant", name, (*names(), "temperature such as 3000K"))
+        return unit_luminance(Spectrum(others[name].wavelengths, others[name].values))
     if name in _LINES:
         return _unit_lines(*_LINES[name])
     return unit_luminance(_smooth(name))
@@ -89,8 +94,7 @@ def _smooth(name: str) -> Spectrum:
         return Spectrum(sun.wavelength_nm, sun.values * (1 + MOON_SLOPE_PER_NM * (sun.wavelength_nm - 550.0)))
     if name == "sunlight":
         return _direct_sun()
-    table = colour_science().SDS_ILLUMINANTS[_TABULATED[name]]
-    return Spectrum(table.wavelengths, table.values)
+    return Spectrum(*published_spectra("illuminants")[_TABULATED[name]])
 
 
 @cache
@@ -108,17 +112,22 @@ def daylight(cct_k: float) -> Spectrum:
         For a temperature outside that range, in which the formula holds.
     """
     require_range("illuminant: daylight [K]", cct_k, 4000.0, 25_000.0, "below it give a black body such as 3000K")
-    colour = colour_science()
-    table = colour.sd_CIE_illuminant_D_series(colour.temperature.CCT_to_xy_CIE_D(cct_k), M1_M2_rounding=False)
-    return unit_luminance(Spectrum(table.wavelengths, table.values))
+    t = np.float64(cct_k)  # rounded as colour-science rounds, whose bits scenes have been known by
+    if t <= 7000.0:
+        x = -4.607e9 / t**3 + 2.9678e6 / t**2 + 0.09911 * 10**3 / t + 0.244063
+    else:
+        x = -2.0064e9 / t**3 + 1.9018e6 / t**2 + 0.24748 * 10**3 / t + 0.23704
+    y = -3.0 * x**2 + 2.87 * x - 0.275
+    m = 0.0241 + 0.2562 * x - 0.7341 * y
+    m1 = (-1.3515 - 1.7703 * x + 5.9114 * y) / m
+    m2 = (0.0300 - 31.4424 * x + 30.0717 * y) / m
+    (nm, s0), (_, s1), (_, s2) = published_spectra("daylight").values()
+    return unit_luminance(Spectrum(nm, s0 + m1 * s1 + m2 * s2))
 
 
 def _direct_sun() -> Spectrum:
     """Sun's own beam at the ground, in 1 nm means: ASTM G173-03, direct and circumsolar, sun 42 degrees high."""
-    table = colour_science().plotting.datasets.SD_ASTMG173_DIRECT_CIRCUMSOLAR
-    nm = np.arange(300.0, 1101.0)
-    fine = Spectrum(table.wavelengths, table.values)
-    return Spectrum(nm, fine.band_average(nm, np.ones_like(nm)))
+    return Spectrum(*published_spectra("sun")["direct"])
 
 
 def unit_luminance(spectrum: Spectrum) -> Spectrum:

@@ -8,7 +8,6 @@ out of the area: the ratio needs no threshold, and has the same expectation at a
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rodcone.errors import InputError
 from rodcone.types import Floats
@@ -31,22 +30,22 @@ class Level:
 
 
 @dataclass(frozen=True)
-class PassMeans:
-    """Means over each pass of a render, from which levels are computed, at unit spectral emission.
+class SceneMeans:
+    """Means over the picture of what is no light, from which levels are computed, at unit spectral emission.
 
     Attributes
     ----------
-    spp : (pass,) int64
-        Samples a pixel: the weights of the passes.
-    uncovered : (pass,) float64
+    radiance : (group, band) float64
+        Light that isn't seen directly, over all of the picture.
+    uncovered : float
         Part of the picture in which no light is seen directly.
-    radiance : (pass, group, band) float64
-        Mean over the picture, without the light that is seen directly.
+    covariance : (group x band + 1, group x band + 1) float64
+        Of the Monte Carlo errors of `radiance` and, last, of `uncovered`.
     """
 
-    spp: NDArray[np.int64]
-    uncovered: Floats
     radiance: Floats
+    uncovered: float
+    covariance: Floats
 
     def mean_radiance(self) -> Floats:
         """Mean radiance of what is no light, shape (group, band).
@@ -56,12 +55,11 @@ class PassMeans:
         InputError
             Where lights fill the picture.
         """
-        uncovered = float(self.spp @ self.uncovered) / float(self.spp.sum())
-        if uncovered <= 0:
+        if self.uncovered <= 0:
             raise InputError(
                 "luminance_cd_m2: every pixel sees a light directly; give illuminance_lux or powers instead"
             )
-        return np.average(self.radiance, axis=0, weights=self.spp) / uncovered
+        return np.asarray(self.radiance / self.uncovered)
 
     def luminance_level(self, weights: Floats) -> Level:
         """Mean luminance of what is no light.
@@ -72,13 +70,11 @@ class PassMeans:
             Luminance of a radiance of 1 times the emission.
         """
         value = float((weights * self.mean_radiance()).sum())
-        if self.spp.size < 2 or value <= 0:
+        if value <= 0:
             return Level(value, None)
-        # Standard error of a ratio of sums over passes (linearised; Cochran, "Sampling Techniques", 2.11).
-        share = self.spp / self.spp.sum()
-        off = (self.radiance * weights).sum(axis=(1, 2)) - value * self.uncovered
-        variance = float(share @ off**2) / (self.spp.size - 1)
-        return Level(value, float(np.sqrt(variance)) / float(share @ self.uncovered) / value)
+        # Standard error of a ratio (linearised; Cochran, "Sampling Techniques", 2.11).
+        off = np.append(weights.ravel(), -value)
+        return Level(value, float(np.sqrt(off @ self.covariance @ off)) / self.uncovered / value)
 
 
 @dataclass(frozen=True)

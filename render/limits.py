@@ -1,6 +1,5 @@
 """When a render stops: samples, error or time, whichever comes first."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,10 +8,15 @@ from render.transport import Stop, Transport
 from rodcone.errors import InputError, require_range, require_whole
 
 DEFAULT_SPP = 64
-PASSES = 8  # scatter of fewer passes says little about the error
-PASS_SPP = 16  # samples a pixel and pass where only an error or a time is asked for
-MOST_SPP = 1 << 16  # ceiling where only an error is asked for
-MOST_ROUNDING = 1.2  # samples drawn over those asked for, at most; below 5 an even number of passes may draw more
+MOST_POINTS = 1 << 15  # of each half: as many as `render.integrator.points` holds
+MOST_SPP = 2 * MOST_POINTS  # ceiling where only an error is asked for
+LEAST_POINTS = 8  # of each half, before an error is believed
+A_POWER = 8  # chunks from one power of two to the next: at most an eighth more is drawn than asked for
+
+
+def chunk_from(start: int) -> int:
+    """Points that are added together from a place in the sequence on: 1 up to 16, 2 up to 32, and so on."""
+    return max(1, (1 << start.bit_length() >> 1) // A_POWER)
 
 
 @dataclass(frozen=True)
@@ -21,10 +25,8 @@ class Limits:
 
     Attributes
     ----------
-    spp : int or None
-        Samples a pixel, drawn in `PASSES` passes or some more.
-    max_spp : int or None
-        The same, drawn in passes of at most `PASS_SPP`: for a render that is to stop earlier.
+    spp, max_spp : int or None
+        Samples a pixel; `max_spp` beside another limit.
     noise : float or None
         Relative Monte Carlo error to reach.
     max_seconds : float or None
@@ -57,48 +59,46 @@ class Limits:
         require_whole("seed", self.seed, 0, 2**63, "give a whole number")
 
     @property
-    def most_spp(self) -> int:
-        """Samples a pixel after which the render stops in any case."""
-        return self.spp or self.max_spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
+    def most_points(self) -> int:
+        """Points of each half after which the render stops in any case: a whole number of chunks."""
+        asked = self.spp or self.max_spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
+        half = -(-asked // 2)
+        chunk = chunk_from(half)
+        return -(-half // chunk) * chunk
 
-    def pass_spp(self, drawn: Callable[[int], int], earlier: Sequence[int] = ()) -> int:
-        """Samples a pixel of each pass to come: the most that keep to `PASSES` and `MOST_ROUNDING`.
-
-        Parameters
-        ----------
-        drawn : callable
-            Samples that the sampler draws where so many are asked for.
-        earlier : sequence of int
-            Samples of each pass that was made already; passes of the last one's size are preferred.
-        """
-        whole = -(-self.most_spp // PASSES)
-        wanted = min(whole, PASS_SPP) if self.max_spp or self.most_spp == MOST_SPP else whole
-        missing = self.most_spp - sum(earlier)
-        for spp in range(earlier[-1] if earlier else wanted, 1, -1):
-            held = drawn(spp)
-            pairs = -(-missing // (2 * held))
-            enough = len(earlier) + 2 * pairs >= PASSES
-            if enough and sum(earlier) + 2 * held * pairs <= MOST_ROUNDING * self.most_spp:
-                return held
-        return 1
+    def next_look(self, count: int) -> int:
+        """Points of each half after which the error is looked at next: powers of two, and half-way between."""
+        if self.noise is None or count < LEAST_POINTS:
+            return self.most_points if self.noise is None else min(LEAST_POINTS, self.most_points)
+        power = 1 << count.bit_length() >> 1
+        return min(power + power // 2 if count < power + power // 2 else 2 * power, self.most_points)
 
     def met_by(self, earlier: Transport) -> bool:
         """Whether a render that was made earlier leaves nothing to do."""
-        pass_seconds = earlier.seconds / earlier.passes
-        reached = self.stop(earlier.spp, earlier.passes, earlier.relative_mc_error, earlier.seconds, pass_seconds)
-        return reached is not None
+        last_s = earlier.seconds / max(earlier.spp, 1)
+        return self.stop(earlier.spp // 2, earlier.relative_mc_error, earlier.seconds, last_s) is not None
 
-    def stop(self, drawn: int, passes: int, error: float, seconds: float, pass_seconds: float) -> Stop | None:
-        """Which limit is reached, None while none is."""
-        if drawn >= self.most_spp:
+    def stop(self, count: int, error: float, seconds: float, last_s: float) -> Stop | None:
+        """Which limit is reached, None while none is.
+
+        Parameters
+        ----------
+        count : int
+            Points of each half so far.
+        error : float
+            Relative Monte Carlo error.
+        seconds, last_s : float
+            So far, and of the last run: another one would end after the time given.
+        """
+        if count >= self.most_points:
             return "samples"
-        if self.noise is not None and passes >= PASSES and error <= self.noise:
+        if self.noise is not None and count >= LEAST_POINTS and error <= self.noise:
             return "noise"
-        if self.max_seconds is not None and seconds + 2 * pass_seconds > self.max_seconds:
-            return "seconds"  # the next pair of passes would end after it
+        if self.max_seconds is not None and count > 0 and seconds + last_s > self.max_seconds:
+            return "seconds"
         return None
 
-    def share(self, drawn: int, error: float, seconds: float) -> float:
+    def share(self, count: int, error: float, seconds: float) -> float:
         """Share of the work done, 0 to 1: by the limit that is nearest."""
         by_noise = (self.noise / error) ** 2 if self.noise and error else 0.0
-        return min(max(drawn / self.most_spp, seconds / (self.max_seconds or np.inf), by_noise), 1.0)
+        return min(max(count / self.most_points, seconds / (self.max_seconds or np.inf), by_noise), 1.0)

@@ -1,19 +1,16 @@
 """From a `Scene` to Mitsuba objects: variant, film, and the scene at unit emission."""
 
-from collections.abc import Iterator
+import re
 from dataclasses import dataclass, replace
 from functools import cache, reduce
 from operator import getitem
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from render.integrator.dense import SPECTRUM_SIZE, dense_path
+from render.integrator.dense import SPECTRUM_SIZE
 from render.integrator.matte import matte_surface, with_matte_surfaces
-from render.integrator.reflectance_table import band_offsets, reflectance_table, with_rows
+from render.integrator.reflectance_table import with_rows
 from render.integrator.scattered_path import scattered_path
-from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node
+from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node, walk
 from render.spectrum import Spectrum
 from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError, one_line
@@ -26,8 +23,8 @@ METER_PIXELS = 64  # film of the irradiance meter, each side
 # number: 40 bands of `still_life_outdoor`, 96x96, 16 samples, take 0.89 s of processor time in two parts and 0.69 s in
 # one, and compile in 5 and 12 s.
 PART_BANDS = 40
-_SAMPLER = {"type": "multijitter"}  # 8.7 times less error than "independent" under sun and sky at 64 samples, as fast
-_METER_SAMPLER = _SAMPLER | {"seed": 1}  # Mitsuba makes equal objects one: they would share a count
+# Without Dr.Jit, whose paths have points of their own: the samples of a pass are drawn independently, as many as asked.
+_SAMPLER = {"type": "independent"}
 _VARIANTS = {"cuda": "cuda_ad_spectral", "llvm": "llvm_ad_spectral", "numpy": "scalar_spectral"}
 
 
@@ -48,9 +45,14 @@ def mitsuba_module() -> Any:
     if backend() == "numpy":
         mi.register_integrator("scatteredpath", scattered_path(mi))
     else:
-        mi.register_integrator("densepath", dense_path(mi))
         mi.register_bsdf("matte", matte_surface(mi))
     return mi
+
+
+def mitsuba_words(error: BaseException) -> str:
+    """Mitsuba's message on one line, without its source locations, and of an object's long description its name."""
+    without_places = re.sub(r"\[\w+\.cpp:\d+\] ", "", one_line(error))
+    return re.sub(r'\[ name = ("[^"]*"),.* \]', r" \1", without_places)
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,10 @@ class Loaded:
     curves: tuple[Spectrum, ...] = ()
     covering: Any = None
 
+    def channels(self, bands: int) -> int:
+        """Channels of a path in so many bands (`render.integrator.dense.Tracer.camera`), about."""
+        return (bands + 4) * (len(self.groups) + self.coloured)
+
     @property
     def camera(self) -> Any:
         """Mitsuba's sensor."""
@@ -110,13 +116,6 @@ class Loaded:
     def meter(self) -> Any | None:
         """Mitsuba's irradiance meter on the reference plane, if the scene states one."""
         return next(iter(self.mi_scene.sensors()[1:]), None)
-
-
-def samples_drawn(spp: int) -> int:
-    """Samples a pixel that Mitsuba's stratified sampler draws where so many are asked for: it fills a grid."""
-    sampler = mitsuba_module().load_dict(_SAMPLER)
-    sampler.set_sample_count(spp)
-    return int(sampler.sample_count())
 
 
 def integrator_name() -> str:
@@ -129,36 +128,86 @@ def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Load
 
     With `metered` the reference plane carries an irradiance meter.
     """
+    hair = ["/".join(path) for path, node in walk(scene.geometry) if node.get("type") == "hair"]
+    if hair and backend() != "numpy" and film.wavelength_nm.size > SPECTRUM_SIZE:
+        raise InputError(
+            f"scene {scene.name}: {', '.join(hair)} of type 'hair' chooses where light goes by wavelength; allowed: "
+            f"{SPECTRUM_SIZE} bands a render; replace it, nearest: principled or roughplastic"
+        )
     names = list(scene.groups)
     carried = [] if backend() == "numpy" or len(names) == 1 else [x for x in names if scene.is_environment(x)][:1]
-    loaded = [_load_group(scene, name, film, metered) for name in names if name not in carried]
+    apart = [name for name in names if name not in carried]
+    curves: tuple[Spectrum, ...] = ()
+    if backend() != "numpy":
+        geometry, curves = with_rows(with_matte_surfaces(scene.geometry))
+        scene = replace(scene, geometry=geometry, extend=None)  # held ends are in the geometry by now
+        scene = _with_common_shapes(scene) if len(apart) > 1 else scene
+    loaded = [_load_group(scene, name, film, curves, metered) for name in apart]
     if carried:
         loaded[0] = replace(loaded[0], groups=(*loaded[0].groups, names.index(carried[0])))
     return loaded
 
 
-def _load_group(scene: Scene, group: str, film: Film, metered: bool) -> Loaded:
-    """Load a scene with one light group at unit spectral emission (or its own colours)."""
+def _with_common_shapes(scene: Scene) -> Scene:
+    """Load the shapes that belong to no light once, for all groups' scenes to hold, and the surfaces of lamps.
+
+    Dr.Jit traces every live surface and shape at each call, whichever scene it is in: with copies for each group,
+    tracing took as many times longer as there are groups.
+    """
+    mi = mitsuba_module()
+    lit = {path.split("/")[0] for group in scene.groups.values() for path in group.emitters}
+    parts = scene.geometry.items()
+    unlit = {x: part for x, part in parts if x not in {scene.reference_plane, *lit} and _is(part, mi.ObjectType.Shape)}
+    shapes = _load(scene, {"type": "scene", **unlit}, merge_meshes=True).shapes()
+    rest = {x: part for x, part in parts if x not in unlit}
+    for x in [x for x in rest if x in lit]:
+        surfaces = {name: part for name, part in rest[x].items() if _is(part, mi.ObjectType.BSDF)}
+        rest[x] = rest[x] | {name: _load(scene, part) for name, part in surfaces.items()}
+    return replace(scene, geometry=rest | dict(zip(unlit, shapes, strict=False)))  # merged meshes are fewer
+
+
+def _is(part: Any, kind: Any) -> bool:
+    """Whether a part of a scene's dict is of a kind of Mitsuba's, and nothing refers from it or to it."""
+    if not isinstance(part, dict) or part["type"] == "shapegroup":
+        return False
+    if any(node.get("type") == "ref" for _, node in walk({"": part})):
+        return False
+    mi = mitsuba_module()
+    own = {"matte": mi.ObjectType.BSDF}  # a plug-in written in Python, whose kind Mitsuba doesn't tell
+    return bool(kind == (own.get(part["type"]) or mi.PluginManager.instance().plugin_type(part["type"])))
+
+
+def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ...], metered: bool) -> Loaded:
+    """Load a scene with one light group at unit spectral emission (or its own colours).
+
+    `curves` are those of the table that the scene's matte surfaces name the rows of.
+    """
     description = scene.lit({group: uniform_node(1.0)})
     description["sensor"] = {**description["sensor"], "film": _recorder(film, film.size), "sampler": _SAMPLER}
     if metered and scene.reference_plane:
         if backend() == "numpy":
             scene.check_meter()
         recorder = _recorder(film, (METER_PIXELS, METER_PIXELS))
-        meter = {"type": "irradiancemeter", "film": recorder, "sampler": _METER_SAMPLER}
+        meter = {"type": "irradiancemeter", "film": recorder, "sampler": _SAMPLER | {"seed": 1}}
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
     index, coloured = (list(scene.groups).index(group),), scene.groups[group].coloured
     if backend() == "numpy":
-        covering = _load(scene, group, _covering(scene, group, film))
-        mi_scene = _load(scene, group, description)
+        covering = _load(scene, _covering(scene, group, film))
+        mi_scene = _load(scene, description)
         return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=True, covering=covering)
-    matte = with_matte_surfaces(description)
-    tabulated, curves = (matte, ()) if coloured else with_rows(matte)
-    mi_scene = _load(scene, group, tabulated)
+    # Merging meshes orders a scene's shapes anew at each load, and its lights with them. A path chooses a light by its
+    # number, so several keep their order only without.
+    mi_scene = _load(scene, description, merge_meshes=len(scene.groups[group].emitters) == 1)
     # A constant environment is met in every direction: directions sampled for the surface alone leave less noise than a
     # mixture with ones sampled for the light, and half of the rays are saved.
     environment = [light.class_name() for light in mi_scene.emitters()] == ["ConstantBackgroundEmitter"]
-    return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=not environment, curves=curves)
+    return Loaded(
+        mi_scene=mi_scene,
+        groups=index,
+        coloured=coloured,
+        sample_lights=not environment,
+        curves=() if coloured else curves,
+    )
 
 
 def _covering(scene: Scene, group: str, film: Film) -> Node:
@@ -174,18 +223,16 @@ def _covering(scene: Scene, group: str, film: Film) -> Node:
     return description
 
 
-def _load(scene: Scene, group: str, description: Node) -> Any:
+def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> Any:
     mi = mitsuba_module()
     config = mi.parser.ParserConfig(variant())
-    # Merging meshes orders a scene's shapes anew at each load, and its lights with them. A path chooses a light by its
-    # number, so several keep their order only without.
-    config.merge_meshes = len(scene.groups[group].emitters) == 1
+    config.merge_meshes = merge_meshes
     try:
         state = mi.parser.parse_dict(config, description)
         mi.parser.transform_all(config, state)
         return mi.parser.instantiate(config, state)
     except RuntimeError as error:
-        words = one_line(error)
+        words = mitsuba_words(error)
         raise InputError(f"scene {scene.name}: Mitsuba can't load it: {words}; correct the description") from error
 
 
@@ -201,36 +248,6 @@ def _recorder(film: Film, size: tuple[int, int]) -> Node:
     return node
 
 
-def integrators(
-    film: Film, part_bands: int, loaded: Loaded, seed: int, meter: bool = False
-) -> Iterator[tuple[NDArray[np.int64], Any]]:
-    """Indices of some bands and their integrator, which together give all bands in order.
-
-    With Dr.Jit each has at most `part_bands` (a multiple of four), their numbers as even as can be: parts of one size
-    share a kernel. A part is filled up to a multiple of four by repeating its last band. The seed decides where in the
-    bands the paths' wavelengths lie.
-    """
-    mi, count = mitsuba_module(), film.wavelength_nm.size
-    if backend() == "numpy":
-        plug_in = "path" if meter else "scatteredpath"
-        yield np.arange(count), mi.load_dict({"type": plug_in, "max_depth": film.max_depth})
-        return
-    offsets = band_offsets(seed)
-    for part in np.array_split(np.arange(count), -(-count // part_bands)):
-        padded = np.concatenate([part, np.full(-part.size % SPECTRUM_SIZE, part[-1])])
-        centre, width = film.wavelength_nm[padded], film.width_nm[padded]
-        made = mi.load_dict(
-            {
-                "type": "densepath",
-                "max_depth": film.max_depth,
-                "meter": meter,
-                "coloured": loaded.coloured,
-                "sample_lights": loaded.sample_lights,
-                "environment": len(loaded.groups) > 1,
-                "wavelength_nm": ",".join(map(repr, centre.tolist())),
-                "width_nm": ",".join(map(repr, width.tolist())),
-            }
-        )
-        if loaded.curves:
-            made.tracer.prepare(offsets, reflectance_table(loaded.curves, centre + width * offsets[:, None]))
-        yield part, made
+def stock_integrator(plug_in: str, film: Film) -> Any:
+    """Integrator of Mitsuba's own, for renders without Dr.Jit."""
+    return mitsuba_module().load_dict({"type": plug_in, "max_depth": film.max_depth})

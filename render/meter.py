@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from render.cache import load_irradiance, save_irradiance
+from render.integrator.dense import Tracer
+from render.integrator.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
 from render.level import Irradiance
-from render.loader import METER_PIXELS, Film, Loaded, integrators, load_groups
-from render.passes import band_planes, let_go, rendered
+from render.loader import METER_PIXELS, Film, Loaded, load_groups, mitsuba_module, stock_integrator
+from render.runs import let_go
 from render.scene import Scene
 from rodcone.errors import InputError
 from rodcone.jit import backend
@@ -67,7 +69,7 @@ def _measured(scene: Scene, film: Film, seed: int) -> Irradiance:
     halves = np.zeros(shape, np.float32)
     for loaded in load_groups(scene, film, metered=True):
         for half in range(2):
-            of_half = int(np.random.SeedSequence([seed, loaded.groups[0], half]).generate_state(2)[1])
+            of_half = seed_of(seed, loaded.groups[0], half, METER_PIXELS)
             halves[half, list(loaded.groups)] = _half(loaded, film, of_half)
     # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
     factor = 1.0 if backend() == "numpy" else np.pi
@@ -78,8 +80,13 @@ def _measured(scene: Scene, film: Film, seed: int) -> Irradiance:
 
 def _half(loaded: Loaded, film: Film, seed: int) -> Planes:
     """Irradiance of each of the film's pixels, (group, band, h, w)."""
+    if backend() == "numpy":
+        image = by_stock(loaded.mi_scene, loaded.meter, stock_integrator("path", film), spp=HALF_SPP, seed=seed)
+        return (image / film_width(film))[None]
     parts = []
-    for part, integrator in integrators(film, METER_BANDS, loaded, seed, meter=True):
-        image = rendered(loaded.mi_scene, loaded.meter, integrator, HALF_SPP, seed)
-        parts.append(band_planes(image, len(loaded.groups), film.width_nm[part])[0])
+    for part in np.array_split(np.arange(film.wavelength_nm.size), -(-film.wavelength_nm.size // METER_BANDS)):
+        bands = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
+        tracer = Tracer(mitsuba_module(), loaded, bands, seed)
+        image = traced(tracer.meter, film.size, Span(0, HALF_SPP, 1), HALF_SPP * METER_PIXELS**2, seed)
+        parts.append(bands_apart(image, len(loaded.groups), part.size)[0][0])
     return np.concatenate(parts, axis=1)

@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from render.published_spectra import published_spectra
 from render.spectrum import Spectrum
-from rodcone.optional import colour_science
 from rodcone.types import Floats
 
 PLANCK_J_S = 6.62607015e-34  # exact, SI 2019
@@ -16,9 +16,8 @@ LUMINOUS_EFFICACY_LM_W = 683.0  # SI: K_cd at 540 THz
 
 @cache
 def colour_matching_functions() -> tuple[Spectrum, Spectrum, Spectrum]:
-    """CIE 1931 2-degree x, y, z at 1 nm from 360 to 830 nm (CIE 018:2019, as colour-science holds them)."""
-    table = colour_science().MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
-    x, y, z = (Spectrum(table.wavelengths, np.maximum(column, 0.0)) for column in table.values.T)
+    """CIE 1931 2-degree x, y, z at 1 nm from 360 to 830 nm (CIE 018:2019)."""
+    x, y, z = (Spectrum(nm, np.maximum(values, 0.0)) for nm, values in published_spectra("observer").values())
     return x, y, z
 
 

@@ -31,7 +31,7 @@ class SpectralRadiance:
         Monte Carlo standard error over the value of the level that the light was brought to; None where none was asked
         for, or there is no estimate.
     signed : bool
-        Whether values may be negative: half of a render's passes, whose noise may cross 0.
+        Whether values may be negative: half of a render, whose noise may cross 0.
 
     Raises
     ------

@@ -74,8 +74,9 @@ class Scene:
     Raises
     ------
     InputError
-        Where a light is missing, of a kind that can't be relit, or in no group; where an ``envmap`` or ``sunsky`` is in
-        a group without `coloured`; or the plane isn't in the scene; or `extend` is something else.
+        Where a light is missing, of a kind that can't be relit, or in no group; where an ``envmap``, ``sunsky`` or
+        textured ``spot`` is in a group without `coloured`; or the plane isn't in the scene; or `extend` is something
+        else.
     """
 
     name: str
@@ -101,7 +102,8 @@ class Scene:
                 raise InputError(
                     f"scene {self.name}: emitter {path!r} is in {grouped.count(path)} light groups; put it in one"
                 )
-            if kind in COLOURED_EMITTERS and path not in tinted:
+            textured = "texture" in reduce(getitem, path.split("/"), self.geometry)  # a spot may hold a slide
+            if (kind in COLOURED_EMITTERS or textured) and path not in tinted:
                 raise InputError(
                     f"scene {self.name}: emitter {path!r} of type {kind!r} has colours of its own; "
                     "allowed: a light group with coloured=True, whose spectrum is a factor; set it"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from render.combine import combine, emission
 from render.error_estimates import SharedPaths, relative_error, within_band_error
 from render.illuminants import illuminant
-from render.level import Irradiance, Level, PassMeans
+from render.level import Irradiance, Level, SceneMeans
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
@@ -30,23 +30,24 @@ class Transport:
     Attributes
     ----------
     radiance : (group, band, h, w) float32
-        Mean over passes; times a spectral emission it is radiance.
+        Mean of two halves, whose paths are independent; times a spectral emission it is radiance.
     half_difference : (group, band, h, w) float32
-        Half the difference between even and odd passes: one draw of the error of `radiance`, all correlations kept.
+        Half the difference between the even and the odd half: one draw of the error of `radiance`, all correlations
+        kept.
     variance : (group, band, h, w) float32
-        Variance of `radiance`, from the scatter of the passes.
-    coverage : (h, w) float32
-        Share of each pixel's samples in which a light is seen directly.
-    seen : tuple of (1 or band, h, w) float32
+        Variance of `radiance`, from the difference of the halves, pooled over 3x3 pixels.
+    coverage, coverage_difference : (h, w) float32
+        Share of each pixel's samples in which a light is seen directly, and half the difference of the halves.
+    seen, seen_difference : tuple of (1 or band, h, w) float32
         The light in `radiance` that is seen directly, of each group: one plane for all bands, or by band where the
-        group has a colour of its own.
-    pass_means : PassMeans
-        What the passes give for levels.
+        group has a colour of its own; and half the difference of the halves.
+    scene_means : SceneMeans
+        What levels are computed from.
     groups : mapping of str to LightGroup
         The scene's own spectra and powers, in the order of the first axis.
     wavelength_nm, width_nm : (band,) float64
-    spp, passes : int
-        Samples a pixel, all passes together, and the number of passes.
+    spp : int
+        Samples a pixel, both halves together.
     stopped_by : "samples", "noise", "seconds" or "interrupt"
     seconds : float
         Of all the calls that it took.
@@ -63,13 +64,14 @@ class Transport:
     half_difference: Planes
     variance: Planes
     coverage: Planes
+    coverage_difference: Planes
     seen: tuple[Planes, ...]
-    pass_means: PassMeans
+    seen_difference: tuple[Planes, ...]
+    scene_means: SceneMeans
     groups: Mapping[str, LightGroup]
     wavelength_nm: Floats
     width_nm: Floats
     spp: int
-    passes: int
     stopped_by: Stop
     seconds: float
     integrator: str
@@ -126,7 +128,7 @@ class Transport:
         return SpectralRadiance(
             values=np.moveaxis(combine(coefficients, self.radiance), 0, -1),
             wavelength_nm=self.wavelength_nm,
-            relative_mc_error=relative_error(coefficients, self.radiance, self.variance, shared=self.shared),
+            relative_mc_error=relative_error(coefficients, self.radiance, self.variance, self.shared),
             width_nm=self.width_nm,
             relative_level_error=level_error,
         )
@@ -139,7 +141,7 @@ class Transport:
         luminance_cd_m2: float | None = None,
         illuminance_lux: float | None = None,
     ) -> tuple[SpectralRadiance, SpectralRadiance]:
-        """Two independent estimates of `relight` with the same arguments, from even and from odd passes.
+        """Two independent estimates of `relight` with the same arguments, from the two halves of the samples.
 
         Their mean is `relight`'s result; a quarter of the squared difference of any linear function of them is an
         unbiased estimate of that function's Monte Carlo variance. Where an error is larger than the value, a half may
@@ -185,7 +187,7 @@ class Transport:
         InputError
             As `relight`, and where lights fill the picture.
         """
-        return self.pass_means.luminance_level(self._luminance_weights(self._emission(spectra, powers)))
+        return self.scene_means.luminance_level(self._luminance_weights(self._emission(spectra, powers)))
 
     def illuminance_lux(self, luminance_cd_m2: float) -> float | None:
         """Illuminance on the reference plane at a mean luminance under the scene's own lights; None without a plane."""
@@ -195,7 +197,7 @@ class Transport:
 
     def mean_radiance(self, *, luminance_cd_m2: float) -> Floats:
         """Mean radiance of what is no light, at a level of the scene's own lights, shape (band,)."""
-        return np.asarray((self._own_at(luminance_cd_m2) * self.pass_means.mean_radiance()).sum(axis=0))
+        return np.asarray((self._own_at(luminance_cd_m2) * self.scene_means.mean_radiance()).sum(axis=0))
 
     def scattered_luminance(self, *, luminance_cd_m2: float | None = None) -> NDArray[np.float64]:
         """Luminance [cd m^-2] of each pixel without light that is seen directly, shape (h, w).
@@ -219,7 +221,7 @@ class Transport:
         facts = {
             "size": f"{self.radiance.shape[2]} x {self.radiance.shape[3]} pixels, {self.wavelength_nm.size} bands",
             "lights": ", ".join(self.groups),
-            "samples": f"{self.spp} a pixel in {self.passes} passes, {self.seconds:.1f} s",
+            "samples": f"{self.spp} a pixel, {self.seconds:.1f} s",
             "Monte Carlo error": f"{self.relative_mc_error:.2g} of the value",
             "integrator": f"{self.integrator}, {self.variant}",
         }
@@ -261,7 +263,7 @@ class Transport:
         weights = self._luminance_weights(emitted)
         if luminance_cd_m2 is not None:
             require_range("luminance_cd_m2", luminance_cd_m2, 0.0, 1e15, "give a mean luminance of 0 or more")
-            asked, present = luminance_cd_m2, self.pass_means.luminance_level(weights)
+            asked, present = luminance_cd_m2, self.scene_means.luminance_level(weights)
         elif illuminance_lux is not None:
             require_range("illuminance_lux", illuminance_lux, 0.0, 1e15, "give an illuminance of 0 or more")
             if self.meter is None:

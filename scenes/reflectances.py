@@ -4,8 +4,8 @@ from functools import cache
 
 import numpy as np
 
+from render.published_spectra import published_spectra
 from render.spectrum import Floats, Spectrum
-from rodcone.optional import colour_science
 
 LONGEST_NM = 1100.0  # as far as lights are known (`render.spectrum.flat`), beyond any response here
 _NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all materials keeps scenes quick to compile
@@ -13,9 +13,9 @@ _NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all mat
 
 @cache
 def color_checker() -> tuple[tuple[str, Spectrum], ...]:
-    """Name and reflectance of the 24 patches, row by row, 380-780 nm (Ohta 1997, as colour-science holds them)."""
-    table = colour_science().SDS_COLOURCHECKERS["cc_ohta"]
-    return tuple((name, Spectrum(curve.wavelengths, np.clip(curve.values, 0, 1))) for name, curve in table.items())
+    """Name and reflectance of the 24 patches, row by row, 380-780 nm (Ohta 1997)."""
+    tables = published_spectra("color_checker")
+    return tuple((name, Spectrum(nm, np.clip(values, 0, 1))) for name, (nm, values) in tables.items())
 
 
 def held(curve: Spectrum) -> Spectrum:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from render.level import Irradiance, PassMeans
+from render.level import Irradiance, SceneMeans
 from render.scene import LightGroup
 from render.transport import Transport
 from sensor.cfa import BAYER, RGBW, Tile
@@ -41,27 +41,29 @@ def transport_of(
     irradiance: NDArray[np.float64] | None = None,
     **changes: Any,
 ) -> Transport:
-    """Transport of radiance (group, band, h, w) in eight passes of eight samples that don't differ.
+    """Transport of radiance (group, band, h, w) of 64 samples, in halves that don't differ.
 
     `seen` (group, h, w) is the share of each pixel in which each group's light is seen directly, none by default.
     """
     given, bands, *size = radiance.shape
     seen = np.zeros((given, *size), np.float32) if seen is None else seen
     scattered = radiance.mean(axis=(2, 3), dtype=np.float64) - seen.mean(axis=(1, 2), dtype=np.float64)[:, None]
-    means = PassMeans(
-        spp=np.full(8, 8),
-        uncovered=np.full(8, 1 - seen.sum(axis=0).mean(dtype=np.float64)),
-        radiance=np.repeat(scattered[None], 8, axis=0),
+    means = SceneMeans(
+        radiance=scattered,
+        uncovered=1 - float(seen.sum(axis=0).mean(dtype=np.float64)),
+        covariance=np.zeros((scattered.size + 1,) * 2),
     )
     measured = None if irradiance is None else Irradiance(irradiance, np.zeros((irradiance.size,) * 2))
-    facts = {"stopped_by": "samples", "seconds": 1.0, "integrator": "none", "variant": "none", "spp": 64, "passes": 8}
+    facts = {"stopped_by": "samples", "seconds": 1.0, "integrator": "none", "variant": "none", "spp": 64}
     errors = {name: np.zeros((given, bands, *size), np.float32) for name in ("half_difference", "variance")}
     return Transport(
         **{
             "radiance": radiance,
             "coverage": seen.sum(axis=0),
             "seen": tuple(seen[:, None]),
-            "pass_means": means,
+            "seen_difference": tuple(np.zeros_like(seen[:, None])),
+            "coverage_difference": np.zeros(size, np.float32),
+            "scene_means": means,
             "groups": dict(groups),
             "wavelength_nm": np.asarray(wavelength_nm, np.float64),
             "width_nm": np.asarray(width_nm, np.float64),

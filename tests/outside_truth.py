@@ -6,7 +6,19 @@ was computed apart from this project, with NumPy, from ISETCam's published formu
 400:10:700 nm of spectra sampled at the band centres.
 """
 
+from functools import cache
+from typing import Any
+
 import numpy as np
+
+from rodcone.optional import quietly_imported
+
+
+@cache
+def colour_science() -> Any:
+    """Return the `colour` module, whose import takes 2 s."""
+    return quietly_imported("colour")
+
 
 MAGNIFICATION = 0.00323  # where none is named
 

@@ -21,7 +21,7 @@ from studies.sweep.run_sweep import Runner, Swept, sweep
 from studies.sweep.workers import InThisProcess, run
 
 RENDER = (
-    '{"integrator": "file", "passes": 8, "stopped_by": "samples", "relative_mc_error": 0.01, '
+    '{"integrator": "file", "stopped_by": "samples", "relative_mc_error": 0.01, '
     '"relative_level_error": null, "first_nm": 390.0, "last_nm": 770.0, "width_nm": 20.0, "brightest_share": null, '
     '"notes": []}'
 )

@@ -9,106 +9,92 @@ Mitsuba is handed in by `render.loader`, which alone imports it.
 
 from typing import Any
 
-from render.integrator.reflectance_table import TableReader
+import numpy as np
+
+from render.integrator.points import APERTURE, FILM, WAVELENGTH, Points
+from render.integrator.reflectance_table import TableReader, band_offsets, reflectance_table
 from rodcone.jit import dr
 
 SPECTRUM_SIZE = 4  # wavelengths of a spectral variant's `Spectrum`
 RR_DEPTH = 5  # Russian roulette from this depth on, as Mitsuba's `path`
 # Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
-# lobes by wavelength and one path can't serve all bands.
+# lobes by wavelength and one path can't serve all bands. Under the horizon `measured` gives densities below 0.
 PDF_TOLERANCE = 1e-3
 
 
-def dense_path(mi: Any) -> Any:
-    """Build the integrator class for the variant that is set; register it as ``densepath``.
-
-    Properties of the plug-in:
-
-    ``wavelength_nm``, ``width_nm``
-        Bands, comma-separated, a multiple of four.
-    ``max_depth``
-    ``coloured``
-        Whether emission depends on wavelength. At unit emission it doesn't, and is evaluated once.
-    ``sample_lights``
-        Whether directions are sampled towards lights. A constant environment is met in any direction.
-    ``environment``
-        Whether the light of a constant environment, which isn't in the scene, is carried by the paths that escape.
-    ``meter``
-        Whether paths begin on the shape of the scene's irradiance meter, instead of with the camera's ray. The bands
-        are then irradiance over pi.
-
-    Channels after the first (alpha-less luminance film) hold the bands, then the environment's. The camera's bands
-    leave out the light that is seen directly, which has channels of its own: the share of paths that meet a light
-    first, which is that light at unit emission; the share that meet the environment; with ``coloured`` the light's
-    bands. The last channel is the share of paths whose BSDF chose by wavelength.
-    """
-
-    class DensePath(mi.SamplingIntegrator):  # type: ignore[misc]
-        def __init__(self, props: Any) -> None:
-            super().__init__(props)
-            self.tracer = Tracer(mi, props)
-
-        def aov_names(self) -> list[str]:
-            return self.tracer.channel_names()
-
-        def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
-            return mi.Spectrum(0.0), mi.Bool(True), self.tracer.channels(scene, sampler, ray, mi.Bool(active))
-
-    return DensePath
-
-
 class Tracer:
-    """What the plug-in does: all wavelengths of a path are a list of `Spectrum`, four bands an entry.
+    """Traces paths of one light group: all wavelengths of a path are a list of `Spectrum`, four bands an entry.
 
     A plain class: Dr.Jit takes apart the arrays that it finds in a loop's variables.
+
+    Parameters
+    ----------
+    mi : module
+    loaded : Loaded
+        What is rendered: `coloured` emission is evaluated at all wavelengths, else once; directions towards lights are
+        sampled with `sample_lights`; with a second group the light of a constant environment, which isn't in the
+        scene, is carried by the paths that escape.
+    film : Film
+        Bands, and the longest path. Their number is filled up to a multiple of four by repeating the last.
+    seed : int
+        Decides where in the bands the paths' wavelengths lie, for a scene whose reflectances are read from a table.
     """
 
-    def __init__(self, mi: Any, props: Any) -> None:
-        self.mi = mi
-        self.max_depth = int(props.get("max_depth", 8))
-        self.coloured = bool(props.get("coloured", False))
-        self.sample_lights = bool(props.get("sample_lights", True))
-        self.environment = bool(props.get("environment", False))
-        self.meter = bool(props.get("meter", False))
-        self.centres = [float(x) for x in str(props["wavelength_nm"]).split(",")]
-        self.widths = [float(x) for x in str(props["width_nm"]).split(",")]
+    def __init__(self, mi: Any, loaded: Any, film: Any, seed: int) -> None:
+        self.mi, self.scene = mi, loaded.mi_scene
+        self.max_depth, self.coloured, self.sample_lights = film.max_depth, loaded.coloured, loaded.sample_lights
+        self.environment = len(loaded.groups) > 1
+        filled = np.append(np.arange(film.wavelength_nm.size), [film.wavelength_nm.size - 1] * 3)
+        filled = filled[: -(-film.wavelength_nm.size // SPECTRUM_SIZE) * SPECTRUM_SIZE]
+        self.centres, self.widths = film.wavelength_nm[filled], film.width_nm[filled]
         self.offsets: Any = None
         self.table: TableReader | None = None
+        if loaded.curves:
+            offsets = band_offsets(seed)
+            self.offsets = mi.Float(offsets)
+            nm = self.centres + self.widths * offsets[:, None]
+            self.table = TableReader(mi, reflectance_table(loaded.curves, nm))
 
-    def prepare(self, offsets: Any, reflectances: Any) -> None:
-        """Take a pass's offsets (step,) and table (row, step, band) of `render.integrator.reflectance_table`."""
-        self.offsets, self.table = self.mi.Float(offsets), TableReader(self.mi, reflectances)
+    def camera(self, size: tuple[int, int], pixel: Any, points: Points) -> list[Any]:
+        """Trace paths from the camera, one a thread.
 
-    def channel_names(self) -> list[str]:
-        """Name of each channel that `channels` gives."""
-        bands = len(self.centres)
-        seen = 0 if self.meter else 1 + self.environment + self.coloured * bands
-        carried = bands * (1 + self.environment)
-        names = [*(f"band{i:04d}" for i in range(carried)), *(f"seen{i:04d}" for i in range(seen))]
-        return [*names, "wavelength_dependent_choice"]
-
-    def channels(self, scene: Any, sampler: Any, ray: Any, active: Any) -> list[Any]:
-        """Trace a path and return its channels."""
-        mi = self.mi
-        wavelengths, step = self._wavelengths(sampler.next_1d(active))
-        if self.meter:
-            start = self._start_on_meter(scene, sampler, ray, wavelengths)
-        else:
-            dark = [mi.Spectrum(0.0) for _ in wavelengths]
-            start = mi.Ray3f(ray), dr.zeros(mi.SurfaceInteraction3f), mi.Float(1.0), mi.Bool(True), dark
-        result, chosen = self._trace(scene, sampler, start, wavelengths, step, active)
-        bands = [value for group in result for value in group]
-        if not self.meter:
-            bands += self._seen(scene, ray, wavelengths)
-        return [*bands, dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
-
-    def _wavelengths(self, sample: Any) -> tuple[list[Any], Any]:
-        """Wavelengths of a path, and the table's step that they belong to.
-
-        The offset from the bands' centres is one of those that the pass has a table for, if it has one. Centres and
-        widths reach the kernel as data: other bands don't compile it anew.
+        Returns
+        -------
+        list of Float
+            Bands without the light that is seen directly, then the environment's; the share of paths that meet a light
+            first, which is that light at unit emission; the share that meet the environment; with ``coloured`` the
+            light's bands; the share of paths whose BSDF chose by wavelength.
         """
         mi = self.mi
+        wavelengths, step = self._wavelengths(points)
+        row, at = pixel // size[1], points.pair(FILM)
+        film = mi.Point2f((mi.Float(pixel - row * size[1]) + at.x) / size[1], (mi.Float(row) + at.y) / size[0])
+        sensor = self.scene.sensors()[0]
+        ray, _ = sensor.sample_ray(0.0, 0.5, film, points.pair(APERTURE))
+        dark = [mi.Spectrum(0.0) for _ in wavelengths]
+        start = mi.Ray3f(ray), dr.zeros(mi.SurfaceInteraction3f), mi.Float(1.0), mi.Bool(True), dark
+        result, chosen = self._trace(self.scene, points, start, wavelengths, step, 0)
+        bands = [value for group in result for value in group]
+        return [*bands, *self._seen(ray, wavelengths), dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
+
+    def meter(self, _: Any, points: Points) -> list[Any]:
+        """Trace paths from the shape of the scene's irradiance meter: irradiance over pi, as the bands of `camera`.
+
+        The pixel isn't asked for: each path starts anywhere on the shape.
+        """
+        wavelengths, step = self._wavelengths(points)
+        start = self._start_on_meter(points, wavelengths)
+        result, chosen = self._trace(self.scene, points, start, wavelengths, step, 1)
+        bands = [value for group in result for value in group]
+        return [*bands, dr.select(chosen, self.mi.Float(1.0), self.mi.Float(0.0))]
+
+    def _wavelengths(self, points: Points) -> tuple[list[Any], Any]:
+        """Wavelengths of a path, and the table's step that they belong to.
+
+        The offset from the bands' centres is one of those that the table is made for, if there is one. Centres and
+        widths reach the kernel as data: other bands don't compile it anew.
+        """
+        mi, sample = self.mi, points.at(WAVELENGTH)
         if self.offsets is None:
             offset, step = sample - 0.5, mi.UInt32(0)
         else:
@@ -116,11 +102,11 @@ class Tracer:
             offset = dr.gather(mi.Float, self.offsets, step)
         bands = [
             dr.fma(offset, dr.opaque(mi.Float, width), dr.opaque(mi.Float, centre))
-            for centre, width in zip(self.centres, self.widths, strict=True)
+            for centre, width in zip(self.centres.tolist(), self.widths.tolist(), strict=True)
         ]
         return [mi.Spectrum(*bands[i : i + SPECTRUM_SIZE]) for i in range(0, len(bands), SPECTRUM_SIZE)], step
 
-    def _start_on_meter(self, scene: Any, sampler: Any, ray: Any, wavelengths: list[Any]) -> tuple[Any, ...]:
+    def _start_on_meter(self, points: Points, wavelengths: list[Any]) -> tuple[Any, ...]:
         """Start of a path on the irradiance meter: a white matte surface whose lights are sampled as any other's.
 
         Mitsuba's own meter only waits for its rays to meet a light: the sun is met once in 50 000, a point light never.
@@ -129,29 +115,32 @@ class Tracer:
         -------
         ray, surface that it leaves, density of its direction, whether no light was sampled, light received so far
         """
-        mi = self.mi
+        mi, scene = self.mi, self.scene
         card = next(shape for shape in scene.shapes() if shape.is_sensor())
-        position = card.sample_position(ray.time, sampler.next_2d())
-        surface = dr.zeros(mi.SurfaceInteraction3f, dr.width(ray.o))
+        position = card.sample_position(0.0, points.pair(FILM))
+        surface = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.index))
         surface.p, surface.n, surface.sh_frame = position.p, position.n, mi.Frame3f(position.n)
         surface.wavelengths = wavelengths[0]
         received = [mi.Spectrum(0.0) for _ in wavelengths]
+        towards_light, _, direction = points.bounce(mi.UInt32(0))
         if self.sample_lights:
-            ds, sampled = scene.sample_emitter_direction(surface, sampler.next_2d(), True)
+            ds, sampled = scene.sample_emitter_direction(surface, towards_light, True)
             density = dr.maximum(surface.to_local(ds.d).z, 0.0) * dr.inv_pi
             factor = density * dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, density))
             arriving = self._arriving(ds, sampled, surface, wavelengths)
-            received = [mi.Spectrum(dr.select(dr.any(sampled != 0), value * factor, 0.0)) for value in arriving]
-        out = mi.warp.square_to_cosine_hemisphere(sampler.next_2d())
+            received = [mi.Spectrum(dr.select(ds.pdf != 0, value * factor, 0.0)) for value in arriving]
+        out = mi.warp.square_to_cosine_hemisphere(direction)
         onward = surface.spawn_ray(surface.to_world(out))
         density = mi.warp.square_to_cosine_hemisphere_pdf(out)
         return onward, surface, density, mi.Bool(not self.sample_lights), received
 
     @dr.syntax
     def _trace(
-        self, scene: Any, sampler: Any, start: tuple[Any, ...], wavelengths: list[Any], step: Any, active: Any
+        self, scene: Any, points: Points, start: tuple[Any, ...], wavelengths: list[Any], step: Any, bounced: int
     ) -> tuple[list[Any], Any]:
         """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``).
+
+        A path that starts on the meter has `bounced` once.
 
         A path that escapes meets the environment, and then carries what that would give it: its throughput. A light
         that the camera's ray meets first counts for `_seen` alone.
@@ -161,18 +150,20 @@ class Tracer:
         ray.wavelengths = wavelengths[0]
         throughput = [mi.Spectrum(1.0) for _ in wavelengths]
         eta, depth = mi.Float(1.0), mi.UInt32(0)
-        chosen, escaped = mi.Bool(False), mi.Bool(False)
+        chosen, escaped, active = mi.Bool(False), mi.Bool(False), mi.Bool(True)
         while dr.hint(active, label="dense path"):
             # Light that the path meets
             si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
             share = self._share(scene, si, previous, previous_pdf, previous_delta)
             emitted = self._emitted(scene, si, wavelengths)
-            indirect = (depth > 0) | self.meter
+            indirect = (depth > 0) | (bounced > 0)
             result = _plus(result, throughput, emitted, dr.select(indirect, share, 0.0))
 
             # Light that is sampled from here, and the direction to go on in
             go_on, escaped = (depth + 1 < self.max_depth) & si.is_valid(), indirect & ~si.is_valid()
-            received, sample, weights, by_wavelength = self._bounce(scene, sampler, ray, si, go_on, wavelengths, step)
+            received, sample, weights, by_wavelength = self._bounce(
+                scene, points.bounce(depth + bounced), ray, si, go_on, wavelengths, step
+            )
             result = _plus(result, throughput, received, 1.0)
             chosen |= go_on & by_wavelength
             scattered = _times(throughput, weights)
@@ -183,17 +174,17 @@ class Tracer:
             previous, previous_pdf = dr.detach(si), sample.pdf
             previous_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
             depth[si.is_valid()] += 1
-            scattered, survives = _roulette(scattered, eta, depth, sampler.next_1d())
+            scattered, survives = _roulette(scattered, eta, depth, points.roulette(depth))
             throughput = _either(escaped & self.environment, throughput, scattered)
             active = go_on & survives
         sky = _either(escaped, throughput, [mi.Spectrum(0.0) for _ in wavelengths])
         return [*result, *(sky if self.environment else [])], chosen
 
-    def _seen(self, scene: Any, ray: Any, wavelengths: list[Any]) -> list[Any]:
+    def _seen(self, ray: Any, wavelengths: list[Any]) -> list[Any]:
         """Channels of what the camera's ray meets first, if that is a light."""
         mi = self.mi
-        si = scene.ray_intersect(mi.Ray3f(ray), mi.RayFlags.All, coherent=True)
-        emitted = self._emitted(scene, si, wavelengths)
+        si = self.scene.ray_intersect(mi.Ray3f(ray), mi.RayFlags.All, coherent=True)
+        emitted = self._emitted(self.scene, si, wavelengths)
         bands = [value for group in emitted for value in group] if self.coloured else []
         shines = mi.Bool(False)
         for value in bands or emitted[:1]:
@@ -224,19 +215,18 @@ class Tracer:
         return [sampled[0]] * len(wavelengths)
 
     def _bounce(
-        self, scene: Any, sampler: Any, ray: Any, si: Any, go_on: Any, wavelengths: list[Any], step: Any
+        self, scene: Any, drawn: tuple[Any, ...], ray: Any, si: Any, go_on: Any, wavelengths: list[Any], step: Any
     ) -> tuple[list[Any], Any, list[Any], Any]:
         """Light from a sampled position on a lamp; next direction, its weights, whether wavelength chose it."""
         mi, bsdf = self.mi, si.bsdf(ray)
+        towards_light, lobe, angle = drawn
         if not self.sample_lights:
-            lobe, angle = sampler.next_1d(), sampler.next_2d()
             sample, weights, by_wavelength = dr.dispatch(bsdf, self._sampled, si, lobe, angle, wavelengths, step)
             return [mi.Spectrum(0.0) for _ in wavelengths], sample, weights, by_wavelength
         lit = go_on & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         si.wavelengths = wavelengths[0]
-        ds, light = scene.sample_emitter_direction(si, sampler.next_2d(), True, lit)
-        lit &= (ds.pdf != 0) & dr.any(light != 0)
-        lobe, angle = sampler.next_1d(), sampler.next_2d()
+        ds, light = scene.sample_emitter_direction(si, towards_light, True, lit)
+        lit &= ds.pdf != 0  # 0 also in shadow; a light may be dark at the first wavelengths and shine at others
         values, pdf, sample, weights, by_wavelength = dr.dispatch(
             bsdf, self._scattered, si, si.to_local(ds.d), lobe, angle, wavelengths, step
         )
@@ -262,7 +252,7 @@ class Tracer:
         _, pdf, sample, _ = drawn[0]
         chosen = _differs(sample, [other for _, _, other, _ in drawn[1:]])
         for _, other_pdf, _, _ in drawn[1:]:
-            chosen |= abs(other_pdf - pdf) > PDF_TOLERANCE * pdf
+            chosen |= abs(other_pdf - pdf) > PDF_TOLERANCE * abs(pdf)
         return [value for value, *_ in drawn], pdf, sample, [weight for *_, weight in drawn], chosen
 
     def _sampled(
@@ -284,7 +274,7 @@ def _differs(sample: Any, others: list[Any]) -> Any:
     """Whether the BSDF sampled another way at other wavelengths."""
     chosen = dr.zeros(dr.mask_t(sample.pdf))
     for other in others:
-        chosen |= abs(other.pdf - sample.pdf) > PDF_TOLERANCE * sample.pdf
+        chosen |= abs(other.pdf - sample.pdf) > PDF_TOLERANCE * abs(sample.pdf)
         chosen |= other.sampled_component != sample.sampled_component
     return chosen
 

@@ -41,7 +41,9 @@ class TableReader:
     def __init__(self, mi: Any, table: NDArray[np.float32]) -> None:
         self._spectrum = mi.Spectrum
         self._groups = table.shape[2] // dr.size_v(mi.Spectrum)
-        self._values = mi.Float(table.ravel())
+        # By way of a list, into memory of Dr.Jit's own: an array of NumPy's is used where it lies, and one that happens
+        # to lie on a multiple of 64 bytes is read by other code, which is compiled anew.
+        self._values = mi.Float(table.ravel().tolist())
 
     def read(self, row: Any, step: Any, active: Any) -> list[Any]:
         """Reflectance of a path's surface at all its wavelengths, four an entry."""

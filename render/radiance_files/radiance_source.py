@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from render.level import PassMeans
+from render.level import SceneMeans
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import read_exr
 from render.radiance_files.iset import read_iset_scene
@@ -52,23 +52,23 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
     nm, width = radiance.wavelength_nm, radiance.widths_nm
     ends = np.clip([(nm - width).min(), (nm + width).max()], SHORTEST_NM, LONGEST_NM)
     whole = Spectrum(ends, np.ones(2))
-    none = np.broadcast_to(np.float32(0), planes.shape)
+    none, dark = np.broadcast_to(np.float32(0), planes.shape), np.zeros((1, *radiance.shape), np.float32)
+    means = planes.mean(axis=(2, 3), dtype=np.float64)
     error = radiance.relative_mc_error
     variance = np.minimum((error * planes.astype(np.float64)) ** 2, np.finfo(np.float32).max).astype(np.float32)
     return Transport(
         radiance=planes,
         half_difference=none,
         variance=variance if error else none,
-        coverage=np.zeros(radiance.shape, np.float32),
-        seen=(np.zeros((1, *radiance.shape), np.float32),),
-        pass_means=PassMeans(
-            spp=np.ones(1, np.int64), uncovered=np.ones(1), radiance=planes.mean(axis=(2, 3), dtype=np.float64)[None]
-        ),
+        coverage=dark[0],
+        coverage_difference=dark[0],
+        seen=(dark,),
+        seen_difference=(dark,),
+        scene_means=SceneMeans(means, 1.0, np.zeros((means.size + 1,) * 2)),
         groups={name: LightGroup((), whole)},
         wavelength_nm=nm,
         width_nm=width,
         spp=0,
-        passes=0,
         stopped_by="samples",
         seconds=0.0,
         integrator="file",

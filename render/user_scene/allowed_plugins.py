@@ -10,7 +10,8 @@ from typing import Any
 from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER
 from rodcone.errors import InputError, unknown
 
-CAMERAS = ("perspective", "thinlens")
+CAMERAS = ("perspective", "thinlens", "orthographic")
+UNUSED_CAMERAS = ("batch", "distant", "radiancemeter")  # read, and left out where another one can be rendered
 METER = "irradiancemeter"  # in a shape it marks the plane on which illuminance is measured
 SPECTRA = ("blackbody", "d65", "irregular", "rawconstant", "regular", "srgb", "uniform")
 
@@ -21,7 +22,8 @@ _STOCK = {
     "sphere",
     "bsdf": "blendbsdf bumpmap conductor dielectric diffuse hair mask measured normalmap null plastic principled "
     "principledthin roughconductor roughdielectric roughplastic thindielectric twosided",
-    "texture": "bitmap checkerboard mesh_attribute",
+    "texture": "bitmap checkerboard mesh_attribute volume",
+    "volume": "constvolume gridvolume",  # inside a texture; media, which also hold them, are refused
     "film": "hdrfilm specfilm",
     "rfilter": "box catmullrom gaussian lanczos mitchell tent",
     "sampler": "independent ldsampler multijitter orthogonal stratified",
@@ -30,32 +32,48 @@ _STOCK = {
 }
 ALLOWED: dict[str, tuple[str, ...]] = {kind: tuple(names.split()) for kind, names in _STOCK.items()}
 ALLOWED["texture"] += SPECTRA
-ALLOWED |= {"emitter": (*EMISSION_PARAMETER, *COLOURED_EMITTERS), "sensor": (*CAMERAS, METER)}
+ALLOWED |= {"emitter": (*EMISSION_PARAMETER, *COLOURED_EMITTERS), "sensor": (*CAMERAS, METER, *UNUSED_CAMERAS)}
 _KIND = {name: kind for kind, names in ALLOWED.items() for name in names}
 
-_MEDIA = "participating media aren't simulated", "remove the medium"
-_POLARISED = "polarisation isn't simulated", "replace it by its plain form"
-_RELIT = "its light can't be relit", f"allowed: {', '.join(ALLOWED['emitter'])}"
-_CAMERA = "the camera is a perspective one", f"allowed: {', '.join(CAMERAS)}"
-_VOLUME = "it needs an integrator of its own", "replace it by a mesh"
-_REASONS: dict[str, tuple[str, str]] = {
-    **dict.fromkeys(("homogeneous", "heterogeneous"), _MEDIA),
-    **dict.fromkeys(("hg", "isotropic", "rayleigh", "sggx", "tabphase", "blendphase"), _MEDIA),
-    **dict.fromkeys(("constvolume", "gridvolume", "volume"), _MEDIA),
-    **dict.fromkeys(("circular", "polarizer", "retarder", "pplastic", "measured_polarized"), _POLARISED),
-    **dict.fromkeys(("directionalarea", "projector", "timed_sunsky"), _RELIT),
-    **dict.fromkeys(("batch", "distant", "orthographic", "radiancemeter"), _CAMERA),
-    **dict.fromkeys(("ellipsoids", "ellipsoidsmesh", "volprim_rf_basic"), _VOLUME),
+_MEDIA = "participating media aren't simulated"
+_POLARISED = "polarisation isn't simulated"
+_RELIT = "its light can't be relit"
+_PRIMITIVES = "it needs an integrator of its own"
+_NO_MEDIUM = "remove the medium; nearest to a dense one comes a plastic or diffuse surface, to a thin one null"
+_REASONS: dict[str, tuple[str, str]] = {  # why a plug-in is refused, and the nearest thing that works
+    **dict.fromkeys(("homogeneous", "heterogeneous"), (_MEDIA, _NO_MEDIUM)),
+    **dict.fromkeys(("hg", "isotropic", "rayleigh", "sggx", "tabphase", "blendphase"), (_MEDIA, _NO_MEDIUM)),
+    **dict.fromkeys(
+        ("circular", "polarizer"), (_POLARISED, "nearest: a mask of opacity 0.5 over a diffuse of reflectance 0")
+    ),
+    "retarder": (_POLARISED, "nearest: null, which it is to unpolarised light"),
+    "pplastic": (_POLARISED, "nearest: roughplastic"),
+    "measured_polarized": (_POLARISED, "nearest: measured, principled or roughconductor"),
+    "directionalarea": (_RELIT, "nearest: area or directional"),
+    "projector": (_RELIT, "nearest: spot with a texture"),
+    "timed_sunsky": (_RELIT, "nearest: sunsky"),
+    **dict.fromkeys(("ellipsoids", "ellipsoidsmesh"), (_PRIMITIVES, "nearest: sphere, or a mesh as ply")),
+    "volprim_rf_basic": (_PRIMITIVES, "remove it: the engine brings its own"),
+    "blender": ("it reads memory at addresses that the scene states", "save the mesh as ply"),
 }
 
 
-def require_allowed(plugin: str, tag: str = "") -> None:
-    """Raise `InputError` for a plug-in that isn't on the list; `tag` narrows the names that the error tells."""
+def require_allowed(plugin: str, *, tag: str, name: str, trust: bool) -> None:
+    """Raise `InputError` for a plug-in that isn't simulated, or, unless the scene is trusted, isn't on the list.
+
+    Parameters
+    ----------
+    plugin : str
+    tag, name : str
+        Kind of the scene's element, and its own name, empty where it has none.
+    trust : bool
+    """
+    what = f"{tag} {name!r} of type" if name else f"{tag} type"
     if plugin in _REASONS:
         reason, fix = _REASONS[plugin]
-        raise InputError(f"plug-in {plugin!r} is refused, {reason}; {fix}")
-    if plugin not in _KIND:
-        refusal = unknown("plug-in", plugin, ALLOWED.get(tag) or _KIND)
+        raise InputError(f"{what} {plugin!r} is refused, {reason}; {fix}")
+    if plugin not in _KIND and not trust:
+        refusal = unknown(what, plugin, ALLOWED.get(tag) or _KIND)
         raise InputError(f"{refusal}; or, if you trust the scene, trust=True or --trust-scene")
 
 
@@ -65,12 +83,10 @@ def kind_of(mi: Any, plugin: str) -> str:
     Raises
     ------
     InputError
-        For an emitter or sensor of a trusted scene's own, and what isn't simulated.
+        For an emitter or sensor of a trusted scene's own.
     """
     if plugin in _KIND:
         return _KIND[plugin]
-    if plugin in _REASONS:
-        raise InputError(f"plug-in {plugin!r} is refused also in a trusted scene, {'; '.join(_REASONS[plugin])}")
     kind = mi.PluginManager.instance().plugin_type(plugin).name.lower()  # "unknown" where it finds none
     if kind in ("emitter", "sensor"):
         raise InputError(f"{kind} {plugin!r} is refused also in a trusted scene; allowed: {', '.join(ALLOWED[kind])}")

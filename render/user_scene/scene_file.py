@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from render.geometry import to_world
-from render.loader import mitsuba_module
+from render.loader import mitsuba_module, mitsuba_words
 from render.scene import Node, spectrum_node, uniform_node
 from render.spectrum import Spectrum
 from render.user_scene.allowed_plugins import require_allowed
-from render.user_scene.scene_lights import reason
 from render.user_scene.scene_parts import SceneFile, assemble
 from render.user_scene.scene_paths import find_file, screen, search_path
 from rodcone.errors import InputError, unknown
@@ -68,7 +67,7 @@ def _parse(mi: Any, file: Path, trust: bool) -> Any:
         state = mi.parser.parse_file(config, str(file))
         mi.parser.transform_upgrade(config, state)
     except RuntimeError as error:
-        raise InputError(f"{reason(error)}; correct the file") from None
+        raise InputError(f"{mitsuba_words(error)}; correct the file") from None
     except UnicodeDecodeError:  # from a message that cuts a character in half, or a file of spectra
         raise InputError(f"{file}: Mitsuba can't read it, nor say why in UTF-8; correct the file") from None
     finally:
@@ -82,9 +81,18 @@ def _from_xml(mi: Any, state: Any, searched: list[Path], folder: Path | None) ->
     nodes, index_of = list(state.nodes), state.id_to_index
     if nodes[0].props.plugin_name() != "scene":
         raise InputError(f"{state.files[0]}: its root is {nodes[0].props.plugin_name()!r}; allowed: <scene>")
+    # A part without an id goes by its key in what holds it.
+    keys = {
+        value.index(): key
+        for node in nodes
+        for key, value in node.props.items()
+        if node.props.type(key).name == "ResolvedReference" and not key.startswith("_arg_")
+    }
     parts = []
-    for node in nodes:
+    for index, node in enumerate(nodes):
         try:
+            name, tag = node.props.id() or keys.get(index, ""), node.type.name.lower()
+            require_allowed(node.props.plugin_name(), tag=tag, name=name, trust=folder is None)
             parts.append(_xml_part(node, nodes, index_of, searched, folder))
         except InputError as error:
             raise InputError(f"{mi.parser.file_location(state, node)}: {error}") from None
@@ -103,8 +111,6 @@ def _xml_part(
 ) -> Node:
     """One node of a parsed scene without its children."""
     properties = node.props
-    if folder is not None:
-        require_allowed(properties.plugin_name(), node.type.name.lower())
     result: Node = {"type": properties.plugin_name()}
     if properties.id():
         result["id"] = properties.id()

@@ -1,26 +1,21 @@
 """The lights of a user's scene: their groups, and the spectrum of each as Mitsuba evaluates it."""
 
-import re
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from render.loader import mitsuba_words
 from render.scene import EMISSION_PARAMETER, Keys, LightGroup, Node, table_of, walk
 from render.spectrum import Spectrum, flat
 from render.user_scene.allowed_plugins import ALLOWED, SPECTRA
-from rodcone.errors import InputError, one_line
+from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from rodcone.types import Floats
 
 # MI_CIE_MIN to MI_CIE_MAX, outside of which Mitsuba's own spectra (rgb, d65, blackbody) are zero, and one point more,
 # which makes 472, by fours.
 _GRID_NM: Floats = np.arange(360.0, 832.0)
-
-
-def reason(error: RuntimeError) -> str:
-    """Mitsuba's message on one line, without its source locations."""
-    return re.sub(r"\[\w+\.cpp:\d+\] ", "", one_line(error))
 
 
 def type_of(part: Any) -> str:
@@ -96,7 +91,7 @@ def _same(a: Spectrum | None, b: Spectrum | None) -> bool:
 
 def _emission(mi: Any, where: str, emitter: Node, parts: Mapping[str, Node]) -> Spectrum | None:
     """Spectrum of an emitter, as Mitsuba evaluates it; None where its colour varies over position or direction."""
-    if emitter["type"] not in EMISSION_PARAMETER:
+    if emitter["type"] not in EMISSION_PARAMETER or "texture" in emitter:  # a spot may hold a slide
         return None
     value: Any = emitter.get(EMISSION_PARAMETER[emitter["type"]])
     while type_of(value) == "ref":
@@ -107,7 +102,7 @@ def _emission(mi: Any, where: str, emitter: Node, parts: Mapping[str, Node]) -> 
     try:  # the `constant` emitter: its emission depends on wavelength alone
         probe = mi.load_dict({"type": "constant"} | ({} if value is None else {"radiance": value}))
     except RuntimeError as error:
-        raise InputError(f"{where}: {reason(error)}; correct its spectrum") from None
+        raise InputError(f"{where}: {mitsuba_words(error)}; correct its spectrum") from None
     return _stated(value) or Spectrum(_GRID_NM[:-1], np.maximum(_evaluate(mi, probe)[:-1], 0.0))
 
 

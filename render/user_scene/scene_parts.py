@@ -60,7 +60,7 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
         for key in kinds
         if kinds[key] == "integrator"
     ]
-    camera, size = _camera(mi, name, [description[key] for key in kinds if kinds[key] == "sensor"], notes)
+    camera, size = _camera(mi, name, description, notes)
     geometry: Node = {"type": "scene", "sensor": camera}
     planes = []
     for key, child in description.items():
@@ -91,15 +91,21 @@ def _kind(mi: Any, part: Any) -> str:
     return kind_of(mi, type_of(part)) if type_of(part) not in ("", "ref") else ""
 
 
-def _camera(mi: Any, name: str, sensors: list[Node], notes: list[str]) -> tuple[Node, tuple[int, int]]:
-    """First camera without film and sampler, and its film's size."""
-    if not sensors or sensors[0]["type"] not in CAMERAS:
-        found = sensors[0]["type"] if sensors else "none"
-        raise InputError(f"scene {name}: camera {found!r}; allowed: {', '.join(CAMERAS)}; add a sensor")
+def _camera(mi: Any, name: str, description: Node, notes: list[str]) -> tuple[Node, tuple[int, int]]:
+    """First camera that can be rendered, without film and sampler, and its film's size."""
+    sensors = [part for part in description.values() if _kind(mi, part) == "sensor"]
+    # A film or sampler may stand in the scene itself, and be referred to.
+    named = {part.get("id", key): part for key, part in description.items() if _kind(mi, part) in _LEFT_OUT}
+    camera = next((sensor for sensor in sensors if sensor["type"] in CAMERAS), None)
+    if camera is None:
+        found = ", ".join(repr(sensor["type"]) for sensor in sensors) or "'none'"
+        raise InputError(f"scene {name}: camera {found}; allowed: {', '.join(CAMERAS)}; add a sensor")
     if len(sensors) > 1:
-        notes.append(f"{len(sensors) - 1} of {len(sensors)} cameras are left out: the first one is rendered")
-    kept = {key: part for key, part in sensors[0].items() if _kind(mi, part) not in _LEFT_OUT}
-    film: Node = next((part for part in sensors[0].values() if _kind(mi, part) == "film"), {})
+        rendered = f"{camera['type']!r}, the first that can be, is rendered"
+        notes.append(f"{len(sensors) - 1} of {len(sensors)} cameras are left out: {rendered}")
+    own = {key: named.get(part["id"], part) if type_of(part) == "ref" else part for key, part in camera.items()}
+    kept = {key: part for key, part in own.items() if _kind(mi, part) not in _LEFT_OUT}
+    film: Node = next((part for part in own.values() if _kind(mi, part) == "film"), {})
     size = film.get("height", FILM_SIZE[0]), film.get("width", FILM_SIZE[1])
     for side, pixels in zip(("height", "width"), size, strict=True):
         require_whole(f"scene {name}: film {side}", pixels, 1, 1 << 15, "give pixels")
@@ -114,7 +120,7 @@ def _check_references(name: str, geometry: Node) -> dict[str, Node]:
     in_emitters: set[int] = set()
     emitter: Keys | None = None
     for path, node in walk(geometry):
-        if node["type"] in (*CAMERAS, METER) and path != ("sensor",):
+        if node["type"] in ALLOWED["sensor"] and path != ("sensor",):
             raise InputError(f"scene {name}: {'/'.join(path)} is a sensor inside another part; place it in the scene")
         if node["type"] == "ref":
             continue

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from render.radiance import SpectralRadiance
 from render.spectrum import LINE_BASE_NM, VISIBLE_NM, Floats, Spectrum, line_bands
@@ -63,14 +64,21 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
     bands are the fine ones, is left out.
     """
     nm, width_nm = wide_bands(transport.wavelength_nm, transport.width_nm, groups)
-    matrix, means = _means(transport.width_nm, groups), transport.pass_means
+    matrix, means = _means(transport.width_nm, groups), transport.scene_means
+    # Of all light groups' bands, and of the uncovered part that stands behind them.
+    every = block_diag(*[matrix] * len(transport.groups), 1.0)
+    seen, seen_difference = (
+        tuple(planes if len(planes) == 1 else _merge(matrix, planes[None])[0] for planes in of_groups)
+        for of_groups in (transport.seen, transport.seen_difference)
+    )
     return replace(
         transport,
         radiance=_merge(matrix, transport.radiance),
         half_difference=_merge(matrix, transport.half_difference),
         variance=_merge(matrix, np.sqrt(np.maximum(transport.variance, 0.0))) ** 2,
-        seen=tuple(planes if len(planes) == 1 else _merge(matrix, planes[None])[0] for planes in transport.seen),
-        pass_means=replace(means, radiance=means.radiance @ matrix.T),
+        seen=seen,
+        seen_difference=seen_difference,
+        scene_means=replace(means, radiance=means.radiance @ matrix.T, covariance=every @ means.covariance @ every.T),
         meter=None,
         wavelength_nm=nm,
         width_nm=width_nm,

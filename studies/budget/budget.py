@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
 
 from render.transport import Transport
 from sensor.config import SensorConfig
@@ -30,7 +29,7 @@ def monte_carlo_share(
     Parameters
     ----------
     error_e : (..., h, w) array
-        Monte Carlo error [e-]: one draw of it, such as half the difference of even and odd passes, or its standard
+        Monte Carlo error [e-]: one draw of it, such as half the difference of its halves, or its standard
         deviation.
     expected_e : (..., h, w) float64
         Of the whole render [e-]. Pixels that reach the well are left out.
@@ -76,7 +75,7 @@ def render_share(
     irradiance = form_image(transport.relight(luminance_cd_m2=luminance_cd_m2), sensor)
     time_s = auto_exposure_s(irradiance, sensor, longest_s) if exposure_s is None else exposure_s
     expected_e = np.moveaxis(channel_electrons(irradiance, sensor, time_s), -1, 0)
-    variance = uniform_filter(transport.relight_variance(luminance_cd_m2=luminance_cd_m2), size=(1, 3, 3))
+    variance = transport.relight_variance(luminance_cd_m2=luminance_cd_m2)
     weights = electrons_per_irradiance(sensor, transport.wavelength_nm, transport.width_nm, time_s)
     weights = weights * camera_equation(sensor.lens)
     error_e = np.tensordot(weights, np.sqrt(np.maximum(variance, 0.0)), axes=1)

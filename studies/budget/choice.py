@@ -9,7 +9,7 @@ from operator import itemgetter
 from studies.budget.ledger import KERNEL, Weighed
 from studies.study.study import BudgetShares, Condition
 
-FIRST_SPP = 128  # fewer samples make passes of under 16, which are noisier than the pilot's
+FIRST_SPP = 128  # fewer are less even than the pilot's, which says how noisy they are
 
 # What a model costs in nanoseconds of one core; ratios are what counts. `still_life` at 256x256 takes 1690, 2370 and
 # 4410 ns a pixel and sample in 8, 16 and 40 bands: 85 ns a band, and as much as 12 bands for tracing a path.

@@ -63,14 +63,14 @@ class PilotNoise:
 
     Attributes
     ----------
-    spp, pass_spp : int
-        Samples of the pilot, and of one of its passes.
+    spp, half_spp : int
+        Samples of the pilot, and of one of its halves.
     level : float
         Variance of the level over its square, of one sample a pixel and for as many pixels as the render has.
     """
 
     spp: int
-    pass_spp: int
+    half_spp: int
     level: float
 
 
@@ -137,8 +137,8 @@ def weigh(
     own = _mean(noise_variance(expected_e, sensor, exposure_s)[below]) or 1.0
     blurred, sharp = found.blurred**2 * pilot.spp, found.sharp**2 * pilot.spp
     signal = np.maximum(found.full.mean(axis=0), np.finfo(np.float64).tiny)
-    # Wavelengths are stratified within a pass; what light a path carries is independent of its wavelength.
-    spread = sharp.mean(axis=0) / signal**2 + 1 / pilot.pass_spp
+    # Wavelengths are stratified within a half; what light a path carries is independent of its wavelength.
+    spread = sharp.mean(axis=0) / signal**2 + 1 / pilot.half_spp
     return Weighed(
         condition=condition,
         mosaic=mosaic,

@@ -25,7 +25,7 @@ from studies.study.study import OWN, Study, conditions, mosaics, parse_exposure
 
 PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels a picture is no smoother, so no effect is smaller
 PILOT_SEED = 1 << 32  # added to the study's seed: the pilot is no part of a render, and the cache keeps them apart
-FULL_PASSES_SPP = 128  # from which on a render's passes have 16 samples
+PILOT_SPP = 128
 REFERENCE_SAMPLES = 4  # times what the study allows: the reference's noise is then at most half of the plan's
 
 Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
@@ -103,7 +103,7 @@ def reference_plan(study: Study) -> Plan:
 
 
 def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> Pilot:
-    """Render a scene's pilot: eight passes, of as many samples as the passes of its render will have.
+    """Render a scene's pilot.
 
     A picture file is its own pilot, and keeps its bands.
     """
@@ -120,7 +120,7 @@ def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> 
         wavelength_nm=nm,
         width_nm=width_nm,
         seed=study.render.seed + PILOT_SEED,
-        max_spp=min(study.render.spp, FULL_PASSES_SPP),
+        max_spp=min(study.render.spp, PILOT_SPP),
         cache=cache,
     )
     return Pilot(opened, transport, {count: groups_of(width_nm, count) for count in counts(width_nm)})
@@ -169,7 +169,7 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
 def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:
     """Monte Carlo noise of the pilot; a picture file states none."""
     if not pilot.rendered:
-        return PilotNoise(spp=0, pass_spp=1, level=0.0)
+        return PilotNoise(spp=0, half_spp=1, level=0.0)
     fewer = lit.coverage.size / (pilot.opened.size[0] * pilot.opened.size[1])
     error = lit.level().relative_error or 0.0
-    return PilotNoise(spp=lit.spp, pass_spp=lit.spp // lit.passes, level=error**2 * lit.spp * fewer)
+    return PilotNoise(spp=lit.spp, half_spp=lit.spp // 2, level=error**2 * lit.spp * fewer)

@@ -1,8 +1,8 @@
 """What each approximation does to a picture, in electrons, found on a small pilot render.
 
 Everything is linear in light and time, so it is found once for 1 cd/m^2 and 1 s and scaled. Each effect is computed
-from the pilot's even and from its odd passes: the product of the two has the effect's square as its mean, free of Monte
-Carlo noise. That noise is drawn anew from the scatter of the passes, and goes through the lens as the light does.
+from the pilot's even and from its odd half: the product of the two has the effect's square as its mean, free of Monte
+Carlo noise. That noise is drawn anew from the variance, and goes through the lens as the light does.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
 from render.transport import Transport
+from rodcone.errors import InputError, unknown
 from sensor.config import LensConfig, SensorConfig
 from sensor.kernel.poisson import LARGEST_ERROR
 from sensor.optics import form_image
 from sensor.response import expected_electrons
 from studies.budget.bands import merge_radiance, merge_transport
 
-Pair = NDArray[np.float64]  # (2, h, w): from even and from odd passes [e- per cd/m^2 and s]
+Pair = NDArray[np.float64]  # (2, h, w): from the even and from the odd half [e- per cd/m^2 and s]
 
 DIFFRACTION = "diffraction"
 LENS_TERMS = {DIFFRACTION: "diffraction", "veiling glare": "veiling_glare", "cos^4": "horizontal_view_deg"}
@@ -121,10 +122,12 @@ def kernel_rms_e(expected_e: NDArray[np.float64], bands: int) -> NDArray[np.floa
 
 
 def horizontal_view_deg(camera: Mapping[str, object], size: tuple[int, int]) -> float:
-    """Angle of view across a picture of a Mitsuba ``perspective`` camera, 0 where it states none as ``fov``."""
+    """Angle of view across a picture of a Mitsuba camera; 0 of an ``orthographic`` one, whose rays are all parallel."""
+    if camera.get("type") == "orthographic":
+        return 0.0
     field, axis = camera.get("fov"), camera.get("fov_axis", "x")
     if not isinstance(field, int | float):
-        return 0.0
+        field, axis = _field_of_focal_length(camera.get("focal_length", "50mm")), "diagonal"
     height, width = size
     spans = {
         "x": width,
@@ -133,8 +136,21 @@ def horizontal_view_deg(camera: Mapping[str, object], size: tuple[int, int]) -> 
         "larger": max(size),
         "diagonal": float(np.hypot(height, width)),
     }
-    half = tan(radians(float(field) / 2)) * width / spans[str(axis)]
+    if str(axis).lower() not in spans:
+        raise unknown("camera: fov_axis", axis, spans)
+    half = tan(radians(float(field) / 2)) * width / spans[str(axis).lower()]
     return float(2 * np.degrees(np.arctan(half)))
+
+
+def _field_of_focal_length(focal_length: object) -> float:
+    """Angle of view in degrees across the diagonal of a film of 36 mm x 24 mm, as Mitsuba takes a focal length."""
+    try:
+        focal_length_mm = float(str(focal_length).removesuffix("mm"))
+    except ValueError:
+        focal_length_mm = 0.0
+    if not 0 < focal_length_mm < np.inf:
+        raise InputError(f"camera: focal_length {focal_length!r} is no length; allowed: above 0; give '50mm'")
+    return float(2 * np.degrees(np.arctan(np.hypot(36.0, 24.0) / (2 * focal_length_mm))))
 
 
 def _noise(transport: Transport, sensor: SensorConfig, rng: np.random.Generator) -> NDArray[np.float64]:

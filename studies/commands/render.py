@@ -18,7 +18,7 @@ from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_keys, require_whole
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
-from rodcone.progress import progress
+from rodcone.progress import progress, render_words
 from studies.commands.console import INTERRUPTED, Flag, Out, Several, print_result, require_ending, say
 from studies.study.lit_scene import render_facts, spectral_luminance
 from studies.study.scene_source import asked_level, open_scene
@@ -104,7 +104,7 @@ def render(
     check_place(out)
     # Render and write
     with progress(sys.stderr) as step:
-        step("render", 0.0)
+        step(render_words(np.inf), 0.0)
         transport = render_transport(
             scene,
             size,
@@ -116,7 +116,7 @@ def render(
             max_depth=max_depth,
             seed=seed,
             cache=cache,
-            progress=lambda share, error: step(f"render, relative error {error:.3f}", share),
+            progress=lambda share, error: step(render_words(error), share),
         )
     radiance = transport.relight(spectra, luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
     write_exr(out, radiance, scene=scene.name)

@@ -50,7 +50,6 @@ class ReportRender:
     seconds: float | None = None
     variant: str | None = None
     integrator: str | None = None
-    passes: int | None = None
     stopped_by: str | None = None
     relative_mc_error: float | None = None
     brightest_share: float | None = None

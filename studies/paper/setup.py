@@ -17,6 +17,7 @@ from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL
 from render.radiance import SpectralRadiance
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_whole
+from rodcone.progress import render_words
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -139,7 +140,9 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
     opened = open_choice(study.scenes[0], study)
     model = as_stated(study).renders[opened.choice]
     folder = setup.out / SWEEP / RENDERS  # the sweeps' own: one render serves them and this
-    transport, _ = make_transport(opened, study, model, folder, lambda share, _: setup.step(f"render {scene}", share))
+    transport, _ = make_transport(
+        opened, study, model, folder, lambda share, error: setup.step(f"{scene}: {render_words(error)}", share)
+    )
     group = transport.groups[white or next(iter(transport.groups))]
     return View(
         scene=scene,

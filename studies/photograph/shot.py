@@ -17,6 +17,7 @@ from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_range, require_whole
 from rodcone.files import check_place
 from rodcone.memory import file_extent, memory, require_memory
+from rodcone.progress import render_words
 from sensor.capture import capture
 from sensor.cfa import channels, check_covers, is_rgbw
 from sensor.config import SensorConfig
@@ -87,12 +88,13 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
     colour = calibrate(sensor, light) if set("RGB") <= set(channels(sensor.cfa)) else None
     check_place(order.out)  # before the render: it may take minutes
     if opened is not None:
+        step(render_words(np.inf), 0.0)
         transport = render(
             opened.scene,
             film_size(opened.size, order.size),
             spp=order.spp,
             seed=order.seed,
-            progress=lambda share, error: step(f"render, relative error {error:.3f}", 0.9 * share),
+            progress=lambda share, error: step(render_words(error), 0.9 * share),
         )
 
     # The exposure.

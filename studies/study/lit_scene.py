@@ -102,6 +102,8 @@ def make_transport(
         None for a picture file.
     cache : Path
         Folder of renders: a coarser one is continued, a finer one is taken.
+    progress : callable
+        As of `render.engine.render`; called before it with an infinite error, since the first passes may compile.
     share : callable, optional
         Noise variance of a render over the sensor's own, for a study with a `noise_share`.
     seed_offset : int
@@ -118,10 +120,11 @@ def make_transport(
         transport, _, assumed = open_radiance_file(opened.choice.source, opened.choice.light)
         return transport, tuple(assumed)
     limits = study.render
+    progress(0.0, np.inf)
     asked: dict[str, Any] = {
         "wavelength_nm": model.wavelength_nm,
         "width_nm": model.width_nm,
-        "max_spp": model.spp,  # in passes of 16 samples, so that a finer request goes on from a coarser one's
+        "max_spp": model.spp,
         "max_seconds": limits.max_seconds,
         "seed": limits.seed + seed_offset,
         "cache": cache,
@@ -144,7 +147,7 @@ class RenderFacts:
     ----------
     integrator, variant, stopped_by : str
     seconds : float
-    spp, passes, bands : int
+    spp, bands : int
     relative_mc_error, relative_level_error : float or None
         Of the lit scene, as `render.radiance.SpectralRadiance`.
     first_nm, last_nm, width_nm : float
@@ -155,7 +158,6 @@ class RenderFacts:
     variant: str
     seconds: float
     spp: int
-    passes: int
     stopped_by: str
     relative_mc_error: float | None
     relative_level_error: float | None
@@ -172,7 +174,6 @@ def render_facts(transport: Transport, radiance: SpectralRadiance) -> RenderFact
         variant=transport.variant,
         seconds=transport.seconds,
         spp=transport.spp,
-        passes=transport.passes,
         stopped_by=transport.stopped_by,
         relative_mc_error=radiance.relative_mc_error,
         relative_level_error=radiance.relative_level_error,

@@ -9,7 +9,7 @@ from render.engine import render
 from render.scene import Scene
 from render.transport import Transport
 
-FIRST_SPP = 128  # in eight passes: enough to tell how many more it takes
+FIRST_SPP = 128  # enough to tell how many more it takes
 MARGIN = 1.05  # on samples that the share so far asks for: it is an estimate
 MOST_GROWTH = 4.0  # of samples from one look to the next
 
@@ -24,7 +24,7 @@ def render_quietly(
     max_seconds: float | None,
     **options: Any,
 ) -> Transport:
-    """Render until `share` is `most_share` or less, or samples or time are used up; the passes made are kept.
+    """Render until `share` is `most_share` or less, or samples or time are used up; what was made is kept.
 
     Parameters
     ----------

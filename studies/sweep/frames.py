@@ -53,7 +53,7 @@ class UnitFrame:
     electrons : Path
         Expected electrons, (h, w) float64.
     half_difference : Path
-        Of even and odd passes, one draw of the Monte Carlo error, (h, w) float32.
+        Of the render's halves, one draw of the Monte Carlo error, (h, w) float32.
     """
 
     key: str

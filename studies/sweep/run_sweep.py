@@ -12,6 +12,7 @@ from itertools import chain
 from pathlib import Path
 
 from isp.processors.catalogue import require_libraries
+from rodcone.progress import render_words
 from studies.budget.model_plan import Plan
 from studies.photograph.clock import FIRST, Clock
 from studies.study.lit_scene import open_all
@@ -132,7 +133,7 @@ def _clear(out: Path) -> None:
 
 def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step) -> int:
     """Make cells, store each as it comes with the time taken so far; returns their number."""
-    began, made = time.perf_counter(), 0
+    made = 0
     seconds, workers = dict[str, float](), set[tuple[str, int]]()
     with closing(runner(missing)) as rows:
         for row in rows:
@@ -142,9 +143,8 @@ def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step
             for name, value in _steps(row).items():
                 seconds[name] = seconds.get(name, 0.0) + value
             note_stages(job.base, run, job.clock.stages(_on_the_clock(seconds, len(workers))))
-            left_s = (time.perf_counter() - began) / made * (len(missing) - made)
             share = RENDER_SHARE + (1 - RENDER_SHARE) * made / len(missing)
-            part(f"cell {made} of {len(missing)}, {duration(left_s)} left", share)
+            part(f"cell {made} of {len(missing)}", share)
     for name, value in _on_the_clock(seconds, len(workers)).items():
         job.clock.add(name, value)
     return made
@@ -167,11 +167,4 @@ def _part(step: Step, index: int, count: int) -> Step:
 
 
 def _rendering(part: Step) -> Callable[[float, float], None]:
-    return lambda share, error: part(f"render, relative error {error:.3f}", RENDER_SHARE * share)
-
-
-def duration(seconds: float) -> str:
-    """Time in words, to the precision that an estimate has: ``40 s``, ``3 min``, ``2.5 h``."""
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+    return lambda share, error: part(render_words(error), RENDER_SHARE * share)

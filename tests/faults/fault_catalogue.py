@@ -305,8 +305,8 @@ LIGHT = (
     _fault(
         "level counts the lamps seen",
         "render/level.py",
-        "uncovered = float(self.spp @ self.uncovered) / float(self.spp.sum())",
-        "uncovered = 1.0",
+        "self.radiance / self.uncovered",
+        "self.radiance / 1.0",
         "render/test_transport",
     ),
     _fault(
@@ -585,26 +585,22 @@ STUDIES = (
 RENDERS = (
     _fault(
         "samples told as asked",
-        "render/limits.py",
-        "                return held\n",
-        "                return spp\n",
+        "render/engine.py",
+        "spp=2 * means.count,",
+        "spp=limits.spp or 2 * means.count,",
         "render/test_samples",
         "studies/test_stated_numbers",
     ),
     _fault(
-        "passes of equal weight",
-        "render/passes.py",
-        "mean += delta * (weight / drawn)",
-        "mean += delta / np.float32(sums.passes)",
+        "parts of equal weight",
+        "render/runs.py",
+        "weight = np.float32(chunk / (means.count + chunk))",
+        "weight = np.float32(1 if means.count == 0 else 0.5)",
         "render/test_samples",
         "render/test_engine",
     ),
     _fault(
-        "an error believed after two passes",
-        "render/limits.py",
-        "passes >= PASSES and error",
-        "passes >= 2 and error",
-        "render/test_engine",
+        "an error believed at once", "render/limits.py", "LEAST_POINTS = 8", "LEAST_POINTS = 1", "render/test_engine"
     ),
     _fault(
         "seconds of the earlier render forgotten",
@@ -615,10 +611,10 @@ RENDERS = (
         "render/test_cache",
     ),
     _fault(
-        "a level's error without the passes' scatter",
+        "a level's error without that of its area",
         "render/level.py",
-        "variance = float(share @ off**2) / (self.spp.size - 1)",
-        "variance = float(share @ off**2)",
+        "off = np.append(weights.ravel(), -value)",
+        "off = np.append(weights.ravel(), 0.0)",
         "render/test_transport",
     ),
     _fault(
@@ -650,28 +646,22 @@ RENDERS = (
         "studies/test_stated_numbers",
     ),
     _fault(
-        "variance of the passes by their number",
-        "render/passes.py",
-        "1 / ((self.passes - 1) * self.drawn)",
-        "1 / (self.passes * self.drawn)",
+        "the whole difference of a render's halves as its error",
+        "render/error_estimates.py",
+        "pooled(np.square(difference))",
+        "pooled(np.square(2 * difference))",
         "render/test_engine",
+        "render/test_error_estimates",
     ),
     _fault(
         "pooled over three pixels",
         "render/error_estimates.py",
-        "0.0) * factor / 9)",
-        "0.0) * factor / 3)",
+        "planes.dtype.type(9)",
+        "planes.dtype.type(3)",
         "render/test_error_estimates",
     ),
     _fault(
         "the end told of another limit", "render/limits.py", 'return "noise"', 'return "samples"', "render/test_engine"
-    ),
-    _fault(
-        "samples of a render as passes",
-        "studies/study/lit_scene.py",
-        "passes=transport.passes,",
-        "passes=transport.spp,",
-        "studies/test_stated_numbers",
     ),
     _fault(
         "the whole difference of the halves as error",

@@ -267,8 +267,20 @@ _LAMP = b"""<scene version="3.0.0">
 """
 
 
+_STRANGE = b"""<scene version="3.0.0">
+  <film type="hdrfilm" id="film"><integer name="width" value="8"/></film>
+  <sensor type="distant"/>
+  <sensor type="orthographic"><ref id="film"/><sampler type="ldsampler"/></sensor>
+  <emitter type="spot"><texture name="texture" type="checkerboard"/><rgb name="intensity" value="1 2 3"/></emitter>
+  <bsdf type="mask" id="lace"><float name="opacity" value="0.5"/><bsdf type="principled"/></bsdf>
+  <texture type="volume" id="wool"><volume type="constvolume" name="volume"/></texture>
+  <shape type="disk"><bsdf type="diffuse"><ref id="wool" name="reflectance"/></bsdf></shape>
+</scene>
+"""
+
+
 def _scene_samples() -> list[Sample]:
-    return [{"scene.xml": _XML, "lamp.xml": _LAMP, "sky.spd": b"400 1\n500 2\n700 1\n"}]
+    return [{"scene.xml": _XML, "lamp.xml": _LAMP, "sky.spd": b"400 1\n500 2\n700 1\n"}, {"scene.xml": _STRANGE}]
 
 
 @cache

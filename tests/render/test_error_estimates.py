@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from render.error_estimates import SAMPLE_PIXELS, SharedPaths, relative_error, within_band_error
+from render.error_estimates import SAMPLE_PIXELS, SharedPaths, relative_error, variance_of, within_band_error
 from render.scene import LightGroup
 from render.spectrum import Spectrum, band_widths, flat, line_spectrum
 
@@ -17,14 +17,23 @@ WIDTH_NM = band_widths(NM, None)
 def test_the_relative_error_of_uniform_planes_is_standard_error_over_mean():
     values, variance = np.full((1, 3, 8, 9), 4.0, np.float32), np.full((1, 3, 8, 9), 0.25, np.float32)
     assert relative_error(ONE, values, variance) == pytest.approx(0.5 / 4.0, rel=1e-6)
-    assert relative_error(ONE, values, variance, factor=4.0) == pytest.approx(1.0 / 4.0, rel=1e-6)
 
 
-def test_the_relative_error_pools_the_variance_over_three_by_three_pixels():
-    values, variance = np.ones((1, 1, 3, 3), np.float32), np.zeros((1, 1, 3, 3), np.float32)
-    variance[0, 0, 1, 1] = 9.0 * 0.04
-    # Every pixel's window holds the middle.
-    assert relative_error(ONE[:, :1], values, variance) == pytest.approx(0.2, rel=1e-6)
+def test_a_variance_is_the_squared_difference_pooled_over_three_by_three_pixels():
+    difference = np.zeros((1, 2, 5, 6), np.float32)
+    difference[0, 1, 0, 2], difference[0, 1, 3, 4] = 0.3, -0.6
+    expected = np.zeros((5, 6))
+    expected[:2, 1:4] += 0.09 / 9
+    expected[0, 1:4] += 0.09 / 9  # beyond the edge the nearest pixels count again
+    expected[2:5, 3:6] += 0.36 / 9
+    assert variance_of(difference)[0, 1] == pytest.approx(expected, rel=1e-6)
+    assert not variance_of(difference)[0, 0].any()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_variance_is_never_negative(seed):
+    scale = 10.0 ** np.random.default_rng(seed).uniform(-9, 9, (1, 1, 6, 7))
+    assert variance_of(scale.astype(np.float32)).min() > 0
 
 
 def test_the_relative_error_does_not_mix_bands_and_leaves_dark_values_out():
@@ -47,9 +56,9 @@ def test_errors_of_groups_that_share_paths_add_with_their_correlation(correlatio
     variance[1] = 0.0
     shared = SharedPaths((2, 0), np.full((1, 5, 4), correlation, np.float32))
     expected = 0.1 * np.sqrt(9.0 + 1.0 + 2 * correlation * 3.0)
-    assert relative_error(emitted, values, variance, shared=shared) == pytest.approx(expected / 4.5, rel=1e-6)
+    assert relative_error(emitted, values, variance, shared) == pytest.approx(expected / 4.5, rel=1e-6)
     shared = SharedPaths((1, 0), np.full((1, 5, 4), correlation, np.float32))  # the second has no error
-    assert relative_error(emitted, values, variance, shared=shared) == pytest.approx(0.1 * 10**0.5 / 4.5, rel=1e-6)
+    assert relative_error(emitted, values, variance, shared) == pytest.approx(0.1 * 10**0.5 / 4.5, rel=1e-6)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 3000), (3000, 1), (90, 70), (257, 301)])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from outside_truth import LIGHT_NM, LIGHTS
+from outside_truth import LIGHT_NM, LIGHTS, colour_science
 
 from render.illuminants import MOON_SLOPE_PER_NM, daylight, illuminant, lines_nm, names, unit_luminance
 from render.photometry import colour_matching_functions, luminance, tristimulus
@@ -73,6 +73,13 @@ ROLO = np.array(
         (774.8, -1.80271, -1.59357, 0.36351, -0.20326, 0.36908, -0.16182, 0.00830),
     ]
 )
+
+
+def test_other_lights_of_colour_science_are_known_by_its_names():
+    other, table = illuminant("FL3.12"), colour_science().SDS_ILLUMINANTS["FL3.12"]
+    assert np.array_equal(other.wavelength_nm, table.wavelengths)
+    assert other.values == pytest.approx(table.values * (other.values.max() / table.values.max()), rel=1e-12)
+    assert luminance(other.band_average(NM, WIDTH_NM), NM, WIDTH_NM) == pytest.approx(1.0, rel=1e-9)
 
 
 def test_moonlight_is_sunlight_times_the_rolo_model_of_the_full_moon():

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from render.error_estimates import SharedPaths
 from render.illuminants import illuminant
-from render.level import PassMeans
+from render.level import SceneMeans
 from render.photometry import luminance
 from render.scene import LightGroup
 from render.spectrum import Spectrum, flat
@@ -127,32 +127,25 @@ def test_the_mean_luminance_asked_for_is_that_of_what_is_no_light(level):
     assert lit.luminance()[1, 4] > 1000 * level
 
 
-def test_a_level_and_its_error_are_those_of_a_ratio_of_sums_over_passes():
-    """Against the jackknife over passes of unequal samples, which knows no formula of the ratio's variance."""
+def test_a_level_and_its_error_are_those_of_a_ratio_of_means():
+    """Against draws of the means' errors, which know no formula of the ratio's variance."""
     rng = np.random.default_rng(5)
-    spp = np.array([4, 4, 9, 9, 16, 16])
-    means = PassMeans(
-        spp=spp,
-        uncovered=rng.uniform(0.89, 0.91, 6),
-        radiance=rng.uniform(0.9, 1.1, (6, 1, 1)) * rng.uniform(0.5, 1.0, (1, 2, NM.size)),
-    )
-    made = transport(pass_means=means)
+    radiance, uncovered = rng.uniform(0.5, 1.0, (2, NM.size)), 0.9
+    spread = rng.normal(size=(2 * NM.size + 1, 4)) * 0.004  # four causes move all means together
+    made = transport(scene_means=SceneMeans(radiance, uncovered, spread @ spread.T))
+    emitted = [x.spectrum.band_average(NM, WIDTH_NM) * x.power for x in made.groups.values()]
 
-    def mean_luminance(kept):
-        emitted = [x.spectrum.band_average(NM, WIDTH_NM) * x.power for x in made.groups.values()]
-        light = sum(
-            n * luminance((emitted * per_pass).sum(axis=0), NM, WIDTH_NM)
-            for n, per_pass in zip(spp[kept], means.radiance[kept], strict=True)
-        )
-        return float(light / (spp[kept] @ means.uncovered[kept]))
+    def mean_luminance(means, share):
+        return float(luminance((emitted * means).sum(axis=0), NM, WIDTH_NM) / share)
 
-    level, kept = made.level(), np.arange(6)
-    assert level.value == pytest.approx(mean_luminance(kept), rel=1e-12)
-    shares = spp / spp.sum()
-    # Delete-one jackknife of unequal parts (Busing, Meijer & Leeden 1999).
-    pseudo = [(level.value - (1 - s) * mean_luminance(kept != i)) / s for i, s in enumerate(shares)]
-    variance = np.mean([(x - level.value) ** 2 * s / (1 - s) for x, s in zip(pseudo, shares, strict=True)])
-    assert level.relative_error == pytest.approx(np.sqrt(variance) / level.value, rel=0.1)
+    level = made.level()
+    assert level.value == pytest.approx(mean_luminance(radiance, uncovered), rel=1e-12)
+    drawn = []
+    for cause in rng.normal(size=(4000, 4)):
+        error = spread @ cause
+        drawn.append(mean_luminance(radiance + error[:-1].reshape(2, -1), uncovered + error[-1]))
+    # The deviation of 4000 draws is known to 1.1 %.
+    assert level.relative_error == pytest.approx(np.std(drawn) / level.value, rel=0.06)
     assert made.relight(luminance_cd_m2=3.0).relative_level_error == level.relative_error
     assert made.relight().relative_level_error is None
 

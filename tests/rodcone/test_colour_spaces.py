@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from outside_truth import colour_science
 
 from rodcone.colour_spaces import (
     A_XY,
@@ -14,7 +15,6 @@ from rodcone.colour_spaces import (
     xyz_from_xy,
     xyz_to_srgb,
 )
-from rodcone.optional import colour_science
 
 
 def test_srgb_matrix_agrees_with_colour_science() -> None:

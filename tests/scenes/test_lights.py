@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from outside_truth import colour_science
 from scipy.stats import norm
 
 from render.engine import render
 from render.geometry import look_at, to_world
 from render.photometry import luminance
 from render.spectrum import Spectrum
-from rodcone.optional import colour_science
 from scenes import lit_and_shadowed, night_street, still_life_outdoor
 from scenes.catalog import load
 

@@ -131,7 +131,8 @@ def test_on_10_nm_relit_is_directly_rendered_within_the_error_reported(name, ran
     trust = np.full(nm.size, INSIDE)
     trust[[0, -1]] = AT_ENDS
     assert (found <= trust * reported + slack).all()
-    tells = found > 5 * slack  # elsewhere it is too small to be told from noise
+    # Where it is well above noise and half a per cent: below, slope and curvature may cancel, whose sizes are reported.
+    tells = (found > 5 * slack) & (found > 0.005)
     assert tells.sum() >= (0 if lines_nm(name) else 3)
     assert (reported[tells] < 1.5 * found[tells]).all()
     if lines_nm(name):

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from outside_truth import colour_science
 
 from isp.colour.encoding import ENCODINGS, encode
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
-from rodcone.optional import colour_science
 
 COLOURS = np.random.default_rng(0).uniform(-0.1, 1.2, (40, 3))
 

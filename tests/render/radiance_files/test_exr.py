@@ -169,7 +169,7 @@ def test_mitsuba_opens_it(tmp_path: Path) -> None:
 
 def test_colour_science_opens_it_through_openimageio(tmp_path: Path) -> None:
     pytest.importorskip("OpenImageIO", reason="OpenImageIO isn't installed")
-    from rodcone.optional import colour_science
+    from outside_truth import colour_science
 
     radiance = picture()
     write_exr(tmp_path / "a.exr", radiance)
@@ -186,7 +186,7 @@ def test_colour_science_opens_it_through_openimageio(tmp_path: Path) -> None:
 @pytest.fixture
 def samples() -> Path:
     """Files that colour-science ships, made by the layout's authors and by colour-science."""
-    from rodcone.optional import colour_science
+    from outside_truth import colour_science
 
     folder = Path(colour_science().__file__).parent / "io" / "tests" / "resources"
     if not (folder / "D65.exr").is_file():

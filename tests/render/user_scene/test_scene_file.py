@@ -19,6 +19,7 @@ from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_parts import LONGEST_CHAIN
 from render.user_scene.scene_paths import MOST_NESTED
 from rodcone.errors import InputError
+from rodcone.jit import backend
 
 CAMERA = """
 <sensor type="perspective" id="camera">
@@ -278,6 +279,67 @@ def test_what_the_engine_brings_itself_is_left_out_and_told(tmp_path: Path) -> N
     assert all(word in told for word in ("'volpath'", "1 of 2 cameras", "crop"))
 
 
+def test_a_cameras_film_and_sampler_may_stand_beside_it(tmp_path: Path) -> None:
+    film = CAMERA[CAMERA.index("<film") : CAMERA.index("  <sampler")].strip()
+    camera = CAMERA.replace(film, '<ref id="film"/>').replace('<sampler type="independent"/>', '<ref id="draws"/>')
+    parts = film.replace("<film", '<film id="film"') + '<sampler type="ldsampler" id="draws"/>'
+    opened = load_scene_file(write(tmp_path, parts, camera, SUN))
+    assert opened.size == (6, 8)
+    assert set(opened.scene.geometry["sensor"]) == {"type", "id", "fov", "to_world"}
+
+
+@pytest.mark.parametrize("kind", ["distant", "radiancemeter", "batch", "irradiancemeter"])
+def test_the_first_camera_that_can_be_rendered_is_taken(kind: str, tmp_path: Path) -> None:
+    other = CAMERA.replace("perspective", kind).replace('id="camera"', 'id="other"').replace('value="8"', 'value="80"')
+    opened = load_scene_file(write(tmp_path, other, CAMERA.replace("perspective", "orthographic"), SUN))
+    assert (opened.size, opened.scene.geometry["sensor"]["type"]) == ((6, 8), "orthographic")
+    assert "1 of 2 cameras are left out: 'orthographic', the first that can be" in opened.notes[0]
+
+
+def test_an_orthographic_camera_sees_things_in_one_size(tmp_path: Path) -> None:
+    """Two squares of one size, one three times as far: the same pixels in parallel projection."""
+    square = (
+        '<shape type="rectangle"><transform name="to_world"><scale value="0.25"/><translate x="{}" z="{}"/></transform>'
+        '<emitter type="area"><spectrum name="radiance" value="1"/></emitter></shape>'
+    )
+    camera = CAMERA.replace("perspective", "orthographic").replace('<float name="fov" value="20"/>', "")
+    camera = camera.replace('value="8"', 'value="16"').replace('value="6"', 'value="16"')
+    path = write(tmp_path, camera, square.format(-0.5, 2), square.format(0.5, -4))
+    opened = load_scene_file(path)
+    made = render(opened.scene, opened.size, wavelength_nm=np.arange(420.0, 700.0, 80.0), spp=16).relight().values
+    lit = made[:, :, 0] > 0.5
+    assert lit.sum() == 2 * 4 * 4  # of 2 m in 16 pixels
+    np.testing.assert_array_equal(lit, lit[:, ::-1])
+
+
+def test_a_scene_that_names_a_volume_as_texture_is_read(tmp_path: Path) -> None:
+    cloth = (
+        '<bsdf type="diffuse" id="cloth"><texture type="volume" name="reflectance">'
+        '<volume type="gridvolume" name="volume"><string name="filename" value="{}"/></volume></texture></bsdf>'
+    )
+    assert "'no.vol' is missing" in refusal(write(tmp_path, CAMERA, SUN, cloth.format("no.vol")))
+    assert "lies outside" in refusal(write(tmp_path, CAMERA, SUN, cloth.format("../no.vol")))
+
+
+@pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba draws wavelengths too")
+def test_lights_that_are_dark_in_the_first_bands_shine_in_the_others(tmp_path: Path) -> None:
+    """Two suns of other spectra in one group, at normal incidence: L = rho (E1 + E2) / pi beyond 560 nm."""
+    suns = "".join(
+        SUN.replace('"sun"', f'"sun:{value}"').replace(
+            "/></emitter>", f'/><spectrum name="irradiance" value="360:0,550:0,560:{value},830:{value}"/></emitter>'
+        )
+        for value in (1, 2)
+    )
+    grey = '<bsdf type="diffuse"><spectrum name="reflectance" value="0.5"/></bsdf>'
+    wall = f'<shape type="rectangle">{grey}</shape>'
+    opened = load_scene_file(write(tmp_path, CAMERA, suns, wall))
+    assert opened.scene.groups["sun"].coloured
+    nm = np.array([420.0, 450.0, 480.0, 510.0, 580.0, 610.0, 640.0, 670.0])
+    made = render(opened.scene, opened.size, wavelength_nm=nm, width_nm=20.0, spp=16).relight().values
+    expected = np.where(nm > 560, 0.5 * 3 / np.pi, 0.0)
+    np.testing.assert_allclose(made, np.broadcast_to(expected, made.shape), rtol=1e-5)
+
+
 def test_many_uses_of_one_part_are_kept_as_references(tmp_path: Path) -> None:
     # Written out, 40 levels of two references each would be 10^12 parts.
     doubling = "".join(
@@ -297,19 +359,34 @@ def test_many_uses_of_one_part_are_kept_as_references(tmp_path: Path) -> None:
 MEDIUM = '<shape type="sphere"><medium type="homogeneous" name="interior"/></shape>'
 REFUSED = {
     "no light": ([CAMERA, WALL], ["it has no light", "add one"]),
-    "no camera": ([SUN], ["camera 'none'", "perspective, thinlens"]),
+    "no camera": ([SUN], ["camera 'none'", "perspective, thinlens, orthographic"]),
     "part of the camera's key": (
         [CAMERA, SUN, '<shape type="sphere" id="sensor"/>'],
         ["part 'sensor' is not the camera"],
     ),
     "meter as camera": (['<sensor type="irradiancemeter"/>', SUN], ["camera 'irradiancemeter'"]),
-    "medium": ([CAMERA, SUN, MEDIUM], ["(line 7", "'homogeneous' is refused, participating media"]),
-    "polariser": ([CAMERA, SUN, '<bsdf type="polarizer"/>'], ["'polarizer'", "polarisation isn't simulated"]),
-    "projector": ([CAMERA, '<emitter type="projector"/>'], ["'projector'", "can't be relit", "sunsky"]),
-    "timed sky": ([CAMERA, '<emitter type="timed_sunsky"/>'], ["'timed_sunsky'", "can't be relit"]),
-    "parallel camera": ([CAMERA.replace("perspective", "orthographic"), SUN], ["'orthographic'", "perspective"]),
+    "no camera that can be rendered": (
+        [*(CAMERA.replace("perspective", kind).replace("camera", kind) for kind in ("distant", "radiancemeter")), SUN],
+        ["camera 'distant', 'radiancemeter'", "perspective, thinlens, orthographic"],
+    ),
+    "medium": (
+        [CAMERA, SUN, MEDIUM],
+        ["(line 7", "medium 'interior' of type 'homogeneous' is refused", "plastic or diffuse surface"],
+    ),
+    "phase function": ([CAMERA, SUN, '<phase type="hg" id="fog"/>'], ["'fog' of type 'hg'", "media aren't simulated"]),
+    "polariser": (
+        [CAMERA, SUN, '<bsdf type="twosided" id="film"><bsdf type="polarizer" name="inner"/></bsdf>'],
+        ["bsdf 'inner' of type 'polarizer'", "polarisation isn't simulated", "nearest: a mask of opacity 0.5"],
+    ),
+    "polarising plastic": ([CAMERA, SUN, '<bsdf type="pplastic"/>'], ["bsdf type 'pplastic'", "roughplastic"]),
+    "projector": (
+        [CAMERA, '<emitter type="projector" id="beamer"/>'],
+        ["emitter 'beamer' of type 'projector'", "can't be relit", "spot with a texture"],
+    ),
+    "timed sky": ([CAMERA, '<emitter type="timed_sunsky"/>'], ["'timed_sunsky'", "can't be relit", "nearest: sunsky"]),
+    "volumetric primitives": ([CAMERA, SUN, '<shape type="ellipsoids"/>'], ["shape type 'ellipsoids'", "ply"]),
     "unknown plug-in": ([CAMERA, SUN, '<bsdf type="difuse"/>'], ["'difuse'", "did you mean 'diffuse'?"]),
-    "memory reader": ([CAMERA, SUN, '<shape type="blender"/>'], ["'blender' is unknown"]),
+    "memory reader": ([CAMERA, SUN, '<shape type="blender"/>'], ["'blender' is refused", "as ply"]),
     "missing mesh": (
         [CAMERA, SUN, '\n<shape type="obj"><string name="filename" value="no/teapot.obj"/></shape>'],
         ["scene.xml (line 8", "'no/teapot.obj' is missing", "put it there"],
@@ -405,7 +482,7 @@ def test_native_code_of_a_scenes_own_is_refused_before_it_is_loaded(tmp_path: Pa
     assert repr(mitsuba_module().file_resolver()) == before
     write(tmp_path, '<path value="."/>', name="in.xml")
     assert "<path>" in refusal(write(tmp_path, '<include filename="in.xml"/>', CAMERA, SUN))
-    assert "plug-in: 'ball' is unknown" in refusal(write(tmp_path, CAMERA, SUN, '<shape type="ball"/>'))
+    assert "shape type: 'ball' is unknown" in refusal(write(tmp_path, CAMERA, SUN, '<shape type="ball"/>'))
     assert str(tmp_path) not in loaded_libraries()
 
 
@@ -420,6 +497,11 @@ def test_a_trusted_scene_may_load_native_code_and_files_from_anywhere(tmp_path: 
     assert scene.geometry["quad"]["filename"] == str((tmp_path / "quad.obj").resolve())
     mitsuba_module().load_dict(scene.description)
     assert str(tmp_path / "mine") in loaded_libraries()
+
+
+def test_what_is_not_simulated_is_refused_in_a_trusted_scene_too(tmp_path: Path) -> None:
+    told = refusal(write(tmp_path, CAMERA, SUN, MEDIUM), trust=True)  # inside a shape
+    assert "medium 'interior' of type 'homogeneous' is refused" in told
 
 
 def test_files_of_a_trusted_scene_are_looked_for_in_the_folders_of_its_paths(tmp_path: Path) -> None:

@@ -8,9 +8,11 @@ import pytest
 from builders import transport_of
 
 from render.illuminants import illuminant
+from render.loader import mitsuba_module
 from render.scene import LightGroup
 from render.spectrum import Spectrum, flat, line_spectrum
 from render.transport import Transport
+from rodcone.errors import InputError
 from rodcone.jit import backend
 from sensor.kernel.kernel import expected_electrons_single
 from sensor.optics import camera_equation, falloff, form_image
@@ -209,7 +211,7 @@ def test_a_ledger_counts_no_noise_as_an_effect() -> None:
     assert row.lens["diffraction"] < 0.5 * 1e-3 * some.lens["diffraction"][0].std()
 
 
-def test_monte_carlo_draws_have_the_passes_scatter() -> None:
+def test_monte_carlo_draws_have_the_stated_variance() -> None:
     """Draws are plus or minus one standard error, so that a plain lens shows exactly that; diffraction evens it out."""
     some = found(transport(even(), noise=0.05), diffraction=1.0)
     signal = found(transport(even())).full.mean(axis=0)
@@ -227,11 +229,40 @@ def test_monte_carlo_draws_have_the_passes_scatter() -> None:
         ({"fov": 90.0, "fov_axis": "y"}, (200, 100), 53.1301),
         ({"fov": 90.0, "fov_axis": "larger"}, (200, 100), 53.1301),
         ({"fov": 90.0, "fov_axis": "diagonal"}, (300, 400), 77.3196),  # tan is 4/5
-        ({"focal_length": "50mm"}, (100, 100), 0.0),
+        ({"focal_length": "50mm"}, (240, 360), 39.5978),  # tan is 18/50
+        ({}, (240, 360), 39.5978),  # Mitsuba's own default
+        ({"type": "orthographic"}, (100, 100), 0.0),  # its rays are parallel: nothing falls off
     ],
 )
 def test_the_view_of_a_camera_is_across_the_picture(camera, size, degrees) -> None:
     assert horizontal_view_deg(camera, size) == pytest.approx(degrees, abs=1e-4)
+
+
+@pytest.mark.parametrize("size", [(30, 40), (40, 30)])
+@pytest.mark.parametrize(
+    "view",
+    [
+        *({"fov": 50.0, "fov_axis": axis} for axis in ("x", "y", "smaller", "Larger", "diagonal")),
+        *({"focal_length": text} for text in ("35mm", "85")),
+        {},
+    ],
+)
+def test_the_view_of_a_camera_is_that_of_mitsuba(view, size) -> None:
+    mi = mitsuba_module()
+    film = {"type": "hdrfilm", "width": size[1], "height": size[0]}
+    for camera in ({"type": "perspective"}, {"type": "thinlens", "aperture_radius": 0.1}):
+        sensor = mi.load_dict({**camera, **view, "film": film})
+        own = np.asarray(mi.traverse(sensor)["x_fov"]).item()
+        assert horizontal_view_deg({**camera, **view}, size) == pytest.approx(own, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("camera", "words"),
+    [({"focal_length": "wide"}, "focal_length 'wide'"), ({"fov": 40.0, "fov_axis": "z"}, "fov_axis: 'z' is unknown")],
+)
+def test_a_camera_without_a_view_is_refused(camera, words) -> None:
+    with pytest.raises(InputError, match=words):
+        horizontal_view_deg(camera, (10, 10))
 
 
 @pytest.mark.skipif(backend() == "numpy", reason="needs LLVM or CUDA for the fast readout")

@@ -17,7 +17,6 @@ import sweep_sample as SAMPLE
 from studies.commands.cli import app, main
 from studies.study.study_file import read_study
 from studies.sweep.database import VERSION
-from studies.sweep.run_sweep import duration
 
 TEXT = """
 scenes = [{source = "scene.exr", light = "E"}]
@@ -197,10 +196,3 @@ def test_shells_complete_the_sweeps_options(shell: Any) -> None:
     text = app.generate_completion(prog_name="rodcone", shell=shell)
     assert "dry-run" in text
     assert "cluster" in text
-
-
-@pytest.mark.parametrize(
-    ("seconds", "words"), [(0.2, "0 s"), (99.4, "99 s"), (100.0, "2 min"), (5999.0, "100 min"), (6000.0, "1.7 h")]
-)
-def test_durations_read_as_estimates(seconds: float, words: str) -> None:
-    assert duration(seconds) == words

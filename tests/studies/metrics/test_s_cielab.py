@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from outside_truth import colour_science
 from scipy.ndimage import gaussian_filter
 from skimage.color import deltaE_cie76, rgb2lab
 
-from rodcone.optional import colour_science
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE, SPREADS, XYZ_TO_OPPONENT, s_cielab, seen_xyz, transfer
 
 

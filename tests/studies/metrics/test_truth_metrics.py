@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from builders import transport_of
+from outside_truth import colour_science
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, flat
 from rodcone.errors import InputError
-from rodcone.optional import colour_science
 from sensor.exposure import LONGEST_S, auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import low_noise, table1_output

@@ -76,7 +76,7 @@ def test_what_the_last_run_wants_takes_the_place_of_the_ones_before(tmp_path: Pa
 
 
 def test_renders_and_runs_are_noted(tmp_path: Path) -> None:
-    facts = RenderFacts("dense", "llvm_ad_spectral", 1.5, 64, 8, "samples", 0.01, None, 20, 390.0, 770.0, 20.0)
+    facts = RenderFacts("dense", "llvm_ad_spectral", 1.5, 64, "samples", 0.01, None, 20, 390.0, 770.0, 20.0)
     record = RenderRecord("content", facts, 0.02, ("assumed",))
     with open_results(tmp_path) as base:
         assert render_record(base, "request") is None

@@ -1,0 +1,97 @@
+"""Seconds from the start of a process to a picture of 16x16 pixels and one sample, for each scene.
+
+Run ``python benchmarks/bench_start.py``; ``--scene``, ``--size``, ``--spp`` and ``--repeats`` narrow it down. Each
+scene gets a home folder of its own, in which Dr.Jit keeps its compiled kernels: the first process finds it empty and
+compiles, the later ones read what is there. It prints the environment, then seconds of the first process, and medians
+over the later ones: from the start of the process to the picture, on the clock and of the processor; of these the
+imports, the scene's dict, the render, in it Mitsuba's loading (timed again after the picture) and Dr.Jit's writing out
+of its kernels; last the kernels that later processes compiled. No illuminance is asked for.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+
+def start(name: str, size: int, spp: int, began: float) -> dict[str, Any]:
+    """Render once, in a process that began at a time of the monotonic clock, and tell what took how long."""
+    marks = [time.monotonic()]
+    from render.engine import render  # imports are part of what is measured
+    from render.loader import Film, load_groups, mitsuba_module
+    from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+    from rodcone.jit import dr
+    from scenes.catalog import load
+
+    mitsuba_module()
+    marks.append(time.monotonic())
+    scene = replace(load(name), reference_plane=None)
+    marks.append(time.monotonic())
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        render(scene, (size, size), spp=spp)
+        kernels = [kernel for kernel in dr.kernel_history() if kernel["type"] == dr.KernelType.JIT]
+    marks.append(time.monotonic())
+    processor_s = time.process_time()
+    nm = DEFAULT_WAVELENGTH_NM
+    load_groups(scene, Film((size, size), nm, band_widths(nm), 8))
+    marks.append(time.monotonic())
+    imports, scene_dict, rendering, loading = np.diff(marks).tolist()
+    return {
+        "whole": marks[3] - began,
+        "processor": processor_s,
+        "imports": imports,
+        "scene": scene_dict,
+        "render": rendering,
+        "loading": loading,
+        "code": sum(kernel["codegen_time"] for kernel in kernels) / 1e3,
+        "compiling": sum(kernel["backend_time"] for kernel in kernels) / 1e3,
+        "compiled": sum(not kernel["cache_hit"] for kernel in kernels),
+    }
+
+
+def starts(name: str, size: int, spp: int, repeats: int) -> list[dict[str, Any]]:
+    """Start processes one after the other, which share one folder of kernels."""
+    made = []
+    with TemporaryDirectory() as home:
+        for _ in range(1 + repeats):
+            command = [sys.executable, __file__, "--one", name, str(size), str(spp), repr(time.monotonic())]
+            done = subprocess.run(command, env=os.environ | {"HOME": home}, check=True, capture_output=True, text=True)
+            made.append(json.loads(done.stdout))
+    return made
+
+
+def main() -> None:
+    if sys.argv[1:2] == ["--one"]:
+        name, size, spp, began = sys.argv[2:]
+        print(json.dumps(start(name, int(size), int(spp), float(began))))
+        return
+    from environment import print_environment
+
+    from scenes.catalog import names
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scene", action="append", help="scene by name; may be given several times")
+    parser.add_argument("--size", type=int, default=16)
+    parser.add_argument("--spp", type=int, default=1)
+    parser.add_argument("--repeats", type=int, default=5)
+    given = parser.parse_args()
+    print_environment()
+    head = ("scene", "first", "compiling", "later", "processor", "imports", "scene", "render", "loading", "code")
+    print(f"{head[0]:20s}" + "".join(f"{word:>10s}" for word in (*head[1:], "compiled")))
+    for name in given.scene or names():
+        first, *later = starts(name, given.size, given.spp, given.repeats)
+        middle = {key: float(np.median([one[key] for one in later])) for key in first}
+        told = [first["whole"], first["compiling"], middle["whole"], *(middle[key] for key in head[4:])]
+        compiled = sum(one["compiled"] for one in later)
+        print(f"{name:20s}" + "".join(f"{value:10.2f}" for value in told) + f"{compiled:10d}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,108 @@
+"""Numbers that paths are drawn from: one Sobol sequence, scrambled for each pixel by itself.
+
+The sequence is Sobol's with the direction numbers of Joe and Kuo (2008), as SciPy holds them. Each pixel and dimension
+has a nested uniform scramble of its own (Owen 1995), by the hash of Laine and Karras (2011) as Burley gives it
+("Practical Hash-based Owen Scrambling", JCGT 9(4), 2020): a pixel's points stay as even as the sequence's, at any
+number of them and best at powers of two, and pixels are independent of each other.
+"""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from rodcone.jit import dr
+
+LOG2_POINTS = 15
+DIMENSIONS = 34  # of the sequence; paths that need more get independent numbers
+# What the dimensions are for: the film or the meter's plate, then four or six a bounce, then the rest.
+FILM, FIRST_BOUNCE, FURTHER_BOUNCES, WAVELENGTH, FIRST_LOBE, APERTURE = 0, 2, 6, 30, 31, 32
+A_BOUNCE = 6  # light 2, direction 2, lobe, and one that stays unused: blocks of even numbers keep pairs together
+EVEN_BOUNCES = 5  # that the sequence reaches
+
+
+@cache
+def _sequence() -> NDArray[np.uint32]:
+    """First points of the sequence, their bits reversed: (dimension x point,), a point's number varies fastest."""
+    points = qmc.Sobol(DIMENSIONS, scramble=False, bits=32).random_base2(LOG2_POINTS)
+    numbers = np.round(points.T * 2.0**32).astype(np.uint32)
+    reversed_bytes = np.array([int(f"{byte:08b}"[::-1], 2) for byte in range(256)], np.uint8)
+    turned = reversed_bytes[numbers[..., None].view(np.uint8)[..., ::-1]]
+    return np.ascontiguousarray(turned).view(np.uint32).ravel()
+
+
+@cache
+def _on_device(mi: Any) -> Any:
+    """The sequence in memory of Dr.Jit's own: a kernel reads NumPy's, which may be aligned or not, by other code."""
+    sequence = mi.UInt32(_sequence()) ^ dr.opaque(mi.UInt32, 0)
+    dr.eval(sequence)
+    return sequence
+
+
+class Points:
+    """Points of a wavefront, one a thread.
+
+    A plain class: Dr.Jit takes arrays apart that it finds in a loop's variables.
+
+    Parameters
+    ----------
+    mi : module
+    index : UInt32
+        Number of the point in its pixel's sequence.
+    key : UInt32
+        Of the pixel: decides the scramble.
+    """
+
+    def __init__(self, mi: Any, index: Any, key: Any) -> None:
+        self.mi, self.index, self.key = mi, index, key
+        self.sequence = _on_device(mi)
+
+    def at(self, dimension: Any) -> Any:
+        """Number in [0, 1) of each thread's point in a dimension, 0 or more."""
+        mi = self.mi
+        dimension = mi.UInt32(dimension)
+        held = dimension < DIMENSIONS
+        number = dr.gather(mi.UInt32, self.sequence, (dimension << LOG2_POINTS) + self.index, held)
+        seed = _mixed(self.key + dimension * 0x9E3779B9)
+        number = dr.select(held, number, _mixed(self.index * 0x85EBCA6B + seed))
+        # Laine and Karras's hash of the reversed bits: each bit is flipped by a function of the higher ones.
+        number ^= number * 0x3D20ADEA
+        number += seed
+        number *= (seed >> 16) | 1
+        number ^= number * 0x05526C56
+        number ^= number * 0x53A22864
+        return dr.minimum(mi.Float(dr.brev(number)) * 2.0**-32, 1 - 2.0**-24)
+
+    def pair(self, dimension: Any) -> Any:
+        """Two numbers, in a dimension and the next."""
+        return self.mi.Point2f(self.at(dimension), self.at(dimension + 1))
+
+    def bounce(self, depth: Any) -> tuple[Any, Any, Any]:
+        """Light (2D), lobe and direction (2D) of a bounce, the first at depth 0."""
+        mi = self.mi
+        further = FURTHER_BOUNCES + (depth - 1) * A_BOUNCE
+        further = dr.select(depth < EVEN_BOUNCES, further, further + DIMENSIONS)
+        first = depth == 0
+        base = dr.select(first, mi.UInt32(FIRST_BOUNCE), further)
+        lobe = dr.select(first, mi.UInt32(FIRST_LOBE), further + 4)
+        return self.pair(base), self.at(lobe), self.pair(base + 2)
+
+    def roulette(self, depth: Any) -> Any:
+        """Number that decides whether a path goes on."""
+        return self.at(depth + 0x10000)
+
+
+def pixel_keys(mi: Any, pixel: Any, seed: int) -> Any:
+    """Key of each pixel, from its number and a seed of 32 bits."""
+    return _mixed(pixel * 0x9E3779B1 + dr.opaque(mi.UInt32, seed))
+
+
+def _mixed(number: Any) -> Any:
+    """Hash of 32 bits (Wellons, "lowbias32", 2018)."""
+    number ^= number >> 16
+    number *= 0x7FEB352D
+    number ^= number >> 15
+    number *= 0x846CA68B
+    return number ^ (number >> 16)

@@ -1,0 +1,227 @@
+"""Runs of two sequences of points over a scene, and their means: the picture, and half the difference as its error.
+
+Each pixel has two sequences of its own, independent of each other: the even and the odd half. A run draws the next
+points of both. They are added in chunks, whose limits follow from their place in the sequence alone, so that a render
+that was stopped anywhere and goes on has the bits of one go.
+"""
+
+import traceback
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from render.error_estimates import relative_error, shared_paths, variance_of
+from render.integrator.dense import Tracer
+from render.integrator.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
+from render.level import SceneMeans
+from render.limits import MOST_POINTS, chunk_from
+from render.loader import PART_BANDS, Film, Loaded, mitsuba_module, stock_integrator
+from render.scene import Scene
+from render.transport import Transport
+from rodcone.jit import backend
+from rodcone.types import Floats, Planes
+
+MOST_FLOATS = 1 << 24  # of all channels of a launch, 64 MiB: as many threads as that allows
+BLOCK = 1 << 16  # pixels whose errors are summed in double precision at once
+
+
+Halves = tuple[Planes, Planes]  # the even and the odd one
+
+
+@dataclass
+class Means:
+    """Means over the points so far, at unit spectral emission; the only mutable state of a render.
+
+    Attributes
+    ----------
+    count : int
+        Points of each half.
+    radiance, difference : (group, band, h, w) float32
+        All light, and half the difference of the halves.
+    seen, seen_difference : list of (1 or band, h, w) float32
+        Light that is seen directly, of each group.
+    coverage, coverage_difference : (h, w) float32
+        Share of the paths that meet a light first.
+    shared : (int, int) or None
+        Groups that are rendered along the same paths.
+    """
+
+    count: int
+    radiance: Planes
+    difference: Planes
+    seen: list[Planes]
+    seen_difference: list[Planes]
+    coverage: Planes
+    coverage_difference: Planes
+    shared: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What a light group gives in some chunks, both halves of each.
+
+    Attributes
+    ----------
+    radiance : pair of (chunk, group, band, h, w) float32
+    seen : tuple of pairs of (chunk, 1 or band, h, w) float32
+        For each group.
+    coverage : pair of (chunk, h, w) float32
+    """
+
+    radiance: Halves
+    seen: tuple[Halves, ...]
+    coverage: Halves
+
+
+def no_means(scene: Scene, film: Film) -> Means:
+    """Means before the first run."""
+    bands = film.wavelength_nm.size
+    radiance, difference = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(2))
+    seen, seen_difference = (
+        [np.zeros((bands if x.coloured else 1, *film.size), np.float32) for x in scene.groups.values()]
+        for _ in range(2)
+    )
+    coverage, coverage_difference = (np.zeros(film.size, np.float32) for _ in range(2))
+    return Means(0, radiance, difference, seen, seen_difference, coverage, coverage_difference)
+
+
+def means_of(transport: Transport) -> Means:
+    """Means that an earlier render stopped at, to go on from: the same bits."""
+    return Means(
+        count=transport.spp // 2,
+        radiance=transport.radiance.copy(),
+        difference=transport.half_difference.copy(),
+        seen=[planes.copy() for planes in transport.seen],
+        seen_difference=[planes.copy() for planes in transport.seen_difference],
+        coverage=transport.coverage.copy(),
+        coverage_difference=transport.coverage_difference.copy(),
+        shared=transport.shared.groups if transport.shared else None,
+    )
+
+
+def error_of(lights: Floats, means: Means) -> float:
+    """Relative Monte Carlo error so far, under lights (group, band)."""
+    variance = variance_of(means.difference)
+    shared = shared_paths(means.shared, means.difference, variance) if means.shared else None
+    return relative_error(lights, means.radiance, variance, shared)
+
+
+def estimates_of(lights: Floats, means: Means) -> dict[str, Any]:
+    """What a `Transport` tells of its own errors, from the means: fields by name."""
+    variance = variance_of(means.difference)
+    shared = shared_paths(means.shared, means.difference, variance) if means.shared else None
+    return {
+        "variance": variance,
+        "shared": shared,
+        "relative_mc_error": relative_error(lights, means.radiance, variance, shared),
+        "scene_means": _scene_means(means),
+    }
+
+
+def _scene_means(means: Means) -> SceneMeans:
+    """Means over the picture of what is no light; pixels are independent of each other."""
+    groups, bands, *size = means.radiance.shape
+    scattered, errors = np.empty((groups, bands)), []
+    for group in range(groups):
+        light = means.radiance[group] - means.seen[group]
+        scattered[group] = light.mean(axis=(1, 2), dtype=np.float64)
+        errors.append((means.difference[group] - means.seen_difference[group]).reshape(bands, -1))
+    error = np.concatenate([*errors, -means.coverage_difference.reshape(1, -1)])
+    covariance = np.zeros((len(error),) * 2)
+    for first in range(0, error.shape[1], BLOCK):
+        part = error[:, first : first + BLOCK].astype(np.float64)
+        covariance += part @ part.T
+    uncovered = 1 - float(means.coverage.mean(dtype=np.float64))
+    return SceneMeans(scattered, uncovered, covariance / (size[0] * size[1]) ** 2)
+
+
+def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, seed: int) -> None:
+    """Draw the points from `means.count` on, before `stop` and as many as a launch holds, and add them.
+
+    An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
+    """
+    start, chunk = means.count, chunk_from(means.count)
+    threads = MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size) for loaded in light_groups)
+    fitting = max(1, threads // (film.size[0] * film.size[1] * chunk))
+    alike = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
+    chunks = min(alike, -(-(stop - start) // chunk))
+    drawn = [_drawn(loaded, film, Span(start, chunk, chunks), threads, seed) for loaded in light_groups]
+    if len(light_groups[0].groups) == 2:
+        means.shared = light_groups[0].groups[0], light_groups[0].groups[1]
+    for index in range(chunks):
+        weight = np.float32(chunk / (means.count + chunk))
+        # Each light group is found by paths of its own: together they cover the sum of what each does.
+        even, odd = (sum(of_group.coverage[half][index] for of_group in drawn) for half in range(2))
+        _add(means.coverage, means.coverage_difference, np.asarray(even), np.asarray(odd), weight)
+        for loaded, of_group in zip(light_groups, drawn, strict=True):
+            for slot, group in enumerate(loaded.groups):
+                even, odd = (half[index, slot] for half in of_group.radiance)
+                _add(means.radiance[group], means.difference[group], even, odd, weight)
+                even, odd = (half[index] for half in of_group.seen[slot])
+                _add(means.seen[group], means.seen_difference[group], even, odd, weight)
+        means.count += chunk
+
+
+def _add(mean: Planes, difference: Planes, even: Planes, odd: Planes, weight: np.float32) -> None:
+    """Add both halves' means over a chunk, in place: m += ((a + b) / 2 - m) w, d += ((a - b) / 2 - d) w."""
+    for planes, twice in ((mean, even + odd), (difference, even - odd)):
+        step = np.multiply(twice, np.float32(0.5), out=twice)
+        np.subtract(step, planes, out=step)
+        np.multiply(step, weight, out=step)
+        np.add(planes, step, out=planes)
+
+
+def _drawn(loaded: Loaded, film: Film, span: Span, threads: int, seed: int) -> Drawn:
+    """Draw a span of both halves of one light group's paths."""
+    halves = []
+    for half in range(2):
+        own_seed, parts = seed_of(seed, loaded.groups[0], half), []
+        for part in np.array_split(np.arange(film.wavelength_nm.size), -(-film.wavelength_nm.size // PART_BANDS)):
+            bands = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
+            if backend() == "numpy":
+                parts.append(_by_mitsuba(loaded, bands, span, own_seed))
+            else:
+                tracer = Tracer(mitsuba_module(), loaded, bands, own_seed)
+                image = traced(partial(tracer.camera, film.size), film.size, span, threads, own_seed)
+                scattered, others = bands_apart(image, len(loaded.groups), part.size)
+                shares, own = np.split(others, [len(loaded.groups)], axis=1)
+                parts.append((scattered, shares, own[:, : part.size]))
+        # All parts of the bands see the same paths: what knows no band is taken from the first.
+        scattered = parts[0][0] if len(parts) == 1 else np.concatenate([part[0] for part in parts], axis=2)
+        shares = parts[0][1]
+        seen = [shares[:, slot, None] for slot in range(len(loaded.groups))]
+        if loaded.coloured:
+            seen[0] = np.concatenate([part[2] for part in parts], axis=1)
+        for slot, planes in enumerate(seen):
+            scattered[:, slot] += planes
+        halves.append((scattered, seen, shares.sum(axis=1)))
+    even, odd = halves
+    return Drawn(radiance=(even[0], odd[0]), seen=tuple(zip(even[1], odd[1], strict=True)), coverage=(even[2], odd[2]))
+
+
+def _by_mitsuba(loaded: Loaded, film: Film, span: Span, seed: int) -> tuple[Planes, Planes, Planes]:
+    """Bands, shares of lights seen directly and their own bands without Dr.Jit: a chunk is a pass with its own seed."""
+    chunks = []
+    for index in range(span.chunks):
+        of_chunk = seed_of(seed, span.start + index * span.chunk)
+        draw = partial(by_stock, spp=span.chunk, seed=of_chunk)
+        seen_directly = mitsuba_module().load_dict({"type": "path", "max_depth": 1})
+        scattered = draw(loaded.mi_scene, loaded.camera, stock_integrator("scatteredpath", film)) / film_width(film)
+        # Renders of their own show the lights.
+        shares = draw(loaded.covering, loaded.covering.sensors()[0], seen_directly) / film_width(film)[:1]
+        own = scattered[:0]
+        if loaded.coloured:
+            own = draw(loaded.mi_scene, loaded.camera, seen_directly) / film_width(film)
+        chunks.append((scattered[None], shares, own))
+    return tuple(np.stack(arrays_of) for arrays_of in zip(*chunks, strict=True))  # type: ignore[return-value]
+
+
+def let_go(error: BaseException) -> None:
+    """Free the refused scene, which the traceback holds: Dr.Jit compiles every live material into the next render."""
+    cause: BaseException | None = error
+    while cause:
+        if cause.__traceback__ and cause.__traceback__.tb_next:
+            traceback.clear_frames(cause.__traceback__.tb_next)
+        cause.__traceback__, cause = None, cause.__cause__ or cause.__context__

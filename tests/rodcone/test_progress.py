@@ -1,0 +1,104 @@
+"""Progress on stderr: a bar that moves on a terminal, a line now and then elsewhere, and the time left on both."""
+
+import math
+import os
+import pty
+import re
+import threading
+import time
+from io import StringIO
+
+import pytest
+
+from rodcone import progress as module
+from rodcone.progress import duration, progress, render_words
+
+
+@pytest.fixture
+def often(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "LINE_EVERY_S", 0.05)
+
+
+def test_lines_come_without_a_call_and_end_with_the_work(often: None) -> None:
+    file, before = StringIO(), threading.active_count()
+    with progress(file) as step:
+        step(render_words(math.inf), 0.0)
+        time.sleep(0.3)
+    lines = file.getvalue().splitlines()
+    assert 2 <= len(lines) <= 6
+    assert set(lines) == {"rodcone: 0%, render, compiling"}
+    time.sleep(0.1)
+    assert len(file.getvalue().splitlines()) == len(lines)
+    assert threading.active_count() == before
+
+
+def test_a_short_command_prints_nothing() -> None:
+    file = StringIO()
+    with progress(file) as step:
+        step("render", 1.0)
+    assert file.getvalue() == ""
+
+
+def test_the_time_left_is_by_the_pace_since_the_first_share(often: None) -> None:
+    """A second of compilation before it, a tenth of the work in 0.1 s: 0.8 s for the eight tenths left, not 4.4 s."""
+    file = StringIO()
+    with progress(file) as step:
+        step("compiling", 0.0)
+        time.sleep(1.0)
+        step("render", 0.1)
+        time.sleep(0.1)
+        step("render", 0.2)
+        time.sleep(0.2)
+    assert re.fullmatch(
+        "rodcone: 20%, render, [123] s left", file.getvalue().splitlines()[-1]
+    )  # a busy machine's 0.1 s
+
+
+def test_what_fails_ends_the_lines_too(often: None) -> None:
+    before = threading.active_count()
+    with pytest.raises(KeyboardInterrupt), progress(StringIO()):
+        raise KeyboardInterrupt
+    assert threading.active_count() == before
+
+
+def test_the_bar_moves_while_nothing_is_told_and_shows_the_time_left() -> None:
+    ours, theirs = pty.openpty()
+    drawn = bytearray()
+
+    def read() -> None:
+        while chunk := os.read(ours, 65536):
+            drawn.extend(chunk)
+            if b"END" in chunk:
+                return
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    with os.fdopen(theirs, "w") as file:
+        with progress(file) as step:
+            step(render_words(math.inf), 0.0)
+            time.sleep(0.5)
+            pictures = drawn.count(b"compiling")
+            step("render", 0.1)
+            time.sleep(0.2)
+            step("render", 0.2)
+            time.sleep(0.7)
+        print("END", file=file, flush=True)
+        reader.join()
+    os.close(ours)
+    text = re.sub(r"\x1b\[[\d;?]*[A-Za-z]", "", drawn.decode())
+    frames = {line for line in re.split(r"[\r\n]+", text) if "compiling" in line}
+    assert pictures >= 3
+    assert len(frames) >= 2  # they differ: it moves
+    assert re.search(r"20 % +0:00:0\d +0:00:0[2-5]", text)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(0.2, "0 s"), (99.4, "99 s"), (100.0, "2 min"), (5999.0, "100 min"), (6000.0, "1.7 h")]
+)
+def test_durations_read_as_estimates(seconds: float, words: str) -> None:
+    assert duration(seconds) == words
+
+
+def test_a_render_compiles_until_its_error_is_known() -> None:
+    assert render_words(math.inf) == "render, compiling"
+    assert render_words(0.0314) == "render, relative error 0.031"
