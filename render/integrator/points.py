@@ -1,20 +1,24 @@
 """Numbers that paths are drawn from: one Sobol sequence, scrambled for each pixel by itself.
 
-The sequence is Sobol's with the direction numbers of Joe and Kuo (2008), as SciPy holds them. Each pixel and dimension
-has a nested uniform scramble of its own (Owen 1995), by the hash of Laine and Karras (2011) as Burley gives it
+The sequence is Sobol's with the direction numbers of Joe and Kuo (2008), as SciPy has them: they lie in a file of this
+package, since importing `scipy.stats` takes 1 s (``python tests/render/integrator/test_points.py`` writes it). Each
+pixel and dimension has a nested uniform scramble of its own (Owen 1995), by the hash of Laine and Karras (2011) as
+Burley gives it
 ("Practical Hash-based Owen Scrambling", JCGT 9(4), 2020): a pixel's points stay as even as the sequence's, at any
 number of them and best at powers of two, and pixels are independent of each other.
 """
 
+import json
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from rodcone.jit import dr
 
+DIRECTIONS = Path(__file__).parent.parent / "data" / "sobol_directions.json"
 LOG2_POINTS = 15
 DIMENSIONS = 34  # of the sequence; paths that need more get independent numbers
 # What the dimensions are for: the film or the meter's plate, then four or six a bounce, then the rest.
@@ -24,19 +28,32 @@ EVEN_BOUNCES = 5  # that the sequence reaches
 
 
 @cache
-def _sequence() -> NDArray[np.uint32]:
-    """First points of the sequence, their bits reversed: (dimension x point,), a point's number varies fastest."""
-    points = qmc.Sobol(DIMENSIONS, scramble=False, bits=32).random_base2(LOG2_POINTS)
-    numbers = np.round(points.T * 2.0**32).astype(np.uint32)
+def sequence() -> NDArray[np.uint32]:
+    """First points of Sobol's sequence in Gray's order as numbers of 32 bits, shape (dimension, point).
+
+    The number of a point is the exclusive or of its dimension's directions at the bits of its Gray code.
+    """
+    directions = np.array(json.loads(DIRECTIONS.read_text(encoding="utf-8")), dtype=np.uint32)
+    index = np.arange(1 << LOG2_POINTS)
+    gray = index ^ index >> 1
+    points = np.zeros((DIMENSIONS, index.size), np.uint32)
+    for bit in range(LOG2_POINTS):
+        points[:, gray >> bit & 1 == 1] ^= directions[:, bit, None]
+    return points
+
+
+@cache
+def _reversed_bits() -> NDArray[np.uint32]:
+    """The sequence with each number's bits reversed: (dimension x point,), a point's number varies fastest."""
     reversed_bytes = np.array([int(f"{byte:08b}"[::-1], 2) for byte in range(256)], np.uint8)
-    turned = reversed_bytes[numbers[..., None].view(np.uint8)[..., ::-1]]
+    turned = reversed_bytes[sequence()[..., None].view(np.uint8)[..., ::-1]]
     return np.ascontiguousarray(turned).view(np.uint32).ravel()
 
 
 @cache
 def _on_device(mi: Any) -> Any:
     """The sequence in memory of Dr.Jit's own: a kernel reads NumPy's, which may be aligned or not, by other code."""
-    sequence = mi.UInt32(_sequence()) ^ dr.opaque(mi.UInt32, 0)
+    sequence = mi.UInt32(_reversed_bits()) ^ dr.opaque(mi.UInt32, 0)
     dr.eval(sequence)
     return sequence
 
