@@ -45,7 +45,7 @@ def expected_electrons_single(
     Returns
     -------
     (h, w) float32
-        May be infinite where single precision ends, at 3e38.
+        At most single precision's largest number, 3.4e38.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def expected_electrons_single(
             electrons += weighted_sum([jit.Float(plane) for plane in piece[some]], [r[some] for r in scalars], channel)
             dr.eval(electrons, channel)
         result[start : start + piece.shape[1]] = electrons.numpy()
-    return result.reshape(height, width)
+    return np.minimum(result, LARGEST).reshape(height, width)
 
 
 def weighted_sum(planes: list[Any], weights: list[list[Any]], channel: Any) -> Any:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from sensor.optics import spreads
 
-TOLERANCE = 1e-6  # of the expected electrons of each pixel
+UNIT = 2.0**-24  # roundoff of single precision
 NOTHING_E = 1e-12  # one photo-electron in 10^12 exposures: more than subnormal numbers lose
 # Of the frame's sum, where a lens spreads light: an FFT errs by 7 u log2(n) of its norm at most (Higham, "Accuracy and
 # Stability of Numerical Algorithms", theorem 24.2); there and back, n = 64 x 64, and two results compared.
@@ -65,6 +65,11 @@ def _electrons(situation: Situation, values: NDArray[np.floating]) -> Image:
 
 
 def _allowed(electrons: Image, situation: Situation) -> Image:
-    """A millionth of each pixel's electrons, and what double precision loses where a lens spreads light."""
+    """What single precision loses of each pixel's sum over bands, and double precision where a lens spreads light.
+
+    A sum of n products errs by n + 2 roundings at most, the factors' own among them (Higham, section 3.1); two results
+    are compared.
+    """
     transform = TRANSFORM * electrons.sum() if spreads(situation.sensor.lens) else 0.0
-    return np.asarray(TOLERANCE * electrons + transform + NOTHING_E)
+    roundings = 2 * (situation.radiance.wavelength_nm.size + 2)
+    return np.asarray(roundings * UNIT * electrons + transform + NOTHING_E)
