@@ -11,7 +11,8 @@ from rodcone.errors import InputError
 GB = 1e9
 # Bytes a pixel, counted from the arrays held at once; `tests/rodcone/test_memory.py` compares them with measured peaks.
 _TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
-_VIEW_ARRAYS = 7  # one pass's planes and their copies; later relit radiance, its halves, and an image forming
+_VIEW_ARRAYS = 4  # pooling the variance; later relit radiance, its halves, and an image forming
+_RUN_BYTES = 2 * 4 * (1 << 24)  # of a light group: what a launch gives of both halves (`render.runs.MOST_FLOATS`)
 _RENDER_BYTES = 120  # for any number of bands: masks of the render, a preview
 _CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
 PROCESS_BYTES = 350e6  # libraries and compiled kernels
@@ -56,11 +57,11 @@ def memory(pixels: int, bands: int, groups: int, workers: int = 0) -> Memory:
         Processes that develop cells; 1: the process that renders does, 0: no cells are made here.
     """
     arrays = _TRANSPORT_ARRAYS * groups + _VIEW_ARRAYS
-    rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + _RENDER_BYTES)
-    if workers <= 1:
-        own = rendering + workers * _CELL_BYTES * pixels
-        return Memory(own, own)
+    rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + _RENDER_BYTES) + _RUN_BYTES * groups
     worker = PROCESS_BYTES + _CELL_BYTES * pixels
+    if workers <= 1:  # the render is let go of before the first cell
+        own = max(rendering, workers * worker)
+        return Memory(own, own)
     return Memory(rendering + workers * worker, max(rendering, worker))
 
 

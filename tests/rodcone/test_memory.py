@@ -52,7 +52,7 @@ def test_a_run_of_4000_by_4000_in_5_gb_is_refused_in_one_line_before_it_renders(
         err,
     )
     assert told is not None, err
-    assert float(told[1]) > 20
+    assert float(told[1]) > 10
     assert 3.5 < float(told[2]) < 5.0  # the interpreter and its libraries have mapped some
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
 
@@ -125,8 +125,10 @@ def test_a_system_that_tells_nothing_sets_no_bound(tmp_path: Path) -> None:
 def test_workers_add_up_and_the_largest_process_counts_for_limits_that_each_has() -> None:
     alone, many = memory(10**6, 20, 1, workers=1), memory(10**6, 20, 1, workers=8)
     assert alone.total == alone.largest < many.total
-    assert many.largest < alone.largest
-    assert memory(10**6, 20, 3).total - memory(10**6, 20, 2).total == 3 * 4 * 20 * 10**6  # three arrays of float32
+    assert many.largest <= alone.largest
+    assert (
+        memory(10**6, 20, 3).total - memory(10**6, 20, 2).total == 3 * 4 * 20 * 10**6 + 2**27
+    )  # three arrays of float32, and a run
 
 
 def test_a_picture_file_counts_by_its_bytes_and_needs_no_render(tmp_path: Path) -> None:
