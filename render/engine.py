@@ -18,7 +18,7 @@ from render.level import Irradiance
 from render.limits import Limits
 from render.loader import Film, integrator_name, load_groups, variant
 from render.meter import Meter
-from render.runs import add_run, error_of, estimates_of, let_go, means_of, no_means
+from render.runs import add_run, errors_of, let_go, means_of, no_means, scene_means_of
 from render.scene import Scene
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
@@ -157,18 +157,21 @@ def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None,
     means = means_of(earlier) if earlier else no_means(scene, film)
     loaded = load_groups(scene, film)
     lights, stopped_by = emission(scene.groups, film.wavelength_nm, film.width_nm), None
-    error, look = np.inf, limits.next_look(means.count)
+    errors: dict[str, Any] = {"relative_mc_error": np.inf}
+    looked, look = 0, limits.next_look(means.count)
     with _interrupt_noted() as interrupted:
         while stopped_by is None:
             run_start = time.perf_counter()
             add_run(loaded, means, film, look, limits.seed)
             if means.count >= look:
-                error, look = error_of(lights, means), limits.next_look(means.count)
-            now = time.perf_counter()
+                errors, looked, look = errors_of(lights, means), means.count, limits.next_look(means.count)
+            now, error = time.perf_counter(), errors["relative_mc_error"]
             progress(limits.share(means.count, error, now - start), error)
             stopped_by = limits.stop(means.count, error, now - start, now - run_start)
             if stopped_by is None and interrupted():
                 stopped_by = "interrupt"
+    if looked < means.count:  # time or Ctrl-C ended it between two looks
+        errors = errors_of(lights, means)
     return Transport(
         radiance=means.radiance,
         half_difference=means.difference,
@@ -176,7 +179,8 @@ def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None,
         coverage_difference=means.coverage_difference,
         seen=tuple(means.seen),
         seen_difference=tuple(means.seen_difference),
-        **estimates_of(lights, means),
+        **errors,
+        scene_means=scene_means_of(means),
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,
         width_nm=film.width_nm,

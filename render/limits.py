@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from render.integrator.points import LOG2_POINTS
 from render.transport import Stop, Transport
 from rodcone.errors import InputError, require_range, require_whole
 
 DEFAULT_SPP = 64
-MOST_POINTS = 1 << 15  # of each half: as many as `render.integrator.points` holds
+MOST_POINTS = 1 << LOG2_POINTS  # of each half
 MOST_SPP = 2 * MOST_POINTS  # ceiling where only an error is asked for
 LEAST_POINTS = 8  # of each half, before an error is believed
 A_POWER = 8  # chunks from one power of two to the next: at most an eighth more is drawn than asked for

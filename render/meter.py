@@ -18,9 +18,7 @@ from rodcone.jit import backend
 from rodcone.types import Planes
 
 METER_BANDS = 4  # traced together: as quick as all at once, and a kernel that compiles sooner
-HALF_SPP = (
-    16  # samples a pixel of its film in each half: 2^17 paths for one number a band, sure to a part in a thousand
-)
+HALF_SPP = 16  # samples a pixel of its film in each half: 2^17 paths for one number a band, right to 0.1 %
 
 
 @dataclass(frozen=True)
@@ -32,7 +30,7 @@ class Meter:
     scene : Scene
         With a reference plane.
     film : Film
-        Its bands and depth count, its size doesn't.
+        Bands and longest path; its size isn't used.
     seed : int
     folder : Path, optional
         Of renders: an irradiance traced before is taken from it.

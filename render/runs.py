@@ -26,7 +26,6 @@ from rodcone.types import Floats, Planes
 MOST_FLOATS = 1 << 24  # of all channels of a launch, 64 MiB: as many threads as that allows
 BLOCK = 1 << 16  # pixels whose errors are summed in double precision at once
 
-
 Halves = tuple[Planes, Planes]  # the even and the odd one
 
 
@@ -101,26 +100,15 @@ def means_of(transport: Transport) -> Means:
     )
 
 
-def error_of(lights: Floats, means: Means) -> float:
-    """Relative Monte Carlo error so far, under lights (group, band)."""
+def errors_of(lights: Floats, means: Means) -> dict[str, Any]:
+    """What a `Transport` tells of its Monte Carlo error under lights (group, band), from the means: fields by name."""
     variance = variance_of(means.difference)
     shared = shared_paths(means.shared, means.difference, variance) if means.shared else None
-    return relative_error(lights, means.radiance, variance, shared)
+    error = relative_error(lights, means.radiance, variance, shared)
+    return {"variance": variance, "shared": shared, "relative_mc_error": error}
 
 
-def estimates_of(lights: Floats, means: Means) -> dict[str, Any]:
-    """What a `Transport` tells of its own errors, from the means: fields by name."""
-    variance = variance_of(means.difference)
-    shared = shared_paths(means.shared, means.difference, variance) if means.shared else None
-    return {
-        "variance": variance,
-        "shared": shared,
-        "relative_mc_error": relative_error(lights, means.radiance, variance, shared),
-        "scene_means": _scene_means(means),
-    }
-
-
-def _scene_means(means: Means) -> SceneMeans:
+def scene_means_of(means: Means) -> SceneMeans:
     """Means over the picture of what is no light; pixels are independent of each other."""
     groups, bands, *size = means.radiance.shape
     scattered, errors = np.empty((groups, bands)), []

@@ -3,9 +3,8 @@
 The sequence is Sobol's with the direction numbers of Joe and Kuo (2008), as SciPy has them: they lie in a file of this
 package, since importing `scipy.stats` takes 1 s (``python tests/render/integrator/test_points.py`` writes it). Each
 pixel and dimension has a nested uniform scramble of its own (Owen 1995), by the hash of Laine and Karras (2011) as
-Burley gives it
-("Practical Hash-based Owen Scrambling", JCGT 9(4), 2020): a pixel's points stay as even as the sequence's, at any
-number of them and best at powers of two, and pixels are independent of each other.
+Burley gives it ("Practical Hash-based Owen Scrambling", JCGT 9(4), 2020): a pixel's points stay as even as the
+sequence's, at any number of them and best at powers of two, and pixels are independent of each other.
 """
 
 import json
@@ -21,7 +20,7 @@ from rodcone.jit import dr
 DIRECTIONS = Path(__file__).parent.parent / "data" / "sobol_directions.json"
 LOG2_POINTS = 15
 DIMENSIONS = 34  # of the sequence; paths that need more get independent numbers
-# What the dimensions are for: the film or the meter's plate, then four or six a bounce, then the rest.
+# What the dimensions are for: the film or the meter's plate, then the bounces, then the rest.
 FILM, FIRST_BOUNCE, FURTHER_BOUNCES, WAVELENGTH, FIRST_LOBE, APERTURE = 0, 2, 6, 30, 31, 32
 A_BOUNCE = 6  # light 2, direction 2, lobe, and one that stays unused: blocks of even numbers keep pairs together
 EVEN_BOUNCES = 5  # that the sequence reaches

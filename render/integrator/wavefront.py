@@ -39,10 +39,10 @@ def traced(
         count = min(most, pixels - first)
         # thread = (number of the chunk x count + number of the pixel) x chunk + number of the point within the chunk
         thread, length = dr.arange(mi.UInt32, count * samples), dr.opaque(mi.UInt32, span.chunk)
-        sums_before, in_block = thread // length, dr.opaque(mi.UInt32, count)
-        number = sums_before // in_block
-        pixel = sums_before - number * in_block + dr.opaque(mi.UInt32, first)
-        index = thread - sums_before * length + number * length + dr.opaque(mi.UInt32, span.start)
+        total_of, in_block = thread // length, dr.opaque(mi.UInt32, count)  # a total for each chunk and pixel
+        number = total_of // in_block
+        pixel = total_of - number * in_block + dr.opaque(mi.UInt32, first)
+        index = thread - total_of * length + number * length + dr.opaque(mi.UInt32, span.start)
         try:
             channels = trace(pixel, Points(mi, index, pixel_keys(mi, pixel, seed)))
             dr.eval(channels)
