@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from render.cache import load_transport, save_transport
 from render.combine import emission
 from render.level import Irradiance
-from render.limits import Limits
+from render.limits import LEAST_POINTS, Limits
 from render.loader import Film, integrator_name, load_groups, variant
 from render.meter import Meter
 from render.runs import add_run, errors_of, let_go, means_of, no_means, scene_means_of
@@ -158,19 +158,22 @@ def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None,
     loaded = load_groups(scene, film)
     lights, stopped_by = emission(scene.groups, film.wavelength_nm, film.width_nm), None
     errors: dict[str, Any] = {"relative_mc_error": np.inf}
-    looked, look = 0, limits.next_look(means.count)
+    look = limits.next_look(means.count)
     with _interrupt_noted() as interrupted:
         while stopped_by is None:
             run_start = time.perf_counter()
             add_run(loaded, means, film, look, limits.seed)
-            if means.count >= look:
-                errors, looked, look = errors_of(lights, means), means.count, limits.next_look(means.count)
+            if means.count >= LEAST_POINTS:
+                errors = errors_of(lights, means)
             now, error = time.perf_counter(), errors["relative_mc_error"]
             progress(limits.share(means.count, error, now - start), error)
-            stopped_by = limits.stop(means.count, error, now - start, now - run_start)
+            # The error is told after every run, and stops the render at a look alone.
+            looked_at = error if means.count >= look else np.inf
+            stopped_by = limits.stop(means.count, looked_at, now - start, now - run_start)
+            look = limits.next_look(means.count) if means.count >= look else look
             if stopped_by is None and interrupted():
                 stopped_by = "interrupt"
-    if looked < means.count:  # time or Ctrl-C ended it between two looks
+    if "variance" not in errors:  # fewer points than an error is told of
         errors = errors_of(lights, means)
     return Transport(
         radiance=means.radiance,
