@@ -9,6 +9,7 @@ from rodcone.types import Floats, Planes
 LEAST_SHARE = 4  # every pixel gets at least one sample in four of the mean number
 MOST_RATE = 64
 POOL = 5  # pixels each way, over which the pilot's noise is pooled
+UNSEEN = 0.3  # of the mean weight, everywhere: noise of rare paths that the pilot hasn't met
 FLOOR = 0.01  # of the mean light: dark noise, which a sensor adds to shot noise
 STEPS = 8  # from one power of two to the next, in the search for the rates' common factor
 
@@ -35,7 +36,7 @@ def rates_of(scattered: Planes, seen: Planes) -> NDArray[np.uint32]:
         floor = FLOOR * light.mean()
         if floor > 0:
             weight = np.maximum(weight, variance / (light + lamp + floor))
-    return _powers_of_two(np.sqrt(weight))
+    return _powers_of_two(np.sqrt(weight + UNSEEN * weight.mean()))
 
 
 def _powers_of_two(wanted: Floats) -> NDArray[np.uint32]:
