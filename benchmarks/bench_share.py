@@ -7,12 +7,13 @@ figure in brackets is one of which the references' own is more than a tenth; onl
 
 - ``python benchmarks/bench_share.py references --scene still_life --samples 16384`` makes the two references, in
   ``out/references``; Ctrl-C ends it, and the same command goes on.
-- ``... judge --scene still_life --samples 512`` renders by ``render(...).relight()``, each picture in a process of its own
-  that has compiled before, and prints the share: median, mean, value that 95 % stay under, and mean over the 99.5 % of
-  the pixels that are least uncertain in the references' variance map, each with its standard deviation over seeds.
-  Several ``--samples`` and ``--bands`` are choices; ``*`` marks those that no other beats in processor time and mean.
-- ``--against CHECKOUT`` renders with another checkout too, in turn. Without ``--samples`` this one draws as many as take
-  the same processor time.
+- ``... judge --scene still_life --samples 512`` renders by ``render(...).relight()``, each picture in a process of its
+  own that has compiled before, and prints the share: median, mean, value that 95 % stay under, and mean over the
+  99.5 % of the pixels that are least uncertain in the references' variance map, each with its standard deviation over
+  seeds. Several ``--samples`` and ``--bands`` are choices; ``*`` marks those that no other beats in processor time and
+  mean. References have 20 bands: with another number the share holds what 20 bands themselves miss.
+- ``--against CHECKOUT`` renders with another checkout too, in turn. Without ``--samples`` this one draws as many as
+  take the same processor time.
 - ``--rows FILE`` keeps what was measured; ``... show FILE`` prints it again, and draws ``--figure FILE.svg``.
 """
 
@@ -39,7 +40,16 @@ from scenes.levels import DEMO_LEVELS
 from sensor.presets import low_noise
 from studies.pages.plots import CHART, COLOURS, SOFT, STYLE, blank, plain_ticks, svg_text
 from studies.speed.points import front
-from studies.speed.share import Shares, electrons, is_known, least_uncertain, own_share_map, share_map, shares, yardstick
+from studies.speed.share import (
+    Shares,
+    electrons,
+    is_known,
+    least_uncertain,
+    own_share_map,
+    share_map,
+    shares,
+    yardstick,
+)
 
 ROOT = Path(__file__).resolve().parents[1]
 THIS = "this checkout"
@@ -229,7 +239,12 @@ def main() -> None:
     given = parser.parse_args()
     try:
         if given.what == "references":
-            make(given.references, load(given.scene), Film(given.size, given.reference_bands), max(given.samples or [16384]))
+            make(
+                given.references,
+                load(given.scene),
+                Film(given.size, given.reference_bands),
+                max(given.samples or [16384]),
+            )
             return
         if given.what == "show":
             rows = [json.loads(line) for line in given.file.read_text("utf-8").splitlines()]

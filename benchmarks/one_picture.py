@@ -1,4 +1,4 @@
-"""Render one picture and time it, for `bench_share.py`: a process of its own, so that another checkout can be asked too.
+"""Render one picture and time it, for `bench_share.py`: in a process of its own, as another checkout can do it too.
 
 It uses what every version since 35f5fbe has: `render(scene, size, wavelength_nm=, max_spp=, seed=)` and `relight()`.
 """

@@ -37,6 +37,7 @@ class Film:
 
     @property
     def wavelength_nm(self) -> NDArray[np.float64]:
+        """Centres of the bands."""
         return 380.0 + 400.0 / self.bands * (np.arange(self.bands) + 0.5)
 
 
@@ -119,10 +120,12 @@ def both(folder: Path, scene: Scene, film: Film) -> tuple[Reference, Reference]:
     """
     found = [find(folder, scene, film, seed) for seed in SEEDS]
     if None in found:
-        command = f"references --scene {scene.name} --size {film.size} --bands {film.bands} --references {folder}"
+        command = (
+            f"references --scene {scene.name} --size {film.size} --reference-bands {film.bands} --references {folder}"
+        )
         raise InputError(
-            f"references: {folder} lacks a render of {scene.name} with seed {SEEDS[found.index(None)]}; allowed: two, of "
-            f"one scene, size and bands; make them: python benchmarks/bench_share.py {command} --samples 16384"
+            f"references: {folder} lacks a render of {scene.name} with seed {SEEDS[found.index(None)]}; allowed: two, "
+            f"of one scene, size and bands; make them: python benchmarks/bench_share.py {command} --samples 16384"
         )
     one, other = (_read(path) for path in found if path)
     return one, other

@@ -117,7 +117,7 @@ def least_uncertain(deviation_e: Image, yard: Yardstick) -> NDArray[np.bool_]:
         Standard deviation of the references.
     """
     share = np.where(yard.inside, deviation_e**2 / yard.noise_e2, np.inf)
-    return share <= np.quantile(share[yard.inside], KEPT)
+    return np.asarray(share <= np.quantile(share[yard.inside], KEPT))
 
 
 def shares(share: Image, kept: NDArray[np.bool_]) -> Shares:

@@ -32,7 +32,9 @@ def flat(deviation_e: float, seed: int = 0) -> tuple[Yardstick, np.ndarray]:
     truth = np.full((CHANNELS, SIDE, SIDE), 1000.0)
     noise = np.random.default_rng(seed).normal(0.0, deviation_e, (2, *truth.shape))
     inside = np.ones(truth.shape, dtype=bool)
-    return Yardstick(low_noise(), 0.01, (truth + noise[0], truth + noise[1]), np.full_like(truth, NOISE_E2), inside), truth
+    return Yardstick(
+        low_noise(), 0.01, (truth + noise[0], truth + noise[1]), np.full_like(truth, NOISE_E2), inside
+    ), truth
 
 
 def test_the_mean_is_the_known_noise_and_bias_whatever_the_references_noise() -> None:
@@ -54,15 +56,15 @@ def test_the_mean_is_the_known_noise_and_bias_whatever_the_references_noise() ->
 def test_quantiles_are_those_of_squares_pooled_over_nine() -> None:
     """References without noise: nine squares of normal errors have a chi-squared distribution of 9 degrees over 9.
 
-    Its median is 8.343 / 9 and its 95 % value 16.919 / 9 (any printed table). Neighbours share pixels: a 96x96 picture of
-    four channels holds 4096 that share none. A quantile's standard error is sqrt(q (1 - q) / n) over the density there,
-    0.1011 and 0.0167 for 9 degrees.
+    Its median is 8.343 / 9 and its 95 % value 16.919 / 9 (any printed table). Neighbours share pixels: a 96x96 picture
+    of four channels holds 4096 that share none. A quantile's standard error is sqrt(q (1 - q) / n) over the density
+    there, 0.0983 and 0.0160 for 9 degrees.
     """
     yard, truth = flat(0.0)
     image = truth + np.random.default_rng(2).normal(0.0, 10.0, truth.shape)
     found = shares(share_map(image, yard)[:, 1:-1, 1:-1], yard.inside[:, 1:-1, 1:-1])
     independent = CHANNELS * SIDE**2 / 9
-    for value, quantile, level, density in ((found.median, 8.343, 0.5, 0.1011), (found.p95, 16.919, 0.95, 0.0167)):
+    for value, quantile, level, density in ((found.median, 8.343, 0.5, 0.0983), (found.p95, 16.919, 0.95, 0.0160)):
         standard_error = np.sqrt(level * (1 - level) / independent) / density / 9
         assert value == pytest.approx(quantile / 9, abs=BOUND * standard_error)
     assert found.mean == found.mean_of_kept
@@ -98,14 +100,16 @@ def test_a_figure_is_known_where_the_references_own_is_a_tenth() -> None:
 
 
 def test_exposure_noise_and_pixels_come_from_the_sensor() -> None:
-    """An even picture is exposed to 80 % of the well in G; W, more sensitive, is over the well and counts for nothing."""
+    """An even picture is exposed to 80 % of the well in G; a channel over the well counts for nothing."""
     radiance = SpectralRadiance(np.full((4, 4, NM.size), 0.1), NM)
     sensor, lamps = low_noise(), np.zeros((4, 4), dtype=bool)
     lamps[0, 0] = True
     yard = yardstick((radiance, radiance), lamps, sensor)
     red, green, blue, white = electrons(radiance, sensor, yard.exposure_s)
     assert green == pytest.approx(0.8 * sensor.pixel.full_well_e)
-    assert yard.inside.any(axis=(1, 2)).tolist() == [(plane < sensor.pixel.full_well_e).all() for plane in (red, green, blue, white)]
+    assert yard.inside.any(axis=(1, 2)).tolist() == [
+        (plane < sensor.pixel.full_well_e).all() for plane in (red, green, blue, white)
+    ]
     assert not yard.inside[:, 0, 0].any()
     pixel = sensor.pixel
     own = 0.8 * pixel.full_well_e
