@@ -182,19 +182,24 @@ def print_table(rows: Sequence[dict[str, Any]]) -> None:
     for place in dict.fromkeys((row["scene"], row["size"]) for row in rows):
         of_place = [row for row in rows if (row["scene"], row["size"]) == place]
         seeds = len({row["seed"] for row in of_place})
-        print(f"\n`{place[0]}`, {place[1]}x{place[1]}, {seeds} seeds\n")
+        print(f"\n`{place[0]}`, {place[1]}x{place[1]}, seeds: {seeds}\n")
         print(f"| choice | {' | '.join(HEAD)} |\n{'|---' * (len(HEAD) + 1)}|")
         for choice, row in summed_up(of_place).items():
             told = [told_figure(row, name) for name in FIGURES]
-            times = [f"{row[name][0]:.1f} ± {row[name][1]:.1f}" for name in ("processor_s", "seconds")]
+            times = [with_spread(*row[name], ".1f", ".1f") for name in ("processor_s", "seconds")]
             name = f"{'*' if row['on_front'] else ''}{Path(choice.checkout).name}, {choice.bands} bands"
             print(f"| {' | '.join([name, str(row['drawn']), *times, *told])} |", flush=True)
+
+
+def with_spread(mean: float, spread: float, form: str, spread_form: str) -> str:
+    """Write a mean and its standard deviation; one seed has none."""
+    return f"{mean:{form}}" if np.isnan(spread) else f"{mean:{form}} ± {spread:{spread_form}}"
 
 
 def told_figure(row: Mapping[str, Any], name: str) -> str:
     """Write a figure with its spread; in brackets where the references' own is too large beside it."""
     mean, spread = row[name]
-    told = f"{mean:.3g} ± {spread:.1g}"
+    told = with_spread(mean, spread, ".3g", ".1g")
     return told if "mean" in name or is_known(mean, row["own"][name]) else f"({told})"
 
 

@@ -11,14 +11,14 @@ import numpy as np
 from render.engine import render
 from scenes.catalog import load
 
-COMPILING_SPP = 16  # the kernels of a few samples are those of many
+COMPILING_SPP = 128  # 35f5fbe makes other kernels for fewer
 
 
 def main() -> None:
     name, size, bands, samples, seed, out = sys.argv[1:]
     scene, side = load(name), int(size)
     nm = 380.0 + 400.0 / int(bands) * (np.arange(int(bands)) + 0.5)
-    render(scene, (side, side), wavelength_nm=nm, max_spp=COMPILING_SPP, seed=int(seed)).relight()
+    render(scene, (side, side), wavelength_nm=nm, max_spp=min(COMPILING_SPP, int(samples)), seed=int(seed)).relight()
     clock, processor = time.perf_counter(), time.process_time()
     made = render(scene, (side, side), wavelength_nm=nm, max_spp=int(samples), seed=int(seed))
     radiance = made.relight().values

@@ -129,6 +129,8 @@ def test_a_row_each_choice_with_its_spread_and_the_front() -> None:
 def test_a_quantile_that_holds_the_references_noise_stands_in_brackets() -> None:
     (found,) = summed_up([row(64, seed, 1.0, 0.4) for seed in range(2)]).values()
     assert [told_figure(found, name) for name in ("median", "mean", "p95")] == ["(0.5 ± 0)", "0.4 ± 0", "1 ± 0"]
+    (found,) = summed_up([row(64, 0, 1.0, 0.4)]).values()
+    assert told_figure(found, "mean") == "0.4"
 
 
 def test_a_picture_comes_from_a_process_of_its_own(
