@@ -199,7 +199,7 @@ def with_spread(mean: float, spread: float, form: str, spread_form: str) -> str:
 def told_figure(row: Mapping[str, Any], name: str) -> str:
     """Write a figure with its spread; in brackets where the references' own is too large beside it."""
     mean, spread = row[name]
-    told = with_spread(mean, spread, ".3g", ".1g")
+    told = with_spread(mean, spread, ".3g", ".2g")
     return told if "mean" in name or is_known(mean, row["own"][name]) else f"({told})"
 
 
