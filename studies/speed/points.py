@@ -30,11 +30,22 @@ class Times:
 
 @dataclass(frozen=True)
 class Measured:
-    """One choice: its times, and its error [e-]."""
+    """One choice.
+
+    Attributes
+    ----------
+    choice : str
+    times : Times
+    error_e : float
+        RMS [e-].
+    share : float or None
+        Squared error over the sensor's noise variance, mean of the pixels' own; None: mean over mean.
+    """
 
     choice: str
     times: Times
     error_e: float
+    share: float | None = None
 
 
 @dataclass(frozen=True)
@@ -60,13 +71,16 @@ class Stage:
     reference_times: Times
 
 
-def front(points: Sequence[Measured]) -> tuple[Measured, ...]:
-    """Pareto front, fastest first: no other choice is as fast and as accurate, and better in one of the two."""
-    best: list[Measured] = []
-    for point in sorted(points, key=lambda each: (each.times.seconds, each.error_e)):
-        if not best or point.error_e < best[-1].error_e:
-            best.append(point)
-    return tuple(best)
+def front(pairs: Sequence[tuple[float, float]]) -> list[bool]:
+    """Which of some (time, error) are on the Pareto front: no other is as fast and as accurate, and better in one.
+
+    Of equal ones the first is.
+    """
+    flags, least = [False] * len(pairs), np.inf
+    for index in sorted(range(len(pairs)), key=lambda each: pairs[each]):
+        flags[index] = pairs[index][1] < least
+        least = min(least, pairs[index][1])
+    return flags
 
 
 def laps(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[T, NDArray[np.float64]]]:
@@ -92,9 +106,15 @@ def timed(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple
     return made
 
 
+def share_of_noise_variance(point: Measured, stage: Stage) -> float:
+    """Squared error of a choice over the sensor's own noise variance."""
+    return (point.error_e / stage.noise_e) ** 2 if point.share is None else point.share
+
+
 def stage_json(stage: Stage) -> dict[str, Any]:
     """Return a stage as JSON holds it: times and errors with their ratios."""
-    best = front(stage.points)
+    shares = [share_of_noise_variance(point, stage) for point in stage.points]
+    on_front = front([(point.times.seconds, share) for point, share in zip(stage.points, shares, strict=True)])
     return {
         "name": stage.name,
         "question": stage.question,
@@ -109,9 +129,9 @@ def stage_json(stage: Stage) -> dict[str, Any]:
                 "time_over_reference": point.times.seconds / stage.reference_times.seconds,
                 "processor_over_reference": point.times.processor_s / stage.reference_times.processor_s,
                 "error_e": point.error_e,
-                "share_of_noise_variance": (point.error_e / stage.noise_e) ** 2,
-                "on_front": point in best,
+                "share_of_noise_variance": share,
+                "on_front": best,
             }
-            for point in stage.points
+            for point, share, best in zip(stage.points, shares, on_front, strict=True)
         ],
     }

@@ -27,6 +27,7 @@ from sensor.response import channel_electrons, expected_electrons
 from studies.budget.bands import fine_bands, groups_of
 from studies.budget.terms import horizontal_view_deg
 from studies.speed.points import Measured, Stage, Times, timed
+from studies.speed.share import electrons, mean_error, yardstick
 
 MOST_BANDS = 40
 STAGES = 6
@@ -47,7 +48,7 @@ class Bench:
     picture : int
         Side of the pictures that lens, readout and reconstruction work on; mirror images of the render fill it.
     bands, samples : tuple of int
-        Numbers of bands; samples a pixel, increasing; a render of four times the last is the reference.
+        Numbers of bands; samples a pixel, increasing; two renders of twice the last are the references.
     neighbourhoods, patches : tuple of int
     repeats : int
         Calls after the first; their median counts.
@@ -109,16 +110,22 @@ def _bands(bench: Bench, scene: Scene, sensor: SensorConfig) -> tuple[Transport,
 
 
 def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
-    """Render with ever more samples; another render, of four times the most, is the reference."""
+    """Render with ever more samples, against two references whose own noise falls out of the mean."""
     edges = np.linspace(380.0, 780.0, 9)
     call = partial(_render, bench, scene, (edges[1:] + edges[:-1]) / 2, np.diff(edges))
     made = timed({f"{spp} samples": call(spp, bench.seed) for spp in bench.samples}, bench.repeats)
-    most = 4 * bench.samples[-1]
-    truth, truth_times = timed({"": call(most, bench.seed + 1)}, 0)[""]
-    error_e, noise_e = _render_errors(bench, sensor, truth)
+    most = 2 * bench.samples[-1]
+    (one, reference_times), (other, _) = timed({str(n): call(most, bench.seed + n) for n in (1, 2)}, 0).values()
+    relit = [each.relight(luminance_cd_m2=bench.level_cd_m2) for each in (one, other)]
+    yard = yardstick((relit[0], relit[1]), (one.coverage > 0) | (other.coverage > 0), sensor)
+    points = []
+    for choice, (transport, times) in made.items():
+        image_e = electrons(transport.relight(luminance_cd_m2=bench.level_cd_m2), sensor, yard.exposure_s)
+        points.append(Measured(choice, times, *mean_error(image_e, yard)))
     question = f"How many samples a pixel? {bench.scene}, {bench.size}x{bench.size}, 8 bands"
-    reference = f"{most} samples of another seed; the errors include its own noise"
-    return replace(_stage("samples", question, reference, noise_e, made, error_e), reference_times=truth_times)
+    reference = f"two renders of {most} samples and other seeds, whose own noise falls out of the mean"
+    noise_e = float(np.sqrt(yard.noise_e2[yard.inside].mean()))
+    return Stage("samples", question, reference, noise_e, tuple(points), reference_times)
 
 
 def _lens(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float, view_deg: float) -> Stage:

@@ -1,0 +1,30 @@
+"""Render one picture and time it, for `bench_share.py`: in a process of its own, as another checkout can do it too.
+
+It uses what every version since 35f5fbe has: `render(scene, size, wavelength_nm=, max_spp=, seed=)` and `relight()`.
+"""
+
+import sys
+import time
+
+import numpy as np
+
+from render.engine import render
+from scenes.catalog import load
+
+COMPILING_SPP = 128  # 35f5fbe makes other kernels for fewer
+
+
+def main() -> None:
+    name, size, bands, samples, seed, out = sys.argv[1:]
+    scene, side = load(name), int(size)
+    nm = 380.0 + 400.0 / int(bands) * (np.arange(int(bands)) + 0.5)
+    render(scene, (side, side), wavelength_nm=nm, max_spp=min(COMPILING_SPP, int(samples)), seed=int(seed)).relight()
+    clock, processor = time.perf_counter(), time.process_time()
+    made = render(scene, (side, side), wavelength_nm=nm, max_spp=int(samples), seed=int(seed))
+    radiance = made.relight().values
+    seconds, processor_s = time.perf_counter() - clock, time.process_time() - processor
+    np.savez(out, radiance=radiance, wavelength_nm=nm, samples=made.spp, seconds=seconds, processor_s=processor_s)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,120 @@
+"""The share of a render's error in the sensor's noise: known noise on a flat picture, and what is left out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from render.radiance import SpectralRadiance
+from sensor.presets import low_noise
+from studies.speed.share import (
+    KEPT,
+    Shares,
+    Yardstick,
+    electrons,
+    is_known,
+    least_uncertain,
+    mean_error,
+    own_share_map,
+    share_map,
+    shares,
+    yardstick,
+)
+
+NM = np.arange(390.0, 780.0, 20.0)
+SIDE, CHANNELS = 96, 4
+NOISE_E2 = 100.0
+BOUND = 4.4  # standard errors; exceeded once in 100 000
+
+
+def flat(deviation_e: float, seed: int = 0) -> tuple[Yardstick, np.ndarray]:
+    """Return references with noise of a known deviation around 1000 e-, and the truth."""
+    truth = np.full((CHANNELS, SIDE, SIDE), 1000.0)
+    noise = np.random.default_rng(seed).normal(0.0, deviation_e, (2, *truth.shape))
+    inside = np.ones(truth.shape, dtype=bool)
+    return Yardstick(
+        low_noise(), 0.01, (truth + noise[0], truth + noise[1]), np.full_like(truth, NOISE_E2), inside
+    ), truth
+
+
+def test_the_mean_is_the_known_noise_and_bias_whatever_the_references_noise() -> None:
+    """Error e of 5 e- and 3 e- of bias: (25 + 9) / 100; the references' 8 e- (0.64) fall out.
+
+    A term has the variance of (e + b - r1)(e + b - r2): with m2 = E(e + b)^2, Var (e + b)^2 + 2 m2 s^2 + s^4.
+    """
+    e, bias, s = 5.0, 3.0, 8.0
+    yard, truth = flat(s)
+    image = truth + bias + np.random.default_rng(1).normal(0.0, e, truth.shape)
+    share = share_map(image, yard)[:, 1:-1, 1:-1]  # the edge's pixels count again in the pooling
+    m2 = e**2 + bias**2
+    standard_error = np.sqrt((2 * e**4 + 4 * bias**2 * e**2 + 2 * m2 * s**2 + s**4) / share.size) / NOISE_E2
+    assert share.mean() == pytest.approx(m2 / NOISE_E2, abs=BOUND * standard_error)
+    own = own_share_map(yard)[:, 1:-1, 1:-1]
+    assert own.mean() == pytest.approx(s**2 / NOISE_E2, abs=BOUND * np.sqrt(2 / own.size) * s**2 / NOISE_E2)
+
+
+def test_quantiles_are_those_of_squares_pooled_over_nine() -> None:
+    """References without noise: nine squares of normal errors have a chi-squared distribution of 9 degrees over 9.
+
+    Its median is 8.343 / 9 and its 95 % value 16.919 / 9 (any printed table). Neighbours share pixels: a 96x96 picture
+    of four channels holds 4096 that share none. A quantile's standard error is sqrt(q (1 - q) / n) over the density
+    there, 0.0983 and 0.0160 for 9 degrees.
+    """
+    yard, truth = flat(0.0)
+    image = truth + np.random.default_rng(2).normal(0.0, 10.0, truth.shape)
+    found = shares(share_map(image, yard)[:, 1:-1, 1:-1], yard.inside[:, 1:-1, 1:-1])
+    independent = CHANNELS * SIDE**2 / 9
+    for value, quantile, level, density in ((found.median, 8.343, 0.5, 0.0983), (found.p95, 16.919, 0.95, 0.0160)):
+        standard_error = np.sqrt(level * (1 - level) / independent) / density / 9
+        assert value == pytest.approx(quantile / 9, abs=BOUND * standard_error)
+    assert found.mean == found.mean_of_kept
+
+
+def test_a_pixel_outside_counts_for_nothing_not_even_beside_it() -> None:
+    yard, truth = flat(0.0)
+    yard.inside[:, 10, 10] = False
+    image = truth + 10.0
+    image[:, 10, 10] = 1e9
+    share = share_map(image, yard)
+    assert np.isnan(share[:, 10, 10]).all()
+    assert np.nanmax(np.abs(share - 1.0)) < 1e-12
+    assert shares(share, yard.inside) == Shares(*[pytest.approx(1.0)] * 4)
+    assert mean_error(image, yard) == pytest.approx((10.0, 1.0))
+
+
+def test_the_kept_pixels_are_the_least_uncertain() -> None:
+    yard, truth = flat(0.0)
+    deviation = np.ones_like(truth)
+    deviation[:, 0, :] = 5.0  # 96 of 9216 pixels, 1.04 %: half a per cent goes, all of it from this row
+    deviation.ravel()[: SIDE - 40] += 1.0
+    kept = least_uncertain(deviation, yard)
+    assert kept[:, 1:].all()
+    assert 1 - kept.mean() <= 1 - KEPT
+    share = share_map(truth, yard)
+    share[~kept] = 1e6
+    assert shares(share, kept).mean_of_kept == 0.0
+
+
+def test_a_figure_is_known_where_the_references_own_is_a_tenth() -> None:
+    assert [is_known(2.0, own) for own in (0.0, 0.2, 0.21)] == [True, True, False]
+
+
+def test_exposure_noise_and_pixels_come_from_the_sensor() -> None:
+    """An even picture is exposed to 80 % of the well in G; a channel over the well counts for nothing."""
+    radiance = SpectralRadiance(np.full((4, 4, NM.size), 0.1), NM)
+    sensor, lamps = low_noise(), np.zeros((4, 4), dtype=bool)
+    lamps[0, 0] = True
+    yard = yardstick((radiance, radiance), lamps, sensor)
+    red, green, blue, white = electrons(radiance, sensor, yard.exposure_s)
+    assert green == pytest.approx(0.8 * sensor.pixel.full_well_e)
+    assert yard.inside.any(axis=(1, 2)).tolist() == [
+        (plane < sensor.pixel.full_well_e).all() for plane in (red, green, blue, white)
+    ]
+    assert not yard.inside[:, 0, 0].any()
+    pixel = sensor.pixel
+    own = 0.8 * pixel.full_well_e
+    own += (pixel.prnu * own) ** 2 + pixel.read_noise_e**2 + pixel.fixed_dark_e**2 + sensor.gain_e_per_dn**2 / 12
+    assert yard.noise_e2[1] == pytest.approx(own)
+    brighter = replace(radiance, values=radiance.values * 1.01)
+    share = share_map(electrons(brighter, sensor, yard.exposure_s), yard)[1]
+    assert np.nanmax(share) == pytest.approx((0.01 * green[0, 0]) ** 2 / own)
