@@ -45,6 +45,8 @@ class Means:
         Share of the paths that meet a light first.
     shared : (int, int) or None
         Groups that are rendered along the same paths.
+    indirect : (group, band, h, w) float32 or None
+        Indirect light in `radiance`, where it is kept by itself.
     """
 
     count: int
@@ -55,6 +57,7 @@ class Means:
     coverage: Planes
     coverage_difference: Planes
     shared: tuple[int, int] | None = None
+    indirect: Planes | None = None
 
 
 @dataclass(frozen=True)
@@ -67,11 +70,14 @@ class Drawn:
     seen : tuple of pairs of (chunk, 1 or band, h, w) float32
         For each group.
     coverage : pair of (chunk, h, w) float32
+    indirect : pair of (chunk, group, band, h, w) float32
+        No groups where it isn't asked for.
     """
 
     radiance: Halves
     seen: tuple[Halves, ...]
     coverage: Halves
+    indirect: Halves
 
 
 def no_means(scene: Scene, film: Film) -> Means:
@@ -130,12 +136,12 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
 
     An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
     """
-    start, chunk = means.count, chunk_from(means.count)
-    threads = MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size) for loaded in light_groups)
+    start, chunk, apart = means.count, chunk_from(means.count), means.indirect is not None
+    threads = MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, apart=apart) for loaded in light_groups)
     fitting = max(1, threads // (film.size[0] * film.size[1] * chunk))
     alike = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
     chunks = min(alike, -(-(stop - start) // chunk))
-    drawn = [_drawn(loaded, film, Span(start, chunk, chunks), threads, seed) for loaded in light_groups]
+    drawn = [_drawn(loaded, film, Span(start, chunk, chunks), threads, seed, apart=apart) for loaded in light_groups]
     if len(light_groups[0].groups) == 2:
         means.shared = light_groups[0].groups[0], light_groups[0].groups[1]
     for index in range(chunks):
@@ -149,6 +155,9 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
                 _add(means.radiance[group], means.difference[group], even, odd, weight)
                 even, odd = (half[index] for half in of_group.seen[slot])
                 _add(means.seen[group], means.seen_difference[group], even, odd, weight)
+                if means.indirect is not None:
+                    even, odd = (half[index, slot] for half in of_group.indirect)
+                    means.indirect[group] += ((even + odd) / 2 - means.indirect[group]) * weight
         means.count += chunk
 
 
@@ -161,7 +170,7 @@ def _add(mean: Planes, difference: Planes, even: Planes, odd: Planes, weight: np
         np.add(planes, step, out=planes)
 
 
-def _drawn(loaded: Loaded, film: Film, span: Span, threads: int, seed: int) -> Drawn:
+def _drawn(loaded: Loaded, film: Film, span: Span, threads: int, seed: int, *, apart: bool) -> Drawn:
     """Draw a span of both halves of one light group's paths."""
     halves = []
     for half in range(2):
@@ -171,22 +180,28 @@ def _drawn(loaded: Loaded, film: Film, span: Span, threads: int, seed: int) -> D
             if backend() == "numpy":
                 parts.append(_by_mitsuba(loaded, bands, span, own_seed))
             else:
-                tracer = Tracer(mitsuba_module(), loaded, bands, own_seed)
+                tracer = Tracer(mitsuba_module(), loaded, bands, own_seed, apart=apart)
                 image = traced(partial(tracer.camera, film.size), film.size, span, threads, own_seed)
-                scattered, others = bands_apart(image, len(loaded.groups), part.size)
+                scattered, others = bands_apart(image, len(loaded.groups) * (1 + apart), part.size)
                 shares, own = np.split(others, [len(loaded.groups)], axis=1)
                 parts.append((scattered, shares, own[:, : part.size]))
         # All parts of the bands see the same paths: what knows no band is taken from the first.
         scattered = parts[0][0] if len(parts) == 1 else np.concatenate([part[0] for part in parts], axis=2)
+        scattered, indirect = np.split(scattered, [len(loaded.groups)], axis=1)
         shares = parts[0][1]
         seen = [shares[:, slot, None] for slot in range(len(loaded.groups))]
         if loaded.coloured:
             seen[0] = np.concatenate([part[2] for part in parts], axis=1)
         for slot, planes in enumerate(seen):
             scattered[:, slot] += planes
-        halves.append((scattered, seen, shares.sum(axis=1)))
+        halves.append((scattered, seen, shares.sum(axis=1), indirect))
     even, odd = halves
-    return Drawn(radiance=(even[0], odd[0]), seen=tuple(zip(even[1], odd[1], strict=True)), coverage=(even[2], odd[2]))
+    return Drawn(
+        radiance=(even[0], odd[0]),
+        seen=tuple(zip(even[1], odd[1], strict=True)),
+        coverage=(even[2], odd[2]),
+        indirect=(even[3], odd[3]),
+    )
 
 
 def _by_mitsuba(loaded: Loaded, film: Film, span: Span, seed: int) -> tuple[Planes, Planes, Planes]:
