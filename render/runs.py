@@ -80,8 +80,8 @@ class Drawn:
     indirect: Halves
 
 
-def no_means(scene: Scene, film: Film) -> Means:
-    """Means before the first run."""
+def no_means(scene: Scene, film: Film, *, apart: bool = False) -> Means:
+    """Means before the first run; with `apart` indirect light is kept by itself."""
     bands = film.wavelength_nm.size
     radiance, difference = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(2))
     seen, seen_difference = (
@@ -89,10 +89,11 @@ def no_means(scene: Scene, film: Film) -> Means:
         for _ in range(2)
     )
     coverage, coverage_difference = (np.zeros(film.size, np.float32) for _ in range(2))
-    return Means(0, radiance, difference, seen, seen_difference, coverage, coverage_difference)
+    indirect = np.zeros_like(radiance) if apart else None
+    return Means(0, radiance, difference, seen, seen_difference, coverage, coverage_difference, indirect=indirect)
 
 
-def means_of(transport: Transport) -> Means:
+def means_of(transport: Transport, *, apart: bool = False) -> Means:
     """Means that an earlier render stopped at, to go on from: the same bits."""
     return Means(
         count=transport.spp // 2,
@@ -103,6 +104,7 @@ def means_of(transport: Transport) -> Means:
         coverage=transport.coverage.copy(),
         coverage_difference=transport.coverage_difference.copy(),
         shared=transport.shared.groups if transport.shared else None,
+        indirect=transport.denoised.indirect.copy() if transport.denoised and apart else None,
     )
 
 

@@ -108,7 +108,9 @@ class Tracer:
             si = self.scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
             go_on = (depth + 1 < self.max_depth) & si.is_valid()
             _, lobe, angle = points.bounce(depth)
-            sample, weights, by_wavelength = dr.dispatch(si.bsdf(ray), self._sampled, si, lobe, angle, wavelengths, step)
+            sample, weights, by_wavelength = dr.dispatch(
+                si.bsdf(ray), self._sampled, si, lobe, angle, wavelengths, step
+            )
             chosen |= go_on & by_wavelength
             throughput = _times(throughput, weights)
             delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)

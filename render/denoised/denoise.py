@@ -1,0 +1,126 @@
+"""Indirect light denoised by Intel's Open Image Denoise, six spectra of it, guided by the surfaces that are seen.
+
+Indirect light over albedo is smooth where surfaces are, whatever their texture. Its spectra are few: six planes hold
+them, made of the bands by hat functions, and the way back is the least-squares fit to the picture itself.
+"""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from render.integrator.dense import Tracer
+from render.integrator.wavefront import Span, bands_apart, seed_of, traced
+from render.loader import PART_BANDS, Film, Loaded, mitsuba_module
+from rodcone.optional import optional_library
+from rodcone.types import Planes
+
+EXTRA = "denoise"
+SPECTRA = 6  # two calls of three planes
+LEAST_ALBEDO = 0.02  # darker surfaces are taken as this: their light over albedo would be noise alone
+SURFACE_POINTS = 64
+SURFACE_THREADS = 1 << 20
+_PLANES = 3  # of a call
+
+
+@dataclass(frozen=True)
+class Denoised:
+    """Denoised light of each group at unit spectral emission, and what its error is measured by.
+
+    Attributes
+    ----------
+    radiance : (group, band, h, w) float32
+        The unbiased light with its indirect part denoised, each group by itself.
+    indirect : (group, band, h, w) float32
+        That part of the unbiased light, with its noise.
+    fold_mean, fold_difference : (group, band, h, w) float32
+        Mean and half the difference of two folds: renders with paths of their own, no part of which is in `radiance`.
+    fold_points : int
+        Samples a pixel of each fold.
+    """
+
+    radiance: Planes
+    indirect: Planes
+    fold_mean: Planes
+    fold_difference: Planes
+    fold_points: int
+
+
+def denoiser() -> Any:
+    """Library of the denoiser.
+
+    Raises
+    ------
+    InputError
+        Where it isn't installed.
+    """
+    return optional_library("mitsuba_oidn", EXTRA)
+
+
+def first_surfaces(loaded: Loaded, film: Film, seed: int) -> tuple[Planes, Planes]:
+    """Albedo (band, h, w) and normal (3, h, w) of the first surfaces that scatter light, means over the pixels."""
+    bands = film.wavelength_nm.size
+    own_seed, albedo, normal = seed_of(seed, loaded.groups[0], 0), [], []
+    for part in np.array_split(np.arange(bands), -(-bands // PART_BANDS)):
+        of_part = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
+        tracer = Tracer(mitsuba_module(), loaded, of_part, own_seed)
+        span = Span(0, SURFACE_POINTS, 1)
+        image = traced(partial(tracer.first_surface, film.size), film.size, span, SURFACE_THREADS, own_seed)
+        values, others = bands_apart(image, 1, part.size)
+        albedo.append(values[0, 0])
+        normal.append(others[0])
+    return np.concatenate(albedo), normal[0]
+
+
+def denoised(indirect: Planes, albedo: Planes, normal: Planes) -> Planes:
+    """Indirect light of one light group without most of its noise, shape (band, h, w).
+
+    Parameters
+    ----------
+    indirect, albedo : (band, h, w) float32
+    normal : (3, h, w) float32
+
+    Raises
+    ------
+    InputError
+        Where the denoiser isn't installed.
+    """
+    library = denoiser()
+    albedo = np.maximum(albedo, np.float32(LEAST_ALBEDO))
+    smooth = indirect / albedo
+    scale = np.float32(smooth.mean(dtype=np.float64))
+    if scale == 0:
+        return indirect
+    smooth /= scale
+    hats = _hats(len(smooth))
+    few = np.tensordot(hats, smooth, 1)
+    # A third call's planes, or a second's, may lack: the last stands in for them.
+    filled = np.minimum(np.arange(-(-len(few) // _PLANES) * _PLANES), len(few) - 1)
+    guide = _last(normal)
+    grey = np.full_like(guide, 0.5)
+    made = [
+        np.moveaxis(library.denoise(_last(few[three]), hdr=True, albedo=grey, normal=guide, clean_aux=True), -1, 0)
+        for three in filled.reshape(-1, _PLANES)
+    ]
+    back = _way_back(smooth, few)
+    return np.asarray(np.maximum(np.tensordot(back, np.concatenate(made)[: len(few)], 1), 0) * albedo * scale)
+
+
+def _hats(bands: int) -> Planes:
+    """Hat functions over the bands, each of sum 1: (spectrum, band)."""
+    count = min(SPECTRA, bands)
+    place = np.linspace(0, count - 1, bands)
+    hats = np.maximum(0, 1 - np.abs(place - np.arange(count)[:, None]))
+    return np.asarray(hats / hats.sum(axis=1, keepdims=True), np.float32)
+
+
+def _way_back(bands: Planes, few: Planes) -> Planes:
+    """Least-squares map from the few spectra to the bands, by the picture itself: (band, spectrum) float32."""
+    here, asked = (planes.reshape(len(planes), -1).astype(np.float64) for planes in (few, bands))
+    return np.asarray(asked @ here.T @ np.linalg.pinv(here @ here.T), np.float32)
+
+
+def _last(planes: Planes) -> Planes:
+    """Planes with their axis last, as the denoiser takes them."""
+    return np.ascontiguousarray(np.moveaxis(planes, 0, -1), np.float32)
