@@ -23,18 +23,18 @@ class MeasuredError:
 
 
 def measured_error(
-    picture: NDArray[np.floating], one: NDArray[np.floating], other: NDArray[np.floating], weight: NDArray[np.floating]
+    one: NDArray[np.floating], other: NDArray[np.floating], weight: NDArray[np.floating]
 ) -> MeasuredError:
     """Weighted mean square of a picture's error over the frame, bias and noise together.
 
-    The mean of (picture - one)(picture - other) is the mean of the picture's squared error, whatever the noise of the
-    two: it is independent of the picture's and of each other's, and has no mean. Its standard error is that of blocks
+    The mean product of its differences from two pictures is the mean of its squared error, whatever the noise of the
+    two: that is independent of the picture's and of each other's, and has no mean. Its standard error is that of blocks
     of pixels, the limit Student's.
 
     Parameters
     ----------
-    picture, one, other : (..., h, w) array
-        In a measure that is linear in light.
+    one, other : (..., h, w) array
+        The picture less each of the two, in a measure that is linear in light.
     weight : (..., h, w) array
         Of each pixel's squared error, 0 where it doesn't count; the mean is over all pixels.
 
@@ -43,7 +43,7 @@ def measured_error(
     MeasuredError
         The mean may be negative, since it is an estimate; the limit isn't.
     """
-    product = (picture.astype(np.float64) - one) * (picture.astype(np.float64) - other) * weight
+    product = one.astype(np.float64) * other * weight
     planes = product.reshape(-1, *product.shape[-2:]).mean(axis=0)
     side = max(1, min(BLOCK, min(planes.shape) // LEAST_BLOCKS))
     sums, pixels = _block_sums(planes, side).ravel(), _block_sums(np.ones(planes.shape), side).ravel()

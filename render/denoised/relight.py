@@ -42,6 +42,6 @@ def relight_denoised(
     picture = denoised.relight(spectra, **asked)
     one, other = folded.relight_halves(spectra, **asked)
     luminance = picture.luminance()
-    upper = measured_error(luminance, one.luminance(), other.luminance(), np.ones(picture.shape)).upper
+    upper = measured_error(luminance - one.luminance(), luminance - other.luminance(), np.ones(picture.shape)).upper
     mean = float(luminance.mean())
     return replace(picture, relative_mc_error=upper**0.5 / mean if mean > 0 else 0.0), one, other
