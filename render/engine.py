@@ -82,7 +82,7 @@ def render(
     progress : callable, optional
         Called after each run with the share done and the error so far (infinite before the first look).
     denoise : bool
-        Give denoised light beside the unbiased, and two folds of an eighth of the samples each that its error is
+        Give denoised light beside the unbiased, and two folds of a quarter of the samples each that its error is
         measured by (`render.denoised.relight`). Their time counts; Ctrl-C ends the render, and they are still drawn.
 
     Returns

@@ -97,12 +97,10 @@ def denoised(indirect: Planes, albedo: Planes, normal: Planes) -> Planes:
     few = np.tensordot(hats, smooth, 1)
     # A third call's planes, or a second's, may lack: the last stands in for them.
     filled = np.minimum(np.arange(-(-len(few) // _PLANES) * _PLANES), len(few) - 1)
+    cpu = library.Device(library.DeviceType.CPU)  # the same light on every machine
     guide = _last(normal)
-    grey = np.full_like(guide, 0.5)
-    made = [
-        np.moveaxis(library.denoise(_last(few[three]), hdr=True, albedo=grey, normal=guide, clean_aux=True), -1, 0)
-        for three in filled.reshape(-1, _PLANES)
-    ]
+    options = {"hdr": True, "albedo": np.full_like(guide, 0.5), "normal": guide, "clean_aux": True, "device": cpu}
+    made = [np.moveaxis(library.denoise(_last(few[three]), **options), -1, 0) for three in filled.reshape(-1, _PLANES)]
     back = _way_back(smooth, few)
     return np.asarray(np.maximum(np.tensordot(back, np.concatenate(made)[: len(few)], 1), 0) * albedo * scale)
 

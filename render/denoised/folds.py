@@ -8,7 +8,7 @@ from render.loader import Film, Loaded
 from render.runs import Means, add_run, no_means
 from render.scene import Scene
 
-FOLD_SHARE = 0.125  # samples of each fold over the render's
+FOLD_SHARE = 0.25  # samples of each fold over the render's
 _FOLDS, _SURFACES = 0xF01D, 0x5F0A  # what a seed is for, beside the render's own
 
 

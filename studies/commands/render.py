@@ -90,7 +90,7 @@ def render(
     extend
         hold: surfaces keep their end values outside their tables' wavelengths; by default bands there are refused.
     denoise
-        Write denoised light; its error is measured against two folds of an eighth of the samples each, whose time
+        Write denoised light; its error is measured against two folds of a quarter of the samples each, whose time
         counts. Needs rodcone[denoise].
     force
         Run even where more memory is needed than is free.
