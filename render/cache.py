@@ -80,8 +80,8 @@ def _kind(denoised: bool) -> str:
 
 
 def _denoised(arrays: Mapping[str, Any], values: Mapping[str, Any]) -> Denoised:
-    planes = {name: arrays[f"denoised_{name}"] for name in ("radiance", "indirect", "fold_mean", "fold_difference")}
-    return Denoised(**planes, fold_points=values["fold_points"])
+    names = [field.name for field in fields(Denoised) if field.name != "fold_points"]
+    return Denoised(**{name: arrays[f"denoised_{name}"] for name in names}, fold_points=values["fold_points"])
 
 
 def load_irradiance(folder: Path, scene: Scene, film: Film, seed: int) -> Irradiance | None:

@@ -45,8 +45,8 @@ class Means:
         Share of the paths that meet a light first.
     shared : (int, int) or None
         Groups that are rendered along the same paths.
-    indirect : (group, band, h, w) float32 or None
-        Indirect light in `radiance`, where it is kept by itself.
+    indirect, indirect_difference : (group, band, h, w) float32 or None
+        Indirect light in `radiance` and in `difference`, where it is kept by itself.
     """
 
     count: int
@@ -58,6 +58,7 @@ class Means:
     coverage_difference: Planes
     shared: tuple[int, int] | None = None
     indirect: Planes | None = None
+    indirect_difference: Planes | None = None
 
 
 @dataclass(frozen=True)
@@ -89,12 +90,15 @@ def no_means(scene: Scene, film: Film, *, apart: bool = False) -> Means:
         for _ in range(2)
     )
     coverage, coverage_difference = (np.zeros(film.size, np.float32) for _ in range(2))
-    indirect = np.zeros_like(radiance) if apart else None
-    return Means(0, radiance, difference, seen, seen_difference, coverage, coverage_difference, indirect=indirect)
+    means = Means(0, radiance, difference, seen, seen_difference, coverage, coverage_difference)
+    if apart:
+        means.indirect, means.indirect_difference = np.zeros_like(radiance), np.zeros_like(radiance)
+    return means
 
 
 def means_of(transport: Transport, *, apart: bool = False) -> Means:
     """Means that an earlier render stopped at, to go on from: the same bits."""
+    denoised = transport.denoised if apart else None
     return Means(
         count=transport.spp // 2,
         radiance=transport.radiance.copy(),
@@ -104,7 +108,8 @@ def means_of(transport: Transport, *, apart: bool = False) -> Means:
         coverage=transport.coverage.copy(),
         coverage_difference=transport.coverage_difference.copy(),
         shared=transport.shared.groups if transport.shared else None,
-        indirect=transport.denoised.indirect.copy() if transport.denoised and apart else None,
+        indirect=denoised.indirect.copy() if denoised else None,
+        indirect_difference=denoised.indirect_difference.copy() if denoised else None,
     )
 
 
@@ -157,9 +162,9 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
                 _add(means.radiance[group], means.difference[group], even, odd, weight)
                 even, odd = (half[index] for half in of_group.seen[slot])
                 _add(means.seen[group], means.seen_difference[group], even, odd, weight)
-                if means.indirect is not None:
+                if means.indirect is not None and means.indirect_difference is not None:
                     even, odd = (half[index, slot] for half in of_group.indirect)
-                    means.indirect[group] += ((even + odd) / 2 - means.indirect[group]) * weight
+                    _add(means.indirect[group], means.indirect_difference[group], even, odd, weight)
         means.count += chunk
 
 

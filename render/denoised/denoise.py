@@ -21,6 +21,8 @@ SPECTRA = 6  # two calls of three planes
 LEAST_ALBEDO = 0.02  # darker surfaces are taken as this: their light over albedo would be noise alone
 SURFACE_POINTS = 64
 SURFACE_THREADS = 1 << 20
+MIXING_PIXELS = 2.0  # standard deviation of the window in which errors are compared
+ROUNDING = 1e-10  # of squares of single-precision numbers: spectra that differ by less are one
 _PLANES = 3  # of a call
 
 
@@ -32,8 +34,8 @@ class Denoised:
     ----------
     radiance : (group, band, h, w) float32
         The unbiased light with its indirect part denoised, each group by itself.
-    indirect : (group, band, h, w) float32
-        That part of the unbiased light, with its noise.
+    indirect, indirect_difference : (group, band, h, w) float32
+        That part of the unbiased light, with its noise, and half the difference of its halves.
     fold_mean, fold_difference : (group, band, h, w) float32
         Mean and half the difference of two folds: renders with paths of their own, no part of which is in `radiance`.
     fold_points : int
@@ -42,6 +44,7 @@ class Denoised:
 
     radiance: Planes
     indirect: Planes
+    indirect_difference: Planes
     fold_mean: Planes
     fold_difference: Planes
     fold_points: int
@@ -73,12 +76,17 @@ def first_surfaces(loaded: Loaded, film: Film, seed: int) -> tuple[Planes, Plane
     return np.concatenate(albedo), normal[0]
 
 
-def denoised(indirect: Planes, albedo: Planes, normal: Planes) -> Planes:
+def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Planes) -> Planes:
     """Indirect light of one light group without most of its noise, shape (band, h, w).
+
+    A denoiser smooths what is no noise too, however many samples there are. So the noisy light is mixed in, by what
+    each is off: the one by the halves' difference, the other by how well a half, denoised, foretells the other half.
 
     Parameters
     ----------
-    indirect, albedo : (band, h, w) float32
+    indirect, difference : (band, h, w) float32
+        Mean of the two halves, and half their difference.
+    albedo : (band, h, w) float32
     normal : (3, h, w) float32
 
     Raises
@@ -87,22 +95,46 @@ def denoised(indirect: Planes, albedo: Planes, normal: Planes) -> Planes:
         Where the denoiser isn't installed.
     """
     library = denoiser()
-    albedo = np.maximum(albedo, np.float32(LEAST_ALBEDO))
-    smooth = indirect / albedo
-    scale = np.float32(smooth.mean(dtype=np.float64))
-    if scale == 0:
+    if not indirect.any():
         return indirect
-    smooth /= scale
-    hats = _hats(len(smooth))
-    few = np.tensordot(hats, smooth, 1)
-    # A third call's planes, or a second's, may lack: the last stands in for them.
-    filled = np.minimum(np.arange(-(-len(few) // _PLANES) * _PLANES), len(few) - 1)
-    cpu = library.Device(library.DeviceType.CPU)  # the same light on every machine
+    # Few spectra of light over albedo, with a mean of 1
+    unit = np.maximum(albedo, np.float32(LEAST_ALBEDO))
+    unit *= np.float32((indirect / unit).mean(dtype=np.float64))
+    hats, light = _hats(len(indirect)), np.asarray(indirect / unit, np.float32)
+    few, error = (np.asarray(np.tensordot(hats, x, 1), np.float32) for x in (light, difference / unit))
+    # Denoise the whole and each half
     guide = _last(normal)
-    options = {"hdr": True, "albedo": np.full_like(guide, 0.5), "normal": guide, "clean_aux": True, "device": cpu}
-    made = [np.moveaxis(library.denoise(_last(few[three]), **options), -1, 0) for three in filled.reshape(-1, _PLANES)]
-    back = _way_back(smooth, few)
-    return np.asarray(np.maximum(np.tensordot(back, np.concatenate(made)[: len(few)], 1), 0) * albedo * scale)
+    options = {"hdr": True, "albedo": np.full_like(guide, 0.5), "normal": guide, "clean_aux": True}
+    options["device"] = library.Device(library.DeviceType.CPU)  # the same light on every machine
+
+    def filtered(planes: Planes) -> Planes:
+        filled = np.minimum(np.arange(-(-len(planes) // _PLANES) * _PLANES), len(planes) - 1)
+        made = [library.denoise(_last(planes[three]), **options) for three in filled.reshape(-1, _PLANES)]
+        return np.concatenate([np.moveaxis(image, -1, 0) for image in made])[: len(planes)]
+
+    even, odd = np.maximum(few + error, 0), np.maximum(few - error, 0)
+    share = _denoised_share(error, (filtered(even) - odd, filtered(odd) - even))
+    mixed = few + share * (filtered(few) - few)
+    return np.asarray(np.maximum(np.tensordot(_way_back(light, few), mixed, 1), 0) * unit)
+
+
+def _denoised_share(error: Planes, missed: tuple[Planes, Planes]) -> Planes:
+    """Share of denoised light in each pixel (h, w), by the variance of the noisy and the squared error of the denoised.
+
+    Parameters
+    ----------
+    error : (spectrum, h, w) float32
+        Half the difference of the halves.
+    missed : pair of (spectrum, h, w) float32
+        What a half, denoised, differs by from the other half: its error, and the noise of that half.
+    """
+    from scipy.ndimage import gaussian_filter  # late: a render that isn't denoised does without
+
+    noisy, one, other = (gaussian_filter(np.square(x).mean(axis=0), MIXING_PIXELS) for x in (error, *missed))
+    # A half has twice the variance of the mean. What is left must be more than that estimate's own standard error.
+    variance, pixels = 2 * noisy, 4 * np.pi * MIXING_PIXELS**2
+    squared = np.maximum((one + other) / 2 - variance - variance * (2 / pixels) ** 0.5, 0)
+    return np.asarray(np.divide(noisy, noisy + squared, out=np.ones_like(noisy), where=noisy + squared > 0))
 
 
 def _hats(bands: int) -> Planes:
@@ -116,7 +148,7 @@ def _hats(bands: int) -> Planes:
 def _way_back(bands: Planes, few: Planes) -> Planes:
     """Least-squares map from the few spectra to the bands, by the picture itself: (band, spectrum) float32."""
     here, asked = (planes.reshape(len(planes), -1).astype(np.float64) for planes in (few, bands))
-    return np.asarray(asked @ here.T @ np.linalg.pinv(here @ here.T), np.float32)
+    return np.asarray(asked @ here.T @ np.linalg.pinv(here @ here.T, rcond=ROUNDING), np.float32)
 
 
 def _last(planes: Planes) -> Planes:

@@ -23,6 +23,7 @@ def denoise_means(
         Where the denoiser isn't installed.
     """
     assert means.indirect is not None
+    assert means.indirect_difference is not None
     folds = no_means(scene, film, apart=True)  # by the kernel of the render's own light: no other is compiled
     if earlier is not None:
         folds.count = earlier.fold_points
@@ -31,10 +32,12 @@ def denoise_means(
     while folds.count < stop:
         add_run(loaded, folds, film, stop, seed_of(seed, _FOLDS))
     albedo, normal = first_surfaces(loaded[0], film, seed_of(seed, _SURFACES))
-    smooth = np.stack([denoised(planes, albedo, normal) for planes in means.indirect])
+    halves = zip(means.indirect, means.indirect_difference, strict=True)
+    smooth = np.stack([denoised(light, difference, albedo, normal) for light, difference in halves])
     return Denoised(
         radiance=np.maximum(means.radiance - means.indirect, 0) + smooth,  # the difference rounds
         indirect=means.indirect,
+        indirect_difference=means.indirect_difference,
         fold_mean=folds.radiance,
         fold_difference=folds.difference,
         fold_points=folds.count,

@@ -94,7 +94,9 @@ def test_relighting_is_a_sum_of_groups() -> None:
     whole = relight_denoised(made)
     parts = [relight_denoised(made, powers={dark: 0.0}) for dark in made.groups]
     for view, *of_groups in zip(whole, *parts, strict=True):
-        assert sum(x.values for x in of_groups) == pytest.approx(view.values, rel=1e-4, abs=1e-5 * view.values.max())
+        assert sum(x.values for x in of_groups) == pytest.approx(
+            view.values, rel=1e-4, abs=1e-5 * float(view.values.max())
+        )
 
 
 def test_the_told_error_is_the_true_one(box) -> None:
