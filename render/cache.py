@@ -25,11 +25,11 @@ from rodcone.digests import digest, digest_file
 from rodcone.files import replacing
 from rodcone.jit import compiler_version
 
-ENGINE_VERSION = 7  # raise it with any change that moves a rendered value: older entries are then not used
+ENGINE_VERSION = 8  # raise it with any change that moves a rendered value: older entries are then not used
 _DIGEST_BYTES = hashlib.sha256().digest_size
-_ARRAYS = ("radiance", "half_difference", "variance", "coverage", "coverage_difference")
+_ARRAYS = ("radiance", "half_difference", "variance", "coverage", "coverage_difference", "counts")
 _MEANS = tuple(field.name for field in fields(SceneMeans))
-_VALUES = ("spp", "stopped_by", "seconds", "integrator", "variant")
+_VALUES = ("stopped_by", "seconds", "integrator", "variant")
 _NOT_IN_NAMES = re.compile(r"[^\w.-]+")  # above all path separators: entries stay in their folder
 
 

@@ -17,10 +17,10 @@ from render.combine import emission
 from render.denoised.denoise import denoiser
 from render.denoised.folds import FOLD_SHARE, denoise_means
 from render.level import Irradiance
-from render.limits import LEAST_POINTS, Limits
+from render.limits import LEAST_POINTS, PILOT_FROM, Limits
 from render.loader import Film, integrator_name, load_groups, variant
 from render.meter import Meter
-from render.runs import add_run, errors_of, let_go, means_of, no_means, scene_means_of
+from render.runs import add_run, errors_of, let_go, means_of, no_means, pilot_rates, scene_means_of
 from render.scene import Scene
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
@@ -62,8 +62,9 @@ def render(
         Band centres and widths; 40 bands of 10 nm over 380-780 nm by default. `render.spectrum.line_bands` gives
         emission lines bands of their own.
     spp : int, optional
-        Samples a pixel, in two independent halves; rounded up by an eighth at most. `Transport.spp` holds the samples
-        drawn.
+        Samples a pixel in the mean over the picture, in two independent halves; rounded up by an eighth at most.
+        `Transport.counts` holds the samples of each pixel. Where more than 64 are asked for, a pilot of 32, which isn't
+        counted, finds the pixels that need more; all get at least a quarter of the mean.
     max_spp : int, optional
         The same as a ceiling beside `noise` or `max_seconds`.
     noise : float, optional
@@ -78,7 +79,8 @@ def render(
     cache : path, optional
         Folder of renders. A stored one that is fine enough is returned, a coarser one continued, a damaged one ignored.
     resume : Transport, optional
-        An earlier result of the same scene, size, bands, depth and seed to go on from: to the bits of one go.
+        An earlier result of the same scene, size, bands, depth and seed to go on from: to the bits of one go. One of 64
+        samples or fewer is made anew where more are asked for, since it had no pilot.
     progress : callable, optional
         Called after each run with the share done and the error so far (infinite before the first look).
     denoise : bool
@@ -176,10 +178,16 @@ def _render(
     scene: Scene, film: Film, limits: Limits, earlier: Transport | None, progress: Progress, denoise: bool
 ) -> Transport:
     start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
-    means = means_of(earlier, apart=denoise) if earlier else no_means(scene, film, apart=denoise)
     own_share, denoised = (1 / (1 + 2 * FOLD_SHARE) if denoise else 1.0), None
+    piloted = limits.most_samples > PILOT_FROM and backend() != "numpy"
     loaded = load_groups(scene, film)
     lights, stopped_by = emission(scene.groups, film.wavelength_nm, film.width_nm), None
+    if earlier and (earlier.spp > PILOT_FROM or not piloted):
+        means = means_of(earlier, apart=denoise)
+    else:  # a short one that had no pilot is drawn anew
+        rates = pilot_rates(loaded, film, lights, limits.seed) if piloted else np.ones(film.size, np.uint32)
+        means, earlier = no_means(scene, film, rates, apart=denoise), None
+    limits = replace(limits, mean_rate=float(means.rates.mean()))
     errors: dict[str, Any] = {"relative_mc_error": np.inf}
     look = limits.next_look(means.count)
     with _interrupt_noted() as interrupted:
@@ -212,7 +220,7 @@ def _render(
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,
         width_nm=film.width_nm,
-        spp=2 * means.count,
+        counts=2 * means.count * means.rates,
         stopped_by=stopped_by,
         seconds=time.perf_counter() - start,
         integrator=integrator_name(),

@@ -53,19 +53,30 @@ def pooled(planes: Planes) -> Planes:
     return np.asarray((rows[..., :-2] + rows[..., 1:-1] + rows[..., 2:]) / planes.dtype.type(9))
 
 
-def variance_of(difference: Planes) -> Planes:
+def variance_of(difference: Planes, rates: NDArray[np.uint32]) -> Planes:
     """Variance of a mean of two halves, from half their difference: its square, pooled over 3x3 pixels.
 
-    One difference has one degree of freedom; bands share their paths, and add none.
+    Pooled as the variance of one sample, since pixels (h, w) have samples in the ratio of `rates`. One difference has
+    one degree of freedom; bands share their paths, and add none.
     """
-    return pooled(np.square(difference))
+    return pooled_by_sample(np.square(difference), rates)
 
 
-def shared_paths(groups: tuple[int, int], difference: Planes, variance: Planes) -> SharedPaths:
+def pooled_by_sample(squares: Planes, rates: NDArray[np.uint32]) -> Planes:
+    """Squares of errors, pooled over 3x3 pixels whose samples are in the ratio of `rates`."""
+    if rates.min() == rates.max():
+        return pooled(squares)
+    samples = rates.astype(np.float32)
+    return np.asarray(pooled(squares * samples) / samples)
+
+
+def shared_paths(
+    groups: tuple[int, int], difference: Planes, variance: Planes, rates: NDArray[np.uint32]
+) -> SharedPaths:
     """Correlation of the errors of two groups, from half the difference of the halves (group, band, h, w)."""
     one, other = groups
     both = np.sqrt(variance[one]) * np.sqrt(variance[other])
-    product = pooled(difference[one] * difference[other])
+    product = pooled_by_sample(difference[one] * difference[other], rates)
     found = np.divide(product, both, out=np.zeros_like(both), where=both > 0)
     return SharedPaths(groups, np.clip(found, -1, 1, out=found))
 

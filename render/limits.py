@@ -1,5 +1,6 @@
 """When a render stops: samples, error or time, whichever comes first."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,8 @@ from render.transport import Stop, Transport
 from rodcone.errors import InputError, require_range, require_whole
 
 DEFAULT_SPP = 64
-MOST_POINTS = 1 << LOG2_POINTS  # of each half
+PILOT_FROM = 64  # samples a pixel: where more are asked for, a pilot says where they are needed
+MOST_POINTS = 1 << LOG2_POINTS  # of each half, in the mean over the picture
 MOST_SPP = 2 * MOST_POINTS  # ceiling where only an error is asked for
 LEAST_POINTS = 8  # of each half, before an error is believed
 A_POWER = 8  # chunks from one power of two to the next: at most an eighth more is drawn than asked for
@@ -32,6 +34,8 @@ class Limits:
         Relative Monte Carlo error to reach.
     max_seconds : float or None
     seed : int
+    mean_rate : float
+        Points of a pixel over those of a pixel of rate 1, in the mean over the picture: all counts below are of rate 1.
 
     Raises
     ------
@@ -44,6 +48,7 @@ class Limits:
     noise: float | None = None
     max_seconds: float | None = None
     seed: int = 0
+    mean_rate: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("spp", "max_spp"):
@@ -60,10 +65,14 @@ class Limits:
         require_whole("seed", self.seed, 0, 2**63, "give a whole number")
 
     @property
+    def most_samples(self) -> int:
+        """Samples a pixel after which the render stops in any case, halves together, before rounding up."""
+        return self.spp or self.max_spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
+
+    @property
     def most_points(self) -> int:
         """Points of each half after which the render stops in any case: a whole number of chunks."""
-        asked = self.spp or self.max_spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
-        half = -(-asked // 2)
+        half = math.ceil(self.most_samples / 2 / self.mean_rate)
         chunk = chunk_from(half)
         return -(-half // chunk) * chunk
 
@@ -76,8 +85,9 @@ class Limits:
 
     def met_by(self, earlier: Transport) -> bool:
         """Whether a render that was made earlier leaves nothing to do."""
-        last_s = earlier.seconds / max(earlier.spp, 1)
-        return self.stop(earlier.spp // 2, earlier.relative_mc_error, earlier.seconds, last_s) is not None
+        count = int(earlier.counts.min()) // 2
+        last_s = earlier.seconds / max(count, 1)
+        return self.stop(count, earlier.relative_mc_error, earlier.seconds, last_s) is not None
 
     def stop(self, count: int, error: float, seconds: float, last_s: float) -> Stop | None:
         """Which limit is reached, None while none is.

@@ -85,6 +85,7 @@ def _half(loaded: Loaded, film: Film, seed: int) -> Planes:
     for part in np.array_split(np.arange(film.wavelength_nm.size), -(-film.wavelength_nm.size // METER_BANDS)):
         bands = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
         tracer = Tracer(mitsuba_module(), loaded, bands, seed)
-        image = traced(tracer.meter, film.size, Span(0, HALF_SPP, 1), HALF_SPP * METER_PIXELS**2, seed)
+        alike, span = np.ones(film.size, np.uint32), Span(0, HALF_SPP, 1)
+        image = traced(tracer.meter, alike, span, HALF_SPP * METER_PIXELS**2, seed)
         parts.append(bands_apart(image, len(loaded.groups), part.size)[0][0])
     return np.concatenate(parts, axis=1)

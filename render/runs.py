@@ -8,11 +8,14 @@ that was stopped anywhere and goes on has the bits of one go.
 import traceback
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from render.error_estimates import relative_error, shared_paths, variance_of
+from render.integrator.allocation import rates_of
 from render.integrator.dense import Tracer
 from render.integrator.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
 from render.level import SceneMeans
@@ -24,6 +27,7 @@ from rodcone.jit import backend
 from rodcone.types import Floats, Planes
 
 MOST_FLOATS = 1 << 24  # of all channels of a launch, 64 MiB: as many threads as that allows
+PILOT = Span(0, 8, 2)  # of each half: 32 samples a pixel, in four sets
 BLOCK = 1 << 16  # pixels whose errors are summed in double precision at once
 
 Halves = tuple[Planes, Planes]  # the even and the odd one
@@ -36,7 +40,9 @@ class Means:
     Attributes
     ----------
     count : int
-        Points of each half.
+        Points of each half in a pixel of rate 1.
+    rates : (h, w) uint32
+        By how many times more points a pixel has: powers of two.
     radiance, difference : (group, band, h, w) float32
         All light, and half the difference of the halves.
     seen, seen_difference : list of (1 or band, h, w) float32
@@ -50,6 +56,7 @@ class Means:
     """
 
     count: int
+    rates: NDArray[np.uint32]
     radiance: Planes
     difference: Planes
     seen: list[Planes]
@@ -81,7 +88,7 @@ class Drawn:
     indirect: Halves
 
 
-def no_means(scene: Scene, film: Film, *, apart: bool = False) -> Means:
+def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, apart: bool = False) -> Means:
     """Means before the first run; with `apart` indirect light is kept by itself."""
     bands = film.wavelength_nm.size
     radiance, difference = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(2))
@@ -90,7 +97,7 @@ def no_means(scene: Scene, film: Film, *, apart: bool = False) -> Means:
         for _ in range(2)
     )
     coverage, coverage_difference = (np.zeros(film.size, np.float32) for _ in range(2))
-    means = Means(0, radiance, difference, seen, seen_difference, coverage, coverage_difference)
+    means = Means(0, rates, radiance, difference, seen, seen_difference, coverage, coverage_difference)
     if apart:
         means.indirect, means.indirect_difference = np.zeros_like(radiance), np.zeros_like(radiance)
     return means
@@ -100,7 +107,8 @@ def means_of(transport: Transport, *, apart: bool = False) -> Means:
     """Means that an earlier render stopped at, to go on from: the same bits."""
     denoised = transport.denoised if apart else None
     return Means(
-        count=transport.spp // 2,
+        count=int(transport.counts.min()) // 2,
+        rates=transport.counts // transport.counts.min(),
         radiance=transport.radiance.copy(),
         difference=transport.half_difference.copy(),
         seen=[planes.copy() for planes in transport.seen],
@@ -115,8 +123,8 @@ def means_of(transport: Transport, *, apart: bool = False) -> Means:
 
 def errors_of(lights: Floats, means: Means) -> dict[str, Any]:
     """What a `Transport` tells of its Monte Carlo error under lights (group, band), from the means: fields by name."""
-    variance = variance_of(means.difference)
-    shared = shared_paths(means.shared, means.difference, variance) if means.shared else None
+    variance = variance_of(means.difference, means.rates)
+    shared = shared_paths(means.shared, means.difference, variance, means.rates) if means.shared else None
     error = relative_error(lights, means.radiance, variance, shared)
     return {"variance": variance, "shared": shared, "relative_mc_error": error}
 
@@ -144,11 +152,12 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
     An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
     """
     start, chunk, apart = means.count, chunk_from(means.count), means.indirect is not None
-    threads = MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, apart=apart) for loaded in light_groups)
-    fitting = max(1, threads // (film.size[0] * film.size[1] * chunk))
+    threads = launch_threads(light_groups, film, apart=apart)
+    fitting = max(1, threads // (int(means.rates.sum()) * chunk))
     alike = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
     chunks = min(alike, -(-(stop - start) // chunk))
-    drawn = [_drawn(loaded, film, Span(start, chunk, chunks), threads, seed, apart=apart) for loaded in light_groups]
+    span = Span(start, chunk, chunks)
+    drawn = [_drawn(each, film, means.rates, span, threads, seed, apart=apart) for each in light_groups]
     if len(light_groups[0].groups) == 2:
         means.shared = light_groups[0].groups[0], light_groups[0].groups[1]
     for index in range(chunks):
@@ -168,6 +177,35 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
         means.count += chunk
 
 
+def pilot_rates(light_groups: list[Loaded], film: Film, lights: Floats, seed: int) -> NDArray[np.uint32]:
+    """Rates of the pixels (h, w), from samples that are drawn for them alone.
+
+    Parameters
+    ----------
+    lights : (group, band) float64
+        The scene's own emission.
+    """
+    energy = (lights * film.width_nm).astype(np.float32)
+    scattered = np.zeros((len(lights), 2 * PILOT.chunks, *film.size), np.float32)
+    seen = np.zeros((len(lights), *film.size), np.float32)
+    uniform, threads = np.ones(film.size, np.uint32), launch_threads(light_groups, film)
+    for loaded in light_groups:
+        drawn = _drawn(loaded, film, uniform, PILOT, threads, seed_of(seed, PILOT.chunk))
+        for slot, group in enumerate(loaded.groups):
+            for index, (half, chunk) in enumerate(product(range(2), range(PILOT.chunks))):
+                lamps = drawn.seen[slot][half][chunk]
+                light = drawn.radiance[half][chunk, slot] - lamps
+                scattered[group, index] = np.tensordot(energy[group], light, axes=1)
+                of_lamps = energy[group] if len(lamps) > 1 else energy[group].sum(keepdims=True)
+                seen[group] += np.tensordot(of_lamps, lamps, axes=1) / (2 * PILOT.chunks)
+    return rates_of(scattered, seen)
+
+
+def launch_threads(light_groups: list[Loaded], film: Film, *, apart: bool = False) -> int:
+    """Threads of a launch, by the memory that their channels need."""
+    return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, apart=apart) for loaded in light_groups)
+
+
 def _add(mean: Planes, difference: Planes, even: Planes, odd: Planes, weight: np.float32) -> None:
     """Add both halves' means over a chunk, in place: m += ((a + b) / 2 - m) w, d += ((a - b) / 2 - d) w."""
     for planes, twice in ((mean, even + odd), (difference, even - odd)):
@@ -177,7 +215,9 @@ def _add(mean: Planes, difference: Planes, even: Planes, odd: Planes, weight: np
         np.add(planes, step, out=planes)
 
 
-def _drawn(loaded: Loaded, film: Film, span: Span, threads: int, seed: int, *, apart: bool) -> Drawn:
+def _drawn(
+    loaded: Loaded, film: Film, rates: NDArray[np.uint32], span: Span, threads: int, seed: int, *, apart: bool = False
+) -> Drawn:
     """Draw a span of both halves of one light group's paths."""
     halves = []
     for half in range(2):
@@ -188,7 +228,7 @@ def _drawn(loaded: Loaded, film: Film, span: Span, threads: int, seed: int, *, a
                 parts.append(_by_mitsuba(loaded, bands, span, own_seed))
             else:
                 tracer = Tracer(mitsuba_module(), loaded, bands, own_seed, apart=apart)
-                image = traced(partial(tracer.camera, film.size), film.size, span, threads, own_seed)
+                image = traced(partial(tracer.camera, film.size), rates, span, threads, own_seed)
                 scattered, others = bands_apart(image, len(loaded.groups) * (1 + apart), part.size)
                 shares, own = np.split(others, [len(loaded.groups)], axis=1)
                 parts.append((scattered, shares, own[:, : part.size]))

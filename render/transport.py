@@ -47,8 +47,8 @@ class Transport:
     groups : mapping of str to LightGroup
         The scene's own spectra and powers, in the order of the first axis.
     wavelength_nm, width_nm : (band,) float64
-    spp : int
-        Samples a pixel, both halves together.
+    counts : (h, w) uint32
+        Samples of each pixel, both halves together; a pixel that is noisier than others has more.
     stopped_by : "samples", "noise", "seconds" or "interrupt"
     seconds : float
         Of all the calls that it took.
@@ -74,7 +74,7 @@ class Transport:
     groups: Mapping[str, LightGroup]
     wavelength_nm: Floats
     width_nm: Floats
-    spp: int
+    counts: NDArray[np.uint32]
     stopped_by: Stop
     seconds: float
     integrator: str
@@ -83,6 +83,11 @@ class Transport:
     shared: SharedPaths | None = None
     meter: Callable[[], Irradiance] | None = None
     denoised: Denoised | None = None
+
+    @property
+    def spp(self) -> float:
+        """Samples a pixel in the mean over the picture, both halves together."""
+        return float(self.counts.mean())
 
     @property
     def irradiance(self) -> Floats | None:
@@ -225,7 +230,7 @@ class Transport:
         facts = {
             "size": f"{self.radiance.shape[2]} x {self.radiance.shape[3]} pixels, {self.wavelength_nm.size} bands",
             "lights": ", ".join(self.groups),
-            "samples": f"{self.spp} a pixel, {self.seconds:.1f} s",
+            "samples": f"{self.spp:.0f} a pixel, {self.seconds:.1f} s",
             "Monte Carlo error": f"{self.relative_mc_error:.2g} of the value",
             "integrator": f"{self.integrator}, {self.variant}",
         }

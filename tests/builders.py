@@ -54,7 +54,7 @@ def transport_of(
         covariance=np.zeros((scattered.size + 1,) * 2),
     )
     measured = None if irradiance is None else Irradiance(irradiance, np.zeros((irradiance.size,) * 2))
-    facts = {"stopped_by": "samples", "seconds": 1.0, "integrator": "none", "variant": "none", "spp": 64}
+    facts = {"stopped_by": "samples", "seconds": 1.0, "integrator": "none", "variant": "none"}
     errors = {name: np.zeros((given, bands, *size), np.float32) for name in ("half_difference", "variance")}
     return Transport(
         **{
@@ -64,6 +64,7 @@ def transport_of(
             "seen_difference": tuple(np.zeros_like(seen[:, None])),
             "coverage_difference": np.zeros(size, np.float32),
             "scene_means": means,
+            "counts": np.full(size, 64, np.uint32),
             "groups": dict(groups),
             "wavelength_nm": np.asarray(wavelength_nm, np.float64),
             "width_nm": np.asarray(width_nm, np.float64),

@@ -39,7 +39,7 @@ class Denoised:
     fold_mean, fold_difference : (group, band, h, w) float32
         Mean and half the difference of two folds: renders with paths of their own, no part of which is in `radiance`.
     fold_points : int
-        Samples a pixel of each fold.
+        Samples of each fold in a pixel of rate 1.
     """
 
     radiance: Planes
@@ -65,11 +65,12 @@ def first_surfaces(loaded: Loaded, film: Film, seed: int) -> tuple[Planes, Plane
     """Albedo (band, h, w) and normal (3, h, w) of the first surfaces that scatter light, means over the pixels."""
     bands = film.wavelength_nm.size
     own_seed, albedo, normal = seed_of(seed, loaded.groups[0], 0), [], []
+    once = np.ones(film.size, np.uint32)
     for part in np.array_split(np.arange(bands), -(-bands // PART_BANDS)):
         of_part = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
         tracer = Tracer(mitsuba_module(), loaded, of_part, own_seed)
         span = Span(0, SURFACE_POINTS, 1)
-        image = traced(partial(tracer.first_surface, film.size), film.size, span, SURFACE_THREADS, own_seed)
+        image = traced(partial(tracer.first_surface, film.size), once, span, SURFACE_THREADS, own_seed)
         values, others = bands_apart(image, 1, part.size)
         albedo.append(values[0, 0])
         normal.append(others[0])

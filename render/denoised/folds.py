@@ -24,7 +24,9 @@ def denoise_means(
     """
     assert means.indirect is not None
     assert means.indirect_difference is not None
-    folds = no_means(scene, film, apart=True)  # by the kernel of the render's own light: no other is compiled
+    folds = no_means(
+        scene, film, means.rates, apart=True
+    )  # by the kernel of the render's own light: no other is compiled
     if earlier is not None:
         folds.count = earlier.fold_points
         folds.radiance, folds.difference = earlier.fold_mean.copy(), earlier.fold_difference.copy()

@@ -66,13 +66,14 @@ class Points:
     ----------
     mi : module
     index : UInt32
-        Number of the point in its pixel's sequence.
+        Number of the point in its pixel's sequence. Past the sequence's end it begins anew, with another scramble.
     key : UInt32
         Of the pixel: decides the scramble.
     """
 
     def __init__(self, mi: Any, index: Any, key: Any) -> None:
-        self.mi, self.index, self.key = mi, index, key
+        self.mi, self.index = mi, index & ((1 << LOG2_POINTS) - 1)
+        self.key = key + (index >> LOG2_POINTS) * 0x632BE5AB
         self.sequence = _on_device(mi)
 
     def at(self, dimension: Any) -> Any:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from render.integrator.dense import SPECTRUM_SIZE
 from render.integrator.points import Points, pixel_keys
@@ -29,39 +30,65 @@ def seed_of(*coordinates: int) -> int:
 
 
 def traced(
-    trace: Callable[[Any, Points], list[Any]], size: tuple[int, int], span: Span, threads: int, seed: int
+    trace: Callable[[Any, Points], list[Any]], rates: NDArray[np.uint32], span: Span, threads: int, seed: int
 ) -> Planes:
-    """Means over each chunk of the channels that a tracer gives, shape (chunk, channel, h, w)."""
-    mi, pixels, samples = mitsuba_module(), size[0] * size[1], span.chunk * span.chunks
-    most = max(1, threads // samples)
+    """Means over each chunk of the channels that a tracer gives, shape (chunk, channel, h, w).
+
+    Of a pixel at rate r the points are r times as many: a chunk of it has r times the span's points.
+    """
+    mi, flat = mitsuba_module(), rates.ravel()
+    order = np.argsort(flat, kind="stable")
+    ends = np.cumsum(flat[order].astype(np.int64) * span.chunk * span.chunks)
     means: Planes | None = None
-    for first in range(0, pixels, most):
-        count = min(most, pixels - first)
-        # thread = (number of the chunk x count + number of the pixel) x chunk + number of the point within the chunk
-        thread, length = dr.arange(mi.UInt32, count * samples), dr.opaque(mi.UInt32, span.chunk)
-        total_of, in_block = thread // length, dr.opaque(mi.UInt32, count)  # a total for each chunk and pixel
-        number = total_of // in_block
-        pixel = total_of - number * in_block + dr.opaque(mi.UInt32, first)
-        index = thread - total_of * length + number * length + dr.opaque(mi.UInt32, span.start)
-        try:
-            channels = trace(pixel, Points(mi, index, pixel_keys(mi, pixel, seed)))
-            dr.eval(channels)
-        except RuntimeError as error:
-            cause = _root_cause(error)
-            if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
-                raise
-            raise InputError(
-                f"scene: Mitsuba can't render it: {mitsuba_words(cause)}; correct the description"
-            ) from None
+    for few in np.split(order, np.flatnonzero(np.diff(ends // threads)) + 1):
+        # A launch has a part for each rate, where chunks of one length follow each other: chunk by chunk, and within it
+        # pixel by pixel. `blocks` gives the pixel and the number of the first point of each `span.chunk` threads.
+        values, firsts = np.unique(flat[few], return_index=True)
+        parts = list(zip(values.tolist(), np.split(few, firsts[1:]), strict=True))
+        blocks = np.concatenate([_blocks(rate, pixels, span) for rate, pixels in parts], axis=1)
+        pixel_of, first_of = (mi.UInt32(numbers) + dr.opaque(mi.UInt32, 0) for numbers in blocks)
+        dr.eval(pixel_of, first_of)  # memory of Dr.Jit's own: a kernel reads NumPy's, aligned or not, by other code
+        channels = _launched(trace, pixel_of, first_of, span.chunk, seed)
         if means is None:
-            means = np.empty((span.chunks, len(channels), pixels), np.float32)
-        for slot, channel in enumerate(channels):
-            total = dr.block_sum(channel, span.chunk) if span.chunk > 1 else channel
-            means[:, slot, first : first + count] = total.numpy().reshape(span.chunks, count)
+            means = np.empty((span.chunks, len(channels), rates.size), np.float32)
+        start = 0
+        for rate, pixels in parts:
+            count = pixels.size * rate * span.chunk * span.chunks
+            index = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, start)
+            for slot, channel in enumerate(channels):
+                own = channel if count == dr.width(channel) else dr.gather(mi.Float, channel, index)
+                total = dr.block_sum(own, rate * span.chunk) if rate * span.chunk > 1 else own
+                means[:, slot, pixels] = total.numpy().reshape(span.chunks, -1) * np.float32(1 / (rate * span.chunk))
+            start += count
     assert means is not None
-    if span.chunk > 1:
-        means *= np.float32(1 / span.chunk)
-    return means.reshape(span.chunks, -1, *size)
+    return means.reshape(span.chunks, -1, *rates.shape)
+
+
+def _blocks(rate: int, pixels: NDArray[np.intp], span: Span) -> NDArray[np.uint32]:
+    """Pixel and first point of blocks of `span.chunk` points of pixels of one rate, shape (2, block)."""
+    chunk, pixel, block = np.meshgrid(np.arange(span.chunks), pixels, np.arange(rate), indexing="ij")
+    first = span.start * rate + (chunk * rate + block) * span.chunk
+    return np.stack([pixel.ravel(), first.ravel()]).astype(np.uint32)
+
+
+def _launched(
+    trace: Callable[[Any, Points], list[Any]], pixel_of: Any, first_of: Any, chunk: int, seed: int
+) -> list[Any]:
+    """Channels of all points of blocks, each `chunk` points long, evaluated."""
+    mi = mitsuba_module()
+    thread, length = dr.arange(mi.UInt32, dr.width(pixel_of) * chunk), dr.opaque(mi.UInt32, chunk)
+    block = thread // length
+    pixel, first = (dr.gather(mi.UInt32, numbers, block) for numbers in (pixel_of, first_of))
+    index = first + thread - block * length
+    try:
+        channels = trace(pixel, Points(mi, index, pixel_keys(mi, pixel, seed)))
+        dr.eval(channels)
+    except RuntimeError as error:
+        cause = _root_cause(error)
+        if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
+            raise
+        raise InputError(f"scene: Mitsuba can't render it: {mitsuba_words(cause)}; correct the description") from None
+    return channels
 
 
 def bands_apart(image: Planes, groups: int, bands: int) -> tuple[Planes, Planes]:

@@ -63,14 +63,14 @@ class PilotNoise:
 
     Attributes
     ----------
-    spp, half_spp : int
+    spp, half_spp : float
         Samples of the pilot, and of one of its halves.
     level : float
         Variance of the level over its square, of one sample a pixel and for as many pixels as the render has.
     """
 
-    spp: int
-    half_spp: int
+    spp: float
+    half_spp: float
     level: float
 
 

@@ -175,4 +175,4 @@ def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:
         return PilotNoise(spp=0, half_spp=1, level=0.0)
     fewer = lit.coverage.size / (pilot.opened.size[0] * pilot.opened.size[1])
     error = lit.level().relative_error or 0.0
-    return PilotNoise(spp=lit.spp, half_spp=lit.spp // 2, level=error**2 * lit.spp * fewer)
+    return PilotNoise(spp=lit.spp, half_spp=lit.spp / 2, level=error**2 * lit.spp * fewer)

@@ -131,7 +131,7 @@ def render(
     say(*opened.notes)
     interrupted = transport.stopped_by == "interrupt"
     if interrupted:
-        say(f"stopped; {transport.spp} samples a pixel are kept in {out}")
+        say(f"stopped; {transport.spp:.0f} samples a pixel are kept in {out}")
     facts = {"path": str(out), **_facts(opened, transport, radiance)}
     facts["largest_band_error"] = float(transport.band_error(spectra).max())
     print_result(out, facts, json=json)

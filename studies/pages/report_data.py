@@ -45,7 +45,7 @@ class ReportRender:
     """
 
     scene: str
-    spp: int | None = None
+    spp: float | None = None
     bands: int | None = None
     seconds: float | None = None
     variant: str | None = None

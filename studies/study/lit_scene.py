@@ -149,7 +149,9 @@ class RenderFacts:
     ----------
     integrator, variant, stopped_by : str
     seconds : float
-    spp, bands : int
+    spp : float
+        Samples a pixel, in the mean.
+    bands : int
     relative_mc_error, relative_level_error : float or None
         Of the lit scene, as `render.radiance.SpectralRadiance`.
     first_nm, last_nm, width_nm : float
@@ -159,7 +161,7 @@ class RenderFacts:
     integrator: str
     variant: str
     seconds: float
-    spp: int
+    spp: float
     stopped_by: str
     relative_mc_error: float | None
     relative_level_error: float | None

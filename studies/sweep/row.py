@@ -15,7 +15,9 @@ class Row:
         Where the cell lies in its study; scene and sensor files by their names.
     luminance_cd_m2, illuminance_lux, exposure_s : float
         The level in both units (lux where the scene states a plane), and the time.
-    spp, bands : int
+    spp : float
+        Samples a pixel of the render, in the mean.
+    bands : int
         Of the render.
     render : str
         What else is known of it, as JSON: `studies.sweep.cells.render_text`.
@@ -69,7 +71,7 @@ class Row:
     luminance_cd_m2: float
     illuminance_lux: float | None
     exposure_s: float
-    spp: int
+    spp: float
     bands: int
     render: str
     lens: str

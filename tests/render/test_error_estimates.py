@@ -26,14 +26,21 @@ def test_a_variance_is_the_squared_difference_pooled_over_three_by_three_pixels(
     expected[:2, 1:4] += 0.09 / 9
     expected[0, 1:4] += 0.09 / 9  # beyond the edge the nearest pixels count again
     expected[2:5, 3:6] += 0.36 / 9
-    assert variance_of(difference)[0, 1] == pytest.approx(expected, rel=1e-6)
-    assert not variance_of(difference)[0, 0].any()
+    alike = np.ones((5, 6), np.uint32)
+    assert variance_of(difference, alike)[0, 1] == pytest.approx(expected, rel=1e-6)
+    assert not variance_of(difference, alike)[0, 0].any()
+
+
+def test_pixels_with_more_samples_are_pooled_by_the_variance_of_a_sample():
+    rates = np.array([[1, 4, 2], [8, 1, 1], [2, 2, 16]], np.uint32)
+    difference = (0.5 / np.sqrt(rates)).astype(np.float32)[None, None]  # a sample has a variance of 0.25 everywhere
+    assert variance_of(difference, rates)[0, 0] == pytest.approx(0.25 / rates, rel=1e-6)
 
 
 @given(st.integers(0, 2**32 - 1))
 def test_a_variance_is_never_negative(seed):
     scale = 10.0 ** np.random.default_rng(seed).uniform(-9, 9, (1, 1, 6, 7))
-    assert variance_of(scale.astype(np.float32)).min() > 0
+    assert variance_of(scale.astype(np.float32), np.ones((6, 7), np.uint32)).min() > 0
 
 
 def test_the_relative_error_does_not_mix_bands_and_leaves_dark_values_out():

@@ -41,17 +41,18 @@ def test_the_unbiased_light_keeps_its_bits(box, made) -> None:
         assert np.array_equal(getattr(plain, name), getattr(made, name))
 
 
-def test_stopped_and_resumed_or_cached_gives_the_bits_of_one_go(box, made, tmp_path) -> None:
-    half = render(box, SIZE, spp=16, denoise=True, cache=tmp_path, **ASKED)
-    for again in (
-        render(box, SIZE, spp=32, denoise=True, resume=half, **ASKED),
-        *(render(box, SIZE, spp=32, denoise=True, cache=tmp_path, **ASKED) for _ in range(2)),
-    ):
-        assert again.denoised.fold_points == made.denoised.fold_points == 8
+@pytest.mark.parametrize(("first", "spp"), [(16, 32), (96, 192)], ids=["uniform", "after a pilot"])
+def test_stopped_and_resumed_or_cached_gives_the_bits_of_one_go(first, spp, box, tmp_path) -> None:
+    made = render(box, SIZE, spp=spp, denoise=True, **ASKED)
+    part = render(box, SIZE, spp=first, denoise=True, cache=tmp_path, **ASKED)
+    resumed = render(box, SIZE, spp=spp, denoise=True, resume=part, **ASKED)
+    continued, cached = (render(box, SIZE, spp=spp, denoise=True, cache=tmp_path, **ASKED) for _ in range(2))
+    for again in (resumed, continued, cached):
+        assert again.denoised.fold_points == made.denoised.fold_points > part.denoised.fold_points
         assert np.array_equal(again.radiance, made.radiance)
         for name, expected in planes(made).items():
             assert np.array_equal(planes(again)[name], expected), name
-    raw = render(box, SIZE, spp=32, cache=tmp_path, **ASKED)  # an entry of its own
+    raw = render(box, SIZE, spp=spp, cache=tmp_path, **ASKED)  # an entry of its own
     assert raw.denoised is None
     assert len(list(tmp_path.iterdir())) == 2
 

@@ -21,7 +21,7 @@ BANDS_NM = np.arange(405.0, 780.0, 50.0)
 
 def drawn(scene: Scene, depth: int, *, apart: bool = True) -> Means:
     film = _checked_film(scene, SIZE, BANDS_NM, None, depth)
-    means, loaded = no_means(scene, film, apart=apart), load_groups(scene, film)
+    means, loaded = no_means(scene, film, np.ones(film.size, np.uint32), apart=apart), load_groups(scene, film)
     while means.count < POINTS:
         add_run(loaded, means, film, POINTS, 3)
     return means

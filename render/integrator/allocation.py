@@ -1,0 +1,53 @@
+"""Samples where they are needed: how many more a pixel gets than the others, by the noise of a pilot."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+
+from rodcone.types import Floats, Planes
+
+LEAST_SHARE = 4  # every pixel gets at least one sample in four of the mean number
+MOST_RATE = 64
+POOL = 5  # pixels each way, over which the pilot's noise is pooled
+UNSEEN = 0.3  # of the mean weight, everywhere: noise of rare paths that the pilot hasn't met
+FLOOR = 0.01  # of the mean light: dark noise, which a sensor adds to shot noise
+STEPS = 8  # from one power of two to the next, in the search for the rates' common factor
+
+
+def rates_of(scattered: Planes, seen: Planes) -> NDArray[np.uint32]:
+    """Rates of the pixels, powers of two from 1 on, shape (h, w).
+
+    A pixel's weight is Monte Carlo variance over mean, the largest over the light groups: in proportion to the share
+    of shot noise, at every level and for every sensor. With samples in proportion to its root, the mean of that
+    share over the picture is least.
+
+    Parameters
+    ----------
+    scattered : (group, set, h, w) float32
+        Radiance pooled over bands, at the scene's own power, without light that is seen directly; in sets of
+        samples.
+    seen : (group, h, w) float32
+        Light that is seen directly.
+    """
+    weight = np.zeros(seen.shape[1:])
+    for sets, lamp in zip(scattered, seen, strict=True):
+        variance = uniform_filter(sets.var(axis=0, ddof=1, dtype=np.float64), POOL, mode="nearest")
+        light = uniform_filter(sets.mean(axis=0, dtype=np.float64), POOL, mode="nearest")
+        floor = FLOOR * light.mean()
+        if floor > 0:
+            weight = np.maximum(weight, variance / (light + lamp + floor))
+    return _powers_of_two(np.sqrt(weight + UNSEEN * weight.mean()))
+
+
+def _powers_of_two(wanted: Floats) -> NDArray[np.uint32]:
+    """Powers of two from 1 on, nearest to numbers times the largest factor that keeps their mean at `LEAST_SHARE`."""
+    if not wanted.any():
+        return np.ones(wanted.shape, np.uint32)
+    logarithm, most = np.log2(np.maximum(wanted / wanted.max(), 1e-30)), int(np.log2(MOST_RATE))
+    rates = np.ones(wanted.shape, np.uint32)
+    for shift in np.arange(0, min(most, -logarithm.min()) + 0.5 / STEPS, 1 / STEPS):
+        larger = 1 << np.clip(np.floor(logarithm + shift + 0.5), 0, most).astype(np.uint32)
+        if larger.mean() > LEAST_SHARE:
+            break
+        rates = larger
+    return rates
