@@ -182,12 +182,14 @@ def _render(
     piloted = limits.most_samples > PILOT_FROM and backend() != "numpy"
     loaded = load_groups(scene, film)
     lights, stopped_by = emission(scene.groups, film.wavelength_nm, film.width_nm), None
+    # Go on from the earlier means, or begin
     if earlier and (earlier.spp > PILOT_FROM or not piloted):
         means = means_of(earlier, apart=denoise)
     else:  # a short one that had no pilot is drawn anew
         rates = pilot_rates(loaded, film, lights, limits.seed) if piloted else np.ones(film.size, np.uint32)
         means, earlier = no_means(scene, film, rates, apart=denoise), None
     limits = replace(limits, mean_rate=float(means.rates.mean()))
+    # Draw runs until a limit is reached
     errors: dict[str, Any] = {"relative_mc_error": np.inf}
     look = limits.next_look(means.count)
     with _interrupt_noted() as interrupted:
@@ -206,6 +208,7 @@ def _render(
                 stopped_by = "interrupt"
         if denoise:
             denoised = denoise_means(scene, loaded, film, means, limits.seed, earlier.denoised if earlier else None)
+    # Tell what was drawn
     if "variance" not in errors:  # fewer points than an error is told of
         errors = errors_of(lights, means)
     return Transport(
