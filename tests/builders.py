@@ -39,9 +39,10 @@ def transport_of(
     *,
     seen: NDArray[np.float32] | None = None,
     irradiance: NDArray[np.float64] | None = None,
+    spp: int = 64,
     **changes: Any,
 ) -> Transport:
-    """Transport of radiance (group, band, h, w) of 64 samples, in halves that don't differ.
+    """Transport of radiance (group, band, h, w) of `spp` samples a pixel, in halves that don't differ.
 
     `seen` (group, h, w) is the share of each pixel in which each group's light is seen directly, none by default.
     """
@@ -64,7 +65,7 @@ def transport_of(
             "seen_difference": tuple(np.zeros_like(seen[:, None])),
             "coverage_difference": np.zeros(size, np.float32),
             "scene_means": means,
-            "counts": np.full(size, 64, np.uint32),
+            "counts": np.full(size, spp, np.uint32),
             "groups": dict(groups),
             "wavelength_nm": np.asarray(wavelength_nm, np.float64),
             "width_nm": np.asarray(width_nm, np.float64),

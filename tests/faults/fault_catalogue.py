@@ -586,8 +586,8 @@ RENDERS = (
     _fault(
         "samples told as asked",
         "render/engine.py",
-        "spp=2 * means.count,",
-        "spp=limits.spp or 2 * means.count,",
+        "counts=2 * means.count * means.rates,",
+        "counts=(limits.spp or 2 * means.count) * means.rates,",
         "render/test_samples",
         "studies/test_stated_numbers",
     ),
