@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from render.combine import emission
+from render.denoised.denoise import Denoised
 from render.error_estimates import SharedPaths, relative_error
 from render.level import Irradiance, SceneMeans
 from render.loader import Film, integrator_name, variant
@@ -32,12 +33,13 @@ _VALUES = ("stopped_by", "seconds", "integrator", "variant")
 _NOT_IN_NAMES = re.compile(r"[^\w.-]+")  # above all path separators: entries stay in their folder
 
 
-def load_transport(folder: Path, scene: Scene, film: Film, seed: int) -> Transport | None:
+def load_transport(folder: Path, scene: Scene, film: Film, seed: int, *, denoised: bool = False) -> Transport | None:
     """Stored transport, or None where there is no intact file: it begins with its SHA-256 digest.
 
+    Renders with `denoised` light are files of their own.
     The digest tells damage by accident. Whoever writes to the folder on purpose is believed.
     """
-    arrays = _read(_path(folder, scene, film, seed))
+    arrays = _read(_path(folder, scene, film, seed, _kind(denoised)))
     if arrays is None:
         return None
     values, lights = json.loads(str(arrays["values"])), emission(scene.groups, film.wavelength_nm, film.width_nm)
@@ -53,6 +55,7 @@ def load_transport(folder: Path, scene: Scene, film: Film, seed: int) -> Transpo
         width_nm=film.width_nm,
         relative_mc_error=relative_error(lights, arrays["radiance"], arrays["variance"], shared),
         shared=shared,
+        denoised=_denoised(arrays, values) if denoised else None,
     )
 
 
@@ -65,7 +68,20 @@ def save_transport(folder: Path, scene: Scene, film: Film, seed: int, transport:
     arrays |= {f"mean_{name}": x for name, x in vars(transport.scene_means).items()}
     arrays |= {"correlation": shared.correlation} if shared else {}
     values = {name: getattr(transport, name) for name in _VALUES} | {"shared": shared.groups if shared else None}
-    _write(_path(folder, scene, film, seed), arrays | {"values": np.array(json.dumps(values))})
+    if transport.denoised:
+        arrays |= {f"denoised_{name}": x for name, x in vars(transport.denoised).items() if name != "fold_points"}
+        values |= {"fold_points": transport.denoised.fold_points}
+    path = _path(folder, scene, film, seed, _kind(transport.denoised is not None))
+    _write(path, arrays | {"values": np.array(json.dumps(values))})
+
+
+def _kind(denoised: bool) -> str:
+    return f"denoised {metadata.version('mitsuba-oidn')}" if denoised else "render"
+
+
+def _denoised(arrays: Mapping[str, Any], values: Mapping[str, Any]) -> Denoised:
+    names = [field.name for field in fields(Denoised) if field.name != "fold_points"]
+    return Denoised(**{name: arrays[f"denoised_{name}"] for name in names}, fold_points=values["fold_points"])
 
 
 def load_irradiance(folder: Path, scene: Scene, film: Film, seed: int) -> Irradiance | None:

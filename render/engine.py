@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike
 
 from render.cache import load_transport, save_transport
 from render.combine import emission
+from render.denoised.denoise import denoiser
+from render.denoised.folds import FOLD_SHARE, denoise_means
 from render.level import Irradiance
 from render.limits import LEAST_POINTS, PILOT_FROM, Limits
 from render.loader import Film, integrator_name, load_groups, variant
@@ -44,6 +46,7 @@ def render(
     cache: str | Path | None = None,
     resume: Transport | None = None,
     progress: Progress | None = None,
+    denoise: bool = False,
 ) -> Transport:
     """Render each light group of a scene at unit spectral emission.
 
@@ -80,6 +83,9 @@ def render(
         samples or fewer is made anew where more are asked for, since it had no pilot.
     progress : callable, optional
         Called after each run with the share done and the error so far (infinite before the first look).
+    denoise : bool
+        Give denoised light beside the unbiased, and two folds of a quarter of the samples each that its error is
+        measured by (`render.denoised.relight`). Their time counts; Ctrl-C ends the render, and they are still drawn.
 
     Returns
     -------
@@ -89,7 +95,8 @@ def render(
     ------
     InputError
         For a bad size, band or limit, a scene without light, a material that picks lobes by wavelength, a surface
-        or sunsky whose data end within the bands, or an earlier result of another size, bands or lights.
+        or sunsky whose data end within the bands, or an earlier result of another size, bands or lights; for `denoise`
+        without the extra of that name, or without Dr.Jit.
 
     Warns
     -----
@@ -98,20 +105,24 @@ def render(
     """
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
+    if denoise:
+        _require_denoiser()
+    if denoise and max_seconds is not None:
+        max_seconds /= 1 + 2 * FOLD_SHARE
     limits = Limits(spp=spp, max_spp=max_spp, noise=noise, max_seconds=max_seconds, seed=seed)
     meter: Callable[[], Irradiance] | None = None
     if scene.reference_plane:
         meter = Meter(scene, film, seed, None if cache is None else Path(cache))
-    earlier = _checked_earlier(resume, scene, film)
+    earlier = _checked_earlier(resume, scene, film, denoise)
     if cache is not None:
-        found = load_transport(Path(cache), scene, film, seed)
+        found = load_transport(Path(cache), scene, film, seed, denoised=denoise)
         earlier = max((x for x in (earlier, found) if x), key=lambda x: x.spp, default=None)
     if earlier is not None:
         meter = earlier.meter or meter  # it may have measured already
         if limits.met_by(earlier):
             return replace(earlier, meter=meter)
     try:
-        transport = _render(scene, film, limits, earlier, progress or (lambda done, error: None))
+        transport = _render(scene, film, limits, earlier, progress or (lambda done, error: None), denoise)
     except InputError as error:
         let_go(error)
         raise
@@ -138,7 +149,13 @@ def _checked_film(
     return Film(size=(int(size[0]), int(size[1])), wavelength_nm=nm, width_nm=widths, max_depth=int(max_depth))
 
 
-def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film) -> Transport | None:
+def _require_denoiser() -> None:
+    if backend() == "numpy":
+        raise InputError("denoise: Dr.Jit has neither LLVM nor CUDA here; allowed: False; see rodcone doctor")
+    denoiser()
+
+
+def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film, denoise: bool) -> Transport | None:
     """Return the result to continue; refuse another scene's."""
     if earlier is None:
         return None
@@ -152,20 +169,27 @@ def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film) -> Tra
             f"{shape} of {list(scene.groups)} asked for; allowed: a result of the same scene, size and bands; "
             "leave it out"
         )
+    if denoise and earlier.denoised is None:
+        raise InputError("resume: it wasn't denoised; allowed with denoise: a result that was; leave one of them out")
     return earlier
 
 
-def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None, progress: Progress) -> Transport:
+def _render(
+    scene: Scene, film: Film, limits: Limits, earlier: Transport | None, progress: Progress, denoise: bool
+) -> Transport:
     start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
+    own_share, denoised = (1 / (1 + 2 * FOLD_SHARE) if denoise else 1.0), None
     piloted = limits.most_samples > PILOT_FROM and backend() != "numpy"
     loaded = load_groups(scene, film)
     lights, stopped_by = emission(scene.groups, film.wavelength_nm, film.width_nm), None
+    # Go on from the earlier means, or begin
     if earlier and (earlier.spp > PILOT_FROM or not piloted):
-        means = means_of(earlier)
+        means = means_of(earlier, apart=denoise)
     else:  # a short one that had no pilot is drawn anew
         rates = pilot_rates(loaded, film, lights, limits.seed) if piloted else np.ones(film.size, np.uint32)
-        means = no_means(scene, film, rates)
+        means, earlier = no_means(scene, film, rates, apart=denoise), None
     limits = replace(limits, mean_rate=float(means.rates.mean()))
+    # Draw runs until a limit is reached
     errors: dict[str, Any] = {"relative_mc_error": np.inf}
     look = limits.next_look(means.count)
     with _interrupt_noted() as interrupted:
@@ -175,13 +199,16 @@ def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None,
             if means.count >= LEAST_POINTS:
                 errors = errors_of(lights, means)
             now, error = time.perf_counter(), errors["relative_mc_error"]
-            progress(limits.share(means.count, error, now - start), error)
+            progress(own_share * limits.share(means.count, error, now - start), error)
             # The error is told after every run, and stops the render at a look alone.
             looked_at = error if means.count >= look else np.inf
             stopped_by = limits.stop(means.count, looked_at, now - start, now - run_start)
             look = limits.next_look(means.count) if means.count >= look else look
             if stopped_by is None and interrupted():
                 stopped_by = "interrupt"
+        if denoise:
+            denoised = denoise_means(scene, loaded, film, means, limits.seed, earlier.denoised if earlier else None)
+    # Tell what was drawn
     if "variance" not in errors:  # fewer points than an error is told of
         errors = errors_of(lights, means)
     return Transport(
@@ -201,6 +228,7 @@ def _render(scene: Scene, film: Film, limits: Limits, earlier: Transport | None,
         seconds=time.perf_counter() - start,
         integrator=integrator_name(),
         variant=variant(),
+        denoised=denoised,
     )
 
 

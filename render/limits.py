@@ -1,7 +1,7 @@
 """When a render stops: samples, error or time, whichever comes first."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -87,7 +87,8 @@ class Limits:
         """Whether a render that was made earlier leaves nothing to do."""
         count = int(earlier.counts.min()) // 2
         last_s = earlier.seconds / max(count, 1)
-        return self.stop(count, earlier.relative_mc_error, earlier.seconds, last_s) is not None
+        rated = replace(self, mean_rate=float(earlier.counts.mean() / earlier.counts.min()))
+        return rated.stop(count, earlier.relative_mc_error, earlier.seconds, last_s) is not None
 
     def stop(self, count: int, error: float, seconds: float, last_s: float) -> Stop | None:
         """Which limit is reached, None while none is.

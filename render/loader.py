@@ -103,9 +103,9 @@ class Loaded:
     curves: tuple[Spectrum, ...] = ()
     covering: Any = None
 
-    def channels(self, bands: int) -> int:
+    def channels(self, bands: int, *, apart: bool = False) -> int:
         """Channels of a path in so many bands (`render.integrator.dense.Tracer.camera`), about."""
-        return (bands + 4) * (len(self.groups) + self.coloured)
+        return (bands + 4) * (len(self.groups) * (1 + apart) + self.coloured)
 
     @property
     def camera(self) -> Any:

@@ -51,6 +51,8 @@ class Means:
         Share of the paths that meet a light first.
     shared : (int, int) or None
         Groups that are rendered along the same paths.
+    indirect, indirect_difference : (group, band, h, w) float32 or None
+        Indirect light in `radiance` and in `difference`, where it is kept by itself.
     """
 
     count: int
@@ -62,6 +64,8 @@ class Means:
     coverage: Planes
     coverage_difference: Planes
     shared: tuple[int, int] | None = None
+    indirect: Planes | None = None
+    indirect_difference: Planes | None = None
 
 
 @dataclass(frozen=True)
@@ -74,15 +78,18 @@ class Drawn:
     seen : tuple of pairs of (chunk, 1 or band, h, w) float32
         For each group.
     coverage : pair of (chunk, h, w) float32
+    indirect : pair of (chunk, group, band, h, w) float32
+        No groups where it isn't asked for.
     """
 
     radiance: Halves
     seen: tuple[Halves, ...]
     coverage: Halves
+    indirect: Halves
 
 
-def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32]) -> Means:
-    """Means before the first run."""
+def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, apart: bool = False) -> Means:
+    """Means before the first run; with `apart` indirect light is kept by itself."""
     bands = film.wavelength_nm.size
     radiance, difference = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(2))
     seen, seen_difference = (
@@ -90,11 +97,15 @@ def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32]) -> Means:
         for _ in range(2)
     )
     coverage, coverage_difference = (np.zeros(film.size, np.float32) for _ in range(2))
-    return Means(0, rates, radiance, difference, seen, seen_difference, coverage, coverage_difference)
+    means = Means(0, rates, radiance, difference, seen, seen_difference, coverage, coverage_difference)
+    if apart:
+        means.indirect, means.indirect_difference = np.zeros_like(radiance), np.zeros_like(radiance)
+    return means
 
 
-def means_of(transport: Transport) -> Means:
+def means_of(transport: Transport, *, apart: bool = False) -> Means:
     """Means that an earlier render stopped at, to go on from: the same bits."""
+    denoised = transport.denoised if apart else None
     return Means(
         count=int(transport.counts.min()) // 2,
         rates=transport.counts // transport.counts.min(),
@@ -105,6 +116,8 @@ def means_of(transport: Transport) -> Means:
         coverage=transport.coverage.copy(),
         coverage_difference=transport.coverage_difference.copy(),
         shared=transport.shared.groups if transport.shared else None,
+        indirect=denoised.indirect.copy() if denoised else None,
+        indirect_difference=denoised.indirect_difference.copy() if denoised else None,
     )
 
 
@@ -138,12 +151,13 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
 
     An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
     """
-    start, chunk = means.count, chunk_from(means.count)
-    threads = launch_threads(light_groups, film)
+    start, chunk, apart = means.count, chunk_from(means.count), means.indirect is not None
+    threads = launch_threads(light_groups, film, apart=apart)
     fitting = max(1, threads // (int(means.rates.sum()) * chunk))
     alike = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
     chunks = min(alike, -(-(stop - start) // chunk))
-    drawn = [_drawn(loaded, film, means.rates, Span(start, chunk, chunks), threads, seed) for loaded in light_groups]
+    span = Span(start, chunk, chunks)
+    drawn = [_drawn(each, film, means.rates, span, threads, seed, apart=apart) for each in light_groups]
     if len(light_groups[0].groups) == 2:
         means.shared = light_groups[0].groups[0], light_groups[0].groups[1]
     for index in range(chunks):
@@ -157,6 +171,9 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
                 _add(means.radiance[group], means.difference[group], even, odd, weight)
                 even, odd = (half[index] for half in of_group.seen[slot])
                 _add(means.seen[group], means.seen_difference[group], even, odd, weight)
+                if means.indirect is not None and means.indirect_difference is not None:
+                    even, odd = (half[index, slot] for half in of_group.indirect)
+                    _add(means.indirect[group], means.indirect_difference[group], even, odd, weight)
         means.count += chunk
 
 
@@ -184,9 +201,9 @@ def pilot_rates(light_groups: list[Loaded], film: Film, lights: Floats, seed: in
     return rates_of(scattered, seen)
 
 
-def launch_threads(light_groups: list[Loaded], film: Film) -> int:
+def launch_threads(light_groups: list[Loaded], film: Film, *, apart: bool = False) -> int:
     """Threads of a launch, by the memory that their channels need."""
-    return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size) for loaded in light_groups)
+    return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, apart=apart) for loaded in light_groups)
 
 
 def _add(mean: Planes, difference: Planes, even: Planes, odd: Planes, weight: np.float32) -> None:
@@ -198,7 +215,9 @@ def _add(mean: Planes, difference: Planes, even: Planes, odd: Planes, weight: np
         np.add(planes, step, out=planes)
 
 
-def _drawn(loaded: Loaded, film: Film, rates: NDArray[np.uint32], span: Span, threads: int, seed: int) -> Drawn:
+def _drawn(
+    loaded: Loaded, film: Film, rates: NDArray[np.uint32], span: Span, threads: int, seed: int, *, apart: bool = False
+) -> Drawn:
     """Draw a span of both halves of one light group's paths."""
     halves = []
     for half in range(2):
@@ -208,22 +227,28 @@ def _drawn(loaded: Loaded, film: Film, rates: NDArray[np.uint32], span: Span, th
             if backend() == "numpy":
                 parts.append(_by_mitsuba(loaded, bands, span, own_seed))
             else:
-                tracer = Tracer(mitsuba_module(), loaded, bands, own_seed)
+                tracer = Tracer(mitsuba_module(), loaded, bands, own_seed, apart=apart)
                 image = traced(partial(tracer.camera, film.size), rates, span, threads, own_seed)
-                scattered, others = bands_apart(image, len(loaded.groups), part.size)
+                scattered, others = bands_apart(image, len(loaded.groups) * (1 + apart), part.size)
                 shares, own = np.split(others, [len(loaded.groups)], axis=1)
                 parts.append((scattered, shares, own[:, : part.size]))
         # All parts of the bands see the same paths: what knows no band is taken from the first.
         scattered = parts[0][0] if len(parts) == 1 else np.concatenate([part[0] for part in parts], axis=2)
+        scattered, indirect = np.split(scattered, [len(loaded.groups)], axis=1)
         shares = parts[0][1]
         seen = [shares[:, slot, None] for slot in range(len(loaded.groups))]
         if loaded.coloured:
             seen[0] = np.concatenate([part[2] for part in parts], axis=1)
         for slot, planes in enumerate(seen):
             scattered[:, slot] += planes
-        halves.append((scattered, seen, shares.sum(axis=1)))
+        halves.append((scattered, seen, shares.sum(axis=1), indirect))
     even, odd = halves
-    return Drawn(radiance=(even[0], odd[0]), seen=tuple(zip(even[1], odd[1], strict=True)), coverage=(even[2], odd[2]))
+    return Drawn(
+        radiance=(even[0], odd[0]),
+        seen=tuple(zip(even[1], odd[1], strict=True)),
+        coverage=(even[2], odd[2]),
+        indirect=(even[3], odd[3]),
+    )
 
 
 def _by_mitsuba(loaded: Loaded, film: Film, span: Span, seed: int) -> tuple[Planes, Planes, Planes]:

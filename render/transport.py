@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.combine import combine, emission
+from render.denoised.denoise import Denoised
 from render.error_estimates import SharedPaths, relative_error, within_band_error
 from render.illuminants import illuminant
 from render.level import Irradiance, Level, SceneMeans
@@ -58,6 +59,8 @@ class Transport:
         Two groups whose errors are correlated, since a constant environment is rendered along with another group.
     meter : callable or None
         Gives the irradiance on the scene's reference plane, traced at its first call; None without a plane.
+    denoised : Denoised or None
+        Denoised light beside the unbiased, where it was asked for (`render.denoised.relight`).
     """
 
     radiance: Planes
@@ -79,6 +82,7 @@ class Transport:
     relative_mc_error: float = 0.0
     shared: SharedPaths | None = None
     meter: Callable[[], Irradiance] | None = None
+    denoised: Denoised | None = None
 
     @property
     def spp(self) -> float:

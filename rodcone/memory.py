@@ -11,6 +11,8 @@ from rodcone.errors import InputError
 GB = 1e9
 # Bytes a pixel, counted from the arrays held at once; `tests/rodcone/test_memory.py` compares them with measured peaks.
 _TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
+_DENOISED_ARRAYS = 7  # beside those: denoised light, indirect light, folds, and their copies
+_DENOISER_BYTES = 1300  # a pixel, of Open Image Denoise
 _VIEW_ARRAYS = 4  # pooling the variance; later relit radiance, its halves, and an image forming
 _RUN_BYTES = 2 * 4 * (1 << 24)  # of a light group: what a launch gives of both halves (`render.runs.MOST_FLOATS`)
 _RENDER_BYTES = 120  # for any number of bands: masks of the render, a preview
@@ -46,7 +48,7 @@ class Limit:
     each: bool = False
 
 
-def memory(pixels: int, bands: int, groups: int, workers: int = 0) -> Memory:
+def memory(pixels: int, bands: int, groups: int, workers: int = 0, *, denoised: bool = False) -> Memory:
     """Memory that a render of so many light groups needs, and what comes after it.
 
     Parameters
@@ -55,9 +57,12 @@ def memory(pixels: int, bands: int, groups: int, workers: int = 0) -> Memory:
         No groups for a picture file, which needs no render.
     workers : int
         Processes that develop cells; 1: the process that renders does, 0: no cells are made here.
+    denoised : bool
+        Whether the render is denoised.
     """
-    arrays = _TRANSPORT_ARRAYS * groups + _VIEW_ARRAYS
-    rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + _RENDER_BYTES) + _RUN_BYTES * groups
+    arrays = (_TRANSPORT_ARRAYS + _DENOISED_ARRAYS * denoised) * groups + _VIEW_ARRAYS
+    other = _RENDER_BYTES + _DENOISER_BYTES * denoised
+    rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + other) + _RUN_BYTES * groups
     worker = PROCESS_BYTES + _CELL_BYTES * pixels
     if workers <= 1:  # the render is let go of before the first cell
         own = max(rendering, workers * worker)

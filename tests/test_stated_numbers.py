@@ -20,7 +20,7 @@ from stated_numbers import PAGE, STATED, Stated, page  # noqa: E402
 TOLD = {name for one in STATED for name in one.told_by}
 # Light and its errors: physics, which other tests compare with closed forms and other programs.
 LIGHT = {"radiance", "coverage", "seen", "scene_means", "meter", "groups", "wavelength_nm", "width_nm", "shared"}
-LIGHT |= {"integrator", "seen_difference", "coverage_difference"}
+LIGHT |= {"integrator", "seen_difference", "coverage_difference", "denoised"}
 # What a cell is, what it is made from, and the figures of its picture.
 ASKED = {"key", "scene", "spectrum", "level", "exposure", "sensor", "processor", "seed", "lens", "budget_share"}
 FIGURES = {

@@ -38,10 +38,12 @@ class Tracer:
         Bands, and the longest path. Their number is filled up to a multiple of four by repeating the last.
     seed : int
         Decides where in the bands the paths' wavelengths lie, for a scene whose reflectances are read from a table.
+    apart : bool
+        Whether indirect light is also given by itself.
     """
 
-    def __init__(self, mi: Any, loaded: Any, film: Any, seed: int) -> None:
-        self.mi, self.scene = mi, loaded.mi_scene
+    def __init__(self, mi: Any, loaded: Any, film: Any, seed: int, *, apart: bool = False) -> None:
+        self.mi, self.scene, self.apart = mi, loaded.mi_scene, apart
         self.max_depth, self.coloured, self.sample_lights = film.max_depth, loaded.coloured, loaded.sample_lights
         self.environment = len(loaded.groups) > 1
         filled = np.append(np.arange(film.wavelength_nm.size), [film.wavelength_nm.size - 1] * 3)
@@ -61,16 +63,13 @@ class Tracer:
         Returns
         -------
         list of Float
-            Bands without the light that is seen directly, then the environment's; the share of paths that meet a light
-            first, which is that light at unit emission; the share that meet the environment; with ``coloured`` the
-            light's bands; the share of paths whose BSDF chose by wavelength.
+            Bands without the light that is seen directly, then the environment's; with ``apart`` as many of indirect
+            light; the share of paths that meet a light first, which is that light at unit emission; the share that meet
+            the environment; with ``coloured`` the light's bands; the share of paths whose BSDF chose by wavelength.
         """
         mi = self.mi
         wavelengths, step = self._wavelengths(points)
-        row, at = pixel // size[1], points.pair(FILM)
-        film = mi.Point2f((mi.Float(pixel - row * size[1]) + at.x) / size[1], (mi.Float(row) + at.y) / size[0])
-        sensor = self.scene.sensors()[0]
-        ray, _ = sensor.sample_ray(0.0, 0.5, film, points.pair(APERTURE))
+        ray = self._camera_ray(size, pixel, points)
         dark = [mi.Spectrum(0.0) for _ in wavelengths]
         start = mi.Ray3f(ray), dr.zeros(mi.SurfaceInteraction3f), mi.Float(1.0), mi.Bool(True), dark
         result, chosen = self._trace(self.scene, points, start, wavelengths, step, 0)
@@ -87,6 +86,51 @@ class Tracer:
         result, chosen = self._trace(self.scene, points, start, wavelengths, step, 1)
         bands = [value for group in result for value in group]
         return [*bands, dr.select(chosen, self.mi.Float(1.0), self.mi.Float(0.0))]
+
+    @dr.syntax
+    def first_surface(self, size: tuple[int, int], pixel: Any, points: Points) -> list[Any]:
+        """Trace paths from the camera to the first surface that scatters light, through glass and by mirrors.
+
+        Returns
+        -------
+        list of Float
+            Bands of its albedo, through all that lies before it; its normal; the share of paths whose BSDF chose by
+            wavelength.
+        """
+        mi = self.mi
+        wavelengths, step = self._wavelengths(points)
+        ray = mi.Ray3f(self._camera_ray(size, pixel, points))
+        ray.wavelengths = wavelengths[0]
+        throughput = [mi.Spectrum(1.0) for _ in wavelengths]
+        albedo, normal = [mi.Spectrum(0.0) for _ in wavelengths], mi.Vector3f(0.0)
+        depth, chosen, active = mi.UInt32(0), mi.Bool(False), mi.Bool(True)
+        while dr.hint(active, label="first surface"):
+            si = self.scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
+            go_on = (depth + 1 < self.max_depth) & si.is_valid()
+            _, lobe, angle = points.bounce(depth)
+            sample, weights, by_wavelength = dr.dispatch(
+                si.bsdf(ray), self._sampled, si, lobe, angle, wavelengths, step
+            )
+            chosen |= go_on & by_wavelength
+            throughput = _times(throughput, weights)
+            delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+            scatters = go_on & ~delta
+            albedo = _either(scatters, throughput, albedo)
+            normal = dr.select(scatters, mi.Vector3f(si.sh_frame.n), normal)
+            ray = si.spawn_ray(si.to_world(sample.wo))
+            ray.wavelengths = wavelengths[0]
+            depth += 1
+            active = go_on & delta
+        bands = [value for group in albedo for value in group]
+        return [*bands, normal.x, normal.y, normal.z, dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
+
+    def _camera_ray(self, size: tuple[int, int], pixel: Any, points: Points) -> Any:
+        """Ray through a point of each thread's pixel."""
+        mi = self.mi
+        row, at = pixel // size[1], points.pair(FILM)
+        film = mi.Point2f((mi.Float(pixel - row * size[1]) + at.x) / size[1], (mi.Float(row) + at.y) / size[0])
+        ray, _ = self.scene.sensors()[0].sample_ray(0.0, 0.5, film, points.pair(APERTURE))
+        return ray
 
     def _wavelengths(self, points: Points) -> tuple[list[Any], Any]:
         """Wavelengths of a path, and the table's step that they belong to.
@@ -144,11 +188,16 @@ class Tracer:
 
         A path that escapes meets the environment, and then carries what that would give it: its throughput. A light
         that the camera's ray meets first counts for `_seen` alone.
+
+        Light is direct that reaches the camera from the first surface that scatters it (by a lobe that isn't a delta),
+        or from the lamp itself, each perhaps through glass and by mirrors; all else is indirect.
         """
         mi = self.mi
         ray, previous, previous_pdf, previous_delta, result = start
         ray.wavelengths = wavelengths[0]
         throughput = [mi.Spectrum(1.0) for _ in wavelengths]
+        indirect = [mi.Spectrum(0.0) for _ in wavelengths] if self.apart else []
+        direct, unscattered = mi.Bool(True), mi.Bool(True)  # the light met next; the path so far
         eta, depth = mi.Float(1.0), mi.UInt32(0)
         chosen, escaped, active = mi.Bool(False), mi.Bool(False), mi.Bool(True)
         while dr.hint(active, label="dense path"):
@@ -156,15 +205,17 @@ class Tracer:
             si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
             share = self._share(scene, si, previous, previous_pdf, previous_delta)
             emitted = self._emitted(scene, si, wavelengths)
-            indirect = (depth > 0) | (bounced > 0)
-            result = _plus(result, throughput, emitted, dr.select(indirect, share, 0.0))
+            unseen = (depth > 0) | (bounced > 0)
+            result = _plus(result, throughput, emitted, dr.select(unseen, share, 0.0))
+            indirect = self._indirect(indirect, throughput, emitted, dr.select(direct, 0.0, share))
 
             # Light that is sampled from here, and the direction to go on in
-            go_on, escaped = (depth + 1 < self.max_depth) & si.is_valid(), indirect & ~si.is_valid()
+            go_on, escaped = (depth + 1 < self.max_depth) & si.is_valid(), unseen & ~si.is_valid()
             received, sample, weights, by_wavelength = self._bounce(
                 scene, points.bounce(depth + bounced), ray, si, go_on, wavelengths, step
             )
             result = _plus(result, throughput, received, 1.0)
+            indirect = self._indirect(indirect, throughput, received, dr.select(unscattered, 0.0, 1.0))
             chosen |= go_on & by_wavelength
             scattered = _times(throughput, weights)
 
@@ -173,12 +224,20 @@ class Tracer:
             eta *= sample.eta
             previous, previous_pdf = dr.detach(si), sample.pdf
             previous_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+            direct = dr.select(si.is_valid(), unscattered, direct)
+            unscattered &= previous_delta
             depth[si.is_valid()] += 1
             scattered, survives = _roulette(scattered, eta, depth, points.roulette(depth))
             throughput = _either(escaped & self.environment, throughput, scattered)
             active = go_on & survives
-        sky = _either(escaped, throughput, [mi.Spectrum(0.0) for _ in wavelengths])
-        return [*result, *(sky if self.environment else [])], chosen
+        dark = [mi.Spectrum(0.0) for _ in wavelengths]
+        sky, indirect_sky = _either(escaped, throughput, dark), _either(escaped & ~direct, throughput, dark)
+        every = [*result, *(sky if self.environment else [])]
+        return [*every, *indirect, *(indirect_sky if self.environment and self.apart else [])], chosen
+
+    def _indirect(self, indirect: list[Any], throughput: list[Any], light: list[Any], factor: Any) -> list[Any]:
+        """Add indirect light where it is asked for by itself."""
+        return _plus(indirect, throughput, light, factor) if self.apart else indirect
 
     def _seen(self, ray: Any, wavelengths: list[Any]) -> list[Any]:
         """Channels of what the camera's ray meets first, if that is a light."""

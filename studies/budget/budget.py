@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from render.denoised.measured_error import measured_error
 from render.transport import Transport
 from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
@@ -48,6 +49,29 @@ def monte_carlo_share(
     if of_pixels is None:
         return float(monte_carlo.mean() / own.mean())
     return float(np.quantile(monte_carlo / own, of_pixels))
+
+
+def charged_share(
+    errors_e: NDArray[np.floating], expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float
+) -> float:
+    """Monte Carlo variance that a frame is charged, over the sensor's own noise variance; 0 where the well is full.
+
+    Parameters
+    ----------
+    errors_e : (1 or 2, h, w) array
+        One draw of the unbiased light's error [e-]; or what denoised light differs by from two folds: the mean of their
+        product is its whole squared error, and its upper limit is charged (`render.denoised.measured_error`).
+    expected_e : (h, w) float64
+    sensor, exposure_s
+        As of `monte_carlo_share`.
+    """
+    if len(errors_e) == 1:
+        return monte_carlo_share(errors_e[0], expected_e, sensor, exposure_s)
+    inside = expected_e < sensor.pixel.full_well_e
+    if not inside.any():
+        return 0.0
+    own = noise_variance(expected_e, sensor, exposure_s)[inside].sum() / inside.size
+    return measured_error(errors_e[0], errors_e[1], inside / own).upper
 
 
 def render_share(

@@ -16,7 +16,7 @@ from sensor.response import electrons_per_irradiance, expected_electrons
 from sensor.variations import vary
 from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger
 from studies.budget.model_plan import Plan
-from studies.study.lit_scene import level_luminance, lux_per_cd_m2, make_transport, open_all, under
+from studies.study.lit_scene import level_luminance, lux_per_cd_m2, make_transport, open_all, photographed, under
 from studies.study.model import ImageModel
 from studies.study.study import Study
 
@@ -108,7 +108,7 @@ def model_electrons(transport: Transport, row: Ledger, model: ImageModel) -> NDA
     lit = under(transport, condition.spectrum)
     level = level_luminance(condition.level, lux_per_cd_m2(lit, [condition.level]))
     sensor = replace(vary(preset(condition.sensor), row.mosaic), lens=model.lens)
-    image = form_image(lit.relight(luminance_cd_m2=level), sensor)
+    image = form_image(photographed(lit, level), sensor)
     if model.exact:
         return expected_electrons(image, sensor, row.exposure_s)
     weights = electrons_per_irradiance(sensor, image.wavelength_nm, image.widths_nm, row.exposure_s)

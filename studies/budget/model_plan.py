@@ -33,9 +33,8 @@ def as_stated(study: Study) -> Plan:
     """Plan without a budget: bands and samples as the study states, lenses as the sensors state."""
     low, high = study.render.range_nm
     edges = np.linspace(low, high, max(1, round((high - low) / study.render.band_nm)) + 1)
-    render = RenderModel(
-        tuple(((edges[1:] + edges[:-1]) / 2).tolist()), tuple(np.diff(edges).tolist()), study.render.spp
-    )
+    centres, widths = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    render = RenderModel(tuple(centres.tolist()), tuple(widths.tolist()), study.render.spp, study.render.denoise)
     lenses = {name: preset(name).lens for name in study.sensors}
     images = {condition: ImageModel(lenses[condition.sensor]) for condition in conditions(study)}
     return Plan(renders=dict.fromkeys(study.scenes, render), images=images)

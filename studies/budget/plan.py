@@ -52,7 +52,8 @@ def plan(study: Study, *, cache: Path | None = None, step: Step = lambda what, s
     Parameters
     ----------
     study : Study
-        `budget` holds the shares, `lens` what the lens does in full, `render.spp` the most samples.
+        `budget` holds the shares, `lens` what the lens does in full, `render.spp` the most samples. They are those of
+        the unbiased light: what a denoiser leaves isn't known before the render.
     cache : Path, optional
         Folder of renders.
 
@@ -78,7 +79,9 @@ def plan(study: Study, *, cache: Path | None = None, step: Step = lambda what, s
             nm, width_nm = wide_bands(
                 pilot.transport.wavelength_nm, pilot.transport.width_nm, pilot.groups[choice.count]
             )
-            renders[opened.choice] = RenderModel(tuple(nm.tolist()), tuple(width_nm.tolist()), choice.spp)
+            renders[opened.choice] = RenderModel(
+                tuple(nm.tolist()), tuple(width_nm.tolist()), choice.spp, study.render.denoise
+            )
         for row in rows:
             left_out = choice.left_out[row.condition]
             lens = full_lens(study, preset(row.condition.sensor).lens, opened)

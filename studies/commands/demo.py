@@ -28,6 +28,7 @@ def demo(
     max_seconds: float | None = None,
     seed: int = 0,
     light: str | None = None,
+    denoise: Flag = False,
     force: Flag = False,
 ) -> None:
     """Photograph one scene from moonlight to daylight with both cameras and write a report; prints its path.
@@ -58,11 +59,14 @@ def demo(
         Seed of the render, the chips and the exposures.
     light
         Light of the scene by name, such as A; for a file the light that is shown as neutral (D65 by default).
+    denoise
+        Photograph denoised light; the report's Monte Carlo share is then its measured error. Needs rodcone[denoise].
     force
         Run even where more memory is needed than is free.
     """
     clock, study = Clock(), read_study(STUDY)
     changed: dict[str, Any] = {"size": size, "spp": spp, "max_seconds": max_seconds, "seed": seed}
+    changed["denoise"] = denoise
     study = replace(
         study,
         scenes=(SceneChoice(scene or study.scenes[0].source, light),),

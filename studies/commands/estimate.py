@@ -48,13 +48,13 @@ def estimate(study: Study, plan: Plan, scenes: Mapping[SceneChoice, OpenedScene]
     needs = []
     for choice, opened in scenes.items():
         if opened.scene is None:
-            pixels, bands, groups = file_extent(choice.source)
+            (pixels, bands, groups), denoised = file_extent(choice.source), False
         else:
             model, pixels, groups = plan.renders[choice], opened.size[0] * opened.size[1], len(opened.scene.groups)
-            bands = len(model.wavelength_nm)
+            bands, denoised = len(model.wavelength_nm), model.denoise
             seconds += RENDER_S * pixels * bands * groups * model.spp
         seconds += per_scene * max(CELL_LEAST_S, CELL_S * pixels) / max(workers, 1)
-        needs.append(memory(pixels, bands, groups, workers))
+        needs.append(memory(pixels, bands, groups, workers, denoised=denoised))
     renders = sum(opened.scene is not None for opened in scenes.values())
     total, largest = max(need.total for need in needs), max(need.largest for need in needs)
     return Estimate(cells, kept, renders, workers, seconds, total, largest)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from render.denoised.relight import relight_denoised
 from render.engine import render as render_transport
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
@@ -43,6 +44,7 @@ def render(
     cache: Path | None = None,
     trust_scene: Flag = False,
     extend: str | None = None,
+    denoise: Flag = False,
     force: Flag = False,
     json: Flag = False,
 ) -> int:
@@ -87,6 +89,9 @@ def render(
         Let the scene file load plug-ins of its own, which are native code, and files from anywhere.
     extend
         hold: surfaces keep their end values outside their tables' wavelengths; by default bands there are refused.
+    denoise
+        Write denoised light; its error is measured against two folds of a quarter of the samples each, whose time
+        counts. Needs rodcone[denoise].
     force
         Run even where more memory is needed than is free.
     json
@@ -100,7 +105,7 @@ def render(
     spectra = _spectra(scene, light or ())
     luminance_cd_m2, illuminance_lux = asked_level(scene, level)
     count = DEFAULT_WAVELENGTH_NM.size if wavelength_nm is None else wavelength_nm.size
-    require_memory(memory(size[0] * size[1], count, len(scene.groups)), force)
+    require_memory(memory(size[0] * size[1], count, len(scene.groups), denoised=denoise), force)
     check_place(out)
     # Render and write
     with progress(sys.stderr) as step:
@@ -117,8 +122,10 @@ def render(
             seed=seed,
             cache=cache,
             progress=lambda share, error: step(render_words(error), share),
+            denoise=denoise,
         )
-    radiance = transport.relight(spectra, luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
+    asked: dict[str, Any] = {"luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
+    radiance = relight_denoised(transport, spectra, **asked)[0] if denoise else transport.relight(spectra, **asked)
     write_exr(out, radiance, scene=scene.name)
     # Say what was done
     say(*opened.notes)

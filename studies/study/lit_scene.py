@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from render.cache import file_digests
+from render.denoised.relight import relight_denoised
 from render.engine import render
 from render.illuminants import illuminant
 from render.photometry import luminance
@@ -129,6 +130,7 @@ def make_transport(
         "seed": limits.seed + seed_offset,
         "cache": cache,
         "progress": progress,
+        "denoise": model.denoise,
     }
     if limits.noise_share is None or share is None:
         transport = render(opened.scene, opened.size, **asked)
@@ -184,6 +186,13 @@ def render_facts(transport: Transport, radiance: SpectralRadiance) -> RenderFact
         last_nm=float(transport.wavelength_nm[-1]),
         width_nm=float(transport.width_nm[0]),
     )
+
+
+def photographed(lit: Transport, luminance_cd_m2: float) -> SpectralRadiance:
+    """Light that a study photographs, at a mean luminance: the denoised where it was asked for."""
+    if lit.denoised is None:
+        return lit.relight(luminance_cd_m2=luminance_cd_m2)
+    return relight_denoised(lit, luminance_cd_m2=luminance_cd_m2)[0]
 
 
 def under(transport: Transport, spectrum: str) -> Transport:

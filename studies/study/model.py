@@ -12,11 +12,12 @@ _DARK_S = 1e7  # longer than any exposure
 
 @dataclass(frozen=True)
 class RenderModel:
-    """How one scene is rendered for all of its conditions: band centres and widths [nm], samples a pixel."""
+    """How one scene is rendered for all of its conditions: bands [nm], samples a pixel, which light is photographed."""
 
     wavelength_nm: tuple[float, ...]
     width_nm: tuple[float, ...]
     spp: int
+    denoise: bool = False
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,9 @@ class RenderLimits:
         Wavelengths that are rendered; a sensor whose window reaches beyond 380-780 nm needs them.
     noise_share : float, optional
         Stop earlier, once 95 % of the pixels see a Monte Carlo variance of this share of the sensor's own or less, in
-        the brightest light that the study asks for.
+        the brightest light that the study asks for; of the unbiased light, denoised or not.
+    denoise : bool
+        Photograph the denoised light (`render.denoised`): its measured error is then the pictures' Monte Carlo share.
     """
 
     size: int | None = None
@@ -76,6 +78,7 @@ class RenderLimits:
     seed: int = 0
     range_nm: tuple[float, float] = VISIBLE_NM
     noise_share: float | None = None
+    denoise: bool = False
 
 
 @dataclass(frozen=True)

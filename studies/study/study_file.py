@@ -80,10 +80,10 @@ def _beside(value: Any, folder: Path) -> Any:
 
 
 def _strict(kind: type, allowed: tuple[type, ...], words: str) -> Callable[[Any, Any], Any]:
-    """Hook that refuses what Python would convert: a text that reads as a number, True as 1."""
+    """Hook that refuses what Python would convert: a text that reads as a number, True as 1, 1 as True."""
 
     def take(value: Any, _: Any) -> Any:
-        if isinstance(value, bool) or not isinstance(value, allowed):
+        if isinstance(value, bool) != (kind is bool) or not isinstance(value, allowed):
             raise InputError(f"{value!r} is not {words}")
         return kind(value)
 
@@ -113,6 +113,7 @@ def _is_tuple(kind: Any) -> bool:
 
 
 _CONVERTER = Converter(forbid_extra_keys=True)
+_CONVERTER.register_structure_hook(bool, _strict(bool, (bool,), "true or false"))
 _CONVERTER.register_structure_hook(str, _strict(str, (str,), "a text in quotes"))
 _CONVERTER.register_structure_hook(int, _strict(int, (int,), "a whole number"))
 _CONVERTER.register_structure_hook(float, _strict(float, (int, float), "a number"))

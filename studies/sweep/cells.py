@@ -71,7 +71,7 @@ class Cell:
     light : Light
     white_cd_m2 : float
         Luminance shown as white.
-    electrons, half_difference, truth : Path
+    electrons, errors, truth : Path
         As `studies.sweep.frames.UnitFrame` holds them.
     pictures : Path
         Folder that the picture goes to, under the hash of its content.
@@ -94,7 +94,7 @@ class Cell:
     light: Light
     white_cd_m2: float
     electrons: Path
-    half_difference: Path
+    errors: Path
     truth: Path
     pictures: Path
     render: RenderRecord

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
+from render.denoised.relight import relight_denoised
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
 from rodcone.digests import digest
@@ -52,8 +53,9 @@ class UnitFrame:
         level and for every sensor.
     electrons : Path
         Expected electrons, (h, w) float64.
-    half_difference : Path
-        Of the render's halves, one draw of the Monte Carlo error, (h, w) float32.
+    errors : Path
+        One draw of the unbiased light's Monte Carlo error, half the difference of its halves, (1, h, w) float32; or
+        what the denoised light's electrons differ by from two folds, (2, h, w).
     """
 
     key: str
@@ -64,7 +66,7 @@ class UnitFrame:
     auto_s: float
     truth: Path
     electrons: Path
-    half_difference: Path
+    errors: Path
 
 
 def frame_key(
@@ -86,7 +88,7 @@ def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None
     if not isinstance(stored, dict) or digest(stored.get("facts")) != stored.get("digest"):
         return None
     facts = stored["facts"]
-    files = {name: folder / facts.pop(name) for name in ("truth", "electrons", "half_difference")}
+    files = {name: folder / facts.pop(name) for name in ("truth", "electrons", "errors")}
     if not all(is_whole(path) for path in files.values()):
         return None
     light = Light(**{name: np.array(values, float) for name, values in facts.pop("light").items()})
@@ -113,7 +115,10 @@ def make_frames(
     levels : sequence of str
         Of the study.
     """
-    views = (transport.relight(luminance_cd_m2=1.0), *transport.relight_halves(luminance_cd_m2=1.0))
+    if transport.denoised is None:
+        views = (transport.relight(luminance_cd_m2=1.0), *transport.relight_halves(luminance_cd_m2=1.0))
+    else:
+        views = relight_denoised(transport, luminance_cd_m2=1.0)
     white = shown_white_cd_m2(transport, 1.0)
     scene = {
         "light": {name: value.tolist() for name, value in vars(light).items()},
@@ -122,11 +127,12 @@ def make_frames(
         "truth": keep(folder, _npy(true_srgb(views[0], light, white)), ".npy"),
     }
     for key, (preset, sensor) in wanted.items():
-        whole, even, odd = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in views)
+        whole, one, other = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in views)
+        errors = [(one - other) / 2] if transport.denoised is None else [whole - one, whole - other]
         facts = scene | {
             "auto_s": unit_exposure_s(views[0], preset),
             "electrons": keep(folder, _npy(whole), ".npy"),
-            "half_difference": keep(folder, _npy(((even - odd) / 2).astype(np.float32)), ".npy"),
+            "errors": keep(folder, _npy(np.stack(errors).astype(np.float32)), ".npy"),
         }
         with replacing(folder / f"{key}.json") as (text,):
             text.write_text(json.dumps({"facts": facts, "digest": digest(facts)}), "utf-8")

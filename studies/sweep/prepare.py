@@ -25,6 +25,7 @@ from studies.study.lit_scene import (
     level_luminance,
     lux_per_cd_m2,
     make_transport,
+    photographed,
     render_facts,
     under,
     white_spectrum,
@@ -83,8 +84,8 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
         transport, assumed = make_transport(opened, job.study, model, job.out / RENDERS, progress, share)
     with job.clock.stage("what cells share"):
         record = RenderRecord(
-            content=digest_bytes(np.ascontiguousarray(transport.radiance).data),
-            facts=render_facts(transport, transport.relight(luminance_cd_m2=1.0)),
+            content=digest_bytes(np.ascontiguousarray((transport.denoised or transport).radiance).data),
+            facts=render_facts(transport, photographed(transport, 1.0)),
             brightest_share=None if job.study.render.noise_share is None else share(transport),
             notes=(*opened.notes, *assumed, *(FELL_BACK if backend() == "numpy" else ())),
         )
@@ -190,7 +191,7 @@ def _cell(
         light=frame.light,
         white_cd_m2=frame.white_cd_m2 * luminance,
         electrons=frame.electrons.resolve(),
-        half_difference=frame.half_difference.resolve(),
+        errors=frame.errors.resolve(),
         truth=frame.truth.resolve(),
         pictures=(job.out / PICTURES).resolve(),
         render=record,

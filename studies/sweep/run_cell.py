@@ -16,7 +16,7 @@ from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.capture import expose
 from sensor.device import draw_device
-from studies.budget.budget import monte_carlo_share
+from studies.budget.budget import charged_share
 from studies.metrics.appearance import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure
 from studies.metrics.target_figures import target_figures
@@ -57,7 +57,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
     light = cell.luminance_cd_m2 * cell.exposure_s
     expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
-    error_e = _array(cell.half_difference) * light
+    errors_e = _array(cell.errors) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
     raw, capture_s, first_capture_s = timed(
@@ -98,7 +98,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         lens=json.dumps(vars(cell.sensor.lens)),
         budget_share=cell.budget_share,
         **figures,
-        mc_share=monte_carlo_share(error_e, expected_e, sensor, cell.exposure_s),
+        mc_share=charged_share(errors_e, expected_e, sensor, cell.exposure_s),
         snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),
         saturated=float(saturated.mean()),

@@ -122,6 +122,11 @@ def test_a_system_that_tells_nothing_sets_no_bound(tmp_path: Path) -> None:
     assert bounds(system(tmp_path, proc__meminfo="nonsense", proc__self__cgroup="0::/\n")) == {}
 
 
+def test_a_denoised_render_needs_more_for_each_group_and_the_denoiser() -> None:
+    plain, denoised = (memory(10**6, 20, 2, denoised=asked).total for asked in (False, True))
+    assert denoised - plain == pytest.approx(10**6 * (7 * 4 * 20 * 2 + 1300))
+
+
 def test_workers_add_up_and_the_largest_process_counts_for_limits_that_each_has() -> None:
     alone, many = memory(10**6, 20, 1, workers=1), memory(10**6, 20, 1, workers=8)
     assert alone.total == alone.largest < many.total

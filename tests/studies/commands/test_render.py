@@ -180,3 +180,18 @@ def test_place_that_cannot_be_written_is_told_before_the_render(
         code, out, err = call([str(scene), "-o", str(place)], capsys)
         assert (code, out, err.count("\n")) == (1, "", 1)
         assert "choose another place with --out" in err
+
+
+def test_denoised_light_is_written_with_its_measured_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mitsuba_oidn", reason="rodcone[denoise] is not installed")
+    made, asked = [], ["cornell_box", "--height", "32", "--width", "32", *QUICK, "--json"]
+    for name, more in (("plain", []), ("denoised", ["--denoise"])):
+        out = tmp_path / f"{name}.exr"
+        code, told, _ = call([*asked, "-o", str(out), *more], capsys)
+        made.append((code, read_exr(out).values, json.loads(told)["relative_mc_error"]))
+    (_, plain, _), (code, denoised, error) = made
+    assert code == 0
+    assert not np.array_equal(plain, denoised)
+    assert denoised.mean() == pytest.approx(plain.mean(), rel=0.1)
+    assert np.isfinite(error)  # at 8 samples, of folds of two
+    assert error > 0

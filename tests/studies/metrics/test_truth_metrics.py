@@ -13,8 +13,9 @@ from rodcone.errors import InputError
 from sensor.exposure import LONGEST_S, auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import low_noise, table1_output
+from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
-from studies.budget.budget import monte_carlo_share
+from studies.budget.budget import charged_share, monte_carlo_share
 from studies.metrics.quality import measure, psnr_db
 from studies.metrics.truth import green_scale, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 
@@ -86,6 +87,24 @@ def test_monte_carlo_share_is_the_ratio_of_variances() -> None:
     share = monte_carlo_share((even - odd) / 2, expected_e, sensor, 0.01)
     noise = expected_e + (0.01 * expected_e) ** 2 + 1.5**2 + 1.0 + sensor.gain_e_per_dn**2 / 12
     assert share == pytest.approx((0.02**2 / 2 * expected_e**2).mean() / noise.mean(), rel=0.03)
+
+
+def test_unbiased_light_is_charged_its_mean_and_denoised_light_its_limit() -> None:
+    """Half of the pixels at 400 e- whose blocks miss by 2 or 4 e-, half beyond the well."""
+    sensor, exposure_s = low_noise(), 0.01
+    saturated = np.arange(256) >= 128
+    expected_e = np.broadcast_to(np.where(saturated, 2.0 * sensor.pixel.full_well_e, 400.0), (256, 256))
+    missed_e = np.broadcast_to(np.where(np.arange(256) % 32 < 16, 2.0, 4.0), (256, 256))
+    own = noise_variance(expected_e, sensor, exposure_s)[0, 0]
+    assert charged_share(missed_e[None], expected_e, sensor, exposure_s) == pytest.approx(10 / own)
+    # 256 blocks: of those below the well half hold 4 and half 16, the others 0. Student's quantile of 255 is 1.651.
+    blocks = np.concatenate([np.tile([4.0, 16.0], 64), np.zeros(128)]) * 2 / own
+    limit = blocks.mean() + 1.651 * blocks.std(ddof=1) / 16
+    both = np.stack([missed_e, missed_e])
+    assert charged_share(both, expected_e, sensor, exposure_s) == pytest.approx(limit, rel=1e-3)
+    opposed = np.stack([missed_e, -missed_e])  # never negative
+    assert charged_share(opposed, expected_e, sensor, exposure_s) == 0.0
+    assert charged_share(both, np.full((256, 256), 1e9), sensor, exposure_s) == 0.0
 
 
 def test_a_lamp_in_the_picture_does_not_set_the_white() -> None:

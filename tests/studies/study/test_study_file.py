@@ -53,9 +53,17 @@ def test_every_example_is_a_study(path: Path) -> None:
 def test_changes_take_toml_values_and_plain_words_and_make_tables(tmp_path: Path) -> None:
     study = read_study(
         written(tmp_path),
-        ["render.spp=64", "seeds=[3, 4]", "sensors=table1_output", "budget.total=0.2", 'levels=["2cd/m2"]'],
+        [
+            "render.spp=64",
+            "render.denoise=true",
+            "seeds=[3, 4]",
+            "sensors=table1_output",
+            "budget.total=0.2",
+            'levels=["2cd/m2"]',
+        ],
     )
     assert (study.render.spp, study.seeds, study.sensors) == (64, (3, 4), ("table1_output",))
+    assert study.render.denoise is True
     assert (study.budget.total, study.levels) == (0.2, ("2cd/m2",))
 
 
@@ -72,7 +80,10 @@ def test_a_number_of_seeds_counts_from_0_and_a_list_names_them(
     [
         (["lvels=3"], "key: 'lvels' is unknown; allowed: budget, exposures"),
         (["lvels=3"], "did you mean 'levels'?"),
-        (["render.ssp=3"], "render: key: 'ssp' is unknown; allowed: band_nm, max_seconds, noise_share, range_nm, seed"),
+        (
+            ["render.ssp=3"],
+            "render: key: 'ssp' is unknown; allowed: band_nm, denoise, max_seconds, noise_share, range_nm",
+        ),
         (['scenes=[{sorce="x"}]'], "did you mean 'source'?"),
         (["seeds=[true]"], "seeds: True is not a whole number"),
         (['seeds=["1"]'], "seeds: '1' is not a whole number"),
@@ -80,6 +91,8 @@ def test_a_number_of_seeds_counts_from_0_and_a_list_names_them(
         (["seeds=-3"], "seeds: -3 is outside 1 to"),
         (["seeds=true"], "seeds: True is not a whole number"),
         (["render.spp=1.5"], "render: spp: 1.5 is not a whole number"),
+        (["render.denoise=1"], "render: denoise: 1 is not true or false"),
+        (["render.denoise='yes'"], "render: denoise: 'yes' is not true or false"),
         (["name=3"], "name: 3 is not a text in quotes"),
         (["render=3"], "render: the value is not a table"),
         (["scenes=[3]"], "3 is not a scene"),

@@ -99,7 +99,7 @@ def test_the_monte_carlo_share_is_of_the_pixels_below_saturation(tmp_path: Path)
     expected_e = np.broadcast_to(np.where(saturated, 2.0 * cell.sensor.pixel.full_well_e, 400.0), SAMPLE.SIZE)
     error_e = np.broadcast_to(np.where(saturated, 5000.0, 3.0), SAMPLE.SIZE)
     given = {}
-    for name, array in (("electrons", expected_e), ("half_difference", error_e)):
+    for name, array in (("electrons", expected_e), ("errors", error_e[None])):
         file = BytesIO()
         np.save(file, array / 0.01)  # at 1 cd/m^2 and 1 s
         given[name] = tmp_path / keep(tmp_path, file.getvalue(), ".npy")

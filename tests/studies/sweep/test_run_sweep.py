@@ -1,6 +1,7 @@
 """Sweeps: the same ledger and pictures whatever ran them, in whatever order, and however often they were ended."""
 
 import errno
+import json
 import os
 import random
 import signal
@@ -16,16 +17,18 @@ from multiprocessing import active_children
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import sweep_sample as SAMPLE
 
+from render.denoised.relight import relight_denoised
 from render.engine import render
 from rodcone.errors import InputError
 from scenes.catalog import load
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import expected_electrons
-from studies.budget.budget import monte_carlo_share
+from studies.budget.budget import charged_share, monte_carlo_share
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import run_cell as cell_run
 from studies.sweep.cells import Cell
@@ -204,6 +207,28 @@ def test_one_render_serves_all_spectra_and_a_finer_one_goes_on_from_it(
         assert len({row.picture for row in table}) == 4
     assert swept(replace(study, render=replace(limits, spp=32)), tmp_path).made == 0  # the same light, to the bit
     assert asked == [16, 32]
+
+
+def test_a_denoised_study_photographs_denoised_light_and_is_charged_its_measured_error(tmp_path: Path) -> None:
+    pytest.importorskip("mitsuba_oidn", reason="rodcone[denoise] is not installed")
+    limits = RenderLimits(size=32, spp=32, band_nm=100.0)
+    plain = Study((SceneChoice("cornell_box"),), ("1cd/m2",), processors=("bayer",), render=limits)
+    study = replace(plain, render=replace(limits, denoise=True))
+    assert [swept(each, tmp_path).made for each in (plain, study, plain)] == [1, 1, 0]  # both stay
+    assert swept(study, tmp_path).made == 0
+    with open_results(tmp_path) as base:
+        row = rows(base)[0]
+    model = SAMPLE.stated(study).renders[study.scenes[0]]
+    bands = {"wavelength_nm": model.wavelength_nm, "width_nm": model.width_nm}
+    transport = render(load("cornell_box"), (32, 32), **bands, spp=32, denoise=True)
+    sensor = preset("low_noise", "bayer")
+    whole, *folds = (
+        expected_electrons(form_image(view, sensor), sensor, row.exposure_s)
+        for view in relight_denoised(transport, luminance_cd_m2=1.0)
+    )
+    share = charged_share(np.stack([whole - fold for fold in folds]), whole, sensor, row.exposure_s)
+    assert row.mc_share == pytest.approx(share, rel=1e-3)  # single precision
+    assert json.loads(row.render)["relative_mc_error"] > transport.relative_mc_error  # of all pixels, and their limit
 
 
 def test_a_finer_request_goes_on_from_the_coarser_render_and_makes_its_cells_anew(tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def flip(path: Path, place: int) -> None:
     path.write_bytes(bytes(content))
 
 
-@pytest.mark.parametrize("name", ["electrons", "half_difference", "truth"])
+@pytest.mark.parametrize("name", ["electrons", "errors", "truth"])
 def test_a_flipped_bit_in_what_cells_share_is_told_and_made_again(name: str, tmp_path: Path) -> None:
     """In the exponent of the last number: 16 binary orders, which no file format notices."""
     study, out = SAMPLE.small_study(tmp_path), tmp_path / "out"

@@ -1,0 +1,1 @@
+"""Light without most of its noise, and its measured error."""

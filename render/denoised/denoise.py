@@ -1,0 +1,157 @@
+"""Indirect light denoised by Intel's Open Image Denoise, six spectra of it, guided by the surfaces that are seen.
+
+Indirect light over albedo is smooth where surfaces are, whatever their texture. Its spectra are few: six planes hold
+them, made of the bands by hat functions, and the way back is the least-squares fit to the picture itself.
+"""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from render.integrator.dense import Tracer
+from render.integrator.wavefront import Span, bands_apart, seed_of, traced
+from render.loader import PART_BANDS, Film, Loaded, mitsuba_module
+from rodcone.optional import optional_library
+from rodcone.types import Planes
+
+EXTRA = "denoise"
+SPECTRA = 6  # two calls of three planes
+LEAST_ALBEDO = 0.02  # darker surfaces are taken as this: their light over albedo would be noise alone
+SURFACE_POINTS = 64
+SURFACE_THREADS = 1 << 20
+MIXING_PIXELS = 2.0  # standard deviation of the window in which errors are compared
+ROUNDING = 1e-10  # of squares of single-precision numbers: spectra that differ by less are one
+_PLANES = 3  # of a call
+
+
+@dataclass(frozen=True)
+class Denoised:
+    """Denoised light of each group at unit spectral emission, and what its error is measured by.
+
+    Attributes
+    ----------
+    radiance : (group, band, h, w) float32
+        The unbiased light with its indirect part denoised, each group by itself.
+    indirect, indirect_difference : (group, band, h, w) float32
+        That part of the unbiased light, with its noise, and half the difference of its halves.
+    fold_mean, fold_difference : (group, band, h, w) float32
+        Mean and half the difference of two folds: renders with paths of their own, no part of which is in `radiance`.
+    fold_points : int
+        Samples of each fold in a pixel of rate 1.
+    """
+
+    radiance: Planes
+    indirect: Planes
+    indirect_difference: Planes
+    fold_mean: Planes
+    fold_difference: Planes
+    fold_points: int
+
+
+def denoiser() -> Any:
+    """Library of the denoiser.
+
+    Raises
+    ------
+    InputError
+        Where it isn't installed.
+    """
+    return optional_library("mitsuba_oidn", EXTRA)
+
+
+def first_surfaces(loaded: Loaded, film: Film, seed: int) -> tuple[Planes, Planes]:
+    """Albedo (band, h, w) and normal (3, h, w) of the first surfaces that scatter light, means over the pixels."""
+    bands = film.wavelength_nm.size
+    own_seed, albedo, normal = seed_of(seed, loaded.groups[0], 0), [], []
+    once = np.ones(film.size, np.uint32)
+    for part in np.array_split(np.arange(bands), -(-bands // PART_BANDS)):
+        of_part = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
+        tracer = Tracer(mitsuba_module(), loaded, of_part, own_seed)
+        span = Span(0, SURFACE_POINTS, 1)
+        image = traced(partial(tracer.first_surface, film.size), once, span, SURFACE_THREADS, own_seed)
+        values, others = bands_apart(image, 1, part.size)
+        albedo.append(values[0, 0])
+        normal.append(others[0])
+    return np.concatenate(albedo), normal[0]
+
+
+def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Planes) -> Planes:
+    """Indirect light of one light group without most of its noise, shape (band, h, w).
+
+    A denoiser smooths what is no noise too, however many samples there are. So the noisy light is mixed in, by what
+    each is off: the one by the halves' difference, the other by how well a half, denoised, foretells the other half.
+
+    Parameters
+    ----------
+    indirect, difference : (band, h, w) float32
+        Mean of the two halves, and half their difference.
+    albedo : (band, h, w) float32
+    normal : (3, h, w) float32
+
+    Raises
+    ------
+    InputError
+        Where the denoiser isn't installed.
+    """
+    library = denoiser()
+    if not indirect.any():
+        return indirect
+    # Few spectra of light over albedo, with a mean of 1
+    unit = np.maximum(albedo, np.float32(LEAST_ALBEDO))
+    unit *= np.float32((indirect / unit).mean(dtype=np.float64))
+    hats, light = _hats(len(indirect)), np.asarray(indirect / unit, np.float32)
+    few, error = (np.asarray(np.tensordot(hats, x, 1), np.float32) for x in (light, difference / unit))
+    # Denoise the whole and each half
+    guide = _last(normal)
+    options = {"hdr": True, "albedo": np.full_like(guide, 0.5), "normal": guide, "clean_aux": True}
+    options["device"] = library.Device(library.DeviceType.CPU)  # the same light on every machine
+
+    def filtered(planes: Planes) -> Planes:
+        filled = np.minimum(np.arange(-(-len(planes) // _PLANES) * _PLANES), len(planes) - 1)
+        made = [library.denoise(_last(planes[three]), **options) for three in filled.reshape(-1, _PLANES)]
+        return np.concatenate([np.moveaxis(image, -1, 0) for image in made])[: len(planes)]
+
+    even, odd = np.maximum(few + error, 0), np.maximum(few - error, 0)
+    share = _denoised_share(error, (filtered(even) - odd, filtered(odd) - even))
+    mixed = few + share * (filtered(few) - few)
+    return np.asarray(np.maximum(np.tensordot(_way_back(light, few), mixed, 1), 0) * unit)
+
+
+def _denoised_share(error: Planes, missed: tuple[Planes, Planes]) -> Planes:
+    """Share of denoised light in each pixel (h, w), by the variance of the noisy and the squared error of the denoised.
+
+    Parameters
+    ----------
+    error : (spectrum, h, w) float32
+        Half the difference of the halves.
+    missed : pair of (spectrum, h, w) float32
+        What a half, denoised, differs by from the other half: its error, and the noise of that half.
+    """
+    from scipy.ndimage import gaussian_filter  # late: a render that isn't denoised does without
+
+    noisy, one, other = (gaussian_filter(np.square(x).mean(axis=0), MIXING_PIXELS) for x in (error, *missed))
+    # A half has twice the variance of the mean. What is left must be more than that estimate's own standard error.
+    variance, pixels = 2 * noisy, 4 * np.pi * MIXING_PIXELS**2
+    squared = np.maximum((one + other) / 2 - variance - variance * (2 / pixels) ** 0.5, 0)
+    return np.asarray(np.divide(noisy, noisy + squared, out=np.ones_like(noisy), where=noisy + squared > 0))
+
+
+def _hats(bands: int) -> Planes:
+    """Hat functions over the bands, each of sum 1: (spectrum, band)."""
+    count = min(SPECTRA, bands)
+    place = np.linspace(0, count - 1, bands)
+    hats = np.maximum(0, 1 - np.abs(place - np.arange(count)[:, None]))
+    return np.asarray(hats / hats.sum(axis=1, keepdims=True), np.float32)
+
+
+def _way_back(bands: Planes, few: Planes) -> Planes:
+    """Least-squares map from the few spectra to the bands, by the picture itself: (band, spectrum) float32."""
+    here, asked = (planes.reshape(len(planes), -1).astype(np.float64) for planes in (few, bands))
+    return np.asarray(asked @ here.T @ np.linalg.pinv(here @ here.T, rcond=ROUNDING), np.float32)
+
+
+def _last(planes: Planes) -> Planes:
+    """Planes with their axis last, as the denoiser takes them."""
+    return np.ascontiguousarray(np.moveaxis(planes, 0, -1), np.float32)

@@ -1,0 +1,46 @@
+"""Denoised light of a render, and two folds: renders of their own, to measure its error against."""
+
+import numpy as np
+
+from render.denoised.denoise import Denoised, denoised, first_surfaces
+from render.integrator.wavefront import seed_of
+from render.loader import Film, Loaded
+from render.runs import Means, add_run, no_means
+from render.scene import Scene
+
+FOLD_SHARE = 0.25  # samples of each fold over the render's
+_FOLDS, _SURFACES = 0xF01D, 0x5F0A  # what a seed is for, beside the render's own
+
+
+def denoise_means(
+    scene: Scene, loaded: list[Loaded], film: Film, means: Means, seed: int, earlier: Denoised | None
+) -> Denoised:
+    """Denoise the means of a render and draw its folds, those of an earlier call continued.
+
+    Raises
+    ------
+    InputError
+        Where the denoiser isn't installed.
+    """
+    assert means.indirect is not None
+    assert means.indirect_difference is not None
+    folds = no_means(
+        scene, film, means.rates, apart=True
+    )  # by the kernel of the render's own light: no other is compiled
+    if earlier is not None:
+        folds.count = earlier.fold_points
+        folds.radiance, folds.difference = earlier.fold_mean.copy(), earlier.fold_difference.copy()
+    stop = max(1, round(2 * means.count * FOLD_SHARE))
+    while folds.count < stop:
+        add_run(loaded, folds, film, stop, seed_of(seed, _FOLDS))
+    albedo, normal = first_surfaces(loaded[0], film, seed_of(seed, _SURFACES))
+    halves = zip(means.indirect, means.indirect_difference, strict=True)
+    smooth = np.stack([denoised(light, difference, albedo, normal) for light, difference in halves])
+    return Denoised(
+        radiance=np.maximum(means.radiance - means.indirect, 0) + smooth,  # the difference rounds
+        indirect=means.indirect,
+        indirect_difference=means.indirect_difference,
+        fold_mean=folds.radiance,
+        fold_difference=folds.difference,
+        fold_points=folds.count,
+    )
