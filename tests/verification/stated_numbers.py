@@ -49,6 +49,13 @@ STATED = (
         "samples told as asked",
     ),
     Stated(
+        "samples of each pixel",
+        ("Transport.counts",),
+        "numbers of the pixels that the tracer was handed, pixel by pixel",
+        "render/test_samples.py::test_each_pixel_has_the_samples_that_its_count_tells",
+        "samples told as asked",
+    ),
+    Stated(
         "what stopped the render",
         ("Transport.stopped_by", "results.json rows.render.stopped_by"),
         "the error reached, recomputed from the relit light",
