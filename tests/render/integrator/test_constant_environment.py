@@ -110,7 +110,7 @@ def test_the_error_told_knows_of_the_correlation(both):
     lights = np.array([g.spectrum.band_average(BANDS_NM, np.full(4, WIDTH_NM)) * g.power for g in both.groups.values()])
     expected = relative_error(lights, both.radiance, both.variance, both.shared)
     assert both.relative_mc_error == both.relight().relative_mc_error == expected
-    assert abs(expected / relative_error(lights, both.radiance, both.variance) - 1) > 0.01
+    assert abs(expected / relative_error(lights, both.radiance, both.variance) - 1) > 0.005
     told = []
     small = made(courtyard(), spp=16, progress=lambda share, error: told.append(error))
     assert told[-1] == pytest.approx(small.relative_mc_error, rel=1e-4)
