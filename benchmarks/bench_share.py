@@ -12,6 +12,7 @@ figure in brackets is one of which the references' own is more than a tenth; onl
   99.5 % of the pixels that are least uncertain in the references' variance map, each with its standard deviation over
   seeds. Several ``--samples`` and ``--bands`` are choices; ``*`` marks those that no other beats in processor time and
   mean. References have 20 bands: with another number the share holds what 20 bands themselves miss.
+- ``--denoise`` judges denoised light beside the unbiased, the time of its folds included.
 - ``--against CHECKOUT`` renders with another checkout too, in turn. Without ``--samples`` this one draws as many as
   take the same processor time.
 - ``--rows FILE`` keeps what was measured; ``... show FILE`` prints it again, and draws ``--figure FILE.svg``.
@@ -23,7 +24,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -61,11 +62,15 @@ HEAD = ("samples", "processor, s", "clock, s", "median", "mean", "95 %", "mean o
 
 @dataclass(frozen=True)
 class Choice:
-    """A way to render: whose `render`, in how many bands, with how many samples a pixel."""
+    """A way to render: whose `render`, in how many bands, with how many samples a pixel, denoised or not.
+
+    The time of denoised light has that of the folds in it, by which its error is measured.
+    """
 
     checkout: str
     bands: int
     samples: int
+    denoised: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ class Picture:
     """Radiance under the scene's own lights, the samples drawn, and seconds: on the clock, of the processor."""
 
     radiance: SpectralRadiance
-    samples: int
+    samples: float
     seconds: float
     processor_s: float
 
@@ -83,12 +88,12 @@ def picture(scene: str, size: int, choice: Choice, seed: int) -> Picture:
     root = ROOT if choice.checkout == THIS else Path(choice.checkout)
     with TemporaryDirectory() as folder:
         out = Path(folder) / "picture.npz"
-        asked = (scene, size, choice.bands, choice.samples, seed, out)
+        asked = (scene, size, choice.bands, choice.samples, seed, choice.denoised, out)
         command = [sys.executable, "-W", "ignore", ROOT / "benchmarks" / "one_picture.py", *map(str, asked)]
         subprocess.run(command, env=os.environ | {"PYTHONPATH": str(root)}, cwd=root, check=True)
         with np.load(out) as made:
             radiance = SpectralRadiance(made["radiance"], made["wavelength_nm"])
-            return Picture(radiance, int(made["samples"]), float(made["seconds"]), float(made["processor_s"]))
+            return Picture(radiance, float(made["samples"]), float(made["seconds"]), float(made["processor_s"]))
 
 
 def scaled(radiance: SpectralRadiance, factor: float) -> SpectralRadiance:
@@ -125,15 +130,18 @@ def samples_in(processor_s: float, tried_s: Mapping[int, float]) -> int:
 
 def choices_of(given: argparse.Namespace) -> list[Choice]:
     """Choices asked for; the samples that take another checkout's time are found by trying."""
-    own = [Choice(THIS, bands, samples) for bands in given.bands for samples in given.samples or ()]
+    kinds = [(bands, denoised) for bands in given.bands for denoised in (False, *[True] * given.denoise)]
+    own = [Choice(THIS, bands, samples, kind) for bands, kind in kinds for samples in given.samples or ()]
     if not given.against:
-        return own or [Choice(THIS, bands, 512) for bands in given.bands]
+        return own or [Choice(THIS, bands, 512, kind) for bands, kind in kinds]
     others = [Choice(str(given.against), bands, given.against_samples) for bands in given.bands]
     for other in others if not own else ():
         other_s = picture(given.scene, given.size, other, given.seeds[0]).processor_s
-        tried = [Choice(THIS, other.bands, samples) for samples in TRIED]
-        tried_s = {x.samples: picture(given.scene, given.size, x, given.seeds[0]).processor_s for x in tried}
-        own.append(Choice(THIS, other.bands, samples_in(other_s, tried_s)))
+        for bands, kind in kinds:
+            if bands == other.bands:
+                tried = [Choice(THIS, bands, samples, kind) for samples in TRIED]
+                tried_s = {x.samples: picture(given.scene, given.size, x, given.seeds[0]).processor_s for x in tried}
+                own.append(Choice(THIS, bands, samples_in(other_s, tried_s), kind))
     return [*others, *own]
 
 
@@ -164,7 +172,7 @@ def summed_up(rows: Sequence[dict[str, Any]]) -> dict[Choice, dict[str, Any]]:
     """Means and standard deviations over seeds of each choice, and whether it is on the front."""
     found: dict[Choice, list[dict[str, Any]]] = {}
     for row in rows:
-        found.setdefault(Choice(*(row[name] for name in Choice.__dataclass_fields__)), []).append(row)
+        found.setdefault(Choice(*(row[field.name] for field in fields(Choice))), []).append(row)
     table: dict[Choice, dict[str, Any]] = {}
     for choice, of_choice in found.items():
         table[choice] = {"drawn": of_choice[0]["drawn"], "own": of_choice[0]["own"]}
@@ -187,8 +195,13 @@ def print_table(rows: Sequence[dict[str, Any]]) -> None:
         for choice, row in summed_up(of_place).items():
             told = [told_figure(row, name) for name in FIGURES]
             times = [with_spread(*row[name], ".1f", ".1f") for name in ("processor_s", "seconds")]
-            name = f"{'*' if row['on_front'] else ''}{Path(choice.checkout).name}, {choice.bands} bands"
-            print(f"| {' | '.join([name, str(row['drawn']), *times, *told])} |", flush=True)
+            name = f"{'*' if row['on_front'] else ''}{kind_of(choice)}"
+            print(f"| {' | '.join([name, format(row['drawn'], '.0f'), *times, *told])} |", flush=True)
+
+
+def kind_of(choice: Choice) -> str:
+    """Write all of a choice but its samples."""
+    return f"{Path(choice.checkout).name}, {choice.bands} bands{', denoised' if choice.denoised else ''}"
 
 
 def with_spread(mean: float, spread: float, form: str, spread_form: str) -> str:
@@ -209,11 +222,10 @@ def figure_of(rows: Sequence[dict[str, Any]]) -> str:
     table = summed_up(rows)
     figure = blank(*CHART)
     axes = figure.subplots()
-    kinds = dict.fromkeys((choice.checkout, choice.bands) for choice in table)
-    for (checkout, bands), colour in zip(kinds, COLOURS, strict=False):
-        of_kind = [(x.samples, row) for x, row in table.items() if (x.checkout, x.bands) == (checkout, bands)]
+    for kind, colour in zip(dict.fromkeys(kind_of(choice) for choice in table), COLOURS, strict=False):
+        of_kind = [(x.samples, row) for x, row in table.items() if kind_of(x) == kind]
         points = sorted((row["processor_s"][0], row["mean"][0], samples, row["on_front"]) for samples, row in of_kind)
-        label = f"{bands} bands" if checkout == THIS else f"{Path(checkout).name}, {bands} bands"
+        label = kind.removeprefix(f"{THIS}, ")
         axes.loglog([x for x, *_ in points], [y for _, y, *_ in points], color=colour, label=label)
         for x, y, samples, on_front in points:
             axes.loglog(x, y, marker="o", color=colour, markerfacecolor=colour if on_front else "white")
@@ -235,6 +247,7 @@ def main() -> None:
     parser.add_argument("--bands", type=int, nargs="+", default=[20])
     parser.add_argument("--reference-bands", type=int, default=20)
     parser.add_argument("--samples", type=int, nargs="+")
+    parser.add_argument("--denoise", action="store_true", help="judge denoised light too")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1, 2, 3, 4])
     parser.add_argument("--against", type=Path, help="another checkout")
     parser.add_argument("--against-samples", type=int, default=512)

@@ -5,23 +5,28 @@ It uses what every version since 35f5fbe has: `render(scene, size, wavelength_nm
 
 import sys
 import time
+from contextlib import suppress
 
 import numpy as np
 
 from render.engine import render
 from scenes.catalog import load
 
+with suppress(ImportError):  # other checkouts
+    from render.denoised.relight import relight_denoised
+
 COMPILING_SPP = 128  # 35f5fbe makes other kernels for fewer
 
 
 def main() -> None:
-    name, size, bands, samples, seed, out = sys.argv[1:]
+    name, size, bands, samples, seed, denoised, out = sys.argv[1:]
     scene, side = load(name), int(size)
     nm = 380.0 + 400.0 / int(bands) * (np.arange(int(bands)) + 0.5)
-    render(scene, (side, side), wavelength_nm=nm, max_spp=min(COMPILING_SPP, int(samples)), seed=int(seed)).relight()
+    options = {"wavelength_nm": nm, "seed": int(seed)} | ({"denoise": True} if denoised == "True" else {})
+    render(scene, (side, side), max_spp=min(COMPILING_SPP, int(samples)), **options).relight()
     clock, processor = time.perf_counter(), time.process_time()
-    made = render(scene, (side, side), wavelength_nm=nm, max_spp=int(samples), seed=int(seed))
-    radiance = made.relight().values
+    made = render(scene, (side, side), max_spp=int(samples), **options)
+    radiance = (relight_denoised(made)[0] if denoised == "True" else made.relight()).values
     seconds, processor_s = time.perf_counter() - clock, time.process_time() - processor
     np.savez(out, radiance=radiance, wavelength_nm=nm, samples=made.spp, seconds=seconds, processor_s=processor_s)
 
