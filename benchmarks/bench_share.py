@@ -172,7 +172,7 @@ def summed_up(rows: Sequence[dict[str, Any]]) -> dict[Choice, dict[str, Any]]:
     """Means and standard deviations over seeds of each choice, and whether it is on the front."""
     found: dict[Choice, list[dict[str, Any]]] = {}
     for row in rows:
-        found.setdefault(Choice(*(row[field.name] for field in fields(Choice))), []).append(row)
+        found.setdefault(Choice(**{x.name: row[x.name] for x in fields(Choice) if x.name in row}), []).append(row)
     table: dict[Choice, dict[str, Any]] = {}
     for choice, of_choice in found.items():
         table[choice] = {"drawn": of_choice[0]["drawn"], "own": of_choice[0]["own"]}

@@ -82,7 +82,7 @@ def make(folder: Path, scene: Scene, film: Film, samples: int) -> None:
                 seed=seed,
                 cache=folder / "renders",
             )
-            print(f"{scene.name}, seed {seed}: {made.spp} of {samples} samples, {made.seconds:.0f} s", flush=True)
+            print(f"{scene.name}, seed {seed}: {made.spp:.0f} of {samples} samples, {made.seconds:.0f} s", flush=True)
             if made.spp < asked:
                 raise InputError("references: interrupted; what was drawn is kept; run the same command again")
         level_cd_m2 = made.level().value
@@ -91,14 +91,14 @@ def make(folder: Path, scene: Scene, film: Film, samples: int) -> None:
             "size": film.size,
             "bands": film.bands,
             "seed": seed,
-            "samples": made.spp,
+            "samples": round(made.spp),
             "seconds": made.seconds,
             "engine_version": ENGINE_VERSION,
             "integrator": made.integrator,
             "variant": made.variant,
             "level_cd_m2": level_cd_m2,
         }
-        path = folder / _name(scene, film, seed, made.spp)
+        path = folder / _name(scene, film, seed, round(made.spp))
         with replacing(path) as (place,), place.open("wb") as file:
             np.savez(
                 file,
