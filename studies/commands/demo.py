@@ -52,7 +52,7 @@ def demo(
     longest_exposure_s
         Longest exposure time in seconds, 0.066 by default.
     spp
-        Samples a pixel of the render, at most; 512 by default.
+        Samples a pixel of the render, at most; 288 by default.
     max_seconds
         Time for the render, at most; 65 by default.
     seed
