@@ -12,7 +12,7 @@ from scenes.catalog import load
 RUNS, BEYOND, MOST_BEYOND = 200, 1.1, 0.05
 SIZE = (32, 32)
 BANDS = {"wavelength_nm": np.array([450.0, 550.0, 650.0]), "width_nm": 60.0}
-REFERENCE_SPP = {"cornell_box": 32768, "still_life": 16384, "lit_and_shadowed": 16384}
+REFERENCE_SPP = {"cornell_box": 32768, "still_life": 16384, "siemens_star": 32768}
 MEDIAN_OF_NORMAL = 0.6745  # of the absolute value, in standard deviations
 
 
@@ -30,12 +30,15 @@ def reference(name):
         ("cornell_box", 0.06),
         ("still_life", 0.04),
         ("still_life", 0.025),
-        ("lit_and_shadowed", 0.06),
-        ("lit_and_shadowed", 0.04),
+        ("siemens_star", 0.035),
+        ("siemens_star", 0.015),
     ],
 )
 def test_the_error_asked_for_is_exceeded_by_a_tenth_in_few_runs(name, goal):
-    """The true error: the median of what pixels and bands are off, over their light, as a standard deviation."""
+    """The true error: the median of what pixels and bands are off, over their light, as a standard deviation.
+
+    Where noise lies at edges alone, as in `siemens_star`, pooling gives their neighbours some: more is told than is.
+    """
     scene, true = load(name), reference(name)
     lit = true > 0
     errors, told = [], []
@@ -49,4 +52,4 @@ def test_the_error_asked_for_is_exceeded_by_a_tenth_in_few_runs(name, goal):
     print(f"{name} {goal}: beyond {beyond:.3f}, true over told {np.mean(errors) / np.mean(told):.3f}, ", end="")
     print(f"true over goal {np.mean(errors) / goal:.3f} ± {np.std(errors) / goal:.3f}")
     assert beyond <= MOST_BEYOND
-    assert np.mean(errors) / np.mean(told) == pytest.approx(1, abs=0.1)
+    assert np.mean(errors) < 1.05 * np.mean(told)
