@@ -12,7 +12,8 @@ figure in brackets is one of which the references' own is more than a tenth; onl
   99.5 % of the pixels that are least uncertain in the references' variance map, each with its standard deviation over
   seeds. Several ``--samples`` and ``--bands`` are choices; ``*`` marks those that no other beats in processor time and
   mean. References have 20 bands: with another number the share holds what 20 bands themselves miss.
-- ``--denoise`` judges denoised light beside the unbiased, the time of its folds included.
+- ``--denoise`` judges denoised light beside the unbiased, the time of its folds included, and sets the mean share that
+  the render tells of itself, by its folds, beside the one found.
 - ``--against CHECKOUT`` renders with another checkout too, in turn. Without ``--samples`` this one draws as many as
   take the same processor time.
 - ``--rows FILE`` keeps what was measured; ``... show FILE`` prints it again, and draws ``--figure FILE.svg``.
@@ -34,6 +35,7 @@ from environment import print_environment
 from matplotlib import rc_context
 from references import SEEDS, Film, both, make
 
+from render.denoised.measured_error import measured_error
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from scenes.catalog import load
@@ -57,6 +59,8 @@ THIS = "this checkout"
 LEVEL = DEMO_LEVELS[-1]
 TRIED = (128, 512)  # samples whose times tell how many take a given time
 FIGURES = tuple(Shares.__dataclass_fields__)
+# Of denoised light: mean share by its folds, its standard error and limit, and by the references; none of them pooled.
+TOLD = ("told", "told_error", "limit", "alike")
 HEAD = ("samples", "processor, s", "clock, s", "median", "mean", "95 %", "mean of 99.5 %")
 
 
@@ -75,9 +79,13 @@ class Choice:
 
 @dataclass(frozen=True)
 class Picture:
-    """Radiance under the scene's own lights, the samples drawn, and seconds: on the clock, of the processor."""
+    """Radiance under the scene's own lights, the samples drawn, and seconds: on the clock, of the processor.
+
+    Denoised light has two folds, under the same lights.
+    """
 
     radiance: SpectralRadiance
+    folds: list[SpectralRadiance]
     samples: float
     seconds: float
     processor_s: float
@@ -93,15 +101,16 @@ def picture(scene: str, size: int, choice: Choice, seed: int) -> Picture:
         subprocess.run(command, env=os.environ | {"PYTHONPATH": str(root)}, cwd=root, check=True)
         with np.load(out) as made:
             radiance = SpectralRadiance(made["radiance"], made["wavelength_nm"])
-            return Picture(radiance, float(made["samples"]), float(made["seconds"]), float(made["processor_s"]))
+            folds = [SpectralRadiance(values, made["wavelength_nm"]) for values in made["folds"]]
+            return Picture(radiance, folds, *(float(made[name]) for name in ("samples", "seconds", "processor_s")))
 
 
 def scaled(radiance: SpectralRadiance, factor: float) -> SpectralRadiance:
     return SpectralRadiance(radiance.values * np.float32(factor), radiance.wavelength_nm)
 
 
-def judge_of(folder: Path, name: str, film: Film) -> tuple[Callable[[SpectralRadiance], Shares], Shares]:
-    """Return what judges a picture, and the references' own shares."""
+def judge_of(folder: Path, name: str, film: Film) -> tuple[Callable[[Picture], dict[str, float]], Shares]:
+    """Return what judges a picture, as figures by name, and the references' own shares."""
     references, sensor = both(folder, load(name), film), low_noise()
     factor = LEVEL.luminance_cd_m2 / float(np.mean([each.level_cd_m2 for each in references]))
     one, other = (scaled(each.radiance, factor) for each in references)
@@ -114,8 +123,16 @@ def judge_of(folder: Path, name: str, film: Film) -> tuple[Callable[[SpectralRad
     told = ", ".join(f"{getattr(own, figure):.3g}" for figure in FIGURES)
     print(f"references of {name}: {facts} samples; their own {', '.join(HEAD[3:])}: {told}", flush=True)
 
-    def judge(radiance: SpectralRadiance) -> Shares:
-        return shares(share_map(electrons(scaled(radiance, factor), sensor, yard.exposure_s), yard), kept)
+    weight = yard.inside / yard.noise_e2 / yard.inside.mean()
+
+    def judge(made: Picture) -> dict[str, float]:
+        seen, *folds = (electrons(scaled(x, factor), sensor, yard.exposure_s) for x in (made.radiance, *made.folds))
+        found = asdict(shares(share_map(seen, yard), kept))
+        if folds:
+            told = measured_error(seen - folds[0], seen - folds[1], weight)
+            alike = measured_error(seen - yard.references[0], seen - yard.references[1], weight).mean
+            found |= dict(zip(TOLD, (told.mean, told.standard_error, told.upper, alike), strict=True))
+        return found
 
     return judge, own
 
@@ -163,7 +180,7 @@ def measure(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
                 "seed": seed,
                 "seconds": made.seconds,
                 "processor_s": made.processor_s,
-                **asdict(judge(made.radiance)),
+                **judge(made),
                 "own": asdict(own),
             }
 
@@ -176,7 +193,7 @@ def summed_up(rows: Sequence[dict[str, Any]]) -> dict[Choice, dict[str, Any]]:
     table: dict[Choice, dict[str, Any]] = {}
     for choice, of_choice in found.items():
         table[choice] = {"drawn": of_choice[0]["drawn"], "own": of_choice[0]["own"]}
-        for name in ("processor_s", "seconds", *FIGURES):
+        for name in ("processor_s", "seconds", *FIGURES, *(TOLD if TOLD[0] in of_choice[0] else ())):
             values = [row[name] for row in of_choice]
             table[choice][name] = float(np.mean(values)), float(np.std(values, ddof=1)) if len(values) > 1 else np.nan
     flags = front([(row["processor_s"][0], row["mean"][0]) for row in table.values()])
@@ -197,6 +214,11 @@ def print_table(rows: Sequence[dict[str, Any]]) -> None:
             times = [with_spread(*row[name], ".1f", ".1f") for name in ("processor_s", "seconds")]
             name = f"{'*' if row['on_front'] else ''}{kind_of(choice)}"
             print(f"| {' | '.join([name, format(row['drawn'], '.0f'), *times, *told])} |", flush=True)
+        for choice, row in summed_up(of_place).items():
+            if choice.denoised and TOLD[0] in row:
+                told, error, limit, found = (with_spread(*row[name], ".3g", ".2g") for name in TOLD)
+                told += f" (standard error {error}, limit {limit})"
+                print(f"\n{kind_of(choice)}: mean share told {told}, found {found}")
 
 
 def kind_of(choice: Choice) -> str:

@@ -26,9 +26,11 @@ def main() -> None:
     render(scene, (side, side), max_spp=min(COMPILING_SPP, int(samples)), **options).relight()
     clock, processor = time.perf_counter(), time.process_time()
     made = render(scene, (side, side), max_spp=int(samples), **options)
-    radiance = (relight_denoised(made)[0] if denoised == "True" else made.relight()).values
+    views = relight_denoised(made) if denoised == "True" else [made.relight()]
     seconds, processor_s = time.perf_counter() - clock, time.process_time() - processor
-    np.savez(out, radiance=radiance, wavelength_nm=nm, samples=made.spp, seconds=seconds, processor_s=processor_s)
+    radiance, *folds = (view.values for view in views)
+    times = {"seconds": seconds, "processor_s": processor_s}
+    np.savez(out, radiance=radiance, folds=folds, wavelength_nm=nm, samples=made.spp, **times)
 
 
 if __name__ == "__main__":

@@ -94,10 +94,10 @@ def own_share_map(yard: Yardstick) -> Image:
 
 
 def _pooled_share(squared_e2: Image, yard: Yardstick) -> Image:
-    """Pool over the pixels inside alone: the rim of a lamp beside them is thousands of times brighter."""
+    """Pool each pixel's own share, over the pixels inside alone: a bright pixel's error isn't held against a dark one."""
     weight = pooled(yard.inside.astype(np.float64))
-    total = pooled(np.where(yard.inside, squared_e2, 0.0))
-    return np.where(yard.inside, total / np.maximum(weight, 1 / 9) / yard.noise_e2, np.nan)
+    total = pooled(np.where(yard.inside, squared_e2 / yard.noise_e2, 0.0))
+    return np.where(yard.inside, total / np.maximum(weight, 1 / 9), np.nan)
 
 
 def mean_error(image_e: Image, yard: Yardstick) -> tuple[float, float]:

@@ -70,6 +70,17 @@ def test_quantiles_are_those_of_squares_pooled_over_nine() -> None:
     assert found.mean == found.mean_of_kept
 
 
+def test_each_pixel_s_error_counts_against_its_own_noise() -> None:
+    """A bright half whose error is a hundredth of its noise variance, and a dark half without error."""
+    yard, truth = flat(0.0)
+    yard.noise_e2[..., SIDE // 2 :] = 1e8
+    image = truth.copy()
+    image[..., SIDE // 2 :] += 1e3
+    share = share_map(image, yard)
+    assert share.mean() == pytest.approx(0.005, rel=1e-9)
+    assert share.max() == pytest.approx(0.01, rel=1e-9)
+
+
 def test_a_pixel_outside_counts_for_nothing_not_even_beside_it() -> None:
     yard, truth = flat(0.0)
     yard.inside[:, 10, 10] = False
