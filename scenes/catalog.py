@@ -1,6 +1,7 @@
 """The scenes that rodcone ships, by name."""
 
 import inspect
+import re
 from importlib import import_module
 from typing import Any
 
@@ -13,6 +14,7 @@ _NAMES = (
     "cornell_box",
     "flat_field",
     "furnace",
+    "generated",
     "lit_and_shadowed",
     "metamers",
     "night_street",
@@ -34,7 +36,7 @@ def load(name: str, **options: Any) -> Scene:
     Parameters
     ----------
     name : str
-        One of `names()`.
+        One of `names()`; ``generated-1f3a`` is `scenes.generated.generated` with that seed, in hexadecimal.
     **options
         The builder's own parameters, such as ``light="A"``.
 
@@ -43,6 +45,9 @@ def load(name: str, **options: Any) -> Scene:
     InputError
         For an unknown name or option; the nearest allowed one is named.
     """
+    drawn = re.fullmatch("generated-([0-9a-f]{1,40})", name)
+    if drawn:
+        name, options = "generated", {**options, "seed": int(drawn[1], 16)}
     if name not in _NAMES:
         raise unknown("scene", name, _NAMES)
     builder = getattr(import_module(f"scenes.{name}"), name)

@@ -5,6 +5,7 @@ import pytest
 
 from render.engine import render
 from render.scene import Scene
+from rodcone.digests import digest
 from rodcone.errors import InputError
 from scenes.catalog import load, names
 from scenes.levels import DEMO_LEVELS
@@ -26,7 +27,7 @@ LIT_BY_NAME = ("color_checker", "cornell_box", "flat_field", "metamers", "siemen
 
 
 def test_names_are_the_scenes_in_order():
-    others = ("furnace", "lit_and_shadowed", "night_street", "still_life_outdoor")
+    others = ("furnace", "generated", "lit_and_shadowed", "night_street", "still_life_outdoor")
     assert names() == tuple(sorted((*LIT_BY_NAME, *others)))
 
 
@@ -69,6 +70,15 @@ def test_every_scene_of_one_light_takes_it_by_name(name):
     red, blue = (warm.spectrum.band_average(nm, 20.0) / cold.spectrum.band_average(nm, 20.0) for nm in (650.0, 450.0))
     assert red > 1.3 * blue
     assert warm.power == cold.power
+
+
+def test_a_generated_scene_is_its_seed_s_and_no_other():
+    assert digest(load("generated-1f3a").geometry) == digest(load("generated", seed=0x1F3A).geometry)
+    assert load("generated-1f3a").name == "generated-1f3a"
+    assert digest(load("generated-1f3a").geometry) != digest(load("generated-1f3b").geometry)
+    hashed = "c0ffee" * 6 + "abcd"  # as long as a commit's hash
+    assert load(f"generated-{hashed}").name == f"generated-{hashed}"
+    assert "'generated-c0ffeeh'" in complaint("generated-c0ffeeh")
 
 
 def test_options_reach_the_builder():
