@@ -26,6 +26,7 @@ from studies.pages.duels import (
 )
 from studies.pages.plots import BLUE, CHART, GREEN, ORANGE, STYLE, blank, name_at_ends, plain_ticks, svg_text
 from studies.pages.report_text import DELTA_E, MISSING, PSNR, Metric, fixed, level_text, percent, significant
+from studies.pages.white_pixel import white_pixel_tables
 from studies.sweep.row import Row
 
 COLUMNS = 2  # charts beside each other
@@ -82,6 +83,7 @@ def page_of(
         facts_table(contests, study),
         f"{ranked} of {len(contests)} conditions are ranked: those in which W's SNR under {code(camera)} is 1 or more, "
         "or not known. Pictures are measured against the noise-free truth at the known exposure scale.",
+        *white_pixel_tables(contests),
         f"![{description(contests, camera)}]({figure})" if figure else "",
         "## Won, level and lost",
         duel_table(contests, camera),

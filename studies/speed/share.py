@@ -94,7 +94,7 @@ def own_share_map(yard: Yardstick) -> Image:
 
 
 def _pooled_share(squared_e2: Image, yard: Yardstick) -> Image:
-    """Pool each pixel's own share, over the pixels inside alone: a bright pixel's error isn't held against a dark one."""
+    """Pool each pixel's own share, over the pixels inside alone: no bright error counts against a dark pixel."""
     weight = pooled(yard.inside.astype(np.float64))
     total = pooled(np.where(yard.inside, squared_e2 / yard.noise_e2, 0.0))
     return np.where(yard.inside, total / np.maximum(weight, 1 / 9), np.nan)

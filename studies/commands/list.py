@@ -1,0 +1,112 @@
+"""The command `rodcone list`."""
+
+import json as notation
+from importlib import import_module
+from typing import Literal
+
+from isp.processors.catalogue import PROCESSORS
+from render import illuminants
+from scenes import catalog
+from sensor import cfa, presets
+from studies.commands.console import Flag, print_table
+from studies.pages.report_text import METRICS
+
+# CIE 015:2018, with the correlated colour temperatures that it states.
+LIGHTS = {
+    "A": "incandescent lamp, 2856 K",
+    **{f"D{n}": f"daylight, {n}00 K" for n in (50, 55, 65, 75)},
+    "E": "the same power at every wavelength",
+    "F2": "fluorescent lamp, cool white",
+    "F11": "fluorescent lamp of narrow bands, 4000 K",
+    **{f"LED-B{n}": f"white LED (blue with phosphor), {k} K" for n, k in enumerate((2733, 2998, 4103, 5109, 6598), 1)},
+    "LED-BH1": "white and red LED, 2851 K",
+    "LED-RGB1": "red, green and blue LED, 2840 K",
+    "LED-V1": "white LED (violet with phosphor), 2724 K",
+    "LED-V2": "white LED (violet with phosphor), 4070 K",
+    "sodium_high": "high-pressure sodium lamp",
+    "sodium_low": "low-pressure sodium lamp: two lines at 589 nm",
+    "moonlight": "sunlight from the full moon",
+    "sunlight": "the sun without the sky (ASTM G173)",
+    "3000K": "black body of that temperature; any number",
+    "D7000K": "daylight of that colour temperature; any number from 4000",
+}
+
+TEMPERATURES = ("3000K", "D7000K")  # that stand for any
+
+Kind = Literal["scenes", "lights", "sensors", "mosaics", "processors", "metrics"]
+
+
+def list_names(kind: Kind | None = None, /, *, json: Flag = False) -> None:
+    """Print what the other commands know by name, with what each is.
+
+    Parameters
+    ----------
+    kind
+        scenes, lights, sensors, mosaics, processors or metrics; all of them by default.
+    json
+        Print one JSON object: kinds, and in each the names with their texts.
+    """
+    found = {name: LISTS[name]() for name in ([kind] if kind else LISTS)}
+    if json:
+        print(notation.dumps(found))
+        return
+    for index, (name, lines) in enumerate(found.items()):
+        print(f"{chr(10) * (index > 0)}{name}")
+        print_table(("", ""), [(f"  {key}", text) for key, text in lines.items()], words=2)
+
+
+def scenes() -> dict[str, str]:
+    """Scenes of the catalogue, each by its module's first line, and its light groups."""
+    lines = {}
+    for name in catalog.names():
+        text = first_line(import_module(f"scenes.{name}").__doc__)
+        lines[name] = f"{text} Lights: {', '.join(catalog.load(name).groups)}."
+    return lines
+
+
+def lights() -> dict[str, str]:
+    """Illuminants."""
+    return {name: LIGHTS[name] for name in (*illuminants.names(), *TEMPERATURES)}
+
+
+def sensors() -> dict[str, str]:
+    """Presets, each by the remark that its file begins with."""
+    found = {}
+    for name in presets.names():
+        remark, _ = presets.preset_file(name).read_text("utf-8").split("\n\n", 1)
+        found[name] = " ".join(remark.replace("#", " ").split())
+    return found
+
+
+def mosaics() -> dict[str, str]:
+    """Mosaics by their tile's rows."""
+    return {name: "/".join(cfa.tile_of(name)) for name in cfa.mosaics()}
+
+
+def processors() -> dict[str, str]:
+    """Processors with mosaic, source, and the extra that they need."""
+    return {
+        name: f"{each.mosaic}: {each.source}{f'; pip install rodcone[{each.extra}]' if each.extra else ''}"
+        for name, each in PROCESSORS.items()
+    }
+
+
+def metrics() -> dict[str, str]:
+    """Columns of a sweep that tell cameras apart."""
+    units = {x.key: f" [{x.unit}]" if x.unit else "" for x in METRICS}
+    return {x.key: f"{x.name}{units[x.key]}, {'higher' if x.higher else 'lower'} is better" for x in METRICS}
+
+
+def first_line(text: str | None) -> str:
+    """First sentence of a text."""
+    return (text or "").strip().split("\n", 1)[0]
+
+
+LISTS = {
+    "scenes": scenes,
+    "lights": lights,
+    "sensors": sensors,
+    "mosaics": mosaics,
+    "processors": processors,
+    "metrics": metrics,
+}

@@ -1,0 +1,52 @@
+"""What `rodcone list` says: every name that a catalogue knows, and temperatures as the spectra have them."""
+
+import json
+import re
+
+import colour
+import numpy as np
+import pytest
+
+from isp.processors.catalogue import PROCESSORS
+from render import illuminants
+from render.illuminants import illuminant
+from render.photometry import tristimulus
+from scenes import catalog
+from sensor import cfa, presets
+from studies.commands.cli import main
+from studies.commands.list import LIGHTS
+
+
+def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    with pytest.raises(SystemExit) as end:
+        main(["list", *arguments])
+    assert end.value.code == 0
+    return capsys.readouterr().out
+
+
+def test_every_name_of_every_catalogue_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    found = json.loads(printed(capsys, "--json"))
+    assert tuple(found["scenes"]) == catalog.names()
+    assert set(illuminants.names()) < set(found["lights"])
+    assert tuple(found["sensors"]) == presets.names()
+    assert tuple(found["mosaics"]) == cfa.mosaics()
+    assert tuple(found["processors"]) == tuple(PROCESSORS)
+    assert "flip_mean" in found["metrics"]
+    assert all(text.strip() for lines in found.values() for text in lines.values())
+    for name in found["lights"]:
+        illuminant(name)
+
+
+def test_one_kind_is_listed_alone_with_a_line_a_name(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = printed(capsys, "mosaics").splitlines()
+    assert lines[0] == "mosaics"
+    assert [line.split() for line in lines[1:3]] == [["rgbw", "RG/BW"], ["bayer", "RG/GB"]]
+
+
+@pytest.mark.parametrize("name", [name for name, text in LIGHTS.items() if re.search(r"\d K$", text)])
+def test_the_temperatures_are_those_of_the_spectra(name: str) -> None:
+    stated_k = float(re.search(r"(\d+) K$", LIGHTS[name])[1])
+    nm = np.arange(380.0, 781.0, 1.0)
+    xyz = tristimulus(illuminant(name).band_average(nm, 1.0), nm, np.ones(nm.size))
+    found_k = colour.temperature.xy_to_CCT(xyz[:2] / xyz.sum(), method="McCamy 1992")
+    assert found_k == pytest.approx(stated_k, rel=0.01)
