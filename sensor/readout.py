@@ -143,6 +143,24 @@ def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposu
     return np.asarray(variance + dark)
 
 
+def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float) -> float:
+    """Photo-electrons of an even field at which signal over `noise_variance`'s root is `snr`; inf where it never is.
+
+    The variance is a + b e + c e^2, so that e solves (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. Beyond an SNR of
+    1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before.
+    """
+    scale_e = sensor.pixel.full_well_e  # three points give the parabola; so far apart, no digits are lost
+    a, half, full = (float(noise_variance(np.full((1, 1), x * scale_e), sensor, exposure_s)[0, 0]) for x in (0, 0.5, 1))
+    c = (full - 2 * half + a) * 2 / scale_e**2
+    b = (full - a) / scale_e - c * scale_e
+    lead = 1 - snr**2 * c
+    if lead <= 0:
+        return float("inf")
+    electrons = (snr**2 * b + np.sqrt((snr**2 * b) ** 2 + 4 * lead * snr**2 * a)) / (2 * lead)
+    dark_e = sensor.pixel.dark_current_e_per_s * exposure_s
+    return float(electrons) if electrons + dark_e < sensor.pixel.full_well_e else float("inf")
+
+
 def as_raw(
     dn: NDArray[np.uint16], sensor: SensorConfig, exposure_s: float, engine: str, hot: NDArray[np.bool_] | None = None
 ) -> RawImage:

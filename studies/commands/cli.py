@@ -35,6 +35,7 @@ app.command("studies.commands.paper:paper", name="paper", help="Compute the pape
 app.command("studies.commands.plan:plan", name="plan", help="Compute a study's error budget and the cheapest model.")
 app.command("studies.commands.render:render", name="render", help="Render a scene into a spectral OpenEXR file.")
 app.command("studies.commands.report:report", name="report", help="Write the report of a sweep as one HTML file.")
+app.command("studies.commands.snr:snr", name="snr", help="Print the light in which a pixel reaches an SNR.")
 app.command("studies.commands.sweep:sweep", name="sweep", help="Make every picture of a study, or those still missing.")
 app.command("studies.commands.sweep:export", name="export", help="Write a sweep's results as CSV or Parquet.")
 app.command("studies.commands.table:table", name="table", help="Print a sweep's figures as a Markdown table.")

@@ -1,0 +1,89 @@
+"""The command `rodcone snr`."""
+
+import json as notation
+from dataclasses import asdict, replace
+from math import isinf
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from rodcone.errors import InputError, require_range
+from rodcone.files import check_place, replacing
+from sensor.config import SensorConfig
+from sensor.presets import preset
+from studies.commands.console import Flag, OutOrNone, print_table, require_ending
+from studies.pages.report_text import MISSING
+from studies.pages.snr_chart import snr_svg
+from studies.photograph.snr import GREY, light_for_snr
+from studies.study.study import parse_exposure
+
+HEAD = ("sensor", "channel", "electrons", "cd/m2", f"lux on {GREY:.0%} grey")
+
+
+def snr(
+    sensors: Annotated[list[str], Parameter(negative_iterable=())],
+    /,
+    *,
+    at: float = 10.0,
+    light: str = "D65",
+    exposure: str = "33ms",
+    f_number: float | None = None,
+    out: OutOrNone = None,
+    json: Flag = False,
+) -> None:
+    """Print the light in which a sensor's pixels reach a signal-to-noise ratio, by channel.
+
+    In closed form, with shot noise, dark current, read noise, fixed patterns of one chip and quantisation; of an even
+    neutral field in the middle of the picture.
+
+    Parameters
+    ----------
+    sensors
+        Sensor presets by name, or preset files.
+    at
+        Signal over noise of a pixel; 10 is 20 dB.
+    light
+        Illuminant.
+    exposure
+        Exposure time, such as 33ms.
+    f_number
+        Of the lens; the preset's own by default.
+    out
+        Plot of the SNR over light (.svg).
+    json
+        Print one JSON object: a list for each sensor.
+    """
+    require_range("at", at, 1e-3, 1e4, "give signal over noise, such as 10")
+    exposure_s = parse_exposure(exposure)
+    if exposure_s is None:
+        raise InputError(f"exposure: {exposure!r} has no time here; allowed: a time such as 33ms; give one")
+    if out is not None:
+        require_ending(out, ".svg")
+        check_place(out)
+    opened = {name: _opened(name, f_number) for name in sensors}
+    found = {name: light_for_snr(at, sensor, light, exposure_s) for name, sensor in opened.items()}
+    if out is not None:
+        with replacing(out) as (place,):
+            place.write_text(snr_svg(opened, light, exposure_s, at), "utf-8")
+    if json:
+        rows = {name: [{k: None if v == float("inf") else v for k, v in asdict(x).items()} for x in of]
+                for name, of in found.items()}  # fmt: skip
+        print(notation.dumps(rows))
+        return
+    print_table(
+        HEAD,
+        [
+            (name, x.channel, *(MISSING if isinf(value) else f"{value:.4g}" for value in figures))
+            for name, of in found.items()
+            for x in of
+            for figures in [(x.electrons, x.luminance_cd_m2, x.illuminance_lux)]
+        ],
+        words=2,
+    )
+    if any(isinf(x.electrons) for of in found.values() for x in of):
+        print(f"{MISSING}: no light is enough: the well is full before, or fixed patterns alone are 1/{at:g} of it")
+
+
+def _opened(name: str, f_number: float | None) -> SensorConfig:
+    sensor = preset(name)
+    return sensor if f_number is None else replace(sensor, lens=replace(sensor.lens, f_number=f_number))

@@ -1,0 +1,57 @@
+"""The light for an SNR: shot noise by hand, a pixel read out many times, and where no light is enough."""
+
+from dataclasses import replace
+from math import inf, pi
+
+import numpy as np
+import pytest
+
+from sensor.capture import expose
+from sensor.device import draw_device
+from sensor.presets import low_noise, table1_output
+from sensor.readout import electrons_at_snr
+from studies.paper.flat import channel_e, light_of, shot_noise_alone
+from studies.photograph.snr import light_for_snr, snr_at
+
+EXPOSURE_S = 0.033
+
+
+def test_shot_noise_alone_takes_the_square_of_the_snr() -> None:
+    quiet = shot_noise_alone(low_noise())
+    quiet = replace(quiet, pixel=replace(quiet.pixel, dark_current_e_per_s=0.0))
+    step = quiet.gain_e_per_dn**2 / 12
+    # e / sqrt(e + step) = 10
+    assert electrons_at_snr(10.0, quiet, EXPOSURE_S) == pytest.approx(50 + np.sqrt(2500 + 100 * step), rel=1e-9)
+
+
+@pytest.mark.parametrize("sensor", [low_noise("bayer"), table1_output("bayer")], ids=["low_noise", "table1_output"])
+def test_pixels_read_out_have_the_snr_that_was_asked_for(sensor) -> None:
+    """100 chips of 400 pixels: a deviation's standard error is 0.35 %; columns share offsets, so 2 % is allowed."""
+    electrons = electrons_at_snr(5.0, sensor, EXPOSURE_S)
+    read = []
+    for chip in range(100):
+        device = draw_device(sensor, (20, 20), np.random.default_rng([chip, 0]))
+        expected = np.full((20, 20), electrons)
+        frame = expose(expected, sensor, EXPOSURE_S, device, np.random.default_rng([chip, 1]), exact=True)
+        read.append(frame.electrons)
+    # The mean holds dark current beside the light.
+    assert electrons / np.std(read) == pytest.approx(5.0, rel=0.02)
+
+
+def test_beyond_fixed_patterns_or_the_well_no_light_is_enough() -> None:
+    sensor = low_noise()
+    assert electrons_at_snr(1.01 / sensor.pixel.prnu, sensor, EXPOSURE_S) == inf
+    assert electrons_at_snr(1.01 * sensor.pixel.full_well_e**0.5, shot_noise_alone(sensor), EXPOSURE_S) == inf
+
+
+def test_light_and_electrons_belong_together() -> None:
+    sensor = table1_output()
+    found = {each.channel: each for each in light_for_snr(10.0, sensor, "A", EXPOSURE_S)}
+    assert list(found) == ["R", "G", "B", "W"]
+    electrons = channel_e(sensor, light_of("A"), found["G"].luminance_cd_m2, EXPOSURE_S)
+    assert electrons[1] == pytest.approx(found["G"].electrons, rel=1e-3)
+    assert found["W"].illuminance_lux == pytest.approx(found["W"].luminance_cd_m2 * pi / 0.18)
+    assert found["W"].luminance_cd_m2 < found["G"].luminance_cd_m2
+    drawn = snr_at(np.array([found["G"].luminance_cd_m2, 1e7]), sensor, "A", EXPOSURE_S)["G"]
+    assert drawn[0] == pytest.approx(10.0, rel=1e-6)
+    assert np.isnan(drawn[1])
