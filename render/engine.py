@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+import rodcone
 from render.cache import load_transport, save_transport
 from render.combine import emission
 from render.denoised.denoise import denoiser
@@ -32,7 +33,7 @@ Progress = Callable[[float, float], None]  # share of the work done (0..1), rela
 
 
 def render(
-    scene: Scene,
+    scene: Scene | str,
     size: tuple[int, int],
     *,
     wavelength_nm: ArrayLike | None = None,
@@ -55,7 +56,8 @@ def render(
 
     Parameters
     ----------
-    scene : Scene
+    scene : Scene or str
+        A scene, or the name of one in the catalogue.
     size : (int, int)
         Height and width in pixels.
     wavelength_nm, width_nm : (band,) array_like, optional
@@ -103,6 +105,12 @@ def render(
     UserWarning
         Where data of a coloured light end within the bands: it gives no light beyond.
     """
+    if isinstance(scene, str):
+        scene = rodcone.load(scene)
+    if not isinstance(scene, Scene):
+        raise InputError(
+            f"scene: a {type(scene).__name__} is none; allowed: a Scene or a name; give rodcone.load(name)"
+        )
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
     if denoise:

@@ -8,7 +8,7 @@ import numpy as np
 from render.photometry import LUMINOUS_EFFICACY_LM_W, colour_matching_functions, luminance
 from render.published_spectra import published_spectra
 from render.spectrum import Spectrum, black_body, flat, line_spectrum
-from rodcone.errors import require_range, unknown
+from rodcone.errors import InputError, require_range, unknown
 from rodcone.optional import quietly_imported
 
 # CIE 015:2018 tables in 5 nm steps. F11 stands for narrow-band fluorescent lamps,
@@ -26,7 +26,7 @@ _LINES = {"sodium_low": ((588.995, 589.592), (2.0, 1.0))}
 # Rise of the full moon's reflectance per nm, over its value at 550 nm: straight line through the 16 bands of 405 to
 # 775 nm of the ROLO model at a phase of 7 degrees (Kieffer & Stone 2005, equation 10 and table 4; libration left out).
 MOON_SLOPE_PER_NM = 1.48e-3
-_TEMPERATURE = re.compile(r"(D?)(\d+(?:\.\d+)?)K")
+_TEMPERATURE = re.compile(r"(D?)(\d+(?:\.\d+)?) ?K")
 
 
 def names() -> tuple[str, ...]:
@@ -55,7 +55,7 @@ def illuminant(name: str) -> Spectrum:
     Parameters
     ----------
     name : str
-        One of `names()`; or ``3000K``, a black body; or ``D7000K``, daylight of that temperature; or what
+        One of `names()`; or ``3000K`` or ``3000 K``, a black body; or ``D7000K``, daylight of that temperature; or what
         colour-science calls another of its lights, such as ``FL3.12``, whose import takes 2 s.
 
     Raises
@@ -63,6 +63,10 @@ def illuminant(name: str) -> Spectrum:
     InputError
         Where `name` is unknown or its temperature out of range.
     """
+    if not isinstance(name, str):
+        raise InputError(
+            f"illuminant: {name!r} is no name; allowed: names such as D65; write '{name} K' for a black body"
+        )
     if temperature := _TEMPERATURE.fullmatch(name):
         kelvin = float(temperature[2])
         if temperature[1]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -96,7 +97,7 @@ class Transport:
 
     def relight(
         self,
-        spectra: Mapping[str, Spectrum | str] | None = None,
+        spectra: Mapping[str, Spectrum | str] | float | None = None,
         *,
         powers: Mapping[str, float] | None = None,
         luminance_cd_m2: float | None = None,
@@ -106,8 +107,8 @@ class Transport:
 
         Parameters
         ----------
-        spectra : mapping of group name to Spectrum or illuminant name, optional
-            Replaces the groups' own spectral emission.
+        spectra : mapping of group name to Spectrum or illuminant name, or float, optional
+            Replaces the groups' own spectral emission; a number is the power of all groups.
         powers : mapping of group name to float, optional
             Replaces the groups' own powers.
         luminance_cd_m2 : float, optional
@@ -132,6 +133,8 @@ class Transport:
         UserWarning
             Where a light's spectrum ends within the bands at a value other than 0: it gives no light beyond.
         """
+        if isinstance(spectra, Real):
+            spectra, powers = None, dict.fromkeys(self.groups, float(spectra))
         emitted = self._emission(spectra, powers)
         coefficients, level_error = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         return SpectralRadiance(

@@ -10,6 +10,7 @@ from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
+from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.readout import read_out
 from sensor.response import electrons_per_irradiance, expected_electrons
@@ -17,7 +18,7 @@ from sensor.response import electrons_per_irradiance, expected_electrons
 
 def capture(
     radiance: SpectralRadiance,
-    sensor: SensorConfig,
+    sensor: SensorConfig | str,
     exposure_s: float,
     device: Device,
     rng: np.random.Generator,
@@ -36,7 +37,8 @@ def capture(
     ----------
     radiance : SpectralRadiance
         Quickest as float32 with band-planar memory, as renders are.
-    sensor : SensorConfig
+    sensor : SensorConfig or str
+        A sensor, or a preset by name or path.
     exposure_s : float
         0 or more [s].
     device : Device
@@ -59,6 +61,12 @@ def capture(
     UserWarning
         Where the bands don't fill the camera's window: what each channel loses.
     """
+    if isinstance(sensor, str):
+        sensor = preset(sensor)
+    if not isinstance(radiance, SpectralRadiance):
+        kind = type(radiance).__name__
+        fix = "call its relight()" if hasattr(radiance, "relight") else "give SpectralRadiance(values, wavelength_nm)"
+        raise InputError(f"radiance: a {kind} is none; allowed: SpectralRadiance; {fix}")
     numpy_runs, scaled = exact or backend() == "numpy", samples_per_pixel == 1 and not spreads(sensor.lens)
     light: SpectralRadiance | SpectralIrradiance = radiance
     if numpy_runs or not scaled:

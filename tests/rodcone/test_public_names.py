@@ -7,6 +7,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import rodcone as public
@@ -125,3 +126,46 @@ def test_mitsuba_before_rodcone_is_told_where_it_loaded_a_library_that_aborts(tm
     said = in_new_python(code)
     assert said.startswith(f"None Dr.Jit was imported before rodcone and loaded {old}")
     assert "import rodcone first" in said
+
+
+def small():
+    return public.render("flat_field", (4, 4), wavelength_nm=np.arange(400.0, 780.0, 40.0), spp=2)
+
+
+def test_names_of_the_catalogues_stand_for_what_they_name():
+    made = small()
+    assert np.array_equal(
+        made.radiance,
+        public.render(public.load("flat_field"), (4, 4), wavelength_nm=made.wavelength_nm, spp=2).radiance,
+    )
+    radiance, device = made.relight(), public.draw_device(public.low_noise(), (4, 4), np.random.default_rng(0))
+    by_name, by_value = (
+        public.capture(radiance, sensor, 0.01, device, np.random.default_rng(1))
+        for sensor in ("low_noise", public.low_noise())
+    )
+    assert np.array_equal(by_name.dn, by_value.dn)
+    assert np.array_equal(public.illuminant("3000 K").values, public.illuminant("3000K").values)
+
+
+def test_a_number_is_the_power_of_all_lights():
+    made = small()
+    (group,) = made.groups
+    assert np.array_equal(made.relight(0.5).values, made.relight(powers={group: 0.5}).values)
+
+
+def test_other_objects_are_refused_in_one_line_with_the_call_that_helps():
+    made = small()
+    device = public.draw_device(public.low_noise(), (4, 4), np.random.default_rng(0))
+    calls = {
+        "relight()": lambda: public.capture(made, "low_noise", 0.01, device, np.random.default_rng(1)),
+        "SpectralRadiance(": lambda: public.capture(np.ones((4, 4, 10)), "low_noise", 0.01, device, None),
+        "rodcone.load(": lambda: public.render(42, (4, 4)),
+        "'3000 K'": lambda: public.illuminant(3000),
+        "still_life": lambda: public.render("still_lif", (4, 4)),
+        "low_noise": lambda: public.capture(made.relight(), "low_nois", 0.01, device, np.random.default_rng(1)),
+    }
+    for words, call in calls.items():
+        with pytest.raises(public.InputError) as caught:
+            call()
+        assert words in str(caught.value)
+        assert "\n" not in str(caught.value)
