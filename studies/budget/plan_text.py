@@ -13,6 +13,9 @@ from studies.budget.model_plan import Plan
 from studies.budget.terms import LENS_TERMS
 from studies.study.study import SceneChoice, Study, label
 
+LEAST_SHOWN = 1e-3  # share of the noise variance, of a column of the table
+LEVEL = 2  # place of the level in a condition's words
+
 
 def plan_json(study: Study, plan: Plan, reference: Plan) -> dict[str, Any]:
     """Everything that a plan holds, as JSON takes it."""
@@ -37,13 +40,38 @@ def plan_json(study: Study, plan: Plan, reference: Plan) -> dict[str, Any]:
 
 
 def plan_table(plan: Plan) -> Table:
-    """The worse mosaic of each condition, a term a column: share of the noise variance, in brackets if modelled."""
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in _head(plan):
-        table.add_column(name, justify="left" if name == "condition" else "right", overflow="fold")
-    for condition in plan.images:
-        rows = [row for row in plan.ledgers if row.condition == condition]
-        table.add_row(*_cells(max(rows, key=lambda row: row.share)))
+    """The worse mosaic of each condition, a term a column: share of the noise variance, in brackets if modelled.
+
+    Narrow: what all conditions have in common is the title, conditions of the same figures share a line, and terms that
+    are under `LEAST_SHOWN` everywhere are named below.
+    """
+    worse = [max((x for x in plan.ledgers if x.condition == of), key=lambda row: row.share) for of in plan.images]
+    words = [_condition(row) for row in worse]
+    varies = [len({line[i] for line in words}) > 1 for i in range(len(words[0]))]
+    small = [all(row.terms[i].share < LEAST_SHOWN for row in worse) for i in range(len(worse[0].terms))]
+    names = [term.name for term in worse[0].terms]
+    title = " ".join(words[0][i] for i in range(len(words[0])) if not varies[i] and i != LEVEL)
+    left_out = ", ".join(name for name, is_small in zip(names, small, strict=True) if is_small)
+    table = Table(
+        box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold", title=title, title_justify="left"
+    )
+    table.caption = f"under {100 * LEAST_SHOWN:g}% everywhere: {left_out}" if left_out else None
+    table.caption_justify = "left"
+    shown = [name for name, is_small in zip(names, small, strict=True) if not is_small]
+    table.add_column("light", overflow="fold", min_width=17)
+    for name in ("noise, e-", "off, e-", "sum", *shown):
+        table.add_column(name.replace(" ", "\n"), justify="right", no_wrap=True)
+    lines: dict[tuple[str, ...], list[str]] = {}
+    for row, line in zip(worse, words, strict=True):
+        figures = [cell for cell, is_small in zip(_figures(row), (*[False] * 3, *small), strict=True) if not is_small]
+        rest = " ".join(word for i, word in enumerate(line) if varies[i] and i != LEVEL)
+        lines.setdefault((rest, *figures), []).append(row.condition.level)
+    above = ""
+    for (rest, *figures), levels in lines.items():
+        if rest != above:
+            table.add_row(f"[bold]{rest}")
+        above = rest
+        table.add_row(", ".join(levels), *figures)
     return table
 
 
@@ -61,10 +89,17 @@ def _head(plan: Plan) -> list[str]:
 
 
 def _cells(row: Ledger) -> list[str]:
+    return [" ".join(_condition(row)), *_figures(row)]
+
+
+def _condition(row: Ledger) -> tuple[str, ...]:
     of = row.condition
-    condition = (label(of.scene.source), of.spectrum, of.level, f"{row.exposure_s * 1e3:.3g}ms", of.sensor, row.mosaic)
+    return label(of.scene.source), of.spectrum, of.level, of.exposure, of.sensor, row.mosaic
+
+
+def _figures(row: Ledger) -> list[str]:
     terms = [f"({_percent(term.share)})" if term.modelled else _percent(term.share) for term in row.terms]
-    return [" ".join(condition), f"{row.noise_e:.3g}", f"{row.rms_e:.2g}", _percent(row.share), *terms]
+    return [f"{row.noise_e:.3g}", f"{row.rms_e:.3g}", _percent(row.share), *terms]
 
 
 def reasons(study: Study, plan: Plan, reference: Plan) -> Iterator[str]:
@@ -114,7 +149,9 @@ def cost_over_reference(plan: Plan, reference: Plan, scene: SceneChoice) -> floa
 
 
 def _percent(share: float) -> str:
-    """Share as per cent, from ten times on as a factor."""
-    if share >= 10:
-        return f"{share:.0f}x"
-    return f"{100 * share:.3g}%" if share >= 1e-5 else "0%"
+    """Share as per cent, from twice on as a factor."""
+    if share >= 2:
+        return f"{share:.1f}x" if share < 10 else f"{share:.0f}x"
+    if share >= 0.1:
+        return f"{100 * share:.0f}%"
+    return f"{100 * share:.2g}%" if share >= LEAST_SHOWN else "0%" if share == 0 else f"<{100 * LEAST_SHOWN:g}%"

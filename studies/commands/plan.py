@@ -47,7 +47,7 @@ def plan(
     if json:
         print(notation.dumps(found | ({"check": checked} if checked else {})))
         return
-    Console(width=None if sys.stdout.isatty() else 200).print(plan_table(chosen))
+    Console(width=None if sys.stdout.isatty() else 100).print(plan_table(chosen))
     print("\n".join(reasons(task, chosen, everything)))
     if checked:
         print(
