@@ -46,7 +46,7 @@ class Pilot:
         return self.opened.scene is not None
 
 
-def plan(study: Study, *, cache: Path | None = None, step: Step = lambda what, share: None) -> Plan:
+def plan(study: Study, *, cache: str | Path | None = None, step: Step = lambda what, share: None) -> Plan:
     """Compute a study's error budget on pilot renders and choose the cheapest model within it.
 
     Parameters
@@ -54,7 +54,7 @@ def plan(study: Study, *, cache: Path | None = None, step: Step = lambda what, s
     study : Study
         `budget` holds the shares, `lens` what the lens does in full, `render.spp` the most samples. They are those of
         the unbiased light: what a denoiser leaves isn't known before the render.
-    cache : Path, optional
+    cache : str or Path, optional
         Folder of renders.
 
     Returns
@@ -71,7 +71,7 @@ def plan(study: Study, *, cache: Path | None = None, step: Step = lambda what, s
     opened_scenes = open_all(study)
     for index, opened in enumerate(opened_scenes.values()):
         step(f"pilot of {opened.choice.source}", index / len(opened_scenes))
-        pilot = make_pilot(opened, study, cache)
+        pilot = make_pilot(opened, study, None if cache is None else Path(cache))
         rows = list(_weigh_all(pilot, study))
         sizes = {count: len(groups) for count, groups in pilot.groups.items()}
         choice = choose(rows, sizes, study.budget, study.render.spp if pilot.rendered else 0)

@@ -47,7 +47,7 @@ def write_results(folder: Path) -> Path:
     return folder / FILE
 
 
-def write_report(folder: Path, path: Path, pictures: int | None = None) -> Path:
+def write_report(folder: str | Path, path: str | Path, pictures: int | None = None) -> Path:
     """Write the report of a sweep's folder, whole or not at all; gives its path.
 
     Raises
@@ -57,7 +57,8 @@ def write_report(folder: Path, path: Path, pictures: int | None = None) -> Path:
     OSError
         Where the file can't be written.
     """
-    page = render_report(*sweep_report(folder, pictures))
+    path = Path(path)
+    page = render_report(*sweep_report(Path(folder), pictures))
     with replacing(path) as (place,):
         place.write_text(page, "utf-8")
     return path

@@ -26,7 +26,7 @@ def check_picture_file(path: Path, bits: int, encoding: str) -> None:
         raise unknown("encoding", encoding, ENCODINGS)
 
 
-def write_picture(encoded: NDArray[np.float64], path: Path, bits: int = 8, encoding: str = "srgb") -> None:
+def write_picture(encoded: NDArray[np.float64], path: str | Path, bits: int = 8, encoding: str = "srgb") -> None:
     """Write an encoded picture (h, w, 3) in [0, 1]; it appears whole or not at all.
 
     Raises
@@ -36,6 +36,7 @@ def write_picture(encoded: NDArray[np.float64], path: Path, bits: int = 8, encod
     OSError
         Where the folder is missing or can't be written.
     """
+    path = Path(path)
     check_picture_file(path, bits, encoding)
     write = to_png if path.suffix.lower() == ".png" else to_tiff
     content = write(encoded, bits, encoding)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what spreadsheets take for the start of a formula (OWASP, CSV injection)
 
 
-def read_rows(folder: Path, everything: bool = False) -> list[Row]:
+def read_rows(folder: str | Path, everything: bool = False) -> list[Row]:
     """Rows of a sweep's folder: those of its last run, or all.
 
     Raises
@@ -27,7 +27,7 @@ def read_rows(folder: Path, everything: bool = False) -> list[Row]:
     InputError
         Where there is no results database, or one of another version.
     """
-    with read_results(folder) as base:
+    with read_results(Path(folder)) as base:
         return rows(base, everything)
 
 
@@ -54,7 +54,7 @@ def to_pandas(table: Sequence[Row]) -> "pd.DataFrame":
     return pandas.DataFrame([asdict(row) for row in table], columns=list(COLUMNS))
 
 
-def write_table(table: Sequence[Row], path: Path) -> None:
+def write_table(table: Sequence[Row], path: str | Path) -> None:
     """Write rows to a ``.csv`` or ``.parquet`` file, whole or not at all.
 
     Raises
@@ -64,6 +64,7 @@ def write_table(table: Sequence[Row], path: Path) -> None:
     OSError
         Where the file can't be written.
     """
+    path = Path(path)
     if path.suffix not in (".csv", ".parquet"):
         raise unknown(f"out: {str(path)!r}: ending", path.suffix, (".csv", ".parquet"))
     if path.suffix == ".parquet":

@@ -54,7 +54,7 @@ class Swept:
 
 def sweep(
     study: Study,
-    out: Path,
+    out: str | Path,
     plan: Plan,
     runner: Runner,
     step: Step = lambda what, share: None,
@@ -70,7 +70,7 @@ def sweep(
     Parameters
     ----------
     study : Study
-    out : Path
+    out : str or Path
         Folder; made where it isn't there.
     plan : Plan
         Of `studies.budget.model_plan.as_stated`, `studies.budget.plan.plan` or `reference_plan`.
@@ -89,7 +89,7 @@ def sweep(
     OSError
         Where the folder can't be written, or the disk is full.
     """
-    clock = clock or Clock()
+    clock, out = clock or Clock(), Path(out)
     for name in study.processors:
         require_libraries(name)
     scenes = open_all(study)

@@ -10,6 +10,7 @@ from html import unescape
 from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pytest
 import report_sample as REPORTS
 import sweep_sample as SAMPLE
@@ -18,13 +19,15 @@ from hypothesis import strategies as st
 
 from rodcone.errors import InputError
 from studies.commands.cli import main
+from studies.commands.report import write_report
 from studies.pages.report import render_report
 from studies.pages.report_data import ReportSensor
 from studies.pages.report_facts import sensor_of
 from studies.pages.report_sweep import chosen_conditions, sweep_report
+from studies.photograph.picture_file import write_picture
 from studies.study.study import SceneChoice
 from studies.sweep.database import FILE
-from studies.sweep.export import read_rows
+from studies.sweep.export import read_rows, write_table
 
 NAME = "</script><b>study"
 FILES = ("<b>bold.exr", "other.exr")
@@ -203,3 +206,12 @@ def test_a_picture_that_is_a_link_out_of_the_folder_is_not_read(out: Path, tmp_p
     picture.symlink_to(tmp_path / "secret")
     with pytest.raises(InputError, match="does not lie in"):
         sweep_report(tmp_path / "swept")
+
+
+def test_paths_may_be_texts_wherever_a_public_function_takes_one(out: Path, tmp_path: Path) -> None:
+    rows = read_rows(str(out))
+    assert rows == read_rows(out)
+    assert write_report(str(out), str(tmp_path / "r.html")).read_bytes().lower().startswith(b"<!doctype html>")
+    write_table(rows, str(tmp_path / "rows.csv"))
+    write_picture(np.zeros((2, 2, 3)), str(tmp_path / "black.png"))
+    assert {path.name for path in tmp_path.iterdir()} == {"r.html", "rows.csv", "black.png"}
