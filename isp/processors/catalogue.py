@@ -1,7 +1,7 @@
 """Every way to make a picture from a raw file, by name: the interleaved camera and its opponents."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from types import MappingProxyType
@@ -10,6 +10,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from isp.colour.colour_fit import ColourFit
+from isp.colour.noise_gains import NoiseGains, colours_in_noise, measured
 from isp.colour.white_balance import WhiteBalance
 from isp.defects import mend
 from isp.picture import Picture
@@ -46,6 +47,9 @@ class Processor:
         Channel whose electrons a neutral reads in the developed picture.
     on_backend : bool
         Whether it runs in Dr.Jit where there is a backend; NumPy else.
+    noise_gains : NoiseGains or None
+        What was measured of its planes, for a colour matrix that knows their error; None: the processor says itself
+        what its matrix knows.
     """
 
     mosaic: str
@@ -55,6 +59,7 @@ class Processor:
     colours: tuple[str, ...] = ("R", "G", "B")
     unit: str = "G"
     on_backend: bool = False
+    noise_gains: NoiseGains | None = None
 
     def develop(
         self,
@@ -78,31 +83,36 @@ class Processor:
         """
         raw = mend(raw)
         white_balance = WhiteBalance.of(raw, neutral, balance)
-        return self.picture(raw, ColourFit.of(matrix), balance=white_balance, **options)
+        colours = ColourFit.of(matrix)
+        if self.noise_gains is not None:
+            colours = colours_in_noise(raw, colours, white_balance, self.unit, self.noise_gains)
+        return self.picture(raw, colours, balance=white_balance, **options)
 
 
 _MALVAR = partial(picture_demosaicked, demosaic=malvar)
 _MENON = partial(picture_demosaicked, demosaic=menon)
 _EARLY = "W as luminance by early fusion"
-# The first two are the paper's.
+# As published; the first two are the paper's.
+_PUBLISHED = {
+    "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)", on_backend=True),
+    "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
+    "bayer_malvar": Processor("bayer", _MALVAR, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
+    "bayer_menon": Processor("bayer", _MENON, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
+    "bayer_nlm": Processor(
+        "bayer", picture_bayer_nlm, "the interleaved camera's non-local means on Bayer", on_backend=True
+    ),
+    "bayer_bm3d": Processor("bayer", picture_bayer_bm3d, "BM3D, Dabov et al. 2007, then Menon", extra=BM3D),
+    "rgbw_sato": Processor("rgbw", picture_sato, f"{_EARLY}: Sato 1983"),
+    "rgbw_kijima": Processor("rgbw", picture_kijima, f"{_EARLY}: Kijima 2007"),
+    "rgbw_yamagami": Processor("rgbw_nd", picture_yamagami, "neutral density on W: Yamagami 1994"),
+    "cmyw_yamagami": Processor(
+        "cmyw", picture_complementary, "complementary colours: Yamagami 1994", colours=("C", "Y", "M"), unit="Y"
+    ),
+    "rgbw_gindele": Processor("rgbw", picture_gindele, "colours alone where W is full: Gindele & Gallagher 2002"),
+}
+FAIR = "_fair"  # ending of a processor's form whose colour matrix knows the noise; the others' does of itself
 PROCESSORS: Mapping[str, Processor] = MappingProxyType(
-    {
-        "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)", on_backend=True),
-        "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
-        "bayer_malvar": Processor("bayer", _MALVAR, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
-        "bayer_menon": Processor("bayer", _MENON, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
-        "bayer_nlm": Processor(
-            "bayer", picture_bayer_nlm, "the interleaved camera's non-local means on Bayer", on_backend=True
-        ),
-        "bayer_bm3d": Processor("bayer", picture_bayer_bm3d, "BM3D, Dabov et al. 2007, then Menon", extra=BM3D),
-        "rgbw_sato": Processor("rgbw", picture_sato, f"{_EARLY}: Sato 1983"),
-        "rgbw_kijima": Processor("rgbw", picture_kijima, f"{_EARLY}: Kijima 2007"),
-        "rgbw_yamagami": Processor("rgbw_nd", picture_yamagami, "neutral density on W: Yamagami 1994"),
-        "cmyw_yamagami": Processor(
-            "cmyw", picture_complementary, "complementary colours: Yamagami 1994", colours=("C", "Y", "M"), unit="Y"
-        ),
-        "rgbw_gindele": Processor("rgbw", picture_gindele, "colours alone where W is full: Gindele & Gallagher 2002"),
-    }
+    _PUBLISHED | {name + FAIR: replace(_PUBLISHED[name], noise_gains=gains) for name, gains in measured().items()}
 )
 
 
