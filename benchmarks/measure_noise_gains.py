@@ -2,8 +2,8 @@
 
 Run ``python benchmarks/measure_noise_gains.py`` for all, or with names for some; the others' rows stay. On pictures
 that no page judges on (`training_pictures`), at light that gives the unit's channel a stated SNR in the mean, on two
-sensors: squared error of the balanced planes over the noise variance of one sample. Of it a share is kept, the one of
-`SHARES` with the smallest product of RMS error and median CIEDE2000 of the developed pictures, neither of which may be
+sensors: squared error of the balanced planes over the noise variance of one sample. The factor on it is the one of
+`FACTORS` with the smallest product of RMS error and median CIEDE2000 of the developed pictures, neither of which may be
 worse than the plain matrix's.
 """
 
@@ -13,14 +13,15 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
-from training_pictures import TrainingPicture, training_pictures
+from training_pictures import TRAINING, TRAINING_SEED, TrainingPicture, training_pictures
 
 from isp.colour.colour_fit import ColourFit
-from isp.colour.noise_gains import TABLE, NoiseGains, colours_in_noise, measured
+from isp.colour.noise_gains import TABLE, NoiseGains, colours_in_noise
 from isp.colour.white_balance import WhiteBalance
 from isp.processors.catalogue import PROCESSORS, Processor
 from render.spectrum import Floats
 from rodcone.colour_spaces import encode_srgb
+from rodcone.toml_file import read_toml
 from sensor.capture import expose
 from sensor.cfa import channels
 from sensor.config import SensorConfig
@@ -37,8 +38,8 @@ from studies.photograph.camera import colour_fit, develop_to_scale
 
 SNR_DB = (-20.0, -10.0, -5.0, 0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
 SENSORS = ("low_noise", "table1_output")
-SHARES = (10.0, 3.0, 1.0, 0.3, 0.1, 0.03, 0.0)
-SIZE, PICTURES, SEED = 96, 6, 20260101
+FACTORS = (10.0, 3.0, 1.0, 0.3, 0.1, 0.03, 0.0)
+SIZE = 96
 TIME_S = 0.066
 BELOW_FULL = 0.9  # of the well: pixels that the planes are held against
 
@@ -72,7 +73,7 @@ class Shot:
 
 @cache
 def pictures() -> list[TrainingPicture]:
-    return training_pictures(SIZE, PICTURES, SEED)
+    return training_pictures(SIZE, TRAINING, TRAINING_SEED)
 
 
 def take(processor: Processor, index: int, name: str, snr_db: float) -> Shot:
@@ -85,7 +86,7 @@ def take(processor: Processor, index: int, name: str, snr_db: float) -> Shot:
     snr2 = 10.0 ** (snr_db / 10)
     mean_e = (snr2 + np.sqrt(snr2**2 + 4 * snr2 * dark)) / 2
     level = float(mean_e / of_channels[..., unit].mean())
-    rng = np.random.default_rng([SEED, index, SENSORS.index(name), round(100 + snr_db)])
+    rng = np.random.default_rng([TRAINING_SEED, index, SENSORS.index(name), round(100 + snr_db)])
     device = draw_device(sensor, (SIZE, SIZE), rng)
     raw = expose(expected_electrons(image, sensor, TIME_S) * level, sensor, TIME_S, device, rng, exact=True)
     neutral = neutral_electrons(sensor, picture.light, TIME_S)
@@ -109,7 +110,7 @@ def plane_error(processor: Processor, shot: Shot) -> Floats:
 def quality(processor: Processor, shot: Shot, gains: NoiseGains) -> tuple[float, float]:
     """RMS error and median CIEDE2000 of the developed picture."""
     white = shot.picture.white_cd_m2 * shot.level_cd_m2
-    if processor.mosaic == "bayer":  # the matrix is the last step: denoised planes serve all shares
+    if processor.mosaic == "bayer":  # the matrix is the last step: denoised planes serve all factors
         balance = WhiteBalance(given=shot.neutral)
         colours = colours_in_noise(shot.raw, shot.colours, balance, processor.unit, gains)
         linear = shot.planes @ colours.matrix().T / (shot.neutral[channels(shot.raw.cfa).index("G")] * white)
@@ -121,48 +122,47 @@ def quality(processor: Processor, shot: Shot, gains: NoiseGains) -> tuple[float,
     return 10 ** (-found.psnr_db / 20), found.delta_e_median
 
 
-def gains_at(name: str, snr_db: float) -> list[float]:
-    """Gains of one processor at one SNR: the share that is kept of the planes' error."""
+def measure_at(name: str, snr_db: float) -> tuple[list[float], float]:
+    """Error of one processor's planes at one SNR, and the factor on it."""
     processor = PROCESSORS[name]
-    shots = [take(processor, index, sensor, snr_db) for index in range(PICTURES) for sensor in SENSORS]
+    shots = [take(processor, index, sensor, snr_db) for index in range(TRAINING) for sensor in SENSORS]
     error = np.mean([plane_error(processor, shot) for shot in shots], axis=0)
     found = []
-    for share in SHARES:
-        gains = NoiseGains(np.zeros(1), share * error[None])
+    for factor in FACTORS:
+        gains = NoiseGains(np.zeros(1), factor * error[None])
         found.append(np.mean([quality(processor, shot, gains) for shot in shots], axis=0))
     figures = np.array(found)
     allowed = (figures <= figures[-1] * (1 + 1e-9)).all(axis=1)
     best = int(np.argmin(np.where(allowed, figures.prod(axis=1), np.inf)))
     won = [
-        f"{SHARES[at]:g}: {20 * np.log10(figures[-1, 0] / figures[at, 0]):+.2f} dB, "
+        f"{FACTORS[at]:g}: {20 * np.log10(figures[-1, 0] / figures[at, 0]):+.2f} dB, "
         f"dE {figures[-1, 1] - figures[at, 1]:+.2f}"
-        for at in (best, SHARES.index(1.0))
+        for at in (best, FACTORS.index(1.0))
     ]
-    print(f"{name:16s} {snr_db:5.0f} dB  error {error.round(3)}  share {won[0]}; {won[1]}", flush=True)
-    return [float(f"{value:.3g}") for value in SHARES[best] * error]
+    print(f"{name:16s} {snr_db:5.0f} dB  error {error.round(3)}  factor {won[0]}; {won[1]}", flush=True)
+    return [float(f"{value:.3g}") for value in error], FACTORS[best]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", choices=list(PROCESSORS))
     names = parser.parse_args().names
-    before = measured() if TABLE.exists() else {}
-    rows = {name: gains.gains.tolist() for name, gains in before.items()}
-    for name in names or list(before):
-        rows[name] = [gains_at(name, snr_db) for snr_db in SNR_DB]
+    rows = read_toml(TABLE)["processors"]
+    for name in names or list(rows):
+        errors, factors = zip(*(measure_at(name, snr_db) for snr_db in SNR_DB), strict=True)
+        rows[name] = {"errors": errors, "factors": factors}
     lines = [
         "# What is left of noise, with blur, in each processor's planes, over the noise variance of one sample.",
         "#   python benchmarks/measure_noise_gains.py",
-        f"# {PICTURES} generated pictures of {SIZE} x {SIZE} pixels (seed {SEED}) on {' and '.join(SENSORS)}; "
+        f"# {TRAINING} generated pictures of {SIZE} x {SIZE} pixels (seed {TRAINING_SEED}) on {' and '.join(SENSORS)}; "
         f"NumPy {np.__version__}.",
-        "# A row for each SNR of the frame's mean in the processor's unit (G; Y of CMYW); its three numbers are the",
-        "# channels that the matrix takes. 0: the plain matrix was better there.",
+        "# errors: a row for each SNR of the frame's mean in the processor's unit (G; Y of CMYW), a number for each",
+        "# channel that the matrix takes. factors: on them, chosen by the pictures; 0 is the plain matrix.",
         f"snr_db = {list(SNR_DB)}",
-        "",
-        "[gains]",
     ]
-    for name, gains in rows.items():
-        lines += [f"{name} = [", *(f"  {row}," for row in gains), "]"]
+    for name, found in rows.items():
+        lines += ["", f"[processors.{name}]", f"factors = {list(found['factors'])}", "errors = ["]
+        lines += [*(f"  {list(row)}," for row in found["errors"]), "]"]
     TABLE.write_text("\n".join(lines) + "\n", "utf-8")
 
 

@@ -14,6 +14,7 @@ from scenes.reflectances import band, edge, grey
 from studies.metrics.truth import Light, light_in_bands, true_srgb
 
 NM = np.arange(390.0, 780.0, 20.0)
+TRAINING, TRAINING_SEED = 6, 20260101  # how many settings are chosen on, and their seed
 LIGHTS = ("D65", "D65", "A", "LED-B3")  # of the pictures in turn
 # How far a surface's dark end reaches down from its bright one: vivid pictures of a mean chroma of 24 in CIELAB, and
 # pale ones of 11; the ColorChecker's surfaces, on which matrices are fitted, have 33.

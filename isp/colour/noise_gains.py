@@ -2,8 +2,8 @@
 
 A processor's planes differ from the true ones by what is left of the noise and by blur. How much, in units of one
 sample's noise variance, is measured on training pictures over light (``python benchmarks/measure_noise_gains.py``), and
-kept in ``noise_gains.toml`` with the command and versions that made it. Where colours that know this error have a lower
-PSNR there than the plain matrix, a smaller share of it is kept, or none, which is the plain matrix.
+kept in ``noise_gains.toml`` with the command and versions that made it. Beside it stands the factor on it that makes
+the best pictures there, none of them worse than by the plain matrix, which is a factor of 0.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ TABLE = Path(__file__).with_name("noise_gains.toml")
 
 @dataclass(frozen=True)
 class NoiseGains:
-    """What a processor's planes differ from the truth by, over one sample's noise variance.
+    """Variance that a processor's colour matrix takes its planes to have, over one sample's noise variance.
 
     Attributes
     ----------
@@ -48,8 +48,11 @@ def measured() -> Mapping[str, NoiseGains]:
     """Gains by processor, as they were measured."""
     table = read_toml(TABLE)
     return {
-        name: NoiseGains(np.array(table["snr_db"], float), np.array(rows, float))
-        for name, rows in table["gains"].items()
+        name: NoiseGains(
+            np.array(table["snr_db"], float),
+            np.array(found["factors"], float)[:, None] * np.array(found["errors"], float),
+        )
+        for name, found in table["processors"].items()
     }
 
 

@@ -90,7 +90,12 @@ def contests_of(rows: Sequence[Row]) -> list[Contest]:
     """
     require_alike(rows)
     of_cells = {
-        (Group(row.scene, row.spectrum, row.exposure, row.sensor, row.white_balance), row.level, row.processor, row.seed): row
+        (
+            Group(row.scene, row.spectrum, row.exposure, row.sensor, row.white_balance),
+            row.level,
+            row.processor,
+            row.seed,
+        ): row
         for row in rows
     }
     processors, seeds = dict.fromkeys(row.processor for row in rows), sorted({row.seed for row in rows})

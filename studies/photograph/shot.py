@@ -153,6 +153,10 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
         require_range("exposure_s", order.exposure_s, 0.0, 1e7, "give seconds, 0 or more")
     elif "G" not in channels(sensor.cfa):
         raise InputError(f"cfa: {sensor.cfa} has no G for the auto exposure; allowed: a mosaic with G; give exposure_s")
+    if order.exposure != AUTO and order.exposure_s is not None:
+        raise InputError(
+            f"exposure_s: {order.exposure_s!r} and exposure {order.exposure!r}; allowed: one; leave one out"
+        )
     if order.exposure != AUTO and "W" not in channels(sensor.cfa):
         raise InputError(
             f"exposure: {order.exposure!r} looks at W, which {sensor.cfa} lacks; allowed: a mosaic with W; "

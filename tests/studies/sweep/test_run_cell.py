@@ -92,6 +92,32 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     assert (row.luminance_cd_m2, row.illuminance_lux, row.mc_share) == (25.0, None, 0.0)
 
 
+def test_rules_of_exposure_are_each_cameras_own_and_leave_its_noise(tmp_path: Path) -> None:
+    rules = ("auto", "auto:W", "auto:information")
+    cells = made(tmp_path, levels=("1000cd/m2",), exposures=rules, seeds=(0,), processors=("bayer", "interleaved"))
+    times = {(cell.processor, cell.condition.exposure): cell.exposure_s for cell in cells}
+    irradiance = form_image(
+        as_transport(load_radiance(tmp_path / "scene.exr")).relight(luminance_cd_m2=1000.0), preset("low_noise")
+    )
+    for_white = auto_exposure_s(irradiance, preset("low_noise"), channel="W")
+    assert {times["bayer", rule] for rule in rules} == {times["interleaved", "auto"]}  # no W to expose for
+    assert times["interleaved", "auto:W"] == pytest.approx(for_white, rel=1e-6)
+    assert times["interleaved", "auto:information"] in (times["interleaved", "auto"], times["interleaved", "auto:W"])
+    bayer = {run_cell(cell).picture for cell in cells if cell.processor == "bayer"}
+    assert len(bayer) == 1  # the same time, the same picture
+
+
+def test_a_white_balance_as_shot_is_the_neutral_of_the_scenes_light(tmp_path: Path) -> None:
+    gray, shot = made(tmp_path, levels=("25cd/m2",), seeds=(0,), white_balances=("gray-world", "as-shot"))
+    assert gray.key != shot.key
+    rows = [run_cell(gray), run_cell(shot)]
+    assert [row.white_balance for row in rows] == ["gray-world", "as-shot"]
+    assert [set(json.loads(row.balance).values()) for row in rows] == [{"gray world"}, {"given"}]
+    # The sample's mean is not grey: Gray World alone takes its colour for the light's. One exposure for both.
+    assert rows[1].psnr_db > rows[0].psnr_db + 1.0
+    assert rows[0].mean_electrons == rows[1].mean_electrons
+
+
 def test_the_monte_carlo_share_is_of_the_pixels_below_saturation(tmp_path: Path) -> None:
     """Half of the pixels at 400 e- with an error of 3 e- each, half beyond the well with 5000 e-, in numbers."""
     cell = made(tmp_path, levels=("1cd/m2",), exposures=("10ms",), seeds=(0,))[0]
