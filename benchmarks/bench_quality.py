@@ -305,7 +305,7 @@ def settings(bench: SceneAndSensor, levels: Sequence[float]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=STAGES)
-    parser.add_argument("--scene", nargs="+", default=["still_life", "color_checker"])
+    parser.add_argument("--scene", nargs="*", default=["still_life", "color_checker"])
     parser.add_argument("--sensor", nargs="+", default=["low_noise", "table1_output"])
     parser.add_argument("--level", nargs="+", type=float, default=[0.0625, 0.25, 1.0, 4.0, 16.0, 64.0, 256.0])
     parser.add_argument("--snr", nargs="+", type=float, default=SNR_DB)

@@ -16,7 +16,7 @@ from isp.colour.colour_fit import LEAST_SIGNAL, ColourFit
 from isp.colour.white_balance import WhiteBalance, neutral_response
 from render.spectrum import Floats
 from rodcone.toml_file import read_toml
-from sensor.cfa import channel_map, channels
+from sensor.cfa import channels, mask
 from sensor.curves import complementary, rgbw
 from sensor.raw import RawImage
 
@@ -58,7 +58,7 @@ def measured() -> Mapping[str, NoiseGains]:
 
 def mean_snr(raw: RawImage, unit: str) -> tuple[float, float]:
     """Mean electrons of a channel's unsaturated samples, not under 0, and their SNR by shot and dark noise."""
-    sampled = channel_map(raw.cfa, raw.shape) == unit
+    sampled = mask(raw.cfa, unit, raw.shape)
     kept = sampled & ~raw.saturated
     mean_e = max(float(raw.electrons[kept if kept.any() else sampled].mean()), 0.0)
     noise_e = np.sqrt(mean_e + raw.dark_noise_e**2)

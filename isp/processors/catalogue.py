@@ -22,6 +22,7 @@ from isp.processors.demosaic import malvar, menon, picture_demosaicked
 from isp.processors.fusion import picture_complementary, picture_kijima, picture_sato, picture_yamagami
 from isp.processors.gindele import picture_gindele
 from rodcone.errors import InputError
+from sensor.cfa import channels
 from sensor.raw import RawImage
 
 _LIBRARIES = {DEMOSAICKING: ("colour_demosaicing",), BM3D: ("bm3d", "colour_demosaicing")}  # what an extra brings
@@ -84,7 +85,7 @@ class Processor:
         raw = mend(raw)
         white_balance = WhiteBalance.of(raw, neutral, balance)
         colours = ColourFit.of(matrix)
-        if self.noise_gains is not None:
+        if self.noise_gains is not None and set(self.colours) <= set(channels(raw.cfa)):  # others are refused below
             colours = colours_in_noise(raw, colours, white_balance, self.unit, self.noise_gains)
         return self.picture(raw, colours, balance=white_balance, **options)
 

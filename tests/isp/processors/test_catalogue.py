@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from builders import raw_image
 
+from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import FAIR, PROCESSORS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
@@ -131,12 +132,13 @@ def test_listed_defects_are_mended_before_any_processor_sees_them(name: str) -> 
     assert np.abs(PROCESSORS[name].develop(raw, IDENTITY).rgb - 800.0).max() > 200.0
 
 
+@pytest.mark.parametrize("matrix", [IDENTITY, ColourFit(("R", "G", "B"), np.ones(3), np.eye(3), np.eye(3))])
 @pytest.mark.parametrize("name", PROCESSORS)
-def test_another_mosaic_is_refused_in_one_line(name: str) -> None:
+def test_another_mosaic_is_refused_in_one_line(name: str, matrix: np.ndarray | ColourFit) -> None:
     other = MOSAICS["rccc"] if name.startswith("bayer") else BAYER
     raw = raw_image(np.full((16, 16), 500), other)
     with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: ") as error:
-        PROCESSORS[name].develop(raw, IDENTITY)
+        PROCESSORS[name].develop(raw, matrix)
     assert "\n" not in str(error.value)
 
 
