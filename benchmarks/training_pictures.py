@@ -1,4 +1,4 @@
-"""Pictures to choose settings on: dead leaves and gratings of random reflectances, which no page judges on."""
+"""Pictures to choose settings on: leaves, gratings and patches of random reflectances, which no page judges on."""
 
 from dataclasses import dataclass
 from itertools import pairwise, product
@@ -14,10 +14,10 @@ from scenes.reflectances import band, edge, grey
 from studies.metrics.truth import Light, light_in_bands, true_srgb
 
 NM = np.arange(390.0, 780.0, 20.0)
-TRAINING, TRAINING_SEED = 6, 20260101  # how many settings are chosen on, and their seed
+TRAINING, TRAINING_SEED = 6, 20260101  # how many settings are chosen on, and their seed: two of each kind
 LIGHTS = ("D65", "D65", "A", "LED-B3")  # of the pictures in turn
 # How far a surface's dark end reaches down from its bright one: vivid pictures of a mean chroma of 24 in CIELAB, and
-# pale ones of 11; the ColorChecker's surfaces, on which matrices are fitted, have 33.
+# pale ones of 10; the ColorChecker's surfaces, on which matrices are fitted, have 33.
 DEPTHS = (0.97, 0.6)
 FINER = 3  # samples a pixel along either axis
 SMALLEST, LARGEST = 1.5, 40.0  # radius of a leaf [pixels]
@@ -34,12 +34,12 @@ class TrainingPicture:
 
 
 def training_pictures(size: int, count: int, seed: int) -> list[TrainingPicture]:
-    """Square pictures: two of dead leaves, one of gratings, and so on; vivid and pale ones in turn."""
+    """Square pictures of `KINDS` in turn, first vivid ones, then pale ones, and so on."""
     made = []
     for index in range(count):
         rng = np.random.default_rng([seed, index])
-        depth = DEPTHS[index % len(DEPTHS)]
-        surfaces = (gratings if index % 3 == 2 else leaves)(rng, size * FINER, depth)
+        depth = DEPTHS[index // len(KINDS) % len(DEPTHS)]
+        surfaces = KINDS[index % len(KINDS)](rng, size * FINER, depth)
         pixels = surfaces.reshape(size, FINER, size, FINER, -1).mean(axis=(1, 3))
         light = light_in_bands(illuminant(LIGHTS[index % len(LIGHTS)]), NM, band_widths(NM))
         values = pixels * light.spectrum
@@ -90,3 +90,13 @@ def gratings(rng: np.random.Generator, side: int, depth: float) -> NDArray[np.fl
         share = (0.5 + 0.5 * np.sin(2 * np.pi * wave / period))[..., None]
         picture[field] = share * reflectance(rng, depth) + (1 - share) * reflectance(rng, depth)
     return picture
+
+
+def patches(rng: np.random.Generator, side: int, depth: float) -> NDArray[np.float64]:
+    """Five by five even fields."""
+    field = np.indices((side, side)) * 5 // side
+    surfaces = np.array([[reflectance(rng, depth) for _ in range(5)] for _ in range(5)])
+    return np.asarray(surfaces[field[0], field[1]])
+
+
+KINDS = (leaves, gratings, patches)  # what a camera meets: detail at every scale, repeating detail, and none

@@ -203,3 +203,15 @@ def test_a_picture_that_is_a_link_out_of_the_folder_is_not_read(out: Path, tmp_p
     picture.symlink_to(tmp_path / "secret")
     with pytest.raises(InputError, match="does not lie in"):
         sweep_report(tmp_path / "swept")
+
+
+def test_white_balances_stand_beside_each_other_and_the_rules_of_exposure_are_told(tmp_path: Path) -> None:
+    study = SAMPLE.small_study(
+        tmp_path, levels=("1cd/m2",), seeds=(0,), exposures=("auto", "auto:W"), white_balances=("gray-world", "as-shot")
+    )
+    SAMPLE.swept(study, tmp_path / "out")
+    report, pictures = sweep_report(tmp_path / "out")
+    assert [cell.first.white_balance for cell in report.cells if cell.first] == ["gray-world", "as-shot"] * 2
+    page = unescape(render_report(report, pictures))
+    assert "low_noise, exposure automatic for W, white balance as-shot" in page
+    assert "automatic: the 99th percentile of expected G at 80 % of the well; automatic for W: the 99th" in page
