@@ -30,7 +30,7 @@ from training_pictures import TRAINING, TRAINING_SEED, training_pictures
 
 from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.catalogue import FAIR, PROCESSORS
 from isp.settings import NEIGHBOURHOOD, Settings
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL, substitution_weight
 from render.engine import render
@@ -197,7 +197,8 @@ def ranking(bench: SceneAndSensor, conditions: Iterable[tuple[float, float]], na
         for name in names:
             try:
                 shots = [
-                    bench.shot(bench.camera(name, s), level, seconds, s).quality for s in range(SEEDS.get(name, 5))
+                    bench.shot(bench.camera(name, s), level, seconds, s).quality
+                    for s in range(SEEDS.get(name.removesuffix(FAIR), 5))
                 ]
             except InputError as error:
                 print(f"  {name}: {error}")

@@ -130,7 +130,7 @@ def facts_table(contests: Sequence[Contest], study: Mapping[str, Any]) -> str:
     }
     return table(
         ["source", "value"],
-        [[name, ", ".join(code(value) for value in dict.fromkeys(of))] for name, of in facts.items()],
+        [[name.replace("_", " "), ", ".join(code(value) for value in dict.fromkeys(of))] for name, of in facts.items()],
     )
 
 
