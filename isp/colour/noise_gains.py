@@ -3,7 +3,7 @@
 A processor's planes differ from the true ones by what is left of the noise and by blur. How much, in units of one
 sample's noise variance, is measured on training pictures over light (``python benchmarks/measure_noise_gains.py``), and
 kept in ``noise_gains.toml`` with the command and versions that made it. Beside it stands the factor on it that makes
-the best pictures there, none of them worse than by the plain matrix, which is a factor of 0.
+the best pictures there, no kind of them worse than by the plain matrix, which is a factor of 0.
 """
 
 from collections.abc import Mapping
