@@ -94,26 +94,28 @@ _MALVAR = partial(picture_demosaicked, demosaic=malvar)
 _MENON = partial(picture_demosaicked, demosaic=menon)
 _EARLY = "W as luminance by early fusion"
 # As published; the first two are the paper's.
-_PUBLISHED = {
-    "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)", on_backend=True),
-    "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
-    "bayer_malvar": Processor("bayer", _MALVAR, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
-    "bayer_menon": Processor("bayer", _MENON, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
-    "bayer_nlm": Processor(
-        "bayer", picture_bayer_nlm, "the interleaved camera's non-local means on Bayer", on_backend=True
-    ),
-    "bayer_bm3d": Processor("bayer", picture_bayer_bm3d, "BM3D, Dabov et al. 2007, then Menon", extra=BM3D),
-    "rgbw_sato": Processor("rgbw", picture_sato, f"{_EARLY}: Sato 1983"),
-    "rgbw_kijima": Processor("rgbw", picture_kijima, f"{_EARLY}: Kijima 2007"),
-    "rgbw_yamagami": Processor("rgbw_nd", picture_yamagami, "neutral density on W: Yamagami 1994"),
-    "cmyw_yamagami": Processor(
-        "cmyw", picture_complementary, "complementary colours: Yamagami 1994", colours=("C", "Y", "M"), unit="Y"
-    ),
-    "rgbw_gindele": Processor("rgbw", picture_gindele, "colours alone where W is full: Gindele & Gallagher 2002"),
-}
+_PUBLISHED: Mapping[str, Processor] = MappingProxyType(
+    {
+        "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)", on_backend=True),
+        "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
+        "bayer_malvar": Processor("bayer", _MALVAR, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
+        "bayer_menon": Processor("bayer", _MENON, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
+        "bayer_nlm": Processor(
+            "bayer", picture_bayer_nlm, "the interleaved camera's non-local means on Bayer", on_backend=True
+        ),
+        "bayer_bm3d": Processor("bayer", picture_bayer_bm3d, "BM3D, Dabov et al. 2007, then Menon", extra=BM3D),
+        "rgbw_sato": Processor("rgbw", picture_sato, f"{_EARLY}: Sato 1983"),
+        "rgbw_kijima": Processor("rgbw", picture_kijima, f"{_EARLY}: Kijima 2007"),
+        "rgbw_yamagami": Processor("rgbw_nd", picture_yamagami, "neutral density on W: Yamagami 1994"),
+        "cmyw_yamagami": Processor(
+            "cmyw", picture_complementary, "complementary colours: Yamagami 1994", colours=("C", "Y", "M"), unit="Y"
+        ),
+        "rgbw_gindele": Processor("rgbw", picture_gindele, "colours alone where W is full: Gindele & Gallagher 2002"),
+    }
+)
 FAIR = "_fair"  # ending of a processor's form whose colour matrix knows the noise; the others' does of itself
 PROCESSORS: Mapping[str, Processor] = MappingProxyType(
-    _PUBLISHED | {name + FAIR: replace(_PUBLISHED[name], noise_gains=gains) for name, gains in measured().items()}
+    {**_PUBLISHED, **{name + FAIR: replace(_PUBLISHED[name], noise_gains=gains) for name, gains in measured().items()}}
 )
 
 
