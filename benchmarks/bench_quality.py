@@ -1,8 +1,8 @@
 """How good the interleaved camera's pictures are, beside its opponents', and whether anything jumps over the light.
 
-Run ``python benchmarks/bench_quality.py transitions``, ``... ranking``, ``... daylight``, ``... substitution`` or
-``... settings``; renders are kept in ``out/bench_quality``. Quality is against the noise-free truth at the known
-exposure scale, as in the demo.
+Run ``python benchmarks/bench_quality.py transitions``, ``... ranking``, ``... daylight``, ``... exposures``,
+``... substitution`` or ``... settings``; renders are kept in ``out/bench_quality``. Quality is against the noise-free
+truth at the known exposure scale, as in the demo.
 
 - transitions: quality over light in half octaves, at a fixed exposure and with auto exposure, and the deepest drop over
   one octave until the colours themselves saturate.
@@ -10,6 +10,8 @@ exposure scale, as in the demo.
   median SNR, and at Figure 6's conditions; the interleaved camera's lead over each with its 95 % interval (20 seeds for
   it and the paper's reference, 5 for the others, 3 for BM3D, which is slow). Where W's SNR is under 1: not ranked.
 - daylight: bright light, where Bayer samples green twice as densely, with and without W below saturation.
+- exposures: what exposing for W is worth beside exposing for green, white balance given, and which of the two holds
+  more information (`sensor.exposure.information_bits`); on training pictures first.
 - substitution: Figure 6's decision, 20 seeds a scene and exposure.
 - settings: sweep of patch, sigma_d and sigma_s that the defaults come from.
 """
@@ -24,10 +26,11 @@ import numpy as np
 from environment import print_environment
 from numpy.typing import NDArray
 from scipy.optimize import brentq
+from training_pictures import TRAINING, TRAINING_SEED, training_pictures
 
 from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.catalogue import FAIR, PROCESSORS
 from isp.settings import NEIGHBOURHOOD, Settings
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL, substitution_weight
 from render.engine import render
@@ -38,7 +41,7 @@ from sensor.capture import expose
 from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
-from sensor.exposure import auto_exposure_s
+from sensor.exposure import auto_exposure_s, information_bits
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -46,7 +49,7 @@ from sensor.response import expected_electrons
 from sensor.variations import vary
 from studies.metrics.confidence import SeedMean, mean_with_confidence
 from studies.metrics.quality import Quality, measure
-from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
+from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
 
 SIZE = 160
@@ -58,6 +61,7 @@ SNR_DB = (-16.0, -8.0, 0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)  # of Bayer
 FIGURE_6 = ((25.0, 0.005), (25.0, 0.010), (25.0, 0.020))  # cd/m^2 and s
 THRESHOLDS = {"table1_output": SUBSTITUTION_SNR, "table1_pixel": SUBSTITUTION_SNR_TABLE1_PIXEL}
 SEEDS = {"interleaved": 20, "bayer": 20, "bayer_bm3d": 3}  # 5 for the others
+STAGES = ("transitions", "ranking", "daylight", "exposures", "substitution", "settings")
 METRICS = (("PSNR", "psnr_db", 1), ("dE2000", "delta_e_median", -1))  # sign: which way is better
 
 
@@ -193,7 +197,8 @@ def ranking(bench: SceneAndSensor, conditions: Iterable[tuple[float, float]], na
         for name in names:
             try:
                 shots = [
-                    bench.shot(bench.camera(name, s), level, seconds, s).quality for s in range(SEEDS.get(name, 5))
+                    bench.shot(bench.camera(name, s), level, seconds, s).quality
+                    for s in range(SEEDS.get(name.removesuffix(FAIR), 5))
                 ]
             except InputError as error:
                 print(f"  {name}: {error}")
@@ -247,6 +252,26 @@ def daylight(bench: SceneAndSensor) -> None:
         print(flush=True)
 
 
+def exposures(bench: SceneAndSensor, levels: Sequence[float], seeds: int) -> None:
+    """What exposing for W in place of green changes in the interleaved camera's pictures, and what bits say of it."""
+    for level in levels:
+        found, told = {}, {}
+        for channel in "GW":
+            cameras = [bench.camera("interleaved", seed) for seed in range(seeds)]
+            electrons, seconds = bench.exposed(cameras[0], level, channel)
+            balance = neutral_electrons(cameras[0].sensor, bench.stage.light, seconds)
+            shots = [bench.shot(camera, level, seconds, s, balance=balance) for s, camera in enumerate(cameras)]
+            found[channel] = np.mean([(shot.quality.psnr_db, shot.quality.delta_e_median) for shot in shots], axis=0)
+            told[channel] = information_bits(electrons, cameras[0].sensor, seconds), seconds
+        psnr_db, delta_e = found["W"] - found["G"]
+        bits, shorter = told["W"][0] - told["G"][0], told["G"][1] / told["W"][1]
+        print(
+            f"{level:8.4g} cd/m2: a time {shorter:.2f} times shorter, for W: {psnr_db:+.2f} dB, dE {delta_e:+.2f}",
+            end="",
+        )
+        print(f", {bits:+.2f} bits a sample", flush=True)
+
+
 def substitution(bench: SceneAndSensor) -> None:
     """Figure 6: 25 cd/m^2 at 5, 10 and 20 ms, each reading of Table 1 with its own threshold."""
     threshold = THRESHOLDS[bench.sensor]
@@ -280,8 +305,8 @@ def settings(bench: SceneAndSensor, levels: Sequence[float]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("transitions", "ranking", "daylight", "substitution", "settings"))
-    parser.add_argument("--scene", nargs="+", default=["still_life", "color_checker"])
+    parser.add_argument("what", choices=STAGES)
+    parser.add_argument("--scene", nargs="*", default=["still_life", "color_checker"])
     parser.add_argument("--sensor", nargs="+", default=["low_noise", "table1_output"])
     parser.add_argument("--level", nargs="+", type=float, default=[0.0625, 0.25, 1.0, 4.0, 16.0, 64.0, 256.0])
     parser.add_argument("--snr", nargs="+", type=float, default=SNR_DB)
@@ -289,8 +314,12 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3)
     options = parser.parse_args()
     print_environment()
-    for scene in options.scene:
-        stage = open_stage(scene, max_spp=768)
+    stages = {scene: lambda scene=scene: open_stage(scene, max_spp=768) for scene in options.scene}
+    if options.what == "exposures":
+        made = enumerate(training_pictures(SIZE, TRAINING, TRAINING_SEED), 1)
+        stages = {f"training {n}": lambda one=one: RenderedScene(**vars(one)) for n, one in made} | stages
+    for scene, open_one in stages.items():
+        stage = open_one()
         for sensor in options.sensor if options.what != "substitution" else THRESHOLDS:
             print(f"\n== {scene}, {sensor}", flush=True)
             bench = SceneAndSensor(stage, sensor)
@@ -301,6 +330,8 @@ def main() -> None:
                 ranking(bench, [*lit, *FIGURE_6], ["interleaved", "bayer", *options.opponent])
             elif options.what == "daylight":
                 daylight(bench)
+            elif options.what == "exposures":
+                exposures(bench, options.level, options.seeds)
             elif options.what == "substitution":
                 substitution(bench)
             else:

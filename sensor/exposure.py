@@ -1,17 +1,28 @@
 """Exposure times: auto exposure from the expected signal, and brackets around a given time."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rodcone.errors import InputError, require_range, unknown
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
-from sensor.response import channel_electrons
+from sensor.readout import noise_variance
+from sensor.response import channel_electrons, expected_electrons
 
 LONGEST_S = 0.066  # Parmar & Wandell 2009, Figure 5: 66 ms
-RULE = "the 99th percentile of expected G at 80 % of the well, never longer than {longest:g} ms"
+AUTO, AUTO_W, AUTO_INFORMATION = "auto", "auto:W", "auto:information"
+# What a camera exposes for, by the rule's name.
+RULES: Mapping[str, str] = MappingProxyType(
+    {
+        AUTO: "the 99th percentile of expected G at 80 % of the well",
+        AUTO_W: "the 99th percentile of expected W at 80 % of the well, of G where the mosaic has no W",
+        AUTO_INFORMATION: "whichever of these two times gives the samples more information",
+    }
+)
 
 
 def auto_exposure_s(
@@ -53,6 +64,58 @@ def auto_exposure_s(
     per_second = channel_electrons(irradiance, sensor, 1.0)[..., channels(sensor.cfa).index(channel)]
     bright = float(np.percentile(per_second, percentile))
     return min(longest_s, well_share * sensor.pixel.full_well_e / bright) if bright > 0 else longest_s
+
+
+def exposure_by_rule_s(
+    rule: str, irradiance: SpectralIrradiance, sensor: SensorConfig, longest_s: float = LONGEST_S
+) -> float:
+    """Exposure by one of `RULES` [s].
+
+    Raises
+    ------
+    InputError
+        For an unknown rule, or a mosaic without the channel that it looks at.
+    """
+    if rule not in RULES:
+        raise unknown("exposure", rule, RULES)
+    for_green_s = auto_exposure_s(irradiance, sensor, longest_s)
+    if rule == AUTO or "W" not in channels(sensor.cfa):
+        return for_green_s
+    for_white_s = auto_exposure_s(irradiance, sensor, longest_s, channel="W")
+    if rule == AUTO_W:
+        return for_white_s
+    return most_informative_s(expected_electrons(irradiance, sensor, 1.0), sensor, (for_green_s, for_white_s))
+
+
+def most_informative_s(per_second_e: NDArray[np.float64], sensor: SensorConfig, times_s: Sequence[float]) -> float:
+    """Time of several whose samples hold the most information on the light; of equal ones the first.
+
+    Parameters
+    ----------
+    per_second_e : (h, w) float64
+        Expected electrons behind each pixel's own filter in a second.
+    sensor : SensorConfig
+    times_s : sequence of float
+        Each above 0.
+    """
+    return max(times_s, key=lambda time_s: information_bits(per_second_e * time_s, sensor, time_s))
+
+
+def information_bits(expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float) -> float:
+    """Information of an exposure's samples, mean over the pixels [bit].
+
+    Each is log2(1 + SNR^2) / 2, what a channel with Gaussian noise carries (Shannon 1949); a full one tells nothing. So
+    a longer time is worth up to one bit a pixel and doubling under dark noise, half of one under shot noise, none
+    beyond the pixels' own unlikeness, and costs all bits of the pixels that it fills.
+
+    Parameters
+    ----------
+    expected_e : (h, w) float64
+        Photo-electrons, as `sensor.response.expected_electrons`.
+    """
+    variance = noise_variance(expected_e, sensor, exposure_s)
+    bits = 0.5 * np.log2(1.0 + expected_e**2 / variance)
+    return float(np.where(expected_e < sensor.pixel.full_well_e, bits, 0.0).mean())
 
 
 def bracket_s(middle_s: float, stops: Sequence[float] = (-2.0, 0.0, 2.0)) -> tuple[float, ...]:

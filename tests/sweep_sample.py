@@ -35,6 +35,7 @@ ROW = Row(
     level="25cd/m2",
     exposure="auto",
     sensor="low_noise",
+    white_balance="gray-world",
     processor="bayer",
     seed=2**40,
     luminance_cd_m2=25.0,
@@ -149,6 +150,7 @@ def row(processor: str, seed: int, **values: Any) -> Row:
         "level": "1cd/m2",
         "exposure": "auto",
         "sensor": "mine.toml",
+        "white_balance": "gray-world",
     }
     return Row(
         **plain

@@ -1,7 +1,7 @@
 """Every way to make a picture from a raw file, by name: the interleaved camera and its opponents."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from types import MappingProxyType
@@ -10,6 +10,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from isp.colour.colour_fit import ColourFit
+from isp.colour.noise_gains import NoiseGains, colours_in_noise, measured
 from isp.colour.white_balance import WhiteBalance
 from isp.defects import mend
 from isp.picture import Picture
@@ -21,6 +22,7 @@ from isp.processors.demosaic import malvar, menon, picture_demosaicked
 from isp.processors.fusion import picture_complementary, picture_kijima, picture_sato, picture_yamagami
 from isp.processors.gindele import picture_gindele
 from rodcone.errors import InputError
+from sensor.cfa import channels
 from sensor.raw import RawImage
 
 _LIBRARIES = {DEMOSAICKING: ("colour_demosaicing",), BM3D: ("bm3d", "colour_demosaicing")}  # what an extra brings
@@ -46,6 +48,9 @@ class Processor:
         Channel whose electrons a neutral reads in the developed picture.
     on_backend : bool
         Whether it runs in Dr.Jit where there is a backend; NumPy else.
+    noise_gains : NoiseGains or None
+        What was measured of its planes, for a colour matrix that knows their error; None: the processor says itself
+        what its matrix knows.
     """
 
     mosaic: str
@@ -55,6 +60,7 @@ class Processor:
     colours: tuple[str, ...] = ("R", "G", "B")
     unit: str = "G"
     on_backend: bool = False
+    noise_gains: NoiseGains | None = None
 
     def develop(
         self,
@@ -78,14 +84,17 @@ class Processor:
         """
         raw = mend(raw)
         white_balance = WhiteBalance.of(raw, neutral, balance)
-        return self.picture(raw, ColourFit.of(matrix), balance=white_balance, **options)
+        colours = ColourFit.of(matrix)
+        if self.noise_gains is not None and set(self.colours) <= set(channels(raw.cfa)):  # others are refused below
+            colours = colours_in_noise(raw, colours, white_balance, self.unit, self.noise_gains)
+        return self.picture(raw, colours, balance=white_balance, **options)
 
 
 _MALVAR = partial(picture_demosaicked, demosaic=malvar)
 _MENON = partial(picture_demosaicked, demosaic=menon)
 _EARLY = "W as luminance by early fusion"
-# The first two are the paper's.
-PROCESSORS: Mapping[str, Processor] = MappingProxyType(
+# As published; the first two are the paper's.
+_PUBLISHED: Mapping[str, Processor] = MappingProxyType(
     {
         "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)", on_backend=True),
         "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
@@ -103,6 +112,10 @@ PROCESSORS: Mapping[str, Processor] = MappingProxyType(
         ),
         "rgbw_gindele": Processor("rgbw", picture_gindele, "colours alone where W is full: Gindele & Gallagher 2002"),
     }
+)
+FAIR = "_fair"  # ending of a processor's form whose colour matrix knows the noise; the others' does of itself
+PROCESSORS: Mapping[str, Processor] = MappingProxyType(
+    {**_PUBLISHED, **{name + FAIR: replace(_PUBLISHED[name], noise_gains=gains) for name, gains in measured().items()}}
 )
 
 

@@ -71,7 +71,7 @@ def plan_table(plan: Plan) -> Table:
         if rest != above:
             table.add_row(f"[bold]{rest}")
         above = rest
-        table.add_row(", ".join(levels), *figures)
+        table.add_row(", ".join(dict.fromkeys(levels)), *figures)
     return table
 
 

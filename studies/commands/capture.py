@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 from rodcone.progress import progress
+from sensor.exposure import AUTO
 from studies.commands.console import Flag, Out, print_result, say
 from studies.photograph.shot import Order, take
 
@@ -16,6 +17,7 @@ def capture(
     sensor: str = "low_noise",
     cfa: str | None = None,
     exposure_s: float | None = None,
+    exposure: str = AUTO,
     level: str | None = None,
     white_balance: str | None = None,
     size: int | None = None,
@@ -41,7 +43,10 @@ def capture(
     cfa
         Mosaic, such as rgbw or bayer; the preset's own by default.
     exposure_s
-        Exposure time in seconds; chosen for the brightest green by default.
+        Exposure time in seconds; chosen by the rule of exposure by default.
+    exposure
+        Rule: auto for the brightest green, auto:W for the brightest W, auto:information for the one of the two whose
+        samples hold more.
     level
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
         by default.
@@ -70,6 +75,7 @@ def capture(
         sensor=sensor,
         cfa=cfa,
         exposure_s=exposure_s,
+        exposure=exposure,
         level=level,
         white_balance=white_balance,
         size=size,

@@ -7,7 +7,7 @@ from math import isnan, log10, nan, sqrt
 
 import numpy as np
 
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.catalogue import FAIR, PROCESSORS
 from rodcone.errors import InputError, unknown
 from sensor.presets import names, preset
 from sensor.readout import as_raw
@@ -25,12 +25,13 @@ FEWEST_SEEDS = 2  # that an interval takes
 
 @dataclass(frozen=True)
 class Group:
-    """Scene, spectrum, exposure and sensor: all that a row of a study's levels has in common."""
+    """Scene, spectrum, exposure, sensor and white balance: all that a row of a study's levels has in common."""
 
     scene: str
     spectrum: str
     exposure: str
     sensor: str
+    white_balance: str
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,12 @@ def contests_of(rows: Sequence[Row]) -> list[Contest]:
     """
     require_alike(rows)
     of_cells = {
-        (Group(row.scene, row.spectrum, row.exposure, row.sensor), row.level, row.processor, row.seed): row
+        (
+            Group(row.scene, row.spectrum, row.exposure, row.sensor, row.white_balance),
+            row.level,
+            row.processor,
+            row.seed,
+        ): row
         for row in rows
     }
     processors, seeds = dict.fromkeys(row.processor for row in rows), sorted({row.seed for row in rows})
@@ -119,14 +125,14 @@ def groups_of(contests: Sequence[Contest]) -> list[Group]:
 def group_name(group: Group, groups: Sequence[Group]) -> str:
     """Name what tells a group from the others; the scene in any case."""
     parts = [group.scene]
-    for name, before in (("spectrum", ""), ("exposure", "exposure "), ("sensor", "")):
+    for name, before in (("spectrum", ""), ("exposure", "exposure "), ("sensor", ""), ("white_balance", "balance ")):
         if len({getattr(other, name) for other in groups}) > 1:
             parts.append(before + getattr(group, name))
     return ", ".join(parts)
 
 
 def opponents_of(contests: Sequence[Contest], camera: str) -> list[str]:
-    """Every other processor of the sweep.
+    """Every other processor of the sweep, by its form with a noise-aware colour matrix where the sweep has that.
 
     Raises
     ------
@@ -138,7 +144,13 @@ def opponents_of(contests: Sequence[Contest], camera: str) -> list[str]:
         raise unknown("camera", camera, there)
     if len(there) == 1:
         raise InputError(f"processors: {there} is not allowed; give the camera and an opponent or more")
-    return [name for name in there if name != camera]
+    return [name for name in there if name != camera and name + FAIR not in there]
+
+
+def plain_opponents_of(contests: Sequence[Contest], camera: str) -> list[str]:
+    """Processors that `opponents_of` has in another form: those whose matrix knows nothing of noise."""
+    there = list(contests[0].rows)
+    return [name for name in there if name != camera and name + FAIR in there]
 
 
 def duels(contests: Sequence[Contest], camera: str, opponent: str, metric: Metric) -> list[Duel]:

@@ -9,6 +9,7 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from isp.processors.catalogue import FAIR
 from rodcone.files import replacing
 from studies.pages.duels import (
     AHEAD,
@@ -22,6 +23,7 @@ from studies.pages.duels import (
     groups_of,
     is_ranked,
     opponents_of,
+    plain_opponents_of,
     snr_db,
 )
 from studies.pages.plots import BLUE, CHART, GREEN, ORANGE, STYLE, blank, name_at_ends, plain_ticks, svg_text
@@ -32,6 +34,7 @@ from studies.sweep.row import Row
 COLUMNS = 2  # charts beside each other
 FEWEST_LEVELS = 2  # that a curve takes
 OTHERS = "#9aa0a5"
+_GROUPED_BY = ("scene", "spectrum", "sensor", "exposure", "white_balance")
 
 
 def write_page(rows: Sequence[Row], study: Mapping[str, Any], folder: Path, out: Path, camera: str) -> None:
@@ -86,7 +89,7 @@ def page_of(
         *white_pixel_tables(contests),
         f"![{description(contests, camera)}]({figure})" if figure else "",
         "## Won, level and lost",
-        duel_table(contests, camera),
+        *duel_tables(contests, camera),
         "Conditions by the outcome of the 95 % interval over seeds, and the leads' range: below 0 "
         f"{code(camera)} is behind. Times are medians over all pictures, in units of {code(camera)}'s, on the machine "
         "of the sweep.",
@@ -122,22 +125,39 @@ def facts_table(contests: Sequence[Contest], study: Mapping[str, Any]) -> str:
     groups = groups_of(contests)
     facts = {
         "study": [str(study.get("name", "study"))],
-        **{name: [getattr(group, name) for group in groups] for name in ("scene", "spectrum", "sensor", "exposure")},
+        **{name: [getattr(group, name) for group in groups] for name in _GROUPED_BY},
         "seeds": [str(row.seed) for row in rows],
         "pixels on the longer side": [str(study.get("render", {}).get("size") or MISSING)],
         "rodcone": [json.loads(rows[0].versions)["rodcone"]],
     }
     return table(
         ["source", "value"],
-        [[name, ", ".join(code(value) for value in dict.fromkeys(of))] for name, of in facts.items()],
+        [[name.replace("_", " "), ", ".join(code(value) for value in dict.fromkeys(of))] for name, of in facts.items()],
     )
 
 
-def duel_table(contests: Sequence[Contest], camera: str) -> str:
+def duel_tables(contests: Sequence[Contest], camera: str) -> list[str]:
+    """Return `duel_table` for each exposure and white balance, with titles where there are several.
+
+    First over the opponents that count, then over those whose colour matrix knows nothing of noise.
+    """
+    ways = list(dict.fromkeys((contest.group.exposure, contest.group.white_balance) for contest in contests))
+    parts = []
+    for way in ways:
+        of_way = [contest for contest in contests if (contest.group.exposure, contest.group.white_balance) == way]
+        title = f"### exposure {code(way[0])}, white balance {code(way[1])}" if len(ways) > 1 else ""
+        plain = plain_opponents_of(of_way, camera)
+        words = f"With the plain colour matrix, as published; the rows above rank `NAME{FAIR}`:" if plain else ""
+        parts += [title, duel_table(of_way, camera, opponents_of(of_way, camera)), words]
+        parts += [duel_table(of_way, camera, plain)] if plain else []
+    return parts
+
+
+def duel_table(contests: Sequence[Contest], camera: str, opponents: Sequence[str]) -> str:
     """Return a table of the camera's leads over each opponent: how often ahead, level, behind, from where to where."""
     own_s = _develop_s(contests, camera)
     rows = []
-    for name in opponents_of(contests, camera):
+    for name in opponents:
         cells = [code(name)]
         for metric in METRICS:
             found = duels(contests, camera, name, metric)

@@ -12,7 +12,7 @@ from typing import Any
 
 from PIL import Image
 
-from sensor.exposure import RULE
+from sensor.exposure import AUTO, RULES
 from studies.metrics.confidence import mean_with_confidence
 from studies.pages.report_data import ReportCell, ReportData, ReportScene
 from studies.pages.report_facts import (
@@ -24,7 +24,7 @@ from studies.pages.report_facts import (
     render_of,
     sensor_of,
 )
-from studies.pages.report_text import METRICS, group_names, view_names
+from studies.pages.report_text import METRICS, exposure_name, group_names, view_names, way_name
 from studies.study.study import label
 from studies.sweep.database import last_run
 from studies.sweep.prepare import PICTURES
@@ -74,7 +74,7 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         scenes=tuple(ReportScene(name, *size) for name, size in zip(names, sizes, strict=True)),
         spectra=tuple(study["spectra"]),
         sensors=tuple(sensor_of(name) for name in study["sensors"]),
-        exposures=tuple(study["exposures"]),
+        exposures=tuple(way_name(*way) for way in _ways(study)),
         levels=tuple(level_of(level) for level in study["levels"]),
         cameras=tuple(study["processors"]),
         seeds=tuple(study["seeds"]),
@@ -84,7 +84,7 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         stages=run.stages,
         environment=environment_of(made),
         configuration=configuration(study),
-        exposure_rule=RULE.format(longest=study["longest_exposure_s"] * 1e3),
+        exposure_rule=_exposure_rules(study),
         left_out=lenses_left_out(made, study["sensors"]),
         notes=(*render_notes(made), *unmade),
         pictures_left_out=left_out,
@@ -95,19 +95,33 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
 def _cells(study: Mapping[str, Any], made: Sequence[Row], names: Sequence[str]) -> list[ReportCell]:
     """Return a cell for each combination that was asked for; one that isn't made yet has no figure."""
     sensors = [label(name) for name in study["sensors"]]
-    found = {(r.scene, r.spectrum, r.sensor, r.exposure, r.level, r.processor, r.seed): r for r in made}
+    found = {
+        (r.scene, r.spectrum, r.sensor, r.exposure, r.white_balance, r.level, r.processor, r.seed): r for r in made
+    }
     light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in made}
     views = view_names(names, study["spectra"])
-    in_view = group_names(sensors, study["exposures"])
+    in_view = group_names(sensors, [way_name(*way) for way in _ways(study)])
     titles = [name + (f", {view}" if view else "") for view in views for name in in_view]
-    groups = product(names, study["spectra"], sensors, study["exposures"])
+    groups = product(names, study["spectra"], sensors, _ways(study))
     cells = []
-    for title, group in zip(titles, groups, strict=True):
+    for title, (*place, way) in zip(titles, groups, strict=True):
+        group = (*place, *way)
         for level, camera in product(study["levels"], study["processors"]):
             of_seeds = [found.get((*group, level, camera, seed)) for seed in study["seeds"]]
             in_both_units = light.get((*group[:2], level), (None, None))
             cells.append(over_seeds(of_seeds, title, study["levels"].index(level), camera, in_both_units))
     return cells
+
+
+def _ways(study: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return each exposure with each white balance; the report's exposures are these."""
+    return list(product(study["exposures"], study["white_balances"]))
+
+
+def _exposure_rules(study: Mapping[str, Any]) -> str:
+    rules = [rule for rule in study["exposures"] if rule in RULES] or [AUTO]
+    words = "; ".join((f"{exposure_name(rule)}: " if len(rules) > 1 else "") + RULES[rule] for rule in rules)
+    return f"{words}, never longer than {study['longest_exposure_s'] * 1e3:g} ms"
 
 
 def over_seeds(

@@ -5,12 +5,14 @@ from dataclasses import dataclass
 from itertools import product
 from math import floor, isfinite, isinf, isnan, log10
 
+from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W
 from studies.pages.report_data import ReportCell
 from studies.study.levels import parse_level
-from studies.study.study import OWN, parse_exposure
+from studies.study.study import GRAY_WORLD, OWN, parse_exposure
 
 MISSING = "—"
 NBSP = "\N{NO-BREAK SPACE}"
+AUTOMATIC = {AUTO: "automatic", AUTO_W: "automatic for W", AUTO_INFORMATION: "automatic by information"}
 CAMERA_NAMES = {"interleaved": "Interleaved", "bayer": "Bayer"}
 # As the title writes them; elsewhere the short names stand beside their pictures.
 CAMERA_TITLES = {"interleaved": "Interleaved RGBW"}
@@ -135,9 +137,15 @@ def group_names(sensors: Sequence[str], exposures: Sequence[str]) -> list[str]:
 
 
 def exposure_name(exposure: str) -> str:
-    """Write an exposure as prose does: ``auto`` as "automatic", ``10ms`` as "10 ms"."""
-    seconds = parse_exposure(exposure)
-    return "automatic" if seconds is None else duration(seconds)
+    """Write an exposure as prose does: ``auto`` as "automatic", ``10ms`` as "10 ms"; after a comma what goes on."""
+    time, comma, balance = exposure.partition(", ")
+    seconds = parse_exposure(time)
+    return (AUTOMATIC[time] if seconds is None else duration(seconds)) + comma + balance
+
+
+def way_name(exposure: str, white_balance: str) -> str:
+    """Write an exposure and how its pictures are balanced, where that isn't Gray World, for `exposure_name`."""
+    return exposure if white_balance == GRAY_WORLD else f"{exposure}, white balance {white_balance}"
 
 
 def spectrum_name(spectrum: str) -> str:

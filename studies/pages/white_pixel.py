@@ -25,7 +25,7 @@ def white_pixel_tables(contests: Sequence[Contest]) -> list[str]:
     parts = ["## What the W pixel brings", TEXT]
     for metric in METRICS:
         unit = f" [{metric.unit}]" if metric.unit else ""
-        head = [f"{metric.name}{unit}", "exposed for", "scenes", *map(level_text, levels)]
+        head = [f"{metric.name}{unit}", "exposure", "white balance", "scenes", *map(level_text, levels)]
         parts.append(
             "\n".join(
                 f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *_rows(contests, levels, metric))
@@ -43,11 +43,14 @@ TEXT = (
 
 def _rows(contests: Sequence[Contest], levels: Sequence[str], metric: Metric) -> list[list[str]]:
     rows = []
-    for sensor, exposure, drawn in dict.fromkeys((x.group.sensor, x.group.exposure, _is_drawn(x)) for x in contests):
-        own = [x for x in contests if (x.group.sensor, x.group.exposure, _is_drawn(x)) == (sensor, exposure, drawn)]
+    for group in dict.fromkeys(map(_group, contests)):
+        sensor, exposure, balance, drawn = group
+        own = [x for x in contests if _group(x) == group]
         scenes = len({x.group.scene for x in own})
         cells = [_cell([x for x in own if x.level == level], metric) for level in levels]
-        rows.append([f"`{sensor}`", f"`{exposure}`", f"{scenes} {'drawn' if drawn else 'named'}", *cells])
+        rows.append(
+            [f"`{sensor}`", f"`{exposure}`", f"`{balance}`", f"{scenes} {'drawn' if drawn else 'named'}", *cells]
+        )
     return rows
 
 
@@ -69,5 +72,7 @@ def _cell(contests: Sequence[Contest], metric: Metric) -> str:
     return f"({shown})" if found.low <= 0 <= found.high else shown
 
 
-def _is_drawn(contest: Contest) -> bool:
-    return contest.group.scene.startswith(DRAWN)
+def _group(contest: Contest) -> tuple[str, str, str, bool]:
+    """Sensor, exposure, white balance, and whether the scene was drawn."""
+    of = contest.group
+    return of.sensor, of.exposure, of.white_balance, of.scene.startswith(DRAWN)

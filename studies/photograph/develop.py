@@ -18,8 +18,7 @@ from sensor.cfa import channels, is_bayer
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import open_raw
 from studies.metrics.truth import WHITE_AT, WHITE_PERCENTILE  # the demo's rule, here on the picture's own luminance
-
-WHITE_BALANCES = ("gray-world", "as-shot")
+from studies.study.study import AS_SHOT, GRAY_WORLD, WHITE_BALANCES
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ def develop(
     calibration: ColourCalibration | None = None,
     *,
     processor: str | None = None,
-    white_balance: str = WHITE_BALANCES[0],
+    white_balance: str = GRAY_WORLD,
 ) -> Picture:
     """Develop a raw image into a linear picture.
 
@@ -71,16 +70,12 @@ def develop(
             "calibrate(sensor, illuminant('D65')) as well"
         )
     colours = fit_of_calibration(colour, channels(raw.cfa))
-    fixed = colour.neutral if white_balance == "as-shot" else None
+    fixed = colour.neutral if white_balance == AS_SHOT else None
     return PROCESSORS[name].develop(raw, colours, neutral=colour.neutral, balance=fixed)
 
 
 def develop_file(
-    path: Path,
-    isp: str | None = None,
-    ev: float | None = None,
-    white_balance: str = WHITE_BALANCES[0],
-    encoding: str = "srgb",
+    path: Path, isp: str | None = None, ev: float | None = None, white_balance: str = GRAY_WORLD, encoding: str = "srgb"
 ) -> Developed:
     """Read a raw file and develop it with its own colour calibration.
 

@@ -14,7 +14,7 @@ from render.radiance_files.radiance_source import is_radiance_file
 from render.scene import Scene
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.user_scene.scene_parts import SceneFile
-from rodcone.errors import InputError, require_range, require_whole
+from rodcone.errors import InputError, require_range, require_whole, unknown
 from rodcone.files import check_place
 from rodcone.memory import file_extent, memory, require_memory
 from rodcone.progress import render_words
@@ -22,7 +22,7 @@ from sensor.capture import capture
 from sensor.cfa import channels, check_covers, is_rgbw
 from sensor.config import SensorConfig
 from sensor.device import draw_device
-from sensor.exposure import auto_exposure_s
+from sensor.exposure import AUTO, RULES, exposure_by_rule_s
 from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending, write_raw
@@ -38,13 +38,14 @@ _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this
 
 @dataclass(frozen=True)
 class Order:
-    """What to photograph and how; None: the preset's mosaic, auto exposure, the scene's level, light and size."""
+    """What to photograph and how; None: the preset's mosaic, the exposure's rule, the scene's level, light and size."""
 
     source: str
     out: Path
     sensor: str = "low_noise"
     cfa: str | None = None
     exposure_s: float | None = None
+    exposure: str = AUTO
     level: str | None = None
     white_balance: str | None = None
     size: int | None = None
@@ -102,7 +103,7 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
     radiance = transport.relight(luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
     exposure_s = order.exposure_s
     if exposure_s is None:
-        exposure_s = auto_exposure_s(form_image(radiance, sensor), sensor)
+        exposure_s = exposure_by_rule_s(order.exposure, form_image(radiance, sensor), sensor)
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
     raw = capture(radiance, sensor, exposure_s, device, np.random.default_rng([order.seed, _FRAME]))
     name = Path(order.sensor).stem.encode("ascii", "replace").decode()
@@ -146,10 +147,21 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
     require_whole("seed", order.seed, 0, 2**31, "give a whole number")
     if order.size is not None:
         require_whole("size", order.size, 1, 8192, "give the picture's longer side in pixels")
+    if order.exposure not in RULES:
+        raise unknown("exposure", order.exposure, RULES)
     if order.exposure_s is not None:
         require_range("exposure_s", order.exposure_s, 0.0, 1e7, "give seconds, 0 or more")
     elif "G" not in channels(sensor.cfa):
         raise InputError(f"cfa: {sensor.cfa} has no G for the auto exposure; allowed: a mosaic with G; give exposure_s")
+    if order.exposure != AUTO and order.exposure_s is not None:
+        raise InputError(
+            f"exposure_s: {order.exposure_s!r} and exposure {order.exposure!r}; allowed: one; leave one out"
+        )
+    if order.exposure != AUTO and "W" not in channels(sensor.cfa):
+        raise InputError(
+            f"exposure: {order.exposure!r} looks at W, which {sensor.cfa} lacks; allowed: a mosaic with W; "
+            f"give {AUTO}, or exposure_s"
+        )
     if is_radiance_file(order.source):
         if order.trust:
             raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")

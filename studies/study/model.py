@@ -31,12 +31,12 @@ class ImageModel:
     exact: bool = True
 
 
-def unit_exposure_s(radiance: SpectralRadiance, preset: SensorConfig) -> float:
+def unit_exposure_s(radiance: SpectralRadiance, preset: SensorConfig, channel: str = "G") -> float:
     """Auto exposure of a scene at 1 cd/m^2 [s], without a longest time; `_DARK_S` where there is no light.
 
-    It is the same for every processor and every model of the lens, so that their pictures can be compared: the preset's
-    own mosaic behind a lens that spreads no light.
+    It is the same for every model of the lens, and for G, with the preset's own mosaic, for every processor, so that
+    their pictures can be compared.
     """
     bare = replace(preset.lens, diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0, defocus_um=0.0)
     plain = replace(preset, lens=bare)
-    return auto_exposure_s(form_image(radiance, plain), plain, _DARK_S)
+    return auto_exposure_s(form_image(radiance, plain), plain, _DARK_S, channel=channel)

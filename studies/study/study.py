@@ -12,7 +12,7 @@ from render.radiance_files.radiance_source import is_radiance_file
 from render.spectrum import VISIBLE_NM
 from rodcone.errors import InputError, require_range, require_whole, unknown
 from sensor.cfa import channels
-from sensor.exposure import LONGEST_S
+from sensor.exposure import AUTO, LONGEST_S, RULES
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.study.levels import parse_level
@@ -20,10 +20,11 @@ from studies.study.levels import parse_level
 OWN = "own"  # the spectrum that the scene's lights have
 LOWEST_NM, HIGHEST_NM = 300.0, 1100.0  # of `render.spectrum.flat`, black bodies and the sun's table
 LEAST_RANGE_NM = 100.0  # the widest band that `RenderLimits.band_nm` takes
-AUTO = "auto"  # the exposure by `sensor.exposure.auto_exposure_s`
 # A light whose table ends short of the bands, at no more than this share of its peak, is taken as dark from there on;
 # white LEDs of the CIE end at 780 nm with 0.6 to 5 %.
 _RUN_OUT = 0.01
+# Gray World from the picture, or the neutral of the scene's light, as a camera notes it in its raw files.
+WHITE_BALANCES = GRAY_WORLD, AS_SHOT = "gray-world", "as-shot"
 FILES = (".xml", ".exr", ".mat", ".toml")  # endings of values that name a file
 _TIME = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+)\s*(us|ms|s)\s*$")
 _SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
@@ -120,9 +121,11 @@ class Condition:
     level : str
         ``25cd/m2`` (mean scene luminance) or ``500lux`` (on the reference plane).
     exposure : str
-        ``auto``, or a time such as ``10ms``.
+        A rule of `sensor.exposure.RULES` such as ``auto``, or a time such as ``10ms``.
     sensor : str
         Preset by name, or a ``.toml`` file.
+    white_balance : str
+        Of `WHITE_BALANCES`.
     """
 
     scene: SceneChoice
@@ -130,11 +133,12 @@ class Condition:
     level: str
     exposure: str
     sensor: str
+    white_balance: str = GRAY_WORLD
 
 
 @dataclass(frozen=True)
 class Study:
-    """Axes of a sweep, and how its pictures are made. Every combination of the seven axes is a cell.
+    """Axes of a sweep, and how its pictures are made. Every combination of the eight axes is a cell.
 
     Raises
     ------
@@ -147,6 +151,7 @@ class Study:
     spectra: tuple[str, ...] = (OWN,)
     exposures: tuple[str, ...] = (AUTO,)
     sensors: tuple[str, ...] = ("low_noise",)
+    white_balances: tuple[str, ...] = (GRAY_WORLD,)
     processors: tuple[str, ...] = ("interleaved", "bayer")
     seeds: tuple[int, ...] = (0,)
     name: str = "study"
@@ -162,8 +167,9 @@ class Study:
 
 
 def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:
-    """All combinations of scenes (or of one alone), spectra, levels, exposures and sensors; the last varies fastest."""
-    axes = (study.scenes if scene is None else (scene,), study.spectra, study.levels, study.exposures, study.sensors)
+    """All combinations of scenes (or of one alone) and of the axes that decide a picture; the last varies fastest."""
+    scenes = study.scenes if scene is None else (scene,)
+    axes = (scenes, study.spectra, study.levels, study.exposures, study.sensors, study.white_balances)
     return [Condition(*place) for place in product(*axes)]
 
 
@@ -179,18 +185,20 @@ def label(value: Any) -> str:
 
 
 def parse_exposure(text: str) -> float | None:
-    """Exposure time [s] of ``10ms``, ``0.5s`` or ``200us``; None for ``auto``.
+    """Exposure time [s] of ``10ms``, ``0.5s`` or ``200us``; None for a rule of `sensor.exposure.RULES`.
 
     Raises
     ------
     InputError
         For anything else, or a time of 0.
     """
-    if text == AUTO:
+    if text in RULES:
         return None
     match = _TIME.match(text)
     if match is None:
-        raise InputError(f"exposures: {text!r} is not a time; allowed: auto, or a number and us, ms or s; write 10ms")
+        raise InputError(
+            f"exposures: {text!r} is not a time; allowed: {', '.join(RULES)}, or a number and us, ms or s; write 10ms"
+        )
     seconds = float(match[1]) * _SECONDS[match[2]]
     require_range("exposures", seconds, 1e-9, 1e6, "give a time above 0 in seconds")
     return seconds
@@ -198,7 +206,7 @@ def parse_exposure(text: str) -> float | None:
 
 def _check_axes(study: Study) -> None:
     """Check that each axis has values of its own, and that levels, times, seeds and lights are known."""
-    for name in ("scenes", "spectra", "levels", "exposures", "sensors", "processors", "seeds"):
+    for name in ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "seeds"):
         values = getattr(study, name)
         labels = [label(value.source if isinstance(value, SceneChoice) else value) for value in values]
         if not labels or len(set(labels)) != len(labels):
@@ -227,15 +235,19 @@ def _check_axes(study: Study) -> None:
 
 
 def _check_cameras(study: Study) -> None:
-    """Check processors, and sensors with the mosaics that these take."""
+    """Check white balances and processors, and sensors with the mosaics that these take."""
+    for balance in study.white_balances:
+        if balance not in WHITE_BALANCES:
+            raise unknown("white_balances", balance, WHITE_BALANCES)
     for name in study.processors:
         if name not in PROCESSORS:
             raise unknown("processors", name, PROCESSORS)
     for name in study.sensors:
         own = preset(name)
-        if AUTO in study.exposures and "G" not in channels(own.cfa):
+        automatic = [exposure for exposure in study.exposures if exposure in RULES]
+        if automatic and "G" not in channels(own.cfa):
             raise InputError(
-                f"exposures: {AUTO!r} looks at G, which {label(name)}'s mosaic lacks; give times such as 5ms"
+                f"exposures: {automatic[0]!r} looks at G, which {label(name)}'s mosaic lacks; give times such as 5ms"
             )
         for mosaic in mosaics(study):
             vary(own, mosaic)

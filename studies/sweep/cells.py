@@ -102,7 +102,7 @@ class Cell:
 
 
 def labels(condition: Condition) -> dict[str, Any]:
-    """Scene, spectrum, level, exposure and sensor as a row names them: a file by its name, without its folder."""
+    """Condition as a row names it: a file by its name, without its folder."""
     return vars(condition) | {"scene": label(condition.scene.source), "sensor": label(condition.sensor)}
 
 
@@ -129,6 +129,7 @@ def exposure_stream(condition: Condition, mosaic: str, seed: int) -> np.random.G
     """Stream of one exposure's noise; processors of the same mosaic develop the same exposure.
 
     It depends on names and values alone, not on their order in the study: one level more leaves the others' noise.
+    All automatic exposures share it: where their rules find the same time, the picture is the same.
     """
     names, (value, unit) = labels(condition), parse_level(condition.level)
     exposure = parse_exposure(condition.exposure)

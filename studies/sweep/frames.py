@@ -20,13 +20,16 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum,
 from render.transport import Transport
 from rodcone.digests import digest
 from rodcone.files import replacing
+from sensor.cfa import channels
 from sensor.config import SensorConfig
+from sensor.exposure import AUTO, AUTO_W, most_informative_s
 from sensor.optics import form_image
 from sensor.response import expected_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
 from studies.study.lit_scene import OpenedScene, in_lux, lux_per_cd_m2
 from studies.study.model import unit_exposure_s
+from studies.study.study import parse_exposure
 from studies.sweep.provenance import versions
 from studies.sweep.stored import is_whole, keep
 
@@ -46,8 +49,8 @@ class UnitFrame:
         Luminance shown as white.
     lux_per_cd_m2 : float or None
         Illuminance of the reference plane; None without one, and where no level is in lux.
-    auto_s : float
-        Auto exposure there, without a longest time [s].
+    auto_s, auto_w_s : float
+        Auto exposures there for G and for W, without a longest time [s]; the same where the mosaic has no W.
     truth : Path
         Linear sRGB of the noise-free scene, not clipped, `white_cd_m2` reads 1, (h, w, 3) float64; the same at every
         level and for every sensor.
@@ -64,6 +67,7 @@ class UnitFrame:
     white_cd_m2: float
     lux_per_cd_m2: float | None
     auto_s: float
+    auto_w_s: float
     truth: Path
     electrons: Path
     errors: Path
@@ -129,13 +133,29 @@ def make_frames(
     for key, (preset, sensor) in wanted.items():
         whole, one, other = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in views)
         errors = [(one - other) / 2] if transport.denoised is None else [whole - one, whole - other]
+        auto_s = unit_exposure_s(views[0], preset)
         facts = scene | {
-            "auto_s": unit_exposure_s(views[0], preset),
+            "auto_s": auto_s,
+            "auto_w_s": unit_exposure_s(views[0], sensor, "W") if "W" in channels(sensor.cfa) else auto_s,
             "electrons": keep(folder, _npy(whole), ".npy"),
             "errors": keep(folder, _npy(np.stack(errors).astype(np.float32)), ".npy"),
         }
         with replacing(folder / f"{key}.json") as (text,):
             text.write_text(json.dumps({"facts": facts, "digest": digest(facts)}), "utf-8")
+
+
+def exposure_s_of(frame: UnitFrame, exposure: str, luminance_cd_m2: float, longest_s: float) -> float:
+    """Exposure time of a frame at a mean luminance [s]; `exposure` as `studies.study.study.Condition` has it."""
+    asked_s = parse_exposure(exposure)
+    if asked_s is not None:
+        return asked_s
+    for_green_s, for_white_s = (min(longest_s, unit_s / luminance_cd_m2) for unit_s in (frame.auto_s, frame.auto_w_s))
+    if exposure == AUTO:
+        return for_green_s
+    if exposure == AUTO_W or for_green_s == for_white_s:
+        return for_white_s
+    per_second_e = np.load(frame.electrons, allow_pickle=False) * luminance_cd_m2
+    return most_informative_s(per_second_e, frame.sensor, (for_green_s, for_white_s))
 
 
 def colours_under(sensor: SensorConfig, processor: Processor, spectrum: Spectrum) -> ColourFit:

@@ -33,7 +33,7 @@ from studies.study.lit_scene import (
 from studies.study.study import Condition, Study, conditions, mosaics, parse_exposure
 from studies.sweep.cells import Cell, RenderRecord, cell_key
 from studies.sweep.database import note_render, render_record
-from studies.sweep.frames import UnitFrame, colours_under, frame_key, make_frames, read_frame
+from studies.sweep.frames import UnitFrame, colours_under, exposure_s_of, frame_key, make_frames, read_frame
 from studies.sweep.provenance import provenance, versions
 
 Progress = Callable[[float, float], None]
@@ -159,8 +159,12 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
         lens = job.plan.images[condition].lens
         for name in job.study.processors:
             imaged = condition.spectrum, condition.sensor, lens, PROCESSORS[name].mosaic
+            frame = frames[imaged]
+            luminance = level_luminance(condition.level, frame.lux_per_cd_m2)
+            longest_s = job.study.longest_exposure_s
+            light = luminance, exposure_s_of(frame, condition.exposure, luminance, longest_s)
             for seed in job.study.seeds:
-                cells.append(_cell(job, condition, name, seed, record, frames[imaged], colours[imaged, name]))
+                cells.append(_cell(job, condition, name, seed, record, frame, colours[imaged, name], light))
     return cells
 
 
@@ -172,10 +176,10 @@ def _cell(
     record: RenderRecord,
     frame: UnitFrame,
     colours: ColourFit,
+    light: tuple[float, float],
 ) -> Cell:
-    luminance = level_luminance(condition.level, frame.lux_per_cd_m2)
-    asked_s = parse_exposure(condition.exposure)
-    exposure_s = min(job.study.longest_exposure_s, frame.auto_s / luminance) if asked_s is None else asked_s
+    """One cell; `light` is the mean luminance [cd/m^2] and the exposure time [s]."""
+    luminance, exposure_s = light
     made_by = provenance(record.facts.variant, processor, exact=job.plan.images[condition].exact)
     return Cell(
         key=cell_key(condition, processor, seed, frame.key, luminance, exposure_s, colours, made_by),

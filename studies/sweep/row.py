@@ -66,6 +66,7 @@ class Row:
     level: str
     exposure: str
     sensor: str
+    white_balance: str
     processor: str
     seed: int
     luminance_cd_m2: float
@@ -111,4 +112,4 @@ class Row:
     worker: int
 
 
-AXES = ("scene", "spectrum", "level", "exposure", "sensor", "processor")
+AXES = ("scene", "spectrum", "level", "exposure", "sensor", "white_balance", "processor")

@@ -20,9 +20,11 @@ from studies.budget.budget import charged_share
 from studies.metrics.appearance import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure
 from studies.metrics.target_figures import target_figures
+from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import develop_to_scale, mean_electrons
 from studies.photograph.clock import timed
 from studies.photograph.png import to_png
+from studies.study.study import AS_SHOT
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text
 from studies.sweep.provenance import in_words, machine, provenance, threads
 from studies.sweep.row import Row
@@ -70,8 +72,11 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     )
     # Develop to linear sRGB in which white is 1.
     saturated = raw.saturated
+    # the neutral of the scene's light, as a raw file would note it; else Gray World's, from the picture
+    as_shot = names["white_balance"] == AS_SHOT
+    options = {"balance": neutral_electrons(sensor, cell.light, raw.exposure_s)} if as_shot else {}
     (linear, picture), develop_s, first_develop_s = timed(
-        lambda: develop_to_scale(raw, processor, cell.colours, sensor, cell.light, cell.white_cd_m2),
+        lambda: develop_to_scale(raw, processor, cell.colours, sensor, cell.light, cell.white_cd_m2, **options),
         *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),
     )
     encoded = encode_srgb(linear)

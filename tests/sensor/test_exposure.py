@@ -1,10 +1,20 @@
 """Exposure times: automatic by a stated rule, and bracketed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rodcone.errors import InputError
-from sensor.exposure import LONGEST_S, auto_exposure_s, bracket_s
+from sensor.exposure import (
+    LONGEST_S,
+    RULES,
+    auto_exposure_s,
+    bracket_s,
+    exposure_by_rule_s,
+    information_bits,
+    most_informative_s,
+)
 from sensor.optics import SpectralIrradiance
 from sensor.presets import preset
 from sensor.response import channel_electrons
@@ -83,3 +93,76 @@ def test_a_bracket_that_cannot_be_is_refused(middle_s, stops, words):
     with pytest.raises(InputError) as error:
         bracket_s(middle_s, stops)
     assert words in str(error.value)
+
+
+def ideal(read_noise_e=0.0):
+    """RGBW camera of 15 000 e- whose noise is the light's, the reading's and a rounding's that is nothing beside."""
+    sensor = preset("low_noise")
+    pixel = replace(sensor.pixel, read_noise_e=read_noise_e, dsnu_e=0.0, prnu=0.0, dark_current_e_per_s=0.0)
+    return replace(sensor, pixel=pixel)
+
+
+def tiles(*lights):
+    """Electrons in a second of a row of 2x2 tiles, R G over B W; a light is the electrons of G."""
+    tile = np.array([[0.5, 1.0], [0.5, 5.0]])
+    return np.hstack([light * tile for light in lights])
+
+
+def bits(*electrons, dark_e2=0.0):
+    """Information of samples, in numbers."""
+    return sum(0.5 * np.log2(1 + e * e / (e + dark_e2)) for e in electrons)
+
+
+@pytest.mark.parametrize("read_noise_e", [0.0, 30.0])
+def test_information_of_a_flat_tile_in_closed_form(read_noise_e):
+    sensor = ideal(read_noise_e)
+    rounding = sensor.gain_e_per_dn**2 / 12
+    dark_e2 = read_noise_e**2 + rounding
+    found = information_bits(tiles(1000.0), sensor, 1.0)
+    assert found == pytest.approx(bits(500, 500, 1000, 5000, dark_e2=dark_e2) / 4, rel=1e-9)
+    # the same light three times as long fills W: its bits are gone
+    found = information_bits(tiles(3000.0), sensor, 1.0)
+    assert found == pytest.approx(bits(1500, 1500, 3000, dark_e2=dark_e2) / 4, rel=1e-9)
+
+
+def test_where_nothing_is_full_the_longer_time_wins_and_where_only_w_counts_the_shorter():
+    sensor = ideal()
+    assert most_informative_s(tiles(100.0), sensor, (5.0, 1.0)) == 5.0
+    assert most_informative_s(tiles(100.0), sensor, (1.0, 5.0)) == 5.0
+    # a flat field whose W is full at 1 s: four channels beat three, each with half a bit an octave more
+    assert most_informative_s(tiles(3500.0), sensor, (1.0, 0.8)) == 0.8
+    assert most_informative_s(tiles(3500.0), sensor, (1.0, 1.0)) == 1.0
+
+
+@pytest.mark.parametrize("read_noise_e", [0.0, 10.0, 30.0])
+def test_the_share_of_full_w_at_which_the_times_are_equal_is_the_closed_forms(read_noise_e):
+    # Two levels: tiles of G 6000 a second, whose W is full at 1 s, and of 60, whose W never is.
+    sensor = ideal(read_noise_e)
+    dark_e2 = read_noise_e**2 + sensor.gain_e_per_dn**2 / 12
+    of = lambda *electrons: bits(*electrons, dark_e2=dark_e2)  # noqa: E731
+    lost = of(600, 600, 1200, 6000) - of(3000, 3000, 6000)  # of a bright tile, by 1 s in place of 0.2: negative is won
+    won = of(30, 30, 60, 300) - of(6, 6, 12, 60)
+    equal = won / (lost + won)
+    assert 0.1 < equal < 0.9
+    for share, best in ((equal - 0.02, 1.0), (equal + 0.02, 0.2)):
+        bright = round(200 * share)
+        row = tiles(*[6000.0] * bright, *[60.0] * (200 - bright))
+        assert most_informative_s(row, sensor, (1.0, 0.2)) == best
+
+
+def test_the_noisier_the_camera_the_more_of_w_it_gives_up_for_a_longer_time():
+    row = tiles(*[6000.0] * 140, *[60.0] * 60)
+    assert [most_informative_s(row, ideal(noise), (1.0, 0.2)) for noise in (0.0, 150.0)] == [0.2, 1.0]
+
+
+def test_rules_by_name():
+    sensor, bayer = preset("low_noise"), preset("low_noise", "bayer")
+    light = ramp()
+    for_green, for_white = (auto_exposure_s(light, sensor, 1e6, channel=channel) for channel in "GW")
+    assert exposure_by_rule_s("auto", light, sensor, 1e6) == for_green
+    assert exposure_by_rule_s("auto:W", light, sensor, 1e6) == for_white < for_green / 4
+    assert exposure_by_rule_s("auto:information", light, sensor, 1e6) in (for_green, for_white)
+    assert {exposure_by_rule_s(rule, light, bayer, 1e6) for rule in RULES} == {for_green}
+    with pytest.raises(InputError, match=r"exposure: 'auto:w' is unknown; .*did you mean 'auto:W'") as error:
+        exposure_by_rule_s("auto:w", light, sensor)
+    assert "\n" not in str(error.value)

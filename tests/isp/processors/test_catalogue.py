@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from builders import raw_image
 
-from isp.processors.catalogue import PROCESSORS
+from isp.colour.colour_fit import ColourFit
+from isp.processors.catalogue import FAIR, PROCESSORS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
@@ -19,7 +20,8 @@ IDENTITY = np.eye(3)
 FULL_E = 15_000.0
 # A neutral's relative electrons; behind its density W collects what G does.
 NEUTRAL = {"R": 0.5, "G": 1.0, "B": 0.4, "W": 5.0, "C": 0.9, "M": 0.7, "Y": 1.0}
-QUICK = [name for name in PROCESSORS if name != "bayer_bm3d"]  # whose library takes seconds: its own file
+ENDS_IN_W = ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami")  # whose luminance is W
+QUICK = [name for name in PROCESSORS if not name.startswith("bayer_bm3d")]  # whose library takes seconds: its own file
 
 
 def neutral_of(name: str) -> Mapping[str, float]:
@@ -85,7 +87,7 @@ def test_bright_ends_at_greens_full_well_or_where_w_alone_is_the_luminance_at_w_
     tile = tile_of(name)
     balance = [neutral_of(name)[channel] for channel in channels(tile)]
     rgb = PROCESSORS[name].develop(grey(name, tile, np.full((24, 24), 1e5)), IDENTITY, balance=balance).rgb
-    ends_with_w = name in ("rgbw_sato", "cmyw_yamagami")
+    ends_with_w = name.removesuffix(FAIR) in ("rgbw_sato", "cmyw_yamagami")
     assert rgb == pytest.approx(np.full((24, 24, 3), FULL_E / 5 if ends_with_w else FULL_E), rel=1e-5)
 
 
@@ -98,7 +100,7 @@ def test_nothing_beside_a_highlight_is_brighter_than_it(name: str) -> None:
     tile = tile_of(name)
     balance = [neutral_of(name)[channel] for channel in channels(tile)]
     rgb = PROCESSORS[name].develop(grey(name, tile, square), IDENTITY, balance=balance).rgb
-    if name in ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami"):  # differences of colours from a luminance of their own
+    if name.removesuffix(FAIR) in ENDS_IN_W:  # differences of colours from a luminance of their own
         assert luminance_of_srgb(rgb).max() <= FULL_E * (1 + 1e-6)
     else:
         assert rgb.max() <= FULL_E * (1 + 1e-6)
@@ -114,7 +116,7 @@ def test_a_given_balance_takes_the_place_of_gray_world(name: str) -> None:
     assert level.balance == dict.fromkeys(names, "given")
     assert unit in names
     # W given as twice as sensitive as it is: half the luminance where W is that, none of a change where it isn't
-    expected = 400.0 if name in ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami") else 800.0
+    expected = 400.0 if name.removesuffix(FAIR) in ENDS_IN_W else 800.0
     assert level.rgb == pytest.approx(np.full((20, 20, 3), expected), rel=1e-5)
 
 
@@ -130,12 +132,13 @@ def test_listed_defects_are_mended_before_any_processor_sees_them(name: str) -> 
     assert np.abs(PROCESSORS[name].develop(raw, IDENTITY).rgb - 800.0).max() > 200.0
 
 
+@pytest.mark.parametrize("matrix", [IDENTITY, ColourFit(("R", "G", "B"), np.ones(3), np.eye(3), np.eye(3))])
 @pytest.mark.parametrize("name", PROCESSORS)
-def test_another_mosaic_is_refused_in_one_line(name: str) -> None:
+def test_another_mosaic_is_refused_in_one_line(name: str, matrix: np.ndarray | ColourFit) -> None:
     other = MOSAICS["rccc"] if name.startswith("bayer") else BAYER
     raw = raw_image(np.full((16, 16), 500), other)
     with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: ") as error:
-        PROCESSORS[name].develop(raw, IDENTITY)
+        PROCESSORS[name].develop(raw, matrix)
     assert "\n" not in str(error.value)
 
 
@@ -162,3 +165,8 @@ def test_every_processor_says_what_it_is() -> None:
     for name, processor in PROCESSORS.items():
         assert processor.source
         assert {*processor.colours, processor.unit} <= set(channels(tile_of(name)))
+
+
+def test_each_processor_whose_colours_know_no_noise_has_a_form_whose_do() -> None:
+    published = [name for name in PROCESSORS if not name.endswith(FAIR)]
+    assert {name for name in published if name + FAIR not in PROCESSORS} == {"interleaved", "bayer_nlm"}

@@ -106,6 +106,20 @@ def test_the_signal_is_that_of_the_level_and_exposure_asked_for(
         assert abs((read_raw(out).electrons - expected).mean()) < 5 * sigma
 
 
+def test_a_camera_exposes_for_green_for_w_or_for_the_more_informative(
+    exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    times = {}
+    for rule in ("auto", "auto:W", "auto:information"):
+        arguments = ["capture", str(exr), "--level", "1000cd/m2", "--exposure", rule, "-o", str(tmp_path / "shot.dng")]
+        _, printed, _ = call([*arguments, "--json"], capsys)
+        facts = json.loads(printed)
+        times[rule] = facts["exposure_s"]
+        assert (facts["saturated"] > 0) == (rule == "auto")  # of the wall W alone is full
+    assert times["auto:W"] < times["auto"] / 4
+    assert times["auto:information"] == times["auto:W"]  # a fourth of the samples lost, two octaves of the others'
+
+
 @pytest.mark.parametrize(("columns", "told"), [(31, False), (33, True), (64, True)])
 def test_a_frame_more_than_half_saturated_is_told(
     columns: int, told: bool, capsys: pytest.CaptureFixture[str], tmp_path: Path
@@ -210,6 +224,9 @@ def test_the_file_carries_the_calibration_for_the_white_balance_asked_for(
         (["flat_field", "--cfa", "rccc", "-o", "o/shot.tif"], ["has no G", "give exposure_s"]),
         (["flat_field", "-o", "o/shot.cr2"], ["another ending", ".dng, .tif, .tiff"]),
         (["flat_field", "--level", "25nits"], ["unit", "'nits'", "cd/m2, lux"]),
+        (["flat_field", "--exposure", "auto:V"], ["exposure", "'auto:V' is unknown", "did you mean 'auto:W'"]),
+        (["flat_field", "--exposure", "auto:W", "--cfa", "bayer"], ["looks at W", "give auto, or exposure_s"]),
+        (["flat_field", "--exposure", "auto:W", "--exposure-s", "0.01"], ["exposure_s", "leave one out"]),
         (["flat_field", "--exposure-s", "-1"], ["exposure_s", "-1", "give seconds"]),
         (["flat_field", "--exposure-s", "nan"], ["exposure_s", "nan", "give seconds"]),
         (["flat_field", "--size", "1"], ["doesn't fit the tile"]),

@@ -55,7 +55,9 @@ def test_sweep_prints_the_ledger_alone_and_the_table_follows(
     assert facts["report"] == str(out / "report.html")
     assert call(["export", str(out), "-o", str(tmp_path / "t.csv")], capsys) == (0, f"{tmp_path / 't.csv'}\n", "")
     header, *table = (tmp_path / "t.csv").read_text("utf-8").splitlines()
-    assert header.startswith("key,scene,spectrum,level,exposure,sensor,processor,seed,luminance_cd_m2,illuminance")
+    assert header.startswith(
+        "key,scene,spectrum,level,exposure,sensor,white_balance,processor,seed,luminance_cd_m2,illuminance"
+    )
     assert [line.split(",")[3] for line in table] == ["1cd/m2", "25cd/m2"]
 
 

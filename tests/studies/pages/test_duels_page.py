@@ -13,7 +13,7 @@ from isp.processors.catalogue import PROCESSORS, require_libraries
 from rodcone.errors import InputError
 from studies.commands.cli import main
 from studies.pages import duels_page as opponents_page
-from studies.pages.duels import contests_of
+from studies.pages.duels import contests_of, opponents_of
 from studies.pages.duels_page import code, duel_table, figure_of, hardest, lead_table, level_table, page_of, write_page
 from studies.pages.plots import BLUE, ORANGE
 from studies.pages.report_text import PSNR
@@ -45,12 +45,36 @@ def test_leads_are_positive_and_losses_bold_in_every_condition() -> None:
 
 
 def test_the_table_counts_outcomes_and_sets_times_beside_the_cameras() -> None:
-    lines = duel_table(contests_of(made()), "a").splitlines()
+    lines = duel_table(contests_of(made()), "a", ["b", "c"]).splitlines()
     even = "0 / 3 / 0 | +0.0 to +0.0 | 0 / 3 / 0 | +0.000 to +0.000"
     assert lines[2:] == [
         f"| `b` | 1 / 0 / 2 | −3.0 to +5.0 | {even} | × 0.5 |",
         f"| `c` | 3 / 0 / 0 | +10.0 to +10.0 | {even} | × 0.5 |",
     ]
+
+
+def test_a_fair_form_takes_its_processors_place_and_the_plain_one_stands_beneath() -> None:
+    figures = {"a": (20.0, 21.0, 22.0), "b": (15.0, 16.0, 17.0), "b_fair": (19.0, 20.0, 23.0), "c": (10.0, 11.0, 12.0)}
+    contests = contests_of(made(figures))
+    assert opponents_of(contests, "a") == ["b_fair", "c"]
+    assert opponents_of(contests, "b_fair") == ["a", "c"]
+    page = page_of(contests, {}, Path("out"), Path("p.md"), "a", None)
+    ranked, plain = page.split("With the plain colour matrix, as published; the rows above rank `NAME_fair`:")
+    assert "| `b_fair` | 2 / 0 / 1 |" in ranked
+    assert "| `b` |" not in ranked
+    assert "| `b` | 3 / 0 / 0 |" in plain
+    assert plain.count("| `b` | 15.0") == 1  # every condition's own figures hold both
+
+
+def test_each_exposure_and_white_balance_has_a_table_of_its_own() -> None:
+    other = made({"a": (20.0, 21.0, 22.0), "b": (30.0, 31.0, 32.0)}, white_balance="as-shot")
+    first = made({"a": (20.0, 21.0, 22.0), "b": (1.0, 2.0, 3.0)})
+    page = page_of(contests_of([*first, *other]), {}, Path("out"), Path("p.md"), "a", None)
+    tables = page.split("### exposure `auto`, white balance ")
+    assert [part.splitlines()[0] for part in tables[1:]] == ["`gray-world`", "`as-shot`"]
+    assert "| `b` | 3 / 0 / 0 |" in tables[1]
+    assert "| `b` | 0 / 0 / 3 |" in tables[2]
+    assert "### `desk, balance as-shot`" in page
 
 
 def test_the_best_of_each_column_is_bold_and_a_tie_twice() -> None:
@@ -169,7 +193,7 @@ def test_the_example_asks_for_every_processor_and_seeds_for_an_interval(
 ) -> None:
     assert call(["new", "study", "opponents", "-o", str(tmp_path / "o.toml")], capsys)[0] == 0
     study = read_study(tmp_path / "o.toml")
-    assert study.processors == tuple(PROCESSORS)
+    assert sorted(study.processors) == sorted(PROCESSORS)
     assert len(study.scenes) == 2
     assert len(study.seeds) >= 2
 

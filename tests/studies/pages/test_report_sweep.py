@@ -211,7 +211,19 @@ def test_a_picture_that_is_a_link_out_of_the_folder_is_not_read(out: Path, tmp_p
 def test_paths_may_be_texts_wherever_a_public_function_takes_one(out: Path, tmp_path: Path) -> None:
     rows = read_rows(str(out))
     assert rows == read_rows(out)
-    assert write_report(str(out), str(tmp_path / "r.html")).read_bytes().lower().startswith(b"<!doctype html>")
+    assert write_report(str(out), str(tmp_path / "r.html")).read_text("utf-8").count("<html") == 1
     write_table(rows, str(tmp_path / "rows.csv"))
     write_picture(np.zeros((2, 2, 3)), str(tmp_path / "black.png"))
     assert {path.name for path in tmp_path.iterdir()} == {"r.html", "rows.csv", "black.png"}
+
+
+def test_white_balances_stand_beside_each_other_and_the_rules_of_exposure_are_told(tmp_path: Path) -> None:
+    study = SAMPLE.small_study(
+        tmp_path, levels=("1cd/m2",), seeds=(0,), exposures=("auto", "auto:W"), white_balances=("gray-world", "as-shot")
+    )
+    SAMPLE.swept(study, tmp_path / "out")
+    report, pictures = sweep_report(tmp_path / "out")
+    assert [cell.first.white_balance for cell in report.cells if cell.first] == ["gray-world", "as-shot"] * 2
+    page = unescape(render_report(report, pictures))
+    assert "low_noise, exposure automatic for W, white balance as-shot" in page
+    assert "automatic: the 99th percentile of expected G at 80 % of the well; automatic for W: the 99th" in page

@@ -99,3 +99,12 @@ def test_labels_keep_their_distance() -> None:
     placed = spread([100.0, 101.0, 199.0], 15, 0, 200)
     assert placed == [100.0, 115.0, 199.0]
     assert spread([199.0, 200.0], 15, 0, 200) == [185.0, 200.0]
+
+
+def test_an_exposure_is_named_with_a_white_balance_that_isnt_gray_worlds() -> None:
+    ways = [text.way_name(*way) for way in (("auto", "gray-world"), ("auto:W", "gray-world"), ("2ms", "as-shot"))]
+    assert text.group_names(["s"], ways) == [
+        "s, exposure automatic",
+        "s, exposure automatic for W",
+        "s, exposure 2\N{NO-BREAK SPACE}ms, white balance as-shot",
+    ]

@@ -34,7 +34,7 @@ def test_a_lead_is_the_mean_over_scenes_and_its_interval_is_over_seeds() -> None
 def test_scenes_that_were_drawn_stand_apart() -> None:
     parts = [part.replace("\N{NO-BREAK SPACE}", " ") for part in white_pixel_tables(contests_of(made()))]
     table = next(part for part in parts if part.startswith("| PSNR")).splitlines()
-    assert table[0] == "| PSNR [dB] | exposed for | scenes | 1 cd/m² | 10 cd/m² |"
+    assert table[0] == "| PSNR [dB] | exposure | white balance | scenes | 1 cd/m² | 10 cd/m² |"
     named = [line for line in table if "1 named" in line]
     drawn = [line for line in table if "1 drawn" in line]
     assert named[0].endswith("| +2.0 ± 0.3 | −1.0 ± 0.3 |")

@@ -56,6 +56,8 @@ def test_auto_exposure_needs_a_green_in_the_presets_own_mosaic(tmp_path: Path) -
         ({"levels": ("25nits",)}, "'nits' is unknown"),
         ({"exposures": ("10",)}, "write 10ms"),
         ({"exposures": ("0s",)}, "give a time above 0"),
+        ({"exposures": ("auto:V",)}, "allowed: auto, auto:W, auto:information, or a number"),
+        ({"white_balances": ("grey-world",)}, "did you mean 'gray-world'"),
         ({"spectra": ("D66",)}, "did you mean 'D65'"),
         ({"scenes": (SceneChoice("still_life", "AA"),)}, "illuminant: 'AA' is unknown"),
         ({"scenes": (SceneChoice("x.exr"),), "spectra": ("A",)}, "can't relight x.exr"),

@@ -86,4 +86,5 @@ def test_a_row_names_files_without_their_folder() -> None:
         "level": "1cd/m2",
         "exposure": "auto",
         "sensor": "mine.toml",
+        "white_balance": "gray-world",
     }

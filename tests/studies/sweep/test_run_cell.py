@@ -16,6 +16,8 @@ from PIL import Image
 from isp.colour.colour_fit import fit_colours
 from isp.pipeline import picture_bayer
 from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from render.radiance_files.exr import write_exr
 from render.radiance_files.radiance_source import as_transport, load_radiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.colour_spaces import encode_srgb
@@ -90,6 +92,36 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     assert hashlib.sha256(content).hexdigest().startswith(Path(row.picture).stem)
     assert json.loads(row.mean_electrons)["G"] == pytest.approx(expected_e[::2, 1::2].mean(), rel=0.2)
     assert (row.luminance_cd_m2, row.illuminance_lux, row.mc_share) == (25.0, None, 0.0)
+
+
+def test_rules_of_exposure_are_each_cameras_own_and_leave_its_noise(tmp_path: Path) -> None:
+    rules = ("auto", "auto:W", "auto:information")
+    cells = made(tmp_path, levels=("1000cd/m2",), exposures=rules, seeds=(0,), processors=("bayer", "interleaved"))
+    times = {(cell.processor, cell.condition.exposure): cell.exposure_s for cell in cells}
+    irradiance = form_image(
+        as_transport(load_radiance(tmp_path / "scene.exr")).relight(luminance_cd_m2=1000.0), preset("low_noise")
+    )
+    for_white = auto_exposure_s(irradiance, preset("low_noise"), channel="W")
+    assert {times["bayer", rule] for rule in rules} == {times["interleaved", "auto"]}  # no W to expose for
+    assert times["interleaved", "auto:W"] == pytest.approx(for_white, rel=1e-6)
+    assert times["interleaved", "auto:information"] in (times["interleaved", "auto"], times["interleaved", "auto:W"])
+    bayer = {run_cell(cell).picture for cell in cells if cell.processor == "bayer"}
+    assert len(bayer) == 1  # the same time, the same picture
+
+
+def test_a_white_balance_as_shot_is_the_neutral_of_the_scenes_light(tmp_path: Path) -> None:
+    # all of the scene is reddish, which Gray World takes for the light's colour
+    shade = np.linspace(0.2, 1.0, SAMPLE.SIZE[1])[None, :, None] * np.ones((SAMPLE.SIZE[0], 1, 1))
+    values = shade * np.linspace(0.3, 1.0, SAMPLE.NM.size) * 1e-3
+    write_exr(tmp_path / "scene.exr", SpectralRadiance(values.astype(np.float32), SAMPLE.NM))
+    gray, shot = made(tmp_path, levels=("25cd/m2",), seeds=(0,), white_balances=("gray-world", "as-shot"))
+    assert gray.key != shot.key
+    rows = [run_cell(gray), run_cell(shot)]
+    assert [row.white_balance for row in rows] == ["gray-world", "as-shot"]
+    assert [set(json.loads(row.balance).values()) for row in rows] == [{"gray world"}, {"given"}]
+    assert rows[0].delta_e_median > 10.0
+    assert rows[1].delta_e_median < 4.0
+    assert rows[0].mean_electrons == rows[1].mean_electrons
 
 
 def test_the_monte_carlo_share_is_of_the_pixels_below_saturation(tmp_path: Path) -> None:
