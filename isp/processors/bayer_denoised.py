@@ -17,12 +17,13 @@ from isp.interleaved import reconstruct_with_noise
 from isp.picture import Image, Picture, finish
 from isp.planes import Plane
 from isp.processors.bm3d import bm3d
-from isp.processors.demosaic import MALVAR_REACH, menon, picture_demosaicked, require_bayer
+from isp.processors.demosaic import MALVAR_REACH, picture_demosaicked, require_bayer
 from isp.processors.mosaic import balance_mosaic, to_rgb
 from isp.processors.sub_images import Mix, bm3d_mosaic
 from sensor.cfa import Tile, channel_map, channels
 from sensor.raw import RawImage
 
+Demosaic = Callable[[Plane, Tile], Image]
 # Noise that BM3D is told after demosaicking, in units of the mosaic's (docs/decisions/0039-the-strongest-opponents.md).
 NOISE_AFTER_DEMOSAICKING = 1.5
 # Mean and two differences of R, G and B: orthonormal rows, the mean first.
@@ -40,14 +41,16 @@ def picture_bayer_nlm(raw: RawImage, colours: ColourFit, *, balance: WhiteBalanc
     return finish(raw, planes, colours, balance=balance, engine=result.engine, noise_gain=result.noise_gain)
 
 
-def picture_denoised_first(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, mix: Mix) -> Picture:
-    """Develop a Bayer raw image with BM3D on the mosaic, then Menon's demosaicking."""
+def picture_denoised_first(
+    raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, mix: Mix, demosaic: Demosaic
+) -> Picture:
+    """Develop a Bayer raw image with BM3D on the mosaic, then demosaicking."""
     require_bayer(raw.cfa)
-    return picture_demosaicked(raw, colours, balance=balance, demosaic=menon, electrons=bm3d_mosaic(raw, mix))
+    return picture_demosaicked(raw, colours, balance=balance, demosaic=demosaic, electrons=bm3d_mosaic(raw, mix))
 
 
 def picture_demosaicked_first(
-    raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, demosaic: Callable[[Plane, Tile], Image]
+    raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, demosaic: Demosaic
 ) -> Picture:
     """Develop a Bayer raw image by demosaicking its noisy mosaic, then BM3D on R, G and B.
 

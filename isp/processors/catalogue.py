@@ -87,9 +87,10 @@ class Processor:
 _MALVAR = partial(picture_demosaicked, demosaic=malvar)
 _MENON = partial(picture_demosaicked, demosaic=menon)
 _RESIDUAL = partial(picture_demosaicked, demosaic=residual_interpolation)
-_BM3D_FIRST = partial(picture_denoised_first, mix=hadamard)
-_PARK = partial(picture_denoised_first, mix=principal_components)
-_BM3D_AFTER = partial(picture_demosaicked_first, demosaic=menon)
+_BM3D_FIRST = partial(picture_denoised_first, mix=hadamard, demosaic=menon)
+_PARK = partial(picture_denoised_first, mix=principal_components, demosaic=residual_interpolation)
+_MENON_BM3D = partial(picture_demosaicked_first, demosaic=menon)
+_RESIDUAL_BM3D = partial(picture_demosaicked_first, demosaic=residual_interpolation)
 _EARLY = "W as luminance by early fusion"
 # The first two are the paper's.
 PROCESSORS: Mapping[str, Processor] = MappingProxyType(
@@ -103,8 +104,9 @@ PROCESSORS: Mapping[str, Processor] = MappingProxyType(
             "bayer", picture_bayer_nlm, "the interleaved camera's non-local means on Bayer", on_backend=True
         ),
         "bayer_bm3d": Processor("bayer", _BM3D_FIRST, "BM3D, Dabov et al. 2007, then Menon", extra=BM3D),
-        "bayer_park": Processor("bayer", _PARK, "BM3D as Park et al. 2009, then Menon", extra=BM3D),
-        "bayer_menon_bm3d": Processor("bayer", _BM3D_AFTER, "Menon, then BM3D as Jin et al. 2020", extra=BM3D),
+        "bayer_park": Processor("bayer", _PARK, "BM3D as Park et al. 2009, then residual", extra=BM3D),
+        "bayer_menon_bm3d": Processor("bayer", _MENON_BM3D, "Menon, then BM3D as Jin et al. 2020", extra=BM3D),
+        "bayer_residual_bm3d": Processor("bayer", _RESIDUAL_BM3D, "residual, then BM3D as Jin et al. 2020", extra=BM3D),
         "rgbw_sato": Processor("rgbw", picture_sato, f"{_EARLY}: Sato 1983"),
         "rgbw_kijima": Processor("rgbw", picture_kijima, f"{_EARLY}: Kijima 2007"),
         "rgbw_yamagami": Processor("rgbw_nd", picture_yamagami, "neutral density on W: Yamagami 1994"),

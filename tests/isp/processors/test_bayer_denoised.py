@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 from builders import BAYER_PHASES, raw_image
 
-from isp.colour.colour_fit import ColourFit
-from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct
 from isp.processors import bm3d
-from isp.processors.bayer_denoised import NOISE_AFTER_DEMOSAICKING, picture_demosaicked_first
+from isp.processors.bayer_denoised import NOISE_AFTER_DEMOSAICKING
 from isp.processors.catalogue import PROCESSORS
-from isp.processors.residual import residual_interpolation
 from sensor.cfa import BAYER, Tile, mask
 from sensor.raw import RawImage
 
@@ -51,10 +48,7 @@ def test_demosaicked_first_the_denoiser_sees_opponent_planes_and_what_their_nois
     library = SimpleNamespace(bm3d=nothing, BM3DProfile=SimpleNamespace)
     monkeypatch.setattr(bm3d, "optional_library", lambda name, extra: library)
     image = exposure(expected_e(cfa, (34, 38), 1000.0), cfa)
-    develop = PROCESSORS["bayer_menon_bm3d"].picture.func
-    assert develop is picture_demosaicked_first
-    balance = WhiteBalance(given=np.array([0.5, 1.0, 0.4]))
-    picture = develop(image, ColourFit.of(np.eye(3)), balance=balance, demosaic=residual_interpolation)
+    picture = PROCESSORS["bayer_residual_bm3d"].develop(image, np.eye(3), balance=[0.5, 1.0, 0.4])
     for index, gain in enumerate((2.0, 1.0, 2.5)):
         assert picture.rgb[..., index] == pytest.approx(1000.0 + gain / 4, abs=0.05)
     ((planes, sigma),) = seen
