@@ -2,7 +2,7 @@
 
 Before, on the mosaic's sub-images (`isp.processors.sub_images`). After, as Q. Jin, G. Facciolo, J.-M. Morel, "A review
 of an old dilemma: demosaicking first, or denoising first?", CVPR Workshops 2020, find better: the demosaicked picture
-is denoised as if its noise were white and about 1.5 times as strong. Ours: the mosaic is in units of noise by then.
+is denoised as if its noise were white and stronger, 1.5 times with them. Ours: 1.75, in units of noise from before.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from sensor.raw import RawImage
 
 Demosaic = Callable[[Plane, Tile], Image]
 # Noise that BM3D is told after demosaicking, in units of the mosaic's (docs/decisions/0039-the-strongest-opponents.md).
-NOISE_AFTER_DEMOSAICKING = 1.5
+NOISE_AFTER_DEMOSAICKING = 1.75
 # Mean and two differences of R, G and B: orthonormal rows, the mean first.
 _OPPONENT = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
 

@@ -1,5 +1,6 @@
 """Processors that denoise with BM3D's own library: light kept, noise gone, the same bits from any thread."""
 
+import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -55,7 +56,10 @@ def test_the_bits_are_the_same_from_any_thread() -> None:
             np.testing.assert_array_equal(result, alone)
 
 
-def test_a_tile_of_more_sites_is_refused_in_one_line() -> None:
+def test_a_tile_of_more_sites_is_refused_in_one_line_before_anything_is_denoised(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "bm3d", None)
     raw = raw_image(np.full((16, 16), 500), RGBW_4X4)
     with pytest.raises(InputError, match=r"^cfa: .* is not 2x2 RGBW; allowed here: R, G, B and W once each") as error:
         PROCESSORS["rgbw_park"].develop(raw, np.eye(3))

@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 from builders import BAYER_PHASES
+from skimage import data
 
+from isp.processors.demosaic import menon
 from isp.processors.residual import REACH, residual_interpolation
 from rodcone.errors import InputError
 from sensor.cfa import RGBW, Tile, channel_map
+from studies.metrics.quality import psnr_db
 
 
 def mosaic_of(picture: np.ndarray, cfa: Tile) -> np.ndarray:
@@ -22,6 +25,12 @@ def test_stripes_of_any_width_come_back_where_colours_are_linear_in_green(cfa: T
     picture = np.stack([0.5 * green + 100, green, 2 * green - 30], axis=-1)
     picture = picture.transpose(1, 0, 2) if turned else picture
     assert residual_interpolation(mosaic_of(picture, cfa), cfa) == pytest.approx(picture, abs=1e-6)
+
+
+@pytest.mark.parametrize("cfa", BAYER_PHASES)
+def test_samples_stay_what_they_are(cfa: Tile) -> None:
+    mosaic = np.random.default_rng(7).uniform(0, 1000, (37, 34))
+    np.testing.assert_allclose(mosaic_of(residual_interpolation(mosaic, cfa), cfa), mosaic, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("cfa", BAYER_PHASES)
@@ -44,6 +53,17 @@ def test_darkness_beside_a_bright_lamp_stays_dark() -> None:
     mosaic[40, 20] = 1e6
     planes = residual_interpolation(mosaic, ("RG", "GB"))
     assert planes[:, 20 + REACH + 1 :] == pytest.approx(np.full((80, 96 - 21 - REACH, 3), 3.0), abs=1e-9)
+
+
+def test_on_photographs_it_is_ahead_of_menon_as_published() -> None:
+    # The paper's own pictures come in no wheel; on these two it reads 39.0 dB, Menon 38.1 and 37.4.
+    pytest.importorskip("colour_demosaicing", reason="rodcone[opponents] is not installed")
+    for picture in (data.astronaut()[:256, :256] * 1.0, data.coffee()[:256, 100:356] * 1.0):
+        mosaic = mosaic_of(picture, ("RG", "GB"))
+        theirs, ours = (
+            psnr_db(demosaic(mosaic, ("RG", "GB")) / 255, picture / 255) for demosaic in (menon, residual_interpolation)
+        )
+        assert ours > theirs + 0.5
 
 
 def test_another_mosaic_is_refused() -> None:
