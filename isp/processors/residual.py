@@ -4,9 +4,11 @@ D. Kiku, Y. Monno, M. Tanaka, M. Okutomi, "Beyond color difference: residual int
 demosaicking", IEEE Trans. Image Process. 25(3), 2016; first in ICIP 2013. A guided filter predicts one colour from
 another, and what is interpolated is the residual at that colour's samples. Green comes first: the differences from the
 other colour in either direction, averaged on four sides by their gradients as in I. Pekkucuksen, Y. Altunbasak,
-"Gradient based threshold free color filter array interpolation", ICIP 2010.
+"Gradient based threshold free color filter array interpolation", ICIP 2010. Windows are averaged by how well they fit,
+as in Y. Monno, D. Kiku, M. Tanaka, M. Okutomi, "Adaptive residual interpolation for color and multispectral image
+demosaicking", Sensors 17(12), 2017.
 
-Taken from the papers' equations, not from their authors' program. Ours: reflection about the outermost pixels.
+After the papers' method, not their authors' program. Ours: reflection about the outermost pixels.
 """
 
 import numpy as np
@@ -24,6 +26,7 @@ _GREEN_WINDOW, _COLOUR_WINDOW = 7, 11  # pixels along a side of the guided filte
 _SECOND = np.array([-1.0, 0.0, 2.0, 0.0, -1.0])  # Laplacian along one axis of samples two apart
 _BETWEEN = np.array([0.5, 1.0, 0.5])  # interpolates samples two apart
 _GAUSSIAN = np.exp(-(np.arange(5) ** 2) / 2.0)  # weight of colour differences towards one side, by distance
+_ROUNDING = 1e-6  # of a mean square: differences of such under this say nothing
 _LEAST = 1e-10  # under any gradient or Laplacian of noise, to divide by
 
 
@@ -79,9 +82,15 @@ def _predict(samples: Plane, guide: Plane, sampled: NDArray[np.bool_], axes: tup
     own, other = np.where(sampled, slopes[0], 0.0), slopes[1]
     gain = _sums(own * other, window) / (_sums(own**2, window) + _LEAST)
     count = _sums(sampled.astype(np.float64), window)
-    means = [_sums(np.where(sampled, plane, 0.0), window) / count for plane in (samples, guide)]
-    offset = means[0] - gain * means[1]
-    return (_sums(gain, window) * guide + _sums(offset, window)) / window**2
+    sample, seen = (np.where(sampled, plane, 0.0) for plane in (samples, guide))
+    mean, mean_seen = _sums(sample, window) / count, _sums(seen, window) / count
+    offset = mean - gain * mean_seen
+    # Windows count by how well they fit: one that holds a lamp, or two surfaces, says little about a pixel beside them.
+    squares = _sums(sample**2, window) / count
+    product = _sums(sample * seen, window) / count - mean * mean_seen
+    missed = squares - mean**2 - 2 * gain * product + gain**2 * (_sums(seen**2, window) / count - mean_seen**2)
+    weight = 1.0 / np.sqrt(np.maximum(missed, _ROUNDING * squares + _LEAST))
+    return (_sums(weight * gain, window) * guide + _sums(weight * offset, window)) / _sums(weight, window)
 
 
 def _sums(values: Plane, window: int) -> Plane:
