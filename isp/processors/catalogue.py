@@ -15,12 +15,15 @@ from isp.colour.white_balance import WhiteBalance
 from isp.defects import mend
 from isp.picture import Picture
 from isp.pipeline import picture_bayer, picture_interleaved
-from isp.processors.bayer_denoised import EXTRA as BM3D
-from isp.processors.bayer_denoised import picture_bayer_bm3d, picture_bayer_nlm
+from isp.processors.bayer_denoised import picture_bayer_nlm, picture_demosaicked_first, picture_denoised_first
+from isp.processors.bm3d import EXTRA as BM3D
 from isp.processors.demosaic import EXTRA as DEMOSAICKING
 from isp.processors.demosaic import malvar, menon, picture_demosaicked
 from isp.processors.fusion import picture_complementary, picture_kijima, picture_sato, picture_yamagami
 from isp.processors.gindele import picture_gindele
+from isp.processors.park import picture_rgbw_park
+from isp.processors.residual import residual_interpolation
+from isp.processors.sub_images import hadamard, principal_components
 from rodcone.errors import InputError
 from sensor.cfa import channels
 from sensor.raw import RawImage
@@ -92,6 +95,10 @@ class Processor:
 
 _MALVAR = partial(picture_demosaicked, demosaic=malvar)
 _MENON = partial(picture_demosaicked, demosaic=menon)
+_RESIDUAL = partial(picture_demosaicked, demosaic=residual_interpolation)
+_BM3D_FIRST = partial(picture_denoised_first, mix=hadamard, demosaic=menon)
+_PARK = partial(picture_denoised_first, mix=principal_components, demosaic=residual_interpolation)
+_RESIDUAL_BM3D = partial(picture_demosaicked_first, demosaic=residual_interpolation)
 _EARLY = "W as luminance by early fusion"
 # As published; the first two are the paper's.
 _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
@@ -100,10 +107,13 @@ _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
         "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
         "bayer_malvar": Processor("bayer", _MALVAR, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
         "bayer_menon": Processor("bayer", _MENON, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
+        "bayer_residual": Processor("bayer", _RESIDUAL, "residual interpolation, Kiku et al. 2016"),
         "bayer_nlm": Processor(
             "bayer", picture_bayer_nlm, "the interleaved camera's non-local means on Bayer", on_backend=True
         ),
-        "bayer_bm3d": Processor("bayer", picture_bayer_bm3d, "BM3D, Dabov et al. 2007, then Menon", extra=BM3D),
+        "bayer_bm3d": Processor("bayer", _BM3D_FIRST, "BM3D, Dabov et al. 2007, then Menon", extra=BM3D),
+        "bayer_park": Processor("bayer", _PARK, "BM3D as Park et al. 2009, then residual", extra=BM3D),
+        "bayer_residual_bm3d": Processor("bayer", _RESIDUAL_BM3D, "residual, then BM3D as Jin et al. 2020", extra=BM3D),
         "rgbw_sato": Processor("rgbw", picture_sato, f"{_EARLY}: Sato 1983"),
         "rgbw_kijima": Processor("rgbw", picture_kijima, f"{_EARLY}: Kijima 2007"),
         "rgbw_yamagami": Processor("rgbw_nd", picture_yamagami, "neutral density on W: Yamagami 1994"),
@@ -111,6 +121,7 @@ _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
             "cmyw", picture_complementary, "complementary colours: Yamagami 1994", colours=("C", "Y", "M"), unit="Y"
         ),
         "rgbw_gindele": Processor("rgbw", picture_gindele, "colours alone where W is full: Gindele & Gallagher 2002"),
+        "rgbw_park": Processor("rgbw", picture_rgbw_park, "BM3D as Park et al. 2009, then Gindele", extra=BM3D),
     }
 )
 FAIR = "_fair"  # ending of a processor's form whose colour matrix knows the noise; the others' does of itself

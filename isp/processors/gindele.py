@@ -31,10 +31,12 @@ _DIAGONALS = ((1, 1), (1, -1))
 _AXES = ((0, 1), (1, 0))
 
 
-def picture_gindele(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop a 2x2 RGBW raw image."""
+def picture_gindele(
+    raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, electrons: Plane | None = None
+) -> Picture:
+    """Develop a 2x2 RGBW raw image: its mosaic, or a denoised one [e-]."""
     require_letters(raw, CHANNELS)
-    mosaic, sources = balance_mosaic(raw, raw.electrons, balance)
+    mosaic, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
     clipped = saturated_nearby(raw, "W", REACH)[..., None]
     planes = np.where(clipped, fill_channels(mosaic, raw.cfa, "RGB"), adams_planes(mosaic, raw.cfa))
     return Picture(to_rgb(raw, planes, colours, REACH), sources)
@@ -54,8 +56,7 @@ def adams_planes(mosaic: Plane, cfa: Tile) -> Image:
 
 def luminance_plane(mosaic: Plane, cfa: Tile) -> Plane:
     """W everywhere, along the smaller gradient: first at the sites diagonal to W's, then at those beside them."""
-    if not is_rgbw(cfa):
-        raise InputError(f"cfa: {cfa} is not 2x2 RGBW; allowed here: R, G, B and W once each; use another processor")
+    require_rgbw(cfa)
     padded = np.pad(mosaic, _PAD, mode="reflect")
     row, column = divmod("".join(cfa).index("W"), 2)
     opposite = mask(cfa, cfa[1 - row][1 - column], (padded.shape[0], padded.shape[1]))
@@ -63,6 +64,12 @@ def luminance_plane(mosaic: Plane, cfa: Tile) -> Plane:
     white = np.where(opposite, _along_smaller_gradient(padded, padded, _DIAGONALS), padded)
     white = np.where(sampled | opposite, white, _along_smaller_gradient(white, padded, _AXES))
     return white[_PAD:-_PAD, _PAD:-_PAD]
+
+
+def require_rgbw(cfa: Tile) -> None:
+    """Raise `InputError` unless the tile is 2x2 with R, G, B and W once each."""
+    if not is_rgbw(cfa):
+        raise InputError(f"cfa: {cfa} is not 2x2 RGBW; allowed here: R, G, B and W once each; use another processor")
 
 
 def _along_smaller_gradient(white: Plane, own: Plane, directions: tuple[tuple[int, int], ...]) -> Plane:

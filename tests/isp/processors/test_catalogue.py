@@ -1,5 +1,6 @@
 """Every processor alike: flat fields in every phase, highlights, balance, defects, and what is refused."""
 
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
@@ -21,7 +22,8 @@ FULL_E = 15_000.0
 # A neutral's relative electrons; behind its density W collects what G does.
 NEUTRAL = {"R": 0.5, "G": 1.0, "B": 0.4, "W": 5.0, "C": 0.9, "M": 0.7, "Y": 1.0}
 ENDS_IN_W = ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami")  # whose luminance is W
-QUICK = [name for name in PROCESSORS if not name.startswith("bayer_bm3d")]  # whose library takes seconds: its own file
+SLOW = [name for name in PROCESSORS if PROCESSORS[name].extra == "bm3d"]  # that library takes seconds: test_bm3d
+QUICK = [name for name in PROCESSORS if name not in SLOW]
 
 
 def neutral_of(name: str) -> Mapping[str, float]:
@@ -157,6 +159,15 @@ def test_a_wrong_matrix_neutral_or_balance_is_refused(name: str) -> None:
 def test_a_missing_library_names_its_extra() -> None:
     with pytest.raises(InputError, match=r"^nowhere_to_be_found: not installed .*pip install 'rodcone\[opponents\]'"):
         optional_library("nowhere_to_be_found", "opponents")
+
+
+@pytest.mark.parametrize("name", SLOW)
+def test_without_its_library_a_processor_is_refused_in_one_line(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "bm3d", None)
+    raw = grey(name, tile_of(name), np.full((16, 16), 500.0))
+    with pytest.raises(InputError, match=r"^bm3d: not installed .*pip install 'rodcone\[bm3d\]'") as error:
+        PROCESSORS[name].develop(raw, IDENTITY)
+    assert "\n" not in str(error.value)
 
 
 def test_every_processor_says_what_it_is() -> None:

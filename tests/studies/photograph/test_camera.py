@@ -23,7 +23,7 @@ from studies.photograph.camera import colour_fit, develop_to_scale
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
 LIGHT = light_in_bands(illuminant("D65"), NM, WIDTH)
-QUICK = [name for name in PROCESSORS if not name.startswith("bayer_bm3d")]
+QUICK = [name for name, processor in PROCESSORS.items() if processor.extra != "bm3d"]
 SIDE = 16  # pixels of a patch
 
 

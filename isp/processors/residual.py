@@ -1,0 +1,99 @@
+"""Residual interpolation on Bayer, with minimized Laplacians: MLRI.
+
+D. Kiku, Y. Monno, M. Tanaka, M. Okutomi, "Beyond color difference: residual interpolation for color image
+demosaicking", IEEE Trans. Image Process. 25(3), 2016; first in ICIP 2013. A guided filter predicts one colour from
+another, and what is interpolated is the residual at that colour's samples. Green comes first: the differences from the
+other colour in either direction, averaged on four sides by their gradients as in I. Pekkucuksen, Y. Altunbasak,
+"Gradient based threshold free color filter array interpolation", ICIP 2010. Windows are averaged by how well they fit,
+as in Y. Monno, D. Kiku, M. Tanaka, M. Okutomi, "Adaptive residual interpolation for color and multispectral image
+demosaicking", Sensors 17(12), 2017.
+
+After the papers' method, not their authors' program. Ours: reflection about the outermost pixels.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
+
+from isp.bilinear import fill_channels
+from isp.picture import Image
+from isp.planes import Plane
+from isp.processors.demosaic import require_bayer
+from sensor.cfa import Tile, mask
+
+REACH = 28  # pixels that a value depends on along one axis: 15 for a green, 13 more for R and B
+_GREEN_WINDOW, _COLOUR_WINDOW = 7, 11  # pixels along a side of the guided filters' windows
+_SECOND = np.array([-1.0, 0.0, 2.0, 0.0, -1.0])  # Laplacian along one axis of samples two apart
+_BETWEEN = np.array([0.5, 1.0, 0.5])  # interpolates samples two apart
+_GAUSSIAN = np.exp(-(np.arange(5) ** 2) / 2.0)  # weight of colour differences towards one side, by distance
+_ROUNDING = 1e-6  # of a mean square: differences of such under this say nothing
+_LEAST = 1e-10  # under any gradient or Laplacian of noise, to divide by
+
+
+def residual_interpolation(mosaic: Plane, cfa: Tile) -> Image:
+    """Planes of R, G and B, shape (h, w, 3); parameters as `isp.processors.demosaic.menon`."""
+    require_bayer(cfa)
+    padded = np.pad(mosaic, REACH, mode="reflect")
+    height, width = padded.shape
+    sites = {colour: mask(cfa, colour, (height, width)) for colour in "RGB"}
+    green = _green(padded, sites["G"])
+    planes = {"G": green}
+    for colour in "RB":
+        predicted = _predict(padded, green, sites[colour], (0, 1), _COLOUR_WINDOW)
+        planes[colour] = predicted + fill_channels(padded - predicted, cfa, colour)[..., 0]
+    return np.stack([planes[colour] for colour in "RGB"], axis=-1)[REACH:-REACH, REACH:-REACH]
+
+
+def _green(mosaic: Plane, green: NDArray[np.bool_]) -> Plane:
+    """Green everywhere: at another colour's site its sample and the difference that the four sides tell."""
+    total, weights = np.zeros_like(mosaic), np.zeros_like(mosaic)
+    for axis, difference in ((1, _differences(mosaic, green)), (0, _differences(mosaic.T, green.T).T)):
+        gradient = np.abs(convolve1d(difference, [1.0, 0.0, -1.0], axis))
+        around = convolve1d(gradient, np.ones(5), 1 - axis)
+        for side in (1, -1):
+            reached = np.concatenate([np.zeros(4), np.ones(5)])[::side]
+            average = np.concatenate([np.zeros(4), _GAUSSIAN / _GAUSSIAN.sum()])[::side]
+            weight = 1.0 / (convolve1d(around, reached, axis) ** 2 + _LEAST)
+            total += weight * convolve1d(difference, average, axis)
+            weights += weight
+    return np.where(green, mosaic, mosaic + total / weights)
+
+
+def _differences(mosaic: Plane, green: NDArray[np.bool_]) -> Plane:
+    """Green less the other colour of the same row, at every pixel, by residual interpolation along the rows."""
+    between = convolve1d(mosaic, [0.5, 0.0, 0.5], axis=1)
+    as_green, as_colour = np.where(green, mosaic, between), np.where(green, between, mosaic)
+    result = np.empty_like(mosaic)
+    for parity in (0, 1):  # rows with red, rows with blue
+        rows = np.zeros_like(green)
+        rows[parity::2] = True
+        planes = []
+        for guide, sampled in ((as_colour, rows & green), (as_green, rows & ~green)):
+            predicted = _predict(mosaic, guide, sampled, (1,), _GREEN_WINDOW)
+            residual = np.where(sampled, mosaic - predicted, 0.0)
+            planes.append(predicted + convolve1d(residual, _BETWEEN, axis=1))
+        result[parity::2] = (planes[0] - planes[1])[parity::2]
+    return result
+
+
+def _predict(samples: Plane, guide: Plane, sampled: NDArray[np.bool_], axes: tuple[int, ...], window: int) -> Plane:
+    """A colour that is linear in the guide within each window, the Laplacian of its residual being the least."""
+    slopes = [sum(convolve1d(plane, _SECOND, axis) for axis in axes) for plane in (guide, samples)]
+    own, other = np.where(sampled, slopes[0], 0.0), slopes[1]
+    gain = _sums(own * other, window) / (_sums(own**2, window) + _LEAST)
+    count = _sums(sampled.astype(np.float64), window)
+    sample, seen = (np.where(sampled, plane, 0.0) for plane in (samples, guide))
+    mean, mean_seen = _sums(sample, window) / count, _sums(seen, window) / count
+    offset = mean - gain * mean_seen
+    # Windows count by how well they fit: one that holds a lamp, or two surfaces, says little about a pixel beside them.
+    squares = _sums(sample**2, window) / count
+    product = _sums(sample * seen, window) / count - mean * mean_seen
+    missed = squares - mean**2 - 2 * gain * product + gain**2 * (_sums(seen**2, window) / count - mean_seen**2)
+    weight = 1.0 / np.sqrt(np.maximum(missed, _ROUNDING * squares + _LEAST))
+    return (_sums(weight * gain, window) * guide + _sums(weight * offset, window)) / _sums(weight, window)
+
+
+def _sums(values: Plane, window: int) -> Plane:
+    """Sum of the window around each pixel, each summed anew: a running sum leaves rounding behind what was bright."""
+    ones = np.ones(window)
+    return np.asarray(convolve1d(convolve1d(values, ones, 0), ones, 1))

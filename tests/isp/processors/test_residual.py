@@ -1,0 +1,82 @@
+"""Residual interpolation: pictures that its model describes come back, and padding reaches as far as it does."""
+
+import numpy as np
+import pytest
+from builders import BAYER_PHASES
+from skimage import data
+
+from isp.processors.demosaic import menon
+from isp.processors.residual import REACH, residual_interpolation
+from rodcone.errors import InputError
+from sensor.cfa import RGBW, Tile, channel_map
+from studies.metrics.quality import psnr_db
+
+
+def mosaic_of(picture: np.ndarray, cfa: Tile) -> np.ndarray:
+    sites = channel_map(cfa, picture.shape[:2])
+    return np.select([sites == name for name in "RGB"], list(np.moveaxis(picture, -1, 0)))
+
+
+@pytest.mark.parametrize("cfa", BAYER_PHASES)
+@pytest.mark.parametrize("turned", [False, True])
+def test_stripes_of_any_width_come_back_where_colours_are_linear_in_green(cfa: Tile, turned: bool) -> None:
+    # Along the stripes green is known, the gradient there is 0; red and blue are then what the guide says, everywhere.
+    green = np.broadcast_to(np.random.default_rng(6).uniform(100, 1000, 46), (40, 46))
+    picture = np.stack([0.5 * green + 100, green, 2 * green - 30], axis=-1)
+    picture = picture.transpose(1, 0, 2) if turned else picture
+    assert residual_interpolation(mosaic_of(picture, cfa), cfa) == pytest.approx(picture, abs=1e-6)
+
+
+@pytest.mark.parametrize("cfa", BAYER_PHASES)
+def test_samples_stay_what_they_are(cfa: Tile) -> None:
+    mosaic = np.random.default_rng(7).uniform(0, 1000, (37, 34))
+    np.testing.assert_allclose(mosaic_of(residual_interpolation(mosaic, cfa), cfa), mosaic, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("cfa", BAYER_PHASES)
+def test_a_grey_ramp_is_reproduced(cfa: Tile) -> None:
+    rows, columns = np.indices((2 * REACH + 8, 2 * REACH + 10))
+    ramp = 10.0 * rows + 4.0 * columns
+    inside = (slice(REACH, -REACH),) * 2
+    assert residual_interpolation(ramp, cfa)[inside] == pytest.approx(ramp[inside][..., None].repeat(3, 2), abs=1e-6)
+
+
+def test_more_reflection_changes_nothing() -> None:
+    mosaic = np.random.default_rng(4).uniform(0, 1000, (37, 34))
+    more = residual_interpolation(np.pad(mosaic, 32, mode="reflect"), ("GB", "RG"))[32:-32, 32:-32]
+    np.testing.assert_allclose(residual_interpolation(mosaic, ("GB", "RG")), more, rtol=0, atol=1e-9)
+
+
+def test_darkness_beside_a_bright_lamp_stays_dark() -> None:
+    # sums that run along the rows would leave some 1e-8 of the lamp's Laplacian behind, and divide by it
+    mosaic = np.full((80, 96), 3.0)
+    mosaic[40, 20] = 1e6
+    planes = residual_interpolation(mosaic, ("RG", "GB"))
+    assert planes[:, 20 + REACH + 1 :] == pytest.approx(np.full((80, 96 - 21 - REACH, 3), 3.0), abs=1e-9)
+
+
+def test_a_lamp_in_the_dark_leaks_little_beyond_three_pixels() -> None:
+    # 15 000 e- in a field of 0 +- 1.5 e-: windows averaged alike leave up to 340 e- there, weighted ones 6 at most
+    dark = 1.5 * np.random.default_rng(8).standard_normal((64, 64))
+    for size in (1, 2, 4):
+        lit = dark.copy()
+        lit[30 : 30 + size, 30 : 30 + size] = 15_000.0
+        leaked = residual_interpolation(lit, ("RG", "GB")) - residual_interpolation(dark, ("RG", "GB"))
+        leaked[27 : 33 + size, 27 : 33 + size] = 0.0
+        assert np.abs(leaked).max() < 8.0
+
+
+def test_on_photographs_it_is_ahead_of_menon_as_published() -> None:
+    # The paper's own pictures come in no wheel; on these two it reads 39.1 dB, Menon 38.1 and 37.4.
+    pytest.importorskip("colour_demosaicing", reason="rodcone[opponents] is not installed")
+    for picture in (data.astronaut()[:256, :256] * 1.0, data.coffee()[:256, 100:356] * 1.0):
+        mosaic = mosaic_of(picture, ("RG", "GB"))
+        theirs, ours = (
+            psnr_db(demosaic(mosaic, ("RG", "GB")) / 255, picture / 255) for demosaic in (menon, residual_interpolation)
+        )
+        assert ours > theirs + 0.5
+
+
+def test_another_mosaic_is_refused() -> None:
+    with pytest.raises(InputError, match=r"^raw: mosaic .* is not Bayer; allowed here: "):
+        residual_interpolation(np.ones((16, 16)), RGBW)

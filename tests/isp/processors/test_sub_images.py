@@ -1,0 +1,82 @@
+"""The way into a mosaic's sub-images and back, and what their principal components keep."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from builders import BAYER_PHASES, RGBW_PHASES, raw_image
+
+from isp.processors import bm3d
+from isp.processors.sub_images import Mix, bm3d_mosaic, hadamard, principal_components
+from sensor.cfa import Tile, mask
+from sensor.raw import RawImage
+
+SHARES = {"R": 0.5, "G": 1.0, "B": 0.4, "W": 5.0}
+
+
+def raw(cfa: Tile, shape: tuple[int, int], seed: int = 1) -> RawImage:
+    """Poisson exposure of a neutral field with 2 e- of read noise, green at 400 e-."""
+    rng = np.random.default_rng(seed)
+    expected = sum(share * 400.0 * mask(cfa, channel, shape) for channel, share in SHARES.items())
+    electrons = rng.poisson(expected) + 2.0 * rng.standard_normal(shape)
+    return raw_image(np.rint(electrons + 100), cfa, read_noise_e=2.0, dsnu_e=0.0)
+
+
+@pytest.mark.parametrize("mix", [hadamard, principal_components])
+@pytest.mark.parametrize("cfa", BAYER_PHASES + RGBW_PHASES)
+@pytest.mark.parametrize("shape", [(33, 38), (70, 64)])
+def test_a_denoiser_that_does_nothing_gives_the_mosaic_back(
+    cfa: Tile, shape: tuple[int, int], mix: Mix, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # then only the unbiased inverse is left, 1/4 e- over the algebraic one and 3/8 (root^-1), 11/8 / root^2 of it less
+    seen = []
+
+    def nothing(planes: np.ndarray, sigma: list[float], profile: SimpleNamespace) -> np.ndarray:
+        seen.append((planes, sigma, profile.num_threads))
+        return planes
+
+    library = SimpleNamespace(bm3d=nothing, BM3DProfile=SimpleNamespace)
+    monkeypatch.setattr(bm3d, "optional_library", lambda name, extra: library)
+    image = raw(cfa, shape)
+    root = 2 * np.sqrt(image.electrons + 0.375 + image.dark_noise_e**2)
+    correction = 0.25 + np.sqrt(1.5) / 4 / root - 1.375 / root**2 + 0.625 * np.sqrt(1.5) / root**3
+    np.testing.assert_allclose(bm3d_mosaic(image, mix), image.electrons + correction, rtol=0, atol=1e-8)
+    ((mixed, sigma, threads),) = seen
+    assert mixed.shape == (max(-(-shape[0] // 2), 32), max(-(-shape[1] // 2), 32), 4)
+    assert (sigma, threads) == ([1.0] * 4, 1)
+    assert np.std(mixed, axis=(0, 1)) == pytest.approx(np.ones(4), rel=0.15)  # still units of noise
+
+
+def test_components_are_orthonormal_so_independent_noise_stays_so_and_as_strong() -> None:
+    # closed form: noise of covariance s^2 I has M s^2 I M^T = s^2 I afterwards
+    sites = np.random.default_rng(2).standard_normal((20, 24, 4)) @ np.random.default_rng(3).uniform(-1, 1, (4, 4))
+    matrix = principal_components(sites)
+    assert matrix @ matrix.T == pytest.approx(np.eye(4), abs=1e-12)
+    covariance = np.cov((sites @ matrix.T).reshape(-1, 4), rowvar=False)
+    assert covariance == pytest.approx(np.diag(np.diag(covariance)), abs=1e-12)
+    assert np.all(np.diff(np.diag(covariance)) < 0)  # most in the first
+
+
+def test_noise_as_strong_in_each_turns_no_component() -> None:
+    # four uncorrelated patterns of zero mean, added to each sub-image with the same variance
+    i, j = np.indices((8, 8))
+    own = np.stack([np.where(pattern % 2, 1.0, -1.0) for pattern in (i, j, i + j, i // 2)], axis=-1)
+    scene = np.where(j // 2 % 2, 1.0, -1.0)[..., None] * [1.0, 2.0, 3.0, 4.0]
+    assert np.cov(np.concatenate([own, scene], -1).reshape(-1, 8), rowvar=False)[4, :4] == pytest.approx(np.zeros(4))
+    first, noisy = (principal_components(sites)[0] for sites in (scene, scene + 3 * own))
+    assert np.abs(first) == pytest.approx(np.arange(1, 5) / np.sqrt(30))
+    assert np.abs(noisy) == pytest.approx(np.abs(first))
+
+
+def test_what_all_sub_images_share_stands_in_one_component_which_alone_gives_them_back() -> None:
+    picture = np.random.default_rng(4).uniform(0, 9, (12, 10))
+    sites = np.repeat(picture[..., None], 4, axis=-1)
+    matrix = principal_components(sites)
+    assert np.abs(matrix[0]) == pytest.approx(np.full(4, 0.5))
+    assert (sites @ matrix[:1].T) @ matrix[:1] == pytest.approx(sites)
+
+
+def test_a_frame_of_one_value_stays_what_it_is() -> None:
+    # its covariance is 0: any orthonormal rows will do
+    matrix = principal_components(np.full((8, 8, 4), 7.0))
+    assert matrix @ matrix.T == pytest.approx(np.eye(4), abs=1e-12)
