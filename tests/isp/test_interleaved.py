@@ -97,7 +97,7 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
     def distance(i, x, y):
         at = lambda p, a: h[i][reflect(p[0] + a[0], height), reflect(p[1] + a[1], width)]  # noqa: E731
         total = sum((at(x, a) - at(y, a)) ** 2 for a in steps)
-        bias = noise[i][x[0] % 2, x[1] % 2, y[0] - x[0] + reach, y[1] - x[1] + reach]
+        bias = noise[i][x[0] % 2, x[1] % 2, y[0] - x[0] + reach, y[1] - x[1] + reach] if patch > 1 else 0.0
         return math.sqrt(max(total - bias, 0.0))
 
     window = list(product(range(-(WINDOW // 2), WINDOW // 2 + 1), repeat=2))
@@ -118,6 +118,14 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
                     total += share * ((stable[ends[0]] - stable[ends[1]]) ** 2 / 4 - 1 / 2)
         return max(total, 0.0)
 
+    def counts(x, y):
+        """Whether y isn't brighter than the brightest of its letter around x allows."""
+        site = [a + (b - a) % 2 for a, b in zip(x, y, strict=True)]
+        near = [(site[0] + a, site[1] + b) for a, b in product((-2, 0, 2), repeat=2)]
+        most = max(raw.electrons[s] for s in near if s in white)
+        spread = math.sqrt(max(most, 0.0) + raw.dark_noise_e**2)
+        return raw.electrons[y] <= most + max(2.0, sigma_s / 1.5) * spread + 2.25 / (1 + raw.dark_noise_e**2)
+
     full = {y: raw.electrons[y] >= raw.saturation_e and letters[y] == "W" for y in np.ndindex(raw.shape)}
 
     def filled_from_full(y):
@@ -132,7 +140,7 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
         for k, i in enumerate("RGBW"):
             log_weights, values = [], []
             for y in np.ndindex(raw.shape):
-                if letters[y] == i and max(abs(y[0] - x[0]), abs(y[1] - x[1])) <= reach:
+                if letters[y] == i and max(abs(y[0] - x[0]), abs(y[1] - x[1])) <= reach and counts(x, y):
                     beta_s = alpha(y) * distance(i, x, y) + (1 - alpha(y)) * distance("W", x, y)
                     log_weights.append(
                         -(math.dist(x, y) ** 2) / (2 * sigma_d**2) - trust(x) * beta_s**2 / (2 * sigma_s**2)
