@@ -101,7 +101,7 @@ def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
         electrons=raw.electrons,
         channel=np.argmax([mask(raw.cfa, name, raw.shape) for name in names], axis=0),
         h=np.pad(h, ((0, 0), (half, half), (half, half)), mode="reflect"),
-        alpha=saturated_fraction(raw),
+        alpha=saturated_fraction(raw, settings.window),
         reliability=trust,
         brightest=bound,
         tile=size,

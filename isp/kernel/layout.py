@@ -156,7 +156,7 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
     part = _surroundings(shape, halo((rows, (0, shape[1])), pattern, settings), pattern, settings)
     dn, black, gain = raw.dn[part], np.float32(raw.black_dn), np.float32(raw.gain_e_per_dn)
     full = dn >= saturation_dn(raw)
-    alpha = fraction_of_full(full, raw.cfa) if pattern.white is not None and full.any() else None
+    alpha = fraction_of_full(full, raw.cfa, settings.window) if pattern.white is not None and full.any() else None
     dn = dn.astype(np.float32)
     samples = dn - black
     electrons = samples * gain

@@ -92,8 +92,8 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
     -------
     entries : (list, length, values) float32
         Row and column of the offset, log2 G(beta_d, sigma_d) of eqs. (2) and (4), and noise distances where patches
-        have more than one pixel. With guide W there is a list for each phase, with W's distances for the cells of y. Else there is one for each phase and cell, with
-        those of the channel at that cell and of W.
+        have more than one pixel. With guide W there is a list for each phase, with W's distances for the cells of y.
+        Else there is one for each phase and cell, with those of the channel at that cell and of W.
     counts : (list,) uint32
         Entries that hold; the rest is padding.
     """

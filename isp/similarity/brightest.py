@@ -14,8 +14,9 @@ from isp.planes import BLOCK_ROWS
 from isp.settings import SIGMA_S
 from sensor.raw import RawImage
 
-SIGMAS = 2.0  # over the brightest of 9: of a flat field's samples 6e-4 or fewer are left out at a pixel
-FEWEST_E = 2.25  # so that 1 or 2 electrons count where 9 samples hold none
+# Of a flat field's samples 1.2 in 1000 or fewer are left out at a pixel, and 0.3 % of the light at most, at 0.2 e-.
+SIGMAS = 2.0  # over the brightest of 9
+FEWEST_E = 2.25  # 1 and 2 electrons count where 9 samples hold none
 
 
 def brightest_allowed(electrons: NDArray[Any], raw: RawImage, sigma_s: float) -> NDArray[Any]:
