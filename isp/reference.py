@@ -88,13 +88,11 @@ def sum_weights(raw: RawImage, settings: Settings) -> ReferenceSums:
 
 def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
     names, half, in_noise = channels(raw.cfa), settings.patch // 2, settings.distance == "noise"
-    size = len(raw.cfa), len(raw.cfa[0])
     noise = noise_distances(raw.cfa, settings.patch, settings.reach)
     mosaic = guide_mosaic(raw.electrons, raw, settings.distance)
     h = np.stack([fill(mosaic, raw.cfa, name) for name in names])
-    trust, bound = np.ones(raw.shape), np.full([n + step - 1 for n, step in zip(raw.shape, size, strict=True)], np.inf)
+    trust = np.ones(raw.shape)
     if in_noise:
-        bound = brightest_allowed(raw.electrons, raw, settings.sigma_s)
         light_e = fill(raw.electrons, raw.cfa, "W") if "W" in names else raw.electrons
         trust = np.asarray(reliability(light_e, raw.dark_noise_e, WINDOW) * certainty(mosaic, raw.cfa, settings.patch))
     return _Inputs(
@@ -103,8 +101,8 @@ def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
         h=np.pad(h, ((0, 0), (half, half), (half, half)), mode="reflect"),
         alpha=saturated_fraction(raw, settings.window),
         reliability=trust,
-        brightest=bound,
-        tile=size,
+        brightest=brightest_allowed(raw.electrons, raw, settings),
+        tile=(len(raw.cfa), len(raw.cfa[0])),
         noise=noise if in_noise and settings.patch > 1 else [np.zeros_like(table) for table in noise],
         white=names.index("W") if "W" in names else None,
     )

@@ -50,7 +50,7 @@ def add_samples(
 ) -> list[Sums]:
     """Add one sample to each pixel's sums; at a fixed scale the log weights have HEADROOM added.
 
-    Samples over `brightest` get the lowest weight.
+    Samples over `brightest` don't count.
     """
     add = _add_to_running_maximum if running else _add_at_fixed_scale
     return [add(*pixel) for pixel in zip(sums, log_weights, samples, brightest, strict=True)]
@@ -104,7 +104,7 @@ def _at_least(value: Any, least: float) -> Any:
 
 def _add_at_fixed_scale(sums: Sums, log_weight: Any, sample: Any, brightest: Any) -> Sums:
     weight, value, *square = sums
-    new = _exp2(dr.select((log_weight > LOWEST_EXPONENT) & (sample <= brightest), log_weight, LOWEST_EXPONENT))
+    new = dr.select(sample <= brightest, _exp2(_at_least(log_weight, LOWEST_EXPONENT)), 0.0)
     return weight + new, dr.fma(new, sample, value), *(dr.fma(new, new, total) for total in square)
 
 

@@ -152,26 +152,19 @@ def strip_rows(shape: tuple[int, int], pattern: Pattern, patch: int) -> int:
 
 def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -> Strip:
     """What some rows of a frame depend on."""
-    shape, dark_noise_e = raw.dn.shape, raw.dark_noise_e
+    shape = raw.dn.shape
     part = _surroundings(shape, halo((rows, (0, shape[1])), pattern, settings), pattern, settings)
     dn, black, gain = raw.dn[part], np.float32(raw.black_dn), np.float32(raw.gain_e_per_dn)
     full = dn >= saturation_dn(raw)
     alpha = fraction_of_full(full, raw.cfa, settings.window) if pattern.white is not None and full.any() else None
     dn = dn.astype(np.float32)
-    samples = dn - black
-    electrons = samples * gain
+    samples, electrons = dn - black, (dn - black) * gain
     guide = guide_mosaic(electrons, raw, settings.distance)
-    factor = np.float32(np.log2(np.e) / (2.0 * settings.sigma_s**2))
-    if settings.distance == "raw":
-        inverse_variance = np.full(dn.shape, factor)
-        allowed = np.full((dn.shape[0] + pattern.tile[0] - 1, dn.shape[1] + pattern.tile[1] - 1), np.float32(np.inf))
-    else:
+    inverse_variance = np.full(dn.shape, np.float32(np.log2(np.e) / (2.0 * settings.sigma_s**2)))
+    if settings.distance == "noise":
         light_e = ((dn if pattern.white is None else fill(dn, raw.cfa, "W")) - black) * gain
-        inverse_variance = reliability(light_e, dark_noise_e, WINDOW)
+        inverse_variance *= reliability(light_e, raw.dark_noise_e, WINDOW)
         inverse_variance *= certainty(guide, raw.cfa, settings.patch)
-        inverse_variance *= factor
-        allowed = brightest_allowed(electrons, raw, settings.sigma_s)
-        allowed /= gain
     np.maximum(inverse_variance, np.float32(LEAST_INVERSE_VARIANCE), out=inverse_variance)
     return Strip(
         shape=(shape[0], shape[1]),
@@ -180,7 +173,7 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
         guide=guide,
         inverse_variance=inverse_variance,
         alpha=alpha,
-        brightest=allowed,
+        brightest=brightest_allowed(electrons, raw, settings) / gain,
     )
 
 
@@ -239,13 +232,8 @@ def lay_out(
     entries[..., 1 : offsets.shape[2] - 1] = offsets[..., 2:]
     shares = {} if alpha is None else {"alpha": alpha}
     inverse_variance = _window(strip.inverse_variance[own], start, size, 0, 0.0)
-    read = {
-        "planes": planes,
-        "inverse_variance": inverse_variance,
-        "brightest": _window(strip.brightest[more], start, size, 0, 0.0),
-        "packets": packets,
-        "entries": entries,
-    }
+    read = {"planes": planes, "inverse_variance": inverse_variance, "packets": packets, "entries": entries}
+    read["brightest"] = _window(strip.brightest[more], start, size, 0, 0.0)
     numbers = {
         "length": entries.shape[1],
         "stride": size[1],

@@ -11,22 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.planes import BLOCK_ROWS
-from isp.settings import SIGMA_S
+from isp.settings import SIGMA_S, Settings
 from sensor.raw import RawImage
 
-# Of a flat field's samples 1.2 in 1000 or fewer are left out at a pixel, and 0.3 % of the light at most, at 0.2 e-.
-SIGMAS = 2.0  # over the brightest of 9
+# Of a flat field's samples 3 in 10 000 or fewer are left out at a pixel, and 0.3 % of the light at most, at 0.2 e-.
+SIGMAS = 2.5  # over the brightest of 9
+MOST_SIGMAS = 1e3  # beyond it there is no bound
 FEWEST_E = 2.25  # 1 and 2 electrons count where 9 samples hold none
 
 
-def brightest_allowed(electrons: NDArray[Any], raw: RawImage, sigma_s: float) -> NDArray[Any]:
+def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings) -> NDArray[Any]:
     """Electrons up to which a sample counts at pixels near each site of its channel.
 
     With m the brightest sample of the site's channel in 3 x 3 tiles around it, s the dark noise and p the PRNU
 
-        B = m + z sqrt(m + s^2 + (p m)^2) + 2.25 / (1 + s^2).
+        B = m + z sqrt(m + s^2 + (p m)^2) + 2.25 / (1 + s^2)^2.
 
-    z is `SIGMAS` up to the default sigma_s and rises with it: who lets all patches count as similar gets no bound.
+    z is `SIGMAS` up to the default sigma_s and rises with it: who lets all patches count as similar gets no bound, nor
+    does who takes the paper's distance.
 
     Parameters
     ----------
@@ -38,11 +40,11 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, sigma_s: float) ->
     (h + th - 1, w + tw - 1) of the same type
         A pixel x with a sample y reads the site at x + (y - x) mod (th, tw): y's channel, less than a tile away.
     """
-    z, (down, across), (height, width) = (
-        max(SIGMAS, sigma_s * (SIGMAS / SIGMA_S)),
-        (len(raw.cfa), len(raw.cfa[0])),
-        electrons.shape,
-    )
+    (down, across), (height, width) = (len(raw.cfa), len(raw.cfa[0])), electrons.shape
+    z = max(SIGMAS, settings.sigma_s * (SIGMAS / SIGMA_S))
+    result = np.full((height + down - 1, width + across - 1), np.inf, electrons.dtype)
+    if settings.distance == "raw" or z > MOST_SIGMAS:
+        return result
     allowed = np.full((height + 3 * down - 1, width + 3 * across - 1), -np.inf, electrons.dtype)
     for first in range(0, height, BLOCK_ROWS):
         part = electrons[first : first + BLOCK_ROWS]
@@ -53,10 +55,9 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, sigma_s: float) ->
         bound += raw.dark_noise_e**2
         np.sqrt(bound, out=bound)
         bound *= z
-        bound += FEWEST_E / (1.0 + raw.dark_noise_e**2)
+        bound += FEWEST_E / (1.0 + raw.dark_noise_e**2) ** 2
         # B rises with m: the largest m has the largest B.
         np.add(bound, part, out=allowed[down + first : down + first + len(part), across : across + width])
-    result = np.empty((height + down - 1, width + across - 1), electrons.dtype)
     for first in range(0, len(result), BLOCK_ROWS):
         last = min(first + BLOCK_ROWS, len(result))
         lines = np.maximum(allowed[first:last], allowed[first + down : last + down])

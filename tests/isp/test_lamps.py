@@ -16,7 +16,8 @@ from sensor.cfa import BAYER, RGBW
 
 TILES = {"rgbw": RGBW, "rgbw_nd": RGBW, "bayer": BAYER, "cmyw": ("CM", "YW")}
 WELL_E, DARK_E, BLACK, APART = 15_000.0, 1.5, 100.0, 56
-SEEDS = 6
+SEEDS = 12  # of processors that look far; the others are 0 beyond their reach in every frame
+FAR = ("interleaved", "bayer_nlm", "bayer_menon")
 # Pixels up to which a lamp may show: what the processor interpolates from. `bayer_bm3d`, whose transform spreads a lamp
 # over its blocks, and the paper's own method, which has no bound, are told of in docs/decisions/0037.
 REACH = {
@@ -65,13 +66,13 @@ def test_a_lamp_stays_where_it_is(name, field_e):
     if libraries(name):
         pytest.importorskip("colour_demosaicing", reason="rodcone[opponents] isn't installed")
     tile, noise_e = TILES[PROCESSORS[name].mosaic], np.sqrt(field_e + DARK_E**2)
-    found, dark = {}, []
-    for seed, size, times in product(range(SEEDS), range(1, 9), (10.0, 30.0, 2 * WELL_E)):
+    found, dark, seeds = {}, [], SEEDS if name in FAR else 2
+    for seed, size, times in product(range(seeds), range(1, 9), (10.0, 2 * WELL_E)):
         without, lit, distance = lamps(field_e, times * noise_e, size, seed, tile)
         if size == 1 and times == 10.0:
             dark.append(planes(name, without))
         excess = planes(name, lit) - dark[seed]
-        found[size, times] = found.get((size, times), 0.0) + excess[distance > REACH[name]] / SEEDS
+        found[size, times] = found.get((size, times), 0.0) + excess[distance > REACH[name]] / seeds
     deviation = np.std(dark, axis=(0, 1, 2))
     for case, excess in found.items():
         assert (excess / deviation).max() < 1.0, case
