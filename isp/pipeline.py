@@ -9,7 +9,7 @@ from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish, require_letters
-from isp.settings import DEFAULTS, Settings
+from isp.settings import DEFAULTS, PAPER, Settings
 from isp.similarity.guide import saturated_fraction
 from isp.substitution import COLOUR_ERROR, OCTAVES, SUBSTITUTION_SNR, green_snr, matrix_with_white, substitution_weight
 from sensor.raw import RawImage
@@ -71,10 +71,35 @@ def picture_interleaved(
     snr = green_snr(raw, planes)
     weight = substitution_weight(snr, substitution_snr, octaves)
     # W leaves the colours as eq. (6) leaves it out of the similarity: by the share of saturated pixels around.
-    alpha = saturated_fraction(raw)[..., None]
+    alpha = saturated_fraction(raw, settings.window)[..., None]
     rgb = (1.0 - alpha) * (balanced @ matrix_with_white(colours, noise, weight).T)
     rgb += alpha * (balanced[..., :3] @ colours.matrix("RGB", noise[:3] * COLOUR_ERROR).T)
     return Picture(rgb, sources, engine=result.engine, snr=snr, substitution=weight)
+
+
+def picture_interleaved_paper(
+    raw: RawImage,
+    matrix: ArrayLike | ColourFit,
+    *,
+    neutral: ArrayLike | None = None,
+    balance: ArrayLike | WhiteBalance | None = None,
+    settings: Settings = PAPER,
+    substitution_snr: float = SUBSTITUTION_SNR,
+) -> Picture:
+    """Develop an interleaved RGBW raw image as the paper writes it; parameters as `picture_interleaved`.
+
+    Distances in electrons, alpha counted over the patch, a plain 3x3 matrix without W, and a switch to W's luminance.
+    `settings` is `isp.settings.PAPER`, one pixel, the bilateral filter; `PAPER_5X5` is its non-local means.
+    """
+    return picture_interleaved(
+        raw,
+        ColourFit.of(matrix).matrix(),
+        neutral=neutral,
+        balance=balance,
+        settings=settings,
+        substitution_snr=substitution_snr,
+        octaves=0.0,
+    )
 
 
 def picture_bayer(

@@ -12,18 +12,22 @@ from scipy.ndimage import convolve1d
 
 from isp.planes import Plane, fill, guide_mosaic
 from isp.settings import DEFAULTS, WINDOW, Reconstruction, Settings
+from isp.similarity.brightest import brightest_allowed
 from isp.similarity.guide import reliability, saturated_fraction
 from isp.similarity.interpolation import certainty
 from isp.similarity.noise_distance import noise_distances
 from sensor.cfa import channels, mask
 from sensor.raw import RawImage
 
+LEFT_OUT = -1e28  # log weight of a sample that doesn't count; finite, as the first one may be
+
 
 @dataclass(frozen=True)
 class _Inputs:
     """What eqs. (1)-(6) read.
 
-    Electrons, the channel sampled at each pixel, padded planes, alpha, reliability of similarity, noise distances, W.
+    Electrons, the channel sampled at each pixel, padded planes, alpha, reliability of similarity, up to where samples
+    count, rows and columns of the tile, noise distances, W.
     """
 
     electrons: Plane
@@ -31,6 +35,8 @@ class _Inputs:
     h: Plane
     alpha: Plane
     reliability: Plane
+    brightest: Plane
+    tile: tuple[int, int]
     noise: list[Plane]
     white: int | None
 
@@ -93,9 +99,11 @@ def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
         electrons=raw.electrons,
         channel=np.argmax([mask(raw.cfa, name, raw.shape) for name in names], axis=0),
         h=np.pad(h, ((0, 0), (half, half), (half, half)), mode="reflect"),
-        alpha=saturated_fraction(raw),
+        alpha=saturated_fraction(raw, settings.window),
         reliability=trust,
-        noise=noise if in_noise else [np.zeros_like(table) for table in noise],
+        brightest=brightest_allowed(raw.electrons, raw, settings),
+        tile=(len(raw.cfa), len(raw.cfa[0])),
+        noise=noise if in_noise and settings.patch > 1 else [np.zeros_like(table) for table in noise],
         white=names.index("W") if "W" in names else None,
     )
 
@@ -108,12 +116,16 @@ def _add_offset(sums: ReferenceSums, inputs: _Inputs, settings: Settings, offset
     distance = [_distance(inputs, i, settings, x, offset) for i in range(len(inputs.h))]
     log_spatial = -(offset[0] ** 2 + offset[1] ** 2) / (2.0 * settings.sigma_d**2)  # eqs. (2), (4)
     trust = inputs.reliability[np.ix_(*x)]
+    # Of y's channel, less than a tile behind x
+    site = (line + d % size for line, d, size in zip(x, offset, inputs.tile, strict=True))
+    bound = inputs.brightest[np.ix_(*site)]
     channel, alpha, electrons = (a[np.ix_(*y)] for a in (inputs.channel, inputs.alpha, inputs.electrons))
     for i in range(len(inputs.h)):
         at = np.nonzero(channel == i)  # S_i(y) of eq. (1)
         white = i if inputs.white is None else inputs.white
         beta_s = alpha[at] * np.sqrt(distance[i][at]) + (1.0 - alpha[at]) * np.sqrt(distance[white][at])  # eq. (5)
         log_weight = log_spatial - trust[at] * beta_s**2 / (2.0 * settings.sigma_s**2)
+        log_weight[electrons[at] > bound[at]] = LEFT_OUT
         _accumulate(sums, (x[0][at[0]], x[1][at[1]], np.full(at[0].shape, i)), log_weight, electrons[at])
 
 

@@ -19,7 +19,7 @@ NEIGHBOURHOOD = 21  # Parmar & Wandell 2009, section 3.1: the only one of the fo
 PATCH = 1
 SIGMA_D = 6.0
 SIGMA_S = 3.0
-WINDOW = 9  # pixels a side over which eq. (6) counts, and W's SNR is averaged
+WINDOW = 9  # pixels a side over which W's SNR is averaged, and eq. (6) counts in units of noise
 SMALLEST_SIGMA = 1e-3  # below it the spatial weight of the next pixel is exp(-5e5) or less: nothing new to ask for
 
 
@@ -37,8 +37,8 @@ class Settings:
         Standard deviation of the similarity weight, eq. (5) [standard deviations of one pixel's noise, or electrons];
         0.001 to inf.
     distance : {"noise", "raw"}
-        Whether patches are compared in units of noise, debiased and trusted as far as their SNR allows, or as the paper
-        has it, in electrons.
+        Whether patches are compared in units of noise, and trusted as far as noise allows, or as the paper has it: in
+        electrons, with alpha counted over the same patch.
 
     Raises
     ------
@@ -56,6 +56,11 @@ class Settings:
     def reach(self) -> int:
         """Largest offset in Omega along one axis [pixels]."""
         return self.neighbourhood // 2
+
+    @cached_property
+    def window(self) -> int:
+        """Pixels a side over which eq. (6) counts: the paper's is the patch itself."""
+        return WINDOW if self.distance == "noise" else self.patch
 
     def __post_init__(self) -> None:
         for name in ("neighbourhood", "patch"):
@@ -80,6 +85,10 @@ class Settings:
 
 
 DEFAULTS = Settings()
+# The paper's own method. It gives neither patch nor sigmas: these sigma_s are the best of 30, 100, 300 and 1000 e-, one
+# for all light (docs/decisions/0037-lamps-in-the-dark.md).
+PAPER = Settings(distance="raw", sigma_s=300.0)
+PAPER_5X5 = Settings(distance="raw", sigma_s=1000.0, patch=5)
 
 
 @dataclass(frozen=True)

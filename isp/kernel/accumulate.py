@@ -45,30 +45,35 @@ def start_sums(running: bool, noise: bool) -> tuple[float, ...]:
     return (0.0, 0.0) + (0.0,) * noise + (NO_LOG_WEIGHT,) * running
 
 
-def add_samples(sums: list[Sums], log_weights: list[Any], samples: list[Any], *, running: bool) -> list[Sums]:
-    """Add one sample to each pixel's sums; at a fixed scale the log weights have HEADROOM added."""
+def add_samples(
+    sums: list[Sums], log_weights: list[Any], samples: list[Any], brightest: list[Any], *, running: bool
+) -> list[Sums]:
+    """Add one sample to each pixel's sums; at a fixed scale the log weights have HEADROOM added.
+
+    Samples over `brightest` don't count.
+    """
     add = _add_to_running_maximum if running else _add_at_fixed_scale
-    return [add(*pixel) for pixel in zip(sums, log_weights, samples, strict=True)]
+    return [add(*pixel) for pixel in zip(sums, log_weights, samples, brightest, strict=True)]
 
 
 def squared_distances(
     at_x: dict[int, list[Any]], at_y: dict[int, list[Any]], noise: list[Any], pixels: list[tuple[int, int]], patch: int
 ) -> list[Any]:
-    """Squared distance of each pixel's patches, less what noise alone makes, 0 or more.
+    """Squared distance of each pixel's patches; of more than one pixel less what noise alone makes, 0 or more.
 
     Parameters
     ----------
     at_x, at_y : mapping of int to list
         Rows under the patches around x and y; a pixel's patch begins at its own row and column.
     noise : list
-        A number a pixel.
+        A number a pixel; empty for patches of one pixel.
     """
     # y - x, not x - y: the x stay in memory, and a processor subtracts memory from a register.
     squares = {i: [dr.square(y - x) for x, y in zip(at_x[i], at_y[i], strict=True)] for i in at_x}
     columns = sorted({c for _, c in pixels})
     lines = {c: {i: _sum(line, c, patch) for i, line in squares.items()} for c in columns}
     totals = [_sum(lines[c], r, patch) for r, c in pixels]
-    return [_at_least(total - share, 0.0) for total, share in zip(totals, noise, strict=True)]
+    return [_at_least(total - share, 0.0) for total, share in zip(totals, noise, strict=True)] if noise else totals
 
 
 def mixed_squares(own: list[Any], white: list[Any], alpha: list[Any]) -> list[Any]:
@@ -97,15 +102,15 @@ def _at_least(value: Any, least: float) -> Any:
     return dr.select(value > least, value, least)
 
 
-def _add_at_fixed_scale(sums: Sums, log_weight: Any, sample: Any) -> Sums:
+def _add_at_fixed_scale(sums: Sums, log_weight: Any, sample: Any, brightest: Any) -> Sums:
     weight, value, *square = sums
-    new = _exp2(_at_least(log_weight, LOWEST_EXPONENT))
+    new = dr.select(sample <= brightest, _exp2(_at_least(log_weight, LOWEST_EXPONENT)), 0.0)
     return weight + new, dr.fma(new, sample, value), *(dr.fma(new, new, total) for total in square)
 
 
-def _add_to_running_maximum(sums: Sums, log_weight: Any, sample: Any) -> Sums:
+def _add_to_running_maximum(sums: Sums, log_weight: Any, sample: Any, brightest: Any) -> Sums:
     weight, value, *square, largest = sums
-    bounded = _at_least(log_weight, LOWEST_LOG_WEIGHT)
+    bounded = dr.select((log_weight > LOWEST_LOG_WEIGHT) & (sample <= brightest), log_weight, LOWEST_LOG_WEIGHT)
     ahead = bounded - largest
     smaller = _exp2(_at_least(-dr.abs(ahead), LOWEST_EXPONENT))  # one exponential: of the two weights the larger is 1
     is_larger = ahead > 0.0

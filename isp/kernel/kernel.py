@@ -76,7 +76,7 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
     pixels = [(r, c) for r in rows for c in columns]
     window = sorted({r + i for r in rows for i in range(patch)})  # rows under the patches
     under, block = shape.block[1] + patch - 1, shape.block[1]  # values of a packet: of the plane, and samples
-    noises = down * across if dense else 2
+    noises = 0 if patch == 1 else down * across if dense else 2
 
     # Where things are
     x_row, x_column = threads.row - inputs.top, threads.column - inputs.left
@@ -106,6 +106,8 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
         for plane in planes
     ]
     inverse_variance = [dr.gather(jit.Float, inputs.inverse_variance, x + r * inputs.stride + c) for r, c in pixels]
+    site = jit.UInt(x_row + threads.phase // across) * inputs.stride + jit.UInt(x_column + threads.phase % across)
+    brightest = [dr.gather(jit.Float, inputs.brightest, site + r * inputs.stride + c) for r, c in pixels]
 
     def load(source: Any, packet: Any, size: int, needed: int) -> list[Any]:
         """First values of a packet, 8 at a time: part k of packet p is number p * (size / 8) + k."""
@@ -131,7 +133,7 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
                     patches_at_y[i] = values[j * under : (j + 1) * under]
                     samples.setdefault(i, values[pair * under + j * block :][:block])
             # A noise distance for each cell of y, or for each plane.
-            less = [noise[r % down * across + c % across if dense else n] for r, c in pixels]
+            less = [noise[r % down * across + c % across if dense else n] for r, c in pixels] if noise else []
             distances.append(squared_distances(patches, patches_at_y, less, pixels, patch))
         beta_squared = distances[0]
         if shape.guide == "mixed":
@@ -141,7 +143,7 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
             log_spatial = log_spatial + HEADROOM
         log_weights = [dr.fma(-v, beta, log_spatial) for v, beta in zip(inverse_variance, beta_squared, strict=True)]
         values = [samples[r][c] for r, c in pixels]
-        return k + 1, add_samples(totals, log_weights, values, running=shape.running)
+        return k + 1, add_samples(totals, log_weights, values, brightest, running=shape.running)
 
     start = [tuple(dr.full(jit.Float, value, count) for value in start_sums(shape.running, shape.noise))] * len(pixels)
     _, totals = dr.while_loop((jit.UInt(0), start), lambda k, _: k < entries, add_offset)

@@ -37,6 +37,7 @@ from isp.kernel.accumulate import LEAST_INVERSE_VARIANCE, OUTSIDE
 from isp.kernel.schedule import Guide, Pattern, list_offsets
 from isp.planes import fill, guide_mosaic
 from isp.settings import WINDOW, Settings
+from isp.similarity.brightest import brightest_allowed
 from isp.similarity.guide import fraction_of_full, reliability, saturation_dn
 from isp.similarity.interpolation import certainty
 from rodcone.device_arrays import aligned, upload
@@ -67,6 +68,8 @@ class Strip:
         log2(e) r(x) c(x) / (2 sigma_s^2), the factor on beta_s^2 of eq. (5): `reliability` and `certainty` included.
     alpha : (h, w) float64 or None
         Eq. (6); None where it is 0 everywhere, or without W.
+    brightest : (h + th - 1, w + tw - 1) float32
+        Up to where samples count, of `isp.similarity.brightest` [DN over black].
     """
 
     shape: tuple[int, int]
@@ -75,6 +78,7 @@ class Strip:
     guide: Array
     inverse_variance: Array
     alpha: Array | None
+    brightest: Array
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,7 @@ class Inputs:
 
     Attributes
     ----------
-    planes, inverse_variance : Float
+    planes, inverse_variance, brightest : Float
         Read at x: planes h_i, [channel, row, column], W's alone with guide W; [row, column].
     packets : Float
         Read at y: [channel, row, packet, value].
@@ -109,6 +113,7 @@ class Inputs:
 
     planes: Any
     inverse_variance: Any
+    brightest: Any
     packets: Any
     alpha: Any
     entries: Any
@@ -140,28 +145,26 @@ def strip_rows(shape: tuple[int, int], pattern: Pattern, patch: int) -> int:
     channels, block = len(pattern.channels), pattern.block
     # Planes and their packets, packets of alpha, three sums a cell of the tile, results, the strip itself.
     floats = channels * (packet_width(2 * block[1] + patch - 1) + 1) + packet_width(block[1])
-    floats += 3 * len(pattern.cells) + 2 * channels + 8
+    floats += 3 * len(pattern.cells) + 2 * channels + 10
     most, blocks = max(int(STRIP_BYTES / (4 * floats * shape[1])) // block[0], 1), -(-shape[0] // block[0])
     return -(-blocks // -(-blocks // most)) * block[0]
 
 
 def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -> Strip:
     """What some rows of a frame depend on."""
-    shape, dark_noise_e = raw.dn.shape, raw.dark_noise_e
+    shape = raw.dn.shape
     part = _surroundings(shape, halo((rows, (0, shape[1])), pattern, settings), pattern, settings)
     dn, black, gain = raw.dn[part], np.float32(raw.black_dn), np.float32(raw.gain_e_per_dn)
     full = dn >= saturation_dn(raw)
-    alpha = fraction_of_full(full, raw.cfa) if pattern.white is not None and full.any() else None
+    alpha = fraction_of_full(full, raw.cfa, settings.window) if pattern.white is not None and full.any() else None
     dn = dn.astype(np.float32)
-    samples = dn - black
-    guide = guide_mosaic(samples * gain, raw, settings.distance)
-    factor = np.float32(np.log2(np.e) / (2.0 * settings.sigma_s**2))
-    inverse_variance = np.full(dn.shape, factor)
+    samples, electrons = dn - black, (dn - black) * gain
+    guide = guide_mosaic(electrons, raw, settings.distance)
+    inverse_variance = np.full(dn.shape, np.float32(np.log2(np.e) / (2.0 * settings.sigma_s**2)))
     if settings.distance == "noise":
         light_e = ((dn if pattern.white is None else fill(dn, raw.cfa, "W")) - black) * gain
-        inverse_variance = reliability(light_e, dark_noise_e, WINDOW)
+        inverse_variance *= reliability(light_e, raw.dark_noise_e, WINDOW)
         inverse_variance *= certainty(guide, raw.cfa, settings.patch)
-        inverse_variance *= factor
     np.maximum(inverse_variance, np.float32(LEAST_INVERSE_VARIANCE), out=inverse_variance)
     return Strip(
         shape=(shape[0], shape[1]),
@@ -170,6 +173,7 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
         guide=guide,
         inverse_variance=inverse_variance,
         alpha=alpha,
+        brightest=brightest_allowed(electrons, raw, settings) / gain,
     )
 
 
@@ -196,6 +200,7 @@ def lay_out(
     (top, bottom), (left, right) = spans = halo(region, pattern, settings)
     part = _surroundings(strip.shape, spans, pattern, settings)
     own = tuple(slice(at.start - first, at.stop - first) for at, first in zip(part, strip.origin, strict=True))
+    more = tuple(slice(at.start, at.stop + tile - 1) for at, tile in zip(own, pattern.tile, strict=True))
     start, size = (top - part[0].start, left - part[1].start), (bottom - top, right - left)
     half, block = settings.patch // 2, pattern.block[1]
     channels = [number for number in range(len(pattern.channels)) if guide != "W" or number == pattern.white]
@@ -228,6 +233,7 @@ def lay_out(
     shares = {} if alpha is None else {"alpha": alpha}
     inverse_variance = _window(strip.inverse_variance[own], start, size, 0, 0.0)
     read = {"planes": planes, "inverse_variance": inverse_variance, "packets": packets, "entries": entries}
+    read["brightest"] = _window(strip.brightest[more], start, size, 0, 0.0)
     numbers = {
         "length": entries.shape[1],
         "stride": size[1],

@@ -91,9 +91,9 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
     Returns
     -------
     entries : (list, length, values) float32
-        Row and column of the offset, log2 G(beta_d, sigma_d) of eqs. (2) and (4), noise distances. With guide W there
-        is a list for each phase, with W's distances for the cells of y. Else there is one for each phase and cell, with
-        those of the channel at that cell and of W.
+        Row and column of the offset, log2 G(beta_d, sigma_d) of eqs. (2) and (4), and noise distances where patches
+        have more than one pixel. With guide W there is a list for each phase, with W's distances for the cells of y.
+        Else there is one for each phase and cell, with those of the channel at that cell and of W.
     counts : (list,) uint32
         Entries that hold; the rest is padding.
     """
@@ -118,6 +118,8 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
         distances = [[noise[channel][k], white[k]] for k, channel in enumerate(pattern.cells)]
         if guide == "W":
             distances = [white]
+        if settings.patch == 1:
+            distances = [[]] * len(distances)
         lists += [np.stack([row, column, log_spatial, *some], axis=-1) for some in distances]
     counts = np.array([len(table) for table in lists], dtype=np.uint32)
     entries = np.zeros((len(lists), int(counts.max()), lists[0].shape[1]), dtype=np.float32)

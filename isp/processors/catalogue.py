@@ -14,7 +14,7 @@ from isp.colour.noise_gains import NoiseGains, colours_in_noise, measured
 from isp.colour.white_balance import WhiteBalance
 from isp.defects import mend
 from isp.picture import Picture
-from isp.pipeline import picture_bayer, picture_interleaved
+from isp.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
 from isp.processors.bayer_denoised import picture_bayer_nlm, picture_demosaicked_first, picture_denoised_first
 from isp.processors.bm3d import EXTRA as BM3D
 from isp.processors.demosaic import EXTRA as DEMOSAICKING
@@ -105,6 +105,9 @@ _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
     {
         "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)", on_backend=True),
         "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
+        "interleaved_paper": Processor(
+            "rgbw", picture_interleaved_paper, "the same to the letter, its own matrix and switch", on_backend=True
+        ),
         "bayer_malvar": Processor("bayer", _MALVAR, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
         "bayer_menon": Processor("bayer", _MENON, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
         "bayer_residual": Processor("bayer", _RESIDUAL, "residual interpolation, Kiku et al. 2016"),

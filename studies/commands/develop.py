@@ -31,9 +31,7 @@ def develop(
     out
         Picture to write, .png or .tif; the raw file's name with .png by default.
     isp
-        Pipeline: interleaved (RGBW) or bayer, by default the one for the file's mosaic. For Bayer also bayer_malvar,
-        bayer_menon, bayer_residual, bayer_nlm, bayer_bm3d, bayer_park and bayer_residual_bm3d; for
-        RGBW rgbw_sato, rgbw_kijima, rgbw_yamagami, rgbw_gindele and rgbw_park.
+        Processor: interleaved (RGBW) or bayer by default, by the file's mosaic; rodcone list processors names them all.
     bits
         Bits a channel: 8 or 16.
     ev

@@ -3,7 +3,8 @@
 A verdict follows from the numbers and is never written by hand.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Literal, get_args
 
@@ -31,6 +32,9 @@ class ClaimCheck:
         Range in which the claim holds, ends included; infinite where it has no end.
     unit : str
         In the words of the page, such as ``dB``.
+    default : float or None
+        What the default camera, `interleaved`, gives where the paper's own method, `interleaved_paper`, gives `value`.
+        It has no part in the verdict.
     """
 
     condition: str
@@ -38,6 +42,7 @@ class ClaimCheck:
     low: float
     high: float
     unit: str = ""
+    default: float | None = None
 
     @property
     def holds(self) -> bool:
@@ -93,6 +98,20 @@ def at_most(condition: str, value: float, high: float, unit: str = "") -> ClaimC
     return ClaimCheck(condition, value, -inf, high, unit)
 
 
+def beside(claims: Sequence[Claim], defaults: Sequence[Claim]) -> tuple[Claim, ...]:
+    """Claims computed by the paper's own method, with the values of the same claims computed by the default."""
+    return tuple(
+        replace(
+            one,
+            checks=tuple(
+                replace(check, default=None if own.value == check.value else own.value)
+                for check, own in zip(one.checks, other.checks, strict=True)
+            ),
+        )
+        for one, other in zip(claims, defaults, strict=True)
+    )
+
+
 @dataclass(frozen=True)
 class PaperFigure:
     """A figure: the paper's number, its caption, and the drawing."""
@@ -120,3 +139,8 @@ def value_text(check: ClaimCheck) -> str:
         if shown not in ends or check.value in (check.low, check.high):
             break
     return f"{shown}\N{NO-BREAK SPACE}{check.unit}" if check.unit else shown
+
+
+def default_text(check: ClaimCheck) -> str:
+    """What the default camera gives: ``default: 3.1 dB``."""
+    return "" if check.default is None else f"default: {value_text(replace(check, value=check.default))}"

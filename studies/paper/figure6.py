@@ -7,12 +7,14 @@ from itertools import product
 import numpy as np
 from skimage.color import deltaE_ciede2000, rgb2lab
 
-from isp.processors.catalogue import PROCESSORS
 from isp.substitution import SUBSTITUTION_SNR
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from studies.pages.plots import picture_rows
-from studies.paper.claims import Claim, PaperFigure, at_least, at_most, near
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, beside, near
 from studies.paper.setup import (
+    CAMERAS,
+    DEFAULT,
+    PAPER,
     READINGS,
     Image,
     Setup,
@@ -26,7 +28,6 @@ from studies.paper.setup import (
     swept,
     view,
 )
-from studies.photograph.camera import colour_fit
 from studies.sweep.row import Row
 
 LUMINANCE_CD_M2 = 25.0
@@ -103,7 +104,7 @@ def claims_6(
             "Section 3.1.3",
             "Where W replaces the luminance, noise falls a lot",
             tuple(at_least(name, swap.noise_ratio, A_LOT, "×") for name, swap in swaps.items()),
-            f"Noise without substitution over that with it, plain 3 × 3 matrix as in the paper, {DARKEST}.",
+            f"Noise without substitution over that with it, {DARKEST}.",
         ),
         Claim(
             "Section 3.1.3",
@@ -118,11 +119,11 @@ def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Pictures of the study `paper_6.toml`, and what substitution does at 5 ms.
 
     A processor in a sweep substitutes by the threshold of `table1_output`; under the other reading the interleaved
-    camera's exposures are drawn again and developed with that reading's own.
+    cameras' exposures are drawn again and developed with that reading's own.
     """
     rows = swept(setup, "6")
     seen = view(setup, "still_life", LUMINANCE_CD_M2)
-    outcomes: dict[str, dict[str, Outcome]] = {"bayer": {}, "interleaved": {}}
+    outcomes: dict[str, dict[str, Outcome]] = {name: {} for name in ("bayer", *CAMERAS)}
     table = []
     for (reading, threshold), camera in product(READINGS.items(), outcomes):
         pictures: list[tuple[str, Image]] = []
@@ -131,23 +132,26 @@ def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
                 own = [row for row in rows if (row.sensor, row.exposure, row.processor) == (reading, exposure, camera)]
                 outcome, encoded = _of_sweep(setup, own)
             else:
-                outcome, encoded = _again(setup, seen, reading, exposure, threshold)
+                outcome, encoded = _again(setup, seen, reading, exposure, camera, threshold)
             outcomes[camera][f"{reading}, {exposure}"] = outcome
-            words = "Bayer" if camera == "bayer" else "W's luminance" if outcome.substituted else "interleaved"
+            words = {"bayer": "Bayer", PAPER: "interleaved", DEFAULT: "the default"}[camera]
+            words += ", W's luminance" if outcome.substituted else ""
             pictures.append((f"{words}, {exposure}" if pictures else f"{reading}: {words}, {exposure}", encoded))
         table.append(pictures)
-    claims = claims_6(**outcomes, swaps={name: swap(setup, seen, name) for name in READINGS})
-    caption = "Bayer and interleaved with Table 1's pixel at 25 cd/m², by exposure time."
-    return PaperFigure("6", caption, picture_rows(table)), claims
+    paper, default = (
+        claims_6(outcomes["bayer"], outcomes[name], {reading: swap(setup, seen, reading, name) for reading in READINGS})
+        for name in (PAPER, DEFAULT)
+    )
+    caption = "Bayer, interleaved and the default with Table 1's pixel at 25 cd/m², by exposure time."
+    return PaperFigure("6", caption, picture_rows(table)), beside(paper, default)
 
 
-def swap(setup: Setup, seen: View, reading: str) -> Swap:
-    """Substitution at `DARKEST`, always against never, with the plain 3x3 matrix that the paper's camera has."""
+def swap(setup: Setup, seen: View, reading: str, camera: str) -> Swap:
+    """Substitution at `DARKEST`, always against never."""
     sensor = sensor_of(reading)
-    matrix = colour_fit(sensor, PROCESSORS["interleaved"], seen.light).matrix()
     raws = exposures(seen, reading, DARKEST, count=setup.seeds)
     without, with_white = (
-        [develop(raw, seen, sensor, matrix=matrix, substitution_snr=threshold)[0] for raw in raws]
+        [develop(raw, seen, sensor, camera, substitution_snr=threshold)[0] for raw in raws]
         for threshold in (0.0, np.inf)
     )
     means = (rgb2lab(encode_srgb(np.mean(pictures, axis=0))) for pictures in (without, with_white))
@@ -163,10 +167,12 @@ def _of_sweep(setup: Setup, rows: Sequence[Row]) -> tuple[Outcome, Image]:
     return Outcome(noise([decode_srgb(picture) for picture in pictures]), psnr, share), pictures[0]
 
 
-def _again(setup: Setup, seen: View, reading: str, exposure: str, threshold: float) -> tuple[Outcome, Image]:
+def _again(
+    setup: Setup, seen: View, reading: str, exposure: str, camera: str, threshold: float
+) -> tuple[Outcome, Image]:
     """As `_of_sweep`, developed with another threshold of substitution."""
     made = [
-        develop(raw, seen, sensor_of(reading), substitution_snr=threshold)
+        develop(raw, seen, sensor_of(reading), camera, substitution_snr=threshold)
         for raw in exposures(seen, reading, exposure, count=setup.seeds)
     ]
     pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in made]  # as the sweep's files hold them

@@ -13,7 +13,7 @@ from studies.pages.environment import environment
 from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import png_bytes, svg_text
 from studies.paper.bilateral import bilateral_claims
-from studies.paper.claims import VERDICTS, Claim, PaperFigure, range_text, value_text
+from studies.paper.claims import VERDICTS, Claim, PaperFigure, default_text, range_text, value_text
 from studies.paper.figure1 import figure_1a, figure_1b
 from studies.paper.figure2 import figure_2
 from studies.paper.figure3 import figure_3
@@ -79,6 +79,7 @@ def write(paper: Paper, folder: Path) -> Path:
         facts=paper.facts,
         verdicts=VERDICTS,
         value_text=value_text,
+        default_text=default_text,
         range_text=range_text,
         style=own_file("report.css") + own_file("paper.css"),
     )

@@ -48,6 +48,8 @@ READINGS: Mapping[str, float] = MappingProxyType(
     {"table1_pixel": SUBSTITUTION_SNR_TABLE1_PIXEL, "table1_output": SUBSTITUTION_SNR}
 )
 TODAY = "low_noise"  # a pixel of today with Table 1's geometry, for comparison
+# The paper's own method, which its claims are tested with, and the default, whose values stand beside them.
+PAPER, DEFAULT = CAMERAS = ("interleaved_paper", "interleaved")
 Step = Callable[[str, float], None]  # what is being done, and the share of it (0..1)
 # Samples over those of the setup: the dark half's own noise hides far more, and a constant environment needs few.
 _SPP_SHARE = {"lit_and_shadowed": 0.25, "slanted_edge": 0.25}
@@ -170,7 +172,7 @@ def shown(setup: Setup, row: Row) -> Image:
 
 
 def exposures(
-    seen: View, reading: str, exposure: str, processor: str = "interleaved", count: int = 1, pitch_um: int | None = None
+    seen: View, reading: str, exposure: str, processor: str = PAPER, count: int = 1, pitch_um: int | None = None
 ) -> list[RawImage]:
     """Exposures by as many chips, drawn as a sweep draws its cells.
 
@@ -201,16 +203,13 @@ def exposures(
 
 
 def develop(
-    raw: RawImage, view: View, sensor: SensorConfig, processor: str = "interleaved", **options: Any
+    raw: RawImage, view: View, sensor: SensorConfig, processor: str = PAPER, **options: Any
 ) -> tuple[Image, Picture]:
-    """Develop an exposure as `develop_to_scale` does, with the colours fitted under the view's light.
-
-    A ``matrix`` among the processor's `options` stands in place of the fit.
-    """
+    """Develop an exposure as `develop_to_scale` does, with the colours fitted under the view's light."""
     used = PROCESSORS[processor]
-    matrix = options.pop("matrix", None)
-    colours = colour_fit(sensor, used, view.light) if matrix is None else matrix
-    return develop_to_scale(raw, used, colours, sensor, view.light, view.white_cd_m2, **options)
+    return develop_to_scale(
+        raw, used, colour_fit(sensor, used, view.light), sensor, view.light, view.white_cd_m2, **options
+    )
 
 
 def noise(pictures: Sequence[Image]) -> float:

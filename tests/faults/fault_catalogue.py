@@ -425,6 +425,14 @@ ISP = (
         *_SIMILARITY,
     ),
     _fault(
+        "lamps spread over the dark",
+        "isp/similarity/brightest.py",
+        "        bound *= z\n",
+        "        bound *= 1e3 * z\n",
+        "isp/similarity/test_brightest",
+        *_SIMILARITY,
+    ),
+    _fault(
         "overlap of patches forgotten",
         "isp/similarity/noise_distance.py",
         "variance + other - 2.0 * covariance[at]",

@@ -1,6 +1,7 @@
 """The reconstruction: closed forms, a transcription of eqs. (1)-(6), and the kernel against the reference."""
 
 import math
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -9,8 +10,9 @@ from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, raw_image
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.kernel.schedule import list_threads, make_pattern
+from isp.planes import fill, planes
 from isp.reference import reconstruct_reference, reference_with_noise, sum_weights
-from isp.settings import SIGMA_D, WINDOW, Settings
+from isp.settings import PAPER, PAPER_5X5, SIGMA_D, WINDOW, Settings
 from isp.similarity.guide import saturated_fraction
 from isp.similarity.noise_distance import noise_distances
 from rodcone.errors import InputError
@@ -97,7 +99,7 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
     def distance(i, x, y):
         at = lambda p, a: h[i][reflect(p[0] + a[0], height), reflect(p[1] + a[1], width)]  # noqa: E731
         total = sum((at(x, a) - at(y, a)) ** 2 for a in steps)
-        bias = noise[i][x[0] % 2, x[1] % 2, y[0] - x[0] + reach, y[1] - x[1] + reach]
+        bias = noise[i][x[0] % 2, x[1] % 2, y[0] - x[0] + reach, y[1] - x[1] + reach] if patch > 1 else 0.0
         return math.sqrt(max(total - bias, 0.0))
 
     window = list(product(range(-(WINDOW // 2), WINDOW // 2 + 1), repeat=2))
@@ -118,6 +120,14 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
                     total += share * ((stable[ends[0]] - stable[ends[1]]) ** 2 / 4 - 1 / 2)
         return max(total, 0.0)
 
+    def counts(x, y):
+        """Whether y isn't brighter than the brightest of its letter around x allows."""
+        site = [a + (b - a) % 2 for a, b in zip(x, y, strict=True)]
+        near = [(site[0] + a, site[1] + b) for a, b in product((-2, 0, 2), repeat=2)]
+        most = max(raw.electrons[s] for s in near if s in white)
+        spread = math.sqrt(max(most, 0.0) + raw.dark_noise_e**2)
+        return raw.electrons[y] <= most + max(2.5, sigma_s / 1.2) * spread + 2.25 / (1 + raw.dark_noise_e**2) ** 2
+
     full = {y: raw.electrons[y] >= raw.saturation_e and letters[y] == "W" for y in np.ndindex(raw.shape)}
 
     def filled_from_full(y):
@@ -132,7 +142,7 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
         for k, i in enumerate("RGBW"):
             log_weights, values = [], []
             for y in np.ndindex(raw.shape):
-                if letters[y] == i and max(abs(y[0] - x[0]), abs(y[1] - x[1])) <= reach:
+                if letters[y] == i and max(abs(y[0] - x[0]), abs(y[1] - x[1])) <= reach and counts(x, y):
                     beta_s = alpha(y) * distance(i, x, y) + (1 - alpha(y)) * distance("W", x, y)
                     log_weights.append(
                         -(math.dist(x, y) ** 2) / (2 * sigma_d**2) - trust(x) * beta_s**2 / (2 * sigma_s**2)
@@ -150,6 +160,36 @@ def test_the_reference_is_the_paper_pixel_by_pixel(patch, sigma_s):
         weights = np.exp(log_weights - log_weights.max())
         expected = (weights * values).sum() / weights.sum()
         assert got[place] == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("function", [reconstruct, reconstruct_reference])
+@pytest.mark.parametrize("settings", [PAPER, PAPER_5X5])
+def test_the_papers_own_method_is_eqs_1_to_6_to_the_letter(settings, function):
+    """Distances in electrons, every sample counts, and alpha is counted over the patch: no outside term is left."""
+    raw = scene((12, 13), 2500.0, seed=2)
+    assert 0 < raw.saturated.mean() < 0.5
+    settings = replace(settings, neighbourhood=7)
+    half, letters = settings.patch // 2, channel_map(RGBW, raw.shape)
+    full = fill((raw.electrons >= raw.saturation_e).astype(float), RGBW, "W") > 0
+    windows = [
+        np.lib.stride_tricks.sliding_window_view(np.pad(plane, half, mode="reflect"), (settings.patch, settings.patch))
+        for plane in planes(raw, "raw")
+    ]
+    got = function(raw, settings)
+    for x in np.ndindex(raw.shape):
+        for i, letter in enumerate("RGBW"):
+            near = [y for y in np.ndindex(raw.shape) if letters[y] == letter and max(abs(np.subtract(x, y))) <= 3]
+            log_weights = []
+            for y in near:
+                rows, columns = (slice(max(k - half, 0), k + half + 1) for k in y)
+                alpha = full[rows, columns].mean()  # the patch in the frame
+                own, white = (np.linalg.norm(windows[k][x] - windows[k][y]) for k in (i, 3))
+                beta_s = alpha * own + (1 - alpha) * white
+                log_weights.append(
+                    -(math.dist(x, y) ** 2) / (2 * settings.sigma_d**2) - beta_s**2 / (2 * settings.sigma_s**2)
+                )
+            weights = np.exp(np.array(log_weights) - max(log_weights))
+            assert got[(*x, i)] == pytest.approx(np.average([raw.electrons[y] for y in near], weights=weights), abs=0.2)
 
 
 KERNEL_CASES = [
