@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-import rodcone
 from render.cache import load_transport, save_transport
 from render.combine import emission
 from render.denoised.denoise import denoiser
@@ -105,11 +104,15 @@ def render(
     UserWarning
         Where data of a coloured light end within the bands: it gives no light beyond.
     """
+    # What is asked for
     if isinstance(scene, str):
-        scene = rodcone.load(scene)
-    if not isinstance(scene, Scene):
+        from rodcone import load  # late: the catalogue stands above this package
+
+        scene = load(scene)
+    given: object = scene
+    if not isinstance(given, Scene):
         raise InputError(
-            f"scene: a {type(scene).__name__} is none; allowed: a Scene or a name; give rodcone.load(name)"
+            f"scene: a {type(given).__name__} is none; allowed: a Scene or a name; give rodcone.load(name)"
         )
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
@@ -121,6 +124,7 @@ def render(
     meter: Callable[[], Irradiance] | None = None
     if scene.reference_plane:
         meter = Meter(scene, film, seed, None if cache is None else Path(cache))
+    # What there is already
     earlier = _checked_earlier(resume, scene, film, denoise)
     if cache is not None:
         found = load_transport(Path(cache), scene, film, seed, denoised=denoise)

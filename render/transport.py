@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -133,8 +132,9 @@ class Transport:
         UserWarning
             Where a light's spectrum ends within the bands at a value other than 0: it gives no light beyond.
         """
-        if isinstance(spectra, Real):
-            spectra, powers = None, dict.fromkeys(self.groups, float(spectra))
+        if isinstance(spectra, float | int):
+            powers = dict.fromkeys(self.groups, float(spectra))
+            spectra = None
         emitted = self._emission(spectra, powers)
         coefficients, level_error = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         return SpectralRadiance(

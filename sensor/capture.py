@@ -63,10 +63,10 @@ def capture(
     """
     if isinstance(sensor, str):
         sensor = preset(sensor)
-    if not isinstance(radiance, SpectralRadiance):
-        kind = type(radiance).__name__
-        fix = "call its relight()" if hasattr(radiance, "relight") else "give SpectralRadiance(values, wavelength_nm)"
-        raise InputError(f"radiance: a {kind} is none; allowed: SpectralRadiance; {fix}")
+    given: object = radiance
+    if not isinstance(given, SpectralRadiance):
+        fix = "call its relight()" if hasattr(given, "relight") else "give SpectralRadiance(values, wavelength_nm)"
+        raise InputError(f"radiance: a {type(given).__name__} is none; allowed: SpectralRadiance; {fix}")
     numpy_runs, scaled = exact or backend() == "numpy", samples_per_pixel == 1 and not spreads(sensor.lens)
     light: SpectralRadiance | SpectralIrradiance = radiance
     if numpy_runs or not scaled:

@@ -180,4 +180,8 @@ def test_every_processor_says_what_it_is() -> None:
 
 def test_each_processor_whose_colours_know_no_noise_has_a_form_whose_do() -> None:
     published = [name for name in PROCESSORS if not name.endswith(FAIR)]
-    assert {name for name in published if name + FAIR not in PROCESSORS} == {"interleaved", "interleaved_paper", "bayer_nlm"}
+    assert {name for name in published if name + FAIR not in PROCESSORS} == {
+        "interleaved",
+        "interleaved_paper",
+        "bayer_nlm",
+    }
