@@ -64,7 +64,7 @@ class Patches:
 
 
 def padded(samples: NDArray[np.generic], size: int) -> NDArray[np.generic]:
-    """Samples (h, w, ...), continued by reflection so that every pixel lies in as many patches."""
+    """Samples (h, w, ...), continued by reflection so that every one lies in as many patches."""
     sides = [(size - STRIDE, (length - 1) // STRIDE * STRIDE + size - length) for length in samples.shape[:2]]
     return np.pad(samples, sides + [(0, 0)] * (samples.ndim - 2), mode="reflect")
 

@@ -4,21 +4,22 @@ In the dark a patch of 8x8 pixels holds too little light to say what it shows. S
 over larger patches; the finer scale takes them as further samples with a known error.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from isp.anscombe import stabilise, unstabilise
-from isp.ple.estimate import STRIDE, Estimate, Pilot, estimate, padded
+from isp.ple.estimate import STRIDE, Estimate, Pilot, estimate
 from isp.ple.prior import LETTERS, PATCH, Prior
-from isp.ple.tables import Sampling, Singles
+from isp.ple.tables import PILOT_ERROR, Sampling, Singles
 from sensor.cfa import channel_map, channels
 from sensor.raw import RawImage
 
 SCALES = 4  # coarser ones
 CELLS = 4  # a side of a coarse patch
 LEAST_CELLS = 5  # a side of the coarsest scale
+COLOUR_SPREAD = 0.2  # relative standard deviation of the light that a patch's own sums show, by its colour
 
 
 @dataclass(frozen=True)
@@ -31,16 +32,27 @@ class Cells:
         Of the mosaic's channels [e-].
     full : (h, w, channel) bool
         Where a saturated W is in the sum.
-    counts : (channel,) float64
-        Samples in a sum.
+    sampling : Sampling
+        Of patches of 4x4 cells.
+    index : tuple of int
+        Places of the mosaic's channels among R, G, B and W.
     """
 
     electrons: Singles
     full: NDArray[np.bool_]
-    counts: NDArray[np.float64]
+    sampling: Sampling
+    index: tuple[int, ...]
 
 
-def reconstruct(raw: RawImage, prior: Prior) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+@dataclass(frozen=True)
+class Light:
+    """Light of each patch, (ny, nx) [e- of white in G], and its variance."""
+
+    mean: Singles
+    variance: Singles
+
+
+def reconstruct(raw: RawImage, prior: Prior) -> tuple[Singles, NDArray[np.float64]]:
     """Reconstruct every channel at every pixel.
 
     Parameters
@@ -57,101 +69,124 @@ def reconstruct(raw: RawImage, prior: Prior) -> tuple[NDArray[np.float32], NDArr
     (channel,) float64
         Posterior variance of a pixel over a sample's noise, median over the patches.
     """
-    names = channels(raw.cfa)
-    index = [LETTERS.index(name) for name in names]
     electrons = raw.electrons.astype(np.float32)
-    sites = channel_map(raw.cfa, raw.shape)
-    full = raw.saturated & (sites == "W")
-    found: Estimate | None = None
-    before: Sampling | None = None
-    for cells in reversed(_pyramid(raw, electrons, full)):
-        counts = np.ones(4)
-        counts[index] = cells.counts
-        rows = tuple(4 * place + channel for place in range(CELLS**2) for channel in index)
-        sampling = _sampling(raw, prior, counts, CELLS, rows)
-        samples = np.stack(
-            [stabilise(cells.electrons[..., i], sampling.dark_e[c], 0.0) for i, c in enumerate(index)], axis=-1
-        )
-        if found is None or before is None:
-            light, pilot = _light(cells, sampling, index), None
-        else:
-            light, pilot = _told(found, before, sampling, samples.shape[:2])
-        found, before = estimate(prior, sampling, samples, cells.full, light, pilot), sampling
-    rows = tuple(
-        4 * (PATCH * y + x) + LETTERS.index(raw.cfa[y % 2][x % 2]) for y in range(PATCH) for x in range(PATCH)
-    )
-    sampling = _sampling(raw, prior, np.ones(4), PATCH, rows)
-    light, pilot = _told(found, before, sampling, raw.shape)
+    full = raw.saturated & (channel_map(raw.cfa, raw.shape) == "W")
+    pyramid = _pyramid(raw, prior, electrons, full)
+    coarsest = pyramid[-1]
+    light = _own_light(coarsest, [_border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
+    found = _estimate_cells(prior, coarsest, light, None)
+    for coarse, cells in zip(pyramid[:0:-1], pyramid[-2::-1], strict=True):
+        shape = cells.full.shape[:2]
+        own = _own_light(cells, [_border(length, CELLS) for length in shape], STRIDE)
+        found = _estimate_cells(prior, cells, *_told(found, coarse.sampling, cells.sampling, own))
+
+    cells = pyramid[0]
+    own = _own_light(cells, _sides(raw.shape, cells.full.shape, PATCH), 1)
+    sites = [4 * (PATCH * y + x) + LETTERS.index(raw.cfa[y % 2][x % 2]) for y in range(PATCH) for x in range(PATCH)]
+    sampling = _sampling(raw, prior, np.ones(4), PATCH, tuple(sites))
+    light, pilot = _told(found, cells.sampling, sampling, own)
     found = estimate(prior, sampling, stabilise(electrons, raw.dark_noise_e, 0.0), full, light, pilot)
-    planes = found.planes[..., index]
-    for part in range(0, len(planes), 256):
-        planes[part : part + 256] = unstabilise(planes[part : part + 256], raw.dark_noise_e)
-    return planes, found.noise[index]
+    planes = found.planes[..., cells.index]
+    for first in range(0, len(planes), 256):
+        planes[first : first + 256] = unstabilise(planes[first : first + 256], raw.dark_noise_e)
+    return planes, found.noise[list(cells.index)]
 
 
-def _sampling(
-    raw: RawImage, prior: Prior, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]
-) -> Sampling:
+def _sampling(raw: RawImage, prior: Prior, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]) -> Sampling:
     dark = raw.dark_noise_e * np.sqrt(counts)
     return Sampling(size, rows, tuple((prior.neutral_e * counts).tolist()), tuple(dark.tolist()), raw.prnu)
 
 
-def _pyramid(raw: RawImage, electrons: Singles, full: NDArray[np.bool_]) -> list[Cells]:
+def _pyramid(raw: RawImage, prior: Prior, electrons: Singles, full: NDArray[np.bool_]) -> list[Cells]:
     """Cells of 2x2, 4x4, ... pixels."""
+    names = channels(raw.cfa)
+    index = tuple(LETTERS.index(name) for name in names)
+    rows = tuple(4 * place + channel for place in range(CELLS**2) for channel in index)
     height, width = (length // 2 for length in raw.shape)
-    quads = electrons[: 2 * height, : 2 * width].reshape(height, 2, width, 2)
-    hit = full[: 2 * height, : 2 * width].reshape(height, 2, width, 2)
-    sums, fulls, counts = [], [], []
-    for name in channels(raw.cfa):
+    quads, hit = (a[: 2 * height, : 2 * width].reshape(height, 2, width, 2) for a in (electrons, full))
+    sums, fulls, counts = [], [], np.ones(4)
+    for name, channel in zip(names, index, strict=True):
         sites = [(i, j) for i in (0, 1) for j in (0, 1) if raw.cfa[i][j] == name]
         sums.append(sum(quads[:, i, :, j] for i, j in sites))
         fulls.append(np.any([hit[:, i, :, j] for i, j in sites], axis=0))
-        counts.append(len(sites))
-    levels = [Cells(np.stack(sums, axis=-1), np.stack(fulls, axis=-1), np.array(counts, dtype=np.float64))]
-    while len(levels) < SCALES and min(levels[-1].full.shape[:2]) // 2 >= LEAST_CELLS:
-        last = levels[-1]
+        counts[channel] = len(sites)
+    last = Cells(np.stack(sums, -1), np.stack(fulls, -1), _sampling(raw, prior, counts, CELLS, rows), index)
+    levels = [last]
+    while len(levels) < SCALES and min(last.full.shape[:2]) // 2 >= LEAST_CELLS:
         height, width = (length // 2 for length in last.full.shape[:2])
-        blocks = [
-            values[: 2 * height, : 2 * width].reshape(height, 2, width, 2, -1) for values in (last.electrons, last.full)
-        ]
-        levels.append(Cells(blocks[0].sum(axis=(1, 3)), blocks[1].any(axis=(1, 3)), 4 * last.counts))
+        four, hit = (a[: 2 * height, : 2 * width].reshape(height, 2, width, 2, -1) for a in (last.electrons, last.full))
+        counts[list(index)] *= 4
+        last = replace(
+            last,
+            electrons=four.sum(axis=(1, 3)),
+            full=hit.any(axis=(1, 3)),
+            sampling=_sampling(raw, prior, counts, CELLS, rows),
+        )
+        levels.append(last)
     return levels
 
 
-def _light(cells: Cells, sampling: Sampling, index: list[int]) -> Singles:
-    """Light of each patch from its own sums, each channel as sure as its noise over the frame; full Ws left out."""
-    gains, dark = np.array(sampling.gains)[index], np.array(sampling.dark_e)[index]
-    weights = gains / (np.maximum(cells.electrons.mean(axis=(0, 1)), 0.1) + dark**2)
-    weights = np.where(_sums(padded(cells.full, CELLS), STRIDE) > 0, 0.0, weights)
-    sums = _sums(padded(cells.electrons, CELLS), STRIDE)
-    return np.asarray((sums * weights).sum(axis=-1) / (CELLS**2 * (weights @ gains)), dtype=np.float32)
+def _estimate_cells(prior: Prior, cells: Cells, light: Singles, pilot: Pilot | None) -> Estimate:
+    dark = np.array(cells.sampling.dark_e, dtype=np.float32)[list(cells.index)]
+    return estimate(prior, cells.sampling, stabilise(cells.electrons, dark, 0.0), cells.full, light, pilot)
 
 
-def _told(coarse: Estimate, before: Sampling, now: Sampling, shape: tuple[int, ...]) -> tuple[Singles, Pilot]:
-    """Light and pilot of each patch of a scale of this shape, from the coarser scale's estimate.
+def _border(length: int, size: int) -> tuple[int, int]:
+    """Samples to add before and behind, so that every one lies in as many patches."""
+    return size - STRIDE, (length - 1) // STRIDE * STRIDE + size - length
 
-    A patch of the finer scale covers 4x4 cells of the coarser one, and moves on by one.
+
+def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[tuple[int, int]]:
+    """Cells to add before and behind, so that 4x4 of them stand for each patch of the finer scale."""
+    patches = [(length - 1) // STRIDE + size // STRIDE for length in shape]
+    return [(size // STRIDE - 1, count + CELLS - size // STRIDE - cells) for count, cells in zip(patches, coarse, strict=False)]
+
+
+def _own_light(cells: Cells, sides: list[tuple[int, int]], stride: int) -> Light:
+    """Light of patches of 4x4 cells from their own sums, each channel as sure as its noise; full Ws left out."""
+    gains, dark = (np.array(each)[list(cells.index)] for each in (cells.sampling.gains, cells.sampling.dark_e))
+    weights = gains / (np.maximum(np.median(cells.electrons, axis=(0, 1)), 0.1) + dark**2)
+    full, sums = (_sums(np.pad(a, [*sides, (0, 0)], mode="symmetric"), stride) for a in (cells.full, cells.electrons))
+    weights = np.where(full > 0, 0.0, weights)
+    whole = CELLS**2 * (weights @ gains)
+    mean = (sums * weights).sum(axis=-1) / whole
+    seen = np.maximum(mean, 0.0)
+    noise = CELLS**2 * (weights**2 * (seen[..., None] * gains + dark**2)).sum(axis=-1) / whole**2
+    return Light(mean.astype(np.float32), (noise + (COLOUR_SPREAD * seen) ** 2).astype(np.float32))
+
+
+def _told(coarse: Estimate, before: Sampling, now: Sampling, own: Light) -> tuple[Singles, Pilot]:
+    """Light and pilot of each patch of a scale, from the coarser scale's estimate and the patch's own light.
+
+    A patch of the finer scale covers 4x4 cells of the coarser one, or 2x2 where it is of cells itself.
     """
-    old, new = np.array(before.dark_e), np.array(now.dark_e)
-    share = np.array(now.gains) / np.array(before.gains)
-    sides = []
-    for length, cells in zip(shape, coarse.planes.shape[:2], strict=True):
-        patches = (length - 1) // STRIDE + now.size // STRIDE
-        sides.append((CELLS - 1, patches + CELLS - 1 - (CELLS - 1) - cells))
+    old, new, share = np.array(before.dark_e), np.array(now.dark_e), np.array(now.gains) / np.array(before.gains)
     electrons = np.stack([unstabilise(coarse.planes[..., c], old[c]) for c in range(4)], axis=-1)
     finer = electrons * share
-    slope = share**2 * (np.maximum(electrons, 0) + old**2 + 0.375) / (np.maximum(finer, 0) + new**2 + 0.375)
-    wide = np.repeat(np.repeat(coarse.variance, STRIDE, 0), STRIDE, 1)[: slope.shape[0], : slope.shape[1]]
-    variance = (wide * slope).mean(axis=-1)
-    roots = 2.0 * np.sqrt(np.maximum(finer + new**2 + 0.125, 0.01))
+    noise = np.maximum(finer, 0) + new**2 + 0.375
+    # A posterior variance counts in the finer scale's units of noise.
+    wide = np.repeat(np.repeat(coarse.variance, STRIDE, 0), STRIDE, 1)[: finer.shape[0], : finer.shape[1]]
+    wide = wide * (share**2 * (np.maximum(electrons, 0) + old**2 + 0.375) / noise)
     light = finer[..., 3] / now.gains[3]
-    held = np.concatenate([roots, variance[..., None], light[..., None]], axis=-1).astype(np.float32)
-    means = _sums(np.pad(held, [*sides, (0, 0)], mode="symmetric"), 1) / CELLS**2
-    return means[..., 5], Pilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
+    light_variance = wide[..., 3] * noise[..., 3] / now.gains[3] ** 2 + (PILOT_ERROR * light) ** 2
+    roots = 2.0 * np.sqrt(np.maximum(finer + new**2 + 0.125, 0.01))
+    held = np.concatenate([roots, np.stack([wide.mean(axis=-1), light, light_variance], axis=-1)], axis=-1)
+    means = _patch_means(held.astype(np.float32), own.mean.shape, now.size)
+    light, light_variance = means[..., 5], means[..., 6]
+    light = (light * own.variance + own.mean * light_variance) / (own.variance + light_variance)
+    return light, Pilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
 
 
-def _sums(values: NDArray[np.generic], stride: int) -> Singles:
-    """Sums over `CELLS` x `CELLS`, `stride` apart."""
-    ends = [(length - CELLS) // stride * stride + 1 for length in values.shape[:2]]
-    rows = sum(values[i : i + ends[0] : stride].astype(np.float32) for i in range(CELLS))
-    return np.asarray(sum(rows[:, j : j + ends[1] : stride] for j in range(CELLS)))
+def _patch_means(values: Singles, shape: tuple[int, ...], size: int) -> Singles:
+    """Means over the cells that each patch of a finer scale covers."""
+    side = size // STRIDE
+    sides = [(side - 1, count - cells) for count, cells in zip(shape, values.shape[:2], strict=True)]
+    wide = np.pad(values, [*sides, (0, 0)], mode="symmetric")
+    return _sums(wide, 1, side) / side**2
+
+
+def _sums(values: NDArray[np.generic], stride: int, side: int = CELLS) -> Singles:
+    """Sums over `side` x `side`, `stride` apart."""
+    ends = [(length - side) // stride * stride + 1 for length in values.shape[:2]]
+    rows = sum(values[i : i + ends[0] : stride].astype(np.float32) for i in range(side))
+    return np.asarray(sum(rows[:, j : j + ends[1] : stride] for j in range(side)))
