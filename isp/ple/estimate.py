@@ -15,6 +15,8 @@ STRIDE = 2  # pixels from patch to patch: one tile
 MARGIN = 8.0  # by which the quick log likelihood may be wrong
 STRIP = 30_000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons
+DOUBT = 2.0
+INFLATE = 2.0
 LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of noise^2]
 
 
@@ -181,7 +183,7 @@ def _solve_one_light(at: Table, y: Singles, pilot: Pilot | None, index: NDArray[
     quick = _quick_likelihood(at, y)
     candidate = quick > quick.max(axis=1, keepdims=True) - MARGIN
     if pilot is not None:
-        noise = (2.0 * pilot.variance + at.pilot_floor) / (PILOT_VARIANCE + at.pilot_floor)
+        noise = (INFLATE * pilot.variance + at.pilot_floor) / (PILOT_VARIANCE + at.pilot_floor)
 
     # The likelihood in full, of the candidates alone.
     best, chosen = np.full(count, -np.inf, np.float32), np.zeros(count, np.int32)
@@ -215,7 +217,7 @@ def _solve_one_light(at: Table, y: Singles, pilot: Pilot | None, index: NDArray[
             variance -= (1.0 / spread) @ by.pilot_variance
             inner -= (1.0 / spread) @ by.pilot_inner
         # A patch that no component explains knows its pixels by as much less.
-        doubt = np.maximum(misfit[some], 1.0) ** 2
+        doubt = np.maximum(misfit[some], 1.0) ** DOUBT
         found.weight[place] = 1.0 / (doubt * (variance.mean(axis=1) + LEAST_VARIANCE))
         found.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
         found.noise[place] = variance

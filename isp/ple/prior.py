@@ -19,7 +19,7 @@ from rodcone.files import replacing
 PATCH = 8  # pixels a side
 LETTERS = ("R", "G", "B", "W")
 OWN = Path(__file__).with_name("prior.npz")  # of the project's own curves, `sensor.curves.rgbw`
-_FIELDS = ("neutral_e", "mean", "basis", "weights", "centres", "factors", "rest")
+_FIELDS = ("neutrals_e", "mean", "basis", "weights", "centres", "factors", "rest")
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +28,8 @@ class Prior:
 
     Attributes
     ----------
-    neutral_e : (4,) float64
-        Electrons of R, G, B and W from white under D65, relative to G: the curves that the prior is for.
+    neutrals_e : (light, 4) float64
+        Electrons of R, G, B and W from white under D65 and other lights, relative to G: the curves that it is for.
     mean : (256,) float32
         Of all patches; pixels row by row, four channels each.
     basis : (256, direction) float32
@@ -46,7 +46,7 @@ class Prior:
         Command, versions, seed and hashes of what it was trained from, as JSON.
     """
 
-    neutral_e: NDArray[np.float64]
+    neutrals_e: NDArray[np.float64]
     mean: NDArray[np.float32]
     basis: NDArray[np.float32]
     weights: NDArray[np.float32]
@@ -54,6 +54,11 @@ class Prior:
     factors: NDArray[np.float32]
     rest: NDArray[np.float32]
     source: str
+
+    @property
+    def neutral_e(self) -> NDArray[np.float64]:
+        """Electrons of R, G, B and W from white under D65, relative to G, shape (4,): a signal of 1 in each."""
+        return self.neutrals_e[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +123,7 @@ def load_prior(path: Path) -> Prior:
     if size != PATCH**2 or held["basis"].shape != (4 * size, directions):
         raise InputError(f"prior: {str(path)!r} is of other patches than {PATCH}x{PATCH}; train one anew")
     values = {name: held[name].astype(np.float32) for name in _FIELDS[1:]}
-    return Prior(**(values | {"factors": factors, "neutral_e": held["neutral_e"], "source": source}))
+    return Prior(**(values | {"factors": factors, "neutrals_e": held["neutrals_e"], "source": source}))
 
 
 def save_prior(prior: Prior, path: Path) -> None:

@@ -19,6 +19,7 @@ from sensor.raw import RawImage
 SCALES = 4  # coarser ones
 CELLS = 4  # a side of a coarse patch
 LEAST_CELLS = 5  # a side of the coarsest scale
+POSITIVE = 2.0
 COLOUR_SPREAD = 0.2  # relative standard deviation of the light that a patch's own sums show, by its colour
 
 
@@ -173,8 +174,10 @@ def _told(coarse: Estimate, before: Sampling, now: Sampling, own: Light) -> tupl
     held = np.concatenate([roots, np.stack([wide.mean(axis=-1), light, light_variance], axis=-1)], axis=-1)
     means = _patch_means(held.astype(np.float32), own.mean.shape, now.size)
     light, light_variance = means[..., 5], means[..., 6]
-    light = (light * own.variance + own.mean * light_variance) / (own.variance + light_variance)
-    return light, Pilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
+    both = (light * own.variance + own.mean * light_variance) / (own.variance + light_variance)
+    # Light is positive: one that noise took under 0 is about as large as its error.
+    both = 0.5 * (both + np.sqrt(both**2 + POSITIVE * own.variance * light_variance / (own.variance + light_variance)))
+    return both, Pilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
 
 
 def _patch_means(values: Singles, shape: tuple[int, ...], size: int) -> Singles:

@@ -36,14 +36,14 @@ def draw_patches(pictures: Iterable[Planes], rng: np.random.Generator) -> Matrix
     return result
 
 
-def fit_prior(patches: Matrix, neutral_e: NDArray[np.float64], rng: np.random.Generator, source: str) -> Prior:
+def fit_prior(patches: Matrix, neutrals_e: NDArray[np.float64], rng: np.random.Generator, source: str) -> Prior:
     """Fit `COMPONENTS` Gaussians in the patches' `DIRECTIONS` principal directions.
 
     Parameters
     ----------
     patches : (patch, 256) float32
         Of `draw_patches`.
-    neutral_e, source
+    neutrals_e, source
         As `isp.ple.prior.Prior`.
     """
     mean = patches.mean(axis=0)
@@ -54,7 +54,7 @@ def fit_prior(patches: Matrix, neutral_e: NDArray[np.float64], rng: np.random.Ge
     weights, centres, factors, parts = _expect_and_maximise(reduced, _first_parts(reduced, rng))
     outside = np.maximum((centred**2).sum(axis=1) - (reduced**2).sum(axis=1), 0.0)
     rest = np.maximum(parts.T @ outside / (weights * len(patches)) / (patches.shape[1] - DIRECTIONS), 1e-7)
-    return Prior(neutral_e, mean, basis, weights, centres, factors, rest, source)
+    return Prior(neutrals_e, mean, basis, weights, centres, factors, rest, source)
 
 
 def _first_parts(reduced: Matrix, rng: np.random.Generator) -> Matrix:

@@ -6,7 +6,7 @@ Yuksel, "Spectral primary decomposition for rendering with sRGB reflectance", EG
 among them: what is judged is never trained on.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 
@@ -29,6 +29,8 @@ CHANNELS = ("R", "G", "B", "W")
 # (SpaceX). CC0: camera (L. Varshney), chelsea (S. van der Walt), coffee (R. Michetti), brick and gravel (CC0Textures),
 # grass (D. A. Nash's, linearlabs).
 PHOTOGRAPHS = ("astronaut", "camera", "chelsea", "coffee", "coins", "rocket", "brick", "grass", "gravel")
+# Ends and middles of what `draw_light` draws; D65 first.
+LIGHTS = ("D65", "D4000K", "D9000K", "2400K", "3600K", *(f"LED-B{n}" for n in range(1, 6)), "F2", "F11", "sodium_high", "sodium_low")
 LEAVES, GRATINGS = 20, 10  # pictures of each kind
 SIDE = 256  # pixels of a generated picture
 _NM = np.arange(385.0, 780.0, 10.0)
@@ -47,16 +49,25 @@ class Light:
         return np.asarray(reflectance @ self.weights.T)
 
 
-def neutral_electrons(sensor: SensorConfig) -> Floats:
-    """Electrons of R, G, B and W from white under D65, relative to G, shape (4,)."""
-    collected = _collected(sensor, "D65").sum(axis=1)
-    return np.asarray(collected / collected[1])
+def neutral_electrons(sensor: SensorConfig, lights: Sequence[str]) -> Floats:
+    """Electrons of R, G, B and W from white under each light, relative to G, shape (light, 4)."""
+    collected = np.array([_collected(sensor, light).sum(axis=1) for light in lights])
+    return np.asarray(collected / collected[:, 1:2])
 
 
 def draw_light(rng: np.random.Generator, sensor: SensorConfig) -> Light:
     """Draw a light: daylight more than half of the time, then bulbs, LEDs, fluorescent lamps and sodium."""
-    names = ("D65", f"D{rng.uniform(4000, 9000):.0f}K", f"{rng.uniform(2400, 3600):.0f}K", "", "F2", "F11", "sodium_high")
-    name = str(rng.choice(names, p=(0.4, 0.2, 0.14, 0.14, 0.04, 0.04, 0.04))) or f"LED-B{rng.integers(1, 6)}"
+    kinds = {
+        "D65": 0.4,
+        f"D{rng.uniform(4000, 9000):.0f}K": 0.2,
+        f"{rng.uniform(2400, 3600):.0f}K": 0.14,
+        f"LED-B{rng.integers(1, 6)}": 0.14,
+        "F2": 0.04,
+        "F11": 0.04,
+        "sodium_high": 0.02,
+        "sodium_low": 0.02,
+    }
+    name = str(rng.choice(list(kinds), p=list(kinds.values())))
     weights = _collected(sensor, name) / _collected(sensor, "D65").sum(axis=1, keepdims=True)
     return Light(weights / weights[3].sum())
 
