@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from isp.ple.prior import Prior
-from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table
+from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, window
 
 STRIDE = 2  # pixels from patch to patch: one tile
 MARGIN = 8.0  # by which the quick log likelihood may be wrong
@@ -99,7 +99,7 @@ def estimate(
     wide, wide_full = padded(samples, size), padded(full, size)
     rows = max(1, STRIP // nx)
 
-    def strip(first: int) -> tuple[Singles, Singles, Singles, Singles]:
+    def strip(first: int) -> tuple[Singles, ...]:
         last = min(first + rows, ny)
         part = slice(first * STRIDE, (last - 1) * STRIDE + size)
         y, hit = (_windows(values[part], size) for values in (wide, wide_full))
@@ -111,18 +111,23 @@ def estimate(
 
     # Sums run strip by strip, whatever the threads.
     total = np.zeros(((ny - 1) * STRIDE + size, (nx - 1) * STRIDE + size, 4), np.float32)
-    cells = (total.shape[0] // STRIDE, total.shape[1] // STRIDE)
-    weight, variance, noise = np.zeros(cells, np.float32), np.zeros((*cells, 4), np.float32), []
+    weight = np.zeros(total.shape[:2], np.float32)
+    variance = np.zeros((total.shape[0] // STRIDE, total.shape[1] // STRIDE, 4), np.float32)
+    cells, noise = np.zeros(variance.shape[:2], np.float32), []
     with ThreadPoolExecutor(cpu_count()) as threads:
-        for first, (values, weights, inner, each) in zip(
+        for first, (values, weights, inner, count, each) in zip(
             range(0, ny, rows), threads.map(strip, range(0, ny, rows)), strict=True
         ):
-            total[first * STRIDE : first * STRIDE + len(values)] += values
-            weight[first : first + len(weights)] += weights
-            variance[first : first + len(weights)] += inner
+            for sums, part, start in (
+                (total, values, first * STRIDE),
+                (weight, weights, first * STRIDE),
+                (variance, inner, first),
+                (cells, count, first),
+            ):
+                sums[start : start + len(part)] += part
             noise.append(each)
-    variance /= weight[..., None]
-    total.reshape(cells[0], STRIDE, cells[1], STRIDE, 4)[:] /= weight[:, None, :, None, None]
+    total /= weight[..., None]
+    variance /= cells[..., None]
     edge = size - STRIDE
     inside = total[edge : edge + shape[0], edge : edge + shape[1]]
     kept = tuple(slice(edge // STRIDE, edge // STRIDE + -(-length // STRIDE)) for length in shape)
@@ -153,9 +158,11 @@ def _solve(
         rows = np.array(sampling.rows)
         kept = rows % 4 != 3
         blind = Sampling(sampling.size, tuple(rows[kept].tolist()), sampling.gains, sampling.dark_e, sampling.prnu)
+        some = np.flatnonzero(hit)
+        _solve_by_light(prior, blind, y[:, kept], steps, pilot, some, found)
+        guess = found.values[np.ix_(some, rows)] / window(sampling.size).ravel()[rows // 4]
         y = y.copy()
-        _solve_by_light(prior, blind, y[:, kept], steps, pilot, np.flatnonzero(hit), found)
-        y[full] = np.maximum(y, found.values[:, rows], where=full, out=y)[full]
+        y[some] = np.where(full[some], np.maximum(y[some], guess), y[some])
     _solve_by_light(prior, sampling, y, steps, pilot, np.arange(count), found)
     return found
 
@@ -233,21 +240,25 @@ def _quick_likelihood(at: Table, y: Singles) -> Singles:
     return np.asarray(features @ at.quick)
 
 
-def _overlapped(found: Patches, shape: tuple[int, int], size: int) -> tuple[Singles, Singles, Singles]:
-    """Weighted sums of overlapping patches: values (row, column, 4), weights and variances by cells of 2x2 pixels."""
+def _overlapped(found: Patches, shape: tuple[int, int], size: int) -> tuple[Singles, ...]:
+    """Sums over overlapping patches: values and weights by pixel, variances and weights by cells of 2x2 pixels."""
     (ny, nx), across = shape, size // STRIDE
     total = np.zeros(((ny - 1) * STRIDE + size, nx - 1 + across, 4 * STRIDE), np.float32)
-    weight = np.zeros((ny - 1 + across, nx - 1 + across), np.float32)
-    variance = np.zeros((*weight.shape, 4), np.float32)
+    weight = np.zeros((len(total), nx - 1 + across, STRIDE), np.float32)
+    cells = np.zeros((ny - 1 + across, nx - 1 + across), np.float32)
+    variance = np.zeros((*cells.shape, 4), np.float32)
     values = found.values
     values *= found.weight[:, None]
     values = values.reshape(ny, nx, size, across, 4 * STRIDE)
     each, inner = found.weight.reshape(ny, nx), (found.inner * found.weight[:, None]).reshape(ny, nx, 4)
+    taper = window(size).reshape(size, across, STRIDE)
     for i in range(size):
         for j in range(across):
-            total[i : i + (ny - 1) * STRIDE + 1 : STRIDE, j : j + nx] += values[:, :, i, j]
+            rows = slice(i, i + (ny - 1) * STRIDE + 1, STRIDE)
+            total[rows, j : j + nx] += values[:, :, i, j]
+            weight[rows, j : j + nx] += each[..., None] * taper[i, j]
     for i in range(across):
         for j in range(across):
-            weight[i : i + ny, j : j + nx] += each
+            cells[i : i + ny, j : j + nx] += each
             variance[i : i + ny, j : j + nx] += inner
-    return total.reshape(len(total), -1, 4), weight, variance
+    return total.reshape(len(total), -1, 4), weight.reshape(len(total), -1), variance, cells

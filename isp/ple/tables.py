@@ -21,6 +21,7 @@ STEP = 1.25  # of light, from one table to the next
 LIGHT_ERROR = 0.12  # relative standard deviation of a patch's light, the step's included
 PILOT_ERROR = 0.03  # by which a coarser scale may differ from the patch, beside its variance [of the light]
 PILOT_VARIANCE = 0.02  # typical of a coarser scale [units of noise^2]; the ratio between channels depends on it
+TAPER = 1.0
 FEW = 20  # directions in which components are told apart first
 _TABLES = 160  # kept; up to 4 MB each
 
@@ -75,6 +76,12 @@ class Estimator:
     inner: Doubles
     pilot_variance: Doubles
     pilot_inner: Doubles
+
+
+def window(size: int) -> Singles:
+    """How much each pixel of a patch counts where patches overlap, shape (size, size): its edges are less sure."""
+    line = np.sin(np.pi * (np.arange(size) + 0.5) / size) ** TAPER
+    return np.outer(line, line).astype(np.float32)
 
 
 class Table:
@@ -168,10 +175,11 @@ class Table:
         variance = self.average @ (np.diagonal(covariance) - (half**2).sum(axis=1))
         inner = ((self.inner @ covariance) * self.inner).sum(axis=1) - ((self.inner @ half) ** 2).sum(axis=1)
         pilot = self.turn[k] @ (self.average @ covariance - (self.average @ half) @ half.T)
+        taper = np.repeat(window(self.mix.size).ravel(), 4)
         return Estimator(
-            linear=np.ascontiguousarray(linear.T, dtype=np.float32),
-            offset=(self.values[k] - linear @ self.values[k, at]).astype(np.float32),
-            pilot=pilot.astype(np.float32),
+            linear=np.ascontiguousarray(linear.T * taper, dtype=np.float32),
+            offset=((self.values[k] - linear @ self.values[k, at]) * taper).astype(np.float32),
+            pilot=(pilot * taper).astype(np.float32),
             variance=variance,
             inner=inner,
             pilot_variance=pilot**2 @ self.average.T,

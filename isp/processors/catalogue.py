@@ -20,7 +20,7 @@ from isp.processors.demosaic import EXTRA as DEMOSAICKING
 from isp.processors.demosaic import malvar, menon, picture_demosaicked
 from isp.processors.fusion import picture_complementary, picture_kijima, picture_sato, picture_yamagami
 from isp.processors.gindele import picture_gindele
-from isp.processors.piecewise import picture_piecewise
+from isp.processors.piecewise import picture_ple_bayer, picture_ple_rgbw
 from rodcone.errors import InputError
 from sensor.raw import RawImage
 
@@ -104,8 +104,8 @@ PROCESSORS: Mapping[str, Processor] = MappingProxyType(
             "cmyw", picture_complementary, "complementary colours: Yamagami 1994", colours=("C", "Y", "M"), unit="Y"
         ),
         "rgbw_gindele": Processor("rgbw", picture_gindele, "colours alone where W is full: Gindele & Gallagher 2002"),
-        "ple_rgbw": Processor("rgbw", picture_piecewise, _PIECEWISE),
-        "ple_bayer": Processor("bayer", picture_piecewise, _PIECEWISE),
+        "ple_rgbw": Processor("rgbw", picture_ple_rgbw, _PIECEWISE),
+        "ple_bayer": Processor("bayer", picture_ple_bayer, _PIECEWISE),
     }
 )
 

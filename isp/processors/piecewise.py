@@ -12,24 +12,23 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from isp.colour.colour_fit import ColourFit
+from isp.colour.colour_fit import ColourFit, relative_noise
+from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
-from isp.picture import Picture, finish
+from isp.picture import Picture
 from isp.ple.prior import LETTERS, Prior, own_prior
 from isp.ple.pyramid import reconstruct
-from isp.substitution import COLOUR_ERROR
+from isp.processors.demosaic import require_bayer
 from render.spectrum import Floats
 from rodcone.errors import InputError
-from sensor.cfa import channels, is_bayer, is_rgbw
+from sensor.cfa import RGBW, channels, is_rgbw
 from sensor.raw import RawImage
 
 OTHER_CURVES = 0.1  # in the logarithm of a channel over green: how far a neutral may lie from those of known lights
 
 
-def picture_piecewise(
-    raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, prior: Prior | None = None
-) -> Picture:
-    """Develop an RGBW or Bayer raw image, whose tile is 2x2.
+def picture_ple_rgbw(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, prior: Prior | None = None) -> Picture:
+    """Develop an RGBW raw image whose tile is 2x2.
 
     Parameters
     ----------
@@ -48,30 +47,43 @@ def picture_piecewise(
     UserWarning
         Where the calibrated neutral can't be that of the prior's curves.
     """
-    if not (is_rgbw(raw.cfa) or is_bayer(raw.cfa)):
+    if not is_rgbw(raw.cfa):
         raise InputError(
-            f"raw: mosaic {raw.cfa} is not allowed here; allowed: R, G, B and W in 2x2, or Bayer's; use another processor"
+            f"raw: mosaic {raw.cfa} is not 2x2 of R, G, B and W; allowed here: {RGBW} in any order; use another processor"
         )
-    prior = prior or own_prior()
+    return _developed(raw, colours, balance, prior or own_prior())
+
+
+def picture_ple_bayer(
+    raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, prior: Prior | None = None
+) -> Picture:
+    """Develop a Bayer raw image; as `picture_ple_rgbw`."""
+    require_bayer(raw.cfa)
+    return _developed(raw, colours, balance, prior or own_prior())
+
+
+def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: Prior) -> Picture:
     index = [LETTERS.index(name) for name in channels(raw.cfa)]
-    if balance.neutral is not None:
-        neutral = np.round(balance.neutral / balance.neutral[index.index(1)], 3)
-        if curves_differ(prior, neutral, index):
-            warnings.warn(
-                f"curves: a neutral reads {neutral.tolist()} in {''.join(channels(raw.cfa))}, as under no light that the "
-                "prior of ple knows; its pictures may be poor; train one for this sensor: rodcone train --sensor NAME",
-                UserWarning,
-                stacklevel=2,
-            )
-    planes, variance = reconstruct(raw, prior)
-    gain = np.broadcast_to(variance[:3] / COLOUR_ERROR, (*raw.shape, 3))
-    return finish(raw, planes[..., :3].astype(np.float64), colours, balance=balance, noise_gain=gain)
+    if balance.neutral is not None and curves_differ(prior, balance.neutral, index):
+        warnings.warn(
+            f"curves: a neutral reads {np.round(balance.neutral, 3).tolist()} in {''.join(channels(raw.cfa))}, as under no "
+            "light that this prior knows; its pictures may be poor; train one by `rodcone train --sensor NAME`",
+            UserWarning,
+            stacklevel=2,
+        )
+    found, variance = reconstruct(raw, prior)
+    planes = found.astype(np.float64)
+    gains, sources = balance.gains(raw, planes)
+    # The posterior variance is all of the error: no factor on it, as weighted means of samples need.
+    noise = relative_noise(raw, planes, np.broadcast_to(variance, planes.shape), gains, colours)[:3]
+    rgb = clip_highlights(raw, planes[..., :3] * gains[:3]) @ colours.matrix(noise=noise).T
+    return Picture(rgb, sources)
 
 
 def curves_differ(prior: Prior, neutral: Floats, index: Sequence[int]) -> bool:
     """Whether a calibrated neutral lies far from those of the prior's curves, under any mix of two known lights."""
     known = np.log(prior.neutrals_e[:, index])
-    seen = np.log(np.maximum(neutral, 1e-9))
+    seen = np.log(neutral / neutral[index.index(LETTERS.index("G"))])
     along = known[:, None] - known
     share = ((seen - known) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), 1e-12)
     nearest = known + np.clip(share, 0.0, 1.0)[..., None] * along
