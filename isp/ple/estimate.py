@@ -12,8 +12,8 @@ from isp.ple.prior import Prior
 from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, window
 
 STRIDE = 2  # pixels from patch to patch: one tile
-MARGIN = 8.0  # by which the quick log likelihood may be wrong
-STRIP = 30_000  # patches that are estimated together
+MARGIN = 5.0  # by which the quick log likelihood may be wrong
+STRIP = 100_000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons
 DOUBT = 2.0
 INFLATE = 2.0
@@ -186,49 +186,56 @@ def _solve_by_light(
 
 def _solve_one_light(at: Table, y: Singles, pilot: Pilot | None, index: NDArray[np.intp], found: Patches) -> None:
     """Estimate the patches `index`, whose samples are y, from one table."""
-    count, size = len(y), y.shape[1]
-    quick = _quick_likelihood(at, y)
-    candidate = quick > quick.max(axis=1, keepdims=True) - MARGIN
+    noise = None
     if pilot is not None:
         noise = (INFLATE * pilot.variance + at.pilot_floor) / (PILOT_VARIANCE + at.pilot_floor)
+    chosen, misfit, innovation = _pick(at, y, pilot, noise)
+    order = np.argsort(chosen, kind="stable")
+    bounds = np.flatnonzero(np.diff(chosen[order], prepend=-1, append=-1))
+    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+        some = order[first:last]
+        place, by = index[some], at.estimator(int(chosen[some[0]]))
+        values = y[some] @ by.linear
+        values += by.offset
+        variance, inner = by.variance, by.inner
+        if noise is not None:
+            values += innovation[some] @ by.pilot
+            sure = 1.0 / (noise[some, None] + at.spread[chosen[some[0]]])
+            variance, inner = by.variance - sure @ by.pilot_variance, by.inner - sure @ by.pilot_inner
+        # A patch that no component explains knows its pixels by as much less.
+        doubt = np.maximum(misfit[some], 1.0) ** DOUBT
+        found.weight[place] = 1.0 / (doubt * (variance.mean(axis=-1) + LEAST_VARIANCE))
+        found.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
+        found.noise[place] = variance
+        found.values[place] = values
 
-    # The likelihood in full, of the candidates alone.
+
+def _pick(
+    at: Table, y: Singles, pilot: Pilot | None, noise: Singles | None
+) -> tuple[NDArray[np.int32], Singles, Singles]:
+    """Pick each patch's likeliest component: which, its misfit, and the pilot's innovation over its variance."""
+    count, size = y.shape
     best, chosen = np.full(count, -np.inf, np.float32), np.zeros(count, np.int32)
     misfit, innovation = np.empty(count, np.float32), np.zeros((count, 4), np.float32)
+    quick = _quick_likelihood(at, y)
+    candidate = quick > quick.max(axis=1, keepdims=True) - MARGIN
     for k in np.flatnonzero(candidate.any(axis=0)):
         some = np.flatnonzero(candidate[:, k])
-        read = y[some] @ at.reads[k].T - at.read_offset[k]
+        read = y[some] @ at.reads[k].T
+        read -= at.read_offset[k]
         square = np.einsum("ij,ij->i", read[:, :size], read[:, :size])
         likelihood = at.log_scale[k] - 0.5 * square
-        if pilot is not None:
+        if pilot is not None and noise is not None:
             news = pilot.means[some] @ at.pilot_turn[k].T - at.pilot_offset[k] - read[:, size:]
             spread = noise[some, None] + at.spread[k].astype(np.float32)
+            likelihood -= 0.5 * (np.log(spread) + news**2 / spread).sum(axis=1)
             news /= spread
-            likelihood -= 0.5 * (np.log(spread) + news**2 * spread).sum(axis=1)
         better = likelihood > best[some]
         winners = some[better]
         best[winners], chosen[winners], misfit[winners] = likelihood[better], k, square[better] / size
         if pilot is not None:
             innovation[winners] = news[better]
-
-    # The estimate of the component picked.
-    for k in np.unique(chosen):
-        some = np.flatnonzero(chosen == k)
-        place, by = index[some], at.estimator(int(k))
-        values = y[some] @ by.linear
-        values += by.offset
-        variance, inner = np.tile(by.variance, (len(some), 1)), np.tile(by.inner, (len(some), 1))
-        if pilot is not None:
-            values += innovation[some] @ by.pilot
-            spread = noise[some, None] + at.spread[k]
-            variance -= (1.0 / spread) @ by.pilot_variance
-            inner -= (1.0 / spread) @ by.pilot_inner
-        # A patch that no component explains knows its pixels by as much less.
-        doubt = np.maximum(misfit[some], 1.0) ** DOUBT
-        found.weight[place] = 1.0 / (doubt * (variance.mean(axis=1) + LEAST_VARIANCE))
-        found.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
-        found.noise[place] = variance
-        found.values[place] = values
+    return chosen, misfit, innovation
 
 
 def _quick_likelihood(at: Table, y: Singles) -> Singles:

@@ -109,7 +109,7 @@ class Table:
         # The pilot: the patch's means p by channel, turned so that its directions are independent given the samples.
         self.average = np.tile(np.eye(4), pixels) / pixels
         steep = self.average * self.slopes[:, None]
-        lean = steep @ mix.covariances
+        lean = steep.astype(np.float32) @ mix.covariances
         drift = (self.average @ self.drift.T).T
         cross = lean[:, :, at] * self.slopes[:, None, at] + drift[:, :, None] * self.drift[:, None, at]
         whole = lean @ steep.swapaxes(1, 2) + drift[:, :, None] * drift[:, None]
