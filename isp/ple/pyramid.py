@@ -7,7 +7,7 @@ over larger patches; the finer scale takes them as further samples with a known 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from isp.anscombe import stabilise, unstabilise
 from isp.ple.estimate import STRIDE, Estimate, Pilot, estimate
@@ -53,7 +53,7 @@ class Light:
     variance: Singles
 
 
-def reconstruct(raw: RawImage, prior: Prior) -> tuple[Singles, NDArray[np.float64]]:
+def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Singles, NDArray[np.float64]]:
     """Reconstruct every channel at every pixel.
 
     Parameters
@@ -62,6 +62,8 @@ def reconstruct(raw: RawImage, prior: Prior) -> tuple[Singles, NDArray[np.float6
         Its tile is 2x2, of R, G, B and W.
     prior : Prior
         Of the camera's curves.
+    white_e : (4,) array_like
+        Electrons of R, G, B and W from white under the scene's light, relative to G.
 
     Returns
     -------
@@ -72,7 +74,7 @@ def reconstruct(raw: RawImage, prior: Prior) -> tuple[Singles, NDArray[np.float6
     """
     electrons = raw.electrons.astype(np.float32)
     full = raw.saturated & (channel_map(raw.cfa, raw.shape) == "W")
-    pyramid = _pyramid(raw, prior, electrons, full)
+    pyramid = _pyramid(raw, white_e, electrons, full)
     coarsest = pyramid[-1]
     light = _own_light(coarsest, [_border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
     found = _estimate_cells(prior, coarsest, light, None)
@@ -84,7 +86,7 @@ def reconstruct(raw: RawImage, prior: Prior) -> tuple[Singles, NDArray[np.float6
     cells = pyramid[0]
     own = _own_light(cells, _sides(raw.shape, cells.full.shape, PATCH), 1)
     sites = [4 * (PATCH * y + x) + LETTERS.index(raw.cfa[y % 2][x % 2]) for y in range(PATCH) for x in range(PATCH)]
-    sampling = _sampling(raw, prior, np.ones(4), PATCH, tuple(sites))
+    sampling = _sampling(raw, white_e, np.ones(4), PATCH, tuple(sites))
     light, pilot = _told(found, cells.sampling, sampling, own)
     found = estimate(prior, sampling, stabilise(electrons, raw.dark_noise_e, 0.0), full, light, pilot)
     planes = found.planes[..., cells.index]
@@ -93,12 +95,12 @@ def reconstruct(raw: RawImage, prior: Prior) -> tuple[Singles, NDArray[np.float6
     return planes, found.noise[list(cells.index)]
 
 
-def _sampling(raw: RawImage, prior: Prior, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]) -> Sampling:
+def _sampling(raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]) -> Sampling:
     dark = raw.dark_noise_e * np.sqrt(counts)
-    return Sampling(size, rows, tuple((prior.neutral_e * counts).tolist()), tuple(dark.tolist()), raw.prnu)
+    return Sampling(size, rows, tuple((np.asarray(white_e) * counts).tolist()), tuple(dark.tolist()), raw.prnu)
 
 
-def _pyramid(raw: RawImage, prior: Prior, electrons: Singles, full: NDArray[np.bool_]) -> list[Cells]:
+def _pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray[np.bool_]) -> list[Cells]:
     """Cells of 2x2, 4x4, ... pixels."""
     names = channels(raw.cfa)
     index = tuple(LETTERS.index(name) for name in names)
@@ -111,7 +113,7 @@ def _pyramid(raw: RawImage, prior: Prior, electrons: Singles, full: NDArray[np.b
         sums.append(sum(quads[:, i, :, j] for i, j in sites))
         fulls.append(np.any([hit[:, i, :, j] for i, j in sites], axis=0))
         counts[channel] = len(sites)
-    last = Cells(np.stack(sums, -1), np.stack(fulls, -1), _sampling(raw, prior, counts, CELLS, rows), index)
+    last = Cells(np.stack(sums, -1), np.stack(fulls, -1), _sampling(raw, white_e, counts, CELLS, rows), index)
     levels = [last]
     while len(levels) < SCALES and min(last.full.shape[:2]) // 2 >= LEAST_CELLS:
         height, width = (length // 2 for length in last.full.shape[:2])
@@ -121,7 +123,7 @@ def _pyramid(raw: RawImage, prior: Prior, electrons: Singles, full: NDArray[np.b
             last,
             electrons=four.sum(axis=(1, 3)),
             full=hit.any(axis=(1, 3)),
-            sampling=_sampling(raw, prior, counts, CELLS, rows),
+            sampling=_sampling(raw, white_e, counts, CELLS, rows),
         )
         levels.append(last)
     return levels

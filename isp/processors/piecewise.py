@@ -64,14 +64,17 @@ def picture_ple_bayer(
 
 def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: Prior) -> Picture:
     index = [LETTERS.index(name) for name in channels(raw.cfa)]
-    if balance.neutral is not None and curves_differ(prior, balance.neutral, index):
-        warnings.warn(
-            f"curves: a neutral reads {np.round(balance.neutral, 3).tolist()} in {''.join(channels(raw.cfa))}, as under no "
-            "light that this prior knows; its pictures may be poor; train one by `rodcone train --sensor NAME`",
-            UserWarning,
-            stacklevel=2,
-        )
-    found, variance = reconstruct(raw, prior)
+    white_e = prior.neutral_e.copy()
+    if balance.neutral is not None:
+        if curves_differ(prior, balance.neutral, index):
+            warnings.warn(
+                f"curves: a neutral reads {np.round(balance.neutral, 3).tolist()} in {''.join(channels(raw.cfa))}, as "
+                "under no light that this prior knows; its pictures may be poor; train one by `rodcone train`",
+                UserWarning,
+                stacklevel=2,
+            )
+        white_e[index] = balance.neutral / balance.neutral[index.index(LETTERS.index("G"))]
+    found, variance = reconstruct(raw, prior, white_e)
     planes = found.astype(np.float64)
     gains, sources = balance.gains(raw, planes)
     # The posterior variance is all of the error: no factor on it, as weighted means of samples need.

@@ -32,6 +32,7 @@ PHOTOGRAPHS = ("astronaut", "camera", "chelsea", "coffee", "coins", "rocket", "b
 # Ends and middles of what `draw_light` draws; D65 first.
 LIGHTS = ("D65", "D4000K", "D9000K", "2400K", "3600K", *(f"LED-B{n}" for n in range(1, 6)), "F2", "F11", "sodium_high", "sodium_low")
 LEAVES, GRATINGS = 20, 10  # pictures of each kind
+UNKNOWN = 6  # of so many pictures one whose light the camera doesn't know
 SIDE = 256  # pixels of a generated picture
 _NM = np.arange(385.0, 780.0, 10.0)
 _FINE = 3  # samples a pixel and direction, which pixels then average
@@ -40,12 +41,12 @@ _DARKEST = 2e-3  # of white
 
 @dataclass(frozen=True)
 class Light:
-    """What a camera's channels collect from each band: electrons relative to white under D65, shape (4, band)."""
+    """What a camera's channels collect from each band, over what they do from white, shape (4, band)."""
 
     weights: Floats
 
     def signals(self, reflectance: Floats) -> Floats:
-        """Signals (..., 4) of reflectances (..., band); white under D65 reads 1 in every channel."""
+        """Signals (..., 4) of reflectances (..., band); what the camera takes for white reads 1 in every channel."""
         return np.asarray(reflectance @ self.weights.T)
 
 
@@ -56,7 +57,10 @@ def neutral_electrons(sensor: SensorConfig, lights: Sequence[str]) -> Floats:
 
 
 def draw_light(rng: np.random.Generator, sensor: SensorConfig) -> Light:
-    """Draw a light: daylight more than half of the time, then bulbs, LEDs, fluorescent lamps and sodium."""
+    """Draw a light: daylight more than half of the time, then bulbs, LEDs, fluorescent lamps and sodium.
+
+    The camera knows what white is under it, but for one picture in `UNKNOWN`, where it takes D65's.
+    """
     kinds = {
         "D65": 0.4,
         f"D{rng.uniform(4000, 9000):.0f}K": 0.2,
@@ -68,8 +72,9 @@ def draw_light(rng: np.random.Generator, sensor: SensorConfig) -> Light:
         "sodium_low": 0.02,
     }
     name = str(rng.choice(list(kinds), p=list(kinds.values())))
-    weights = _collected(sensor, name) / _collected(sensor, "D65").sum(axis=1, keepdims=True)
-    return Light(weights / weights[3].sum())
+    collected = _collected(sensor, name)
+    white = _collected(sensor, "D65" if rng.random() < 1 / UNKNOWN else name).sum(axis=1, keepdims=True)
+    return Light(collected / white * white[3] / collected[3].sum())
 
 
 def _collected(sensor: SensorConfig, light: str) -> Floats:

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from builders import raw_image
 
-from isp.ple import estimate
+from isp.ple import estimate, pyramid
 from isp.ple.prior import LETTERS, own_prior
-from isp.ple.pyramid import reconstruct
 from sensor.cfa import BAYER, RGBW, channel_map, channels
 from sensor.raw import RawImage
 
 FULL_E, NOISE_E = 15_000.0, 1.5
+
+
+def reconstruct(raw):
+    return pyramid.reconstruct(raw, own_prior(), own_prior().neutral_e)
 
 
 def exposure(expected_e, tile, rng) -> RawImage:
@@ -31,7 +34,7 @@ def grey(level_e, tile, shape=(96, 96)):
 @pytest.mark.parametrize("level_e", [0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10_000.0])
 def test_a_flat_field_keeps_its_mean(tile, level_e):
     # at 10 000 e- W is full, and nothing is asked of it
-    planes, _ = reconstruct(exposure(grey(level_e, tile), tile, np.random.default_rng(4)), own_prior())
+    planes, _ = reconstruct(exposure(grey(level_e, tile), tile, np.random.default_rng(4)))
     for name, plane in zip(channels(tile), np.moveaxis(planes, -1, 0), strict=True):
         expected = own_prior().neutral_e[LETTERS.index(name)] * level_e
         if expected < FULL_E:
@@ -52,7 +55,7 @@ def test_a_lamp_in_the_dark_has_no_frame_around_it(tile, side):
         raw = exposure(np.full((80, 80), 0.1), tile, rng)
         lit = raw.dn.copy()
         lit[at[0] : at[0] + side, at[1] : at[1] + side] = 200 + FULL_E + rng.normal(0, NOISE_E, (side, side))
-        without, within = (reconstruct(each, own_prior())[0] for each in (raw, replace(raw, dn=lit)))
+        without, within = (reconstruct(each)[0] for each in (raw, replace(raw, dn=lit)))
         moved.append(np.roll(within - without, (-at[0], -at[1]), axis=(0, 1)))
     lines = np.arange(80)
     away = np.where(lines < side, 0, np.minimum(lines - side + 1, 80 - lines))
@@ -65,7 +68,7 @@ def test_a_full_sample_is_a_lower_bound():
     # W fills along a ramp, in the middle of patches; above, the colours say how far
     tile, ramp = RGBW, np.linspace(1500, 6000, 96)
     raw = exposure(grey(ramp, tile), tile, np.random.default_rng(5))
-    planes, variance = reconstruct(raw, own_prior())
+    planes, variance = reconstruct(raw)
     full = raw.saturated & (channel_map(tile, raw.shape) == "W")
     assert 0.05 < full.mean() < 0.22
     least = FULL_E - 4 * np.sqrt(variance[3] * FULL_E)
@@ -80,12 +83,12 @@ def test_threads_change_nothing(monkeypatch):
     found = []
     for count in (1, 3):
         monkeypatch.setattr(estimate, "cpu_count", lambda count=count: count)
-        found.append(reconstruct(raw, own_prior())[0])
+        found.append(reconstruct(raw)[0])
     assert np.array_equal(*found)
 
 
 @pytest.mark.parametrize("shape", [(2, 2), (3, 5), (9, 16), (16, 9), (31, 33)])
 def test_any_size_of_frame_will_do(shape):
-    planes, _ = reconstruct(raw_image(np.full(shape, 600)), own_prior())
+    planes, _ = reconstruct(raw_image(np.full(shape, 600)))
     assert planes.shape == (*shape, 4)
     assert np.isfinite(planes).all()
