@@ -2,7 +2,9 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from os import cpu_count
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -12,7 +14,7 @@ from isp.ple.prior import Prior
 from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, window
 
 STRIDE = 2  # pixels from patch to patch: one tile
-MARGIN = 5.0  # by which the quick log likelihood may be wrong
+MARGIN = 20.0  # by which the quick log likelihood may be wrong
 STRIP = 100_000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons
 DOUBT = 2.0
@@ -65,19 +67,14 @@ class Patches:
     noise: Singles
 
 
-def padded(samples: NDArray[np.generic], size: int) -> NDArray[np.generic]:
+def padded(samples: NDArray[Any], size: int) -> NDArray[Any]:
     """Samples (h, w, ...), continued by reflection so that every one lies in as many patches."""
     sides = [(size - STRIDE, (length - 1) // STRIDE * STRIDE + size - length) for length in samples.shape[:2]]
     return np.pad(samples, sides + [(0, 0)] * (samples.ndim - 2), mode="reflect")
 
 
 def estimate(
-    prior: Prior,
-    sampling: Sampling,
-    samples: Singles,
-    full: NDArray[np.bool_],
-    light: Singles,
-    pilot: Pilot | None,
+    prior: Prior, sampling: Sampling, samples: Singles, full: NDArray[np.bool_], light: Singles, pilot: Pilot | None
 ) -> Estimate:
     """Estimate every channel at every pixel of one scale.
 
@@ -134,7 +131,7 @@ def estimate(
     return Estimate(inside, variance[kept], np.median(np.concatenate(noise), axis=0))
 
 
-def _windows(values: NDArray[np.generic], size: int) -> NDArray[np.generic]:
+def _windows(values: NDArray[Any], size: int) -> NDArray[Any]:
     """Patches `STRIDE` apart, shape (patch, sample)."""
     view = sliding_window_view(values, (size, size), axis=(0, 1))[::STRIDE, ::STRIDE]
     if values.ndim == 3:
@@ -143,12 +140,7 @@ def _windows(values: NDArray[np.generic], size: int) -> NDArray[np.generic]:
 
 
 def _solve(
-    prior: Prior,
-    sampling: Sampling,
-    y: Singles,
-    full: NDArray[np.bool_],
-    steps: NDArray[np.int32],
-    pilot: Pilot | None,
+    prior: Prior, sampling: Sampling, y: Singles, full: NDArray[np.bool_], steps: NDArray[np.int32], pilot: Pilot | None
 ) -> Patches:
     """Estimate patches by light; where Ws are full, first without any W, then with what that says of the full ones."""
     count, values = len(y), 4 * sampling.size**2
@@ -178,7 +170,7 @@ def _solve_by_light(
 ) -> None:
     order = among[np.argsort(steps[among], kind="stable")]
     bounds = np.flatnonzero(np.diff(steps[order], prepend=-(1 << 30), append=1 << 30))
-    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+    for first, last in pairwise(bounds.tolist()):
         index = order[first:last]
         told = None if pilot is None else Pilot(pilot.means[index], pilot.variance[index])
         _solve_one_light(table(prior, sampling, int(steps[index[0]])), y[index], told, index, found)
@@ -192,7 +184,7 @@ def _solve_one_light(at: Table, y: Singles, pilot: Pilot | None, index: NDArray[
     chosen, misfit, innovation = _pick(at, y, pilot, noise)
     order = np.argsort(chosen, kind="stable")
     bounds = np.flatnonzero(np.diff(chosen[order], prepend=-1, append=-1))
-    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+    for first, last in pairwise(bounds.tolist()):
         some = order[first:last]
         place, by = index[some], at.estimator(int(chosen[some[0]]))
         values = y[some] @ by.linear

@@ -58,7 +58,7 @@ class Prior:
     @property
     def neutral_e(self) -> NDArray[np.float64]:
         """Electrons of R, G, B and W from white under D65, relative to G, shape (4,): a signal of 1 in each."""
-        return self.neutrals_e[0]
+        return np.asarray(self.neutrals_e[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +111,10 @@ def load_prior(path: Path) -> Prior:
         For a file that isn't one.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as place, np.load(place, allow_pickle=False) as file:
             held = {name: np.asarray(file[name]) for name in _FIELDS}
             source = str(file["source"])
-    except (OSError, ValueError, KeyError, BadZipFile) as error:
+    except (OSError, EOFError, ValueError, KeyError, BadZipFile) as error:
         raise InputError(f"prior: {str(path)!r} can't be read: {error}; give a file of `rodcone train`") from error
     size = held["mean"].size // 4
     components, directions = held["centres"].shape
@@ -122,13 +122,16 @@ def load_prior(path: Path) -> Prior:
     factors[:, *np.tril_indices(directions)] = held["factors"]
     if size != PATCH**2 or held["basis"].shape != (4 * size, directions):
         raise InputError(f"prior: {str(path)!r} is of other patches than {PATCH}x{PATCH}; train one anew")
-    values = {name: held[name].astype(np.float32) for name in _FIELDS[1:]}
-    return Prior(**(values | {"factors": factors, "neutrals_e": held["neutrals_e"], "source": source}))
+    single = {name: held[name].astype(np.float32) for name in _FIELDS[1:] if name != "factors"}
+    return Prior(neutrals_e=held["neutrals_e"], factors=factors, source=source, **single)
 
 
 def save_prior(prior: Prior, path: Path) -> None:
     """Write a prior; factors and basis in half precision."""
     lower = prior.factors[:, *np.tril_indices(prior.factors.shape[1])].astype(np.float16)
-    held = {name: getattr(prior, name) for name in _FIELDS} | {"factors": lower, "basis": prior.basis.astype(np.float16)}
+    held = {name: getattr(prior, name) for name in _FIELDS} | {
+        "factors": lower,
+        "basis": prior.basis.astype(np.float16),
+    }
     with replacing(path) as (place,), place.open("wb") as file:
         np.savez_compressed(file, source=prior.source, allow_pickle=False, **held)

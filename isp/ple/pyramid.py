@@ -1,10 +1,11 @@
 """From a raw image to every channel at every pixel: coarse scales first, each finer one told by the last.
 
-In the dark a patch of 8x8 pixels holds too little light to say what it shows. Sums of 2x2, 4x4, ... pixels say the means
-over larger patches; the finer scale takes them as further samples with a known error.
+In the dark a patch of 8x8 pixels holds too little light to say what it shows. Sums of 2x2, 4x4, ... pixels say the
+means over larger patches; the finer scale takes them as further samples with a known error.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -95,7 +96,9 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     return planes, found.noise[list(cells.index)]
 
 
-def _sampling(raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]) -> Sampling:
+def _sampling(
+    raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]
+) -> Sampling:
     dark = raw.dark_noise_e * np.sqrt(counts)
     return Sampling(size, rows, tuple((np.asarray(white_e) * counts).tolist()), tuple(dark.tolist()), raw.prnu)
 
@@ -122,7 +125,7 @@ def _pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArra
         last = replace(
             last,
             electrons=four.sum(axis=(1, 3)),
-            full=hit.any(axis=(1, 3)),
+            full=np.asarray(hit.any(axis=(1, 3))),
             sampling=_sampling(raw, white_e, counts, CELLS, rows),
         )
         levels.append(last)
@@ -130,8 +133,11 @@ def _pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArra
 
 
 def _estimate_cells(prior: Prior, cells: Cells, light: Singles, pilot: Pilot | None) -> Estimate:
-    dark = np.array(cells.sampling.dark_e, dtype=np.float32)[list(cells.index)]
-    return estimate(prior, cells.sampling, stabilise(cells.electrons, dark, 0.0), cells.full, light, pilot)
+    stable = [
+        stabilise(plane, cells.sampling.dark_e[channel], 0.0)
+        for plane, channel in zip(np.moveaxis(cells.electrons, -1, 0), cells.index, strict=True)
+    ]
+    return estimate(prior, cells.sampling, np.stack(stable, axis=-1), cells.full, light, pilot)
 
 
 def _border(length: int, size: int) -> tuple[int, int]:
@@ -142,7 +148,10 @@ def _border(length: int, size: int) -> tuple[int, int]:
 def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[tuple[int, int]]:
     """Cells to add before and behind, so that 4x4 of them stand for each patch of the finer scale."""
     patches = [(length - 1) // STRIDE + size // STRIDE for length in shape]
-    return [(size // STRIDE - 1, count + CELLS - size // STRIDE - cells) for count, cells in zip(patches, coarse, strict=False)]
+    return [
+        (size // STRIDE - 1, count + CELLS - size // STRIDE - cells)
+        for count, cells in zip(patches, coarse, strict=False)
+    ]
 
 
 def _own_light(cells: Cells, sides: list[tuple[int, int]], stride: int) -> Light:
@@ -187,11 +196,11 @@ def _patch_means(values: Singles, shape: tuple[int, ...], size: int) -> Singles:
     side = size // STRIDE
     sides = [(side - 1, count - cells) for count, cells in zip(shape, values.shape[:2], strict=True)]
     wide = np.pad(values, [*sides, (0, 0)], mode="symmetric")
-    return _sums(wide, 1, side) / side**2
+    return _sums(wide, 1, side) / np.float32(side**2)
 
 
-def _sums(values: NDArray[np.generic], stride: int, side: int = CELLS) -> Singles:
+def _sums(values: NDArray[Any], stride: int, side: int = CELLS) -> Singles:
     """Sums over `side` x `side`, `stride` apart."""
     ends = [(length - side) // stride * stride + 1 for length in values.shape[:2]]
-    rows = sum(values[i : i + ends[0] : stride].astype(np.float32) for i in range(side))
-    return np.asarray(sum(rows[:, j : j + ends[1] : stride] for j in range(side)))
+    rows = np.add.reduce([values[i : i + ends[0] : stride].astype(np.float32) for i in range(side)])
+    return np.asarray(np.add.reduce([rows[:, j : j + ends[1] : stride] for j in range(side)]))

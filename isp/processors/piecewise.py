@@ -27,7 +27,9 @@ from sensor.raw import RawImage
 OTHER_CURVES = 0.1  # in the logarithm of a channel over green: how far a neutral may lie from those of known lights
 
 
-def picture_ple_rgbw(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, prior: Prior | None = None) -> Picture:
+def picture_ple_rgbw(
+    raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, prior: Prior | None = None
+) -> Picture:
     """Develop an RGBW raw image whose tile is 2x2.
 
     Parameters
@@ -49,7 +51,7 @@ def picture_ple_rgbw(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance
     """
     if not is_rgbw(raw.cfa):
         raise InputError(
-            f"raw: mosaic {raw.cfa} is not 2x2 of R, G, B and W; allowed here: {RGBW} in any order; use another processor"
+            f"raw: mosaic {raw.cfa} is not R, G, B and W in 2x2; allowed here: {RGBW} in any order; use another camera"
         )
     return _developed(raw, colours, balance, prior or own_prior())
 

@@ -68,9 +68,9 @@ def _first_parts(reduced: Matrix, rng: np.random.Generator) -> Matrix:
             centres[k] = reduced[nearest == k].mean(axis=0)
     nearest += even
     ordered = np.argsort(reduced[:, 1:].std(axis=1))[: count // 2]
-    for k, members in enumerate(np.array_split(ordered, even)):
-        nearest[members] = k
-    return np.eye(COMPONENTS, dtype=np.float32)[nearest]
+    for index, members in enumerate(np.array_split(ordered, even)):
+        nearest[members] = index
+    return np.asarray(np.eye(COMPONENTS, dtype=np.float32)[nearest])
 
 
 def _expect_and_maximise(reduced: Matrix, parts: Matrix) -> tuple[Matrix, Matrix, Matrix, Matrix]:

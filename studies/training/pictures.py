@@ -23,6 +23,7 @@ from scenes.reflectances import band, edge, grey
 from sensor.config import SensorConfig
 
 Planes = NDArray[np.float32]
+Places = tuple[NDArray[np.intp], NDArray[np.intp]]
 
 CHANNELS = ("R", "G", "B", "W")
 # Of scikit-image's wheel, without a download. Public domain: astronaut (NASA), coins (Brooklyn Museum), rocket
@@ -30,7 +31,18 @@ CHANNELS = ("R", "G", "B", "W")
 # grass (D. A. Nash's, linearlabs).
 PHOTOGRAPHS = ("astronaut", "camera", "chelsea", "coffee", "coins", "rocket", "brick", "grass", "gravel")
 # Ends and middles of what `draw_light` draws; D65 first.
-LIGHTS = ("D65", "D4000K", "D9000K", "2400K", "3600K", *(f"LED-B{n}" for n in range(1, 6)), "F2", "F11", "sodium_high", "sodium_low")
+LIGHTS = (
+    "D65",
+    "D4000K",
+    "D9000K",
+    "2400K",
+    "3600K",
+    *(f"LED-B{n}" for n in range(1, 6)),
+    "F2",
+    "F11",
+    "sodium_high",
+    "sodium_low",
+)
 LEAVES, GRATINGS = 20, 10  # pictures of each kind
 UNKNOWN = 6  # of so many pictures one whose light the camera doesn't know
 SIDE = 256  # pixels of a generated picture
@@ -95,8 +107,8 @@ def draw_surface(rng: np.random.Generator) -> Floats:
     elif kind < 0.9:
         curve = band(rng.uniform(420, 640), rng.uniform(20, 60), low, high)
     else:
-        return np.interp(_NM, np.linspace(380, 780, 7), rng.uniform(0.03, 0.85, 7))
-    return curve.band_average(_NM, width)
+        return np.asarray(np.interp(_NM, np.linspace(380, 780, 7), rng.uniform(0.03, 0.85, 7)))
+    return np.asarray(curve.band_average(_NM, width))
 
 
 def dead_leaves(rng: np.random.Generator, light: Light, shapes: int = 900) -> Floats:
@@ -113,20 +125,20 @@ def dead_leaves(rng: np.random.Generator, light: Light, shapes: int = 900) -> Fl
     return _finished(rng, picture)
 
 
-def _shape(rng: np.random.Generator, at: Floats, radius: float, side: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _shape(rng: np.random.Generator, at: Floats, radius: float, side: int) -> Places:
     """Pixels of an ellipse, a polygon or a thin bar."""
     kind = rng.integers(4)
     if kind == 0:
-        return ellipse(*at, radius, radius * rng.uniform(0.3, 1), shape=(side, side), rotation=rng.uniform(0, np.pi))
+        y, x = ellipse(*at, radius, radius * rng.uniform(0.3, 1), shape=(side, side), rotation=rng.uniform(0, np.pi))
+        return y, x
     angles = np.sort(rng.uniform(0, 2 * np.pi, rng.integers(3, 6)))
     if kind == 3:
         angles = rng.uniform(0, 2 * np.pi) + np.array([0, 0.3, np.pi, np.pi + 0.3])
-    return polygon(at[0] + radius * np.sin(angles), at[1] + radius * np.cos(angles), shape=(side, side))
+    y, x = polygon(at[0] + radius * np.sin(angles), at[1] + radius * np.cos(angles), shape=(side, side))
+    return y, x
 
 
-def _painted(
-    rng: np.random.Generator, light: Light, at: tuple[NDArray[np.intp], NDArray[np.intp]], radius: float
-) -> Floats:
+def _painted(rng: np.random.Generator, light: Light, at: Places, radius: float) -> Floats:
     """Signals of a shape's pixels: even, shaded, speckled, or striped in two colours; shape (pixel, 4)."""
     (y, x), colour, kind = at, light.signals(draw_surface(rng)), rng.random()
     if kind < 0.25:
@@ -200,4 +212,4 @@ def draw_pictures(sensor: SensorConfig, seed: int) -> Iterator[tuple[str, Planes
 
 def photograph_hashes() -> dict[str, str]:
     """SHA-256 of each photograph's pixels."""
-    return {name: sha256(np.ascontiguousarray(getattr(data, name)())).hexdigest() for name in PHOTOGRAPHS}
+    return {name: sha256(getattr(data, name)().tobytes()).hexdigest() for name in PHOTOGRAPHS}
