@@ -189,7 +189,7 @@ def _solve_one_light(at: Table, y: Singles, pilot: Pilot | None, index: NDArray[
         place, by = index[some], at.estimator(int(chosen[some[0]]))
         values = y[some] @ by.linear
         values += by.offset
-        variance, inner = by.variance, by.inner
+        variance, inner, share = by.variance, by.inner, by.noise / by.variance
         if noise is not None:
             values += innovation[some] @ by.pilot
             sure = 1.0 / (noise[some, None] + at.spread[chosen[some[0]]])
@@ -198,7 +198,7 @@ def _solve_one_light(at: Table, y: Singles, pilot: Pilot | None, index: NDArray[
         doubt = np.maximum(misfit[some], 1.0) ** DOUBT
         found.weight[place] = 1.0 / (doubt * (variance.mean(axis=-1) + LEAST_VARIANCE))
         found.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
-        found.noise[place] = variance
+        found.noise[place] = variance * share
         found.values[place] = values
 
 

@@ -10,17 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.anscombe import stabilise, unstabilise
 from isp.ple.estimate import STRIDE, Estimate, Pilot, estimate
 from isp.ple.prior import LETTERS, PATCH, Prior
-from isp.ple.tables import PILOT_ERROR, Sampling, Singles
+from isp.ple.tables import LIFT, PILOT_ERROR, Sampling, Singles, lift, lifted_root, unlift
 from sensor.cfa import channel_map, channels
 from sensor.raw import RawImage
 
 SCALES = 4  # coarser ones
 CELLS = 4  # a side of a coarse patch
 LEAST_CELLS = 5  # a side of the coarsest scale
-POSITIVE = 2.0
 COLOUR_SPREAD = 0.2  # relative standard deviation of the light that a patch's own sums show, by its colour
 
 
@@ -48,10 +46,11 @@ class Cells:
 
 @dataclass(frozen=True)
 class Light:
-    """Light of each patch, (ny, nx) [e- of white in G], and its variance."""
+    """Light of each patch, (ny, nx) [e- of white in G]; its variance is ``shot * light + floor``, and its colour's."""
 
     mean: Singles
-    variance: Singles
+    shot: Singles
+    floor: Singles
 
 
 def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Singles, NDArray[np.float64]]:
@@ -89,10 +88,10 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     sites = [4 * (PATCH * y + x) + LETTERS.index(raw.cfa[y % 2][x % 2]) for y in range(PATCH) for x in range(PATCH)]
     sampling = _sampling(raw, white_e, np.ones(4), PATCH, tuple(sites))
     light, pilot = _told(found, cells.sampling, sampling, own)
-    found = estimate(prior, sampling, stabilise(electrons, raw.dark_noise_e, 0.0), full, light, pilot)
+    found = estimate(prior, sampling, lift(electrons, raw.dark_noise_e), full, light, pilot)
     planes = found.planes[..., cells.index]
     for first in range(0, len(planes), 256):
-        planes[first : first + 256] = unstabilise(planes[first : first + 256], raw.dark_noise_e)
+        planes[first : first + 256] = unlift(planes[first : first + 256], raw.dark_noise_e)
     return planes, found.noise[list(cells.index)]
 
 
@@ -134,7 +133,7 @@ def _pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArra
 
 def _estimate_cells(prior: Prior, cells: Cells, light: Singles, pilot: Pilot | None) -> Estimate:
     stable = [
-        stabilise(plane, cells.sampling.dark_e[channel], 0.0)
+        lift(plane, cells.sampling.dark_e[channel])
         for plane, channel in zip(np.moveaxis(cells.electrons, -1, 0), cells.index, strict=True)
     ]
     return estimate(prior, cells.sampling, np.stack(stable, axis=-1), cells.full, light, pilot)
@@ -162,9 +161,8 @@ def _own_light(cells: Cells, sides: list[tuple[int, int]], stride: int) -> Light
     weights = np.where(full > 0, 0.0, weights)
     whole = CELLS**2 * (weights @ gains)
     mean = (sums * weights).sum(axis=-1) / whole
-    seen = np.maximum(mean, 0.0)
-    noise = CELLS**2 * (weights**2 * (seen[..., None] * gains + dark**2)).sum(axis=-1) / whole**2
-    return Light(mean.astype(np.float32), (noise + (COLOUR_SPREAD * seen) ** 2).astype(np.float32))
+    shot, floor = (CELLS**2 * (weights**2 * each).sum(axis=-1) / whole**2 for each in (gains, dark**2))
+    return Light(*(each.astype(np.float32) for each in (mean, shot, floor)))
 
 
 def _told(coarse: Estimate, before: Sampling, now: Sampling, own: Light) -> tuple[Singles, Pilot]:
@@ -173,22 +171,22 @@ def _told(coarse: Estimate, before: Sampling, now: Sampling, own: Light) -> tupl
     A patch of the finer scale covers 4x4 cells of the coarser one, or 2x2 where it is of cells itself.
     """
     old, new, share = np.array(before.dark_e), np.array(now.dark_e), np.array(now.gains) / np.array(before.gains)
-    electrons = np.stack([unstabilise(coarse.planes[..., c], old[c]) for c in range(4)], axis=-1)
+    electrons = np.stack([unlift(coarse.planes[..., c], old[c]) for c in range(4)], axis=-1)
     finer = electrons * share
-    noise = np.maximum(finer, 0) + new**2 + 0.375
+    noise = np.maximum(finer, 0) + (LIFT * new) ** 2 + 0.375
     # A posterior variance counts in the finer scale's units of noise.
     wide = np.repeat(np.repeat(coarse.variance, STRIDE, 0), STRIDE, 1)[: finer.shape[0], : finer.shape[1]]
-    wide = wide * (share**2 * (np.maximum(electrons, 0) + old**2 + 0.375) / noise)
+    wide = wide * (share**2 * (np.maximum(electrons, 0) + (LIFT * old) ** 2 + 0.375) / noise)
     light = finer[..., 3] / now.gains[3]
     light_variance = wide[..., 3] * noise[..., 3] / now.gains[3] ** 2 + (PILOT_ERROR * light) ** 2
-    roots = 2.0 * np.sqrt(np.maximum(finer + new**2 + 0.125, 0.01))
+    roots = 2.0 * lifted_root(np.maximum(finer, 0.0), new)
     held = np.concatenate([roots, np.stack([wide.mean(axis=-1), light, light_variance], axis=-1)], axis=-1)
     means = _patch_means(held.astype(np.float32), own.mean.shape, now.size)
     light, light_variance = means[..., 5], means[..., 6]
-    both = (light * own.variance + own.mean * light_variance) / (own.variance + light_variance)
-    # Light is positive: one that noise took under 0 is about as large as its error.
-    both = 0.5 * (both + np.sqrt(both**2 + POSITIVE * own.variance * light_variance / (own.variance + light_variance)))
-    return both, Pilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
+    most = np.maximum(np.maximum(own.mean, light), 0.0)
+    own_variance = own.shot * most + own.floor + (COLOUR_SPREAD * most) ** 2
+    both = (light * own_variance + own.mean * light_variance) / (own_variance + light_variance)
+    return both.astype(np.float32), Pilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
 
 
 def _patch_means(values: Singles, shape: tuple[int, ...], size: int) -> Singles:

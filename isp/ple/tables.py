@@ -1,17 +1,20 @@
 """The prior in a frame's own units of noise, at one light: what picks a component, and the estimate that it gives.
 
-In units of noise (`isp.anscombe`) a sample of e electrons reads about t = 2 sqrt(e + s^2 + 1/8), with noise of 1. Of a
-patch with light m and roots of signal u, sample c holds e = m g_c u^2. About a component's mean t is straight in u, so
-each component is a Gaussian over t as well, and its estimate from the mosaic's samples y is the linear one with the
-least squared error, t + C_xy (C_yy + N)^-1 (y - t_y).
+In units of noise (`isp.anscombe`, for a dark noise d = `LIFT` times s) a sample of e electrons reads about
+t = 2 sqrt(e + d^2 + 3/8 - r / 4), with noise of variance r = (e + s^2) / (e + d^2). Of a patch with light m and roots of
+signal u, a sample of channel c holds e = m g_c u^2. About a component's mean t is straight in u, so each component is a
+Gaussian over t as well, and its estimate from the mosaic's samples y is the linear one with the least squared error,
+t + C_xy (C_yy + N)^-1 (y - t_y).
 """
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from isp.anscombe import stabilise, unstabilise
 from isp.ple.prior import Mixture, Prior, mixture
 
 Doubles = NDArray[np.float64]
@@ -21,7 +24,11 @@ STEP = 1.25  # of light, from one table to the next
 LIGHT_ERROR = 0.12  # relative standard deviation of a patch's light, the step's included
 PILOT_ERROR = 0.03  # by which a coarser scale may differ from the patch, beside its variance [of the light]
 PILOT_VARIANCE = 0.02  # typical of a coarser scale [units of noise^2]; the ratio between channels depends on it
-TAPER = 1.0
+TAPER = 1.0  # power of half a sine: the weight of a patch's pixels
+# The transform bends most at 0, where dark noise of its own size makes outliers of dark samples; as for twice the dark
+# noise it is nearly straight, and the samples' noise under 1 by a known factor.
+LIFT = 2.0
+_LEAST_BASE = 1e-12
 FEW = 20  # directions in which components are told apart first
 _TABLES = 160  # kept; up to 4 MB each
 
@@ -61,8 +68,8 @@ class Estimator:
         The estimate without a pilot is ``y @ linear + offset``.
     pilot : (4, value) float32
         What each of the pilot's four directions adds, by its innovation over its variance.
-    variance : (4,) float64
-        Posterior variance of a pixel, mean by channel.
+    variance, noise : (4,) float64
+        Posterior variance of a pixel, mean by channel, and the same over the variance of a sample's noise.
     inner : (4,) float64
         Posterior variance of the mean of the patch's middle, by channel.
     pilot_variance, pilot_inner : (4, 4) float64
@@ -73,9 +80,37 @@ class Estimator:
     offset: Singles
     pilot: Singles
     variance: Doubles
+    noise: Doubles
     inner: Doubles
     pilot_variance: Doubles
     pilot_inner: Doubles
+
+
+def lift(electrons: NDArray[Any], dark_e: float) -> NDArray[Any]:
+    """Samples in units of noise, as the transform makes them for `LIFT` times the dark noise."""
+    return stabilise(electrons, LIFT * dark_e, 0.0)
+
+
+def lifted_root(electrons: NDArray[Any], dark_e: NDArray[Any]) -> Doubles:
+    """Half of what samples of these expected electrons read in the mean after `lift`.
+
+    To second order E sqrt(x) = sqrt(E x - var x / (4 E x)).
+    """
+    base = electrons + (LIFT * dark_e) ** 2
+    return np.asarray(np.sqrt(base + 0.375 - 0.25 * (electrons + dark_e**2) / np.maximum(base, _LEAST_BASE)))
+
+
+def unlift(stable: NDArray[Any], dark_e: float) -> Doubles:
+    """Electrons whose samples read this in the mean after `lift`.
+
+    To second order as `lifted_root`; beyond, what the exact inverse adds for shot noise, by its share of the noise.
+    """
+    plain = 0.25 * np.asarray(stable, dtype=np.float64) ** 2 - (LIFT * dark_e) ** 2 - 0.375
+    skew = unstabilise(stable, LIFT * dark_e) - plain - 0.25
+    seen = np.maximum(plain, 0.0)
+    ratio = (seen + dark_e**2) / np.maximum(seen + (LIFT * dark_e) ** 2, _LEAST_BASE)
+    share = seen / np.maximum(seen + dark_e**2, _LEAST_BASE) if dark_e else 1.0
+    return np.asarray(plain + 0.25 * ratio + share * skew)
 
 
 def window(size: int) -> Singles:
@@ -94,15 +129,17 @@ class Table:
         # The components in units of noise: values t, their slope in u, and their slope in the light.
         variances = np.diagonal(mix.covariances, axis1=1, axis2=2)
         electrons = gains * light * (mix.means**2 + variances)
-        root = np.sqrt(electrons + dark**2 + 0.125)
+        root = lifted_root(electrons, dark)
         self.values, self.slopes = 2.0 * root, 2.0 * gains * light * mix.means / root
         own = gains[self.rows] ** 2 / (gains[self.rows] * light + dark[self.rows] ** 2)
-        self.drift = electrons / root * np.hypot(LIGHT_ERROR, 0.5 / (light * np.sqrt(own.sum())))
+        self.drift = electrons / root * np.hypot(LIGHT_ERROR, 1 / (light * np.sqrt(own.sum())))
         # Samples: whitening, and the log likelihood's constant.
         at = self.rows
         seen = mix.covariances[:, at[:, None], at] * self.slopes[:, at, None] * self.slopes[:, None, at]
         seen += self.drift[:, at, None] * self.drift[:, None, at]
-        noise = 1.0 + (sampling.prnu * electrons[:, at] / root[:, at]) ** 2
+        shot = electrons + dark**2 + (sampling.prnu * electrons) ** 2
+        noise = shot[:, at] / (electrons[:, at] + (LIFT * dark[at]) ** 2)
+        self.unit = (electrons + (LIFT * dark) ** 2) / (electrons + dark**2)
         seen[:, np.arange(count), np.arange(count)] += noise
         self.factors = np.linalg.inv(np.linalg.cholesky(seen))
         self.log_scale = mix.log_weights + np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
@@ -181,6 +218,7 @@ class Table:
             offset=((self.values[k] - linear @ self.values[k, at]) * taper).astype(np.float32),
             pilot=(pilot * taper).astype(np.float32),
             variance=variance,
+            noise=variance * (self.average @ self.unit[k]),
             inner=inner,
             pilot_variance=pilot**2 @ self.average.T,
             pilot_inner=(pilot @ self.inner.T) ** 2,

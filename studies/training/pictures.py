@@ -150,10 +150,10 @@ def _painted(rng: np.random.Generator, light: Light, at: Places, radius: float) 
     elif kind < 0.55:
         angle, period = rng.uniform(0, np.pi), rng.uniform(2.2, 10) * _FINE
         first = np.sin(2 * np.pi * (np.cos(angle) * y + np.sin(angle) * x) / period) > 0
-        return np.where(first[:, None], colour, light.signals(draw_surface(rng)))
+        return np.asarray(np.where(first[:, None], colour, light.signals(draw_surface(rng))))
     else:
         shade = np.ones(y.shape)
-    return np.clip(colour * shade[:, None], 0.0, 1.6)
+    return np.asarray(np.clip(colour * shade[:, None], 0.0, 1.6))
 
 
 def gratings(rng: np.random.Generator, light: Light) -> Floats:

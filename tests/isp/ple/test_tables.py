@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from isp.ple.prior import LETTERS, PATCH, Mixture, mixture, own_prior
-from isp.ple.tables import PILOT_VARIANCE, Sampling, Table, window
+from isp.ple.tables import LIFT, PILOT_VARIANCE, Sampling, Table, window
 from sensor.cfa import BAYER, RGBW
 
+GAINS = (0.5, 1.0, 0.45, 4.9)
 SIGMAS = 4.5  # of a normal deviate: 1 in 150 000
 
 
@@ -15,18 +16,17 @@ def mosaic_rows(tile):
 
 
 def sampling(tile=RGBW, prnu=0.01):
-    return Sampling(PATCH, mosaic_rows(tile), (0.5, 1.0, 0.45, 4.9), (1.8,) * 4, prnu)
+    return Sampling(PATCH, mosaic_rows(tile), GAINS, (1.8,) * 4, prnu)
 
 
-def drawn(table: Table, k: int, count: int, rng):
+def drawn(table: Table, k: int, light_e: float, count: int, rng):
     """Values of a component in units of noise, and their samples with noise."""
     mix, at = table.mix, table.rows
     factor = np.linalg.cholesky(mix.covariances[k].astype(np.float64) + 1e-9 * np.eye(len(table.values[k])))
     values = table.values[k] + rng.standard_normal((count, len(factor))) @ factor.T * table.slopes[k]
     values += rng.standard_normal((count, 1)) * table.drift[k]
-    root = table.values[k, at] / 2
-    electrons = root**2 - 1.8**2 - 0.125
-    noise = np.sqrt(1 + (0.01 * electrons / root) ** 2)
+    electrons = np.tile(GAINS, 64)[at] * light_e * (mix.means[k] ** 2 + np.diag(mix.covariances[k]))[at]
+    noise = np.sqrt((electrons + 1.8**2 + (0.01 * electrons) ** 2) / (electrons + (LIFT * 1.8) ** 2))
     return values, (values[:, at] + noise * rng.standard_normal((count, len(at)))).astype(np.float32)
 
 
@@ -36,7 +36,7 @@ def test_over_signals_drawn_from_the_prior_the_error_is_0_in_the_mean_and_varies
     rng, count = np.random.default_rng(1), 3000
     table = Table(mixture(own_prior()), sampling(tile), light_e)
     for k in (0, 17, 40):
-        values, y = drawn(table, k, count, rng)
+        values, y = drawn(table, k, light_e, count, rng)
         by = table.estimator(k)
         error = (y @ by.linear + by.offset) / np.repeat(window(PATCH).ravel(), 4) - values
         deviation = error.std(axis=0)
@@ -49,9 +49,9 @@ def test_over_signals_drawn_from_the_prior_the_error_is_0_in_the_mean_and_varies
 
 
 def test_with_a_pilot_the_error_varies_as_the_closed_form():
-    rng, count, k, told = np.random.default_rng(2), 3000, 17, 0.05
-    table = Table(mixture(own_prior()), sampling(), 2.0)
-    values, y = drawn(table, k, count, rng)
+    rng, count, k, told, light_e = np.random.default_rng(2), 3000, 17, 0.05, 2.0
+    table = Table(mixture(own_prior()), sampling(), light_e)
+    values, y = drawn(table, k, light_e, count, rng)
     by = table.estimator(k)
     scale = 1 / np.sqrt(
         (table.turn[k].T @ table.turn[k]).diagonal()
@@ -75,14 +75,15 @@ def test_one_component_is_the_textbooks_linear_estimate():
     mix = Mixture(PATCH, np.zeros(1), rng.uniform(0.5, 1.5, (1, 256)), covariance[None].astype(np.float32))
     given, light = sampling(prnu=0.0), 30.0
     at, gains = np.array(given.rows), np.tile(given.gains, 64)
-    # by hand, in units of noise: t = 2 sqrt(e + s^2 + 1/8), slope 2 g m u / sqrt(e + s^2 + 1/8)
+    # by hand, in units of noise: t = 2 sqrt(e + d^2 + 3/8 - r / 4), slope 2 g m u / (t / 2), noise r
     electrons = gains * light * (mix.means[0] ** 2 + np.diag(covariance))
-    deviation = np.sqrt(electrons + 1.8**2 + 0.125)
+    noise = (electrons + 1.8**2) / (electrons + (LIFT * 1.8) ** 2)
+    deviation = np.sqrt(electrons + (LIFT * 1.8) ** 2 + 0.375 - noise / 4)
     slope = 2 * gains * light * mix.means[0] / deviation
     table = Table(mix, given, light)
     whole = slope[:, None] * covariance * slope + np.outer(table.drift[0], table.drift[0])
     y = 2 * deviation[at] + rng.normal(0, 2, 64)
-    gain = np.linalg.solve(whole[np.ix_(at, at)] + np.eye(64), whole[at]).T
+    gain = np.linalg.solve(whole[np.ix_(at, at)] + np.diag(noise[at]), whole[at]).T
     expected = 2 * deviation + gain @ (y - 2 * deviation[at])
     by = table.estimator(0)
     found = (y.astype(np.float32) @ by.linear + by.offset) / np.repeat(window(PATCH).ravel(), 4)
