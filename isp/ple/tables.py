@@ -1,8 +1,8 @@
 """The prior in a frame's own units of noise, at one light: what picks a component, and the estimate that it gives.
 
 In units of noise (`isp.anscombe`, for a dark noise d = `LIFT` times s) a sample of e electrons reads about
-t = 2 sqrt(e + d^2 + 3/8 - r / 4), with noise of variance r = (e + s^2) / (e + d^2). Of a patch with light m and roots of
-signal u, a sample of channel c holds e = m g_c u^2. About a component's mean t is straight in u, so each component is a
+t = 2 sqrt(e + d^2 + 3/8 - r / 4), with noise of variance r = (e + s^2) / (e + d^2). Of a patch with light m and roots
+of signal u, a sample of channel c holds e = m g_c u^2. About a component's mean t is straight in u, so each component is a
 Gaussian over t as well, and its estimate from the mosaic's samples y is the linear one with the least squared error,
 t + C_xy (C_yy + N)^-1 (y - t_y).
 """

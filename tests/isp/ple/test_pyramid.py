@@ -31,7 +31,7 @@ def grey(level_e, tile, shape=(96, 96)):
 
 
 @pytest.mark.parametrize("tile", [RGBW, BAYER])
-@pytest.mark.parametrize("level_e", [0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10_000.0])
+@pytest.mark.parametrize("level_e", [0.01, 0.3, 10.0, 300.0, 10_000.0])
 def test_a_flat_field_keeps_its_mean(tile, level_e):
     # at 10 000 e- W is full, and nothing is asked of it
     planes, _ = reconstruct(exposure(grey(level_e, tile), tile, np.random.default_rng(4)))
@@ -44,21 +44,21 @@ def test_a_flat_field_keeps_its_mean(tile, level_e):
 
 
 @pytest.mark.parametrize("tile", [RGBW, BAYER])
-@pytest.mark.parametrize("side", [1, 2, 4, 8])
+@pytest.mark.parametrize("side", [1, 4])
 def test_a_lamp_in_the_dark_has_no_frame_around_it(tile, side):
     # Frames alike but for the lamp, which lies on each site of the tile in turn. No coarse scale helps beside it, and a
     # patch's own 16 Ws, or 32 greens, are what its estimate rests on.
     moved = []
     for seed in range(4):
-        at = (40 + seed % 2, 40 + seed // 2)
+        at = (32 + seed % 2, 32 + seed // 2)
         rng = np.random.default_rng(seed)
-        raw = exposure(np.full((80, 80), 0.1), tile, rng)
+        raw = exposure(np.full((64, 64), 0.1), tile, rng)
         lit = raw.dn.copy()
         lit[at[0] : at[0] + side, at[1] : at[1] + side] = 200 + FULL_E + rng.normal(0, NOISE_E, (side, side))
         without, within = (reconstruct(each)[0] for each in (raw, replace(raw, dn=lit)))
         moved.append(np.roll(within - without, (-at[0], -at[1]), axis=(0, 1)))
-    lines = np.arange(80)
-    away = np.where(lines < side, 0, np.minimum(lines - side + 1, 80 - lines))
+    lines = np.arange(64)
+    away = np.where(lines < side, 0, np.minimum(lines - side + 1, 64 - lines))
     beyond = np.maximum(away[:, None], away) > 3
     mean = np.mean(moved, axis=0)[beyond]
     assert np.abs(mean).max() < 4.5 * NOISE_E / np.sqrt(16 * len(moved))
