@@ -14,7 +14,6 @@ from isp.ple.prior import Prior
 from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, window
 
 STRIDE = 2  # pixels from patch to patch: one tile
-MARGIN = 20.0  # by which the quick log likelihood may be wrong
 STRIP = 100_000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons
 DOUBT = 2.0
@@ -23,7 +22,7 @@ LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of nois
 
 
 @dataclass(frozen=True)
-class Pilot:
+class PatchPilot:
     """What a coarser scale says of each patch.
 
     Attributes
@@ -39,7 +38,7 @@ class Pilot:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ScaleEstimate:
     """Every channel at every pixel of a scale.
 
     Attributes
@@ -74,8 +73,13 @@ def padded(samples: NDArray[Any], size: int) -> NDArray[Any]:
 
 
 def estimate(
-    prior: Prior, sampling: Sampling, samples: Singles, full: NDArray[np.bool_], light: Singles, pilot: Pilot | None
-) -> Estimate:
+    prior: Prior,
+    sampling: Sampling,
+    samples: Singles,
+    full: NDArray[np.bool_],
+    light: Singles,
+    pilot: PatchPilot | None,
+) -> ScaleEstimate:
     """Estimate every channel at every pixel of one scale.
 
     Parameters
@@ -88,7 +92,7 @@ def estimate(
         W's saturated samples: only lower bounds.
     light : (ny, nx) float32
         Of each patch [e- of white in G].
-    pilot : Pilot or None
+    pilot : PatchPilot or None
     """
     size = sampling.size
     shape, (ny, nx) = samples.shape[:2], light.shape
@@ -102,7 +106,7 @@ def estimate(
         y, hit = (_windows(values[part], size) for values in (wide, wide_full))
         told = None
         if pilot is not None:
-            told = Pilot(pilot.means[first:last].reshape(-1, 4), pilot.variance[first:last].ravel())
+            told = PatchPilot(pilot.means[first:last].reshape(-1, 4), pilot.variance[first:last].ravel())
         found = _solve(prior, sampling, y, hit, steps[first:last].ravel(), told)
         return *_overlapped(found, (last - first, nx), size), found.noise
 
@@ -128,7 +132,7 @@ def estimate(
     edge = size - STRIDE
     inside = total[edge : edge + shape[0], edge : edge + shape[1]]
     kept = tuple(slice(edge // STRIDE, edge // STRIDE + -(-length // STRIDE)) for length in shape)
-    return Estimate(inside, variance[kept], np.median(np.concatenate(noise), axis=0))
+    return ScaleEstimate(inside, variance[kept], np.median(np.concatenate(noise), axis=0))
 
 
 def _windows(values: NDArray[Any], size: int) -> NDArray[Any]:
@@ -140,7 +144,12 @@ def _windows(values: NDArray[Any], size: int) -> NDArray[Any]:
 
 
 def _solve(
-    prior: Prior, sampling: Sampling, y: Singles, full: NDArray[np.bool_], steps: NDArray[np.int32], pilot: Pilot | None
+    prior: Prior,
+    sampling: Sampling,
+    y: Singles,
+    full: NDArray[np.bool_],
+    steps: NDArray[np.int32],
+    pilot: PatchPilot | None,
 ) -> Patches:
     """Estimate patches by light; where Ws are full, first without any W, then with what that says of the full ones."""
     count, values = len(y), 4 * sampling.size**2
@@ -164,7 +173,7 @@ def _solve_by_light(
     sampling: Sampling,
     y: Singles,
     steps: NDArray[np.int32],
-    pilot: Pilot | None,
+    pilot: PatchPilot | None,
     among: NDArray[np.intp],
     found: Patches,
 ) -> None:
@@ -172,11 +181,11 @@ def _solve_by_light(
     bounds = np.flatnonzero(np.diff(steps[order], prepend=-(1 << 30), append=1 << 30))
     for first, last in pairwise(bounds.tolist()):
         index = order[first:last]
-        told = None if pilot is None else Pilot(pilot.means[index], pilot.variance[index])
+        told = None if pilot is None else PatchPilot(pilot.means[index], pilot.variance[index])
         _solve_one_light(table(prior, sampling, int(steps[index[0]])), y[index], told, index, found)
 
 
-def _solve_one_light(at: Table, y: Singles, pilot: Pilot | None, index: NDArray[np.intp], found: Patches) -> None:
+def _solve_one_light(at: Table, y: Singles, pilot: PatchPilot | None, index: NDArray[np.intp], found: Patches) -> None:
     """Estimate the patches `index`, whose samples are y, from one table."""
     noise = None
     if pilot is not None:
@@ -203,14 +212,14 @@ def _solve_one_light(at: Table, y: Singles, pilot: Pilot | None, index: NDArray[
 
 
 def _pick(
-    at: Table, y: Singles, pilot: Pilot | None, noise: Singles | None
+    at: Table, y: Singles, pilot: PatchPilot | None, noise: Singles | None
 ) -> tuple[NDArray[np.int32], Singles, Singles]:
     """Pick each patch's likeliest component: which, its misfit, and the pilot's innovation over its variance."""
     count, size = y.shape
     best, chosen = np.full(count, -np.inf, np.float32), np.zeros(count, np.int32)
     misfit, innovation = np.empty(count, np.float32), np.zeros((count, 4), np.float32)
     quick = _quick_likelihood(at, y)
-    candidate = quick > quick.max(axis=1, keepdims=True) - MARGIN
+    candidate = quick > quick.max(axis=1, keepdims=True) - at.margin
     for k in np.flatnonzero(candidate.any(axis=0)):
         some = np.flatnonzero(candidate[:, k])
         read = y[some] @ at.reads[k].T

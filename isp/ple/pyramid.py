@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.ple.estimate import STRIDE, Estimate, Pilot, estimate
+from isp.ple.estimate import STRIDE, PatchPilot, ScaleEstimate, estimate
 from isp.ple.prior import LETTERS, PATCH, Prior
 from isp.ple.tables import LIFT, PILOT_ERROR, Sampling, Singles, lift, lifted_root, unlift
 from sensor.cfa import channel_map, channels
@@ -45,7 +45,7 @@ class Cells:
 
 
 @dataclass(frozen=True)
-class Light:
+class PatchLight:
     """Light of each patch, (ny, nx) [e- of white in G]; its variance is ``shot * light + floor``, and its colour's."""
 
     mean: Singles
@@ -131,7 +131,7 @@ def _pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArra
     return levels
 
 
-def _estimate_cells(prior: Prior, cells: Cells, light: Singles, pilot: Pilot | None) -> Estimate:
+def _estimate_cells(prior: Prior, cells: Cells, light: Singles, pilot: PatchPilot | None) -> ScaleEstimate:
     stable = [
         lift(plane, cells.sampling.dark_e[channel])
         for plane, channel in zip(np.moveaxis(cells.electrons, -1, 0), cells.index, strict=True)
@@ -153,7 +153,7 @@ def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[t
     ]
 
 
-def _own_light(cells: Cells, sides: list[tuple[int, int]], stride: int) -> Light:
+def _own_light(cells: Cells, sides: list[tuple[int, int]], stride: int) -> PatchLight:
     """Light of patches of 4x4 cells from their own sums, each channel as sure as its noise; full Ws left out."""
     gains, dark = (np.array(each)[list(cells.index)] for each in (cells.sampling.gains, cells.sampling.dark_e))
     weights = gains / (np.maximum(np.median(cells.electrons, axis=(0, 1)), 0.1) + dark**2)
@@ -162,10 +162,10 @@ def _own_light(cells: Cells, sides: list[tuple[int, int]], stride: int) -> Light
     whole = CELLS**2 * (weights @ gains)
     mean = (sums * weights).sum(axis=-1) / whole
     shot, floor = (CELLS**2 * (weights**2 * each).sum(axis=-1) / whole**2 for each in (gains, dark**2))
-    return Light(*(each.astype(np.float32) for each in (mean, shot, floor)))
+    return PatchLight(*(each.astype(np.float32) for each in (mean, shot, floor)))
 
 
-def _told(coarse: Estimate, before: Sampling, now: Sampling, own: Light) -> tuple[Singles, Pilot]:
+def _told(coarse: ScaleEstimate, before: Sampling, now: Sampling, own: PatchLight) -> tuple[Singles, PatchPilot]:
     """Light and pilot of each patch of a scale, from the coarser scale's estimate and the patch's own light.
 
     A patch of the finer scale covers 4x4 cells of the coarser one, or 2x2 where it is of cells itself.
@@ -186,7 +186,7 @@ def _told(coarse: Estimate, before: Sampling, now: Sampling, own: Light) -> tupl
     most = np.maximum(np.maximum(own.mean, light), 0.0)
     own_variance = own.shot * most + own.floor + (COLOUR_SPREAD * most) ** 2
     both = (light * own_variance + own.mean * light_variance) / (own_variance + light_variance)
-    return both.astype(np.float32), Pilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
+    return both.astype(np.float32), PatchPilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
 
 
 def _patch_means(values: Singles, shape: tuple[int, ...], size: int) -> Singles:

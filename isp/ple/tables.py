@@ -2,8 +2,8 @@
 
 In units of noise (`isp.anscombe`, for a dark noise d = `LIFT` times s) a sample of e electrons reads about
 t = 2 sqrt(e + d^2 + 3/8 - r / 4), with noise of variance r = (e + s^2) / (e + d^2). Of a patch with light m and roots
-of signal u, a sample of channel c holds e = m g_c u^2. About a component's mean t is straight in u, so each component is a
-Gaussian over t as well, and its estimate from the mosaic's samples y is the linear one with the least squared error,
+of signal u, a sample of channel c holds e = m g_c u^2. About a component's mean t is straight in u, so each component
+is a Gaussian over t as well. Its estimate from the mosaic's samples y is the linear one with the least squared error,
 t + C_xy (C_yy + N)^-1 (y - t_y).
 """
 
@@ -30,6 +30,7 @@ TAPER = 1.0  # power of half a sine: the weight of a patch's pixels
 LIFT = 2.0
 _LEAST_BASE = 1e-12
 FEW = 20  # directions in which components are told apart first
+MARGINS = (5.0, 20.0)  # of that log likelihood: where the other directions are noise, and where they are all signal
 _TABLES = 160  # kept; up to 4 MB each
 
 
@@ -164,10 +165,15 @@ class Table:
         self.read_offset = np.einsum("kij,kj->ki", self.reads, self.values[:, at]).astype(np.float32)
         self.pilot_offset = np.einsum("kij,kj->ki", self.turn, self.values @ self.average.T).astype(np.float32)
         self.pilot_turn = self.turn.astype(np.float32)
-        self.centre, self.few, self.pairs, self.quick = self._quick_likelihood(seen)
+        self.centre, self.few, self.pairs, self.quick, outside = self._quick_likelihood(seen)
+        # The quick likelihood may be wrong by the more, the more signal the directions hold that it leaves out.
+        signal = 1.0 - np.mean(noise) / (np.exp(self.mix.log_weights) @ outside)
+        self.margin = float(np.interp(signal, (0.0, 1.0), MARGINS))
         self.estimators: dict[int, Estimator] = {}
 
-    def _quick_likelihood(self, seen: Doubles) -> tuple[Singles, Singles, tuple[NDArray[np.intp], ...], Singles]:
+    def _quick_likelihood(
+        self, seen: Doubles
+    ) -> tuple[Singles, Singles, tuple[NDArray[np.intp], ...], Singles, Doubles]:
         """Log likelihood in `FEW` directions and the rest's length, as one matrix on products of coordinates."""
         weights, at = np.exp(self.mix.log_weights), self.values[:, self.rows]
         centre = weights @ at
@@ -186,7 +192,7 @@ class Table:
             np.linalg.slogdet(within)[1] + (straight * mean).sum(axis=1) + others * np.log(outside)
         )
         quick = np.concatenate([square, straight, -0.5 / outside[:, None], constant[:, None]], axis=1)
-        return centre.astype(np.float32), few.astype(np.float32), pairs, quick.T.astype(np.float32)
+        return centre.astype(np.float32), few.astype(np.float32), pairs, quick.T.astype(np.float32), outside
 
     @cached_property
     def inner(self) -> Doubles:

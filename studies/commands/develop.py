@@ -32,8 +32,8 @@ def develop(
         Picture to write, .png or .tif; the raw file's name with .png by default.
     isp
         Pipeline: interleaved (RGBW) or bayer, by default the one for the file's mosaic. For Bayer also bayer_malvar,
-        bayer_menon, bayer_nlm, bayer_bm3d and ple_bayer; for RGBW rgbw_sato, rgbw_kijima, rgbw_yamagami, rgbw_gindele and
-        ple_rgbw.
+        bayer_menon, bayer_nlm, bayer_bm3d and ple_bayer; for RGBW rgbw_sato, rgbw_kijima, rgbw_yamagami, rgbw_gindele
+        and ple_rgbw.
     bits
         Bits a channel: 8 or 16.
     ev

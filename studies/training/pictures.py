@@ -52,7 +52,7 @@ _DARKEST = 2e-3  # of white
 
 
 @dataclass(frozen=True)
-class Light:
+class KnownLight:
     """What a camera's channels collect from each band, over what they do from white, shape (4, band)."""
 
     weights: Floats
@@ -68,7 +68,7 @@ def neutral_electrons(sensor: SensorConfig, lights: Sequence[str]) -> Floats:
     return np.asarray(collected / collected[:, 1:2])
 
 
-def draw_light(rng: np.random.Generator, sensor: SensorConfig) -> Light:
+def draw_light(rng: np.random.Generator, sensor: SensorConfig) -> KnownLight:
     """Draw a light: daylight more than half of the time, then bulbs, LEDs, fluorescent lamps and sodium.
 
     The camera knows what white is under it, but for one picture in `UNKNOWN`, where it takes D65's.
@@ -86,7 +86,7 @@ def draw_light(rng: np.random.Generator, sensor: SensorConfig) -> Light:
     name = str(rng.choice(list(kinds), p=list(kinds.values())))
     collected = _collected(sensor, name)
     white = _collected(sensor, "D65" if rng.random() < 1 / UNKNOWN else name).sum(axis=1, keepdims=True)
-    return Light(collected / white * white[3] / collected[3].sum())
+    return KnownLight(collected / white * white[3] / collected[3].sum())
 
 
 def _collected(sensor: SensorConfig, light: str) -> Floats:
@@ -111,7 +111,7 @@ def draw_surface(rng: np.random.Generator) -> Floats:
     return np.asarray(curve.band_average(_NM, width))
 
 
-def dead_leaves(rng: np.random.Generator, light: Light, shapes: int = 900) -> Floats:
+def dead_leaves(rng: np.random.Generator, light: KnownLight, shapes: int = 900) -> Floats:
     """Draw shapes that cover one another, sizes as the power law of natural pictures, shape (SIDE, SIDE, 4)."""
     side = SIDE * _FINE
     picture = np.empty((side, side, 4))
@@ -138,7 +138,7 @@ def _shape(rng: np.random.Generator, at: Floats, radius: float, side: int) -> Pl
     return y, x
 
 
-def _painted(rng: np.random.Generator, light: Light, at: Places, radius: float) -> Floats:
+def _painted(rng: np.random.Generator, light: KnownLight, at: Places, radius: float) -> Floats:
     """Signals of a shape's pixels: even, shaded, speckled, or striped in two colours; shape (pixel, 4)."""
     (y, x), colour, kind = at, light.signals(draw_surface(rng)), rng.random()
     if kind < 0.25:
@@ -156,7 +156,7 @@ def _painted(rng: np.random.Generator, light: Light, at: Places, radius: float) 
     return np.asarray(np.clip(colour * shade[:, None], 0.0, 1.6))
 
 
-def gratings(rng: np.random.Generator, light: Light) -> Floats:
+def gratings(rng: np.random.Generator, light: KnownLight) -> Floats:
     """Draw straight bars of three surfaces whose width grows across the picture, shape (SIDE, SIDE, 4)."""
     y, x = np.mgrid[: SIDE * _FINE, : SIDE * _FINE] / _FINE
     angle = rng.uniform(0, np.pi)
@@ -176,7 +176,7 @@ def _finished(rng: np.random.Generator, fine: Floats) -> Floats:
     return np.asarray(picture * np.exp(slope[0] * y + slope[1] * x)[..., None])
 
 
-def photograph(rng: np.random.Generator, light: Light, name: str) -> Floats:
+def photograph(rng: np.random.Generator, light: KnownLight, name: str) -> Floats:
     """Photograph of `PHOTOGRAPHS` at half its size, as signals under the light, shape (h, w, 4).
 
     The basis gives each colour one spectrum; a factor a channel stands for the others that look the same.
