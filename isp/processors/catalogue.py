@@ -22,6 +22,7 @@ from isp.processors.demosaic import malvar, menon, picture_demosaicked
 from isp.processors.fusion import picture_complementary, picture_kijima, picture_sato, picture_yamagami
 from isp.processors.gindele import picture_gindele
 from isp.processors.park import picture_rgbw_park
+from isp.processors.piecewise import picture_ple_bayer, picture_ple_rgbw
 from isp.processors.residual import residual_interpolation
 from isp.processors.sub_images import hadamard, principal_components
 from rodcone.errors import InputError
@@ -100,6 +101,7 @@ _BM3D_FIRST = partial(picture_denoised_first, mix=hadamard, demosaic=menon)
 _PARK = partial(picture_denoised_first, mix=principal_components, demosaic=residual_interpolation)
 _RESIDUAL_BM3D = partial(picture_demosaicked_first, demosaic=residual_interpolation)
 _EARLY = "W as luminance by early fusion"
+_PIECEWISE = "piecewise linear: Yu, Sapiro & Mallat 2012 with a fixed prior, Zoran & Weiss 2011"
 # As published; the first two are the paper's.
 _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
     {
@@ -125,6 +127,8 @@ _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
         ),
         "rgbw_gindele": Processor("rgbw", picture_gindele, "colours alone where W is full: Gindele & Gallagher 2002"),
         "rgbw_park": Processor("rgbw", picture_rgbw_park, "BM3D as Park et al. 2009, then Gindele", extra=BM3D),
+        "ple_rgbw": Processor("rgbw", picture_ple_rgbw, _PIECEWISE),
+        "ple_bayer": Processor("bayer", picture_ple_bayer, _PIECEWISE),
     }
 )
 FAIR = "_fair"  # ending of a processor's form whose colour matrix knows the noise; the others' does of itself

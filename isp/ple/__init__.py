@@ -1,0 +1,1 @@
+"""Piecewise linear estimation: every channel at every pixel from a mosaic, by a prior over patches."""

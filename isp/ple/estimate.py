@@ -1,0 +1,272 @@
+"""One scale: each patch picks a component and takes its estimate, and overlapping patches are averaged."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import pairwise
+from os import cpu_count
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from isp.ple.prior import Prior
+from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, window
+
+STRIDE = 2  # pixels from patch to patch: one tile
+STRIP = 100_000  # patches that are estimated together
+LEAST_LIGHT = 1e-3  # electrons
+DOUBT = 2.0
+INFLATE = 2.0
+LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of noise^2]
+
+
+@dataclass(frozen=True)
+class PatchPilot:
+    """What a coarser scale says of each patch.
+
+    Attributes
+    ----------
+    means : (ny, nx, 4) float32
+        Of the patch, by channel [units of noise].
+    variance : (ny, nx) float32
+        Of these means.
+    """
+
+    means: Singles
+    variance: Singles
+
+
+@dataclass(frozen=True)
+class ScaleEstimate:
+    """Every channel at every pixel of a scale.
+
+    Attributes
+    ----------
+    planes : (h, w, 4) float32
+        In units of noise.
+    variance : (h/2, w/2, 4) float32
+        Posterior variance of the mean of a patch's middle.
+    noise : (4,) float64
+        Posterior variance of a pixel, median over the patches.
+    """
+
+    planes: Singles
+    variance: Singles
+    noise: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Estimates of some patches; arrays over the patches first."""
+
+    values: Singles
+    weight: Singles
+    inner: Singles
+    noise: Singles
+
+
+def padded(samples: NDArray[Any], size: int) -> NDArray[Any]:
+    """Samples (h, w, ...), continued by reflection so that every one lies in as many patches."""
+    sides = [(size - STRIDE, (length - 1) // STRIDE * STRIDE + size - length) for length in samples.shape[:2]]
+    return np.pad(samples, sides + [(0, 0)] * (samples.ndim - 2), mode="reflect")
+
+
+def estimate(
+    prior: Prior,
+    sampling: Sampling,
+    samples: Singles,
+    full: NDArray[np.bool_],
+    light: Singles,
+    pilot: PatchPilot | None,
+) -> ScaleEstimate:
+    """Estimate every channel at every pixel of one scale.
+
+    Parameters
+    ----------
+    prior : Prior
+    sampling : Sampling
+    samples : (h, w) or (h, w, channel) float32
+        In units of noise.
+    full : like `samples`, bool
+        W's saturated samples: only lower bounds.
+    light : (ny, nx) float32
+        Of each patch [e- of white in G].
+    pilot : PatchPilot or None
+    """
+    size = sampling.size
+    shape, (ny, nx) = samples.shape[:2], light.shape
+    steps = np.round(np.log(np.maximum(light, LEAST_LIGHT)) / np.log(STEP)).astype(np.int32)
+    wide, wide_full = padded(samples, size), padded(full, size)
+    rows = max(1, STRIP // nx)
+
+    def strip(first: int) -> tuple[Singles, ...]:
+        last = min(first + rows, ny)
+        part = slice(first * STRIDE, (last - 1) * STRIDE + size)
+        y, hit = (_windows(values[part], size) for values in (wide, wide_full))
+        told = None
+        if pilot is not None:
+            told = PatchPilot(pilot.means[first:last].reshape(-1, 4), pilot.variance[first:last].ravel())
+        found = _solve(prior, sampling, y, hit, steps[first:last].ravel(), told)
+        return *_overlapped(found, (last - first, nx), size), found.noise
+
+    # Sums run strip by strip, whatever the threads.
+    total = np.zeros(((ny - 1) * STRIDE + size, (nx - 1) * STRIDE + size, 4), np.float32)
+    weight = np.zeros(total.shape[:2], np.float32)
+    variance = np.zeros((total.shape[0] // STRIDE, total.shape[1] // STRIDE, 4), np.float32)
+    cells, noise = np.zeros(variance.shape[:2], np.float32), []
+    with ThreadPoolExecutor(cpu_count()) as threads:
+        for first, (values, weights, inner, count, each) in zip(
+            range(0, ny, rows), threads.map(strip, range(0, ny, rows)), strict=True
+        ):
+            for sums, part, start in (
+                (total, values, first * STRIDE),
+                (weight, weights, first * STRIDE),
+                (variance, inner, first),
+                (cells, count, first),
+            ):
+                sums[start : start + len(part)] += part
+            noise.append(each)
+    total /= weight[..., None]
+    variance /= cells[..., None]
+    edge = size - STRIDE
+    inside = total[edge : edge + shape[0], edge : edge + shape[1]]
+    kept = tuple(slice(edge // STRIDE, edge // STRIDE + -(-length // STRIDE)) for length in shape)
+    return ScaleEstimate(inside, variance[kept], np.median(np.concatenate(noise), axis=0))
+
+
+def _windows(values: NDArray[Any], size: int) -> NDArray[Any]:
+    """Patches `STRIDE` apart, shape (patch, sample)."""
+    view = sliding_window_view(values, (size, size), axis=(0, 1))[::STRIDE, ::STRIDE]
+    if values.ndim == 3:
+        view = np.moveaxis(view, 2, -1)
+    return view.reshape(view.shape[0] * view.shape[1], -1)
+
+
+def _solve(
+    prior: Prior,
+    sampling: Sampling,
+    y: Singles,
+    full: NDArray[np.bool_],
+    steps: NDArray[np.int32],
+    pilot: PatchPilot | None,
+) -> Patches:
+    """Estimate patches by light; where Ws are full, first without any W, then with what that says of the full ones."""
+    count, values = len(y), 4 * sampling.size**2
+    found = Patches(*(np.empty((count, *shape), np.float32) for shape in ((values,), (), (4,), (4,))))
+    hit = full.any(axis=1)
+    if hit.any():
+        rows = np.array(sampling.rows)
+        kept = rows % 4 != 3
+        blind = Sampling(sampling.size, tuple(rows[kept].tolist()), sampling.gains, sampling.dark_e, sampling.prnu)
+        some = np.flatnonzero(hit)
+        _solve_by_light(prior, blind, y[:, kept], steps, pilot, some, found)
+        guess = found.values[np.ix_(some, rows)] / window(sampling.size).ravel()[rows // 4]
+        y = y.copy()
+        y[some] = np.where(full[some], np.maximum(y[some], guess), y[some])
+    _solve_by_light(prior, sampling, y, steps, pilot, np.arange(count), found)
+    return found
+
+
+def _solve_by_light(
+    prior: Prior,
+    sampling: Sampling,
+    y: Singles,
+    steps: NDArray[np.int32],
+    pilot: PatchPilot | None,
+    among: NDArray[np.intp],
+    found: Patches,
+) -> None:
+    order = among[np.argsort(steps[among], kind="stable")]
+    bounds = np.flatnonzero(np.diff(steps[order], prepend=-(1 << 30), append=1 << 30))
+    for first, last in pairwise(bounds.tolist()):
+        index = order[first:last]
+        told = None if pilot is None else PatchPilot(pilot.means[index], pilot.variance[index])
+        _solve_one_light(table(prior, sampling, int(steps[index[0]])), y[index], told, index, found)
+
+
+def _solve_one_light(at: Table, y: Singles, pilot: PatchPilot | None, index: NDArray[np.intp], found: Patches) -> None:
+    """Estimate the patches `index`, whose samples are y, from one table."""
+    noise = None
+    if pilot is not None:
+        noise = (INFLATE * pilot.variance + at.pilot_floor) / (PILOT_VARIANCE + at.pilot_floor)
+    chosen, misfit, innovation = _pick(at, y, pilot, noise)
+    order = np.argsort(chosen, kind="stable")
+    bounds = np.flatnonzero(np.diff(chosen[order], prepend=-1, append=-1))
+    for first, last in pairwise(bounds.tolist()):
+        some = order[first:last]
+        place, by = index[some], at.estimator(int(chosen[some[0]]))
+        values = y[some] @ by.linear
+        values += by.offset
+        variance, inner, share = by.variance, by.inner, by.noise / by.variance
+        if noise is not None:
+            values += innovation[some] @ by.pilot
+            sure = 1.0 / (noise[some, None] + at.spread[chosen[some[0]]])
+            variance, inner = by.variance - sure @ by.pilot_variance, by.inner - sure @ by.pilot_inner
+        # A patch that no component explains knows its pixels by as much less.
+        doubt = np.maximum(misfit[some], 1.0) ** DOUBT
+        found.weight[place] = 1.0 / (doubt * (variance.mean(axis=-1) + LEAST_VARIANCE))
+        found.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
+        found.noise[place] = variance * share
+        found.values[place] = values
+
+
+def _pick(
+    at: Table, y: Singles, pilot: PatchPilot | None, noise: Singles | None
+) -> tuple[NDArray[np.int32], Singles, Singles]:
+    """Pick each patch's likeliest component: which, its misfit, and the pilot's innovation over its variance."""
+    count, size = y.shape
+    best, chosen = np.full(count, -np.inf, np.float32), np.zeros(count, np.int32)
+    misfit, innovation = np.empty(count, np.float32), np.zeros((count, 4), np.float32)
+    quick = _quick_likelihood(at, y)
+    candidate = quick > quick.max(axis=1, keepdims=True) - at.margin
+    for k in np.flatnonzero(candidate.any(axis=0)):
+        some = np.flatnonzero(candidate[:, k])
+        read = y[some] @ at.reads[k].T
+        read -= at.read_offset[k]
+        square = np.einsum("ij,ij->i", read[:, :size], read[:, :size])
+        likelihood = at.log_scale[k] - 0.5 * square
+        if pilot is not None and noise is not None:
+            news = pilot.means[some] @ at.pilot_turn[k].T - at.pilot_offset[k] - read[:, size:]
+            spread = noise[some, None] + at.spread[k].astype(np.float32)
+            likelihood -= 0.5 * (np.log(spread) + news**2 / spread).sum(axis=1)
+            news /= spread
+        better = likelihood > best[some]
+        winners = some[better]
+        best[winners], chosen[winners], misfit[winners] = likelihood[better], k, square[better] / size
+        if pilot is not None:
+            innovation[winners] = news[better]
+    return chosen, misfit, innovation
+
+
+def _quick_likelihood(at: Table, y: Singles) -> Singles:
+    off = y - at.centre
+    few = off @ at.few
+    outside = np.einsum("ij,ij->i", off, off) - np.einsum("ij,ij->i", few, few)
+    pairs = few[:, at.pairs[0]] * few[:, at.pairs[1]]
+    features = np.concatenate([pairs, few, outside[:, None], np.ones_like(outside)[:, None]], axis=1)
+    return np.asarray(features @ at.quick)
+
+
+def _overlapped(found: Patches, shape: tuple[int, int], size: int) -> tuple[Singles, ...]:
+    """Sums over overlapping patches: values and weights by pixel, variances and weights by cells of 2x2 pixels."""
+    (ny, nx), across = shape, size // STRIDE
+    total = np.zeros(((ny - 1) * STRIDE + size, nx - 1 + across, 4 * STRIDE), np.float32)
+    weight = np.zeros((len(total), nx - 1 + across, STRIDE), np.float32)
+    cells = np.zeros((ny - 1 + across, nx - 1 + across), np.float32)
+    variance = np.zeros((*cells.shape, 4), np.float32)
+    values = found.values
+    values *= found.weight[:, None]
+    values = values.reshape(ny, nx, size, across, 4 * STRIDE)
+    each, inner = found.weight.reshape(ny, nx), (found.inner * found.weight[:, None]).reshape(ny, nx, 4)
+    taper = window(size).reshape(size, across, STRIDE)
+    for i in range(size):
+        for j in range(across):
+            rows = slice(i, i + (ny - 1) * STRIDE + 1, STRIDE)
+            total[rows, j : j + nx] += values[:, :, i, j]
+            weight[rows, j : j + nx] += each[..., None] * taper[i, j]
+    for i in range(across):
+        for j in range(across):
+            cells[i : i + ny, j : j + nx] += each
+            variance[i : i + ny, j : j + nx] += inner
+    return total.reshape(len(total), -1, 4), weight.reshape(len(total), -1), variance, cells

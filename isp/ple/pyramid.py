@@ -1,0 +1,204 @@
+"""From a raw image to every channel at every pixel: coarse scales first, each finer one told by the last.
+
+In the dark a patch of 8x8 pixels holds too little light to say what it shows. Sums of 2x2, 4x4, ... pixels say the
+means over larger patches; the finer scale takes them as further samples with a known error.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from isp.ple.estimate import STRIDE, PatchPilot, ScaleEstimate, estimate
+from isp.ple.prior import LETTERS, PATCH, Prior
+from isp.ple.tables import LIFT, PILOT_ERROR, Sampling, Singles, lift, lifted_root, unlift
+from sensor.cfa import channel_map, channels
+from sensor.raw import RawImage
+
+SCALES = 4  # coarser ones
+CELLS = 4  # a side of a coarse patch
+LEAST_CELLS = 5  # a side of the coarsest scale
+COLOUR_SPREAD = 0.2  # relative standard deviation of the light that a patch's own sums show, by its colour
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Sums of samples over square cells.
+
+    Attributes
+    ----------
+    electrons : (h, w, channel) float32
+        Of the mosaic's channels [e-].
+    full : (h, w, channel) bool
+        Where a saturated W is in the sum.
+    sampling : Sampling
+        Of patches of 4x4 cells.
+    index : tuple of int
+        Places of the mosaic's channels among R, G, B and W.
+    """
+
+    electrons: Singles
+    full: NDArray[np.bool_]
+    sampling: Sampling
+    index: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class PatchLight:
+    """Light of each patch, (ny, nx) [e- of white in G]; its variance is ``shot * light + floor``, and its colour's."""
+
+    mean: Singles
+    shot: Singles
+    floor: Singles
+
+
+def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Singles, NDArray[np.float64]]:
+    """Reconstruct every channel at every pixel.
+
+    Parameters
+    ----------
+    raw : RawImage
+        Its tile is 2x2, of R, G, B and W.
+    prior : Prior
+        Of the camera's curves.
+    white_e : (4,) array_like
+        Electrons of R, G, B and W from white under the scene's light, relative to G.
+
+    Returns
+    -------
+    (h, w, channel) float32
+        In electrons, channels in the order of `sensor.cfa.channels`.
+    (channel,) float64
+        Posterior variance of a pixel over a sample's noise, median over the patches.
+    """
+    electrons = raw.electrons.astype(np.float32)
+    full = raw.saturated & (channel_map(raw.cfa, raw.shape) == "W")
+    pyramid = _pyramid(raw, white_e, electrons, full)
+    coarsest = pyramid[-1]
+    light = _own_light(coarsest, [_border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
+    found = _estimate_cells(prior, coarsest, light, None)
+    for coarse, cells in zip(pyramid[:0:-1], pyramid[-2::-1], strict=True):
+        shape = cells.full.shape[:2]
+        own = _own_light(cells, [_border(length, CELLS) for length in shape], STRIDE)
+        found = _estimate_cells(prior, cells, *_told(found, coarse.sampling, cells.sampling, own))
+
+    cells = pyramid[0]
+    own = _own_light(cells, _sides(raw.shape, cells.full.shape, PATCH), 1)
+    sites = [4 * (PATCH * y + x) + LETTERS.index(raw.cfa[y % 2][x % 2]) for y in range(PATCH) for x in range(PATCH)]
+    sampling = _sampling(raw, white_e, np.ones(4), PATCH, tuple(sites))
+    light, pilot = _told(found, cells.sampling, sampling, own)
+    found = estimate(prior, sampling, lift(electrons, raw.dark_noise_e), full, light, pilot)
+    planes = found.planes[..., cells.index]
+    for first in range(0, len(planes), 256):
+        planes[first : first + 256] = unlift(planes[first : first + 256], raw.dark_noise_e)
+    return planes, found.noise[list(cells.index)]
+
+
+def _sampling(
+    raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]
+) -> Sampling:
+    dark = raw.dark_noise_e * np.sqrt(counts)
+    return Sampling(size, rows, tuple((np.asarray(white_e) * counts).tolist()), tuple(dark.tolist()), raw.prnu)
+
+
+def _pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray[np.bool_]) -> list[Cells]:
+    """Cells of 2x2, 4x4, ... pixels."""
+    names = channels(raw.cfa)
+    index = tuple(LETTERS.index(name) for name in names)
+    rows = tuple(4 * place + channel for place in range(CELLS**2) for channel in index)
+    height, width = (length // 2 for length in raw.shape)
+    quads, hit = (a[: 2 * height, : 2 * width].reshape(height, 2, width, 2) for a in (electrons, full))
+    sums, fulls, counts = [], [], np.ones(4)
+    for name, channel in zip(names, index, strict=True):
+        sites = [(i, j) for i in (0, 1) for j in (0, 1) if raw.cfa[i][j] == name]
+        sums.append(sum(quads[:, i, :, j] for i, j in sites))
+        fulls.append(np.any([hit[:, i, :, j] for i, j in sites], axis=0))
+        counts[channel] = len(sites)
+    last = Cells(np.stack(sums, -1), np.stack(fulls, -1), _sampling(raw, white_e, counts, CELLS, rows), index)
+    levels = [last]
+    while len(levels) < SCALES and min(last.full.shape[:2]) // 2 >= LEAST_CELLS:
+        height, width = (length // 2 for length in last.full.shape[:2])
+        four, hit = (a[: 2 * height, : 2 * width].reshape(height, 2, width, 2, -1) for a in (last.electrons, last.full))
+        counts[list(index)] *= 4
+        last = replace(
+            last,
+            electrons=four.sum(axis=(1, 3)),
+            full=np.asarray(hit.any(axis=(1, 3))),
+            sampling=_sampling(raw, white_e, counts, CELLS, rows),
+        )
+        levels.append(last)
+    return levels
+
+
+def _estimate_cells(prior: Prior, cells: Cells, light: Singles, pilot: PatchPilot | None) -> ScaleEstimate:
+    stable = [
+        lift(plane, cells.sampling.dark_e[channel])
+        for plane, channel in zip(np.moveaxis(cells.electrons, -1, 0), cells.index, strict=True)
+    ]
+    return estimate(prior, cells.sampling, np.stack(stable, axis=-1), cells.full, light, pilot)
+
+
+def _border(length: int, size: int) -> tuple[int, int]:
+    """Samples to add before and behind, so that every one lies in as many patches."""
+    return size - STRIDE, (length - 1) // STRIDE * STRIDE + size - length
+
+
+def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[tuple[int, int]]:
+    """Cells to add before and behind, so that 4x4 of them stand for each patch of the finer scale."""
+    patches = [(length - 1) // STRIDE + size // STRIDE for length in shape]
+    return [
+        (size // STRIDE - 1, count + CELLS - size // STRIDE - cells)
+        for count, cells in zip(patches, coarse, strict=False)
+    ]
+
+
+def _own_light(cells: Cells, sides: list[tuple[int, int]], stride: int) -> PatchLight:
+    """Light of patches of 4x4 cells from their own sums, each channel as sure as its noise; full Ws left out."""
+    gains, dark = (np.array(each)[list(cells.index)] for each in (cells.sampling.gains, cells.sampling.dark_e))
+    weights = gains / (np.maximum(np.median(cells.electrons, axis=(0, 1)), 0.1) + dark**2)
+    full, sums = (_sums(np.pad(a, [*sides, (0, 0)], mode="symmetric"), stride) for a in (cells.full, cells.electrons))
+    weights = np.where(full > 0, 0.0, weights)
+    whole = CELLS**2 * (weights @ gains)
+    mean = (sums * weights).sum(axis=-1) / whole
+    shot, floor = (CELLS**2 * (weights**2 * each).sum(axis=-1) / whole**2 for each in (gains, dark**2))
+    return PatchLight(*(each.astype(np.float32) for each in (mean, shot, floor)))
+
+
+def _told(coarse: ScaleEstimate, before: Sampling, now: Sampling, own: PatchLight) -> tuple[Singles, PatchPilot]:
+    """Light and pilot of each patch of a scale, from the coarser scale's estimate and the patch's own light.
+
+    A patch of the finer scale covers 4x4 cells of the coarser one, or 2x2 where it is of cells itself.
+    """
+    old, new, share = np.array(before.dark_e), np.array(now.dark_e), np.array(now.gains) / np.array(before.gains)
+    electrons = np.stack([unlift(coarse.planes[..., c], old[c]) for c in range(4)], axis=-1)
+    finer = electrons * share
+    noise = np.maximum(finer, 0) + (LIFT * new) ** 2 + 0.375
+    # A posterior variance counts in the finer scale's units of noise.
+    wide = np.repeat(np.repeat(coarse.variance, STRIDE, 0), STRIDE, 1)[: finer.shape[0], : finer.shape[1]]
+    wide = wide * (share**2 * (np.maximum(electrons, 0) + (LIFT * old) ** 2 + 0.375) / noise)
+    light = finer[..., 3] / now.gains[3]
+    light_variance = wide[..., 3] * noise[..., 3] / now.gains[3] ** 2 + (PILOT_ERROR * light) ** 2
+    roots = 2.0 * lifted_root(np.maximum(finer, 0.0), new)
+    held = np.concatenate([roots, np.stack([wide.mean(axis=-1), light, light_variance], axis=-1)], axis=-1)
+    means = _patch_means(held.astype(np.float32), own.mean.shape, now.size)
+    light, light_variance = means[..., 5], means[..., 6]
+    most = np.maximum(np.maximum(own.mean, light), 0.0)
+    own_variance = own.shot * most + own.floor + (COLOUR_SPREAD * most) ** 2
+    both = (light * own_variance + own.mean * light_variance) / (own_variance + light_variance)
+    return both.astype(np.float32), PatchPilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
+
+
+def _patch_means(values: Singles, shape: tuple[int, ...], size: int) -> Singles:
+    """Means over the cells that each patch of a finer scale covers."""
+    side = size // STRIDE
+    sides = [(side - 1, count - cells) for count, cells in zip(shape, values.shape[:2], strict=True)]
+    wide = np.pad(values, [*sides, (0, 0)], mode="symmetric")
+    return _sums(wide, 1, side) / np.float32(side**2)
+
+
+def _sums(values: NDArray[Any], stride: int, side: int = CELLS) -> Singles:
+    """Sums over `side` x `side`, `stride` apart."""
+    ends = [(length - side) // stride * stride + 1 for length in values.shape[:2]]
+    rows = np.add.reduce([values[i : i + ends[0] : stride].astype(np.float32) for i in range(side)])
+    return np.asarray(np.add.reduce([rows[:, j : j + ends[1] : stride] for j in range(side)]))

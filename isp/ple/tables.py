@@ -1,0 +1,237 @@
+"""The prior in a frame's own units of noise, at one light: what picks a component, and the estimate that it gives.
+
+In units of noise (`isp.anscombe`, for a dark noise d = `LIFT` times s) a sample of e electrons reads about
+t = 2 sqrt(e + d^2 + 3/8 - r / 4), with noise of variance r = (e + s^2) / (e + d^2). Of a patch with light m and roots
+of signal u, a sample of channel c holds e = m g_c u^2. About a component's mean t is straight in u, so each component
+is a Gaussian over t as well. Its estimate from the mosaic's samples y is the linear one with the least squared error,
+t + C_xy (C_yy + N)^-1 (y - t_y).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.anscombe import stabilise, unstabilise
+from isp.ple.prior import Mixture, Prior, mixture
+
+Doubles = NDArray[np.float64]
+Singles = NDArray[np.float32]
+
+STEP = 1.25  # of light, from one table to the next
+LIGHT_ERROR = 0.12  # relative standard deviation of a patch's light, the step's included
+PILOT_ERROR = 0.03  # by which a coarser scale may differ from the patch, beside its variance [of the light]
+PILOT_VARIANCE = 0.02  # typical of a coarser scale [units of noise^2]; the ratio between channels depends on it
+TAPER = 1.0  # power of half a sine: the weight of a patch's pixels
+# The transform bends most at 0, where dark noise of its own size makes outliers of dark samples; as for twice the dark
+# noise it is nearly straight, and the samples' noise under 1 by a known factor.
+LIFT = 2.0
+_LEAST_BASE = 1e-12
+FEW = 20  # directions in which components are told apart first
+MARGINS = (5.0, 20.0)  # of that log likelihood: where the other directions are noise, and where they are all signal
+_TABLES = 160  # kept; up to 4 MB each
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How a patch is sampled, the same all over a scale.
+
+    Attributes
+    ----------
+    size : int
+        Pixels a side of a patch.
+    rows : tuple of int
+        Places of the samples in the patch's vector, 4 * pixel + channel.
+    gains : (4,) tuple of float
+        Electrons of a sample of each channel in unit light, from white.
+    dark_e : (4,) tuple of float
+        Dark noise of a sample [e-].
+    prnu : float
+    """
+
+    size: int
+    rows: tuple[int, ...]
+    gains: tuple[float, ...]
+    dark_e: tuple[float, ...]
+    prnu: float
+
+
+@dataclass(frozen=True, eq=False)
+class Estimator:
+    """One component's estimate at one light, for samples y and a coarser scale's means p.
+
+    Attributes
+    ----------
+    linear : (sample, value) float32
+    offset : (value,) float32
+        The estimate without a pilot is ``y @ linear + offset``.
+    pilot : (4, value) float32
+        What each of the pilot's four directions adds, by its innovation over its variance.
+    variance, noise : (4,) float64
+        Posterior variance of a pixel, mean by channel, and the same over the variance of a sample's noise.
+    inner : (4,) float64
+        Posterior variance of the mean of the patch's middle, by channel.
+    pilot_variance, pilot_inner : (4, 4) float64
+        What a direction (row) takes off both, over its variance.
+    """
+
+    linear: Singles
+    offset: Singles
+    pilot: Singles
+    variance: Doubles
+    noise: Doubles
+    inner: Doubles
+    pilot_variance: Doubles
+    pilot_inner: Doubles
+
+
+def lift(electrons: NDArray[Any], dark_e: float) -> NDArray[Any]:
+    """Samples in units of noise, as the transform makes them for `LIFT` times the dark noise."""
+    return stabilise(electrons, LIFT * dark_e, 0.0)
+
+
+def lifted_root(electrons: NDArray[Any], dark_e: NDArray[Any]) -> Doubles:
+    """Half of what samples of these expected electrons read in the mean after `lift`.
+
+    To second order E sqrt(x) = sqrt(E x - var x / (4 E x)).
+    """
+    base = electrons + (LIFT * dark_e) ** 2
+    return np.asarray(np.sqrt(base + 0.375 - 0.25 * (electrons + dark_e**2) / np.maximum(base, _LEAST_BASE)))
+
+
+def unlift(stable: NDArray[Any], dark_e: float) -> Doubles:
+    """Electrons whose samples read this in the mean after `lift`.
+
+    To second order as `lifted_root`; beyond, what the exact inverse adds for shot noise, by its share of the noise.
+    """
+    plain = 0.25 * np.asarray(stable, dtype=np.float64) ** 2 - (LIFT * dark_e) ** 2 - 0.375
+    skew = unstabilise(stable, LIFT * dark_e) - plain - 0.25
+    seen = np.maximum(plain, 0.0)
+    ratio = (seen + dark_e**2) / np.maximum(seen + (LIFT * dark_e) ** 2, _LEAST_BASE)
+    share = seen / np.maximum(seen + dark_e**2, _LEAST_BASE) if dark_e else 1.0
+    return np.asarray(plain + 0.25 * ratio + share * skew)
+
+
+def window(size: int) -> Singles:
+    """How much each pixel of a patch counts where patches overlap, shape (size, size): its edges are less sure."""
+    line = np.sin(np.pi * (np.arange(size) + 0.5) / size) ** TAPER
+    return np.outer(line, line).astype(np.float32)
+
+
+class Table:
+    """All components at one light; the estimators are made when they are first asked for."""
+
+    def __init__(self, mix: Mixture, sampling: Sampling, light: float) -> None:
+        self.mix, self.rows = mix, np.array(sampling.rows)
+        pixels, count = mix.size**2, len(sampling.rows)
+        gains, dark = (np.tile(values, pixels) for values in (sampling.gains, sampling.dark_e))
+        # The components in units of noise: values t, their slope in u, and their slope in the light.
+        variances = np.diagonal(mix.covariances, axis1=1, axis2=2)
+        electrons = gains * light * (mix.means**2 + variances)
+        root = lifted_root(electrons, dark)
+        self.values, self.slopes = 2.0 * root, 2.0 * gains * light * mix.means / root
+        own = gains[self.rows] ** 2 / (gains[self.rows] * light + dark[self.rows] ** 2)
+        self.drift = electrons / root * np.hypot(LIGHT_ERROR, 1 / (light * np.sqrt(own.sum())))
+        # Samples: whitening, and the log likelihood's constant.
+        at = self.rows
+        seen = mix.covariances[:, at[:, None], at] * self.slopes[:, at, None] * self.slopes[:, None, at]
+        seen += self.drift[:, at, None] * self.drift[:, None, at]
+        shot = electrons + dark**2 + (sampling.prnu * electrons) ** 2
+        noise = shot[:, at] / (electrons[:, at] + (LIFT * dark[at]) ** 2)
+        self.unit = (electrons + (LIFT * dark) ** 2) / (electrons + dark**2)
+        seen[:, np.arange(count), np.arange(count)] += noise
+        self.factors = np.linalg.inv(np.linalg.cholesky(seen))
+        self.log_scale = mix.log_weights + np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
+        # The pilot: the patch's means p by channel, turned so that its directions are independent given the samples.
+        self.average = np.tile(np.eye(4), pixels) / pixels
+        steep = self.average * self.slopes[:, None]
+        lean = steep.astype(np.float32) @ mix.covariances
+        drift = (self.average @ self.drift.T).T
+        cross = lean[:, :, at] * self.slopes[:, None, at] + drift[:, :, None] * self.drift[:, None, at]
+        whole = lean @ steep.swapaxes(1, 2) + drift[:, :, None] * drift[:, None]
+        half = cross @ self.factors.swapaxes(1, 2)
+        brightness = np.sqrt((self.average @ (electrons / root).T) ** 2).mean(axis=1)
+        self.pilot_floor = float(((PILOT_ERROR * brightness) ** 2).mean())
+        scale = np.sqrt(PILOT_VARIANCE + (PILOT_ERROR * brightness) ** 2)
+        left = (whole - half @ half.swapaxes(1, 2)) / scale / scale[:, None]
+        self.spread, turns = np.linalg.eigh(left)
+        self.spread = np.maximum(self.spread, 0.0)
+        self.turn = turns.swapaxes(1, 2) / scale  # (component, direction, channel)
+        # One matrix gives both: whitened samples, and what they say of the pilot's directions.
+        told = self.turn @ (half @ self.factors)
+        self.reads = np.concatenate([self.factors, told], axis=1).astype(np.float32)
+        self.read_offset = np.einsum("kij,kj->ki", self.reads, self.values[:, at]).astype(np.float32)
+        self.pilot_offset = np.einsum("kij,kj->ki", self.turn, self.values @ self.average.T).astype(np.float32)
+        self.pilot_turn = self.turn.astype(np.float32)
+        self.centre, self.few, self.pairs, self.quick, outside = self._quick_likelihood(seen)
+        # The quick likelihood may be wrong by the more, the more signal the directions hold that it leaves out.
+        signal = 1.0 - np.mean(noise) / (np.exp(self.mix.log_weights) @ outside)
+        self.margin = float(np.interp(signal, (0.0, 1.0), MARGINS))
+        self.estimators: dict[int, Estimator] = {}
+
+    def _quick_likelihood(
+        self, seen: Doubles
+    ) -> tuple[Singles, Singles, tuple[NDArray[np.intp], ...], Singles, Doubles]:
+        """Log likelihood in `FEW` directions and the rest's length, as one matrix on products of coordinates."""
+        weights, at = np.exp(self.mix.log_weights), self.values[:, self.rows]
+        centre = weights @ at
+        off = at - centre
+        pooled = np.tensordot(weights, seen, 1) + (off.T * weights) @ off
+        few = np.linalg.eigh(pooled)[1][:, ::-1][:, :FEW]
+        mean, within = off @ few, few.T @ seen @ few
+        inverse = np.linalg.inv(within)
+        others = seen.shape[1] - FEW
+        total = np.trace(seen, axis1=1, axis2=2) + (off**2).sum(axis=1)
+        outside = (total - np.trace(within, axis1=1, axis2=2) - (mean**2).sum(axis=1)) / max(others, 1)
+        pairs = np.triu_indices(FEW)
+        square = -0.5 * inverse[:, pairs[0], pairs[1]] * np.where(pairs[0] == pairs[1], 1.0, 2.0)
+        straight = np.einsum("kij,kj->ki", inverse, mean)
+        constant = self.mix.log_weights - 0.5 * (
+            np.linalg.slogdet(within)[1] + (straight * mean).sum(axis=1) + others * np.log(outside)
+        )
+        quick = np.concatenate([square, straight, -0.5 / outside[:, None], constant[:, None]], axis=1)
+        return centre.astype(np.float32), few.astype(np.float32), pairs, quick.T.astype(np.float32), outside
+
+    @cached_property
+    def inner(self) -> Doubles:
+        """Averages over the patch's middle by channel, shape (4, value)."""
+        size = self.mix.size
+        middle = np.zeros((size, size))
+        middle[size // 4 : -(size // 4), size // 4 : -(size // 4)] = 1.0
+        return np.asarray((middle.ravel()[:, None, None] * np.eye(4)).reshape(-1, 4).T / middle.sum())
+
+    def estimator(self, k: int) -> Estimator:
+        """Estimator of component k."""
+        if k not in self.estimators:
+            self.estimators[k] = self._make_estimator(k)
+        return self.estimators[k]
+
+    def _make_estimator(self, k: int) -> Estimator:
+        at, factor = self.rows, self.factors[k]
+        covariance = self.mix.covariances[k] * self.slopes[k] * self.slopes[k][:, None]
+        covariance += self.drift[k] * self.drift[k][:, None]
+        half = covariance[:, at] @ factor.T
+        linear = half @ factor
+        # What is left given the samples: of every pixel, of the middle's mean, and with the pilot's directions.
+        variance = self.average @ (np.diagonal(covariance) - (half**2).sum(axis=1))
+        inner = ((self.inner @ covariance) * self.inner).sum(axis=1) - ((self.inner @ half) ** 2).sum(axis=1)
+        pilot = self.turn[k] @ (self.average @ covariance - (self.average @ half) @ half.T)
+        taper = np.repeat(window(self.mix.size).ravel(), 4)
+        return Estimator(
+            linear=np.ascontiguousarray(linear.T * taper, dtype=np.float32),
+            offset=((self.values[k] - linear @ self.values[k, at]) * taper).astype(np.float32),
+            pilot=(pilot * taper).astype(np.float32),
+            variance=variance,
+            noise=variance * (self.average @ self.unit[k]),
+            inner=inner,
+            pilot_variance=pilot**2 @ self.average.T,
+            pilot_inner=(pilot @ self.inner.T) ** 2,
+        )
+
+
+@lru_cache(maxsize=_TABLES)
+def table(prior: Prior, sampling: Sampling, step: int) -> Table:
+    """Table at light ``STEP ** step``."""
+    return Table(mixture(prior, sampling.size), sampling, STEP**step)

@@ -1,0 +1,215 @@
+"""Pictures to train on: full-resolution signals of every channel of a camera, under many lights.
+
+Generated ones (dead leaves, after A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 41,
+2001, and gratings), and photographs from scikit-image's wheel, which become spectra by the basis of I. Mallett and C.
+Yuksel, "Spectral primary decomposition for rendering with sRGB reflectance", EGSR 2019. None of the project's scenes is
+among them: what is judged is never trained on.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+
+import numpy as np
+from numpy.typing import NDArray
+from skimage import data
+from skimage.draw import ellipse, polygon
+
+from render.illuminants import illuminant
+from render.photometry import photons_per_joule
+from render.spectrum import Floats, band_widths
+from rodcone.optional import quietly_imported
+from scenes.reflectances import band, edge, grey
+from sensor.config import SensorConfig
+
+Planes = NDArray[np.float32]
+Places = tuple[NDArray[np.intp], NDArray[np.intp]]
+
+CHANNELS = ("R", "G", "B", "W")
+# Of scikit-image's wheel, without a download. Public domain: astronaut (NASA), coins (Brooklyn Museum), rocket
+# (SpaceX). CC0: camera (L. Varshney), chelsea (S. van der Walt), coffee (R. Michetti), brick and gravel (CC0Textures),
+# grass (D. A. Nash's, linearlabs).
+PHOTOGRAPHS = ("astronaut", "camera", "chelsea", "coffee", "coins", "rocket", "brick", "grass", "gravel")
+# Ends and middles of what `draw_light` draws; D65 first.
+LIGHTS = (
+    "D65",
+    "D4000K",
+    "D9000K",
+    "2400K",
+    "3600K",
+    *(f"LED-B{n}" for n in range(1, 6)),
+    "F2",
+    "F11",
+    "sodium_high",
+    "sodium_low",
+)
+LEAVES, GRATINGS = 20, 10  # pictures of each kind
+UNKNOWN = 6  # of so many pictures one whose light the camera doesn't know
+SIDE = 256  # pixels of a generated picture
+_NM = np.arange(385.0, 780.0, 10.0)
+_FINE = 3  # samples a pixel and direction, which pixels then average
+_DARKEST = 2e-3  # of white
+
+
+@dataclass(frozen=True)
+class KnownLight:
+    """What a camera's channels collect from each band, over what they do from white, shape (4, band)."""
+
+    weights: Floats
+
+    def signals(self, reflectance: Floats) -> Floats:
+        """Signals (..., 4) of reflectances (..., band); what the camera takes for white reads 1 in every channel."""
+        return np.asarray(reflectance @ self.weights.T)
+
+
+def neutral_electrons(sensor: SensorConfig, lights: Sequence[str]) -> Floats:
+    """Electrons of R, G, B and W from white under each light, relative to G, shape (light, 4)."""
+    collected = np.array([_collected(sensor, light).sum(axis=1) for light in lights])
+    return np.asarray(collected / collected[:, 1:2])
+
+
+def draw_light(rng: np.random.Generator, sensor: SensorConfig) -> KnownLight:
+    """Draw a light: daylight more than half of the time, then bulbs, LEDs, fluorescent lamps and sodium.
+
+    The camera knows what white is under it, but for one picture in `UNKNOWN`, where it takes D65's.
+    """
+    kinds = {
+        "D65": 0.4,
+        f"D{rng.uniform(4000, 9000):.0f}K": 0.2,
+        f"{rng.uniform(2400, 3600):.0f}K": 0.14,
+        f"LED-B{rng.integers(1, 6)}": 0.14,
+        "F2": 0.04,
+        "F11": 0.04,
+        "sodium_high": 0.02,
+        "sodium_low": 0.02,
+    }
+    name = str(rng.choice(list(kinds), p=list(kinds.values())))
+    collected = _collected(sensor, name)
+    white = _collected(sensor, "D65" if rng.random() < 1 / UNKNOWN else name).sum(axis=1, keepdims=True)
+    return KnownLight(collected / white * white[3] / collected[3].sum())
+
+
+def _collected(sensor: SensorConfig, light: str) -> Floats:
+    """Electrons from a white surface in each band, any scale, shape (4, band)."""
+    width = band_widths(_NM)
+    photons = illuminant(light).band_average(_NM, width) * photons_per_joule(_NM) * width
+    return np.asarray(sensor.responses.band_average(CHANNELS, _NM, width) * photons)
+
+
+def draw_surface(rng: np.random.Generator) -> Floats:
+    """Draw a smooth reflectance, shape (band,): grey, an edge, a bump, or seven random points joined."""
+    kind, width = rng.random(), band_widths(_NM)
+    low, high = np.sort(rng.uniform(0.03, 0.85, 2))
+    if kind < 0.35:
+        curve = grey(rng.uniform(0.03, 0.9))
+    elif kind < 0.65:
+        curve = edge(rng.uniform(470, 640), rng.uniform(8, 30), low, high)
+    elif kind < 0.9:
+        curve = band(rng.uniform(420, 640), rng.uniform(20, 60), low, high)
+    else:
+        return np.asarray(np.interp(_NM, np.linspace(380, 780, 7), rng.uniform(0.03, 0.85, 7)))
+    return np.asarray(curve.band_average(_NM, width))
+
+
+def dead_leaves(rng: np.random.Generator, light: KnownLight, shapes: int = 900) -> Floats:
+    """Draw shapes that cover one another, sizes as the power law of natural pictures, shape (SIDE, SIDE, 4)."""
+    side = SIDE * _FINE
+    picture = np.empty((side, side, 4))
+    picture[:] = light.signals(draw_surface(rng))
+    least, most = 2.0 * _FINE, 70.0 * _FINE
+    for _ in range(shapes):
+        radius = (least**-1.2 - rng.random() * (least**-1.2 - most**-1.2)) ** (-1 / 1.2)
+        y, x = _shape(rng, rng.uniform(0, side, 2), radius, side)
+        if len(y):
+            picture[y, x] = _painted(rng, light, (y, x), radius)
+    return _finished(rng, picture)
+
+
+def _shape(rng: np.random.Generator, at: Floats, radius: float, side: int) -> Places:
+    """Pixels of an ellipse, a polygon or a thin bar."""
+    kind = rng.integers(4)
+    if kind == 0:
+        y, x = ellipse(*at, radius, radius * rng.uniform(0.3, 1), shape=(side, side), rotation=rng.uniform(0, np.pi))
+        return y, x
+    angles = np.sort(rng.uniform(0, 2 * np.pi, rng.integers(3, 6)))
+    if kind == 3:
+        angles = rng.uniform(0, 2 * np.pi) + np.array([0, 0.3, np.pi, np.pi + 0.3])
+    y, x = polygon(at[0] + radius * np.sin(angles), at[1] + radius * np.cos(angles), shape=(side, side))
+    return y, x
+
+
+def _painted(rng: np.random.Generator, light: KnownLight, at: Places, radius: float) -> Floats:
+    """Signals of a shape's pixels: even, shaded, speckled, or striped in two colours; shape (pixel, 4)."""
+    (y, x), colour, kind = at, light.signals(draw_surface(rng)), rng.random()
+    if kind < 0.25:
+        slope = rng.normal(0, 0.5, 2)
+        shade = np.exp(slope[0] * (y - y.mean()) / radius + slope[1] * (x - x.mean()) / radius)
+    elif kind < 0.45:
+        grain = rng.normal(0, rng.uniform(0.03, 0.3), (SIDE, SIDE))
+        shade = np.exp(grain[y // _FINE, x // _FINE])
+    elif kind < 0.55:
+        angle, period = rng.uniform(0, np.pi), rng.uniform(2.2, 10) * _FINE
+        first = np.sin(2 * np.pi * (np.cos(angle) * y + np.sin(angle) * x) / period) > 0
+        return np.asarray(np.where(first[:, None], colour, light.signals(draw_surface(rng))))
+    else:
+        shade = np.ones(y.shape)
+    return np.asarray(np.clip(colour * shade[:, None], 0.0, 1.6))
+
+
+def gratings(rng: np.random.Generator, light: KnownLight) -> Floats:
+    """Draw straight bars of three surfaces whose width grows across the picture, shape (SIDE, SIDE, 4)."""
+    y, x = np.mgrid[: SIDE * _FINE, : SIDE * _FINE] / _FINE
+    angle = rng.uniform(0, np.pi)
+    across, along = np.cos(angle) * x + np.sin(angle) * y, np.sin(angle) * x - np.cos(angle) * y
+    period = rng.uniform(1.8, 4) + (np.abs(across) % 97) * rng.uniform(0.02, 0.15)
+    surfaces = np.stack([light.signals(draw_surface(rng)) for _ in range(3)])
+    bars = surfaces[np.floor(across / period).astype(int) % 3]
+    gaps = np.floor(along / rng.uniform(15, 40)).astype(int) % 2 == 1
+    return _finished(rng, np.where(gaps[..., None], light.signals(draw_surface(rng)), bars))
+
+
+def _finished(rng: np.random.Generator, fine: Floats) -> Floats:
+    """Average samples to pixels, and light the picture unevenly."""
+    picture = fine.reshape(SIDE, _FINE, SIDE, _FINE, 4).mean(axis=(1, 3))
+    y, x = np.mgrid[:SIDE, :SIDE] / SIDE - 0.5
+    slope = rng.normal(0, 0.6, 2)
+    return np.asarray(picture * np.exp(slope[0] * y + slope[1] * x)[..., None])
+
+
+def photograph(rng: np.random.Generator, light: KnownLight, name: str) -> Floats:
+    """Photograph of `PHOTOGRAPHS` at half its size, as signals under the light, shape (h, w, 4).
+
+    The basis gives each colour one spectrum; a factor a channel stands for the others that look the same.
+    """
+    basis = quietly_imported("colour.recovery").MSDS_BASIS_FUNCTIONS_sRGB_MALLETT2019
+    spectra = np.stack([np.interp(_NM, basis.wavelengths, basis.values[:, index]) for index in range(3)])
+    encoded = getattr(data, name)() / 255.0
+    encoded = encoded if encoded.ndim == 3 else np.repeat(encoded[..., None], 3, axis=2)
+    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    height, width = (size // 2 for size in linear.shape[:2])
+    linear = linear[: 2 * height, : 2 * width].reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
+    return np.asarray(linear @ light.signals(spectra) * np.exp(rng.normal(0, 0.04, 4)))
+
+
+def draw_pictures(sensor: SensorConfig, seed: int) -> Iterator[tuple[str, Planes]]:
+    """Draw the training pictures of a sensor's curves one by one, with the name of each; (h, w, 4) float32.
+
+    Every second one gets grain, as a render's own noise and fine texture do.
+    """
+    kinds = ["leaves"] * LEAVES + ["gratings"] * GRATINGS + list(PHOTOGRAPHS)
+    for kind, rng in zip(kinds, np.random.default_rng(seed).spawn(len(kinds)), strict=True):
+        light = draw_light(rng, sensor)
+        if kind == "leaves":
+            picture = dead_leaves(rng, light)
+        elif kind == "gratings":
+            picture = gratings(rng, light)
+        else:
+            picture = photograph(rng, light, kind)
+        if rng.random() < 0.5:
+            picture = picture * np.exp(rng.normal(0, rng.uniform(0.005, 0.03), picture.shape[:2]))[..., None]
+        yield kind, np.maximum(picture, _DARKEST).astype(np.float32)
+
+
+def photograph_hashes() -> dict[str, str]:
+    """SHA-256 of each photograph's pixels."""
+    return {name: sha256(getattr(data, name)().tobytes()).hexdigest() for name in PHOTOGRAPHS}

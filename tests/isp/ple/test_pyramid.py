@@ -1,0 +1,95 @@
+"""The whole reconstruction: flat fields, lamps, full samples, threads, and frames of any size."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import raw_image
+
+from isp.ple import estimate, pyramid
+from isp.ple.prior import LETTERS, own_prior
+from sensor.cfa import BAYER, RGBW, channel_map, channels
+from sensor.raw import RawImage
+
+FULL_E, NOISE_E = 15_000.0, 1.5
+
+
+def reconstruct(raw):
+    return pyramid.reconstruct(raw, own_prior(), own_prior().neutral_e)
+
+
+def exposure(expected_e, tile, rng) -> RawImage:
+    """Poisson, the well, then Gaussian noise; not rounded."""
+    held = np.minimum(rng.poisson(expected_e), FULL_E) + rng.normal(0, NOISE_E, expected_e.shape)
+    return RawImage(held + 200, tile, 200.0, 200 + FULL_E, 1.0, NOISE_E, 0.0, 0.0, 0.01)
+
+
+def grey(level_e, tile, shape=(96, 96)):
+    """Expected electrons of a grey scene whose green collects `level_e`."""
+    share = own_prior().neutral_e[np.vectorize(LETTERS.index)(channel_map(tile, shape))]
+    return np.broadcast_to(level_e, shape) * share
+
+
+@pytest.mark.parametrize("tile", [RGBW, BAYER])
+@pytest.mark.parametrize("level_e", [0.01, 0.3, 10.0, 300.0, 10_000.0])
+def test_a_flat_field_keeps_its_mean(tile, level_e):
+    # at 10 000 e- W is full, and nothing is asked of it
+    planes, _ = reconstruct(exposure(grey(level_e, tile), tile, np.random.default_rng(4)))
+    for name, plane in zip(channels(tile), np.moveaxis(planes, -1, 0), strict=True):
+        expected = own_prior().neutral_e[LETTERS.index(name)] * level_e
+        if expected < FULL_E:
+            samples = plane.size * "".join(tile).count(name) / 4
+            error = np.sqrt((expected + NOISE_E**2 + 1 / 12) / samples)
+            assert abs(plane.mean() - expected) < max(0.005 * expected, 4 * error), name
+
+
+@pytest.mark.parametrize("tile", [RGBW, BAYER])
+@pytest.mark.parametrize("side", [1, 4])
+def test_a_lamp_in_the_dark_has_no_frame_around_it(tile, side):
+    # Frames alike but for the lamp, which lies on each site of the tile in turn. No coarse scale helps beside it, and a
+    # patch's own 16 Ws, or 32 greens, are what its estimate rests on.
+    moved = []
+    for seed in range(4):
+        at = (32 + seed % 2, 32 + seed // 2)
+        rng = np.random.default_rng(seed)
+        raw = exposure(np.full((64, 64), 0.1), tile, rng)
+        lit = raw.dn.copy()
+        lit[at[0] : at[0] + side, at[1] : at[1] + side] = 200 + FULL_E + rng.normal(0, NOISE_E, (side, side))
+        without, within = (reconstruct(each)[0] for each in (raw, replace(raw, dn=lit)))
+        moved.append(np.roll(within - without, (-at[0], -at[1]), axis=(0, 1)))
+    lines = np.arange(64)
+    away = np.where(lines < side, 0, np.minimum(lines - side + 1, 64 - lines))
+    beyond = np.maximum(away[:, None], away) > 3
+    mean = np.mean(moved, axis=0)[beyond]
+    assert np.abs(mean).max() < 4.5 * NOISE_E / np.sqrt(16 * len(moved))
+    assert np.abs(mean.mean(axis=0)).max() < 0.05
+
+
+def test_a_full_sample_is_a_lower_bound():
+    # W fills along a ramp, in the middle of patches; above, the colours say how far
+    tile, ramp = RGBW, np.linspace(1500, 6000, 96)
+    raw = exposure(grey(ramp, tile), tile, np.random.default_rng(5))
+    planes, variance = reconstruct(raw)
+    full = raw.saturated & (channel_map(tile, raw.shape) == "W")
+    assert 0.05 < full.mean() < 0.22
+    least = FULL_E - 4 * np.sqrt(variance[3] * FULL_E)
+    assert (planes[full][:, 3] > least).mean() > 0.999
+    above = planes[..., 3][:, ramp > 4500].mean(axis=0)
+    assert above == pytest.approx(own_prior().neutral_e[3] * ramp[ramp > 4500], rel=0.1)
+
+
+def test_threads_change_nothing(monkeypatch):
+    raw = exposure(grey(np.linspace(1, 200, 128), RGBW, (96, 128)), RGBW, np.random.default_rng(7))
+    monkeypatch.setattr(estimate, "STRIP", 500)
+    found = []
+    for count in (1, 3):
+        monkeypatch.setattr(estimate, "cpu_count", lambda count=count: count)
+        found.append(reconstruct(raw)[0])
+    assert np.array_equal(*found)
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (3, 5), (9, 16), (16, 9), (31, 33)])
+def test_any_size_of_frame_will_do(shape):
+    planes, _ = reconstruct(raw_image(np.full(shape, 600)))
+    assert planes.shape == (*shape, 4)
+    assert np.isfinite(planes).all()

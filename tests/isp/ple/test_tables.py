@@ -1,0 +1,92 @@
+"""One component's estimate: closed forms, and what drawn signals show of them."""
+
+import numpy as np
+import pytest
+
+from isp.ple.prior import LETTERS, PATCH, Mixture, mixture, own_prior
+from isp.ple.tables import LIFT, PILOT_VARIANCE, Sampling, Table, window
+from sensor.cfa import BAYER, RGBW
+
+GAINS = (0.5, 1.0, 0.45, 4.9)
+SIGMAS = 4.5  # of a normal deviate: 1 in 150 000
+
+
+def mosaic_rows(tile):
+    return tuple(4 * (PATCH * y + x) + LETTERS.index(tile[y % 2][x % 2]) for y in range(PATCH) for x in range(PATCH))
+
+
+def sampling(tile=RGBW, prnu=0.01):
+    return Sampling(PATCH, mosaic_rows(tile), GAINS, (1.8,) * 4, prnu)
+
+
+def drawn(table: Table, k: int, light_e: float, count: int, rng):
+    """Values of a component in units of noise, and their samples with noise."""
+    mix, at = table.mix, table.rows
+    factor = np.linalg.cholesky(mix.covariances[k].astype(np.float64) + 1e-9 * np.eye(len(table.values[k])))
+    values = table.values[k] + rng.standard_normal((count, len(factor))) @ factor.T * table.slopes[k]
+    values += rng.standard_normal((count, 1)) * table.drift[k]
+    electrons = np.tile(GAINS, 64)[at] * light_e * (mix.means[k] ** 2 + np.diag(mix.covariances[k]))[at]
+    noise = np.sqrt((electrons + 1.8**2 + (0.01 * electrons) ** 2) / (electrons + (LIFT * 1.8) ** 2))
+    return values, (values[:, at] + noise * rng.standard_normal((count, len(at)))).astype(np.float32)
+
+
+@pytest.mark.parametrize("tile", [RGBW, BAYER])
+@pytest.mark.parametrize("light_e", [0.5, 20.0, 2000.0])
+def test_over_signals_drawn_from_the_prior_the_error_is_0_in_the_mean_and_varies_as_the_closed_form(tile, light_e):
+    rng, count = np.random.default_rng(1), 3000
+    table = Table(mixture(own_prior()), sampling(tile), light_e)
+    for k in (0, 17, 40):
+        values, y = drawn(table, k, light_e, count, rng)
+        by = table.estimator(k)
+        error = (y @ by.linear + by.offset) / np.repeat(window(PATCH).ravel(), 4) - values
+        deviation = error.std(axis=0)
+        assert np.abs(error.mean(axis=0) / deviation).max() < SIGMAS / np.sqrt(count) + 0.01
+        for channel in range(4):
+            # of the variances' means over pixels, which go together: a chi-square of `count` draws at the least
+            assert (deviation**2)[channel::4].mean() == pytest.approx(
+                by.variance[channel], rel=SIGMAS * (2 / count) ** 0.5
+            )
+
+
+def test_with_a_pilot_the_error_varies_as_the_closed_form():
+    rng, count, k, told, light_e = np.random.default_rng(2), 3000, 17, 0.05, 2.0
+    table = Table(mixture(own_prior()), sampling(), light_e)
+    values, y = drawn(table, k, light_e, count, rng)
+    by = table.estimator(k)
+    scale = 1 / np.sqrt(
+        (table.turn[k].T @ table.turn[k]).diagonal()
+    )  # of the pilot's noise by channel, at a noise of 1
+    means = values @ table.average.T + rng.standard_normal((count, 4)) * scale * np.sqrt(told)
+    read = y @ table.reads[k].T - table.read_offset[k]
+    news = means @ table.turn[k].T - table.pilot_offset[k] - read[:, len(table.rows) :]
+    spread = told + table.spread[k]
+    assert (news**2).mean(axis=0) == pytest.approx(spread, rel=SIGMAS * (2 / count) ** 0.5)
+    error = (y @ by.linear + by.offset + (news / spread) @ by.pilot) / np.repeat(window(PATCH).ravel(), 4) - values
+    expected = by.variance - (1 / spread) @ by.pilot_variance
+    for channel in range(4):
+        assert (error**2)[:, channel::4].mean() == pytest.approx(expected[channel], rel=SIGMAS * (2 / count) ** 0.5)
+    assert scale.min() ** 2 >= PILOT_VARIANCE
+
+
+def test_one_component_is_the_textbooks_linear_estimate():
+    rng = np.random.default_rng(3)
+    root = rng.normal(0, 0.05, (256, 30))
+    covariance = root @ root.T + 1e-4 * np.eye(256)
+    mix = Mixture(PATCH, np.zeros(1), rng.uniform(0.5, 1.5, (1, 256)), covariance[None].astype(np.float32))
+    given, light = sampling(prnu=0.0), 30.0
+    at, gains = np.array(given.rows), np.tile(given.gains, 64)
+    # by hand, in units of noise: t = 2 sqrt(e + d^2 + 3/8 - r / 4), slope 2 g m u / (t / 2), noise r
+    electrons = gains * light * (mix.means[0] ** 2 + np.diag(covariance))
+    noise = (electrons + 1.8**2) / (electrons + (LIFT * 1.8) ** 2)
+    deviation = np.sqrt(electrons + (LIFT * 1.8) ** 2 + 0.375 - noise / 4)
+    slope = 2 * gains * light * mix.means[0] / deviation
+    table = Table(mix, given, light)
+    whole = slope[:, None] * covariance * slope + np.outer(table.drift[0], table.drift[0])
+    y = 2 * deviation[at] + rng.normal(0, 2, 64)
+    gain = np.linalg.solve(whole[np.ix_(at, at)] + np.diag(noise[at]), whole[at]).T
+    expected = 2 * deviation + gain @ (y - 2 * deviation[at])
+    by = table.estimator(0)
+    found = (y.astype(np.float32) @ by.linear + by.offset) / np.repeat(window(PATCH).ravel(), 4)
+    assert found == pytest.approx(expected, rel=2e-4)
+    left = np.diag(whole) - np.einsum("ij,ji->i", gain, whole[at])
+    assert by.variance == pytest.approx([left[channel::4].mean() for channel in range(4)], rel=1e-4)

@@ -1,0 +1,78 @@
+"""Training: signals of known surfaces, pictures that can be drawn again, and a mixture that is found again."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from isp.ple.prior import mixture
+from sensor.presets import preset
+from studies.training import em, pictures
+from studies.training.em import draw_patches, fit_prior
+from studies.training.pictures import PHOTOGRAPHS, draw_light, draw_surface, neutral_electrons, photograph
+
+
+def test_white_reads_1_in_every_channel_where_the_camera_knows_the_light(monkeypatch):
+    monkeypatch.setattr(pictures, "UNKNOWN", np.inf)
+    for seed in range(10):
+        light = draw_light(np.random.default_rng(seed), preset("low_noise"))
+        assert light.signals(np.ones(40)) == pytest.approx(np.ones(4))
+
+
+def test_a_photographs_grey_is_grey_but_for_the_metameric_factor():
+    light = draw_light(np.random.default_rng(0), preset("low_noise"))
+    signals = photograph(np.random.default_rng(1), light, "camera")
+    ratio = signals / signals[..., 3:]
+    assert ratio.std(axis=(0, 1)).max() < 1e-3
+    assert ratio.mean(axis=(0, 1)) == pytest.approx(np.ones(4), rel=0.4)
+
+
+def test_surfaces_reflect_no_more_than_they_get():
+    surfaces = np.array([draw_surface(np.random.default_rng(seed)) for seed in range(200)])
+    assert 0 <= surfaces.min() < surfaces.max() <= 1
+
+
+def test_a_seed_gives_the_same_pictures():
+    light = draw_light(np.random.default_rng(0), preset("low_noise"))
+    first, second = (pictures.gratings(np.random.default_rng(3), light) for _ in range(2))
+    assert np.array_equal(first, second)
+    assert first.shape == (pictures.SIDE, pictures.SIDE, 4)
+
+
+def test_no_scene_that_is_judged_is_trained_on():
+    # of the scenes' package only smooth reflectance curves, not the chart's
+    names = {
+        f"{node.module}.{alias.name}"
+        for path in Path(pictures.__file__).parent.glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("scenes")
+        for alias in node.names
+    }
+    assert names == {f"scenes.reflectances.{name}" for name in ("band", "edge", "grey")}
+    assert len(set(PHOTOGRAPHS)) == len(PHOTOGRAPHS)
+
+
+def test_patches_are_in_roots_of_signal_over_their_mean_w():
+    picture = np.random.default_rng(0).uniform(0.1, 1, (40, 50, 4)).astype(np.float32)
+    patches = draw_patches([picture], np.random.default_rng(1)).reshape(-1, 64, 4)
+    assert (patches[..., 3] ** 2).mean(axis=1) == pytest.approx(np.ones(len(patches)), rel=1e-5)
+
+
+def test_the_mixtures_mean_and_covariance_are_the_patches(monkeypatch):
+    monkeypatch.setattr(em, "COMPONENTS", 6)
+    monkeypatch.setattr(em, "DIRECTIONS", 10)
+    rng = np.random.default_rng(2)
+    basis = np.linalg.qr(rng.standard_normal((256, 10)))[0]
+    centres = rng.standard_normal((3, 10)) * 2
+    patches = 1 + (centres[rng.integers(0, 3, 6000)] + rng.standard_normal((6000, 10)) * 0.3) @ basis.T
+    patches += rng.standard_normal(patches.shape) * 0.01
+    prior = fit_prior(patches.astype(np.float32), neutral_electrons(preset("low_noise"), ["D65"]), rng, "{}")
+    held = mixture(prior)
+    weights = np.exp(held.log_weights)
+    assert weights.sum() == pytest.approx(1, abs=1e-4)
+    mean = weights @ held.means
+    assert mean == pytest.approx(patches.mean(axis=0), abs=0.01)
+    off = held.means - mean
+    covariance = np.tensordot(weights, held.covariances, 1) + (off.T * weights) @ off
+    assert covariance == pytest.approx(np.cov(patches.T), abs=0.02)
