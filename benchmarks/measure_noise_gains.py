@@ -110,7 +110,7 @@ def plane_error(processor: Processor, shot: Shot) -> Floats:
 def quality(processor: Processor, shot: Shot, gains: NoiseGains) -> tuple[float, float]:
     """RMS error and median CIEDE2000 of the developed picture."""
     white = shot.picture.white_cd_m2 * shot.level_cd_m2
-    if processor.mosaic == "bayer":  # the matrix is the last step: denoised planes serve all factors
+    if processor.mosaic == "bayer" or processor.extra == "bm3d":  # the matrix is the last step: one development serves
         balance = WhiteBalance(given=shot.neutral)
         colours = colours_in_noise(shot.raw, shot.colours, balance, processor.unit, gains)
         linear = shot.planes @ colours.matrix().T / (shot.neutral[channels(shot.raw.cfa).index("G")] * white)

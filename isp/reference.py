@@ -27,7 +27,7 @@ class _Inputs:
     """What eqs. (1)-(6) read.
 
     Electrons, the channel sampled at each pixel, padded planes, alpha, reliability of similarity, up to where samples
-    count, rows and columns of the tile, noise distances, W.
+    count, noise distances, W.
     """
 
     electrons: Plane
@@ -36,7 +36,6 @@ class _Inputs:
     alpha: Plane
     reliability: Plane
     brightest: Plane
-    tile: tuple[int, int]
     noise: list[Plane]
     white: int | None
 
@@ -102,7 +101,6 @@ def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
         alpha=saturated_fraction(raw, settings.window),
         reliability=trust,
         brightest=brightest_allowed(raw.electrons, raw, settings),
-        tile=(len(raw.cfa), len(raw.cfa[0])),
         noise=noise if in_noise and settings.patch > 1 else [np.zeros_like(table) for table in noise],
         white=names.index("W") if "W" in names else None,
     )
@@ -116,9 +114,8 @@ def _add_offset(sums: ReferenceSums, inputs: _Inputs, settings: Settings, offset
     distance = [_distance(inputs, i, settings, x, offset) for i in range(len(inputs.h))]
     log_spatial = -(offset[0] ** 2 + offset[1] ** 2) / (2.0 * settings.sigma_d**2)  # eqs. (2), (4)
     trust = inputs.reliability[np.ix_(*x)]
-    # Of y's channel, less than a tile behind x
-    site = (line + d % size for line, d, size in zip(x, offset, inputs.tile, strict=True))
-    bound = inputs.brightest[np.ix_(*site)]
+    phase = tuple(d % size for d, size in zip(offset, inputs.brightest.shape[:2], strict=True))
+    bound = inputs.brightest[phase][np.ix_(*x)]
     channel, alpha, electrons = (a[np.ix_(*y)] for a in (inputs.channel, inputs.alpha, inputs.electrons))
     for i in range(len(inputs.h)):
         at = np.nonzero(channel == i)  # S_i(y) of eq. (1)

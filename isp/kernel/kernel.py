@@ -106,8 +106,8 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
         for plane in planes
     ]
     inverse_variance = [dr.gather(jit.Float, inputs.inverse_variance, x + r * inputs.stride + c) for r, c in pixels]
-    site = jit.UInt(x_row + threads.phase // across) * inputs.stride + jit.UInt(x_column + threads.phase % across)
-    brightest = [dr.gather(jit.Float, inputs.brightest, site + r * inputs.stride + c) for r, c in pixels]
+    bound = jit.UInt(threads.phase) * inputs.plane_size + x
+    brightest = [dr.gather(jit.Float, inputs.brightest, bound + r * inputs.stride + c) for r, c in pixels]
 
     def load(source: Any, packet: Any, size: int, needed: int) -> list[Any]:
         """First values of a packet, 8 at a time: part k of packet p is number p * (size / 8) + k."""

@@ -68,7 +68,7 @@ class Strip:
         log2(e) r(x) c(x) / (2 sigma_s^2), the factor on beta_s^2 of eq. (5): `reliability` and `certainty` included.
     alpha : (h, w) float64 or None
         Eq. (6); None where it is 0 everywhere, or without W.
-    brightest : (h + th - 1, w + tw - 1) float32
+    brightest : (th, tw, h, w) float32
         Up to where samples count, of `isp.similarity.brightest` [DN over black].
     """
 
@@ -88,7 +88,7 @@ class Inputs:
     Attributes
     ----------
     planes, inverse_variance, brightest : Float
-        Read at x: planes h_i, [channel, row, column], W's alone with guide W; [row, column].
+        Read at x: planes h_i, [channel, row, column], W's alone with guide W; [row, column]; [phase, row, column].
     packets : Float
         Read at y: [channel, row, packet, value].
     alpha : Float
@@ -143,9 +143,9 @@ def packet_width(count: int) -> int:
 def strip_rows(shape: tuple[int, int], pattern: Pattern, patch: int) -> int:
     """Rows of strips that take STRIP_BYTES or less, as even as whole blocks allow."""
     channels, block = len(pattern.channels), pattern.block
-    # Planes and their packets, packets of alpha, three sums a cell of the tile, results, the strip itself.
+    # Planes and packets, packets of alpha, bounds and three sums a cell of the tile, results, the strip itself.
     floats = channels * (packet_width(2 * block[1] + patch - 1) + 1) + packet_width(block[1])
-    floats += 3 * len(pattern.cells) + 2 * channels + 10
+    floats += 5 * len(pattern.cells) + 2 * channels + 10
     most, blocks = max(int(STRIP_BYTES / (4 * floats * shape[1])) // block[0], 1), -(-shape[0] // block[0])
     return -(-blocks // -(-blocks // most)) * block[0]
 
@@ -196,11 +196,9 @@ def lay_out(
     jit: Any, strip: Strip, region: tuple[Span, Span], pattern: Pattern, settings: Settings, guide: Guide
 ) -> Inputs:
     """Fill planes, make packets and upload what the threads of a region of the strip's rows and columns read."""
-    # The part of the strip that counts, and where the arrays begin in it.
     (top, bottom), (left, right) = spans = halo(region, pattern, settings)
     part = _surroundings(strip.shape, spans, pattern, settings)
     own = tuple(slice(at.start - first, at.stop - first) for at, first in zip(part, strip.origin, strict=True))
-    more = tuple(slice(at.start, at.stop + tile - 1) for at, tile in zip(own, pattern.tile, strict=True))
     start, size = (top - part[0].start, left - part[1].start), (bottom - top, right - left)
     half, block = settings.patch // 2, pattern.block[1]
     channels = [number for number in range(len(pattern.channels)) if guide != "W" or number == pattern.white]
@@ -230,10 +228,12 @@ def lay_out(
     steps = offsets[..., 0] // down * row_packets + offsets[..., 1] // across  # packets from x to y
     entries[..., 0] = steps.astype(np.int32).view(np.float32)
     entries[..., 1 : offsets.shape[2] - 1] = offsets[..., 2:]
-    shares = {} if alpha is None else {"alpha": alpha}
-    inverse_variance = _window(strip.inverse_variance[own], start, size, 0, 0.0)
-    read = {"planes": planes, "inverse_variance": inverse_variance, "packets": packets, "entries": entries}
-    read["brightest"] = _window(strip.brightest[more], start, size, 0, 0.0)
+    brightest = aligned((len(pattern.cells), *size), np.float32)
+    for phase, target in zip(np.ndindex(pattern.tile), brightest, strict=True):
+        target[:] = _window(strip.brightest[phase][own], start, size, 0, 0.0)
+    read = {"planes": planes, "packets": packets, "brightest": brightest, "entries": entries, "counts": counts}
+    read["inverse_variance"] = _window(strip.inverse_variance[own], start, size, 0, 0.0)
+    read |= {} if alpha is None else {"alpha": alpha}
     numbers = {
         "length": entries.shape[1],
         "stride": size[1],
@@ -245,7 +245,7 @@ def lay_out(
         "width": strip.shape[1],
     }
     return Inputs(
-        **{"alpha": None} | {name: upload(values) for name, values in {**read, **shares, "counts": counts}.items()},
+        **{"alpha": None} | {name: upload(values) for name, values in read.items()},
         **{name: dr.opaque(jit.UInt, number) for name, number in numbers.items()},
         top=dr.opaque(jit.Int, top),
         left=dr.opaque(jit.Int, left),

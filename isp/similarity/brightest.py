@@ -15,15 +15,16 @@ from isp.settings import SIGMA_S, Settings
 from sensor.raw import RawImage
 
 # Of a flat field's samples 3 in 10 000 or fewer are left out at a pixel, and 0.3 % of the light at most, at 0.2 e-.
-SIGMAS = 2.5  # over the brightest of 9
+SIGMAS = 2.5  # over the brightest of 9 or more
 MOST_SIGMAS = 1e3  # beyond it there is no bound
 FEWEST_E = 2.25  # 1 and 2 electrons count where 9 samples hold none
 
 
 def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings) -> NDArray[Any]:
-    """Electrons up to which a sample counts at pixels near each site of its channel.
+    """Electrons up to which a sample counts at each pixel, by where its channel's samples lie from there.
 
-    With m the brightest sample of the site's channel in 3 x 3 tiles around it, s the dark noise and p the PRNU
+    With m the brightest sample of the channel up to 2 tiles less a pixel away along either axis, as far on one side as
+    on the other, s the dark noise and p the PRNU
 
         B = m + z sqrt(m + s^2 + (p m)^2) + 2.25 / (1 + s^2)^2.
 
@@ -37,16 +38,17 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
 
     Returns
     -------
-    (h + th - 1, w + tw - 1) of the same type
-        A pixel x with a sample y reads the site at x + (y - x) mod (th, tw): y's channel, less than a tile away.
+    (th, tw, h, w) of the same type
+        A sample y counts at x up to the value [(y - x) mod (th, tw), x].
     """
-    (down, across), (height, width) = (len(raw.cfa), len(raw.cfa[0])), electrons.shape
+    tile, shape = (len(raw.cfa), len(raw.cfa[0])), electrons.shape
     z = max(SIGMAS, settings.sigma_s * (SIGMAS / SIGMA_S))
-    result = np.full((height + down - 1, width + across - 1), np.inf, electrons.dtype)
+    result = np.full((*tile, *shape), np.inf, electrons.dtype)
     if settings.distance == "raw" or z > MOST_SIGMAS:
         return result
-    allowed = np.full((height + 3 * down - 1, width + 3 * across - 1), -np.inf, electrons.dtype)
-    for first in range(0, height, BLOCK_ROWS):
+    (down, across), ends = tile, (2 * tile[0] - 1, 2 * tile[1] - 1)
+    allowed = np.full((shape[0] + 2 * ends[0], shape[1] + 2 * ends[1]), -np.inf, electrons.dtype)
+    for first in range(0, shape[0], BLOCK_ROWS):
         part = electrons[first : first + BLOCK_ROWS]
         light = np.maximum(part, 0.0)
         bound = light * raw.prnu
@@ -57,11 +59,16 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
         bound *= z
         bound += FEWEST_E / (1.0 + raw.dark_noise_e**2) ** 2
         # B rises with m: the largest m has the largest B.
-        np.add(bound, part, out=allowed[down + first : down + first + len(part), across : across + width])
-    for first in range(0, len(result), BLOCK_ROWS):
-        last = min(first + BLOCK_ROWS, len(result))
-        lines = np.maximum(allowed[first:last], allowed[first + down : last + down])
-        np.maximum(lines, allowed[first + 2 * down : last + 2 * down], out=lines)
-        columns = lines[:, : -2 * across], lines[:, across:-across], lines[:, 2 * across :]
-        np.maximum(np.maximum(columns[0], columns[1]), columns[2], out=result[first:last])
+        np.add(bound, part, out=allowed[ends[0] + first : ends[0] + first + len(part), ends[1] : ends[1] + shape[1]])
+    for first in range(0, shape[0], BLOCK_ROWS):
+        last = min(first + BLOCK_ROWS, shape[0])
+        for a, b in np.ndindex(tile):
+            # Steps to the samples at phase (a, b) from x, from -(2 tiles - 1) on, counted from there.
+            rows, columns = (
+                range((a - 1) % down, 2 * ends[0] + 1, down),
+                range((b - 1) % across, 2 * ends[1] + 1, across),
+            )
+            lines = np.maximum.reduce([allowed[first + i : last + i] for i in rows])
+            target = result[a, b, first:last]
+            np.maximum.reduce([lines[:, j : j + shape[1]] for j in columns], out=target)
     return result

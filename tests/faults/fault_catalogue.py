@@ -648,9 +648,9 @@ RENDERS = (
     ),
     _fault(
         "the longest exposure as the shortest",
-        "studies/sweep/prepare.py",
-        "min(job.study.longest_exposure_s, ",
-        "max(job.study.longest_exposure_s, ",
+        "studies/sweep/frames.py",
+        "(min(longest_s, unit_s / luminance_cd_m2) ",
+        "(max(longest_s, unit_s / luminance_cd_m2) ",
         "studies/test_stated_numbers",
     ),
     _fault(

@@ -122,8 +122,8 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
 
     def counts(x, y):
         """Whether y isn't brighter than the brightest of its letter around x allows."""
-        site = [a + (b - a) % 2 for a, b in zip(x, y, strict=True)]
-        near = [(site[0] + a, site[1] + b) for a, b in product((-2, 0, 2), repeat=2)]
+        steps = [[a for a in range(-3, 4) if (a - (d - c)) % 2 == 0] for c, d in zip(x, y, strict=True)]
+        near = [(x[0] + a, x[1] + b) for a, b in product(*steps)]
         most = max(raw.electrons[s] for s in near if s in white)
         spread = math.sqrt(max(most, 0.0) + raw.dark_noise_e**2)
         return raw.electrons[y] <= most + max(2.5, sigma_s / 1.2) * spread + 2.25 / (1 + raw.dark_noise_e**2) ** 2
