@@ -197,6 +197,7 @@ def lay_out(
 ) -> Inputs:
     """Fill planes, make packets and upload what the threads of a region of the strip's rows and columns read."""
     (top, bottom), (left, right) = spans = halo(region, pattern, settings)
+    # The part of the strip that counts, and where the arrays begin in it.
     part = _surroundings(strip.shape, spans, pattern, settings)
     own = tuple(slice(at.start - first, at.stop - first) for at, first in zip(part, strip.origin, strict=True))
     start, size = (top - part[0].start, left - part[1].start), (bottom - top, right - left)
@@ -211,8 +212,7 @@ def lay_out(
     packets = aligned((len(channels), size[0] // down, row_packets, packet_width(down * (under + block))), np.float32)
     for number, plane, target in zip(channels, planes, packets, strict=True):
         filled = fill(strip.guide[own], pattern.cfa, pattern.channels[number])
-        early = start[0] - half, start[1] - half
-        wide = _window(filled, early, (size[0], size[1] + under), half, OUTSIDE)
+        wide = _window(filled, (start[0] - half, start[1] - half), (size[0], size[1] + under), half, OUTSIDE)
         plane[:] = wide[:, : size[1]]
         for k in range(down):
             _put_packets(target[..., k * under : (k + 1) * under], wide[k::down], across)

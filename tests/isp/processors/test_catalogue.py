@@ -185,4 +185,6 @@ def test_each_processor_whose_colours_know_no_noise_has_a_form_whose_do() -> Non
         "interleaved",
         "interleaved_paper",
         "bayer_nlm",
+        "ple_rgbw",
+        "ple_bayer",
     }
