@@ -66,9 +66,14 @@ class Patches:
     noise: Singles
 
 
+def border(length: int, size: int) -> tuple[int, int]:
+    """Samples to add before and behind, so that every one lies in as many patches."""
+    return size - STRIDE, (length - 1) // STRIDE * STRIDE + size - length
+
+
 def padded(samples: NDArray[Any], size: int) -> NDArray[Any]:
-    """Samples (h, w, ...), continued by reflection so that every one lies in as many patches."""
-    sides = [(size - STRIDE, (length - 1) // STRIDE * STRIDE + size - length) for length in samples.shape[:2]]
+    """Samples (h, w, ...), continued by reflection by their `border`."""
+    sides = [border(length, size) for length in samples.shape[:2]]
     return np.pad(samples, sides + [(0, 0)] * (samples.ndim - 2), mode="reflect")
 
 

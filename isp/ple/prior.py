@@ -1,8 +1,8 @@
 """The prior over patches: a mixture of Gaussians, the file that holds it, and the Gaussians in a patch's own pixels.
 
 A patch is 8x8 pixels of R, G, B and W, in roots of signal over the patch's mean W, so that one prior serves at every
-light. A signal is electrons over those of white under D65; the curves of a camera decide what it is, its noise, well,
-exposure and mosaic don't.
+light. A signal is electrons over those of what the camera takes for white; its curves and the light decide what that
+is, its noise, well, exposure and mosaic don't.
 """
 
 from dataclasses import dataclass

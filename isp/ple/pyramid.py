@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.ple.estimate import STRIDE, PatchPilot, ScaleEstimate, estimate
+from isp.ple.estimate import STRIDE, PatchPilot, ScaleEstimate, border, estimate
 from isp.ple.prior import LETTERS, PATCH, Prior
 from isp.ple.tables import LIFT, PILOT_ERROR, Sampling, Singles, lift, lifted_root, unlift
 from sensor.cfa import channel_map, channels
@@ -76,11 +76,11 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     full = raw.saturated & (channel_map(raw.cfa, raw.shape) == "W")
     pyramid = _pyramid(raw, white_e, electrons, full)
     coarsest = pyramid[-1]
-    light = _own_light(coarsest, [_border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
+    light = _own_light(coarsest, [border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
     found = _estimate_cells(prior, coarsest, light, None)
     for coarse, cells in zip(pyramid[:0:-1], pyramid[-2::-1], strict=True):
         shape = cells.full.shape[:2]
-        own = _own_light(cells, [_border(length, CELLS) for length in shape], STRIDE)
+        own = _own_light(cells, [border(length, CELLS) for length in shape], STRIDE)
         found = _estimate_cells(prior, cells, *_told(found, coarse.sampling, cells.sampling, own))
 
     cells = pyramid[0]
@@ -137,11 +137,6 @@ def _estimate_cells(prior: Prior, cells: Cells, light: Singles, pilot: PatchPilo
         for plane, channel in zip(np.moveaxis(cells.electrons, -1, 0), cells.index, strict=True)
     ]
     return estimate(prior, cells.sampling, np.stack(stable, axis=-1), cells.full, light, pilot)
-
-
-def _border(length: int, size: int) -> tuple[int, int]:
-    """Samples to add before and behind, so that every one lies in as many patches."""
-    return size - STRIDE, (length - 1) // STRIDE * STRIDE + size - length
 
 
 def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[tuple[int, int]]:

@@ -27,7 +27,18 @@ from studies.pages.duels import (
     snr_db,
 )
 from studies.pages.plots import BLUE, CHART, GREEN, ORANGE, STYLE, blank, name_at_ends, plain_ticks, svg_text
-from studies.pages.report_text import DELTA_E, MISSING, PSNR, Metric, fixed, level_text, percent, significant
+from studies.pages.report_text import (
+    DELTA_E,
+    MISSING,
+    PSNR,
+    Metric,
+    fixed,
+    level_text,
+    percent,
+    signed,
+    significant,
+    table,
+)
 from studies.pages.white_pixel import white_pixel_tables
 from studies.sweep.row import Row
 
@@ -114,11 +125,6 @@ def code(text: str) -> str:
     return "`" + " ".join(text.split()).replace("`", "'").replace("|", "\\|") + "`"
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a Markdown table."""
-    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))
-
-
 def facts_table(contests: Sequence[Contest], study: Mapping[str, Any]) -> str:
     """Return a table of what the numbers come from."""
     rows = next(iter(contests[0].rows.values()))
@@ -164,7 +170,7 @@ def duel_table(contests: Sequence[Contest], camera: str, opponents: Sequence[str
             outcomes = [duel.outcome for duel in found]
             counts = " / ".join(str(outcomes.count(outcome)) for outcome in (AHEAD, LEVEL, BEHIND))
             leads = [duel.lead.mean for duel in found]
-            span = f"{_signed(metric, min(leads))} to {_signed(metric, max(leads))}" if leads else MISSING
+            span = f"{signed(metric, min(leads))} to {signed(metric, max(leads))}" if leads else MISSING
             cells += [counts, span]
         rows.append([*cells, f"× {significant(_develop_s(contests, name) / own_s, digits=2)}"])
     heads = [head for metric in METRICS for head in (f"{metric.name}: ahead / level / behind", _lead_head(metric))]
@@ -179,7 +185,7 @@ def lead_table(metric: Metric, of_group: Sequence[Contest], camera: str) -> str:
         cells = []
         for contest in of_group:
             duel = leads.get(contest.level)
-            shown = _signed(metric, duel.lead.mean) if duel else MISSING
+            shown = signed(metric, duel.lead.mean) if duel else MISSING
             way = {BEHIND: f"**{shown}**", LEVEL: f"({shown})"}
             cells.append(way.get(duel.outcome, shown) if duel else shown)
         rows.append([code(name), *cells])
@@ -199,11 +205,6 @@ def level_table(of_group: Sequence[Contest], camera: str) -> str:
 
 def _lead_head(metric: Metric) -> str:
     return f"lead in {metric.name}" + (f" [{metric.unit}]" if metric.unit else "")
-
-
-def _signed(metric: Metric, value: float) -> str:
-    shown = fixed(value, metric.digits)
-    return shown if value < 0 else f"+{shown}"
 
 
 def _both(contest: Contest, name: str) -> str:

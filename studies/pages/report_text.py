@@ -63,6 +63,12 @@ def significant(value: float | None, unit: str = "", digits: int = 3) -> str:
     return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "\N{MINUS SIGN}") + (NBSP + unit if unit else "")
 
 
+def signed(metric: Metric, value: float) -> str:
+    """Write a difference of a metric's figures, with its sign."""
+    shown = fixed(value, metric.digits)
+    return shown if value < 0 else f"+{shown}"
+
+
 def level_text(level: str) -> str:
     """Write ``25cd/m2`` as prose does."""
     value, unit = parse_level(level)
@@ -151,3 +157,8 @@ def way_name(exposure: str, white_balance: str) -> str:
 def spectrum_name(spectrum: str) -> str:
     """Write a spectrum as prose does."""
     return "own light" if spectrum == OWN else f"under {spectrum}"
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))

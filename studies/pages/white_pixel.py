@@ -6,7 +6,7 @@ import numpy as np
 
 from studies.metrics.confidence import SeedMean, mean_with_confidence
 from studies.pages.duels import METRICS, Contest
-from studies.pages.report_text import MISSING, Metric, fixed, level_text
+from studies.pages.report_text import MISSING, Metric, fixed, level_text, signed, table
 
 RGBW, BAYER = "ple_rgbw", "ple_bayer"
 DRAWN = "generated"  # how the names of scenes begin that are drawn from a number
@@ -26,11 +26,7 @@ def white_pixel_tables(contests: Sequence[Contest]) -> list[str]:
     for metric in METRICS:
         unit = f" [{metric.unit}]" if metric.unit else ""
         head = [f"{metric.name}{unit}", "exposure", "white balance", "scenes", *map(level_text, levels)]
-        parts.append(
-            "\n".join(
-                f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *_rows(contests, levels, metric))
-            )
-        )
+        parts.append(table(head, _rows(contests, levels, metric)))
     return parts
 
 
@@ -67,8 +63,7 @@ def _cell(contests: Sequence[Contest], metric: Metric) -> str:
     if not contests:
         return MISSING
     found = lead(contests, metric)
-    shown = f"{fixed(found.mean, metric.digits)} ± {fixed((found.high - found.low) / 2, metric.digits)}"
-    shown = shown if found.mean < 0 else f"+{shown}"
+    shown = f"{signed(metric, found.mean)} ± {fixed((found.high - found.low) / 2, metric.digits)}"
     return f"({shown})" if found.low <= 0 <= found.high else shown
 
 

@@ -1,20 +1,18 @@
-"""The light that a pixel needs for an SNR, in closed form with every noise term."""
+"""An even neutral field before a camera in closed form: electrons, SNR, and the light that an SNR takes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from render.illuminants import illuminant
-from render.spectrum import VISIBLE_NM
+from render.spectrum import VISIBLE_NM, Floats
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.readout import electrons_at_snr, noise_variance
-from studies.metrics.truth import light_in_bands, neutral_electrons
+from studies.metrics.truth import Light, light_in_bands, neutral_electrons
 
 GREY = 0.18  # reflectance of the card whose illuminance is told
-BAND_NM = 1.0
 
 
 @dataclass(frozen=True)
@@ -38,34 +36,45 @@ class LightForSnr:
     illuminance_lux: float
 
 
-def electrons_per_luminance(sensor: SensorConfig, light: str, exposure_s: float) -> dict[str, float]:
-    """Electrons of each channel's pixel from an even neutral field of 1 cd/m^2 under a named light."""
-    nm = np.arange(VISIBLE_NM[0] + BAND_NM / 2, VISIBLE_NM[1], BAND_NM)
-    under = light_in_bands(illuminant(light), nm, np.full(nm.size, BAND_NM))
-    return dict(zip(channels(sensor.cfa), neutral_electrons(sensor, under, exposure_s).tolist(), strict=True))
+def light_of(name: str) -> Light:
+    """Illuminant of 1 cd/m^2 in bands of 1 nm over 380-780 nm."""
+    nm: Floats = np.arange(VISIBLE_NM[0] + 0.5, VISIBLE_NM[1])
+    return light_in_bands(illuminant(name), nm, np.ones_like(nm))
 
 
-def light_for_snr(snr: float, sensor: SensorConfig, light: str, exposure_s: float) -> list[LightForSnr]:
+def channel_e(sensor: SensorConfig, light: Light, luminance_cd_m2: float, exposure_s: float) -> Floats:
+    """Expected electrons of each channel's pixel from a uniform neutral field, shape (channel,)."""
+    return neutral_electrons(sensor, light, exposure_s) * luminance_cd_m2
+
+
+def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float) -> Floats:
+    """Expected electrons over the noise of one pixel of one chip, fixed patterns included, shape of `electrons`.
+
+    Crosstalk plays no part: neighbours exchange the same.
+    """
+    even = replace(sensor, pixel=replace(sensor.pixel, crosstalk=0.0))
+    return np.asarray(electrons / np.sqrt(noise_variance(electrons, even, exposure_s)))
+
+
+def light_for_snr(ratio: float, sensor: SensorConfig, light: str, exposure_s: float) -> list[LightForSnr]:
     """Light for an SNR by channel, in the order of `sensor.cfa.channels`.
 
     Parameters
     ----------
-    snr : float
+    ratio : float
         Mean signal over the standard deviation of one pixel of one chip, fixed patterns included.
     """
-    electrons = electrons_at_snr(snr, sensor, exposure_s)
-    of = electrons_per_luminance(sensor, light, exposure_s)
-    found = {channel: electrons / per_cd_m2 for channel, per_cd_m2 in of.items()}
-    return [LightForSnr(channel, electrons, level, level * pi / GREY) for channel, level in found.items()]
+    electrons = electrons_at_snr(ratio, sensor, exposure_s)
+    of = channel_e(sensor, light_of(light), 1.0, exposure_s)
+    return [
+        LightForSnr(channel, electrons, electrons / own, electrons / own * pi / GREY)
+        for channel, own in zip(channels(sensor.cfa), of.tolist(), strict=True)
+    ]
 
 
-def snr_at(
-    luminance_cd_m2: NDArray[np.float64], sensor: SensorConfig, light: str, exposure_s: float
-) -> dict[str, NDArray[np.float64]]:
+def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s: float) -> dict[str, Floats]:
     """SNR of each channel's pixel over light; NaN where its well is full."""
-    found = {}
-    for channel, per_cd_m2 in electrons_per_luminance(sensor, light, exposure_s).items():
-        electrons = per_cd_m2 * luminance_cd_m2
-        variance = [float(noise_variance(np.full((1, 1), x), sensor, exposure_s)[0, 0]) for x in electrons]
-        found[channel] = np.where(electrons < sensor.pixel.full_well_e, electrons / np.sqrt(variance), np.nan)
-    return found
+    of = channel_e(sensor, light_of(light), 1.0, exposure_s)
+    electrons = dict(zip(channels(sensor.cfa), of[:, None] * luminance_cd_m2, strict=True))
+    full_e = sensor.pixel.full_well_e
+    return {name: np.where(e < full_e, snr(e, sensor, exposure_s), np.nan) for name, e in electrons.items()}

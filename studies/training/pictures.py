@@ -18,6 +18,7 @@ from skimage.draw import ellipse, polygon
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import Floats, band_widths
+from rodcone.colour_spaces import decode_srgb
 from rodcone.optional import quietly_imported
 from scenes.reflectances import band, edge, grey
 from sensor.config import SensorConfig
@@ -185,7 +186,7 @@ def photograph(rng: np.random.Generator, light: KnownLight, name: str) -> Floats
     spectra = np.stack([np.interp(_NM, basis.wavelengths, basis.values[:, index]) for index in range(3)])
     encoded = getattr(data, name)() / 255.0
     encoded = encoded if encoded.ndim == 3 else np.repeat(encoded[..., None], 3, axis=2)
-    linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    linear = decode_srgb(encoded)
     height, width = (size // 2 for size in linear.shape[:2])
     linear = linear[: 2 * height, : 2 * width].reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
     return np.asarray(linear @ light.signals(spectra) * np.exp(rng.normal(0, 0.04, 4)))

@@ -10,8 +10,8 @@ from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.presets import low_noise, table1_output
 from sensor.readout import electrons_at_snr
-from studies.paper.flat import channel_e, light_of, shot_noise_alone
-from studies.photograph.snr import light_for_snr, snr_at
+from studies.paper.flat import shot_noise_alone
+from studies.photograph.snr import channel_e, light_for_snr, light_of, snr_at
 
 EXPOSURE_S = 0.033
 
