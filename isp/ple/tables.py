@@ -30,7 +30,7 @@ TAPER = 1.0  # power of half a sine: the weight of a patch's pixels
 LIFT = 2.0
 _LEAST_BASE = 1e-12
 FEW = 20  # directions in which components are told apart first
-MARGINS = (5.0, 20.0)  # of that log likelihood: where the other directions are noise, and where they are all signal
+MARGINS = (5.0, 15.0)  # of that log likelihood: where the other directions are noise, and where they are all signal
 _TABLES = 160  # kept; up to 4 MB each
 
 
@@ -64,11 +64,8 @@ class Estimator:
 
     Attributes
     ----------
-    linear : (sample, value) float32
-    offset : (value,) float32
-        The estimate without a pilot is ``y @ linear + offset``.
-    pilot : (4, value) float32
-        What each of the pilot's four directions adds, by its innovation over its variance.
+    linear : (sample + 5, value) float32
+        On the samples, 1, and the pilot's innovation over its variance in each of its four directions.
     variance, noise : (4,) float64
         Posterior variance of a pixel, mean by channel, and the same over the variance of a sample's noise.
     inner : (4,) float64
@@ -78,8 +75,6 @@ class Estimator:
     """
 
     linear: Singles
-    offset: Singles
-    pilot: Singles
     variance: Doubles
     noise: Doubles
     inner: Doubles
@@ -159,21 +154,21 @@ class Table:
         self.spread, turns = np.linalg.eigh(left)
         self.spread = np.maximum(self.spread, 0.0)
         self.turn = turns.swapaxes(1, 2) / scale  # (component, direction, channel)
-        # One matrix gives both: whitened samples, and what they say of the pilot's directions.
+        # One matrix takes samples, 1 and the pilot's means to whitened samples and the pilot's innovations.
         told = self.turn @ (half @ self.factors)
-        self.reads = np.concatenate([self.factors, told], axis=1).astype(np.float32)
-        self.read_offset = np.einsum("kij,kj->ki", self.reads, self.values[:, at]).astype(np.float32)
-        self.pilot_offset = np.einsum("kij,kj->ki", self.turn, self.values @ self.average.T).astype(np.float32)
-        self.pilot_turn = self.turn.astype(np.float32)
-        self.centre, self.few, self.pairs, self.quick, outside = self._quick_likelihood(seen)
+        reads = np.concatenate([self.factors, -told], axis=1)
+        offset = -np.einsum("kij,kj->ki", reads, self.values[:, at])
+        offset[:, count:] -= np.einsum("kij,kj->ki", self.turn, self.values @ self.average.T)
+        turn = np.concatenate([np.zeros((len(reads), count, 4)), self.turn], axis=1)
+        reads = np.concatenate([reads, offset[..., None], turn], axis=2).swapaxes(1, 2)
+        self.reads = np.ascontiguousarray(reads, dtype=np.float32)
+        self.centre, self.few, self.quick, outside = self._quick_likelihood(seen)
         # The quick likelihood may be wrong by the more, the more signal the directions hold that it leaves out.
         signal = 1.0 - np.mean(noise) / (np.exp(self.mix.log_weights) @ outside)
         self.margin = float(np.interp(signal, (0.0, 1.0), MARGINS))
         self.estimators: dict[int, Estimator] = {}
 
-    def _quick_likelihood(
-        self, seen: Doubles
-    ) -> tuple[Singles, Singles, tuple[NDArray[np.intp], ...], Singles, Doubles]:
+    def _quick_likelihood(self, seen: Doubles) -> tuple[Singles, Singles, Singles, Doubles]:
         """Log likelihood in `FEW` directions and the rest's length, as one matrix on products of coordinates."""
         weights, at = np.exp(self.mix.log_weights), self.values[:, self.rows]
         centre = weights @ at
@@ -192,7 +187,7 @@ class Table:
             np.linalg.slogdet(within)[1] + (straight * mean).sum(axis=1) + others * np.log(outside)
         )
         quick = np.concatenate([square, straight, -0.5 / outside[:, None], constant[:, None]], axis=1)
-        return centre.astype(np.float32), few.astype(np.float32), pairs, quick.T.astype(np.float32), outside
+        return centre.astype(np.float32), few.astype(np.float32), quick.astype(np.float32), outside
 
     @cached_property
     def inner(self) -> Doubles:
@@ -219,10 +214,9 @@ class Table:
         inner = ((self.inner @ covariance) * self.inner).sum(axis=1) - ((self.inner @ half) ** 2).sum(axis=1)
         pilot = self.turn[k] @ (self.average @ covariance - (self.average @ half) @ half.T)
         taper = np.repeat(window(self.mix.size).ravel(), 4)
+        offset = self.values[k] - linear @ self.values[k, at]
         return Estimator(
-            linear=np.ascontiguousarray(linear.T * taper, dtype=np.float32),
-            offset=((self.values[k] - linear @ self.values[k, at]) * taper).astype(np.float32),
-            pilot=(pilot * taper).astype(np.float32),
+            linear=(np.concatenate([linear.T, offset[None], pilot]) * taper).astype(np.float32),
             variance=variance,
             noise=variance * (self.average @ self.unit[k]),
             inner=inner,

@@ -19,6 +19,7 @@ from studies.sweep.row import Row
 
 FLIP = Metric("flip_mean", "FLIP, mean", 3, "", higher=False)
 METRICS = (PSNR, DELTA_E, FLIP)
+MARGINS = {PSNR.key: 0.1, DELTA_E.key: 0.1, FLIP.key: 0.003}  # of a lead: less is not seen
 AHEAD, LEVEL, BEHIND = "ahead", "level", "behind"
 FEWEST_SEEDS = 2  # that an interval takes
 
@@ -160,6 +161,15 @@ def duels(contests: Sequence[Contest], camera: str, opponent: str, metric: Metri
         for contest in contests
         if is_ranked(contest, camera)
     ]
+
+
+def no_worse(contests: Sequence[Contest], camera: str, opponents: Sequence[str], metric: Metric) -> int:
+    """Conditions in which the camera is ahead of every one of these opponents, or level with it.
+
+    Level is a lead whose whole 95 % interval is above minus the metric's margin of `MARGINS`.
+    """
+    least = [[duel.lead.low for duel in duels(contests, camera, name, metric)] for name in opponents]
+    return sum(low >= -MARGINS[metric.key] for low in map(min, zip(*least, strict=True)))
 
 
 def lead_over(contest: Contest, camera: str, opponent: str, metric: Metric) -> SeedMean:

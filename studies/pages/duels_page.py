@@ -9,12 +9,13 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from isp.processors.catalogue import FAIR
+from isp.processors.catalogue import FAIR, PROCESSORS
 from rodcone.files import replacing
 from studies.pages.duels import (
     AHEAD,
     BEHIND,
     LEVEL,
+    MARGINS,
     METRICS,
     Contest,
     contests_of,
@@ -22,6 +23,7 @@ from studies.pages.duels import (
     group_name,
     groups_of,
     is_ranked,
+    no_worse,
     opponents_of,
     plain_opponents_of,
     snr_db,
@@ -102,7 +104,8 @@ def page_of(
         "## Won, level and lost",
         *duel_tables(contests, camera),
         "Conditions by the outcome of the 95 % interval over seeds, and the leads' range: below 0 "
-        f"{code(camera)} is behind. Times are medians over all pictures, in units of {code(camera)}'s, on the machine "
+        f"{code(camera)} is behind. Level by a margin: the interval's far end is within it. Times are medians over all "
+        f"pictures, in units of {code(camera)}'s, on the machine "
         "of the sweep.",
         "## Lead in every condition",
         f"Positive: {code(camera)} is better. **Bold**: it is behind, and the whole interval is below 0. In brackets: "
@@ -154,9 +157,27 @@ def duel_tables(contests: Sequence[Contest], camera: str) -> list[str]:
         title = f"### exposure {code(way[0])}, white balance {code(way[1])}" if len(ways) > 1 else ""
         plain = plain_opponents_of(of_way, camera)
         words = f"With the plain colour matrix, as published; the rows above rank `NAME{FAIR}`:" if plain else ""
-        parts += [title, duel_table(of_way, camera, opponents_of(of_way, camera)), words]
+        opponents = opponents_of(of_way, camera)
+        parts += [title, duel_table(of_way, camera, opponents), no_worse_table(of_way, camera, opponents), words]
         parts += [duel_table(of_way, camera, plain)] if plain else []
     return parts
+
+
+def no_worse_table(contests: Sequence[Contest], camera: str, opponents: Sequence[str]) -> str:
+    """Return a table of the conditions in which the camera is ahead or level: by opponent, and beside all at once."""
+    bayer = [name for name in opponents if name in PROCESSORS and PROCESSORS[name].mosaic == "bayer"]
+    of_rows = {code(name): [name] for name in opponents} | {"every Bayer camera": bayer, "every one": opponents}
+    ranked = sum(is_ranked(contest, camera) for contest in contests)
+    margins = (f"{fixed(MARGINS[metric.key], metric.digits)} {metric.unit}".strip() for metric in METRICS)
+    heads = (f"{metric.name}, worse by {margin} at most" for metric, margin in zip(METRICS, margins, strict=True))
+    return table(
+        [f"ahead or level, of {ranked} conditions", *heads],
+        [
+            [name, *(str(no_worse(contests, camera, among, metric)) for metric in METRICS)]
+            for name, among in of_rows.items()
+            if among
+        ],
+    )
 
 
 def duel_table(contests: Sequence[Contest], camera: str, opponents: Sequence[str]) -> str:

@@ -30,6 +30,10 @@ def drawn(table: Table, k: int, light_e: float, count: int, rng):
     return values, (values[:, at] + noise * rng.standard_normal((count, len(at)))).astype(np.float32)
 
 
+def _with_1(y):
+    return np.concatenate([y, np.ones((len(y), 1))], axis=1)
+
+
 @pytest.mark.parametrize("tile", [RGBW, BAYER])
 @pytest.mark.parametrize("light_e", [0.5, 20.0, 2000.0])
 def test_over_signals_drawn_from_the_prior_the_error_is_0_in_the_mean_and_varies_as_the_closed_form(tile, light_e):
@@ -38,7 +42,7 @@ def test_over_signals_drawn_from_the_prior_the_error_is_0_in_the_mean_and_varies
     for k in (0, 17, 40):
         values, y = drawn(table, k, light_e, count, rng)
         by = table.estimator(k)
-        error = (y @ by.linear + by.offset) / np.repeat(window(PATCH).ravel(), 4) - values
+        error = (_with_1(y) @ by.linear[: len(table.rows) + 1]) / np.repeat(window(PATCH).ravel(), 4) - values
         deviation = error.std(axis=0)
         assert np.abs(error.mean(axis=0) / deviation).max() < SIGMAS / np.sqrt(count) + 0.01
         for channel in range(4):
@@ -57,11 +61,12 @@ def test_with_a_pilot_the_error_varies_as_the_closed_form():
         (table.turn[k].T @ table.turn[k]).diagonal()
     )  # of the pilot's noise by channel, at a noise of 1
     means = values @ table.average.T + rng.standard_normal((count, 4)) * scale * np.sqrt(told)
-    read = y @ table.reads[k].T - table.read_offset[k]
-    news = means @ table.turn[k].T - table.pilot_offset[k] - read[:, len(table.rows) :]
+    told_all = np.concatenate([_with_1(y), means], axis=1)
+    news = (told_all @ table.reads[k])[:, len(table.rows) :]
     spread = told + table.spread[k]
     assert (news**2).mean(axis=0) == pytest.approx(spread, rel=SIGMAS * (2 / count) ** 0.5)
-    error = (y @ by.linear + by.offset + (news / spread) @ by.pilot) / np.repeat(window(PATCH).ravel(), 4) - values
+    error = np.concatenate([_with_1(y), news / spread], axis=1) @ by.linear
+    error = error / np.repeat(window(PATCH).ravel(), 4) - values
     expected = by.variance - (1 / spread) @ by.pilot_variance
     for channel in range(4):
         assert (error**2)[:, channel::4].mean() == pytest.approx(expected[channel], rel=SIGMAS * (2 / count) ** 0.5)
@@ -86,7 +91,7 @@ def test_one_component_is_the_textbooks_linear_estimate():
     gain = np.linalg.solve(whole[np.ix_(at, at)] + np.diag(noise[at]), whole[at]).T
     expected = 2 * deviation + gain @ (y - 2 * deviation[at])
     by = table.estimator(0)
-    found = (y.astype(np.float32) @ by.linear + by.offset) / np.repeat(window(PATCH).ravel(), 4)
+    found = _with_1(y[None])[0] @ by.linear[:65] / np.repeat(window(PATCH).ravel(), 4)
     assert found == pytest.approx(expected, rel=2e-4)
     left = np.diag(whole) - np.einsum("ij,ji->i", gain, whole[at])
     assert by.variance == pytest.approx([left[channel::4].mean() for channel in range(4)], rel=1e-4)

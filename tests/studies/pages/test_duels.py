@@ -19,12 +19,14 @@ from studies.pages.duels import (
     duels,
     is_ranked,
     lead_over,
+    no_worse,
     opponents_of,
     snr_db,
 )
 from studies.pages.report_text import DELTA_E, PSNR
 from studies.sweep.row import Row
 
+T_1 = 12.706205  # Student's t, two-sided 95 %, 1 degree of freedom
 T_2 = 4.302653  # Student's t, two-sided 95 %, 2 degrees of freedom
 
 
@@ -44,6 +46,18 @@ def test_a_lead_is_clear_where_its_whole_interval_is_on_one_side_of_0(
     assert duel.lead.mean == pytest.approx(sum(x - y for x, y in zip(ours, theirs, strict=True)) / 3)
     if outcome == LEVEL:  # 1, 2 and 3: a deviation of 1
         assert duel.lead.high - duel.lead.mean == pytest.approx(T_2 / sqrt(3), rel=1e-5)
+
+
+def test_no_worse_is_an_interval_above_minus_the_margin_beside_every_opponent() -> None:
+    def rows(least: float) -> list[Row]:  # leads of 0 and 2 m, so that the interval's low end is m - t m
+        m = least / (1 - T_1)
+        return rows_of({"a": [30.0, 30.0 + 2 * m], "b": [30.0, 30.0], "c": [0.0, 0.0]})
+
+    for least, count in ((-0.099, 1), (-0.101, 0)):
+        contests = contests_of(rows(least))
+        assert no_worse(contests, "a", ["b"], PSNR) == count
+        assert no_worse(contests, "a", ["c"], PSNR) == 1
+        assert no_worse(contests, "a", ["c", "b"], PSNR) == count
 
 
 def test_seeds_are_paired_by_their_number_not_by_their_place() -> None:
