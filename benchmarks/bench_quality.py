@@ -1,8 +1,8 @@
 """How good the interleaved camera's pictures are, beside its opponents', and whether anything jumps over the light.
 
 Run ``python benchmarks/bench_quality.py transitions``, ``... ranking``, ``... daylight``, ``... exposures``,
-``... substitution`` or ``... settings``; renders are kept in ``out/bench_quality``. Quality is against the noise-free
-truth at the known exposure scale, as in the demo.
+``... substitution``, ``... fringes`` or ``... settings``; renders are kept in ``out/bench_quality``. Quality is against
+the noise-free truth at the known exposure scale, as in the demo.
 
 - transitions: quality over light in half octaves, at a fixed exposure and with auto exposure, and the deepest drop over
   one octave until the colours themselves saturate.
@@ -13,6 +13,7 @@ truth at the known exposure scale, as in the demo.
 - exposures: what exposing for W is worth beside exposing for green, white balance given, and which of the two holds
   more information (`sensor.exposure.information_bits`); on training pictures first.
 - substitution: Figure 6's decision, 20 seeds a scene and exposure.
+- fringes: a grey star that no scene holds: RMS of R - G and B - G of the encoded picture, 0 in truth.
 - settings: sweep of patch, sigma_d and sigma_s that the defaults come from.
 """
 
@@ -34,6 +35,9 @@ from isp.processors.catalogue import FAIR, PROCESSORS
 from isp.settings import NEIGHBOURHOOD, Settings
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL, substitution_weight
 from render.engine import render
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from render.spectrum import band_widths
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
@@ -53,6 +57,7 @@ from studies.metrics.truth import Light, light_in_bands, neutral_electrons, show
 from studies.photograph.camera import colour_fit, develop_to_scale
 
 SIZE = 160
+FINER = 8  # samples a pixel along either axis, of the star
 WAVELENGTH_NM = np.arange(390.0, 780.0, 20.0)
 FIXED_S, LONGEST_S = 0.020, 0.066
 DAYLIGHT_CD_M2 = 1000.0
@@ -65,7 +70,7 @@ SEEDS = {
     "bayer": 20,
     **{name: 3 for name, one in PROCESSORS.items() if one.extra == "bm3d"},
 }  # 5: others
-STAGES = ("transitions", "ranking", "daylight", "exposures", "substitution", "settings")
+STAGES = ("transitions", "ranking", "daylight", "exposures", "substitution", "fringes", "settings")
 METRICS = (("PSNR", "psnr_db", 1), ("dE2000", "delta_e_median", -1))  # sign: which way is better
 
 
@@ -95,6 +100,7 @@ class MeasuredShot:
 
     raw: RawImage
     picture: Picture
+    encoded: NDArray[np.float64]
     quality: Quality
 
 
@@ -141,7 +147,8 @@ class SceneAndSensor:
         raw = expose(electrons, camera.sensor, seconds, camera.device, np.random.default_rng([seed, 1]), exact=True)
         white = stage.white_cd_m2 * level
         linear, picture = develop_to_scale(raw, processor, camera.colours, camera.sensor, stage.light, white, **options)
-        return MeasuredShot(raw, picture, measure(encode_srgb(linear), stage.truth))
+        encoded = encode_srgb(linear)
+        return MeasuredShot(raw, picture, encoded, measure(encoded, stage.truth))
 
     def snr_db(self, name: str, channel: str, level: float, seconds: float) -> float:
         """Median SNR of a channel's pixels, in expectation: shot noise and dark noise."""
@@ -289,6 +296,36 @@ def substitution(bench: SceneAndSensor) -> None:
         )
 
 
+def star() -> RenderedScene:
+    """White card with a star of 29 black spokes, between 9 and 27 pixels from the middle, grey under D65."""
+    y, x = (np.indices((128 * FINER, 128 * FINER)) + 0.5) / FINER
+    radius, angle = np.hypot(y - 70.8, x - 57.3), np.arctan2(y - 70.8, x - 57.3)
+    black = (np.sin(29 * (angle - 0.19)) > 0) & (radius < 27.0) | (radius < 9.0)
+    card = np.where(black, 0.04, 0.85).reshape(128, FINER, 128, FINER).mean(axis=(1, 3))
+    light = light_in_bands(illuminant("D65"), WAVELENGTH_NM, band_widths(WAVELENGTH_NM))
+    radiance = SpectralRadiance(card[..., None] * light.spectrum, WAVELENGTH_NM)
+    radiance = SpectralRadiance(radiance.values / radiance.luminance().mean(), WAVELENGTH_NM)
+    white = float(radiance.luminance().max()) / 0.9
+    return RenderedScene(radiance, light, white, encode_srgb(true_srgb(radiance, light, white)))
+
+
+def fringes(bench: SceneAndSensor, names: Sequence[str], levels: Sequence[float], seeds: int) -> None:
+    """Colour on a grey star: RMS of R - G and B - G within 30 pixels of its middle, balance given."""
+    y, x = np.indices((128, 128)) + 0.5
+    near = np.hypot(y - 70.8, x - 57.3) < 30.0
+    for level in levels:
+        for name in names:
+            for channel in "GW"[: 1 + (PROCESSORS[name].mosaic == "rgbw")]:
+                found = []
+                for seed in range(seeds):
+                    camera = bench.camera(name, seed)
+                    _, seconds = bench.exposed(camera, level, channel)
+                    balance = neutral_electrons(camera.sensor, bench.stage.light, seconds)
+                    rgb = bench.shot(camera, level, seconds, seed, balance=balance).encoded[near]
+                    found.append(np.sqrt(np.mean((rgb[:, [0, 2]] - rgb[:, 1:2]) ** 2)))
+                print(f"{level:8.4g} cd/m2, {name}, exposed for {channel}: {np.mean(found):.4f}", flush=True)
+
+
 def settings(bench: SceneAndSensor, levels: Sequence[float]) -> None:
     """Mean loss of PSNR against the best of the sweep at each level, and mean ratio of dE2000 to its best."""
     choices = [(p, d, s) for p in (1, 3, 5) for d in (3.0, 6.0, 10.0) for s in (2.0, 3.0, 4.0, 8.0, 16.0)]
@@ -314,7 +351,7 @@ def main() -> None:
     parser.add_argument("--sensor", nargs="+", default=["low_noise", "table1_output"])
     parser.add_argument("--level", nargs="+", type=float, default=[0.0625, 0.25, 1.0, 4.0, 16.0, 64.0, 256.0])
     parser.add_argument("--snr", nargs="+", type=float, default=SNR_DB)
-    parser.add_argument("--opponent", nargs="*", choices=list(PROCESSORS)[2:], default=list(PROCESSORS)[2:])
+    parser.add_argument("--opponent", nargs="*", choices=list(PROCESSORS), default=list(PROCESSORS)[2:])
     parser.add_argument("--seeds", type=int, default=3)
     options = parser.parse_args()
     print_environment()
@@ -322,6 +359,8 @@ def main() -> None:
     if options.what == "exposures":
         made = enumerate(training_pictures(SIZE, TRAINING, TRAINING_SEED), 1)
         stages = {f"training {n}": lambda one=one: RenderedScene(**vars(one)) for n, one in made} | stages
+    if options.what == "fringes":
+        stages = {"star": star}
     for scene, open_one in stages.items():
         stage = open_one()
         for sensor in options.sensor if options.what != "substitution" else THRESHOLDS:
@@ -338,6 +377,8 @@ def main() -> None:
                 exposures(bench, options.level, options.seeds)
             elif options.what == "substitution":
                 substitution(bench)
+            elif options.what == "fringes":
+                fringes(bench, options.opponent, options.level, options.seeds)
             else:
                 settings(bench, options.level)
 
