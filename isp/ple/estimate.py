@@ -1,6 +1,5 @@
 """One scale: each patch picks a component and takes its estimate, and overlapping patches are averaged."""
 
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,14 +11,13 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from isp.ple.pick import BLOCK, blocks, pick
 from isp.ple.prior import Prior
 from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, window
 
 STRIDE = 2  # pixels from patch to patch: one tile
 STRIP = 100_000  # patches that are estimated together
-BLOCK = 1024  # of them whose numbers stay in a core's cache
 LEAST_LIGHT = 1e-3  # electrons
-MOST = 24  # components that a patch is held against, of the likeliest in a few directions
 DOUBT = 2.0
 INFLATE = 2.0
 LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of noise^2]
@@ -203,7 +201,7 @@ def _solve_one_light(at: Table, y: Singles, pilot: PatchPilot | None, index: NDA
         noise = (INFLATE * pilot.variance + at.pilot_floor) / (PILOT_VARIANCE + at.pilot_floor)
         told.append(pilot.means)
     known = np.concatenate(told, axis=1)
-    chosen, misfit, innovation = _pick(at, known, noise)
+    chosen, misfit, innovation = pick(at, known, noise)
     known[:, y.shape[1] + 1 :] = innovation
     taken, values = (np.empty((BLOCK, width), np.float32) for width in (known.shape[1], found.values.shape[1]))
     order = np.argsort(chosen, kind="stable")
@@ -211,7 +209,7 @@ def _solve_one_light(at: Table, y: Singles, pilot: PatchPilot | None, index: NDA
     for first, last in pairwise(bounds.tolist()):
         by = at.estimator(int(chosen[order[first]]))
         linear = by.linear[: known.shape[1]]
-        for some in _blocks(order[first:last]):
+        for some in blocks(order[first:last]):
             variance, inner = by.variance, by.inner
             if noise is not None:
                 sure = 1.0 / (noise[some, None] + at.spread[chosen[some[0]]])
@@ -224,60 +222,6 @@ def _solve_one_light(at: Table, y: Singles, pilot: PatchPilot | None, index: NDA
             found.noise[place] = variance * (by.noise / by.variance)
             np.take(known, some, axis=0, out=taken[: some.size], mode="clip")
             found.values[place] = np.matmul(taken[: some.size], linear, out=values[: some.size])
-
-
-def _pick(at: Table, known: Singles, noise: Singles | None) -> tuple[NDArray[np.int32], Singles, Singles]:
-    """Pick each patch's likeliest component: which, its misfit, and the pilot's innovation over its variance."""
-    count, size = len(known), len(at.centre)
-    best, chosen = np.full(count, -np.inf, np.float32), np.zeros(count, np.int32)
-    misfit = np.empty(count, np.float32)
-    innovation = np.zeros((count, known.shape[1] - size - 1), np.float32)
-    # Arrays are made once: fresh memory costs as much as the sums.
-    taken = np.empty((BLOCK, known.shape[1]), np.float32)
-    reads = np.empty((BLOCK, size + innovation.shape[1]), np.float32)
-    candidates = _candidates(at, known[:, :size])
-    for k, some in ((k, some) for k, row in enumerate(candidates) for some in _blocks(np.flatnonzero(row))):
-        np.take(known, some, axis=0, out=taken[: some.size], mode="clip")
-        read = np.matmul(taken[: some.size], at.reads[k][: known.shape[1], : reads.shape[1]], out=reads[: some.size])
-        square = np.einsum("ij,ij->i", read[:, :size], read[:, :size])
-        likelihood = at.log_scale[k] - 0.5 * square
-        if noise is not None:
-            news, spread = read[:, size:], noise[some, None] + at.spread[k].astype(np.float32)
-            over = news / spread
-            likelihood -= 0.5 * (np.log(spread.prod(axis=1)) + np.einsum("ij,ij->i", news, over))
-        better = likelihood > best[some]
-        winners = some[better]
-        best[winners], chosen[winners], misfit[winners] = likelihood[better], k, square[better] / size
-        if noise is not None:
-            innovation[winners] = over[better]
-    return chosen, misfit, innovation
-
-
-def _blocks(index: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
-    return (index[first : first + BLOCK] for first in range(0, len(index), BLOCK))
-
-
-def _candidates(at: Table, y: Singles) -> NDArray[np.bool_]:
-    """Which components may be the likeliest, shape (component, patch), by the likelihood in a few directions."""
-    quick = np.empty((len(at.quick), len(y)), np.float32)
-    few = at.few.shape[1]
-    starts = np.cumsum([0, *range(few, 0, -1)]).tolist()
-    held = np.empty((at.quick.shape[1], BLOCK), np.float32)
-    for first in range(0, len(y), BLOCK):
-        off = y[first : first + BLOCK] - at.centre
-        told = (off @ at.few).T
-        features = held[:, : len(off)]
-        for i, start in enumerate(starts[:-1]):
-            np.multiply(told[i], told[i:], out=features[start : starts[i + 1]])
-        features[starts[-1] : starts[-1] + few] = told
-        features[-2] = np.einsum("ij,ij->i", off, off) - np.einsum("ij,ij->j", told, told)
-        features[-1] = 1.0
-        quick[:, first : first + BLOCK] = at.quick @ features
-    candidates = np.asarray(quick > quick.max(axis=0) - at.margin)
-    crowded = np.flatnonzero(candidates.sum(axis=0) > MOST)
-    last = np.partition(quick[:, crowded], len(quick) - MOST, axis=0)[-MOST]
-    candidates[:, crowded] &= quick[:, crowded] >= last
-    return candidates
 
 
 def _overlapped(found: Patches, shape: tuple[int, int], size: int) -> tuple[Singles, ...]:
