@@ -1,6 +1,5 @@
 """A study: scenes, spectra, levels, exposures, sensors, processors and seeds, of which every combination is a cell."""
 
-import re
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
@@ -15,6 +14,7 @@ from sensor.cfa import channels
 from sensor.exposure import AUTO, LONGEST_S, RULES
 from sensor.presets import preset
 from sensor.variations import vary
+from studies.study.exposures import parse_exposure
 from studies.study.levels import parse_level
 
 OWN = "own"  # the spectrum that the scene's lights have
@@ -26,8 +26,6 @@ _RUN_OUT = 0.01
 # Gray World from the picture, or the neutral of the scene's light, as a camera notes it in its raw files.
 WHITE_BALANCES = GRAY_WORLD, AS_SHOT = "gray-world", "as-shot"
 FILES = (".xml", ".exr", ".mat", ".toml")  # endings of values that name a file
-_TIME = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+)\s*(us|ms|s)\s*$")
-_SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
 
 
 @dataclass(frozen=True)
@@ -182,26 +180,6 @@ def label(value: Any) -> str:
     """Name of a value of an axis in rows and seeds: a file's name without its folder, any other value as it is."""
     text = str(value)
     return Path(text).name if Path(text).suffix.lower() in FILES else text
-
-
-def parse_exposure(text: str) -> float | None:
-    """Exposure time [s] of ``10ms``, ``0.5s`` or ``200us``; None for a rule of `sensor.exposure.RULES`.
-
-    Raises
-    ------
-    InputError
-        For anything else, or a time of 0.
-    """
-    if text in RULES:
-        return None
-    match = _TIME.match(text)
-    if match is None:
-        raise InputError(
-            f"exposures: {text!r} is not a time; allowed: {', '.join(RULES)}, or a number and us, ms or s; write 10ms"
-        )
-    seconds = float(match[1]) * _SECONDS[match[2]]
-    require_range("exposures", seconds, 1e-9, 1e6, "give a time above 0 in seconds")
-    return seconds
 
 
 def _check_axes(study: Study) -> None:
