@@ -10,6 +10,7 @@ from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.substitution import COLOUR_ERROR
+from rodcone.brief import brief
 from rodcone.errors import InputError
 from rodcone.jit import Backend
 from rodcone.notebook import html_of, preview_png
@@ -42,6 +43,8 @@ class Picture:
     engine: Backend = "numpy"
     snr: float | None = None
     substitution: float | None = None
+
+    __repr__ = brief
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from render.photometry import luminance, tristimulus
 from render.spectrum import band_widths
+from rodcone.brief import brief
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.errors import InputError, require_range
 from rodcone.notebook import html_of, preview_png
@@ -46,6 +47,8 @@ class SpectralRadiance:
     width_nm: Floats | None = None
     relative_level_error: float | None = None
     signed: bool = False
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         values = np.asarray(self.values)

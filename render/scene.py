@@ -10,6 +10,7 @@ import numpy as np
 
 from render.optical_constants import optical_constant
 from render.spectrum import Spectrum
+from rodcone.brief import brief
 from rodcone.errors import InputError, one_line, unknown
 from rodcone.types import Floats
 
@@ -53,6 +54,8 @@ class LightGroup:
     power: float = 1.0
     coloured: bool = False
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -84,6 +87,8 @@ class Scene:
     groups: Mapping[str, LightGroup]
     reference_plane: str | None = None
     extend: str | None = None
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         grouped = [path for group in self.groups.values() for path in group.emitters]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rodcone.brief import brief
 from rodcone.errors import InputError
 from rodcone.types import Floats as Floats  # noqa: PLC0414  (other packages import it from here)
 
@@ -35,6 +36,8 @@ class Spectrum:
 
     wavelength_nm: Floats
     values: Floats
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         nm = np.array(self.wavelength_nm, dtype=np.float64)

@@ -5,6 +5,7 @@ from math import ceil, hypot
 from numbers import Real
 
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, require_whole
 from sensor.cfa import RGBW, Tile, channels, check_tile
 from sensor.curves import Responses, rgbw
@@ -56,6 +57,8 @@ class PixelConfig:
     hot_pixel_share: float = 0.0
     hot_pixel_dark_current_e_per_s: float = 0.0
     crosstalk: float = 0.0
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         limits = {
@@ -121,6 +124,8 @@ class LensConfig:
     defocus_um: float = 0.0
     veiling_glare: float = 0.0
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         limits = {
             "f_number": (0.1, 1e4, "give focal length over aperture"),
@@ -162,6 +167,8 @@ class SensorConfig:
     bits: int = 14
     black_level_dn: int | None = None
     window_nm: tuple[float, float] = VISIBLE_NM
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, unknown
 
 # Smooth curves of the project's own: peak * exp(-|(nm - centre) / width|^power), another width and power on each side.
@@ -41,6 +42,8 @@ class Responses:
     """
 
     curves: Mapping[str, Spectrum]
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         for channel, curve in self.curves.items():

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from rodcone.brief import brief
 from sensor.cfa import check_covers
 from sensor.config import SensorConfig
 from sensor.random import NoiseTerm, draw_key, normals
@@ -31,6 +32,8 @@ class Device:
     dark_offset_e: NDArray[np.float64]
     column_gain: NDArray[np.float64] | None = None
     hot: NDArray[np.bool_] | None = None
+
+    __repr__ = brief
 
     @property
     def shape(self) -> tuple[int, int]:

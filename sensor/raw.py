@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_range
 from rodcone.notebook import html_of, preview_png
 from sensor.calibration import ColourCalibration
@@ -73,6 +74,8 @@ class RawImage:
     engine: str = ""
     column_gain_spread: float = 0.0
     defects: NDArray[np.intp] | None = None
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))

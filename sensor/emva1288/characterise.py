@@ -7,6 +7,7 @@ from math import hypot, log10, sqrt
 import numpy as np
 
 from render.spectrum import Floats
+from rodcone.brief import brief
 from rodcone.errors import require_range, require_whole
 from rodcone.jit import backend
 from sensor.config import SensorConfig
@@ -25,6 +26,8 @@ class ExposurePlan:
     exposure_s: float
     frames: int
     dark_times_s: Sequence[float]
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,8 @@ class Characterisation:
     saturation_e: float
     linearity_share: Floats
     notes: tuple[str, ...]
+
+    __repr__ = brief
 
     @property
     def snr(self) -> Floats:

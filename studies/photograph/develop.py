@@ -13,6 +13,7 @@ from isp.colour.encoding import encode
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant
+from rodcone.brief import brief
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError, require_range, unknown
 from rodcone.types import Floats
@@ -35,6 +36,8 @@ class Developed:
 
     encoded: NDArray[np.float64]
     facts: dict[str, Any]
+
+    __repr__ = brief
 
 
 def mosaic_processor(raw: RawImage) -> str:

@@ -9,6 +9,7 @@ from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant, lines_nm
 from render.radiance_files.radiance_source import is_radiance_file
 from render.spectrum import VISIBLE_NM
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, require_whole, unknown
 from sensor.cfa import channels
 from sensor.exposure import AUTO, LONGEST_S, RULES
@@ -157,6 +158,8 @@ class Study:
     render: RenderLimits = field(default_factory=RenderLimits)
     lens: LensTerms = field(default_factory=LensTerms)
     budget: BudgetShares = field(default_factory=BudgetShares)
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         _check_axes(self)
