@@ -14,6 +14,7 @@ from rodcone.brief import brief
 from rodcone.errors import InputError
 from rodcone.jit import Backend
 from rodcone.notebook import html_of, preview_png
+from rodcone.plots import Axes, draw_line
 from sensor.cfa import channels
 from sensor.raw import RawImage
 
@@ -66,6 +67,11 @@ class Picture:
 
     def __truediv__(self, scale: ArrayLike) -> Image:
         return np.asarray(self.rgb / np.asarray(scale))
+
+    def plot_line(self, row: int | None = None, column: int | None = None, axes: Axes | None = None) -> Axes:
+        """Draw R, G and B along a row (the middle one by default) or a column into Matplotlib's axes."""
+        planes = dict(zip("RGB", np.moveaxis(self.rgb, -1, 0), strict=True))
+        return draw_line(planes, row, column, axes, "linear sRGB, electrons of green")
 
     def _repr_png_(self) -> bytes:
         return preview_png(self.rgb)

@@ -1,5 +1,6 @@
 """A scene as plain data: what `mitsuba.load_dict` takes, its light groups, and where illuminance is measured."""
 
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import reduce
@@ -9,9 +10,10 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from render.optical_constants import optical_constant
-from render.spectrum import Spectrum
+from render.spectrum import VISIBLE_NM, Spectrum
 from rodcone.brief import brief
 from rodcone.errors import InputError, one_line, unknown
+from rodcone.notebook import html_of
 from rodcone.types import Floats
 
 Node: TypeAlias = dict[str, Any]
@@ -27,6 +29,7 @@ EMISSION_PARAMETER = {
 }
 # Emitter plug-ins whose colour differs over directions: a spectrum can only filter them.
 COLOURED_EMITTERS = ("envmap", "sunsky")
+THUMBNAIL_SIZE, THUMBNAIL_SPP, THUMBNAIL_NM = (128, 128), 16, 40.0
 HELD_NM = (100.0, 20_000.0)  # as far as held ends go
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
 _SIZELESS_EMITTERS = ("point", "spot", "directional")  # rays can't meet them
@@ -126,6 +129,15 @@ class Scene:
         kinds = [emitter_paths(self.geometry)[path] for path in lights.emitters]
         return kinds == ["constant"] and not lights.coloured
 
+    def _repr_html_(self) -> str:
+        others = ("sensor", *emitter_paths(self.geometry))
+        facts = {
+            "lights": ", ".join(self.groups),
+            "shapes": str(sum(isinstance(part, dict) and key not in others for key, part in self.geometry.items())),
+            "lux are measured on": self.reference_plane or "nothing: give levels in cd/m²",
+        }
+        return html_of(f"Scene {self.name}", facts, _thumbnail(self))
+
     def check_meter(self) -> None:
         """Raise `InputError` where Mitsuba's own irradiance meter, whose rays have to meet a light, would read 0."""
         for path, kind in emitter_paths(self.geometry).items():
@@ -155,6 +167,20 @@ class Scene:
                 elif not group.coloured:
                     holder[key][EMISSION_PARAMETER[holder[key]["type"]]] = emission[name]
         return result
+
+
+def _thumbnail(scene: Scene) -> bytes | None:
+    """Small, noisy picture of a scene under its own lights; None for one that can't be rendered."""
+    from render.engine import render  # late: it imports this module
+
+    nm = np.arange(VISIBLE_NM[0] + THUMBNAIL_NM / 2, VISIBLE_NM[1], THUMBNAIL_NM)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of lights that are dark in some bands: told when the scene is rendered
+        try:
+            radiance = render(scene, THUMBNAIL_SIZE, wavelength_nm=nm, spp=THUMBNAIL_SPP, max_depth=4).relight()
+        except InputError:
+            return None
+    return radiance._repr_png_()
 
 
 def spectrum_node(spectrum: Spectrum) -> Node:
