@@ -27,6 +27,7 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from render.transport import Transport
 from rodcone.errors import InputError, require_whole
 from rodcone.jit import backend
+from rodcone.progress import Step, render_words, told
 
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
 
@@ -83,7 +84,8 @@ def render(
         An earlier result of the same scene, size, bands, depth and seed to go on from: to the bits of one go. One of 64
         samples or fewer is made anew where more are asked for, since it had no pilot.
     progress : callable, optional
-        Called after each run with the share done and the error so far (infinite before the first look).
+        Called after each run with the share done and the error so far (infinite before the first look); left out, a
+        notebook shows a bar.
     denoise : bool
         Give denoised light beside the unbiased, and two folds of a quarter of the samples each that its error is
         measured by (`render.denoised.relight`). Their time counts; Ctrl-C ends the render, and they are still drawn.
@@ -133,11 +135,15 @@ def render(
         meter = earlier.meter or meter  # it may have measured already
         if limits.met_by(earlier):
             return replace(earlier, meter=meter)
-    try:
-        transport = _render(scene, film, limits, earlier, progress or (lambda done, error: None), denoise)
-    except InputError as error:
-        let_go(error)
-        raise
+    own: Step | None = (lambda what, share: None) if progress else None
+    with told(own) as step:
+        step(render_words(np.inf), 0.0)
+        show = progress or (lambda share, error: step(render_words(error), share))
+        try:
+            transport = _render(scene, film, limits, earlier, show, denoise)
+        except InputError as error:
+            let_go(error)
+            raise
     if cache is not None:
         save_transport(Path(cache), scene, film, seed, transport)
     return replace(transport, meter=meter)

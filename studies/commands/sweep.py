@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from isp.processors.catalogue import require_libraries
 from rodcone.errors import InputError, require_whole
 from rodcone.memory import Memory, require_memory
-from rodcone.progress import duration, progress
+from rodcone.progress import Step, duration, progress
 from studies.budget.model_plan import Plan
 from studies.budget.model_plan import as_stated as plan_as_stated
 from studies.budget.plan import plan as plan_study
@@ -29,7 +29,7 @@ from studies.study.study_file import read_study
 from studies.sweep.cluster import on_cluster
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows, write_table
-from studies.sweep.run_sweep import Runner, Step, Swept
+from studies.sweep.run_sweep import Runner, Swept
 from studies.sweep.run_sweep import sweep as run_sweep
 from studies.sweep.workers import InThisProcess, cores, run, run_in_processes
 

@@ -1,6 +1,6 @@
 """One photograph as raw files: a scene or a stored radiance in, digital negatives out."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_range, require_whole
 from rodcone.files import check_place
 from rodcone.memory import file_extent, memory, require_memory
-from rodcone.progress import render_words
+from rodcone.progress import Step, render_words
 from sensor.capture import capture
 from sensor.cfa import channels, check_covers, is_rgbw
 from sensor.config import SensorConfig
@@ -34,7 +34,6 @@ from studies.study.radiance_file import LIGHT, check_radiance_file, open_radianc
 from studies.study.scene_source import asked_level, asked_size, film_size, open_scene
 from studies.study.study import AS_SHOT, GRAY_WORLD
 
-Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
 _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
 
@@ -71,7 +70,7 @@ class Order:
 
     source: str | Path
     out: str | Path
-    sensor: str = "low_noise"
+    sensor: str | Path = "low_noise"
     cfa: str | None = None
     exposure_s: float | None = None
     exposure: str = AUTO
@@ -97,8 +96,14 @@ class Taken:
     notes: tuple[str, ...]
 
 
-def take(order: Order, step: Step = lambda what, share: None) -> Taken:
+def take(order: Order, step: Step | None = None) -> Taken:
     """Photograph and write; a 2x2 RGBW negative gets a re-mosaiced Bayer one beside it, ``NAME_bayer.dng``.
+
+    Parameters
+    ----------
+    order : Order
+    step : callable, optional
+        Called with what is being done and the share that is done; left out, a notebook shows a bar for the render.
 
     Raises
     ------
@@ -126,17 +131,19 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
     colour = calibrate(sensor, balance or light) if set("RGB") <= set(channels(sensor.cfa)) else None
     check_place(out)  # before the render: it may take minutes
     if opened is not None:
-        step(render_words(np.inf), 0.0)
+        if step:
+            step(render_words(np.inf), 0.0)
         transport = render(
             opened.scene,
             _size(order, opened),
             spp=order.spp,
             seed=order.seed,
-            progress=lambda share, error: step(render_words(error), 0.9 * share),
+            progress=None if step is None else lambda share, error: step(render_words(error), 0.9 * share),
         )
 
     # The exposure.
-    step("exposure", 0.9)
+    if step:
+        step("exposure", 0.9)
     radiance = transport.relight(spectra, luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
     if exposure_s is None:
         exposure_s = exposure_by_rule_s(order.exposure, form_image(radiance, sensor), sensor)
@@ -159,7 +166,7 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
     facts = {
         "paths": [str(path) for path in paths],
         "source": str(order.source),
-        "sensor": order.sensor,
+        "sensor": str(order.sensor),
         "cfa": list(raw.cfa),
         "size": list(raw.shape),
         "seed": order.seed,

@@ -46,6 +46,9 @@ class SceneChoice:
     light: str | None = None
     extend: str | None = None
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "source", str(self.source))  # from Python it may be a Path
+
 
 @dataclass(frozen=True)
 class RenderLimits:
@@ -162,6 +165,7 @@ class Study:
     __repr__ = brief
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sensors", tuple(map(str, self.sensors)))  # from Python they may be Paths
         _check_axes(self)
         _check_cameras(self)
         _check_numbers(self)

@@ -1,7 +1,7 @@
 """`rodcone capture` and `rodcone develop`: files, exit codes, and grey walls whose picture is known on paper."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +19,16 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from sensor.cfa import BAYER, RGBW, mask
 from sensor.optics import form_image, left_out
-from sensor.presets import preset
+from sensor.presets import preset, preset_file
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.response import expected_electrons
 from studies.commands.cli import main
 from studies.photograph.calibrate import calibrate, iso_speed
+from studies.photograph.develop import develop_file
+from studies.photograph.picture_file import write_picture
+from studies.photograph.shot import Order, take
+from studies.study.study import SceneChoice, Study
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
@@ -625,3 +629,16 @@ def test_what_cannot_be_developed_is_one_line_exit_code_2_and_no_picture(
 def calibrate_four():
     """Calibration of four channels, of which one is no W."""
     return calibrate(preset("low_noise", "rgbw"), illuminant("D65"))
+
+
+@pytest.mark.parametrize("kind", [str, Path])
+def test_from_python_paths_are_texts_or_paths(kind: type, exr: Path, tmp_path: Path) -> None:
+    sensor = tmp_path / "mine.toml"
+    sensor.write_bytes(preset_file("low_noise").read_bytes())
+    taken = take(Order(kind(exr), kind(tmp_path / "shot.dng"), sensor=kind(sensor), exposure="10ms"))
+    assert json.dumps(taken.facts)
+    developed = develop_file(kind(taken.paths[0]))
+    write_picture(developed.encoded, kind(tmp_path / "shot.png"))
+    assert (tmp_path / "shot.png").exists()
+    study = Study((SceneChoice(kind(exr)),), ("1cd/m2",), sensors=(kind(sensor),))
+    assert json.loads(json.dumps(asdict(study)))["sensors"] == [str(sensor)]
