@@ -25,7 +25,7 @@ from render.scene import Scene
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from render.transport import Transport
-from rodcone.errors import InputError, require_whole
+from rodcone.errors import InputError, require_kind, require_whole
 from rodcone.jit import backend
 from rodcone.progress import Step, render_words, told
 
@@ -111,11 +111,7 @@ def render(
         from rodcone import load  # late: the catalogue stands above this package
 
         scene = load(scene)
-    given: object = scene
-    if not isinstance(given, Scene):
-        raise InputError(
-            f"scene: a {type(given).__name__} is none; allowed: a Scene or a name; give rodcone.load(name)"
-        )
+    require_kind("scene", scene, Scene, "give rodcone.load(name), or the name alone")
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
     if denoise:

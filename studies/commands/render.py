@@ -26,6 +26,7 @@ MOST_BANDS = 1000
 
 def render(
     source: str,
+    /,
     *,
     out: Out = Path("render.exr"),
     height: int | None = None,

@@ -177,7 +177,7 @@ def _estimated(study: Study, out: Path, reference: bool, workers: int) -> Estima
 
 def _words(found: Estimate) -> str:
     return (
-        f"{found.cells} cells, {found.kept} in the ledger from the last run; {found.renders} renders\n"
+        f"{found.cells} cells, {found.kept} in the ledger from the last run; {found.renders} to render\n"
         f"about {duration(found.seconds)} with {found.workers} workers, at most {found.bytes / 1e9:.1f} GB of memory; "
         "renders and cells that exist already are counted too"
     )

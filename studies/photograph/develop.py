@@ -15,7 +15,7 @@ from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant
 from rodcone.brief import brief
 from rodcone.colour_spaces import luminance_of_srgb
-from rodcone.errors import InputError, require_range, unknown
+from rodcone.errors import InputError, require_kind, require_range, unknown
 from rodcone.types import Floats
 from sensor.calibration import ColourCalibration
 from sensor.cfa import channels, is_bayer
@@ -70,6 +70,7 @@ def develop(
     InputError
         For an unknown name, a raw image without colours, or a mosaic that the processor doesn't know.
     """
+    require_kind("raw", raw, RawImage, "give what capture or read_raw gives")
     name = processor or mosaic_processor(raw)
     if name not in PROCESSORS:
         raise unknown("isp", name, PROCESSORS)

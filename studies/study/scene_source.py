@@ -10,6 +10,11 @@ from rodcone.errors import InputError, require_whole
 from scenes.catalog import load
 from studies.study.levels import parse_level
 
+_READ = (".xml", ".exr", ".mat")  # endings of files that are scenes
+_OTHER_FILES = {
+    **dict.fromkeys((".dng", ".tif", ".tiff", ".nef", ".cr2", ".cr3", ".arw"), "a raw file, for rodcone develop"),
+    ".toml": "a study or a sensor, for rodcone sweep or --sensor",
+}
 CATALOGUE_SIDE = 256  # pixels, where neither the scene nor the user states a size
 
 
@@ -36,6 +41,9 @@ def open_scene(source: str, trust: bool = False, extend: str | None = None, ligh
         return load_scene_file(source, trust=trust, extend=extend)
     if trust:
         raise InputError(f"trust-scene: {source!r} is no .xml scene; leave --trust-scene out")
+    other = _OTHER_FILES.get(Path(source).suffix.lower())
+    if other:
+        raise InputError(f"scene: {source!r} is {other}; allowed: {', '.join(_READ)}, or a name of rodcone list scenes")
     scene = load(source, **({} if light is None else {"light": light}))
     return SceneFile(replace(scene, extend=extend), (CATALOGUE_SIDE, CATALOGUE_SIDE), ())
 

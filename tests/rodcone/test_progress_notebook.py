@@ -1,6 +1,7 @@
 """Bars that a notebook shows by itself: its own kernel's display is played by a recorder."""
 
 import sys
+from contextlib import suppress
 from types import SimpleNamespace
 from typing import Any
 
@@ -37,9 +38,8 @@ def test_a_bar_moves_and_vanishes(shown: list[dict[str, str]]) -> None:
 
 
 def test_it_vanishes_after_an_error_too(shown: list[dict[str, str]]) -> None:
-    with pytest.raises(ValueError, match="out of luck"), told(None) as step:
-        step("half", 0.5)
-        raise ValueError("out of luck")
+    with suppress(ZeroDivisionError), told(None) as step:
+        step("half", 1 / 0)
     assert shown[-1] == {"text/plain": ""}
 
 

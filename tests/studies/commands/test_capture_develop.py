@@ -218,6 +218,9 @@ def test_the_file_carries_the_calibration_for_the_white_balance_asked_for(
     [
         (["color_cheker"], ["scene", "color_cheker", "did you mean 'color_checker'"]),
         (["flat_field", "--sensor", "lownoise"], ["sensor preset", "did you mean 'low_noise'"]),
+        (["flat_field", "--cfa", "RGGB"], ["cfa: 'RGGB' is unknown", "write 'bayer_rggb'"]),
+        (["shot.dng"], ["'shot.dng' is a raw file, for rodcone develop", ".xml, .exr, .mat"]),
+        (["mine.toml"], ["'mine.toml' is a study or a sensor", "rodcone sweep or --sensor"]),
         (["flat_field", "--cfa", "bayr"], ["rodcone: cfa: 'bayr' is unknown", "did you mean 'bayer'"]),
         (["flat_field", "--trust-scene"], ["'flat_field' is no .xml scene"]),
         (["scene.exr", "--trust-scene"], ["'scene.exr' is no .xml scene"]),
@@ -513,6 +516,13 @@ def test_what_develop_cannot_do_is_one_line_and_no_file(
     code, out, err = call(["develop", str(tmp_path / "shot.dng"), *more], capsys)
     assert (code, out, err.count("\n"), (tmp_path / "shot.png").exists()) == (2, "", 1, False)
     assert all(word in err for word in words), err
+
+
+def test_a_picture_is_no_raw_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "shot.png").write_bytes(b"\x89PNG")
+    code, out, err = call(["develop", str(tmp_path / "shot.png")], capsys)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "it is a picture, developed already" in err
 
 
 def test_sixteen_bits_hold_what_eight_round_away(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
