@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rodcone.colour_spaces import encode_srgb
 
 WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # this percentile of a picture is shown at 90 % of white
+LEAST_SHOWN = 384  # pixels of the screen that a small picture is as wide as, about: each of its own is several there
 SIDE = 512  # most pixels of a shown picture's longer side
 
 
@@ -41,5 +42,9 @@ def html_of(title: str, facts: Mapping[str, str | Sequence[str]], png: bytes | N
     )
     picture = ""
     if png is not None:
-        picture = f"<img alt='{escape(title)}' src='data:image/png;base64,{b64encode(png).decode('ascii')}'>"
+        times = max(1, LEAST_SHOWN // int.from_bytes(png[16:20]))  # PNG's header: the picture's width
+        style = f"width:{times * int.from_bytes(png[16:20])}px;image-rendering:pixelated" if times > 1 else ""
+        picture = (
+            f"<img alt='{escape(title)}' style='{style}' src='data:image/png;base64,{b64encode(png).decode('ascii')}'>"
+        )
     return f"<div><b>{escape(title)}</b><br>{picture}<table>{rows}</table></div>"
