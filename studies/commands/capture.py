@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rodcone.progress import progress
 from sensor.exposure import AUTO
-from studies.commands.console import Flag, Out, Several, print_result, say
+from studies.commands.console import Flag, Out, Seconds, Several, print_result, say
 from studies.photograph.shot import Order, take
 from studies.study.study import AS_SHOT
 
@@ -18,7 +18,7 @@ def capture(
     sensor: str = "low_noise",
     cfa: str | None = None,
     exposure: str = AUTO,
-    exposure_s: float | None = None,
+    exposure_s: Seconds | None = None,
     level: str | None = None,
     light: Several = None,
     white_balance: str = AS_SHOT,
@@ -50,7 +50,7 @@ def capture(
         Time such as 20ms, or a rule: auto for the brightest green, auto:W for the brightest W, auto:information for the
         one of the two whose samples hold more.
     exposure_s
-        Time in seconds, in place of --exposure; 0 for a dark frame.
+        Time in seconds or with its unit, in place of --exposure; 0 for a dark frame.
     level
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
         by default.

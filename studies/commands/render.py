@@ -17,7 +17,7 @@ from rodcone.errors import InputError
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import progress, render_words
-from studies.commands.console import INTERRUPTED, Flag, Out, Several, print_result, require_ending, say
+from studies.commands.console import INTERRUPTED, Flag, Out, Seconds, Several, print_result, require_ending, say
 from studies.study.lit_scene import asked_spectra, render_facts
 from studies.study.scene_source import asked_level, asked_size, open_scene
 
@@ -36,7 +36,7 @@ def render(
     level: str | None = None,
     spp: int | None = None,
     noise: float | None = None,
-    max_seconds: float | None = None,
+    max_seconds: Seconds | None = None,
     max_depth: int = 8,
     seed: int = 0,
     cache: Path | None = None,
@@ -76,7 +76,7 @@ def render(
     noise
         Relative Monte Carlo error to reach, such as 0.02.
     max_seconds
-        Time for the render, at most.
+        Time for the render in seconds, at most.
     max_depth
         Longest path in segments; 2 is direct light.
     seed

@@ -1,6 +1,7 @@
 """Exposure times as a user writes them: ``20ms``, or a rule by name."""
 
 import re
+from collections.abc import Sequence
 from difflib import get_close_matches
 
 from rodcone.errors import InputError, require_range
@@ -23,14 +24,25 @@ def parse_exposure(text: str, name: str = "exposures") -> float | None:
     """
     if text in RULES:
         return None
+    if near := get_close_matches(text, RULES, 1):
+        allowed = f"{', '.join(RULES)}, or a number and us, ms or s"
+        raise InputError(f"{name}: {text!r} is not a time; allowed: {allowed}; did you mean {near[0]!r}?")
+    seconds = parse_time(text, name, tuple(RULES))
+    require_range(name, seconds, 1e-9, 1e6, "give a time above 0 in seconds")
+    return seconds
+
+
+def parse_time(text: str, name: str = "time", others: Sequence[str] = ()) -> float:
+    """Time [s] of ``10ms``, ``0.5s`` or ``200us``; `others` are what an error names beside it.
+
+    Raises
+    ------
+    InputError
+        For anything else, a number without a unit too.
+    """
     match = _TIME.match(text)
     if match is None:
         fix = f"write {text.strip()}ms or {text.strip()}s" if _NUMBER.fullmatch(text.strip()) else "write 10ms"
-        near = get_close_matches(text, RULES, 1)
-        raise InputError(
-            f"{name}: {text!r} is not a time; allowed: {', '.join(RULES)}, or a number and us, ms or s; "
-            f"{f'did you mean {near[0]!r}?' if near else fix}"
-        )
-    seconds = float(match[1]) * _SECONDS[match[2]]
-    require_range(name, seconds, 1e-9, 1e6, "give a time above 0 in seconds")
-    return seconds
+        rules = f"{', '.join(others)}, or " if others else ""
+        raise InputError(f"{name}: {text!r} is not a time; allowed: {rules}a number and us, ms or s; {fix}")
+    return float(match[1]) * _SECONDS[match[2]]

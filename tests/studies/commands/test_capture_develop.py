@@ -236,6 +236,8 @@ def test_the_file_carries_the_calibration_for_the_white_balance_asked_for(
         (["flat_field", "--exposure", "auto:W", "--exposure-s", "0.01"], ["exposure_s", "leave one out"]),
         (["flat_field", "--exposure", "20"], ["exposure: '20' is not a time", "write 20ms or 20s"]),
         (["flat_field", "--exposure", "0s"], ["exposure", "0.0", "give a time above 0"]),
+        (["flat_field", "--exposure-s", "20mss"], ["--exposure-s", "'20mss' is not a time", "write 10ms"]),
+        (["flat_field", "--exposure-s", "auto"], ["--exposure-s", "'auto' is not a time"]),
         (["flat_field", "--exposure=-5ms"], ["exposure: '-5ms' is not a time", "write 10ms"]),
         (["flat_field", "--exposure", "20ms", "--exposure-s", "0.02"], ["exposure_s", "leave one out"]),
         (["flat_field", "--light", "D66"], ["illuminant", "'D66'", "D65"]),
@@ -318,7 +320,7 @@ def test_a_time_with_a_unit_is_the_time_in_seconds(
     exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     frames = []
-    for given in (["--exposure", "20ms"], ["--exposure", "0.02s"], ["--exposure-s", "0.02"]):
+    for given in (["--exposure", "20ms"], ["--exposure-s", "20ms"], ["--exposure-s", "0.02"]):
         assert call(["capture", str(exr), "-o", str(tmp_path / "shot.dng"), *given], capsys)[0] == 0
         frames.append((tmp_path / "shot.dng").read_bytes())
     assert frames[0] == frames[1] == frames[2]
