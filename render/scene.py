@@ -29,7 +29,8 @@ EMISSION_PARAMETER = {
 }
 # Emitter plug-ins whose colour differs over directions: a spectrum can only filter them.
 COLOURED_EMITTERS = ("envmap", "sunsky")
-THUMBNAIL_SIZE, THUMBNAIL_SPP, THUMBNAIL_NM = (128, 128), 16, 40.0
+THUMBNAIL_SIDE, THUMBNAIL_SPP, THUMBNAIL_NM = 128, 16, 40.0
+OWN_SIDE = 256  # pixels, of a scene that states no size
 HELD_NM = (100.0, 20_000.0)  # as far as held ends go
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
 _SIZELESS_EMITTERS = ("point", "spot", "directional")  # rays can't meet them
@@ -123,6 +124,12 @@ class Scene:
         if self.extend:
             object.__setattr__(self, "geometry", _hold(self.geometry, present))
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """Height and width of the camera's film, whose proportions the scene is made for; 256 x 256 without one."""
+        film = self.geometry["sensor"].get("film", {})
+        return int(film.get("height", OWN_SIDE)), int(film.get("width", OWN_SIDE))
+
     def is_environment(self, group: str) -> bool:
         """Whether a group is one light of one spectrum and of the same radiance from all around."""
         lights = self.groups[group]
@@ -169,18 +176,25 @@ class Scene:
         return result
 
 
+def film_size(own: tuple[int, int], longest: int | None) -> tuple[int, int]:
+    """Height and width, or their proportions with the longer side that was asked for."""
+    scale = 1.0 if longest is None else longest / max(own)
+    return max(1, round(own[0] * scale)), max(1, round(own[1] * scale))
+
+
 def _thumbnail(scene: Scene) -> bytes | None:
     """Small, noisy picture of a scene under its own lights; None for one that can't be rendered."""
     from render.engine import render  # late: it imports this module
 
     nm = np.arange(VISIBLE_NM[0] + THUMBNAIL_NM / 2, VISIBLE_NM[1], THUMBNAIL_NM)
+    size = film_size(scene.size, THUMBNAIL_SIDE)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of lights that are dark in some bands: told when the scene is rendered
         try:
-            radiance = render(scene, THUMBNAIL_SIZE, wavelength_nm=nm, spp=THUMBNAIL_SPP, max_depth=4).relight()
+            made = render(scene, size, wavelength_nm=nm, spp=THUMBNAIL_SPP, max_depth=4)
         except InputError:
             return None
-    return radiance._repr_png_()
+        return made._repr_png_()
 
 
 def spectrum_node(spectrum: Spectrum) -> Node:

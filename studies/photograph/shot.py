@@ -11,7 +11,7 @@ from isp.remosaic import remosaic
 from render.engine import render
 from render.illuminants import illuminant
 from render.radiance_files.radiance_source import is_radiance_file
-from render.scene import Scene
+from render.scene import Scene, film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_range, require_whole
@@ -31,7 +31,7 @@ from studies.study.exposures import parse_exposure
 from studies.study.levels import parse_level
 from studies.study.lit_scene import asked_spectra
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
-from studies.study.scene_source import asked_level, asked_size, film_size, open_scene
+from studies.study.scene_source import asked_level, asked_size, open_scene
 from studies.study.study import AS_SHOT, GRAY_WORLD
 
 MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant

@@ -15,7 +15,7 @@ from render.illuminants import illuminant
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import is_radiance_file
-from render.scene import Scene
+from render.scene import Scene, film_size
 from render.scene_range import check_range
 from render.spectrum import Floats, Spectrum
 from render.transport import Transport
@@ -25,7 +25,7 @@ from studies.study.levels import parse_level
 from studies.study.model import RenderModel
 from studies.study.quiet_render import render_quietly
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
-from studies.study.scene_source import asked_level, film_size, open_scene
+from studies.study.scene_source import asked_level, open_scene
 from studies.study.study import OWN, SceneChoice, Study
 
 Progress = Callable[[float, float], None]

@@ -15,7 +15,6 @@ _OTHER_FILES = {
     **dict.fromkeys((".dng", ".tif", ".tiff", ".nef", ".cr2", ".cr3", ".arw"), "a raw file, for rodcone develop"),
     ".toml": "a study or a sensor, for rodcone sweep or --sensor",
 }
-CATALOGUE_SIDE = 256  # pixels, where neither the scene nor the user states a size
 
 
 def open_scene(source: str, trust: bool = False, extend: str | None = None, light: str | None = None) -> SceneFile:
@@ -45,13 +44,7 @@ def open_scene(source: str, trust: bool = False, extend: str | None = None, ligh
     if other:
         raise InputError(f"scene: {source!r} is {other}; allowed: {', '.join(_READ)}, or a name of rodcone list scenes")
     scene = load(source, **({} if light is None else {"light": light}))
-    return SceneFile(replace(scene, extend=extend), (CATALOGUE_SIDE, CATALOGUE_SIDE), ())
-
-
-def film_size(own: tuple[int, int], longest: int | None) -> tuple[int, int]:
-    """Height and width of the film, or its proportions with the longer side that was asked for."""
-    scale = 1.0 if longest is None else longest / max(own)
-    return max(1, round(own[0] * scale)), max(1, round(own[1] * scale))
+    return SceneFile(replace(scene, extend=extend), scene.size, ())
 
 
 def asked_size(own: tuple[int, int], height: int | None, width: int | None) -> tuple[int, int]:
