@@ -10,9 +10,11 @@ from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.substitution import COLOUR_ERROR
+from rodcone.brief import brief
 from rodcone.errors import InputError
 from rodcone.jit import Backend
 from rodcone.notebook import html_of, preview_png
+from rodcone.plots import Axes, draw_line
 from sensor.cfa import channels
 from sensor.raw import RawImage
 
@@ -43,6 +45,8 @@ class Picture:
     snr: float | None = None
     substitution: float | None = None
 
+    __repr__ = brief
+
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of `rgb`."""
@@ -63,6 +67,11 @@ class Picture:
 
     def __truediv__(self, scale: ArrayLike) -> Image:
         return np.asarray(self.rgb / np.asarray(scale))
+
+    def plot_line(self, row: int | None = None, column: int | None = None, axes: Axes | None = None) -> Axes:
+        """Draw R, G and B along a row (the middle one by default) or a column into Matplotlib's axes."""
+        planes = dict(zip("RGB", np.moveaxis(self.rgb, -1, 0), strict=True))
+        return draw_line(planes, row, column, axes, "linear sRGB, electrons of green")
 
     def _repr_png_(self) -> bytes:
         return preview_png(self.rgb)

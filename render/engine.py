@@ -25,8 +25,9 @@ from render.scene import Scene
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from render.transport import Transport
-from rodcone.errors import InputError, require_whole
+from rodcone.errors import InputError, require_kind, require_whole
 from rodcone.jit import backend
+from rodcone.progress import Step, render_words, told
 
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
 
@@ -83,7 +84,8 @@ def render(
         An earlier result of the same scene, size, bands, depth and seed to go on from: to the bits of one go. One of 64
         samples or fewer is made anew where more are asked for, since it had no pilot.
     progress : callable, optional
-        Called after each run with the share done and the error so far (infinite before the first look).
+        Called after each run with the share done and the error so far (infinite before the first look); left out, a
+        notebook shows a bar.
     denoise : bool
         Give denoised light beside the unbiased, and two folds of a quarter of the samples each that its error is
         measured by (`render.denoised.relight`). Their time counts; Ctrl-C ends the render, and they are still drawn.
@@ -109,11 +111,7 @@ def render(
         from rodcone import load  # late: the catalogue stands above this package
 
         scene = load(scene)
-    given: object = scene
-    if not isinstance(given, Scene):
-        raise InputError(
-            f"scene: a {type(given).__name__} is none; allowed: a Scene or a name; give rodcone.load(name)"
-        )
+    require_kind("scene", scene, Scene, "give rodcone.load(name), or the name alone")
     film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
     if denoise:
@@ -133,11 +131,15 @@ def render(
         meter = earlier.meter or meter  # it may have measured already
         if limits.met_by(earlier):
             return replace(earlier, meter=meter)
-    try:
-        transport = _render(scene, film, limits, earlier, progress or (lambda done, error: None), denoise)
-    except InputError as error:
-        let_go(error)
-        raise
+    own: Step | None = (lambda what, share: None) if progress else None
+    with told(own) as step:
+        step(render_words(np.inf), 0.0)
+        show = progress or (lambda share, error: step(render_words(error), share))
+        try:
+            transport = _render(scene, film, limits, earlier, show, denoise)
+        except InputError as error:
+            let_go(error)
+            raise
     if cache is not None:
         save_transport(Path(cache), scene, film, seed, transport)
     return replace(transport, meter=meter)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from render.scene import LightGroup
 from render.spectrum import Spectrum
+from rodcone.brief import brief
 from rodcone.types import Floats, Planes
 
 SAMPLE_PIXELS = 1024  # with 40 bands the median of the error is then known to about 1 %
@@ -31,6 +32,8 @@ class SharedPaths:
 
     groups: tuple[int, int]
     correlation: Planes
+
+    __repr__ = brief
 
     def term(self, emitted: Floats, variance: Planes) -> Planes:
         """Twice the covariance of the two groups' light: what it adds to the variance of the sum, (band, h, w).

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rodcone.brief import brief
 from rodcone.errors import InputError
 from rodcone.types import Floats
 
@@ -46,6 +47,8 @@ class SceneMeans:
     radiance: Floats
     uncovered: float
     covariance: Floats
+
+    __repr__ = brief
 
     def mean_radiance(self) -> Floats:
         """Mean radiance of what is no light, shape (group, band).
@@ -90,6 +93,8 @@ class Irradiance:
 
     mean: Floats
     covariance: Floats
+
+    __repr__ = brief
 
     def level(self, weights: Floats) -> Level:
         """Illuminance; `weights` as of `PassMeans.luminance_level`."""

@@ -7,9 +7,11 @@ from numpy.typing import NDArray
 
 from render.photometry import luminance, tristimulus
 from render.spectrum import band_widths
+from rodcone.brief import brief
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.errors import InputError, require_range
 from rodcone.notebook import html_of, preview_png
+from rodcone.plots import Axes, draw_line
 from rodcone.types import Floats
 
 
@@ -47,6 +49,8 @@ class SpectralRadiance:
     relative_level_error: float | None = None
     signed: bool = False
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         values = np.asarray(self.values)
         if not np.issubdtype(values.dtype, np.floating):
@@ -75,6 +79,10 @@ class SpectralRadiance:
     def luminance(self) -> NDArray[np.float64]:
         """Luminance of each pixel [cd m^-2], shape (h, w)."""
         return luminance(self.values, self.wavelength_nm, self.widths_nm)
+
+    def plot_line(self, row: int | None = None, column: int | None = None, axes: Axes | None = None) -> Axes:
+        """Draw the luminance along a row (the middle one by default) or a column into Matplotlib's axes."""
+        return draw_line({"": self.luminance()}, row, column, axes, "luminance, cd/m²")
 
     def _repr_png_(self) -> bytes:
         return preview_png(tristimulus(self.values, self.wavelength_nm, self.widths_nm) @ XYZ_TO_SRGB_ROUNDED.T)

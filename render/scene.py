@@ -1,5 +1,6 @@
 """A scene as plain data: what `mitsuba.load_dict` takes, its light groups, and where illuminance is measured."""
 
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import reduce
@@ -9,8 +10,10 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from render.optical_constants import optical_constant
-from render.spectrum import Spectrum
+from render.spectrum import VISIBLE_NM, Spectrum
+from rodcone.brief import brief
 from rodcone.errors import InputError, one_line, unknown
+from rodcone.notebook import html_of
 from rodcone.types import Floats
 
 Node: TypeAlias = dict[str, Any]
@@ -26,6 +29,8 @@ EMISSION_PARAMETER = {
 }
 # Emitter plug-ins whose colour differs over directions: a spectrum can only filter them.
 COLOURED_EMITTERS = ("envmap", "sunsky")
+THUMBNAIL_SIDE, THUMBNAIL_SPP, THUMBNAIL_NM = 128, 16, 40.0
+OWN_SIDE = 256  # pixels, of a scene that states no size
 HELD_NM = (100.0, 20_000.0)  # as far as held ends go
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
 _SIZELESS_EMITTERS = ("point", "spot", "directional")  # rays can't meet them
@@ -52,6 +57,8 @@ class LightGroup:
     spectrum: Spectrum
     power: float = 1.0
     coloured: bool = False
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True)
@@ -85,6 +92,8 @@ class Scene:
     reference_plane: str | None = None
     extend: str | None = None
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         grouped = [path for group in self.groups.values() for path in group.emitters]
         present = emitter_paths(self.geometry)
@@ -115,11 +124,26 @@ class Scene:
         if self.extend:
             object.__setattr__(self, "geometry", _hold(self.geometry, present))
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """Height and width of the camera's film, whose proportions the scene is made for; 256 x 256 without one."""
+        film = self.geometry["sensor"].get("film", {})
+        return int(film.get("height", OWN_SIDE)), int(film.get("width", OWN_SIDE))
+
     def is_environment(self, group: str) -> bool:
         """Whether a group is one light of one spectrum and of the same radiance from all around."""
         lights = self.groups[group]
         kinds = [emitter_paths(self.geometry)[path] for path in lights.emitters]
         return kinds == ["constant"] and not lights.coloured
+
+    def _repr_html_(self) -> str:
+        others = ("sensor", *emitter_paths(self.geometry))
+        facts = {
+            "lights": ", ".join(self.groups),
+            "shapes": str(sum(isinstance(part, dict) and key not in others for key, part in self.geometry.items())),
+            "lux are measured on": self.reference_plane or "nothing: give levels in cd/m²",
+        }
+        return html_of(f"Scene {self.name}", facts, _thumbnail(self))
 
     def check_meter(self) -> None:
         """Raise `InputError` where Mitsuba's own irradiance meter, whose rays have to meet a light, would read 0."""
@@ -150,6 +174,27 @@ class Scene:
                 elif not group.coloured:
                     holder[key][EMISSION_PARAMETER[holder[key]["type"]]] = emission[name]
         return result
+
+
+def film_size(own: tuple[int, int], longest: int | None) -> tuple[int, int]:
+    """Height and width, or their proportions with the longer side that was asked for."""
+    scale = 1.0 if longest is None else longest / max(own)
+    return max(1, round(own[0] * scale)), max(1, round(own[1] * scale))
+
+
+def _thumbnail(scene: Scene) -> bytes | None:
+    """Small, noisy picture of a scene under its own lights; None for one that can't be rendered."""
+    from render.engine import render  # late: it imports this module
+
+    nm = np.arange(VISIBLE_NM[0] + THUMBNAIL_NM / 2, VISIBLE_NM[1], THUMBNAIL_NM)
+    size = film_size(scene.size, THUMBNAIL_SIDE)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of lights that are dark in some bands: told when the scene is rendered
+        try:
+            made = render(scene, size, wavelength_nm=nm, spp=THUMBNAIL_SPP, max_depth=4)
+        except InputError:
+            return None
+        return made._repr_png_()
 
 
 def spectrum_node(spectrum: Spectrum) -> Node:

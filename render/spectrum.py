@@ -5,7 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rodcone.brief import brief
 from rodcone.errors import InputError
+from rodcone.notebook import html_of
+from rodcone.plots import Axes, draw_curves, png_of
 from rodcone.types import Floats as Floats  # noqa: PLC0414  (other packages import it from here)
 
 VISIBLE_NM = (380.0, 780.0)
@@ -36,6 +39,8 @@ class Spectrum:
     wavelength_nm: Floats
     values: Floats
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         nm = np.array(self.wavelength_nm, dtype=np.float64)
         values = np.array(self.values, dtype=np.float64)
@@ -50,6 +55,18 @@ class Spectrum:
             )
         object.__setattr__(self, "wavelength_nm", nm)
         object.__setattr__(self, "values", values)
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the curve into Matplotlib's axes, new ones by default."""
+        return draw_curves({"": (self.wavelength_nm, self.values)}, axes, x="wavelength, nm", y="value")
+
+    def _repr_html_(self) -> str:
+        nm, values = self.wavelength_nm, self.values
+        facts = {
+            "range": f"{nm[0]:g} to {nm[-1]:g} nm, {nm.size} points",
+            "values": f"{values.min():.4g} to {values.max():.4g}, most at {nm[values.argmax()]:g} nm",
+        }
+        return html_of("Spectrum", facts, png_of(self.plot))
 
     def __mul__(self, factor: float) -> "Spectrum":
         """Return the spectrum times a number."""

@@ -17,6 +17,7 @@ from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.scene_range import warn_of_dark_ends
 from render.spectrum import Spectrum
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_keys, require_range
 from rodcone.notebook import html_of
 from rodcone.types import Floats, Planes
@@ -83,6 +84,8 @@ class Transport:
     shared: SharedPaths | None = None
     meter: Callable[[], Irradiance] | None = None
     denoised: Denoised | None = None
+
+    __repr__ = brief
 
     @property
     def spp(self) -> float:

@@ -52,6 +52,13 @@ def require_whole(name: str, value: Any, low: int, high: int, fix: str) -> None:
         raise InputError(f"{name}: {value!r} is not a whole number; allowed: {low} to {high}; round it")
 
 
+def require_kind(name: str, value: object, kind: type, fix: str) -> None:
+    """Raise `InputError` unless `value` is of a kind."""
+    if not isinstance(value, kind):
+        article = "an" if type(value).__name__[0] in "AEIOUaeiou" else "a"
+        raise InputError(f"{name}: {article} {type(value).__name__} is none; allowed: {kind.__name__}; {fix}")
+
+
 def require_keys(what: str, given: Iterable[str], allowed: Iterable[str]) -> None:
     """Raise `InputError` for the first key of `given` that is not in `allowed`."""
     allowed = list(allowed)

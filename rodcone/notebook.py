@@ -1,7 +1,7 @@
 """Display of values in a notebook: a small picture and a table of facts, made only when they are shown."""
 
 from base64 import b64encode
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from io import BytesIO
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rodcone.colour_spaces import encode_srgb
 
 WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # this percentile of a picture is shown at 90 % of white
+LEAST_SHOWN = 384  # pixels of the screen that a small picture is as wide as, about: each of its own is several there
 SIDE = 512  # most pixels of a shown picture's longer side
 
 
@@ -31,11 +32,19 @@ def preview_png(linear: NDArray[np.floating]) -> bytes:
     return file.getvalue()
 
 
-def html_of(title: str, facts: Mapping[str, str], png: bytes) -> str:
-    """A picture with facts beside it, self-contained and without script."""
+def html_of(title: str, facts: Mapping[str, str | Sequence[str]], png: bytes | None) -> str:
+    """A picture, where there is one, with facts under it, each of one value or several; without script."""
     rows = "".join(
-        f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(value)}</td></tr>"
+        f"<tr><th style='text-align:left'>{escape(name)}</th>"
+        + "".join(f"<td>{escape(x)}</td>" for x in ([value] if isinstance(value, str) else value))
+        + "</tr>"
         for name, value in facts.items()
     )
-    picture = f"<img alt='{escape(title)}' src='data:image/png;base64,{b64encode(png).decode('ascii')}'>"
+    picture = ""
+    if png is not None:
+        times = max(1, LEAST_SHOWN // int.from_bytes(png[16:20]))  # PNG's header: the picture's width
+        style = f"width:{times * int.from_bytes(png[16:20])}px;image-rendering:pixelated" if times > 1 else ""
+        picture = (
+            f"<img alt='{escape(title)}' style='{style}' src='data:image/png;base64,{b64encode(png).decode('ascii')}'>"
+        )
     return f"<div><b>{escape(title)}</b><br>{picture}<table>{rows}</table></div>"

@@ -1,20 +1,25 @@
 """Progress of one long command on stderr: a bar on a terminal, a line every few seconds in a log."""
 
 import math
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from html import escape
 from threading import Event, Thread
-from typing import TextIO
+from time import monotonic
+from typing import Any, TextIO, TypeAlias
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, SpinnerColumn, Task, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+Step: TypeAlias = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 LINE_EVERY_S = 5.0
+SHOW_EVERY_S = 0.2  # in a notebook
 PACE_OVER_S = 300.0  # of the latest work, by which the time left is told: its parts differ
 
 
 @contextmanager
-def progress(file: TextIO) -> Iterator[Callable[[str, float], None]]:
+def progress(file: TextIO) -> Iterator[Step]:
     """Give a function to call with what is being done and the share of the whole that is done (0..1).
 
     On a terminal it moves a bar, which vanishes at the end; elsewhere, as in the log of a batch system, a line is
@@ -49,6 +54,43 @@ def progress(file: TextIO) -> Iterator[Callable[[str, float], None]]:
             ended.set()
             if printer.is_alive():
                 printer.join()
+
+
+@contextmanager
+def told(step: Step | None) -> Iterator[Step]:
+    """Give the caller's own step, or where there is none a bar under a notebook's cell; elsewhere nothing is shown.
+
+    The bar is a few lines of HTML, which every notebook shows; it vanishes at the end.
+    """
+    display = None if step else _notebook_display()
+    if step is not None or display is None:
+        yield step or (lambda what, share: None)
+        return
+    handle, shown_at = display({"text/plain": ""}, raw=True, display_id=True), -math.inf
+
+    def show(what: str, share: float) -> None:
+        nonlocal shown_at
+        if monotonic() - shown_at >= SHOW_EVERY_S:
+            shown_at = monotonic()
+            state = f"value='{share:.4f}'" if share else ""  # without a value it swings to and fro
+            handle.update({"text/html": f"<progress {state}></progress> {escape(what)} {share:.0%}"}, raw=True)
+
+    try:
+        yield show
+    finally:
+        handle.update({"text/plain": ""}, raw=True)
+
+
+def _notebook_display() -> Callable[..., Any] | None:
+    """IPython's display where a notebook's kernel runs this; IPython is asked only where it is loaded already."""
+    ipython = sys.modules.get("IPython")
+    shell = ipython.get_ipython() if ipython else None
+    if shell is None or not hasattr(shell, "kernel"):
+        return None
+    from IPython.display import display
+
+    shown: Callable[..., Any] = display
+    return shown
 
 
 def _print_lines(task: Task, file: TextIO, ended: Event) -> None:

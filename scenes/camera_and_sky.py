@@ -9,10 +9,16 @@ from render.scene import LightGroup, Node, Scene
 SKY_LUMINANCE_CD_M2 = 100.0
 
 
-def camera(fov_deg: float, origin: tuple[float, float, float], target: tuple[float, float, float]) -> Node:
-    """Perspective camera; `fov_deg` is the angle of view over the picture's shorter side."""
+def camera(
+    fov_deg: float,
+    origin: tuple[float, float, float],
+    target: tuple[float, float, float],
+    size: tuple[int, int] | None = None,
+) -> Node:
+    """Perspective camera of `fov_deg` over the picture's shorter side; `size` is the picture's own height and width."""
     pose = to_world(look_at(origin, target))
-    return {"type": "perspective", "fov": fov_deg, "fov_axis": "smaller", "to_world": pose}
+    view: Node = {"type": "perspective", "fov": fov_deg, "fov_axis": "smaller", "to_world": pose}
+    return view | ({"film": {"type": "hdrfilm", "height": size[0], "width": size[1]}} if size else {})
 
 
 def under_sky(name: str, view: Node, shapes: Mapping[str, Node], light: str, reference_plane: str) -> Scene:

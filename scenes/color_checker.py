@@ -17,6 +17,7 @@ from scenes.reflectances import grey, held
 PATCH_M, GAP_M = 0.040, 0.005  # the classic chart's 40 mm patches
 COLUMNS, ROWS = 6, 4
 BOARD = 0.04  # reflectance of the board between the patches: the chart's black frame
+CHART_SIZE = 170, 256  # 3:2, as the chart: a square picture cuts a seventh off its first and last column
 FACING = look_at((0, 0, 0), (0, 0, 1))  # towards the camera
 
 
@@ -40,7 +41,7 @@ def color_checker(light: str = "D65", surround: float = 0.2) -> Scene:
 
 def chart_scene(name: str, curves: Sequence[Spectrum], surround: Spectrum, light: str) -> Scene:
     """Make a scene of a chart of 24 reflectances on a card, all on one grid, in a constant environment."""
-    view = camera(20.0, (0, 0, 0.72), (0, 0, 0))
+    view = camera(20.0, (0, 0, 0.72), (0, 0, 0), CHART_SIZE)
     scene = under_sky(name, view, {"card": panel(FACING, 4.0, 4.0, matte(surround))}, light, reference_plane="card")
     board = Spectrum(surround.wavelength_nm, np.full(surround.values.shape, BOARD))
     return replace(scene, geometry=scene.geometry | chart(translate(0, 0, 0.0002) @ FACING, curves, board))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_range
 from sensor.capture import capture
 from sensor.config import SensorConfig
@@ -44,6 +45,8 @@ class Merged:
     temporal_variance: NDArray[np.float64]
     fixed_variance: NDArray[np.float64]
     saturated: NDArray[np.bool_]
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True)

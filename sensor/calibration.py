@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from render.spectrum import Floats
+from rodcone.brief import brief
 from rodcone.errors import InputError
 
 
@@ -39,6 +40,8 @@ class ColourCalibration:
     xyz_to_camera_d65: Floats
     camera_to_xyz_a: Floats
     camera_to_xyz_d65: Floats
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         neutral: Any = self.neutral  # from a file it may be anything, a list of lists of unequal length too

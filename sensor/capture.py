@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
-from rodcone.errors import InputError
+from rodcone.errors import InputError, require_kind
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import Device
@@ -63,10 +63,9 @@ def capture(
     """
     if isinstance(sensor, str):
         sensor = preset(sensor)
-    given: object = radiance
-    if not isinstance(given, SpectralRadiance):
-        fix = "call its relight()" if hasattr(given, "relight") else "give SpectralRadiance(values, wavelength_nm)"
-        raise InputError(f"radiance: a {type(given).__name__} is none; allowed: SpectralRadiance; {fix}")
+    fix = "call its relight()" if hasattr(radiance, "relight") else "give SpectralRadiance(values, wavelength_nm)"
+    require_kind("radiance", radiance, SpectralRadiance, fix)
+    require_kind("device", device, Device, "give draw_device(sensor, radiance.shape, rng)")
     numpy_runs, scaled = exact or backend() == "numpy", samples_per_pixel == 1 and not spreads(sensor.lens)
     light: SpectralRadiance | SpectralIrradiance = radiance
     if numpy_runs or not scaled:

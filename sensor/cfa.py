@@ -49,6 +49,9 @@ def tile_of(mosaic: str | Sequence[str]) -> Tile:
     if not isinstance(mosaic, str):
         return check_tile(mosaic)
     if mosaic not in MOSAICS:
+        bayer = f"bayer_{mosaic.lower()}"
+        if bayer in MOSAICS:
+            raise InputError(f"cfa: {mosaic!r} is unknown; allowed: {', '.join(sorted(MOSAICS))}; write {bayer!r}")
         raise unknown("cfa", mosaic, MOSAICS)
     return MOSAICS[mosaic]
 

@@ -1,14 +1,19 @@
 """What a camera is: pixel, lens, mosaic, responses, converter. Zero switches a term off."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import ceil, hypot
 from numbers import Real
 
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, require_whole
+from rodcone.notebook import html_of
+from rodcone.plots import png_of
 from sensor.cfa import RGBW, Tile, channels, check_tile
 from sensor.curves import Responses, rgbw
 
+SHOWN_EXPOSURE_S = 0.033  # of the noise that a notebook shows
 BLACK_SIGMAS = 5.0  # black level in dark standard deviations, so that clipping at 0 doesn't bias darks
 
 
@@ -56,6 +61,8 @@ class PixelConfig:
     hot_pixel_share: float = 0.0
     hot_pixel_dark_current_e_per_s: float = 0.0
     crosstalk: float = 0.0
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         limits = {
@@ -121,6 +128,8 @@ class LensConfig:
     defocus_um: float = 0.0
     veiling_glare: float = 0.0
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         limits = {
             "f_number": (0.1, 1e4, "give focal length over aperture"),
@@ -163,6 +172,8 @@ class SensorConfig:
     black_level_dn: int | None = None
     window_nm: tuple[float, float] = VISIBLE_NM
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
         require_whole("bits", self.bits, 1, 16, "give the converter's resolution")
@@ -173,6 +184,23 @@ class SensorConfig:
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give [shortest, longest] in 100-20000 nm")
         object.__setattr__(self, "window_nm", (float(pair[0]), float(pair[1])))
         self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every channel needs a curve
+
+    def _repr_html_(self) -> str:
+        from sensor.readout import noise_sources  # late: it imports this module
+
+        signals_e = (0.0, 100.0, self.pixel.full_well_e / 2)
+        sources = [noise_sources(signal_e, self, SHOWN_EXPOSURE_S) for signal_e in signals_e]
+        facts: dict[str, str | Sequence[str]] = {
+            "mosaic": " / ".join(self.cfa),
+            "pixel": f"{self.pixel.pitch_um:g} µm, full well {self.pixel.full_well_e:g} e⁻",
+            "lens": f"f/{self.lens.f_number:g}",
+            "converter": f"{self.bits} bits, {self.gain_e_per_dn:.3g} e⁻/DN, black at {self.black_dn} DN",
+            f"noise in {1e3 * SHOWN_EXPOSURE_S:g} ms": [f"of {signal_e:g} e⁻" for signal_e in signals_e],
+        }
+        facts |= {name: [f"{each[name]:.3g} e⁻" for each in sources] for name in sources[0]}
+        facts["all"] = [f"{hypot(*each.values()):.3g} e⁻" for each in sources]
+        own = {name: self.responses.curves[name] for name in channels(self.cfa)}
+        return html_of("SensorConfig", facts, png_of(Responses(own).plot))
 
     @property
     def white_dn(self) -> int:

@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, unknown
+from rodcone.plots import Axes, draw_curves
 
 # Smooth curves of the project's own: peak * exp(-|(nm - centre) / width|^power), another width and power on each side.
 # Peaks and centres are those of ISETCam's interleaved RGBW sensor; widths and powers were fitted so that electrons per
@@ -42,6 +44,8 @@ class Responses:
 
     curves: Mapping[str, Spectrum]
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         for channel, curve in self.curves.items():
             if curve.values.max() > 1.0:
@@ -54,6 +58,11 @@ class Responses:
     def __reduce__(self) -> tuple[type["Responses"], tuple[dict[str, Spectrum]]]:
         """Pickle the mapping as a dict: a mapping proxy can't be pickled."""
         return Responses, (dict(self.curves),)
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw each channel's curve into Matplotlib's axes, new ones by default."""
+        curves = {name: (curve.wavelength_nm, curve.values) for name, curve in self.curves.items()}
+        return draw_curves(curves, axes, x="wavelength, nm", y="electrons a photon")
 
     def band_average(self, channels: tuple[str, ...], wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
         """Mean response in each band, shape (channel, band).

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from rodcone.brief import brief
 from sensor.cfa import check_covers
 from sensor.config import SensorConfig
+from sensor.presets import preset
 from sensor.random import NoiseTerm, draw_key, normals
 
 
@@ -32,20 +34,23 @@ class Device:
     column_gain: NDArray[np.float64] | None = None
     hot: NDArray[np.bool_] | None = None
 
+    __repr__ = brief
+
     @property
     def shape(self) -> tuple[int, int]:
         """Height and width in pixels."""
         return self.photo_response.shape[0], self.photo_response.shape[1]
 
 
-def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Generator) -> Device:
-    """Make a chip of `shape` pixels; one key from `rng` decides all of it.
+def draw_device(sensor: SensorConfig | str, shape: tuple[int, int], rng: np.random.Generator) -> Device:
+    """Make a chip of `shape` pixels; one key from `rng` decides all of it. A sensor may be a preset's name.
 
     Raises
     ------
     InputError
         Where the shape doesn't hold a tile of the mosaic, or `rng` isn't a Generator.
     """
+    sensor = preset(sensor) if isinstance(sensor, str) else sensor
     check_covers(sensor.cfa, tuple(shape))
     key, one_row = draw_key(rng), (1, shape[1])
     pixel = sensor.pixel

@@ -6,7 +6,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import InputError, require_range, unknown
+from rodcone.errors import InputError, require_kind, require_range, unknown
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
@@ -56,6 +56,7 @@ def auto_exposure_s(
     InputError
         For a number out of range, or a channel that the mosaic doesn't have.
     """
+    require_kind("irradiance", irradiance, SpectralIrradiance, "give sensor.optics.form_image(radiance, sensor)")
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     require_range("percentile", percentile, 0.0, 100.0, "give per cent of the pixels")
     require_range("well_share", well_share, 1e-6, 1.0, "give a fraction of the well")

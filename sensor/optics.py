@@ -17,6 +17,7 @@ from scipy.fft import dctn, idctn
 from render.photometry import luminance, photons_per_joule
 from render.radiance import SpectralRadiance, check_values
 from render.spectrum import Floats, band_widths
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_whole
 from sensor.config import LensConfig, SensorConfig
 from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf
@@ -51,6 +52,8 @@ class SpectralIrradiance:
     pitch_um: float
     width_nm: Floats | None = None
     signed: bool = False
+
+    __repr__ = brief
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "wavelength_nm", np.array(self.wavelength_nm, dtype=np.float64))

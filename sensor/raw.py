@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_range
 from rodcone.notebook import html_of, preview_png
+from rodcone.plots import Axes, draw_line
 from sensor.calibration import ColourCalibration
-from sensor.cfa import Tile, channels, check_covers, check_tile
+from sensor.cfa import Tile, channels, check_covers, check_tile, mask
 
 # A saturated pixel reads white - 4 sigma_dark or more, give or take half a DN, with probability 1 - 3.2e-5.
 SATURATION_SIGMAS = 4.0
@@ -74,6 +76,8 @@ class RawImage:
     column_gain_spread: float = 0.0
     defects: NDArray[np.intp] | None = None
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
         object.__setattr__(self, "dn", _checked_dn(self.dn))
@@ -108,6 +112,11 @@ class RawImage:
                 f"colour: {self.colour.neutral.size} channels don't fit the mosaic's {channels(self.cfa)}; "
                 "calibrate this camera"
             )
+
+    def plot_line(self, row: int | None = None, column: int | None = None, axes: Axes | None = None) -> Axes:
+        """Draw the electrons along a row (the middle one by default) or a column into Matplotlib's axes, by channel."""
+        planes = {x: np.where(mask(self.cfa, x, self.shape), self.electrons, np.nan) for x in channels(self.cfa)}
+        return draw_line(planes, row, column, axes, "electrons")
 
     def _repr_png_(self) -> bytes:
         return preview_png(np.maximum(self.electrons, 0.0))

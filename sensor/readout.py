@@ -143,6 +143,29 @@ def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposu
     return np.asarray(variance + dark)
 
 
+def noise_sources(expected_e: float, sensor: SensorConfig, exposure_s: float) -> dict[str, float]:
+    """Standard deviation of each source of a pixel's noise in an even field [e-], by name.
+
+    Their squares sum to `noise_variance`, which says what each of them is.
+    """
+    pixel = sensor.pixel
+    hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
+    dark_e = pixel.dark_current_e_per_s * exposure_s + hot_share * hot_e
+    variance_e2 = {
+        "shot noise": expected_e,
+        "dark current": dark_e + hot_share * (1 - hot_share) * hot_e**2,
+        "PRNU": (pixel.prnu * expected_e) ** 2,
+    }
+    collected_e2 = sum(variance_e2.values()) + (expected_e + dark_e) ** 2
+    variance_e2 |= {
+        "column gains": pixel.column_gain_spread**2 * collected_e2,
+        "DSNU and column offsets": pixel.fixed_dark_e**2,
+        "read noise": pixel.read_noise_e**2,
+        "quantisation": sensor.gain_e_per_dn**2 / 12,
+    }
+    return {name: value**0.5 for name, value in variance_e2.items()}
+
+
 def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float) -> float:
     """Photo-electrons of an even field at which signal over `noise_variance`'s root is `snr`; inf where it never is.
 

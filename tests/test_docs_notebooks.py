@@ -7,8 +7,9 @@ import pytest
 NOTEBOOKS = sorted((Path(__file__).resolve().parent.parent / "docs" / "notebooks").glob("*.ipynb"))
 
 
-def test_there_is_a_notebook() -> None:
-    assert [path.name for path in NOTEBOOKS] == ["first_picture.ipynb"]
+def test_there_is_a_notebook_for_each_user() -> None:
+    names = ["camera_engineer.ipynb", "first_picture.ipynb", "student.ipynb", "vision_scientist.ipynb"]
+    assert [path.name for path in NOTEBOOKS] == names
 
 
 @pytest.mark.slow
@@ -24,4 +25,4 @@ def test_a_notebook_runs_from_top_to_bottom_and_every_cell_shows_something(path:
     for cell in notebook.cells:
         if cell.cell_type == "code":
             shown = [output.get("data", {}) for output in cell.outputs]
-            assert any("text/html" in data for data in shown), cell.source
+            assert any({"text/html", "image/png"} & data.keys() for data in shown), cell.source

@@ -3,8 +3,13 @@
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit
+from render.photometry import tristimulus
+from render.spectrum import DEFAULT_WAVELENGTH_NM as NM
+from render.spectrum import Floats, Spectrum, band_widths
 from rodcone.colour_spaces import A_XY, D65_XY, adapt_to_d65, xyz_from_xy, xyz_to_srgb
 from sensor.calibration import ColourCalibration
+
+WIDTH = band_widths(NM)
 
 # Mean and mean product of the ColorChecker's 24 patches in linear sRGB under D65 (`scenes.reflectances`).
 MEAN_SRGB = np.array([0.3295, 0.2602, 0.2292])
@@ -40,3 +45,28 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
     unexplained = np.diag([0.0 if name in "RGB" else UNEXPLAINED**2 for name in names])
     cross = rows @ MOMENTS_SRGB
     return ColourFit(channels=names, mean=rows @ MEAN_SRGB, moments=cross @ rows.T + unexplained, cross=cross)
+
+
+def neutral_under(colour: ColourCalibration, light: Spectrum) -> Floats:
+    """Response of each channel to a neutral under a light, green 1, from a camera's matrices alone, shape (channel,).
+
+    As the DNG specification 1.7 has it: the matrices from XYZ under A and D65, interpolated by the light's inverse
+    correlated colour temperature, which is McCamy's (1992); under A and D65 themselves within 4e-4.
+
+    Parameters
+    ----------
+    light : Spectrum
+        At any level.
+    """
+    white = tristimulus(light.band_average(NM, WIDTH), NM, WIDTH)
+    a, d65, at = (_inverse_temperature(xyz) for xyz in (xyz_from_xy(A_XY), xyz_from_xy(D65_XY), white))
+    share = float(np.clip((at - d65) / (a - d65), 0.0, 1.0))
+    response = (share * colour.xyz_to_camera_a + (1 - share) * colour.xyz_to_camera_d65) @ white
+    return np.asarray(response / response[1])  # R, G, B come first
+
+
+def _inverse_temperature(xyz: Floats) -> float:
+    """Inverse of McCamy's correlated colour temperature [1/K]."""
+    x, y = xyz[:2] / xyz.sum()
+    n = (x - 0.3320) / (0.1858 - y)
+    return float(1 / (449 * n**3 + 3525 * n**2 + 6823.3 * n + 5520.33))

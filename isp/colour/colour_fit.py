@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from render.photometry import photons_per_joule, tristimulus
 from render.spectrum import Floats, band_widths
+from rodcone.brief import brief
 from rodcone.colour_spaces import adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from rodcone.errors import InputError
 from sensor.cfa import channels
@@ -51,6 +52,8 @@ class ColourFit:
     moments: Floats
     cross: Floats
     plain: Floats | None = None
+
+    __repr__ = brief
 
     @classmethod
     def of(cls, matrix: ArrayLike | ColourFit) -> ColourFit:

@@ -14,6 +14,7 @@ from isp.colour.highlights import saturated_nearby
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
+from rodcone.brief import brief
 from rodcone.errors import InputError
 from sensor.cfa import channel_map, channels
 from sensor.curves import Responses, rgbw
@@ -37,6 +38,8 @@ class WhiteBalance:
 
     neutral: Floats | None = None
     given: Floats | None = None
+
+    __repr__ = brief
 
     @classmethod
     def of(

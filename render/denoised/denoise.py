@@ -13,6 +13,7 @@ import numpy as np
 from render.integrator.dense import Tracer
 from render.integrator.wavefront import Span, bands_apart, seed_of, traced
 from render.loader import PART_BANDS, Film, Loaded, mitsuba_module
+from rodcone.brief import brief
 from rodcone.optional import optional_library
 from rodcone.types import Planes
 
@@ -48,6 +49,8 @@ class Denoised:
     fold_mean: Planes
     fold_difference: Planes
     fold_points: int
+
+    __repr__ = brief
 
 
 def denoiser() -> Any:

@@ -27,7 +27,7 @@ from render.radiance_files.exr_layout import (
 )
 from render.radiance_files.file_checks import MOST_EXPANSION, require_extent, require_file
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
-from rodcone.errors import InputError, one_line
+from rodcone.errors import InputError, one_line, require_kind
 from rodcone.files import replacing
 
 ERROR, SCENE, PREVIEW = "rodconeRelativeMcError", "rodconeScene", "rodconePreview"
@@ -63,6 +63,8 @@ def write_exr(path: str | Path, radiance: SpectralRadiance, *, scene: str = "") 
         Where the file can't be written.
     """
     path = Path(path)
+    fix = "call its relight()" if hasattr(radiance, "relight") else "give write_exr(path, radiance)"
+    require_kind("radiance", radiance, SpectralRadiance, fix)
     if radiance.values.max() > _FLOAT.max:
         raise InputError(f"{path}: radiance {radiance.values.max():g} is over float32's {_FLOAT.max:g}; scale it down")
     names = [channel_name(nm) for nm in radiance.wavelength_nm]

@@ -7,6 +7,7 @@ from typing import Any
 from render.scene import Keys, Node, Scene, walk
 from render.user_scene.allowed_plugins import ALLOWED, CAMERAS, METER, kind_of
 from render.user_scene.scene_lights import attach_area_lights, light_groups, type_of
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_whole, unknown
 
 FILM_SIZE = 576, 768  # height and width of Mitsuba's films where a scene states none
@@ -31,6 +32,8 @@ class SceneFile:
     scene: Scene
     size: tuple[int, int]
     notes: tuple[str, ...]
+
+    __repr__ = brief
 
 
 def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -> SceneFile:

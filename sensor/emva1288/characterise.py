@@ -7,8 +7,10 @@ from math import hypot, log10, sqrt
 import numpy as np
 
 from render.spectrum import Floats
+from rodcone.brief import brief
 from rodcone.errors import require_range, require_whole
 from rodcone.jit import backend
+from rodcone.plots import BLUE, ORANGE, Axes, draw_curves
 from sensor.config import SensorConfig
 from sensor.emva1288 import estimators as emva
 from sensor.emva1288.photon_transfer import Expose, Transfer, bench, dark_slopes, take_stack, take_transfer
@@ -25,6 +27,8 @@ class ExposurePlan:
     exposure_s: float
     frames: int
     dark_times_s: Sequence[float]
+
+    __repr__ = brief
 
 
 @dataclass(frozen=True)
@@ -66,11 +70,27 @@ class Characterisation:
     linearity_share: Floats
     notes: tuple[str, ...]
 
+    __repr__ = brief
+
     @property
     def snr(self) -> Floats:
         """Mean above the dark over the temporal noise, at each level; NaN where nothing varies."""
         noise = np.sqrt(np.where(self.transfer.variance_dn2 > 0, self.transfer.variance_dn2, np.nan))
         return np.asarray((self.transfer.mean_dn - self.dark_mean_dn) / noise)
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the photon transfer, temporal noise over signal, into Matplotlib's axes, new ones by default."""
+        signal_e = (self.transfer.mean_dn - self.dark_mean_dn) / self.gain_dn_per_e
+        noise_e = np.sqrt(np.maximum(self.transfer.variance_dn2, 0.0)) / self.gain_dn_per_e
+        known = (signal_e > 0) & (noise_e > 0)
+        light_e = np.geomspace(signal_e[known].min(), signal_e[known].max(), 60)
+        dark_e = float(np.sqrt(max(self.dark_variance_dn2, 0.0)) / self.gain_dn_per_e)
+        axes = draw_curves({"shot noise, slope ½": (light_e, np.sqrt(light_e))}, axes, x="signal, e⁻", y="noise, e⁻")
+        axes.plot(signal_e[known], noise_e[known], color=BLUE, marker="o", markersize=4.0, linestyle="")
+        axes.axhline(dark_e, color=ORANGE, linestyle="--", label="dark noise")
+        axes.set(xscale="log", yscale="log")
+        axes.legend(frameon=False)
+        return axes
 
     def figure(self, name: str) -> FigureOfMerit:
         """Result by name."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.spectrum import Floats
+from rodcone.brief import brief
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -46,6 +47,8 @@ class Transfer:
     mean_dn: Floats
     variance_dn2: Floats
 
+    __repr__ = brief
+
 
 @dataclass(frozen=True)
 class Stack:
@@ -63,6 +66,8 @@ class Stack:
     mean_dn: NDArray[np.float64]
     variance_dn2: float
     frames: int
+
+    __repr__ = brief
 
     @property
     def spatial_dn2(self) -> float:

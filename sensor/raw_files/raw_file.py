@@ -10,6 +10,7 @@ from sensor.raw_files.dng import is_own, read_dng, write_dng
 from sensor.raw_files.photograph import read_photograph
 from sensor.raw_files.raw_tiff import read_tiff, write_tiff
 
+PICTURES = (".png", ".jpg", ".jpeg", ".webp")
 ENDINGS = (".dng", ".tif", ".tiff")
 
 
@@ -61,6 +62,8 @@ def open_raw(path: str | Path) -> tuple[RawImage, dict[str, Any]]:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a raw file")
+    if path.suffix.lower() in PICTURES:
+        raise InputError(f"{path}: it is a picture, developed already; allowed: raw files; give the one it is made of")
     if path.suffix.lower() in ENDINGS[1:]:
         return read_tiff(path), {}
     if path.suffix.lower() == ENDINGS[0] and is_own(path):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rodcone.brief import brief
 from sensor.presets import preset
 from studies.budget.ledger import Ledger
 from studies.study.model import ImageModel, RenderModel
@@ -22,6 +23,8 @@ class Plan:
     images: Mapping[Condition, ImageModel]
     shares: Mapping[Condition, float] = field(default_factory=dict)
     ledgers: tuple[Ledger, ...] = ()
+
+    __repr__ = brief
 
     def _repr_html_(self) -> str:
         from studies.budget.plan_text import plan_html  # late: it reads this type

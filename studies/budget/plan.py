@@ -1,6 +1,6 @@
 """The error budget of a study: what its pictures have to hold, and what the sensor's noise hides."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from render.engine import render
 from render.spectrum import Spectrum
 from render.transport import Transport
+from rodcone.progress import Step
 from sensor.config import LensConfig
 from sensor.presets import preset
 from sensor.variations import vary
@@ -18,17 +19,17 @@ from studies.budget.choice import choose
 from studies.budget.ledger import KERNEL, PilotNoise, Weighed, ledger, weigh
 from studies.budget.model_plan import Plan
 from studies.budget.terms import LENS_TERMS, effects, horizontal_view_deg
+from studies.study.exposures import parse_exposure
 from studies.study.lit_scene import OpenedScene, level_luminance, lux_per_cd_m2, open_all, under, white_spectrum
 from studies.study.model import ImageModel, RenderModel, unit_exposure_s
 from studies.study.radiance_file import open_radiance_file
-from studies.study.study import OWN, Study, conditions, mosaics, parse_exposure
+from studies.study.study import OWN, Study, conditions, mosaics
 
 PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels a picture is no smoother, so no effect is smaller
 PILOT_SEED = 1 << 32  # added to the study's seed: the pilot is no part of a render, and the cache keeps them apart
 PILOT_SPP = 128
 REFERENCE_SAMPLES = 4  # times what the study allows: the reference's noise is then at most half of the plan's
 
-Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 Groups = Mapping[int, Sequence[NDArray[np.intp]]]
 
 
@@ -46,7 +47,7 @@ class Pilot:
         return self.opened.scene is not None
 
 
-def plan(study: Study, *, cache: str | Path | None = None, step: Step = lambda what, share: None) -> Plan:
+def plan(study: Study, *, cache: str | Path | None = None, step: Step | None = None) -> Plan:
     """Compute a study's error budget on pilot renders and choose the cheapest model within it.
 
     Parameters
@@ -56,6 +57,8 @@ def plan(study: Study, *, cache: str | Path | None = None, step: Step = lambda w
         the unbiased light: what a denoiser leaves isn't known before the render.
     cache : str or Path, optional
         Folder of renders.
+    step : callable, optional
+        Called with what is being done and the share that is done; a notebook shows a bar for each pilot's render.
 
     Returns
     -------
@@ -70,7 +73,8 @@ def plan(study: Study, *, cache: str | Path | None = None, step: Step = lambda w
     renders, images, ledgers = {}, {}, []
     opened_scenes = open_all(study)
     for index, opened in enumerate(opened_scenes.values()):
-        step(f"pilot of {opened.choice.source}", index / len(opened_scenes))
+        if step:
+            step(f"pilot of {opened.choice.source}", index / len(opened_scenes))
         pilot = make_pilot(opened, study, None if cache is None else Path(cache))
         rows = list(_weigh_all(pilot, study))
         sizes = {count: len(groups) for count, groups in pilot.groups.items()}

@@ -78,7 +78,7 @@ def plan_table(plan: Plan) -> Table:
 def plan_html(plan: Plan) -> str:
     """The ledger as a table for a notebook: a row a condition and mosaic, a column a term."""
     if not plan.ledgers:
-        return f"<p>Plan of {len(plan.renders)} renders and {len(plan.images)} images, without a budget</p>"
+        return f"<p>Plan without a budget: renders {len(plan.renders)}, images {len(plan.images)}</p>"
     head = "".join(f"<th>{escape(name)}</th>" for name in _head(plan))
     rows = ("".join(f"<td>{escape(text)}</td>" for text in _cells(row)) for row in plan.ledgers)
     return f"<table>{''.join(f'<tr>{row}</tr>' for row in (head, *rows))}</table>"

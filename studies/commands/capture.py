@@ -5,8 +5,9 @@ from pathlib import Path
 
 from rodcone.progress import progress
 from sensor.exposure import AUTO
-from studies.commands.console import Flag, Out, print_result, say
+from studies.commands.console import Flag, Out, Seconds, Several, print_result, say
 from studies.photograph.shot import Order, take
+from studies.study.study import AS_SHOT
 
 
 def capture(
@@ -16,11 +17,14 @@ def capture(
     out: Out = Path("shot.dng"),
     sensor: str = "low_noise",
     cfa: str | None = None,
-    exposure_s: float | None = None,
     exposure: str = AUTO,
+    exposure_s: Seconds | None = None,
     level: str | None = None,
-    white_balance: str | None = None,
+    light: Several = None,
+    white_balance: str = AS_SHOT,
     size: int | None = None,
+    height: int | None = None,
+    width: int | None = None,
     spp: int = 64,
     seed: int = 0,
     trust_scene: Flag = False,
@@ -42,20 +46,27 @@ def capture(
         Sensor preset by name, or a preset file.
     cfa
         Mosaic, such as rgbw or bayer; the preset's own by default.
-    exposure_s
-        Exposure time in seconds; chosen by the rule of exposure by default.
     exposure
-        Rule: auto for the brightest green, auto:W for the brightest W, auto:information for the one of the two whose
-        samples hold more.
+        Time such as 20ms, or a rule: auto for the brightest green, auto:W for the brightest W, auto:information for the
+        one of the two whose samples hold more.
+    exposure_s
+        Time in seconds or with its unit, in place of --exposure; 0 for a dark frame.
     level
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
         by default.
+    light
+        ILLUMINANT, such as A, in place of all of the scene's lights, or GROUP=ILLUMINANT in place of one group, each at
+        the same luminance; may be given several times. For a file of radiance the light that it was lit by.
     white_balance
-        Illuminant, such as D65, that the camera's as-shot white balance and colour matrix are set to; the scene's
-        first light by default, D65 for a file of radiance.
+        Illuminant, such as D65, under which the camera shows grey as grey; as-shot for the scene's first light, and
+        that of --light, or D65, for a file of radiance.
     size
         Longer side of the rendered picture in pixels; 256 by default, a .xml scene's film has its own, a file of
         radiance keeps its own.
+    height
+        Pixels; with one of height and width the other keeps the proportions.
+    width
+        Pixels; as height.
     spp
         Samples a pixel of the render.
     seed
@@ -77,8 +88,11 @@ def capture(
         exposure_s=exposure_s,
         exposure=exposure,
         level=level,
+        lights=tuple(light or ()),
         white_balance=white_balance,
         size=size,
+        height=height,
+        width=width,
         spp=spp,
         seed=seed,
         trust=trust_scene,

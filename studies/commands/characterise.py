@@ -8,7 +8,7 @@ from rodcone.json_values import finite
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
-from studies.commands.console import Flag, OutOrNone, print_table, require_ending
+from studies.commands.console import Flag, OutOrNone, Seconds, print_table, require_ending
 from studies.pages.transfer_chart import transfer_svg
 
 HEAD = ("figure", "unit", "configured", "measured", "std. error", "in std. errors")
@@ -22,7 +22,7 @@ def characterise(
     json: Flag = False,
     height: int = 256,
     width: int = 320,
-    exposure_s: float = 0.01,
+    exposure_s: Seconds = 0.01,
     seed: int = 0,
 ) -> None:
     """Measure a simulated chip as an EMVA 1288 laboratory does and print the figures beside the configured ones.
@@ -40,7 +40,7 @@ def characterise(
     width
         Width of the chip in pixels; more columns measure the column noise better.
     exposure_s
-        Exposure time of the photon-transfer series in seconds.
+        Exposure time of the photon-transfer series, in seconds or such as 10ms.
     seed
         Seed of the chip and of its frames.
     """

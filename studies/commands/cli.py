@@ -55,6 +55,9 @@ def main(arguments: list[str] | None = None) -> Any:
         fail(" ".join(str(error).split()), BAD_INPUT)
     except InputError as error:
         fail(str(error), BAD_INPUT)
+    except BrokenPipeError:  # the reader, such as head, has enough
+        sys.stdout = None  # which Python would flush at its end, to nobody
+        sys.exit(0)
     except OSError as error:
         fail(f"{error.filename or 'file'}: {error.strerror or error}; choose another place with --out", 1)
     except KeyboardInterrupt:

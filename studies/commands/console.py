@@ -12,11 +12,24 @@ from rich.table import Table
 from rich.text import Text
 
 from rodcone.errors import InputError
+from studies.study.exposures import parse_time
 
 Out = Annotated[Path, Parameter(name=["--out", "-o"])]
 OutOrNone = Annotated[Path | None, Parameter(name=["--out", "-o"])]
 Flag = Annotated[bool, Parameter(negative="")]
 Several = Annotated[list[str] | None, Parameter(negative_iterable=())]
+
+
+def _seconds(_: Any, tokens: Sequence[Any]) -> float:
+    """Seconds as a number, or a time with its unit."""
+    text = tokens[0].value
+    try:
+        return float(text)
+    except ValueError:
+        return parse_time(text)
+
+
+Seconds = Annotated[float, Parameter(converter=_seconds)]  # 0.02 or 20ms
 
 INTERRUPTED = 130  # exit code after Ctrl-C: 128 + SIGINT
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.budget.model_plan import as_stated
-from studies.commands.console import Flag, Out, Several
+from studies.commands.console import Flag, Out, Seconds, Several
 from studies.commands.sweep import check_memory, make_all
 from studies.photograph.clock import Clock
 from studies.study.study import SceneChoice
@@ -23,7 +23,7 @@ def demo(
     size: int | None = None,
     sensor: Several = None,
     level: Several = None,
-    longest_exposure_s: float | None = None,
+    longest_exposure_s: Seconds | None = None,
     spp: int | None = None,
     max_seconds: float | None = None,
     seed: int = 0,
@@ -50,7 +50,7 @@ def demo(
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); may be given
         several times (seven levels from moonlight to daylight by default).
     longest_exposure_s
-        Longest exposure time in seconds, 0.066 by default.
+        Longest exposure time in seconds or with its unit; 66ms by default.
     spp
         Samples a pixel of the render, at most; 288 by default.
     max_seconds

@@ -7,6 +7,7 @@ from rodcone.files import check_place
 from studies.commands.console import Flag, OutOrNone, print_result
 from studies.photograph.develop import develop_file
 from studies.photograph.picture_file import check_picture_file, write_picture
+from studies.study.study import AS_SHOT
 
 
 def develop(
@@ -17,7 +18,9 @@ def develop(
     isp: str | None = None,
     bits: int = 8,
     ev: float | None = None,
-    white_balance: str = "gray-world",
+    white_balance: str = AS_SHOT,
+    height: int | None = None,
+    width: int | None = None,
     encoding: str = "srgb",
     json: Flag = False,
 ) -> None:
@@ -38,7 +41,12 @@ def develop(
         Brightness in stops; at 0 a full well is white. By default the 99th percentile of the picture's luminance is
         shown at 90 % of white.
     white_balance
-        gray-world, as in the paper, or as-shot: what capture's --white-balance or the camera set, as raw converters do.
+        Illuminant, such as D65, under which grey is shown as grey; as-shot for the one that capture or the camera set,
+        as raw converters do; or gray-world, found in the picture as in the paper.
+    height
+        Pixels of the picture, at most the raw file's; with one of height and width the other keeps the proportions.
+    width
+        Pixels; as height.
     encoding
         Colours of the picture: srgb, or display-p3 for screens with a wider gamut.
     json
@@ -49,6 +57,6 @@ def develop(
     picture = raw.with_suffix(".png") if out is None else out
     check_picture_file(picture, bits, encoding)
     check_place(picture)
-    developed = develop_file(raw, isp, ev, white_balance, encoding)
+    developed = develop_file(raw, isp, ev, white_balance, encoding, height=height, width=width)
     write_picture(developed.encoded, picture, bits, encoding)
     print_result(picture, {"path": str(picture), **developed.facts}, json=json)

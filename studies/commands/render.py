@@ -1,7 +1,6 @@
 """The command `rodcone render`."""
 
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,26 +8,25 @@ import numpy as np
 
 from render.denoised.relight import relight_denoised
 from render.engine import render as render_transport
-from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
-from render.scene import Scene
-from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum
+from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
-from rodcone.errors import InputError, require_keys, require_whole
+from rodcone.errors import InputError
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import progress, render_words
-from studies.commands.console import INTERRUPTED, Flag, Out, Several, print_result, require_ending, say
-from studies.study.lit_scene import render_facts, spectral_luminance
-from studies.study.scene_source import asked_level, open_scene
+from studies.commands.console import INTERRUPTED, Flag, Out, Seconds, Several, print_result, require_ending, say
+from studies.study.lit_scene import asked_spectra, render_facts
+from studies.study.scene_source import asked_level, asked_size, open_scene
 
 MOST_BANDS = 1000
 
 
 def render(
     source: str,
+    /,
     *,
     out: Out = Path("render.exr"),
     height: int | None = None,
@@ -38,7 +36,7 @@ def render(
     level: str | None = None,
     spp: int | None = None,
     noise: float | None = None,
-    max_seconds: float | None = None,
+    max_seconds: Seconds | None = None,
     max_depth: int = 8,
     seed: int = 0,
     cache: Path | None = None,
@@ -68,8 +66,8 @@ def render(
     bands
         Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; 380:780:10 by default.
     light
-        GROUP=ILLUMINANT, such as lamp=A: another spectrum for a light group, at the same luminance; may be given
-        several times.
+        GROUP=ILLUMINANT, such as lamp=A: another spectrum for a light group, at the same luminance; or ILLUMINANT
+        alone, for all of them; may be given several times.
     level
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
         by default.
@@ -78,7 +76,7 @@ def render(
     noise
         Relative Monte Carlo error to reach, such as 0.02.
     max_seconds
-        Time for the render, at most.
+        Time for the render in seconds, at most.
     max_depth
         Longest path in segments; 2 is direct light.
     seed
@@ -101,8 +99,8 @@ def render(
     require_ending(out, ".exr")
     wavelength_nm, width_nm = _bands(bands)
     opened = open_scene(source, trust_scene, extend)
-    scene, size = opened.scene, _size(opened.size, height, width)
-    spectra = _spectra(scene, light or ())
+    scene, size = opened.scene, asked_size(opened.size, height, width)
+    spectra = asked_spectra(scene, light or ())
     luminance_cd_m2, illuminance_lux = asked_level(scene, level)
     count = DEFAULT_WAVELENGTH_NM.size if wavelength_nm is None else wavelength_nm.size
     require_memory(memory(size[0] * size[1], count, len(scene.groups), denoised=denoise), force)
@@ -154,33 +152,6 @@ def _bands(text: str | None) -> tuple[Floats | None, Floats | None]:
         )
     edges = np.linspace(first, last, count + 1)
     return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
-
-
-def _size(own: tuple[int, int], height: int | None, width: int | None) -> tuple[int, int]:
-    """Height and width; the one that isn't given keeps the scene's proportions."""
-    for name, pixels in (("height", height), ("width", width)):
-        if pixels is not None:
-            require_whole(name, pixels, 1, 1 << 15, "give pixels")
-    if height is not None:
-        return height, width if width is not None else max(1, round(height * own[1] / own[0]))
-    return (max(1, round(width * own[0] / own[1])), width) if width is not None else own
-
-
-def _spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
-    """Illuminants by light group, each at the luminance of the group's own spectrum."""
-    found: dict[str, Spectrum] = {}
-    for text in lights:
-        group, _, name = text.rpartition("=")
-        if not group or not name:
-            raise InputError(f"light: {text!r} is not allowed; write GROUP=ILLUMINANT, such as lamp=A")
-        require_keys(f"scene {scene.name}: light group", [group], scene.groups)
-        lit = scene.groups[group]
-        own = spectral_luminance(lit.spectrum)
-        if lit.coloured or own <= 0:
-            why = "has colours of its own" if lit.coloured else "is dark"
-            raise InputError(f"light: group {group!r} of scene {scene.name} {why}; leave it as it is")
-        found[group] = illuminant(name) * own
-    return found
 
 
 def _facts(opened: SceneFile, transport: Transport, radiance: SpectralRadiance) -> dict[str, Any]:

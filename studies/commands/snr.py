@@ -15,7 +15,7 @@ from studies.commands.console import Flag, OutOrNone, print_table, require_endin
 from studies.pages.report_text import MISSING
 from studies.pages.snr_chart import snr_svg
 from studies.photograph.snr import GREY, light_for_snr
-from studies.study.study import parse_exposure
+from studies.study.exposures import parse_exposure
 
 HEAD = ("sensor", "channel", "electrons", "cd/m2", f"lux on {GREY:.0%} grey")
 
@@ -54,7 +54,7 @@ def snr(
         Print one JSON object: a list for each sensor.
     """
     require_range("at", at, 1e-3, 1e4, "give signal over noise, such as 10")
-    exposure_s = parse_exposure(exposure)
+    exposure_s = parse_exposure(exposure, "exposure")
     if exposure_s is None:
         raise InputError(f"exposure: {exposure!r} has no time here; allowed: a time such as 33ms; give one")
     if out is not None:

@@ -14,7 +14,7 @@ from cyclopts import Parameter
 from isp.processors.catalogue import require_libraries
 from rodcone.errors import InputError, require_whole
 from rodcone.memory import Memory, require_memory
-from rodcone.progress import duration, progress
+from rodcone.progress import Step, duration, progress
 from studies.budget.model_plan import Plan
 from studies.budget.model_plan import as_stated as plan_as_stated
 from studies.budget.plan import plan as plan_study
@@ -29,7 +29,7 @@ from studies.study.study_file import read_study
 from studies.sweep.cluster import on_cluster
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows, write_table
-from studies.sweep.run_sweep import Runner, Step, Swept
+from studies.sweep.run_sweep import Runner, Swept
 from studies.sweep.run_sweep import sweep as run_sweep
 from studies.sweep.workers import InThisProcess, cores, run, run_in_processes
 
@@ -177,7 +177,7 @@ def _estimated(study: Study, out: Path, reference: bool, workers: int) -> Estima
 
 def _words(found: Estimate) -> str:
     return (
-        f"{found.cells} cells, {found.kept} in the ledger from the last run; {found.renders} renders\n"
+        f"{found.cells} cells, {found.kept} in the ledger from the last run; {found.renders} to render\n"
         f"about {duration(found.seconds)} with {found.workers} workers, at most {found.bytes / 1e9:.1f} GB of memory; "
         "renders and cells that exist already are counted too"
     )

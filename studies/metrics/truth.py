@@ -9,6 +9,7 @@ from render.photometry import tristimulus
 from render.radiance import SpectralRadiance
 from render.spectrum import Floats, Spectrum
 from render.transport import Transport
+from rodcone.brief import brief
 from rodcone.colour_spaces import adapt_to_d65, xyz_to_srgb
 from sensor.cfa import channels
 from sensor.config import SensorConfig
@@ -30,6 +31,8 @@ class Light:
     wavelength_nm: Floats
     width_nm: Floats
     spectrum: Floats
+
+    __repr__ = brief
 
 
 def light_in_bands(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) -> Light:

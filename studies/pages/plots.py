@@ -12,6 +12,9 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
+from rodcone.plots import BLUE as BLUE  # noqa: PLC0414  (pages and figures import the colours from here)
+from rodcone.plots import INK as INK  # noqa: PLC0414
+from rodcone.plots import ORANGE as ORANGE  # noqa: PLC0414
 from studies.pages.charts import spread, tick_text
 
 UNIT = 1 / 72  # inches: lengths below are points, which are the units of Matplotlib's SVG
@@ -19,9 +22,9 @@ SIDE = 192  # width of a picture [points]
 CHART = (460, 250)  # width and height of a chart [points]
 LABEL_GAP = 15  # between the names at the ends of lines [points]
 PNG_DPI = 144
-BLUE, ORANGE, GREEN, PURPLE = "#0068a8", "#b34700", "#00795a", "#8d4a78"
+GREEN, PURPLE = "#00795a", "#8d4a78"
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
-INK, SOFT = "#1d2125", "#565d64"
+SOFT = "#565d64"
 STYLE: dict[Any, Any] = {  # Matplotlib's settings
     "svg.hashsalt": "rodcone",  # otherwise the ids of an SVG are random
     "svg.fonttype": "none",  # text stays text

@@ -7,8 +7,9 @@ from math import floor, isfinite, isinf, isnan, log10
 
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W
 from studies.pages.report_data import ReportCell
+from studies.study.exposures import parse_exposure
 from studies.study.levels import parse_level
-from studies.study.study import GRAY_WORLD, OWN, parse_exposure
+from studies.study.study import GRAY_WORLD, OWN
 
 MISSING = "—"
 NBSP = "\N{NO-BREAK SPACE}"

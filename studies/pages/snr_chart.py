@@ -5,12 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib import rc_context
 
+from rodcone.plots import CHANNEL_COLOURS
 from sensor.config import SensorConfig
 from studies.pages.plots import CHART, SOFT, STYLE, blank, plain_ticks, svg_text
 from studies.photograph.snr import snr_at
 
 LINES = ("-", "--", ":", "-.")  # a sensor each, in turn
-CHANNEL_COLOURS = {"R": "#b3261e", "G": "#00795a", "B": "#0068a8", "W": "#1d2125", "C": "#00838f", "Y": "#8a6d00"}
 LEAST_CD_M2, MOST_CD_M2, POINTS = 1e-4, 1e5, 181  # starlight to sunlit snow
 
 

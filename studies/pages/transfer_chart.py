@@ -14,7 +14,6 @@ def transfer_svg(result: Characterisation, title: str) -> str:
     transfer, gain = result.transfer, result.gain_dn_per_e
     signal_dn = transfer.mean_dn - result.dark_mean_dn
     signal_e = signal_dn / gain
-    noise_e = np.sqrt(np.maximum(transfer.variance_dn2, 0.0)) / gain
     useful = (signal_dn > 0) & (transfer.light_e <= result.saturation_e)  # beyond it clipping hides the noise
     dark_e = float(np.sqrt(max(result.dark_variance_dn2, 0.0)) / gain)
     light_e = np.geomspace(signal_e[signal_e > 0].min(), signal_e.max(), 60)
@@ -27,11 +26,8 @@ def transfer_svg(result: Characterisation, title: str) -> str:
     linear.plot(line_dn, gain * line_dn + result.dark_variance_dn2, color=BLUE, label=f"slope {gain:.4g} DN/e⁻")
     linear.set(title="Photon transfer: temporal variance, DN²", xlabel="mean above dark, DN")
 
-    _draw(logarithmic, signal_e, noise_e)
-    logarithmic.plot(light_e, np.sqrt(light_e), color=BLUE, label="shot noise, slope ½")
-    logarithmic.axhline(dark_e, color=ORANGE, linestyle="--", label="dark noise")
-    logarithmic.set(xscale="log", yscale="log")
-    logarithmic.set(title="Photon transfer, logarithmic: temporal noise, e⁻", xlabel="signal, e⁻")
+    result.plot(logarithmic)
+    logarithmic.set(title="Photon transfer, logarithmic: temporal noise, e⁻", ylabel="")
 
     _draw(snr, signal_e[useful], 20 * np.log10(result.snr[useful]))
     snr.plot(light_e, 10 * np.log10(light_e), color=BLUE, label="shot noise alone")

@@ -14,20 +14,21 @@ from sensor.calibration import ColourCalibration
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation
+from sensor.presets import preset
 from sensor.response import electrons_per_irradiance
 from studies.metrics.truth import Light, green_scale, light_in_bands
 
 ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is 78 / exposure that saturates [lux s]
 
 
-def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
+def calibrate(sensor: SensorConfig | str, light: Spectrum | str) -> ColourCalibration:
     """Fit a camera's colours under the light of an exposure, illuminant A and D65.
 
     Parameters
     ----------
-    sensor : SensorConfig
+    sensor : SensorConfig or str
         With R, G and B in its mosaic. Channels beyond these get a fitted column from XYZ, and carry no colour back.
-    light : Spectrum
+    light : Spectrum or str
         What the camera's white balance is set to.
 
     Raises
@@ -35,6 +36,8 @@ def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
     InputError
         Where a channel is missing, collects nothing, or the three can't tell colours apart.
     """
+    sensor = preset(sensor) if isinstance(sensor, str) else sensor
+    light = illuminant(light) if isinstance(light, str) else light
     if not set("RGB") <= set(channels(sensor.cfa)):
         raise InputError(f"cfa: {sensor.cfa} holds no colours to calibrate; allowed: R, G and B; write its raw as .tif")
     neutral, to_srgb, _, _ = _under(sensor, light)

@@ -6,19 +6,28 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from skimage.transform import resize_local_mean
 
-from isp.colour.calibrated_colours import fit_of_calibration
+from isp.colour.calibrated_colours import fit_of_calibration, neutral_under
 from isp.colour.encoding import encode
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
+from render.illuminants import illuminant
+from rodcone.brief import brief
 from rodcone.colour_spaces import luminance_of_srgb
-from rodcone.errors import InputError, require_range, unknown
+from rodcone.errors import InputError, require_kind, require_range, unknown
+from rodcone.types import Floats
 from sensor.calibration import ColourCalibration
 from sensor.cfa import channels, is_bayer
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import open_raw
 from studies.metrics.truth import WHITE_AT, WHITE_PERCENTILE  # the demo's rule, here on the picture's own luminance
-from studies.study.study import AS_SHOT, GRAY_WORLD, WHITE_BALANCES
+from studies.study.scene_source import asked_size
+from studies.study.study import AS_SHOT, WHITE_BALANCES
+
+# Lights that the matrices under A and D65 know as well as their own temperature: the presets' neutral is met to 1 % in
+# R, G and B and 6 % in W. Under lamps with bands of their own B is up to 26 % off, and W by a factor of two.
+BROAD = ("A", "D50", "D55", "D65", "D75", "moonlight", "sunlight")
 
 
 @dataclass(frozen=True)
@@ -27,6 +36,8 @@ class Developed:
 
     encoded: NDArray[np.float64]
     facts: dict[str, Any]
+
+    __repr__ = brief
 
 
 def mosaic_processor(raw: RawImage) -> str:
@@ -39,7 +50,7 @@ def develop(
     calibration: ColourCalibration | None = None,
     *,
     processor: str | None = None,
-    white_balance: str = GRAY_WORLD,
+    white_balance: str = AS_SHOT,
 ) -> Picture:
     """Develop a raw image into a linear picture.
 
@@ -51,18 +62,18 @@ def develop(
     processor : str, optional
         Of `isp.processors.catalogue.PROCESSORS`; ``bayer`` or ``interleaved``, by the mosaic, where left out.
     white_balance : str
-        ``gray-world`` as in the paper, with the as-shot neutral where the picture is too dark for that; or ``as-shot``,
-        that neutral in any case.
+        ``as-shot``: the calibration's neutral; an illuminant such as ``D65``: its neutral, from the calibration's
+        matrices; or ``gray-world`` as in the paper, with the as-shot neutral where the picture is too dark for that.
 
     Raises
     ------
     InputError
         For an unknown name, a raw image without colours, or a mosaic that the processor doesn't know.
     """
+    require_kind("raw", raw, RawImage, "give what capture or read_raw gives")
     name = processor or mosaic_processor(raw)
-    for what, value, allowed in (("isp", name, PROCESSORS), ("white_balance", white_balance, WHITE_BALANCES)):
-        if value not in allowed:
-            raise unknown(what, value, allowed)
+    if name not in PROCESSORS:
+        raise unknown("isp", name, PROCESSORS)
     colour = calibration or raw.colour
     if colour is None:
         raise InputError(
@@ -70,12 +81,34 @@ def develop(
             "calibrate(sensor, illuminant('D65')) as well"
         )
     colours = fit_of_calibration(colour, channels(raw.cfa))
-    fixed = colour.neutral if white_balance == AS_SHOT else None
-    return PROCESSORS[name].develop(raw, colours, neutral=colour.neutral, balance=fixed)
+    return PROCESSORS[name].develop(raw, colours, neutral=colour.neutral, balance=_asked_neutral(colour, white_balance))
+
+
+def _asked_neutral(colour: ColourCalibration, white_balance: str) -> Floats | None:
+    """What a neutral reads under the light that is asked for; None where Gray World finds it in the picture."""
+    if white_balance in WHITE_BALANCES:
+        return colour.neutral if white_balance == AS_SHOT else None
+    try:
+        light = illuminant(white_balance)
+    except InputError:
+        raise unknown("white_balance", white_balance, (*WHITE_BALANCES, *BROAD, "temperature such as 3000K")) from None
+    if white_balance not in BROAD and not white_balance.endswith("K"):
+        raise InputError(
+            f"white_balance: {white_balance!r} has bands that a raw file's matrices don't know; allowed: "
+            f"{', '.join((*WHITE_BALANCES, *BROAD))}, temperature such as 3000K; give it to capture instead"
+        )
+    return neutral_under(colour, light)
 
 
 def develop_file(
-    path: Path, isp: str | None = None, ev: float | None = None, white_balance: str = GRAY_WORLD, encoding: str = "srgb"
+    path: str | Path,
+    isp: str | None = None,
+    ev: float | None = None,
+    white_balance: str = AS_SHOT,
+    encoding: str = "srgb",
+    *,
+    height: int | None = None,
+    width: int | None = None,
 ) -> Developed:
     """Read a raw file and develop it with its own colour calibration.
 
@@ -90,10 +123,12 @@ def develop_file(
         Brightness in stops: at 0 green's full well is white. Left out, the 99th percentile of the picture's luminance
         comes to 90 % of white, which noise raises in the deepest dark; for looking, not for measuring.
     white_balance : str
-        ``gray-world`` as in the paper, with the file's as-shot neutral where the picture is too dark for that; or
-        ``as-shot``, that neutral in any case.
+        As of `develop`.
     encoding : str
         Of `isp.colour.encoding.ENCODINGS`.
+    height, width : int, optional
+        Pixels of the picture, at most the raw file's, each the mean of the linear light on its area; one of them alone
+        keeps the proportions.
 
     Raises
     ------
@@ -106,7 +141,7 @@ def develop_file(
     if raw.colour is None:
         raise InputError(f"{path}: it holds no colour calibration; allowed: a camera with R, G and B; capture with one")
     picture = develop(raw, processor=isp, white_balance=white_balance)
-    linear = picture.rgb / raw.full_well_e
+    linear = _scaled(picture.rgb / raw.full_well_e, height, width)
     stops = _stops(linear) if ev is None else ev
     facts = {
         "raw": str(path),
@@ -122,6 +157,19 @@ def develop_file(
         **file_facts,
     }
     return Developed(encode(linear * 2.0**stops, encoding), facts)
+
+
+def _scaled(linear: NDArray[np.float64], height: int | None, width: int | None) -> NDArray[np.float64]:
+    """Picture of fewer pixels, each the mean of its area."""
+    own = linear.shape[0], linear.shape[1]
+    size = asked_size(own, height, width)
+    if size[0] > own[0] or size[1] > own[1]:
+        raise InputError(
+            f"height, width: {size} is more than the raw file's {own}; allowed: as many or fewer; give less"
+        )
+    if size == own:
+        return linear
+    return np.asarray(resize_local_mean(linear, size, channel_axis=-1))
 
 
 def _stops(linear: NDArray[np.float64]) -> float:

@@ -1,6 +1,6 @@
 """One photograph as raw files: a scene or a stored radiance in, digital negatives out."""
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,44 +11,75 @@ from isp.remosaic import remosaic
 from render.engine import render
 from render.illuminants import illuminant
 from render.radiance_files.radiance_source import is_radiance_file
-from render.scene import Scene
+from render.scene import Scene, film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.user_scene.scene_parts import SceneFile
-from rodcone.errors import InputError, require_range, require_whole, unknown
+from rodcone.errors import InputError, require_range, require_whole
 from rodcone.files import check_place
 from rodcone.memory import file_extent, memory, require_memory
-from rodcone.progress import render_words
+from rodcone.progress import Step, render_words
 from sensor.capture import capture
 from sensor.cfa import channels, check_covers, is_rgbw
 from sensor.config import SensorConfig
 from sensor.device import draw_device
-from sensor.exposure import AUTO, RULES, exposure_by_rule_s
+from sensor.exposure import AUTO, exposure_by_rule_s
 from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending, write_raw
 from studies.photograph.calibrate import calibrate, iso_speed
+from studies.study.exposures import parse_exposure
 from studies.study.levels import parse_level
+from studies.study.lit_scene import asked_spectra
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
-from studies.study.scene_source import asked_level, film_size, open_scene
+from studies.study.scene_source import asked_level, asked_size, open_scene
+from studies.study.study import AS_SHOT, GRAY_WORLD
 
-Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
 _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
 
 
 @dataclass(frozen=True)
 class Order:
-    """What to photograph and how; None: the preset's mosaic, the exposure's rule, the scene's level, light and size."""
+    """What to photograph and how.
 
-    source: str
-    out: Path
-    sensor: str = "low_noise"
+    Attributes
+    ----------
+    source, out : str or Path
+        Scene by name or file, and the raw file to write.
+    sensor, cfa : str
+        Preset by name or file; mosaic, where it isn't the preset's own.
+    exposure : str
+        A rule of `sensor.exposure.RULES`, or a time such as ``20ms``.
+    exposure_s : float, optional
+        The time in seconds, in place of `exposure`; 0 for a dark frame.
+    level : str, optional
+        Such as ``25cd/m2``; the scene's own where left out.
+    lights : tuple of str
+        ``GROUP=ILLUMINANT`` or ``ILLUMINANT``, as `studies.study.lit_scene.asked_spectra`; of a file of radiance one
+        illuminant, the light that it was lit by.
+    white_balance : str
+        Illuminant that the camera's neutral and colour matrix are set to; ``as-shot`` for the scene's first light.
+    size, height, width : int, optional
+        Longer side in pixels, or height and width, of which one keeps the proportions.
+    spp, seed : int
+    trust, extend
+        As of `studies.study.scene_source.open_scene`.
+    force : bool
+        Run even where more memory is needed than is free.
+    """
+
+    source: str | Path
+    out: str | Path
+    sensor: str | Path = "low_noise"
     cfa: str | None = None
     exposure_s: float | None = None
     exposure: str = AUTO
     level: str | None = None
-    white_balance: str | None = None
+    lights: tuple[str, ...] = ()
+    white_balance: str = AS_SHOT
     size: int | None = None
+    height: int | None = None
+    width: int | None = None
     spp: int = 64
     seed: int = 0
     trust: bool = False
@@ -65,8 +96,14 @@ class Taken:
     notes: tuple[str, ...]
 
 
-def take(order: Order, step: Step = lambda what, share: None) -> Taken:
+def take(order: Order, step: Step | None = None) -> Taken:
     """Photograph and write; a 2x2 RGBW negative gets a re-mosaiced Bayer one beside it, ``NAME_bayer.dng``.
+
+    Parameters
+    ----------
+    order : Order
+    step : callable, optional
+        Called with what is being done and the share that is done; left out, a notebook shows a bar for the render.
 
     Raises
     ------
@@ -75,33 +112,39 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
     OSError
         Where the folder can't be written.
     """
-    sensor, opened = _check(order)
+    sensor, opened, exposure_s = _check(order)
+    out, balance = Path(order.out), None if order.white_balance == AS_SHOT else illuminant(order.white_balance)
 
     # What is looked at, and the light that the camera's colours are set to.
     if opened is None:
-        transport, light, notes = open_radiance_file(order.source, order.white_balance)
+        stated = order.lights[0] if order.lights else None
+        known = stated or (None if balance is None else order.white_balance)
+        transport, light, notes = open_radiance_file(order.source, known)
+        spectra: dict[str, Spectrum] = {}
         luminance_cd_m2 = None if order.level is None else parse_level(order.level)[0]
         illuminance_lux = None
     else:
-        light, notes = _light(order, opened.scene)
-        notes += opened.notes
+        spectra = asked_spectra(opened.scene, order.lights)
+        light, notes = _first_light(opened.scene, spectra)
+        notes = [*notes, *opened.notes] if balance is None else [*opened.notes]
         luminance_cd_m2, illuminance_lux = asked_level(opened.scene, order.level)
-    colour = calibrate(sensor, light) if set("RGB") <= set(channels(sensor.cfa)) else None
-    check_place(order.out)  # before the render: it may take minutes
+    colour = calibrate(sensor, balance or light) if set("RGB") <= set(channels(sensor.cfa)) else None
+    check_place(out)  # before the render: it may take minutes
     if opened is not None:
-        step(render_words(np.inf), 0.0)
+        if step:
+            step(render_words(np.inf), 0.0)
         transport = render(
             opened.scene,
-            film_size(opened.size, order.size),
+            _size(order, opened),
             spp=order.spp,
             seed=order.seed,
-            progress=lambda share, error: step(render_words(error), 0.9 * share),
+            progress=None if step is None else lambda share, error: step(render_words(error), 0.9 * share),
         )
 
     # The exposure.
-    step("exposure", 0.9)
-    radiance = transport.relight(luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
-    exposure_s = order.exposure_s
+    if step:
+        step("exposure", 0.9)
+    radiance = transport.relight(spectra, luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
     if exposure_s is None:
         exposure_s = exposure_by_rule_s(order.exposure, form_image(radiance, sensor), sensor)
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
@@ -111,19 +154,19 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
         notes += [
-            f"{saturated:.0%} of the pixels are saturated at {raw.exposure_s:g} s; give a shorter --exposure-s "
-            "(seconds: 20 ms is 0.02), or leave it out"
+            f"{saturated:.0%} of the pixels are saturated at {raw.exposure_s:g} s; give a shorter --exposure, "
+            "such as 20ms, or leave it out"
         ]
 
     # The files.
-    bayer = remosaic(raw) if order.out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) else None
-    paths = write_raw(raw, order.out)
+    bayer = remosaic(raw) if out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) else None
+    paths = write_raw(raw, out)
     if bayer is not None:
-        paths += write_raw(bayer, order.out.with_stem(order.out.stem + "_bayer"))
+        paths += write_raw(bayer, out.with_stem(out.stem + "_bayer"))
     facts = {
         "paths": [str(path) for path in paths],
-        "source": order.source,
-        "sensor": order.sensor,
+        "source": str(order.source),
+        "sensor": str(order.sensor),
         "cfa": list(raw.cfa),
         "size": list(raw.shape),
         "seed": order.seed,
@@ -139,51 +182,77 @@ def take(order: Order, step: Step = lambda what, share: None) -> Taken:
     return Taken(paths, facts, tuple(notes))
 
 
-def _check(order: Order) -> tuple[SensorConfig, SceneFile | None]:
-    """Sensor and scene (None: a stored radiance), or `InputError`."""
+def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
+    """Sensor, scene (None: a stored radiance) and exposure time (None: by a rule), or `InputError`."""
     sensor = preset(order.sensor, order.cfa)
-    check_ending(order.out, sensor.cfa)
+    check_ending(Path(order.out), sensor.cfa)
     require_whole("spp", order.spp, 1, 1 << 16, "give samples per pixel")
     require_whole("seed", order.seed, 0, 2**31, "give a whole number")
     if order.size is not None:
         require_whole("size", order.size, 1, 8192, "give the picture's longer side in pixels")
-    if order.exposure not in RULES:
-        raise unknown("exposure", order.exposure, RULES)
-    if order.exposure_s is not None:
-        require_range("exposure_s", order.exposure_s, 0.0, 1e7, "give seconds, 0 or more")
-    elif "G" not in channels(sensor.cfa):
-        raise InputError(f"cfa: {sensor.cfa} has no G for the auto exposure; allowed: a mosaic with G; give exposure_s")
-    if order.exposure != AUTO and order.exposure_s is not None:
+    if order.size is not None and (order.height is not None or order.width is not None):
+        raise InputError(f"size: {order.size!r} beside height or width; allowed: one of the two ways; leave one out")
+    if order.white_balance == GRAY_WORLD:
         raise InputError(
-            f"exposure_s: {order.exposure_s!r} and exposure {order.exposure!r}; allowed: one; leave one out"
+            f"white_balance: {GRAY_WORLD!r} is found in a picture; allowed: {AS_SHOT} or an illuminant such as D65; "
+            "give it to develop"
         )
-    if order.exposure != AUTO and "W" not in channels(sensor.cfa):
-        raise InputError(
-            f"exposure: {order.exposure!r} looks at W, which {sensor.cfa} lacks; allowed: a mosaic with W; "
-            f"give {AUTO}, or exposure_s"
-        )
+    exposure_s = _asked_exposure_s(order, channels(sensor.cfa))
     if is_radiance_file(order.source):
         if order.trust:
             raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")
         if order.extend:
             raise InputError(f"extend: {order.source!r} is a picture, which has no surfaces; leave --extend out")
+        if asked := [name for name in ("size", "height", "width") if getattr(order, name) is not None]:
+            raise InputError(
+                f"{asked[0]}: {order.source!r} has its own; leave it out, or render the scene at that size"
+            )
+        if len(order.lights) > 1 or "=" in "".join(order.lights):
+            raise InputError(
+                f"light: {' '.join(order.lights)!r} for a picture, whose light is in it; allowed: the illuminant that "
+                "it was lit by, such as A; give one"
+            )
         check_radiance_file(order.source, () if order.level is None else (order.level,))
-        require_memory(memory(*file_extent(order.source)), order.force)
-        return sensor, None
-    opened = open_scene(order.source, order.trust, order.extend)
+        require_memory(memory(*file_extent(str(order.source))), order.force)
+        return sensor, None, exposure_s
+    opened = open_scene(str(order.source), order.trust, order.extend)
     asked_level(opened.scene, order.level)
-    height, width = film_size(opened.size, order.size)
+    height, width = _size(order, opened)
     check_covers(sensor.cfa, (height, width))
     require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
-    return sensor, opened
+    return sensor, opened, exposure_s
 
 
-def _light(order: Order, scene: Scene) -> tuple[Spectrum, list[str]]:
-    """Light that the camera's colours are set to, and what had to be assumed."""
-    if order.white_balance is not None:
-        return illuminant(order.white_balance), []
+def _asked_exposure_s(order: Order, names: tuple[str, ...]) -> float | None:
+    """Exposure time [s]; None where a rule chooses it, for which the mosaic needs the channels that it looks at."""
+    if order.exposure != AUTO and order.exposure_s is not None:
+        raise InputError(
+            f"exposure_s: {order.exposure_s!r} and exposure {order.exposure!r}; allowed: one; leave one out"
+        )
+    if order.exposure_s is not None:
+        require_range("exposure_s", order.exposure_s, 0.0, 1e7, "give seconds, 0 or more")
+        return order.exposure_s
+    time_s = parse_exposure(order.exposure, "exposure")
+    if time_s is not None:
+        return time_s
+    if "G" not in names:
+        raise InputError(f"cfa: {names} has no G for the auto exposure; allowed: a mosaic with G; give exposure 20ms")
+    if order.exposure != AUTO and "W" not in names:
+        raise InputError(
+            f"exposure: {order.exposure!r} looks at W, which {names} lacks; allowed: a mosaic with W; "
+            f"give {AUTO}, or a time such as 20ms"
+        )
+    return None
+
+
+def _size(order: Order, opened: SceneFile) -> tuple[int, int]:
+    return asked_size(film_size(opened.size, order.size), order.height, order.width)
+
+
+def _first_light(scene: Scene, spectra: Mapping[str, Spectrum]) -> tuple[Spectrum, list[str]]:
+    """First light of a scene, which the camera's colours are set to, and what had to be assumed."""
     name, first = next(iter(scene.groups.items()))
     if not first.coloured:
-        return first.spectrum, []
+        return spectra.get(name, first.spectrum), []
     assumed = f"scene {scene.name}: light group {name!r} has colours of its own; white balance is set to {LIGHT}"
     return illuminant(LIGHT), [f"{assumed}, --white-balance sets it otherwise"]

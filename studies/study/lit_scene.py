@@ -15,17 +15,17 @@ from render.illuminants import illuminant
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import is_radiance_file
-from render.scene import Scene
+from render.scene import Scene, film_size
 from render.scene_range import check_range
 from render.spectrum import Floats, Spectrum
 from render.transport import Transport
 from rodcone.digests import digest, digest_file
-from rodcone.errors import InputError
+from rodcone.errors import InputError, require_keys
 from studies.study.levels import parse_level
 from studies.study.model import RenderModel
 from studies.study.quiet_render import render_quietly
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
-from studies.study.scene_source import asked_level, film_size, open_scene
+from studies.study.scene_source import asked_level, open_scene
 from studies.study.study import OWN, SceneChoice, Study
 
 Progress = Callable[[float, float], None]
@@ -204,6 +204,39 @@ def under(transport: Transport, spectrum: str) -> Transport:
         for name, group in transport.groups.items()
     }
     return replace(transport, groups=groups)
+
+
+def asked_spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
+    """Illuminants by light group, each at the luminance of the group's own spectrum.
+
+    Parameters
+    ----------
+    scene : Scene
+    lights : sequence of str
+        ``GROUP=ILLUMINANT``, or ``ILLUMINANT`` alone for every group; a later one takes the place of an earlier.
+
+    Raises
+    ------
+    InputError
+        For an unknown group or illuminant, or a group that is dark or has colours of its own.
+    """
+    found: dict[str, Spectrum] = {}
+    for text in lights:
+        group, equals, name = text.rpartition("=")
+        if not name or bool(group) != bool(equals):
+            raise InputError(
+                f"light: {text!r} is not allowed; write GROUP=ILLUMINANT, such as {next(iter(scene.groups))}=A, or an "
+                "illuminant for all lights, such as A"
+            )
+        require_keys(f"scene {scene.name}: light group", [group] if group else [], scene.groups)
+        for each in [group] if group else scene.groups:
+            lit = scene.groups[each]
+            own = spectral_luminance(lit.spectrum)
+            if lit.coloured or own <= 0:
+                why = "has colours of its own" if lit.coloured else "is dark"
+                raise InputError(f"light: group {each!r} of scene {scene.name} {why}; leave it as it is")
+            found[each] = illuminant(name) * own
+    return found
 
 
 def spectral_luminance(spectrum: Spectrum) -> float:

@@ -43,7 +43,7 @@ def open_radiance_file(path: str | Path, light: str | None) -> tuple[Transport, 
         assumed.append(f"{name}: its colours are judged under {LIGHT}; give another light where that isn't so")
     if radiance.relative_mc_error:
         assumed.append(
-            f"{name}: it states a relative Monte Carlo error of {radiance.relative_mc_error:.3f}, "
-            "which the Monte Carlo share leaves out"
+            f"{name}: it was rendered with noise of {radiance.relative_mc_error:.1%} of the value in a pixel and band; "
+            "pictures of it hold that beside the sensor's noise, and no Monte Carlo share counts it"
         )
     return as_transport(radiance), spectrum, assumed

@@ -6,11 +6,15 @@ from pathlib import Path
 from render.scene import Scene
 from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_parts import SceneFile
-from rodcone.errors import InputError
+from rodcone.errors import InputError, require_whole
 from scenes.catalog import load
 from studies.study.levels import parse_level
 
-CATALOGUE_SIDE = 256  # pixels, where neither the scene nor the user states a size
+_READ = (".xml", ".exr", ".mat")  # endings of files that are scenes
+_OTHER_FILES = {
+    **dict.fromkeys((".dng", ".tif", ".tiff", ".nef", ".cr2", ".cr3", ".arw"), "a raw file, for rodcone develop"),
+    ".toml": "a study or a sensor, for rodcone sweep or --sensor",
+}
 
 
 def open_scene(source: str, trust: bool = False, extend: str | None = None, light: str | None = None) -> SceneFile:
@@ -36,14 +40,21 @@ def open_scene(source: str, trust: bool = False, extend: str | None = None, ligh
         return load_scene_file(source, trust=trust, extend=extend)
     if trust:
         raise InputError(f"trust-scene: {source!r} is no .xml scene; leave --trust-scene out")
+    other = _OTHER_FILES.get(Path(source).suffix.lower())
+    if other:
+        raise InputError(f"scene: {source!r} is {other}; allowed: {', '.join(_READ)}, or a name of rodcone list scenes")
     scene = load(source, **({} if light is None else {"light": light}))
-    return SceneFile(replace(scene, extend=extend), (CATALOGUE_SIDE, CATALOGUE_SIDE), ())
+    return SceneFile(replace(scene, extend=extend), scene.size, ())
 
 
-def film_size(own: tuple[int, int], longest: int | None) -> tuple[int, int]:
-    """Height and width of the film, or its proportions with the longer side that was asked for."""
-    scale = 1.0 if longest is None else longest / max(own)
-    return max(1, round(own[0] * scale)), max(1, round(own[1] * scale))
+def asked_size(own: tuple[int, int], height: int | None, width: int | None) -> tuple[int, int]:
+    """Height and width that were asked for; the one that wasn't keeps the proportions of `own`."""
+    for name, pixels in (("height", height), ("width", width)):
+        if pixels is not None:
+            require_whole(name, pixels, 1, 1 << 15, "give pixels")
+    if height is not None:
+        return height, width if width is not None else max(1, round(height * own[1] / own[0]))
+    return (max(1, round(width * own[0] / own[1])), width) if width is not None else own
 
 
 def asked_level(scene: Scene, text: str | None) -> tuple[float | None, float | None]:

@@ -1,6 +1,5 @@
 """A study: scenes, spectra, levels, exposures, sensors, processors and seeds, of which every combination is a cell."""
 
-import re
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
@@ -10,11 +9,13 @@ from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant, lines_nm
 from render.radiance_files.radiance_source import is_radiance_file
 from render.spectrum import VISIBLE_NM
+from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, require_whole, unknown
 from sensor.cfa import channels
 from sensor.exposure import AUTO, LONGEST_S, RULES
 from sensor.presets import preset
 from sensor.variations import vary
+from studies.study.exposures import parse_exposure
 from studies.study.levels import parse_level
 
 OWN = "own"  # the spectrum that the scene's lights have
@@ -26,8 +27,6 @@ _RUN_OUT = 0.01
 # Gray World from the picture, or the neutral of the scene's light, as a camera notes it in its raw files.
 WHITE_BALANCES = GRAY_WORLD, AS_SHOT = "gray-world", "as-shot"
 FILES = (".xml", ".exr", ".mat", ".toml")  # endings of values that name a file
-_TIME = re.compile(r"\s*(\d+\.?\d*(?:[eE][-+]?\d+)?|\.\d+)\s*(us|ms|s)\s*$")
-_SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
 
 
 @dataclass(frozen=True)
@@ -46,6 +45,9 @@ class SceneChoice:
     source: str
     light: str | None = None
     extend: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "source", str(self.source))  # from Python it may be a Path
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,10 @@ class Study:
     lens: LensTerms = field(default_factory=LensTerms)
     budget: BudgetShares = field(default_factory=BudgetShares)
 
+    __repr__ = brief
+
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sensors", tuple(map(str, self.sensors)))  # from Python they may be Paths
         _check_axes(self)
         _check_cameras(self)
         _check_numbers(self)
@@ -182,26 +187,6 @@ def label(value: Any) -> str:
     """Name of a value of an axis in rows and seeds: a file's name without its folder, any other value as it is."""
     text = str(value)
     return Path(text).name if Path(text).suffix.lower() in FILES else text
-
-
-def parse_exposure(text: str) -> float | None:
-    """Exposure time [s] of ``10ms``, ``0.5s`` or ``200us``; None for a rule of `sensor.exposure.RULES`.
-
-    Raises
-    ------
-    InputError
-        For anything else, or a time of 0.
-    """
-    if text in RULES:
-        return None
-    match = _TIME.match(text)
-    if match is None:
-        raise InputError(
-            f"exposures: {text!r} is not a time; allowed: {', '.join(RULES)}, or a number and us, ms or s; write 10ms"
-        )
-    seconds = float(match[1]) * _SECONDS[match[2]]
-    require_range("exposures", seconds, 1e-9, 1e6, "give a time above 0 in seconds")
-    return seconds
 
 
 def _check_axes(study: Study) -> None:

@@ -12,6 +12,7 @@ from rodcone.errors import InputError, one_line, require_whole, unknown
 from rodcone.toml_file import parse_toml, read_toml
 from studies.study.study import FILES, SceneChoice, Study
 
+_EXAMPLES = {"levels": '"1lux" or "25cd/m2"', "exposures": '"10ms"'}
 MOST_SEEDS = 100_000
 
 
@@ -36,6 +37,11 @@ def read_study(path: str | Path, changes: Sequence[str] = ()) -> Study:
         raise InputError(
             f"study: {str(path)!r} can't be read ({one_line(error)}); start from one of: rodcone new study -o FILE"
         ) from error
+    if "pixel" in content:
+        raise InputError(
+            f"study {str(path)!r}: it is a sensor; allowed: a study (rodcone new study -o FILE), in which it stands as "
+            f'sensors = ["{Path(path).name}"]'
+        )
     try:
         for change in changes:
             _set(content, change)
@@ -136,4 +142,7 @@ def _first_fault(error: ClassValidationError) -> str:
     else:
         words = "the value is not a table; allowed: a table of keys; see rodcone new study"
     where = [note.name for note in getattr(fault, "__notes__", []) if isinstance(note, AttributeValidationNote)]
+    example = _EXAMPLES.get(where[0]) if where else None
+    if example and "not a text" in words:
+        words = f"{words}; write {example}"
     return f"{where[0]}: {words}" if where else words

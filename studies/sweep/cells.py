@@ -11,9 +11,10 @@ from isp.colour.colour_fit import ColourFit
 from rodcone.digests import digest
 from sensor.config import SensorConfig
 from studies.metrics.truth import Light
+from studies.study.exposures import parse_exposure
 from studies.study.levels import parse_level
 from studies.study.lit_scene import RenderFacts
-from studies.study.study import Condition, label, parse_exposure
+from studies.study.study import Condition, label
 from studies.sweep.provenance import Provenance
 
 

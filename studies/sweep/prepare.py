@@ -20,6 +20,7 @@ from studies.budget.budget import render_share
 from studies.budget.model_plan import Plan
 from studies.metrics.truth import light_in_bands
 from studies.photograph.clock import Clock
+from studies.study.exposures import parse_exposure
 from studies.study.lit_scene import (
     OpenedScene,
     level_luminance,
@@ -30,7 +31,7 @@ from studies.study.lit_scene import (
     under,
     white_spectrum,
 )
-from studies.study.study import Condition, Study, conditions, mosaics, parse_exposure
+from studies.study.study import Condition, Study, conditions, mosaics
 from studies.sweep.cells import Cell, RenderRecord, cell_key
 from studies.sweep.database import note_render, render_record
 from studies.sweep.frames import UnitFrame, colours_under, exposure_s_of, frame_key, make_frames, read_frame

@@ -12,7 +12,7 @@ from itertools import chain
 from pathlib import Path
 
 from isp.processors.catalogue import require_libraries
-from rodcone.progress import render_words
+from rodcone.progress import Step, render_words, told
 from studies.budget.model_plan import Plan
 from studies.photograph.clock import FIRST, Clock
 from studies.study.lit_scene import open_all
@@ -22,7 +22,6 @@ from studies.sweep.database import add, done, forget_old, note_run, note_stages,
 from studies.sweep.prepare import PICTURES, Job, known_cells, scene_cells
 from studies.sweep.row import Row
 
-Step = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 # Such as `partial(studies.sweep.workers.run_in_processes, workers=4)`.
 Runner = Callable[[Sequence[Cell]], Generator[Row, None, None]]
 LEFT_S = 3600.0  # after which a temporary file has no writer any more: writing one takes seconds
@@ -57,7 +56,7 @@ def sweep(
     out: str | Path,
     plan: Plan,
     runner: Runner,
-    step: Step = lambda what, share: None,
+    step: Step | None = None,
     *,
     keep_old: bool = False,
     clock: Clock | None = None,
@@ -76,7 +75,8 @@ def sweep(
         Of `studies.budget.model_plan.as_stated`, `studies.budget.plan.plan` or `reference_plan`.
     runner : callable
         Takes cells, gives rows as they come.
-    step : callable
+    step : callable, optional
+        Called with what is being done and the share that is done; left out, a notebook shows a bar.
     keep_old : bool
         Keep what is made anew as rows of their own, instead of removing them.
     clock : Clock, optional
@@ -95,7 +95,7 @@ def sweep(
     scenes = open_all(study)
     out.mkdir(parents=True, exist_ok=True)
     _clear(out)
-    with open_results(out) as base:
+    with told(step) as show, open_results(out) as base:
         job = Job(study, plan, out, base, clock)
         now = datetime.now(UTC).isoformat(timespec="seconds")
         run = note_run(base, now, platform.node(), json.dumps(asdict(study)))
@@ -107,7 +107,7 @@ def sweep(
         want(base, chain.from_iterable(keys))
         made, notes = 0, dict[str, None]()
         for index, opened in enumerate(scenes.values()):
-            part = _part(step, index, len(scenes))
+            part = _part(show, index, len(scenes))
             cells = found[index] or scene_cells(job, opened, _rendering(part))
             asked = [cell.key for cell in cells]
             notes.update(dict.fromkeys(cells[0].render.notes))

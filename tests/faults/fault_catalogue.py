@@ -130,8 +130,8 @@ SENSOR = (
     _fault(
         "quantisation noise of gain^2 / 2",
         "sensor/readout.py",
-        "sensor.gain_e_per_dn**2 / 12",
-        "sensor.gain_e_per_dn**2 / 2",
+        "+ sensor.gain_e_per_dn**2 / 12",
+        "+ sensor.gain_e_per_dn**2 / 2",
         *_READOUT,
     ),
     _fault(

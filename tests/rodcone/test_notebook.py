@@ -31,8 +31,17 @@ def test_a_large_picture_is_shown_small() -> None:
     assert max(shown.shape) <= SIDE
 
 
+@pytest.mark.parametrize(("width", "shown"), [(64, "width:384px;image-rendering:pixelated"), (300, ""), (500, "")])
+def test_a_small_picture_is_shown_by_whole_multiples(width: int, shown: str) -> None:
+    assert f"style='{shown}'" in html_of("x", {}, preview_png(np.ones((8, width, 3))))
+
+
+def test_a_fact_may_have_several_values() -> None:
+    assert "</th><td>1</td><td>2</td></tr>" in html_of("x", {"a": ("1", "2")}, None)
+
+
 def test_facts_can_not_break_out_of_the_page() -> None:
-    page = html_of("<b>", {"a": "<script>alert(1)</script>"}, b"")
+    page = html_of("<b>", {"a": "<script>alert(1)</script>"}, None)
     assert "<script" not in page
     assert "&lt;script&gt;" in page
 

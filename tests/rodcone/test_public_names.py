@@ -160,6 +160,10 @@ def test_other_objects_are_refused_in_one_line_with_the_call_that_helps():
         "relight()": lambda: public.capture(made, "low_noise", 0.01, device, np.random.default_rng(1)),
         "SpectralRadiance(": lambda: public.capture(np.ones((4, 4, 10)), "low_noise", 0.01, device, None),
         "rodcone.load(": lambda: public.render(42, (4, 4)),
+        "draw_device(": lambda: public.capture(made.relight(), "low_noise", 0.01, (4, 4), np.random.default_rng(1)),
+        "capture or read_raw": lambda: public.develop(made.relight()),
+        "call its relight()": lambda: public.write_exr("a.exr", made),
+        "form_image(radiance, sensor)": lambda: public.auto_exposure_s(made.relight(), public.low_noise()),
         "'3000 K'": lambda: public.illuminant(3000),
         "still_life": lambda: public.render("still_lif", (4, 4)),
         "low_noise": lambda: public.capture(made.relight(), "low_nois", 0.01, device, np.random.default_rng(1)),
@@ -169,3 +173,10 @@ def test_other_objects_are_refused_in_one_line_with_the_call_that_helps():
             call()
         assert words in str(caught.value)
         assert "\n" not in str(caught.value)
+
+
+def test_names_stand_for_what_they_name() -> None:
+    made, rng = small(), np.random.default_rng(1)
+    radiance = made.relight()
+    raw = public.capture(radiance, "low_noise", 0.01, public.draw_device("low_noise", radiance.shape, rng), rng)
+    assert public.develop(raw, public.calibrate("low_noise", "D65")).shape == (*radiance.shape, 3)

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from render.engine import render
-from render.scene import Scene
+from render.scene import Scene, film_size
 from rodcone.digests import digest
 from rodcone.errors import InputError
 from scenes.catalog import load, names
 from scenes.levels import DEMO_LEVELS
 from scenes.materials import metal
 from scenes.reflectances import band, color_checker, edge, grey
+from studies.metrics.patches import patch_masks
 
 BANDS_NM = np.arange(405.0, 780.0, 50.0)
 
@@ -50,7 +51,7 @@ def test_every_scene_keeps_compiling_quick_by_one_grid_and_few_kinds_of_material
     kinds = {node["type"] for node in nodes(load(name).geometry)}
     plugins = {"twosided", "diffuse", "roughplastic", "roughconductor", "dielectric", "checkerboard"}
     shapes = {"rectangle", "cube", "sphere", "cylinder", "disk"}
-    assert kinds <= plugins | shapes | {"scene", "perspective", "regular", "area", "constant"}
+    assert kinds <= plugins | shapes | {"scene", "perspective", "hdrfilm", "regular", "area", "constant"}
 
 
 @pytest.mark.parametrize("name", names())
@@ -190,3 +191,22 @@ def test_a_metal_reflects_as_its_handbook_says(material, nm, reflectance):
     at = [float(bsdf[part]["values"].split(",")[round((nm - 380) / 5)]) for part in ("eta", "k")]
     index = complex(*at)
     assert abs((index - 1) / (index + 1)) ** 2 == pytest.approx(reflectance, abs=0.05)  # Fresnel; samples differ
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_scene_knows_its_proportions(name: str) -> None:
+    assert load(name).size == ((170, 256) if name in ("color_checker", "metamers") else (256, 256))
+    assert film_size(load(name).size, 64) == ((42, 64) if name in ("color_checker", "metamers") else (64, 64))
+
+
+@pytest.mark.parametrize("name", ["color_checker", "metamers"])
+def test_a_chart_in_its_own_proportions_is_whole_and_in_a_square_is_not(name: str) -> None:
+    scene = load(name)
+    whole, square = (patch_masks(scene, size, 1.0) for size in (scene.size, (256, 256)))
+    # 40 mm at 0.72 m, where 20 degrees are the shorter side: 26.8 of 170 pixels, 24 of them alike
+    side = 40 / (2 * 720 * np.tan(np.radians(10))) * scene.size[0]
+    assert np.sqrt(whole.sum(axis=(1, 2))) == pytest.approx(np.full(24, side), rel=0.03)
+    assert not whole[:, [0, -1]].any()
+    assert not whole[:, :, [0, -1]].any()
+    areas = square.sum(axis=(1, 2)).reshape(4, 6)
+    assert areas[:, 0] == pytest.approx(areas[:, 1] * (1 - 1 / 7), rel=0.1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isp.colour.calibrated_colours import MEAN_SRGB, MOMENTS_SRGB, UNEXPLAINED, fit_of_calibration
+from isp.colour.calibrated_colours import MEAN_SRGB, MOMENTS_SRGB, UNEXPLAINED, fit_of_calibration, neutral_under
 from isp.colour.colour_fit import fit_colours, training
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
@@ -64,3 +64,19 @@ def test_three_channels_need_no_more_than_their_matrix() -> None:
     colour = calibrate(preset("low_noise", "bayer"), illuminant("D65"))
     fit = fit_of_calibration(colour, LETTERS[:3])
     assert fit.matrix() == pytest.approx(colour.to_srgb, abs=1e-9)
+
+
+@pytest.mark.parametrize("cfa", ["bayer", "rgbw"])
+def test_the_neutral_under_another_light_is_the_cameras_own(cfa: str) -> None:
+    sensor = preset("low_noise", cfa)
+    colour = calibrate(sensor, illuminant("F11"))  # the light of the exposure plays no part
+    for light, most in (
+        ("A", 1e-3),
+        ("D65", 1e-3),
+        ("D50", 0.05),
+        ("3000K", 0.05),
+        ("D7000K", 0.05),
+        ("sunlight", 0.06),
+    ):
+        known = calibrate(sensor, illuminant(light)).neutral
+        assert neutral_under(colour, illuminant(light) * 7.0) == pytest.approx(known, rel=most), light

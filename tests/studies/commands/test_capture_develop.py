@@ -1,7 +1,7 @@
 """`rodcone capture` and `rodcone develop`: files, exit codes, and grey walls whose picture is known on paper."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +16,19 @@ from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
-from rodcone.colour_spaces import encode_srgb
+from rodcone.colour_spaces import decode_srgb, encode_srgb
 from sensor.cfa import BAYER, RGBW, mask
 from sensor.optics import form_image, left_out
-from sensor.presets import preset
+from sensor.presets import preset, preset_file
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.response import expected_electrons
 from studies.commands.cli import main
 from studies.photograph.calibrate import calibrate, iso_speed
+from studies.photograph.develop import develop_file
+from studies.photograph.picture_file import write_picture
+from studies.photograph.shot import Order, take
+from studies.study.study import SceneChoice, Study
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
@@ -130,8 +134,8 @@ def test_a_frame_more_than_half_saturated_is_told(
     arguments = ["capture", str(tmp_path / "lit.exr"), "-o", str(tmp_path / "shot.dng"), "--exposure-s", "0.01"]
     code, _, err = call(arguments, capsys)
     words = (
-        f"rodcone: {columns / 64:.0%} of the pixels are saturated at 0.01 s; give a shorter --exposure-s (seconds: "
-        "20 ms is 0.02), or leave it out\n"
+        f"rodcone: {columns / 64:.0%} of the pixels are saturated at 0.01 s; give a shorter --exposure, such "
+        "as 20ms, or leave it out\n"
     )
     assert (code, words in err, "saturated" in err) == (0, told, told)
 
@@ -214,6 +218,9 @@ def test_the_file_carries_the_calibration_for_the_white_balance_asked_for(
     [
         (["color_cheker"], ["scene", "color_cheker", "did you mean 'color_checker'"]),
         (["flat_field", "--sensor", "lownoise"], ["sensor preset", "did you mean 'low_noise'"]),
+        (["flat_field", "--cfa", "RGGB"], ["cfa: 'RGGB' is unknown", "write 'bayer_rggb'"]),
+        (["shot.dng"], ["'shot.dng' is a raw file, for rodcone develop", ".xml, .exr, .mat"]),
+        (["mine.toml"], ["'mine.toml' is a study or a sensor", "rodcone sweep or --sensor"]),
         (["flat_field", "--cfa", "bayr"], ["rodcone: cfa: 'bayr' is unknown", "did you mean 'bayer'"]),
         (["flat_field", "--trust-scene"], ["'flat_field' is no .xml scene"]),
         (["scene.exr", "--trust-scene"], ["'scene.exr' is no .xml scene"]),
@@ -221,12 +228,30 @@ def test_the_file_carries_the_calibration_for_the_white_balance_asked_for(
         (["flat_field", "--extend", "zero"], ["extend: 'zero' is unknown; allowed: hold"]),
         (["none.xml"], ["'none.xml' is missing"]),
         (["flat_field", "--cfa", "rccc"], ["can't hold the mosaic", "shot.tif"]),
-        (["flat_field", "--cfa", "rccc", "-o", "o/shot.tif"], ["has no G", "give exposure_s"]),
+        (["flat_field", "--cfa", "rccc", "-o", "o/shot.tif"], ["has no G", "give exposure 20ms"]),
         (["flat_field", "-o", "o/shot.cr2"], ["another ending", ".dng, .tif, .tiff"]),
         (["flat_field", "--level", "25nits"], ["unit", "'nits'", "cd/m2, lux"]),
-        (["flat_field", "--exposure", "auto:V"], ["exposure", "'auto:V' is unknown", "did you mean 'auto:W'"]),
-        (["flat_field", "--exposure", "auto:W", "--cfa", "bayer"], ["looks at W", "give auto, or exposure_s"]),
+        (["flat_field", "--exposure", "auto:V"], ["exposure: 'auto:V' is not a time", "did you mean 'auto:W'"]),
+        (["flat_field", "--exposure", "auto:W", "--cfa", "bayer"], ["looks at W", "give auto, or a time such as 20ms"]),
         (["flat_field", "--exposure", "auto:W", "--exposure-s", "0.01"], ["exposure_s", "leave one out"]),
+        (["flat_field", "--exposure", "20"], ["exposure: '20' is not a time", "write 20ms or 20s"]),
+        (["flat_field", "--exposure", "0s"], ["exposure", "0.0", "give a time above 0"]),
+        (["flat_field", "--exposure-s", "20mss"], ["--exposure-s", "'20mss' is not a time", "write 10ms"]),
+        (["flat_field", "--exposure-s", "auto"], ["--exposure-s", "'auto' is not a time"]),
+        (["flat_field", "--exposure=-5ms"], ["exposure: '-5ms' is not a time", "write 10ms"]),
+        (["flat_field", "--exposure", "20ms", "--exposure-s", "0.02"], ["exposure_s", "leave one out"]),
+        (["flat_field", "--light", "D66"], ["illuminant", "'D66'", "D65"]),
+        (["flat_field", "--light", "lamp=A"], ["light group", "'lamp'", "sky"]),
+        (["flat_field", "--light", "sky="], ["light: 'sky='", "such as sky=A"]),
+        (["flat_field", "--light", "=A"], ["light: '=A'", "such as sky=A"]),
+        (["flat_field", "--height", "0"], ["height", "0", "give pixels"]),
+        (["flat_field", "--width", "1", "--height", "4"], ["doesn't fit the tile"]),
+        (["flat_field", "--size", "8", "--width", "4"], ["size: 8 beside height or width", "leave one out"]),
+        (["scene.exr", "--size", "8"], ["size: 'scene.exr' has its own", "leave it out"]),
+        (["scene.exr", "--width", "8"], ["width: 'scene.exr' has its own", "leave it out"]),
+        (["scene.exr", "--light", "lamp=A"], ["'lamp=A' for a picture", "give one"]),
+        (["scene.exr", "--light", "A", "--light", "D65"], ["'A D65' for a picture", "give one"]),
+        (["flat_field", "--white-balance", "gray-world"], ["'gray-world' is found in a picture", "give it to develop"]),
         (["flat_field", "--exposure-s", "-1"], ["exposure_s", "-1", "give seconds"]),
         (["flat_field", "--exposure-s", "nan"], ["exposure_s", "nan", "give seconds"]),
         (["flat_field", "--size", "1"], ["doesn't fit the tile"]),
@@ -289,6 +314,61 @@ def test_light_with_colours_of_its_own_leaves_the_balance_at_daylight_and_says_s
     colour = read_raw(out).colour
     assert colour is not None
     np.testing.assert_array_equal(colour.neutral, calibrate(preset("low_noise", "bayer"), illuminant("D65")).neutral)
+
+
+def test_a_time_with_a_unit_is_the_time_in_seconds(
+    exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    frames = []
+    for given in (["--exposure", "20ms"], ["--exposure-s", "20ms"], ["--exposure-s", "0.02"]):
+        assert call(["capture", str(exr), "-o", str(tmp_path / "shot.dng"), *given], capsys)[0] == 0
+        frames.append((tmp_path / "shot.dng").read_bytes())
+    assert frames[0] == frames[1] == frames[2]
+
+
+@pytest.mark.parametrize(
+    ("asked", "shape"),
+    [(["--height", "8"], (8, 8)), (["--width", "6"], (6, 6)), (["--height", "6", "--width", "10"], (6, 10))],
+)
+def test_a_scene_is_photographed_in_the_height_and_width_asked_for(
+    asked: list[str], shape: tuple[int, int], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "shot.dng"
+    assert call(["capture", "flat_field", "--spp", "1", "--exposure", "1ms", "-o", str(out), *asked], capsys)[0] == 0
+    assert read_raw(out).shape == shape
+
+
+def test_another_lamp_gives_its_own_colours_and_white_balance_another_neutral(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out, sensor = tmp_path / "shot.dng", preset("low_noise", "bayer")
+    arguments = ["capture", "flat_field", "--spp", "4", "--size", "32", "--cfa", "bayer", "--level", "25cd/m2"]
+    for more, lit, neutral in (
+        ([], "D65", "D65"),
+        (["--light", "A"], "A", "A"),
+        (["--light", "sky=A"], "A", "A"),
+        (["--light", "A", "--white-balance", "D65"], "A", "D65"),
+        (["--light", "A", "--white-balance", "as-shot"], "A", "A"),
+    ):
+        code, printed, _ = call([*arguments, "--exposure", "10ms", "-o", str(out), "--json", *more], capsys)
+        assert (code, json.loads(printed)["luminance_cd_m2"]) == (0, pytest.approx(25.0, rel=1e-6))
+        raw = read_raw(out)
+        assert raw.colour is not None
+        np.testing.assert_array_equal(raw.colour.neutral, calibrate(sensor, illuminant(neutral)).neutral)
+        signal = [raw.electrons[mask(raw.cfa, channel, raw.shape)].mean() for channel in "RGB"]
+        expected = calibrate(sensor, illuminant(lit)).neutral
+        # 256 pixels of R and of B with over 500 e- each: 5 standard errors of the ratio to G
+        assert np.array(signal) / signal[1] == pytest.approx(expected, rel=5 * np.sqrt(2 / (256 * 500)) + 1e-3)
+
+
+def test_the_lamp_of_a_file_is_what_its_colours_are_judged_under(
+    exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "shot.dng"
+    assert call(["capture", str(exr), "--cfa", "bayer", "--light", "A", "-o", str(out)], capsys)[::2] == (0, "")
+    colour = read_raw(out).colour
+    assert colour is not None
+    np.testing.assert_array_equal(colour.neutral, calibrate(preset("low_noise", "bayer"), illuminant("A")).neutral)
 
 
 def test_lux_of_a_file_without_a_plane_is_refused(
@@ -361,7 +441,8 @@ def test_a_picture_too_dark_for_gray_world_takes_the_files_neutral(
 ) -> None:
     raw = negative(tmp_path / "shot.dng", share=0.01, light="A")
     write_raw(replace(raw, read_noise_e=2000.0), tmp_path / "shot.dng")  # 150 e- of green are 72 per standard error
-    code, out, _ = call(["develop", str(tmp_path / "shot.dng"), "--ev", "6", "--json"], capsys)
+    arguments = ["develop", str(tmp_path / "shot.dng"), "--ev", "6", "--white-balance", "gray-world", "--json"]
+    code, out, _ = call(arguments, capsys)
     assert (code, set(json.loads(out)["balance"].values())) == (0, {"calibrated"})
     with Image.open(tmp_path / "shot.png") as picture:
         grey = np.asarray(picture)
@@ -378,9 +459,16 @@ def test_as_shot_balance_keeps_the_light_s_colour_that_gray_world_takes_away(
     write_raw(replace(raw, colour=colour), tmp_path / "shot.dng")  # balanced for daylight, taken under a lamp
     signal = np.array([raw.electrons[mask(raw.cfa, channel, SHAPE)].mean() for channel in "RGB"])
     orange = colour.to_srgb @ (signal / colour.neutral[:3] / raw.full_well_e)
-    for balance, source, expected in (("as-shot", "given", orange), ("gray-world", "gray world", np.full(3, 0.1))):
-        out = tmp_path / f"{balance}.png"
-        arguments = ["develop", str(tmp_path / "shot.dng"), "--ev", "1", "--white-balance", balance, "-o", str(out)]
+    grey = np.full(3, 0.1)
+    for balance, source, expected in (
+        ([], "given", orange),
+        (["--white-balance", "as-shot"], "given", orange),
+        (["--white-balance", "gray-world"], "gray world", grey),
+        (["--white-balance", "A"], "given", grey),
+        (["--white-balance", "2856 K"], "given", grey),
+    ):
+        out = tmp_path / "shot.png"
+        arguments = ["develop", str(tmp_path / "shot.dng"), "--ev", "1", *balance, "-o", str(out)]
         code, printed, _ = call([*arguments, "--json"], capsys)
         assert (code, set(json.loads(printed)["balance"].values())) == (0, {source})
         with Image.open(out) as picture:
@@ -388,6 +476,55 @@ def test_as_shot_balance_keeps_the_light_s_colour_that_gray_world_takes_away(
         # half a level of 8 bits, and the raw data's rounding: half a DN of 340 in B, 0.15 % of linear light
         assert np.abs(pixels - 255 * encode_srgb(2 * expected)).max() <= 0.7
     assert orange[0] > 2 * orange[2]  # R over B of illuminant A seen by daylight
+
+
+@pytest.mark.parametrize(
+    ("asked", "shape"),
+    [(["--width", "32"], (24, 32)), (["--height", "12"], (12, 16)), (["--height", "48", "--width", "1"], (48, 1))],
+)
+def test_a_smaller_picture_holds_the_means_of_linear_light(
+    asked: list[str], shape: tuple[int, int], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    raw = negative(tmp_path / "shot.dng")
+    stripes = np.arange(SHAPE[1]) % 8 < 4  # of half the light: no colour leaves the display's range
+    dn = np.where(stripes, np.rint((raw.dn + raw.black_dn) / 2), raw.dn).astype(np.uint16)
+    write_raw(replace(raw, dn=dn), tmp_path / "shot.dng")
+    arguments = ["develop", str(tmp_path / "shot.dng"), "--isp", "bayer", "--ev", "0", "--bits", "16", *asked, "--json"]
+    assert call(arguments, capsys)[0] == 0
+    with Image.open(tmp_path / "shot.png") as picture:
+        assert (picture.height, picture.width) == shape
+    call(["develop", str(tmp_path / "shot.dng"), "--isp", "bayer", "--ev", "0", "-o", str(tmp_path / "w.png")], capsys)
+    small, whole = (np.asarray(Image.open(tmp_path / name).convert("RGB")) / 255 for name in ("shot.png", "w.png"))
+    means = [decode_srgb(x).mean(axis=(0, 1)) for x in (small, whole)]
+    assert means[0] == pytest.approx(means[1], rel=0.01)  # half a level of 8 bits at 0.13 of linear light
+    assert means[0] == pytest.approx(np.full(3, 0.75 * 0.25), rel=0.02)  # and the edges' own width
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--width", "65"], ["height, width: (49, 65)", "(48, 64)", "give less"]),
+        (["--height", "0"], ["height", "0", "give pixels"]),
+        (["--white-balance", "D66"], ["white_balance: 'D66' is unknown", "as-shot", "did you mean 'D65'"]),
+        (["--white-balance", "F11"], ["'F11' has bands", "give it to capture instead"]),
+        (["--white-balance", "FL3.12"], ["'FL3.12' has bands", "give it to capture instead"]),
+        (["--white-balance", "10K"], ["white_balance: '10K' is unknown"]),
+    ],
+)
+def test_what_develop_cannot_do_is_one_line_and_no_file(
+    more: list[str], words: list[str], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    negative(tmp_path / "shot.dng")
+    code, out, err = call(["develop", str(tmp_path / "shot.dng"), *more], capsys)
+    assert (code, out, err.count("\n"), (tmp_path / "shot.png").exists()) == (2, "", 1, False)
+    assert all(word in err for word in words), err
+
+
+def test_a_picture_is_no_raw_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "shot.png").write_bytes(b"\x89PNG")
+    code, out, err = call(["develop", str(tmp_path / "shot.png")], capsys)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "it is a picture, developed already" in err
 
 
 def test_sixteen_bits_hold_what_eight_round_away(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -454,7 +591,7 @@ def test_a_photograph_of_another_camera_is_developed_and_says_what_was_assumed(
 def test_black_frames_are_black_and_no_division_by_zero(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     raw = negative(tmp_path / "shot.dng")
     write_raw(replace(raw, dn=np.zeros_like(raw.dn)), tmp_path / "shot.dng")
-    code, out, _ = call(["develop", str(tmp_path / "shot.dng"), "--json"], capsys)
+    code, out, _ = call(["develop", str(tmp_path / "shot.dng"), "--white-balance", "gray-world", "--json"], capsys)
     assert (code, json.loads(out)["ev"], set(json.loads(out)["balance"].values())) == (0, 0.0, {"calibrated"})
     with Image.open(tmp_path / "shot.png") as picture:
         assert not np.asarray(picture).any()
@@ -504,3 +641,16 @@ def test_what_cannot_be_developed_is_one_line_exit_code_2_and_no_picture(
 def calibrate_four():
     """Calibration of four channels, of which one is no W."""
     return calibrate(preset("low_noise", "rgbw"), illuminant("D65"))
+
+
+@pytest.mark.parametrize("kind", [str, Path])
+def test_from_python_paths_are_texts_or_paths(kind: type, exr: Path, tmp_path: Path) -> None:
+    sensor = tmp_path / "mine.toml"
+    sensor.write_bytes(preset_file("low_noise").read_bytes())
+    taken = take(Order(kind(exr), kind(tmp_path / "shot.dng"), sensor=kind(sensor), exposure="10ms"))
+    assert json.dumps(taken.facts)
+    developed = develop_file(kind(taken.paths[0]))
+    write_picture(developed.encoded, kind(tmp_path / "shot.png"))
+    assert (tmp_path / "shot.png").exists()
+    study = Study((SceneChoice(kind(exr)),), ("1cd/m2",), sensors=(kind(sensor),))
+    assert json.loads(json.dumps(asdict(study)))["sensors"] == [str(sensor)]

@@ -196,7 +196,7 @@ def test_demo_runs_from_a_file_in_the_files_own_size(tmp_path: Path, capsys: pyt
         assert row["render"]["integrator"] == "file"
         with Image.open(tmp_path / "out" / "pictures" / row["picture"]) as picture:
             assert picture.size == (26, 20)
-    told = "relative Monte Carlo error of 0.250"
+    told = "rendered with noise of 25.0% of the value"
     assert told in capsys.readouterr().err
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "my scene.exr" in page

@@ -135,7 +135,7 @@ BAD = {
     "no exr": (["{scene}", "-o", "o.png"], ["'o.png'", ".exr"]),
     "unknown group": (["{scene}", "--light", "sum=A"], ["light group: 'sum'", "did you mean 'sun'?"]),
     "unknown illuminant": (["{scene}", "--light", "sun=D56"], ["illuminant: 'D56'"]),
-    "light without group": (["{scene}", "--light", "A"], ["'A'", "GROUP=ILLUMINANT"]),
+    "light without group": (["{scene}", "--light", "=A"], ["'=A'", "GROUP=ILLUMINANT"]),
     "light with own colour": (["{sky}", "--light", "sky=A"], ["'sky'", "colours of its own"]),
     "unit": (["{scene}", "--level", "3nits"], ["'nits'", "cd/m2, lux"]),
     "lux without plane": (["{scene}", "--level", "3lux"], ["'3lux' needs a reference plane", "irradiancemeter"]),

@@ -39,7 +39,7 @@ def test_several_sensors_stand_in_one_table_and_one_plot(tmp_path: Path, capsys:
     [
         (["low_nois"], "low_noise"),
         (["low_noise", "--at", "0"], "at:"),
-        (["low_noise", "--exposure", "20"], "write 10ms"),
+        (["low_noise", "--exposure", "20"], "write 20ms or 20s"),
         (["low_noise", "--light", "D64"], "D65"),
         (["low_noise", "-o", "snr.png"], ".svg"),
     ],

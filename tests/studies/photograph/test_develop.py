@@ -1,6 +1,7 @@
 """A raw image developed from Python: with its own colours or given ones, by the paper's processor for its mosaic."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +13,9 @@ from sensor.capture import capture
 from sensor.device import draw_device
 from sensor.presets import low_noise
 from sensor.raw import RawImage
+from sensor.raw_files.raw_file import write_raw
 from studies.photograph.calibrate import calibrate
-from studies.photograph.develop import develop
+from studies.photograph.develop import develop, develop_file
 
 
 def raw_of(cfa: str) -> RawImage:
@@ -46,3 +48,15 @@ def test_what_is_missing_or_unknown_is_said_in_one_line() -> None:
     ):
         with pytest.raises(InputError, match=told):
             develop(**arguments)  # type: ignore[arg-type]
+
+
+def test_as_shot_is_the_default_from_python_too(tmp_path: Path) -> None:
+    raw = raw_of("bayer")
+    raw = replace(raw, colour=calibrate(low_noise("bayer"), illuminant("A")))  # set to a lamp, taken in daylight
+    default, gray = develop(raw), develop(raw, white_balance="gray-world")
+    assert np.array_equal(default.rgb, develop(raw, white_balance="as-shot").rgb)
+    blue, grey = (picture.rgb.mean(axis=(0, 1)) for picture in (default, gray))
+    assert blue[2] > 1.5 * blue[0]
+    assert grey == pytest.approx(np.full(3, grey[1]), rel=0.02)
+    write_raw(raw, tmp_path / "shot.dng")
+    assert set(develop_file(tmp_path / "shot.dng").facts["balance"].values()) == {"given"}

@@ -7,7 +7,8 @@ import pytest
 
 from rodcone.errors import InputError
 from sensor.presets import preset_file
-from studies.study.study import SceneChoice, Study, conditions, label, mosaics, parse_exposure
+from studies.study.exposures import parse_exposure
+from studies.study.study import SceneChoice, Study, conditions, label, mosaics
 
 STUDY = Study((SceneChoice("still_life"), SceneChoice("flat_field", "A")), ("1cd/m2", "25cd/m2", "500lux"))
 

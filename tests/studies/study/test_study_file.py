@@ -110,3 +110,17 @@ def test_what_is_missing_or_unreadable_is_told(tmp_path: Path) -> None:
     assert "can't be read" in told(tmp_path, "levels = [")
     with pytest.raises(InputError, match=r"rodcone new study -o FILE"):
         read_study(tmp_path / "absent.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("bits = 12\n[pixel]\npitch_um = 2.0\n", "it is a sensor; allowed: a study .*, in which it stands as"),
+        ('scenes = "still_life"\nlevels = [1, 5]\n', 'levels: 1 is not a text in quotes; write "1lux" or "25cd/m2"'),
+        ('scenes = "still_life"\nlevels = "1lux"\nexposures = [10]\n', 'exposures: 10 is not .*; write "10ms"'),
+    ],
+)
+def test_a_likely_mistake_is_told_with_its_fix(text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(text, "utf-8")
+    with pytest.raises(InputError, match=words):
+        read_study(tmp_path / "study.toml")
