@@ -8,6 +8,7 @@ from isp.processors.catalogue import PROCESSORS
 from render import illuminants
 from scenes import catalog
 from sensor import cfa, presets
+from sensor.cameras.library import measured_cameras
 from studies.commands.console import Flag, print_table
 from studies.pages.report_text import METRICS
 
@@ -70,11 +71,14 @@ def lights() -> dict[str, str]:
 
 
 def sensors() -> dict[str, str]:
-    """Presets, each by the remark that its file begins with."""
+    """Presets, each by the remark that its file begins with, and cameras whose response was measured."""
     found = {}
     for name in presets.names():
         remark, _ = presets.preset_file(name).read_text("utf-8").split("\n\n", 1)
         found[name] = " ".join(remark.replace("#", " ").split())
+    for name, each in measured_cameras().items():
+        ratios = "" if each.balanced else ", each channel by itself"
+        found[name] = f"Measured response, relative{ratios}: {each.text}. rodcone new preset --camera."
     return found
 
 
