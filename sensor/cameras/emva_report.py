@@ -5,8 +5,12 @@ Equations are numbered as in release 4.0 Linear of the standard.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import pi, sqrt
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from scipy.special import ndtr
 
 from rodcone.errors import InputError, one_line, require_keys, require_range, require_whole
 from rodcone.toml_file import read_toml
@@ -91,8 +95,8 @@ def read_report(path: Path) -> EmvaReport:
 def numbers_of(report: EmvaReport) -> PixelNumbers:
     """Pixel of a report; what the report doesn't tell is left out.
 
-    The well clips where the converter does: at (2^bits - 1 - black) / K. Where a report lacks one of the three, its
-    saturation capacity stands in, which PRNU and shot noise put some per cent under the clip.
+    The well clips where the converter does: at (2^bits - 1 - black) / K. Where a report lacks one of the three, the
+    clip follows from its saturation capacity (`clip_over_saturation`).
     """
     told, figures = report.told, report.figures
     pixel: dict[str, Sourced] = {}
@@ -113,7 +117,10 @@ def numbers_of(report: EmvaReport) -> PixelNumbers:
             f"where the converter ends: {top_dn} DN above black over K = {figures['K']:g} DN/e- (eq. 50); {told}",
         )
     elif "mu_e_sat" in figures:
-        pixel["full_well_e"] = Sourced(figures["mu_e_sat"], f"saturation capacity mu_e.sat, no clip is told; {told}")
+        value = figures["mu_e_sat"]
+        clip_e = clip_over_saturation(value, figures.get("sigma_d", 0.0), figures.get("PRNU1288", 0.0) / 100)
+        words = f"the clip whose variance is greatest at the saturation capacity, mu_e.sat = {value:g} e-"
+        pixel["full_well_e"] = Sourced(clip_e, f"{words}; {told}")
     if "sigma_d" in figures:
         pixel["read_noise_e"], note = _read_noise(figures, told)
         left_out |= note
@@ -128,6 +135,26 @@ def numbers_of(report: EmvaReport) -> PixelNumbers:
     if "eta" in figures:
         efficiency = (figures["eta"] / 100, figures["lambda_nm"])
     return PixelNumbers(f"{report.camera}: {told}", pixel, settings, left_out, efficiency)
+
+
+def clip_over_saturation(saturation_e: float, sigma_d: float, prnu: float) -> float:
+    """Electrons at which pixels clip, from the light at which their temporal variance is greatest, mu_e.sat.
+
+    The variance of min(n, clip) for a normal n of variance mean + sigma_d^2, averaged over pixels whose means spread by
+    PRNU, falls as soon as some pixels clip: mu_e.sat lies two to three standard deviations under the clip.
+    """
+    nodes, weights = np.polynomial.hermite_e.hermegauss(15)
+    light_e = saturation_e * np.linspace(0.5, 1.5, 20_001)
+    mean_e = light_e[:, None] * (1 + prnu * nodes)
+    own = np.maximum(mean_e, 0.0) + sigma_d**2
+    clip_e = saturation_e
+    for _ in range(20):  # the step is a few per cent at first, and then what the last one missed
+        z = (clip_e - mean_e) / np.sqrt(own)
+        above, density = ndtr(-z), np.exp(-(z**2) / 2) / sqrt(2 * pi)
+        first, second = z * above - density, 1 - above - z * density + z**2 * above
+        variance = (own * (second - first**2)) @ weights
+        clip_e += saturation_e - light_e[np.argmax(variance)]
+    return float(clip_e)
 
 
 def _read_noise(figures: Mapping[str, float], told: str) -> tuple[Sourced, dict[str, str]]:
