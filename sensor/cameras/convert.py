@@ -94,7 +94,7 @@ def _camera(path: Path) -> dict[str, Any]:
             "date": header["document_creation_date"][:10],
             "curves": {name: np.rint(table[:, at] * STEPS).astype(int).tolist() for at, name in enumerate("RGB")},
         }
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError) as error:
         raise InputError(
             f"camera: {str(path)!r} can't be read ({type(error).__name__}: {one_line(error)}); allowed: a camera of "
             "rawtoaces-data; copy it again"

@@ -18,7 +18,7 @@ FILE = "cameras.json"
 VARIABLE = "RODCONE_CAMERAS"  # environment variable: folder of the file
 MOST_BYTES = 1 << 23  # 52 cameras take 110 kB
 STEPS = 100_000  # whole numbers in the file are this many to 1: half a step is under the sources' own last digits
-_SHIPPED = Path(__file__).parent.parent / "data" / "cameras"
+_SHIPPED = Path(__file__).parent / "measured"  # a distribution may ship what `convert` writes
 _TEXTS = ("maker", "model", "creator", "laboratory", "equipment", "date")
 
 
@@ -126,7 +126,7 @@ def _read(path: Path, _changed: int) -> dict[str, MeasuredCamera]:
         if len(text) > MOST_BYTES:
             raise ValueError(f"it is over {MOST_BYTES} bytes")
         return _cameras(json.loads(text.decode("utf-8")))
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as error:
+    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError) as error:
         raise InputError(
             f"measured responses: {str(path)!r} can't be read ({type(error).__name__}: {one_line(error)}); "
             "allowed: what rodcone new cameras wrote; write it anew"

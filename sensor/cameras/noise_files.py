@@ -41,11 +41,14 @@ def dng_numbers(path: Path) -> PixelNumbers:
         )
     at = f"at ISO {raw.iso:g}" if raw.iso is not None else "at the photograph's exposure index, which it doesn't tell"
     told = f"NoiseProfile of {path.name}, {at}"
+    white_e = profile.gain_e_per_dn
+    rounding_e = white_e / (raw.white_dn - raw.black_dn) / sqrt(12)
+    read_e, words = profile.dark_noise_e, "sqrt(O) / S"
+    if read_e > rounding_e:
+        read_e, words = sqrt(read_e**2 - rounding_e**2), f"sqrt(O) / S, less {rounding_e:.3g} e- of rounding"
     pixel = {
-        "full_well_e": Sourced(
-            profile.gain_e_per_dn, f"electrons at white, 1 / S; {told}; the photodiode may hold more"
-        ),
-        "read_noise_e": Sourced(profile.dark_noise_e, f"sqrt(O) / S; {told}"),
+        "full_well_e": Sourced(white_e, f"electrons at white, 1 / S; {told}; the photodiode may hold more"),
+        "read_noise_e": Sourced(read_e, f"{words}; {told}"),
     }
     bits = int(raw.white_dn).bit_length()
     settings = {"bits": Sourced(bits, f"white level {raw.white_dn:g} of {path.name}")}
@@ -111,7 +114,7 @@ def _darktable(path: Path) -> dict[str, dict[float, tuple[float, float]]]:
             raise ValueError(f"it is over {MOST_BYTES} bytes")
         held = json.loads(text.decode("utf-8"))
         return {name: profiles for name, profiles in _each_camera(held) if profiles}
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as error:
+    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError) as error:
         raise InputError(
             f"noise: {str(path)!r} can't be read ({type(error).__name__}: {one_line(error)}); allowed: a .dng, an EMVA "
             "report as .toml, or darktable's noiseprofiles.json; give one"

@@ -149,7 +149,8 @@ def _sites(frames: Sequence[NDArray[np.uint16]], tile: Tile) -> list[_Site]:
             rest -= rest.mean(axis=(1, 2), keepdims=True)
             freedom = (len(frames) - 1) * (mean.size - 1)
             variance = float(np.sum(rest**2)) / freedom
-            found.append(_Site(mean, variance, variance * sqrt(2 / freedom), len(frames)))
+            error = max(variance, QUANTISATION_DN2) * sqrt(2 / freedom)  # the same file twice varies in nothing
+            found.append(_Site(mean, variance, error, len(frames)))
     return found
 
 

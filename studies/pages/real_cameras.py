@@ -14,7 +14,7 @@ from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.emva1288.characterise import Characterisation, characterise
 from studies.pages.report_text import MISSING, table
 
-REPORTS = Path(__file__).parent.parent.parent / "sensor" / "data" / "reports"
+REPORTS = Path(__file__).parent.parent.parent / "sensor" / "cameras" / "reports"
 SHAPE, EXPOSURE_S = (256, 320), 0.01
 MOST_OFF = 0.035  # of a figure, 0.3 dB: what Basler states of its own calibration, as the guide quotes it
 HEAD = ("figure", "unit", "published", "configured", "recovered", "off", "is it within 3.5 % or 0.3 dB?")
@@ -32,15 +32,15 @@ REASONS = {  # of what lies beyond, by file and symbol
 TEXT = """\
 # Cameras that exist: published, configured, recovered
 
-Made by `python -m studies.pages.real_cameras docs/real_cameras.md`. For each report of `sensor/data/reports` a preset
+Made by `python -m studies.pages.real_cameras docs/real_cameras.md`. For each report of `sensor/cameras/reports` a preset
 is made from its inputs, as `rodcone new preset --noise REPORT.toml` does, and `rodcone characterise` measures the
 simulated chip of it ({height} x {width} pixels). Published numbers are the report's; configured ones follow from the
 preset in closed form; recovered ones are measured in the chip's frames, which know neither.
 
 **Where the numbers come from.** The makers' own files could not be opened when this page was made. Each number was
 read in a public copy or quotation of the maker's document, which its section names; what no copy holds is left out, and
-nothing is filled in from memory. Of a report without DSNU1288 or PRNU1288 both are switched off, with no effect on the
-other rows. Photo-electrons are set on the bench, so a quantum efficiency is carried into the preset and not tested here.
+nothing is filled in from memory. Where a report lacks DSNU1288 or PRNU1288 it is switched off, with no effect on the
+other rows. Photo-electrons are set on the bench, so a quantum efficiency goes into the preset and is not tested here.
 
 **What is an input.** K with bits and black level gives the clip; then the saturation capacity, which is where the
 temporal variance is greatest, is recovered and no input. Where K or the black level isn't told, the clip is solved from
