@@ -94,7 +94,7 @@ def measured_cameras() -> dict[str, MeasuredCamera]:
         For a file that is damaged.
     """
     path = library_file()
-    return {} if path is None else _read(path, path.stat().st_mtime_ns)
+    return {} if path is None else read_library(path, path.stat().st_mtime_ns)
 
 
 def measured_camera(name: str) -> MeasuredCamera:
@@ -119,7 +119,14 @@ def measured_camera(name: str) -> MeasuredCamera:
 
 
 @cache
-def _read(path: Path, _changed: int) -> dict[str, MeasuredCamera]:
+def read_library(path: Path, _changed: int) -> dict[str, MeasuredCamera]:
+    """Cameras of a file as `sensor.cameras.convert` writes it; one that changed is read anew.
+
+    Raises
+    ------
+    InputError
+        For a file that is damaged.
+    """
     try:
         with path.open("rb") as file:
             text = file.read(MOST_BYTES + 1)

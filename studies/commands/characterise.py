@@ -69,7 +69,7 @@ def characterise(
         _measure_files(flats or [], dark or [], window, out, json)
         return
     if preset is None or window is not None:
-        raise InputError("preset: none is given; allowed: a preset, or raw files by --from and --dark; give one")
+        raise InputError("preset: none is given; allowed: PRESET, or raw files by --from and --dark; give one")
     sensor = sensor_preset(preset)
     if out is not None:
         require_ending(out, ".svg")

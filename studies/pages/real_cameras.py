@@ -32,10 +32,10 @@ REASONS = {  # of what lies beyond, by file and symbol
 TEXT = """\
 # Cameras that exist: published, configured, recovered
 
-Made by `python -m studies.pages.real_cameras docs/real_cameras.md`. For each report of `sensor/cameras/reports` a preset
-is made from its inputs, as `rodcone new preset --noise REPORT.toml` does, and `rodcone characterise` measures the
-simulated chip of it ({height} x {width} pixels). Published numbers are the report's; configured ones follow from the
-preset in closed form; recovered ones are measured in the chip's frames, which know neither.
+Made by `python -m studies.pages.real_cameras docs/real_cameras.md`. For each report of `sensor/cameras/reports` a
+preset is made from its inputs, as `rodcone new preset --noise REPORT.toml` does, and `rodcone characterise` measures
+the simulated chip of it ({height} x {width} pixels). Published numbers are the report's; configured ones follow from
+the preset in closed form; recovered ones are measured in the chip's frames, which know neither.
 
 **Where the numbers come from.** The makers' own files could not be opened when this page was made. Each number was
 read in a public copy or quotation of the maker's document, which its section names; what no copy holds is left out, and
@@ -54,7 +54,7 @@ uncertainty of the light's calibration; what is beyond has its reason beside it.
 
 
 @dataclass(frozen=True)
-class Row:
+class PublishedFigure:
     """A figure of a camera: published and configured values are None where there is none."""
 
     symbol: str
@@ -87,7 +87,7 @@ def camera_of(numbers: PixelNumbers, report: EmvaReport) -> SensorConfig:
     )
 
 
-def rows_of(report: EmvaReport, seed: int = 0) -> list[Row]:
+def rows_of(report: EmvaReport, seed: int = 0) -> list[PublishedFigure]:
     """Figures of a report: published, configured, and recovered from the frames of one simulated chip."""
     numbers = numbers_of(report)
     sensor = camera_of(numbers, report)
@@ -109,12 +109,17 @@ def rows_of(report: EmvaReport, seed: int = 0) -> list[Row]:
         ("DR_dB", "dB", "dynamic range", 1.0),
     )
     rows = [
-        Row(symbol, unit, figures.get(symbol), each.configured * factor, each.measured * factor, symbol in inputs)
+        PublishedFigure(
+            symbol, unit, figures.get(symbol), each.configured * factor, each.measured * factor, symbol in inputs
+        )
         for symbol, unit, name, factor in measured
         for each in [found.figure(name)]
         if symbol in figures or symbol not in ("DSNU1288", "PRNU1288", "mu_I")
     ]
-    return [*rows, Row("SNR_50_dB", "dB", figures.get("SNR_50_dB"), in_closed_form, _snr_db(found, half), False)]
+    return [
+        *rows,
+        PublishedFigure("SNR_50_dB", "dB", figures.get("SNR_50_dB"), in_closed_form, _snr_db(found, half), False),
+    ]
 
 
 def _snr_db(found: Characterisation, light_e: float) -> float:
@@ -147,7 +152,7 @@ def page(reports: dict[str, EmvaReport]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _cells(name: str, row: Row) -> list[str]:
+def _cells(name: str, row: PublishedFigure) -> list[str]:
     digits = ".2f" if row.unit == "dB" else ".5g"
     published, configured = (MISSING if x is None else format(x, digits) for x in (row.published, row.configured))
     off = MISSING if row.off is None else f"{row.off:+.2f} dB" if row.unit == "dB" else f"{100 * row.off:+.1f} %"

@@ -47,7 +47,8 @@ def test_the_intervals_hold_what_was_configured_in_95_of_100_runs_give_or_take_3
             held[name] += each.low <= true <= each.high
             values[name].append(each.value / true)
     assert all(0.92 <= count / RUNS <= 0.98 for count in held.values()), held
-    assert {name: np.mean(each) for name, each in values.items()} == pytest.approx(dict.fromkeys(truth, 1.0), abs=2e-3)
+    for name, each in values.items():  # four standard errors of the mean: once in 15 000 runs
+        assert abs(np.mean(each) - 1) < 4 * np.std(each) / np.sqrt(RUNS), name
 
 
 def test_columns_flicker_and_smooth_shading_do_not_move_the_figures():
