@@ -21,7 +21,7 @@ def gallery_svg(cameras: Mapping[str, MeasuredCamera]) -> str:
     for axes, (name, camera) in zip(grid.flat, cameras.items(), strict=False):
         for channel, curve in camera.responses.curves.items():
             axes.plot(curve.wavelength_nm, curve.values, color=CHANNEL_COLOURS[channel], linewidth=0.9)
-        axes.set_title(f"{name}{'' if camera.balanced else '*'}", fontsize=7)
+        axes.set_title(f"{name}{'' if camera.balanced else '*'}".replace("$", r"\$"), fontsize=7)  # a formula's sign
         axes.set(xlim=(380, 780), ylim=(0, 1.05))
         axes.tick_params(labelsize=6)
         plain_ticks(axes)

@@ -149,6 +149,8 @@ def test_a_report_that_is_a_folder_or_absent_is_refused(tmp_path):
 
 
 def test_a_source_of_many_lines_stays_a_comment(tmp_path):
-    report = HEAD.replace('"report 7"', '"""a\n[pixel]\nprnu = 0.5\u2028x\\u0007\\u0000"""') + "[report]\nsigma_d = 2.5\n"
+    report = (
+        HEAD.replace('"report 7"', '"""a\n[pixel]\nprnu = 0.5\u2028x\\u0007\\u0000"""') + "[report]\nsigma_d = 2.5\n"
+    )
     text = preset_text("X1", numbers_of(read_report(write(tmp_path, report))), None, "")
     assert tomllib.loads(text)["pixel"] == {"fill_factor": 1.0, "read_noise_e": 2.5}
