@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError
-from sensor.cameras.numbers import PixelNumbers, Sourced
+from sensor.cameras.numbers import PixelNumbers, Sourced, bits_of
 from sensor.emva1288.from_frames import FrameFigures, Interval, figures_of_frames
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import read_raw
@@ -73,10 +73,10 @@ def frame_numbers(figures: FrameFigures, files: Sequence[Path]) -> PixelNumbers:
         "prnu": Sourced(figures.prnu.value, f"PRNU1288 (eq. 67), {_told(figures.prnu)}"),
     }
     settings = {
-        "bits": Sourced(int(figures.white_dn).bit_length(), f"white level {figures.white_dn:g}"),
+        "bits": bits_of(figures.white_dn, "the frames"),
         "black_level_dn": Sourced(round(figures.black_dn), f"mean of the dark frames, {figures.black_dn:.5g} DN"),
     }
-    return PixelNumbers(told, pixel, settings, _UNTOLD)
+    return PixelNumbers(told, pixel, settings, _UNTOLD, cfa=figures.cfa)
 
 
 def _told(each: Interval) -> str:

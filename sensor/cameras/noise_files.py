@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rodcone.errors import InputError, one_line, require_range, unknown
-from sensor.cameras.numbers import PixelNumbers, Sourced
+from sensor.cameras.numbers import PixelNumbers, Sourced, bits_of
 from sensor.raw_files.noise_profile import read_noise_profile
 from sensor.raw_files.raw_file import open_raw
 
@@ -50,11 +50,10 @@ def dng_numbers(path: Path) -> PixelNumbers:
         "full_well_e": Sourced(white_e, f"electrons at white, 1 / S; {told}; the photodiode may hold more"),
         "read_noise_e": Sourced(read_e, f"{words}; {told}"),
     }
-    bits = int(raw.white_dn).bit_length()
-    settings = {"bits": Sourced(bits, f"white level {raw.white_dn:g} of {path.name}")}
+    settings = {"bits": bits_of(raw.white_dn, path.name)}
     if raw.black_dn == int(raw.black_dn):
         settings["black_level_dn"] = Sourced(raw.black_dn, f"BlackLevel of {path.name}")
-    return PixelNumbers(told, pixel, settings, _UNTOLD)
+    return PixelNumbers(told, pixel, settings, _UNTOLD, cfa=raw.cfa)
 
 
 def darktable_numbers(path: Path, camera: str, iso: float | None, white_e: float | None) -> PixelNumbers:

@@ -1,13 +1,14 @@
 """Numbers of a pixel, each with its source, and the preset file that they make."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
 
 from rodcone.errors import InputError
 from sensor.cameras.library import MeasuredCamera
+from sensor.cfa import Tile
 from sensor.config import PixelConfig, SensorConfig
 
 NEEDED = ("pitch_um", "fill_factor", "full_well_e", "read_noise_e", "dsnu_e", "prnu")  # keys without a default
@@ -42,6 +43,8 @@ class PixelNumbers:
         Why a key can't be told; a source without a word for a key says nothing of it.
     efficiency : (float, float) or None
         Electrons per photon at a wavelength [nm].
+    cfa : tuple of str
+        Mosaic; empty where not told.
     """
 
     source: str
@@ -49,6 +52,19 @@ class PixelNumbers:
     settings: Mapping[str, Sourced] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
     efficiency: tuple[float, float] | None = None
+    cfa: Tile = ()
+
+
+def bits_of(white_dn: float, source: str) -> Sourced:
+    """Bits of the converter whose top is a white level, or next above it."""
+    bits = int(white_dn).bit_length()
+    top = 2**bits - 1
+    finer = (
+        ""
+        if top == white_dn
+        else f"; the simulated converter ends at {top}, so its DN are {top / white_dn:.3f} times as fine"
+    )
+    return Sourced(bits, f"white level {white_dn:g} of {source}{finer}")
 
 
 def missing(numbers: PixelNumbers) -> list[str]:
@@ -59,9 +75,7 @@ def missing(numbers: PixelNumbers) -> list[str]:
 def completed(numbers: PixelNumbers, sensor: SensorConfig, name: str) -> PixelNumbers:
     """Numbers with what is missing taken from another camera, and said so."""
     lent = {key: Sourced(getattr(sensor.pixel, key), f"of {name}, not of this camera") for key in missing(numbers)}
-    return PixelNumbers(
-        numbers.source, {**numbers.pixel, **lent}, numbers.settings, numbers.left_out, numbers.efficiency
-    )
+    return replace(numbers, pixel={**numbers.pixel, **lent})
 
 
 def preset_text(title: str, numbers: PixelNumbers, camera: MeasuredCamera | None, curves: str) -> str:
@@ -75,7 +89,11 @@ def preset_text(title: str, numbers: PixelNumbers, camera: MeasuredCamera | None
         Name of the CSV of the responses, beside the file; empty for none.
     """
     lines = [f"# {_plain(title)}", f"# Numbers: {_plain(numbers.source)}", ""]
-    if camera is not None or numbers.efficiency is None:
+    if numbers.cfa:
+        lines.append(
+            f"cfa = [{', '.join(f'{chr(34)}{row}{chr(34)}' for row in numbers.cfa)}]  # {_plain(numbers.source)}"
+        )
+    elif camera is not None or numbers.efficiency is None:
         lines.append('cfa = "bayer"  # RG over GB: a choice; another phase of it, or another mosaic, is yours to set')
     else:
         lines.append('cfa = ["W"]  # one channel without a filter, named W: numbers of a monochrome chip')

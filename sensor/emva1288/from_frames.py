@@ -46,6 +46,8 @@ class FrameFigures:
         Means above black of each stack of flat frames, by position in the tile.
     frames : tuple of int
         Flat frames of each stack, then dark frames.
+    cfa : tuple of str
+        Their mosaic.
     """
 
     gain_dn_per_e: Interval
@@ -56,6 +58,7 @@ class FrameFigures:
     white_dn: float
     levels_dn: Floats
     frames: tuple[int, ...]
+    cfa: Tile
 
 
 @dataclass(frozen=True)
@@ -116,6 +119,7 @@ def figures_of_frames(
         white_dn=white_dn,
         levels_dn=levels,
         frames=(*(stack[0].frames for stack in stacks), len(darks)),
+        cfa=tile,
     )
 
 

@@ -15,7 +15,7 @@ from sensor.device import draw_device
 from sensor.presets import low_noise
 from sensor.raw_files.raw_file import write_raw
 
-SENSOR = replace(low_noise("bayer"), pixel=replace(low_noise().pixel, read_noise_e=3.0, dsnu_e=2.0))
+SENSOR = replace(low_noise("rgbw"), pixel=replace(low_noise().pixel, read_noise_e=3.0, dsnu_e=2.0))
 
 
 @pytest.fixture(scope="module")
