@@ -1,5 +1,6 @@
 """A camera from a TOML file: what a preset is, and what users copy and change."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -10,7 +11,7 @@ from rodcone.errors import InputError, one_line, require_keys
 from rodcone.toml_file import read_toml
 from sensor.cfa import Tile, channels, tile_of
 from sensor.config import LensConfig, PixelConfig, SensorConfig
-from sensor.curves import Responses, built_in, read_csv, read_curve, rgbw
+from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_csv, read_curve, rgbw
 
 _SETTINGS = ("bits", "black_level_dn", "window_nm")
 _KEYS = ("cfa", *_SETTINGS, "pixel", "lens", "responses")
@@ -25,8 +26,8 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     path : str or Path
         TOML with the tables ``[pixel]`` and ``[lens]`` (fields of `PixelConfig` and `LensConfig`), optionally ``cfa``
         (a name of `sensor.cfa.MOSAICS`, or rows of channels), ``bits``, ``black_level_dn``, ``window_nm``, and
-        ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency`` ("included", a number, or a CSV) and
-        ``ir_cut`` (nm, or a CSV). Names of CSV files are relative to the TOML's folder.
+        ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency`` ("included", "relative", a number, or a
+        CSV) and ``ir_cut`` (nm, or a CSV). Names of CSV files are relative to the TOML's folder.
     cfa : str or sequence of str, optional
         Mosaic to use in place of the file's.
 
@@ -34,6 +35,11 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     ------
     InputError
         For a file that can't be read, an unknown or missing key, or a value out of range; the file is named.
+
+    Warns
+    -----
+    RelativeResponsesWarning
+        Where the responses are relative.
     """
     tile = None if cfa is None else tile_of(cfa)  # a wrong one isn't the file's fault
     try:
@@ -44,9 +50,17 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
             f"sensor file: {str(path)!r} can't be read ({reason}); copy a preset: rodcone new preset NAME -o FILE"
         ) from error
     try:
-        return _sensor(content, Path(path).parent, tile)
+        sensor = _sensor(content, Path(path).parent, tile)
     except InputError as error:
         raise InputError(f"sensor file {str(path)!r}: {error}") from error
+    if sensor.responses.relative:
+        warnings.warn(
+            f"sensor file {str(path)!r}: its responses are relative, so its electrons, and the light and SNR that "
+            "follow from them, hold up to one factor; give quantum_efficiency a number, of the greatest response",
+            RelativeResponsesWarning,
+            stacklevel=2,
+        )
+    return sensor
 
 
 def _sensor(content: Mapping[str, Any], folder: Path, cfa: Tile | None) -> SensorConfig:
@@ -93,20 +107,22 @@ def _responses(table: Mapping[str, Any], folder: Path) -> Responses:
         if key not in table:
             raise InputError(
                 f"responses: {key} is missing; allowed: csv, range_nm = [shortest, longest], "
-                'quantum_efficiency = "included", a number or a CSV; add it to [responses]'
+                'quantum_efficiency = "included", "relative", a number or a CSV; add it to [responses]'
             )
     if not isinstance(table["csv"], str):
         raise InputError(f"csv: {table['csv']!r} is not a file's name; allowed: a name in quotes; write so")
     pair = table["range_nm"]
     if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(nm, int | float) for nm in pair)):
         raise InputError(f"range_nm: {pair!r} is not a pair of numbers; allowed: [shortest, longest] in nm; write so")
-    efficiency = None if table["quantum_efficiency"] == "included" else table["quantum_efficiency"]
-    return read_csv(
+    said = table["quantum_efficiency"]
+    efficiency = None if said in ("included", "relative") else said
+    found = read_csv(
         folder / table["csv"],
         range_nm=(float(pair[0]), float(pair[1])),
         ir_cut=_number_or_curve("ir_cut", table.get("ir_cut"), folder),
         quantum_efficiency=_number_or_curve("quantum_efficiency", efficiency, folder),
     )
+    return Responses(found.curves, relative=said == "relative")
 
 
 def _number_or_curve(name: str, value: Any, folder: Path) -> float | Spectrum | None:

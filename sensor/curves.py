@@ -40,9 +40,12 @@ class Responses:
     ----------
     curves : mapping of str to Spectrum
         By channel: electrons per photon (0 to 1) over wavelength, quantum efficiency included.
+    relative : bool
+        Whether only their ratios are known: electrons are then known up to a factor that all channels share.
     """
 
     curves: Mapping[str, Spectrum]
+    relative: bool = False
 
     __repr__ = brief
 
@@ -55,9 +58,9 @@ class Responses:
                 )
         object.__setattr__(self, "curves", MappingProxyType(dict(self.curves)))
 
-    def __reduce__(self) -> tuple[type["Responses"], tuple[dict[str, Spectrum]]]:
+    def __reduce__(self) -> tuple[type["Responses"], tuple[dict[str, Spectrum], bool]]:
         """Pickle the mapping as a dict: a mapping proxy can't be pickled."""
-        return Responses, (dict(self.curves),)
+        return Responses, (dict(self.curves), self.relative)
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw each channel's curve into Matplotlib's axes, new ones by default."""
@@ -116,7 +119,7 @@ def complementary(responses: Responses) -> Responses:
         curves[channel] = Spectrum(nm, values[0] + values[1])
     if "W" in responses.curves:
         curves["W"] = responses.curves["W"]
-    return Responses(curves)
+    return Responses(curves, responses.relative)
 
 
 def matched_transmittance(responses: Responses) -> float:
@@ -143,7 +146,8 @@ def matched_transmittance(responses: Responses) -> float:
 
 def neutral_density(responses: Responses) -> Responses:
     """Responses with W behind the neutral density of `matched_transmittance`."""
-    return Responses({**responses.curves, "W": responses.curves["W"] * matched_transmittance(responses)})
+    dimmed = responses.curves["W"] * matched_transmittance(responses)
+    return Responses({**responses.curves, "W": dimmed}, responses.relative)
 
 
 def _require_channels(responses: Responses, channels: str) -> None:
@@ -154,6 +158,10 @@ def _require_channels(responses: Responses, channels: str) -> None:
 
 class QuantumEfficiencyWarning(UserWarning):
     """The curves to be multiplied by a quantum efficiency seem to hold one already."""
+
+
+class RelativeResponsesWarning(UserWarning):
+    """A camera whose responses are known up to a factor: so are its electrons, and all that follows from them."""
 
 
 def read_csv(

@@ -1,23 +1,35 @@
 """The command `rodcone characterise`."""
 
 import json as notation
-from typing import Any
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
 
+from cyclopts import Parameter
+
+from rodcone.errors import InputError
 from rodcone.files import check_place, replacing
 from rodcone.json_values import finite
+from sensor.cameras.frames import frame_numbers, measure_files
+from sensor.cameras.numbers import preset_text
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
-from studies.commands.console import Flag, OutOrNone, Seconds, print_table, require_ending
+from studies.commands.console import Flag, OutOrNone, Seconds, print_table, require_ending, say
 from studies.pages.transfer_chart import transfer_svg
 
 HEAD = ("figure", "unit", "configured", "measured", "std. error", "in std. errors")
+FRAMES_HEAD = ("figure", "unit", "measured", "95 % from", "to")
+Files = list[Path] | None
 
 
 def characterise(
-    preset: str,
+    preset: str | None = None,
     /,
     *,
+    flats: Annotated[Files, Parameter(name="--from", consume_multiple=True, negative_iterable=())] = None,
+    dark: Annotated[Files, Parameter(consume_multiple=True, negative_iterable=())] = None,
+    window: int | None = None,
     out: OutOrNone = None,
     json: Flag = False,
     height: int = 256,
@@ -25,14 +37,21 @@ def characterise(
     exposure_s: Seconds = 0.01,
     seed: int = 0,
 ) -> None:
-    """Measure a simulated chip as an EMVA 1288 laboratory does and print the figures beside the configured ones.
+    """Measure a simulated chip as an EMVA 1288 laboratory does, or a camera of your own from its raw files.
 
     Parameters
     ----------
     preset
-        Sensor preset by name, or a .toml file (see `rodcone new preset`).
+        Sensor preset by name, or a .toml file (see `rodcone new preset`): its figures are printed beside the measured.
+    flats
+        Raw files of a real camera instead: an evenly lit surface, two or more at each light.
+    dark
+        Raw files with the cap on, two or more, at the same exposure index and time.
+    window
+        Width in pixels of the square in the middle of the frames to measure; the whole frame by default.
     out
-        Plot to write as well: photon transfer (linear and logarithmic), SNR and linearity, as .svg.
+        With a preset, plot to write as well: photon transfer (linear and logarithmic), SNR and linearity, as .svg. With
+        raw files, preset file of the camera (.toml), every number with its interval.
     json
         Print one JSON object, which also holds the photon-transfer series, instead of the table.
     height
@@ -44,6 +63,13 @@ def characterise(
     seed
         Seed of the chip and of its frames.
     """
+    if flats or dark:
+        if preset is not None:
+            raise InputError(f"preset: {preset!r} beside raw files; allowed: a preset, or --from and --dark; give one")
+        _measure_files(flats or [], dark or [], window, out, json)
+        return
+    if preset is None or window is not None:
+        raise InputError("preset: none is given; allowed: PRESET, or raw files by --from and --dark; give one")
     sensor = sensor_preset(preset)
     if out is not None:
         require_ending(out, ".svg")
@@ -63,6 +89,36 @@ def characterise(
         rows.append((figure.name, figure.unit, f"{figure.configured:.5g}", f"{figure.measured:.5g}", *errors))
     print_table(HEAD, rows, words=2)
     print("\n".join(["", *(f"- {note}" for note in found.notes)]))
+
+
+def _measure_files(flats: list[Path], dark: list[Path], window: int | None, out: Path | None, json: bool) -> None:
+    """Print what raw files tell, and write it as a preset."""
+    if out is not None:
+        require_ending(out, ".toml")
+        check_place(out)
+        if out.exists():
+            raise InputError(f"out: {str(out)!r} exists; allowed: a new file; choose another name or remove it")
+    found = measure_files(flats, dark, window)
+    rows = (
+        ("gain", "DN/e-", found.gain_dn_per_e),
+        ("read noise", "e-", found.read_noise_e),
+        ("DSNU", "e-", found.dsnu_e),
+        ("PRNU", "1", found.prnu),
+    )
+    if out is not None:
+        text = preset_text(f"A camera measured from {flats[0].name} and others.", frame_numbers(found, flats), None, "")
+        with replacing(out) as (place,):
+            place.write_text(text, "utf-8")
+    if json:
+        print(notation.dumps({**asdict(found), "levels_dn": found.levels_dn.tolist()}))
+        return
+    print_table(
+        FRAMES_HEAD,
+        [(name, unit, *(f"{value:.5g}" for value in (x.value, x.low, x.high))) for name, unit, x in rows],
+        words=2,
+    )
+    if out is not None:
+        say(f"{out}: pitch_um and fill_factor are yours to add, no frame tells them")
 
 
 def _facts(found: Characterisation) -> dict[str, Any]:

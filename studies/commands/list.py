@@ -2,14 +2,19 @@
 
 import json as notation
 from importlib import import_module
+from pathlib import Path
 from typing import Literal
 
 from isp.processors.catalogue import PROCESSORS
 from render import illuminants
+from rodcone.errors import InputError
+from rodcone.files import check_place, replacing
 from scenes import catalog
 from sensor import cfa, presets
-from studies.commands.console import Flag, print_table
+from sensor.cameras.library import measured_cameras
+from studies.commands.console import Flag, OutOrNone, print_table, require_ending
 from studies.pages.report_text import METRICS
+from studies.pages.response_gallery import gallery_svg
 
 # CIE 015:2018, with the correlated colour temperatures that it states.
 LIGHTS = {
@@ -36,16 +41,20 @@ TEMPERATURES = ("3000K", "D7000K")  # that stand for any
 Kind = Literal["scenes", "lights", "sensors", "mosaics", "processors", "metrics"]
 
 
-def list_names(kind: Kind | None = None, /, *, json: Flag = False) -> None:
+def list_names(kind: Kind | None = None, /, *, out: OutOrNone = None, json: Flag = False) -> None:
     """Print what the other commands know by name, with what each is.
 
     Parameters
     ----------
     kind
         scenes, lights, sensors, mosaics, processors or metrics; all of them by default.
+    out
+        With sensors, gallery of the measured responses to write as well (.svg).
     json
         Print one JSON object: kinds, and in each the names with their texts.
     """
+    if out is not None:
+        _write_gallery(kind, out)
     found = {name: LISTS[name]() for name in ([kind] if kind else LISTS)}
     if json:
         print(notation.dumps(found))
@@ -53,6 +62,19 @@ def list_names(kind: Kind | None = None, /, *, json: Flag = False) -> None:
     for index, (name, lines) in enumerate(found.items()):
         print(f"{chr(10) * (index > 0)}{name}")
         print_table(("", ""), [(f"  {key}", text) for key, text in lines.items()], words=2)
+
+
+def _write_gallery(kind: Kind | None, out: Path) -> None:
+    """Draw the measured responses, where there are some."""
+    require_ending(out, ".svg")
+    if kind != "sensors" or not measured_cameras():
+        raise InputError(
+            f"out: {str(out)!r} has nothing to show; allowed: with sensors, where measured responses are at hand "
+            "(rodcone new cameras); leave it out"
+        )
+    check_place(out)
+    with replacing(out) as (place,):
+        place.write_text(gallery_svg(measured_cameras()), "utf-8")
 
 
 def scenes() -> dict[str, str]:
@@ -70,11 +92,14 @@ def lights() -> dict[str, str]:
 
 
 def sensors() -> dict[str, str]:
-    """Presets, each by the remark that its file begins with."""
+    """Presets, each by the remark that its file begins with, and cameras whose response was measured."""
     found = {}
     for name in presets.names():
         remark, _ = presets.preset_file(name).read_text("utf-8").split("\n\n", 1)
         found[name] = " ".join(remark.replace("#", " ").split())
+    for name, each in measured_cameras().items():
+        ratios = "" if each.balanced else ", each channel by itself"
+        found[name] = f"Measured response, relative{ratios}: {each.text}. rodcone new preset --camera."
     return found
 
 

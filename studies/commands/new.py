@@ -1,16 +1,23 @@
 """`rodcone new`: files to start from."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
 from cyclopts import App
 
-from rodcone.errors import InputError, require_keys
-from rodcone.files import replacing
+from rodcone.errors import InputError, require_keys, require_range
+from rodcone.files import check_place, replacing
 from rodcone.toml_file import read_toml
+from sensor.cameras.convert import convert
+from sensor.cameras.emva_report import numbers_of, read_report
+from sensor.cameras.library import MeasuredCamera, measured_camera, measured_cameras
+from sensor.cameras.noise_files import darktable_numbers, dng_numbers
+from sensor.cameras.numbers import PixelNumbers, completed, curves_csv, missing, preset_text
+from sensor.presets import preset as read_preset
 from sensor.presets import preset_file
-from studies.commands.console import Out, require_ending
+from studies.commands.console import Out, require_ending, say
 
 app = App(name="new", help="Write files to start from.")
 _STUDIES = Path(__file__).parent.parent / "configs"
@@ -18,8 +25,21 @@ _CLUSTER = Path(__file__).parent.parent / "data" / "dask.yaml"
 
 
 @app.command
-def preset(name: str, /, *, out: Out) -> None:
-    """Copy a sensor preset to a TOML file to change: pixel, lens, mosaic, responses, every number with its source.
+def preset(
+    name: str | None = None,
+    /,
+    *,
+    out: Out,
+    camera: str | None = None,
+    noise: Path | None = None,
+    anchor: str | None = None,
+    iso: float | None = None,
+    white_e: float | None = None,
+) -> None:
+    """Write a sensor as a TOML file to change: pixel, lens, mosaic, responses, every number with its source.
+
+    Without --camera and --noise, a copy of a preset. With them, a camera that exists; what no source tells is left out
+    with a word, or taken from the preset, if one is named, and said so.
 
     Parameters
     ----------
@@ -27,9 +47,64 @@ def preset(name: str, /, *, out: Out) -> None:
         Preset by name: low_noise, table1_pixel, table1_output, or table1_output_6um, _3um and _2um for the paper's
         Figures 1 and 5.
     out
-        File to write, ending in .toml; one that exists is left alone. Its path can replace any preset name.
+        File to write, ending in .toml; one that exists is left alone. Its path can replace any preset name. Responses
+        go into NAME_curves.csv beside it.
+    camera
+        Measured response of a camera by name, such as "Nikon D850": see rodcone list sensors, rodcone new cameras.
+    noise
+        Where its noise stands: an EMVA 1288 report as .toml, a .dng with a NoiseProfile, or darktable's
+        noiseprofiles.json with --camera and --iso. For raw frames of your own: rodcone characterise --from.
+    anchor
+        Published quantum efficiency at a wavelength, such as 0.5@530, which turns a relative response into electrons.
+    iso
+        Exposure index of a profile in noiseprofiles.json; the lowest by default.
+    white_e
+        Electrons at which the camera reads white there, which such a profile doesn't tell.
     """
-    _copy(preset_file(name), out, ".toml")
+    if camera is None and noise is None:
+        if name is None or anchor is not None:
+            raise InputError("name: none is given; allowed: a preset's name, --camera or --noise; give one")
+        _copy(preset_file(name), out, ".toml")
+        return
+    _require_new(out, ".toml")
+    curves_file = out.parent / f"{out.stem}_curves.csv"
+    _require_new(curves_file, ".csv")
+    lender = None if name is None else read_preset(name)
+    measured = None if camera is None else measured_camera(camera) if _wants_curves(noise) else _if_measured(camera)
+    numbers = _numbers(noise, camera, iso, white_e)
+    if anchor is not None:
+        numbers = replace(numbers, efficiency=_anchor(anchor), source=f"{numbers.source}; anchor {anchor} as given")
+    if lender is not None:
+        numbers = completed(numbers, lender, str(name))
+    curves = curves_csv(numbers, measured)
+    title = f"{measured.maker} {measured.model}" if measured else camera or numbers.source.split(":")[0]
+    text = preset_text(f"{title}, as its sources tell it.", numbers, measured, curves_file.name if curves else "")
+    check_place(out)
+    files = {curves_file: curves, out: text} if curves else {out: text}
+    with replacing(*files) as places:
+        for place, content in zip(places, files.values(), strict=True):
+            place.write_text(content, "utf-8")
+    if missing(numbers):
+        say(
+            f"{out}: needed, and told by no source: {', '.join(missing(numbers))}; add them, or name a preset, "
+            "which lends them"
+        )
+    print(out)
+
+
+@app.command
+def cameras(copy: Path, /, *, out: Out) -> None:
+    """Convert a copy of rawtoaces-data (Academy Software Foundation, Apache-2.0) for --camera and rodcone list sensors.
+
+    Parameters
+    ----------
+    copy
+        Folder of the repository, as cloned.
+    out
+        Folder to write cameras.json into, its licence beside it. The environment variable RODCONE_CAMERAS names it
+        afterwards.
+    """
+    print(convert(copy, out))
 
 
 @app.command
@@ -83,11 +158,56 @@ def _named(study_file: Path) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _copy(source: Path, out: Path, ending: str, beside: Mapping[Path, Path] = MappingProxyType({})) -> None:
-    """Copy a file to a new one, after the files that belong beside it, and print its path."""
+def _wants_curves(noise: Path | None) -> bool:
+    """Whether --camera names a measured response; beside darktable's file it may name that file's camera alone."""
+    return noise is None or noise.suffix.lower() != ".json"
+
+
+def _if_measured(camera: str) -> MeasuredCamera | None:
+    """Measured response where one of that name is at hand."""
+    return measured_camera(camera) if camera.lower() in {each.lower() for each in measured_cameras()} else None
+
+
+def _numbers(noise: Path | None, camera: str | None, iso: float | None, white_e: float | None) -> PixelNumbers:
+    ending = None if noise is None else noise.suffix.lower()
+    if (iso is not None or white_e is not None) and ending != ".json":
+        raise InputError(
+            "iso: it has no place here; allowed: --iso and --white-e with a noiseprofiles.json; leave it out"
+        )
+    if noise is None:
+        return PixelNumbers("no source of noise is given")
+    if ending == ".toml":
+        return numbers_of(read_report(noise))
+    if ending == ".json":
+        if camera is None:
+            raise InputError("camera: none is given; allowed: maker and model as in the file; give --camera")
+        return darktable_numbers(noise, camera, iso, white_e)
+    if ending == ".dng":
+        return dng_numbers(noise)
+    raise InputError(f"noise: {str(noise)!r} has another ending; allowed: .toml, .dng, .json; rename it")
+
+
+def _anchor(text: str) -> tuple[float, float]:
+    """Quantum efficiency and its wavelength [nm] from a text such as 0.5@530."""
+    parts = text.split("@")
+    try:
+        value, at_nm = (float(part) for part in parts)
+    except ValueError:
+        raise InputError(f"anchor: {text!r} is not allowed; give electrons a photon @ nm, such as 0.5@530") from None
+    require_range("anchor", value, 1e-6, 1.0, "give electrons per photon, such as 0.5@530")
+    require_range("anchor", at_nm, 300.0, 1100.0, "give the wavelength in nm, such as 0.5@530")
+    return value, at_nm
+
+
+def _require_new(out: Path, ending: str) -> None:
     require_ending(out, ending)
     if out.exists():
         raise InputError(f"out: {str(out)!r} exists; allowed: a new file; choose another name or remove it")
+
+
+def _copy(source: Path, out: Path, ending: str, beside: Mapping[Path, Path] = MappingProxyType({})) -> None:
+    """Copy a file to a new one, after the files that belong beside it, and print its path."""
+    _require_new(out, ending)
     for target, other in {**beside, out: source}.items():
         if target != out:
             target.parent.mkdir(exist_ok=True)

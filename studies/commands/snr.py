@@ -17,6 +17,7 @@ from studies.pages.snr_chart import snr_svg
 from studies.photograph.snr import GREY, light_for_snr
 from studies.study.exposures import parse_exposure
 
+RELATIVE = "*"  # behind the name of a sensor whose responses are relative
 HEAD = ("sensor", "channel", "electrons", "cd/m2", f"lux on {GREY:.0%} grey")
 
 
@@ -64,22 +65,32 @@ def snr(
     found = {name: light_for_snr(at, sensor, light, exposure_s) for name, sensor in opened.items()}
     if out is not None:
         with replacing(out) as (place,):
-            place.write_text(snr_svg(opened, light, exposure_s, at), "utf-8")
+            shown = {f"{name}{RELATIVE * each.responses.relative}": each for name, each in opened.items()}
+            place.write_text(snr_svg(shown, light, exposure_s, at), "utf-8")
     if json:
-        rows = {name: [{k: None if v == float("inf") else v for k, v in asdict(x).items()} for x in of]
-                for name, of in found.items()}  # fmt: skip
+        rows = {
+            name: [{k: None if v == float("inf") else v for k, v in asdict(x).items()}
+                   | {"relative": opened[name].responses.relative} for x in of]
+            for name, of in found.items()
+        }  # fmt: skip
         print(notation.dumps(rows))
         return
     print_table(
         HEAD,
         [
-            (name, x.channel, *(MISSING if isinf(value) else f"{value:.4g}" for value in figures))
+            (
+                f"{name}{RELATIVE * opened[name].responses.relative}",
+                x.channel,
+                *(MISSING if isinf(value) else f"{value:.4g}" for value in figures),
+            )
             for name, of in found.items()
             for x in of
             for figures in [(x.electrons, x.luminance_cd_m2, x.illuminance_lux)]
         ],
         words=2,
     )
+    if any(sensor.responses.relative for sensor in opened.values()):
+        print(f"{RELATIVE} its responses are relative: the light of its rows holds up to one factor")
     if any(isinf(x.electrons) for of in found.values() for x in of):
         print(f"{MISSING}: no light is enough: the well is full before, or fixed patterns alone are 1/{at:g} of it")
 

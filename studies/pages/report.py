@@ -17,6 +17,7 @@ from studies.pages import report_text as text
 from studies.pages.page import address, own_file, write_out
 from studies.pages.report_charts import SHARE, group_charts, shown_metrics, speed_charts, speed_rows
 from studies.pages.report_data import ReportCell, ReportData, ReportLevel
+from studies.pages.snr_table import snr_over_light
 
 # What stands beneath each picture beside the metrics, in this order: key of the cell's view, label.
 FURTHER_ROWS = (
@@ -211,5 +212,6 @@ def render_report(report: ReportData, pictures: Mapping[str, bytes]) -> str:
         speed_charts=speed_charts(speed),
         # Effect and cost, as `sensor.optics.left_out` parts them.
         left_out=[line.partition(": ")[::2] for line in report.left_out],
+        snr=snr_over_light({each.name: each.config for each in report.sensors if each.config}),
         text=text,
     )

@@ -23,9 +23,8 @@ def snr_svg(sensors: Mapping[str, SensorConfig], light: str, exposure_s: float, 
     for index, (name, sensor) in enumerate(sensors.items()):
         for channel, ratio in snr_at(luminance, sensor, light, exposure_s).items():
             colour = CHANNEL_COLOURS.get(channel, SOFT)
-            axes.semilogx(
-                luminance, 20 * np.log10(ratio), LINES[index % len(LINES)], color=colour, label=f"{name} {channel}"
-            )
+            line, label = LINES[index % len(LINES)], f"{name} {channel}".replace("$", r"\$")  # a formula's sign
+            axes.semilogx(luminance, 20 * np.log10(ratio), line, color=colour, label=label)
     axes.axhline(20 * np.log10(mark), color=SOFT, linewidth=0.8)
     axes.set(title=f"SNR of a pixel [dB], {light}, {1e3 * exposure_s:g} ms", xlabel="cd/m²", ylim=(-20, None))
     plain_ticks(axes)

@@ -1,5 +1,6 @@
 """Every reader of outside files, with small valid files of the project's own writers to begin from."""
 
+import json
 import sys
 import tempfile
 from collections.abc import Callable, Mapping
@@ -20,6 +21,9 @@ from render.radiance_files.iset import read_iset_scene
 from render.user_scene.scene_file import load_scene_file
 from scenes.catalog import load
 from sensor.calibration import ColourCalibration
+from sensor.cameras.emva_report import numbers_of, read_report
+from sensor.cameras.library import read_library
+from sensor.cameras.noise_files import darktable_numbers
 from sensor.config_file import read_sensor
 from sensor.curves import read_csv, read_curve
 from sensor.raw import RawImage
@@ -339,6 +343,41 @@ def _ledger_samples() -> list[Sample]:
     return [_made(write)]
 
 
+_REPORT = b"""camera = "X"
+maker = "M"
+source = "report"
+date = "2020-01-02"
+bits = 12
+black_level_dn = 64
+[report]
+pixel_pitch_um = 3.45
+K = 0.4
+sigma_d = 2.5
+mu_I = 3.0
+exposure_s = 0.1
+DSNU1288 = 1.5
+PRNU1288 = 0.6
+eta = 64
+lambda_nm = 529
+mu_e_sat = 9500
+"""
+_PROFILES = b"""{"noiseprofiles": [{"maker": "A", "models": [{"model": "B", "profiles": [
+{"iso": 100, "a": [4e-6, 2e-6, 3e-6], "b": [2e-8, 1e-8, 2e-8]},
+{"iso": 200, "a": [8e-6, 4e-6, 6e-6], "b": [3e-8, 2e-8, 3e-8], "skip": true}]}]}]}
+"""
+
+
+def _library_samples() -> list[Sample]:
+    curves = {channel: [index * 100 for index in range(9)] for channel in "RGB"}
+    camera = {"maker": "A", "model": "B", "creator": "lab", "date": "2025-01-01", "curves": curves}
+    content = {"source": "s", "licence": "l", "range_nm": [380, 780, 50], "cameras": [camera, {**camera, "model": "C"}]}
+    return [{"cameras.json": json.dumps(content).encode()}]
+
+
+def _read_library(path: Path) -> object:
+    return [camera.responses for camera in read_library(path, path.stat().st_mtime_ns).values()]
+
+
 TARGETS: dict[str, Target] = {
     "exr": Target(_exr_samples, {".exr": any_bytes}, read_exr),
     "mat": Target(_mat_samples, {".mat": mat_elements}, read_iset_scene, in_child=True),
@@ -348,6 +387,15 @@ TARGETS: dict[str, Target] = {
     "noise_profile": Target(_camera_samples, {".dng": tiff_tags}, lambda path: read_noise_profile(path, 1000.0)),
     "study": Target(_study_samples, {".toml": any_text}, read_study),
     "sensor": Target(_sensor_samples, {".toml": any_text, ".csv": any_text}, read_sensor),
+    "report": Target(
+        lambda: [{"report.toml": _REPORT}], {".toml": any_text}, lambda path: numbers_of(read_report(path))
+    ),
+    "darktable": Target(
+        lambda: [{"noiseprofiles.json": _PROFILES}],
+        {".json": any_text},
+        lambda path: darktable_numbers(path, "A B", 100.0, 5e4),
+    ),
+    "library": Target(_library_samples, {".json": json_values}, _read_library),
     "curves": Target(_curve_samples, {".csv": any_text}, _read_curves),
     "scene": Target(_scene_samples, {".xml": any_text, ".spd": any_text}, load_scene_file),
     "cache": Target(_cache_samples, {".npz": any_bytes}, _read_cached),

@@ -1,0 +1,1 @@
+"""Cameras that exist: measured responses, published noise, and preset files made of them."""

@@ -1,0 +1,203 @@
+"""An EMVA 1288 report as a short TOML file in the report's own symbols, and the pixel that it describes.
+
+Equations are numbered as in release 4.0 Linear of the standard.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtr
+
+from rodcone.errors import InputError, one_line, require_keys, require_range, require_whole
+from rodcone.toml_file import read_toml
+from sensor.cameras.numbers import PixelNumbers, Sourced
+
+# Symbols, each with what is allowed and its unit. Those of RESULTS follow from the others: a check, and no input.
+INPUTS = {
+    "pixel_pitch_um": (1e-3, 1e4, "micrometres"),
+    "K": (1e-9, 1e9, "DN per electron; 1 / (e-/DN) where the report gives that"),
+    "sigma_d": (0.0, 1e9, "electrons"),
+    "DSNU1288": (0.0, 1e9, "electrons"),
+    "PRNU1288": (0.0, 100.0, "per cent"),
+    "mu_e_sat": (1.0, 1e12, "electrons"),
+    "mu_I": (0.0, 1e12, "electrons per second"),
+    "eta": (1e-6, 100.0, "per cent, the whole pixel's at lambda_nm"),
+    "lambda_nm": (100.0, 20_000.0, "nanometres"),
+    "exposure_s": (0.0, 1e6, "seconds"),
+}
+RESULTS = {
+    "SNR_max_dB": (0.0, 300.0, "decibels"),
+    "DR_dB": (0.0, 300.0, "decibels"),
+    "mu_e_min": (0.0, 1e9, "electrons"),
+    "SNR_50_dB": (0.0, 300.0, "decibels, at half of saturation"),
+}
+_TEXTS = ("camera", "maker", "source", "date")
+_WHOLE = {"bits": (1, 16), "black_level_dn": (0, 65_534)}
+
+
+@dataclass(frozen=True)
+class EmvaReport:
+    """What a report says.
+
+    Attributes
+    ----------
+    camera, maker, source, date : str
+        The camera with its operating point; where the numbers stand, and when that was published.
+    bits, black_level_dn : int or None
+        Of the operating point; None where not told.
+    figures : mapping of str to float
+        By symbol of `INPUTS` and `RESULTS`.
+    """
+
+    camera: str
+    maker: str
+    source: str
+    date: str
+    bits: int | None
+    black_level_dn: int | None
+    figures: Mapping[str, float]
+
+    @property
+    def told(self) -> str:
+        """The source with its date, on one line."""
+        return " ".join(f"{self.source}, {self.date}".split())
+
+
+def read_report(path: Path) -> EmvaReport:
+    """Read a report.
+
+    Parameters
+    ----------
+    path : Path
+        TOML: ``camera``, ``maker``, ``source``, ``date``, optionally ``bits`` and ``black_level_dn``, and a table
+        ``[report]`` with symbols of `INPUTS` and `RESULTS`.
+
+    Raises
+    ------
+    InputError
+        For a file that can't be read, an unknown or missing key, or a value out of range; the file is named.
+    """
+    try:
+        content = read_toml(path)
+        return _report(content)
+    except InputError as error:
+        raise InputError(f"EMVA report {str(path)!r}: {error}") from error
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"EMVA report: {str(path)!r} can't be read ({one_line(error)}); give a TOML file with a table [report]"
+        ) from error
+
+
+def numbers_of(report: EmvaReport) -> PixelNumbers:
+    """Pixel of a report; what the report doesn't tell is left out.
+
+    The well clips where the converter does: at (2^bits - 1 - black) / K. Where a report lacks one of the three, the
+    clip follows from its saturation capacity (`clip_over_saturation`).
+    """
+    told, figures = report.told, report.figures
+    pixel: dict[str, Sourced] = {}
+    settings: dict[str, Sourced] = {}
+    left_out: dict[str, str] = {}
+    # settings
+    for key, whole in (("bits", report.bits), ("black_level_dn", report.black_level_dn)):
+        if whole is not None:
+            settings[key] = Sourced(whole, told)
+    # pixel
+    if "pixel_pitch_um" in figures:
+        pixel["pitch_um"] = Sourced(figures["pixel_pitch_um"], f"pixel pitch; {told}")
+    pixel["fill_factor"] = Sourced(1.0, "an EMVA quantum efficiency is the whole pixel's, its fill factor included")
+    if "K" in figures and report.bits is not None and report.black_level_dn is not None:
+        top_dn = 2**report.bits - 1 - report.black_level_dn
+        pixel["full_well_e"] = Sourced(
+            top_dn / figures["K"],
+            f"where the converter ends: {top_dn} DN above black over K = {figures['K']:g} DN/e- (eq. 50); {told}",
+        )
+    elif "mu_e_sat" in figures:
+        value = figures["mu_e_sat"]
+        clip_e = clip_over_saturation(value, figures.get("sigma_d", 0.0), figures.get("PRNU1288", 0.0) / 100)
+        words = f"the clip whose variance is greatest at the saturation capacity, mu_e.sat = {value:g} e-"
+        pixel["full_well_e"] = Sourced(clip_e, f"{words}; {told}")
+    if "sigma_d" in figures:
+        pixel["read_noise_e"], note = _read_noise(figures, told)
+        left_out |= note
+    if "DSNU1288" in figures:
+        pixel["dsnu_e"] = Sourced(figures["DSNU1288"], f"DSNU1288 (eq. 66); {told}")
+    if "PRNU1288" in figures:
+        value = figures["PRNU1288"]
+        pixel["prnu"] = Sourced(value / 100, f"PRNU1288 (eq. 67), {value:g} per cent; {told}")
+    if "mu_I" in figures:
+        pixel["dark_current_e_per_s"] = Sourced(figures["mu_I"], f"mu_I (eq. 29), at the report's temperature; {told}")
+    efficiency = None
+    if "eta" in figures:
+        efficiency = (figures["eta"] / 100, figures["lambda_nm"])
+    return PixelNumbers(f"{report.camera}: {told}", pixel, settings, left_out, efficiency)
+
+
+def clip_over_saturation(saturation_e: float, sigma_d: float, prnu: float) -> float:
+    """Electrons at which pixels clip, from the light at which their temporal variance is greatest, mu_e.sat.
+
+    The variance of min(n, clip) for a normal n of variance mean + sigma_d^2, averaged over pixels whose means spread by
+    PRNU, falls as soon as some pixels clip: mu_e.sat lies two to three standard deviations under the clip.
+    """
+    nodes, weights = np.polynomial.hermite_e.hermegauss(15)
+    light_e = saturation_e * np.linspace(0.5, 1.5, 2001)  # a step is 0.05 %
+    mean_e = light_e[:, None] * (1 + prnu * nodes)
+    own = np.maximum(mean_e, 0.0) + sigma_d**2
+    clip_e = saturation_e
+    for _ in range(8):  # the correction is a few per cent at first, and then what the last one missed
+        z = (clip_e - mean_e) / np.sqrt(own)
+        above, density = ndtr(-z), np.exp(-(z**2) / 2) / sqrt(2 * pi)
+        first, second = z * above - density, 1 - above - z * density + z**2 * above
+        variance = (own * (second - first**2)) @ weights
+        clip_e += saturation_e - light_e[np.argmax(variance)]
+    return float(clip_e)
+
+
+def _read_noise(figures: Mapping[str, float], told: str) -> tuple[Sourced, dict[str, str]]:
+    """Read noise from sigma_d, which holds the dark current's shot noise too, and a word on what isn't told."""
+    sigma_d, current, exposure_s = (figures.get(key) for key in ("sigma_d", "mu_I", "exposure_s"))
+    sigma_d = float(sigma_d or 0.0)
+    if current is None:
+        why = "not told; its shot noise at the report's exposure is in read_noise_e"
+        return Sourced(sigma_d, f"temporal dark noise sigma_d; {told}"), {"dark_current_e_per_s": why}
+    if exposure_s is None or sigma_d**2 <= current * exposure_s:
+        return Sourced(sigma_d, f"temporal dark noise sigma_d, mu_I's shot noise in it; {told}"), {}
+    value = float((sigma_d**2 - current * exposure_s) ** 0.5)
+    return Sourced(
+        value, f"root of sigma_d^2 = {sigma_d:g}^2 less mu_I t = {current * exposure_s:g} (eq. 30); {told}"
+    ), {}
+
+
+def _report(content: Mapping[str, Any]) -> EmvaReport:
+    require_keys("key", content, [*_TEXTS, *_WHOLE, "report"])
+    for key in _TEXTS:
+        value = content.get(key)
+        if not isinstance(value, str) or not 0 < len(value.strip()) <= 1000:
+            raise InputError(
+                f"{key}: {value!r} is no text; allowed: words in quotes, which every number's source needs"
+            )
+    for key, (least, most) in _WHOLE.items():
+        if key in content:
+            require_whole(key, content[key], least, most, "give the report's own")
+    table = content.get("report")
+    if not isinstance(table, dict):
+        raise InputError(f"report: {table!r} is not a table; allowed: [report] and its symbols; add it")
+    limits = {**INPUTS, **RESULTS}
+    require_keys("symbol", table, limits)
+    for key, value in table.items():
+        low, high, unit = limits[key]
+        require_range(key, None if isinstance(value, bool) else value, low, high, f"give {unit}")
+    if ("eta" in table) != ("lambda_nm" in table):
+        raise InputError(
+            "eta: a quantum efficiency and its wavelength belong together; allowed: eta and lambda_nm; add"
+        )
+    figures = {key: float(value) for key, value in table.items()}
+    bits, black = (content.get(key) for key in _WHOLE)
+    if bits is not None and black is not None and black >= 2**bits - 1:
+        raise InputError(f"black_level_dn: {black!r} is not under the converter's {2**bits - 1}; correct one")
+    camera, maker, source, date = (content[key].strip() for key in _TEXTS)
+    return EmvaReport(camera, maker, source, date, bits, black, figures)

@@ -1,0 +1,199 @@
+"""Numbers of a pixel, each with its source, and the preset file that they make."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+
+import numpy as np
+
+from rodcone.errors import InputError
+from sensor.cameras.library import MeasuredCamera
+from sensor.cfa import Tile
+from sensor.config import PixelConfig, SensorConfig
+
+NEEDED = ("pitch_um", "fill_factor", "full_well_e", "read_noise_e", "dsnu_e", "prnu")  # keys without a default
+_OFF = {  # what a term that a source says nothing of is, by key
+    "dark_current_e_per_s": "no dark current",
+    "column_gain_spread": "columns alike",
+    "column_offset_e": "columns alike",
+    "hot_pixel_share": "no hot pixels",
+    "crosstalk": "no crosstalk",
+}
+
+
+@dataclass(frozen=True)
+class Sourced:
+    """A number, and on one line where it comes from."""
+
+    value: float
+    source: str
+
+
+@dataclass(frozen=True)
+class PixelNumbers:
+    """What one source tells of a camera.
+
+    Attributes
+    ----------
+    source : str
+        The source as a whole, on one line.
+    pixel, settings : mapping of str to Sourced
+        By key of `PixelConfig`, and of `SensorConfig`: ``bits``, ``black_level_dn``.
+    left_out : mapping of str to str
+        Why a key can't be told; a source without a word for a key says nothing of it.
+    efficiency : (float, float) or None
+        Electrons per photon at a wavelength [nm].
+    cfa : tuple of str
+        Mosaic; empty where not told.
+    """
+
+    source: str
+    pixel: Mapping[str, Sourced] = field(default_factory=dict)
+    settings: Mapping[str, Sourced] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    efficiency: tuple[float, float] | None = None
+    cfa: Tile = ()
+
+
+def bits_of(white_dn: float, source: str) -> Sourced:
+    """Bits of the converter whose top is a white level, or next above it."""
+    bits = int(white_dn).bit_length()
+    top = 2**bits - 1
+    finer = (
+        ""
+        if top == white_dn
+        else f"; the simulated converter ends at {top}, so its DN are {top / white_dn:.3f} times as fine"
+    )
+    return Sourced(bits, f"white level {white_dn:g} of {source}{finer}")
+
+
+def missing(numbers: PixelNumbers) -> list[str]:
+    """Keys that a camera needs and the source doesn't tell."""
+    return [key for key in NEEDED if key not in numbers.pixel]
+
+
+def completed(numbers: PixelNumbers, sensor: SensorConfig, name: str) -> PixelNumbers:
+    """Numbers with what is missing taken from another camera, and said so."""
+    lent = {key: Sourced(getattr(sensor.pixel, key), f"of {name}, not of this camera") for key in missing(numbers)}
+    return replace(numbers, pixel={**numbers.pixel, **lent})
+
+
+def preset_text(title: str, numbers: PixelNumbers, camera: MeasuredCamera | None, curves: str) -> str:
+    """Preset file as `sensor.config_file.read_sensor` reads it, a source on every number.
+
+    Parameters
+    ----------
+    title : str
+        What the camera is, on one line.
+    curves : str
+        Name of the CSV of the responses, beside the file; empty for none.
+    """
+    lines = [f"# {_plain(title)}", f"# Numbers: {_plain(numbers.source)}", ""]
+    if numbers.cfa:
+        lines.append(
+            f"cfa = [{', '.join(f'{chr(34)}{row}{chr(34)}' for row in numbers.cfa)}]  # {_plain(numbers.source)}"
+        )
+    elif camera is not None or numbers.efficiency is None:
+        lines.append('cfa = "bayer"  # RG over GB: a choice; another phase of it, or another mosaic, is yours to set')
+    else:
+        lines.append('cfa = ["W"]  # one channel without a filter, named W: numbers of a monochrome chip')
+    lines += [_line(key, each) for key, each in numbers.settings.items()]
+    lines += ["", *_responses(numbers, camera, curves), "", "[pixel]"]
+    names = [each.name for each in fields(PixelConfig)]
+    lines += [_line(key, numbers.pixel[key]) for key in names if key in numbers.pixel]
+    words = dict.fromkeys(missing(numbers), "not told: needed, so give a number")
+    words |= {key: f"not told: {off}" for key, off in _OFF.items()} | dict(numbers.left_out)
+    lines += [f"# {key} =   # {_plain(why)}" for key, why in words.items() if key not in numbers.pixel]
+    return "\n".join([*lines, "", "[lens]", "f_number = 2.8  # a choice: no source of a sensor tells a lens", ""])
+
+
+def curves_csv(numbers: PixelNumbers, camera: MeasuredCamera | None) -> str:
+    """Responses as CSV: a measured camera's, its greatest 1, or a source's one wavelength; empty without either."""
+    if camera is not None:
+        curves = camera.responses.curves
+        nm, columns = camera.wavelength_nm, {name: curve.values for name, curve in curves.items()}
+    elif numbers.efficiency is not None:
+        value, at_nm = numbers.efficiency
+        nm, columns = np.array([at_nm - 1, at_nm + 1]), {"W": np.array([value, value])}
+    else:
+        return ""
+    rows = [[f"{x:g}", *(f"{column[index]:.6f}" for column in columns.values())] for index, x in enumerate(nm)]
+    return "\n".join(",".join(row) for row in [["wavelength_nm", *columns], *rows]) + "\n"
+
+
+def greatest_response(numbers: PixelNumbers, camera: MeasuredCamera) -> float | None:
+    """Electrons per photon of a measured camera's greatest response, by a source's at one wavelength.
+
+    The channel that responds most there is taken for the one of which the source speaks. None without a source.
+
+    Raises
+    ------
+    InputError
+        For a wavelength at which the camera hardly responds, or a product over one electron a photon.
+    """
+    if numbers.efficiency is None:
+        return None
+    value, at_nm = numbers.efficiency
+    share = max(
+        float(np.interp(at_nm, curve.wavelength_nm, curve.values, left=0.0, right=0.0))
+        for curve in camera.responses.curves.values()
+    )
+    if not share > 0.05 or value / share > 1:
+        raise InputError(
+            f"anchor: {value:g} electrons a photon at {at_nm:g} nm, where {camera.maker} {camera.model} responds with "
+            f"{share:.3g} of its greatest, is not allowed; give a quantum efficiency near a peak, such as 0.5@530"
+        )
+    return value / share
+
+
+def _responses(numbers: PixelNumbers, camera: MeasuredCamera | None, curves: str) -> Sequence[str]:
+    if camera is not None:
+        greatest = greatest_response(numbers, camera)
+        by = f"{camera.source} ({camera.licence}); {camera.text}"
+        shared = "" if camera.balanced else "; each channel was divided by its own maximum: their ratios aren't known"
+        known = (
+            'quantum_efficiency = "relative"  # no anchor: electrons hold up to one factor; a number here fixes it'
+            if greatest is None
+            else f"quantum_efficiency = {greatest:.6g}  # of the greatest response: {_anchor(numbers)}"
+        )
+        return [
+            "[responses]",
+            f'csv = "{curves}"  # {_plain(by)}',
+            f"# per photon, greatest 1: published per radiant power, divided by the wavelength{shared}",
+            _range_line(*camera.wavelength_nm[[0, -1]]),
+            known,
+        ]
+    if numbers.efficiency is None:
+        return ["# [responses] is left out: not told. The project's own curves stand in, not this camera's."]
+    value, at_nm = numbers.efficiency
+    return [
+        "[responses]",
+        f'csv = "{curves}"  # {value:g} electrons a photon at {at_nm:g} nm: {_plain(numbers.source)}',
+        "# Elsewhere the response isn't told, and is 0: put a whole curve in its place before you photograph a scene.",
+        _range_line(at_nm - 1, at_nm + 1),
+        'quantum_efficiency = "included"',
+    ]
+
+
+def _range_line(first_nm: float, last_nm: float) -> str:
+    return f"range_nm = [{float(first_nm)!r}, {float(last_nm)!r}]"
+
+
+def _anchor(numbers: PixelNumbers) -> str:
+    value, at_nm = numbers.efficiency or (0.0, 0.0)
+    return f"{value:g} at {at_nm:g} nm, {_plain(numbers.source)}"
+
+
+def _line(key: str, each: Sourced) -> str:
+    whole = key in ("bits", "black_level_dn")
+    return f"{key} = {int(each.value) if whole else repr(float(each.value))}  # {_plain(each.source)}"
+
+
+def _plain(text: str) -> str:
+    """Words of a text on one line, without what TOML forbids in a comment."""
+    return " ".join("".join(each if each.isprintable() else " " for each in text).split())
+
+
+def file_name(path: Path) -> str:
+    """Name of the CSV beside a preset file."""
+    return f"{path.stem}_curves.csv"

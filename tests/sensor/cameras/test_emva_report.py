@@ -1,0 +1,156 @@
+"""EMVA 1288 reports as TOML: each symbol's conversion, what is left out, the shipped ones, and what is refused."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rodcone.errors import InputError
+from sensor.cameras.emva_report import clip_over_saturation, numbers_of, read_report
+from sensor.cameras.numbers import curves_csv, missing, preset_text
+from sensor.config_file import read_sensor
+
+REPORTS = sorted((Path(__file__).parents[3] / "sensor" / "cameras" / "reports").glob("*.toml"))
+HEAD = 'camera = "X1"\nmaker = "M"\nsource = "report 7"\ndate = "2020-01-02"\n'
+WHOLE = """bits = 12
+black_level_dn = 95
+[report]
+pixel_pitch_um = 3.5
+K = 0.4
+sigma_d = 5.0
+DSNU1288 = 2.0
+PRNU1288 = 0.5
+mu_e_sat = 9500
+mu_I = 100.0
+exposure_s = 0.09
+eta = 60
+lambda_nm = 530
+SNR_max_dB = 39.8
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "report.toml"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_each_symbol_becomes_the_pixels_number_with_its_equation_and_source(tmp_path):
+    numbers = numbers_of(read_report(write(tmp_path, HEAD + WHOLE)))
+    values = {key: each.value for key, each in numbers.pixel.items()}
+    assert values == pytest.approx(
+        {
+            "pitch_um": 3.5,
+            "fill_factor": 1.0,
+            "full_well_e": 4000 / 0.4,  # (2^12 - 1 - 95) / K
+            "read_noise_e": 4.0,  # sqrt(5^2 - 100 / s * 0.09 s)
+            "dsnu_e": 2.0,
+            "prnu": 0.005,
+            "dark_current_e_per_s": 100.0,
+        }
+    )
+    for key, equation in (("full_well_e", "50"), ("read_noise_e", "30"), ("dsnu_e", "66"), ("prnu", "67")):
+        assert f"(eq. {equation})" in numbers.pixel[key].source
+    sourced = [each for key, each in numbers.pixel.items() if key != "fill_factor"]
+    assert all("report 7, 2020-01-02" in each.source for each in (*sourced, *numbers.settings.values()))
+    assert numbers.efficiency == (0.6, 530.0)
+    assert missing(numbers) == []
+
+
+def test_the_preset_of_a_report_reads_as_a_camera_and_has_a_word_on_every_key(tmp_path):
+    numbers = numbers_of(read_report(write(tmp_path, HEAD + WHOLE)))
+    path = tmp_path / "camera.toml"
+    path.write_text(preset_text("X1", numbers, None, "camera_curves.csv"), "utf-8")
+    (tmp_path / "camera_curves.csv").write_text(curves_csv(numbers, None), "utf-8")
+    sensor = read_sensor(path)
+    assert (sensor.cfa, sensor.bits, sensor.black_dn) == (("W",), 12, 95)
+    assert sensor.gain_e_per_dn == pytest.approx(1 / 0.4)  # the report's K comes back
+    # electrons are told at 530 nm alone
+    assert sensor.responses.band_average(("W",), [530.0, 600.0], [1.0, 1.0])[0] == pytest.approx([0.6, 0.0])
+    for line in path.read_text("utf-8").splitlines():
+        assert "=" not in line.split("#")[0] or "# " in line or line.startswith(("csv", "quantum", "range"))
+    assert "crosstalk =   # not told" in path.read_text("utf-8")
+
+
+def test_what_a_report_does_not_tell_is_left_out(tmp_path):
+    numbers = numbers_of(read_report(write(tmp_path, HEAD + "[report]\nsigma_d = 2.5\n")))
+    assert {key: each.value for key, each in numbers.pixel.items()} == {"fill_factor": 1.0, "read_noise_e": 2.5}
+    assert missing(numbers) == ["pitch_um", "full_well_e", "dsnu_e", "prnu"]
+    assert "in read_noise_e" in numbers.left_out["dark_current_e_per_s"]
+    text = preset_text("X1", numbers, None, "")
+    assert tomllib.loads(text)["pixel"] == {"fill_factor": 1.0, "read_noise_e": 2.5}
+    assert "# full_well_e =   # not told: needed" in text
+
+
+@pytest.mark.parametrize(("saturation", "prnu"), [(2000.0, 0.0), (10_000.0, 0.0), (10_000.0, 0.01)])
+def test_the_clip_is_where_the_variance_of_clipped_pixels_is_greatest_at_the_saturation(saturation, prnu):
+    clip = clip_over_saturation(saturation, 5.0, prnu)
+    rng = np.random.default_rng(1)
+    shares = np.linspace(0.96, 1.04, 17)
+    draws, spread = rng.standard_normal((400, 5000)), 1 + prnu * rng.standard_normal(5000)
+    variance = []
+    for mean in saturation * shares:
+        means = mean * spread
+        variance.append(np.minimum(means + draws * np.sqrt(means + 25), clip).var(axis=0).mean())
+    curve = np.polynomial.Polynomial.fit(shares, variance, 3)
+    fine = np.linspace(0.96, 1.04, 801)
+    # 2e6 draws and a cubic through a flat maximum: its place is known to some 0.5 %
+    assert fine[np.argmax(curve(fine))] == pytest.approx(1.0, abs=0.012)
+    assert clip > saturation
+
+
+@pytest.mark.parametrize("path", REPORTS, ids=lambda path: path.stem)
+def test_a_shipped_report_reads_has_source_and_date_and_gives_a_pixel(path):
+    report = read_report(path)
+    assert len(report.source) > 20
+    assert report.date
+    assert {"full_well_e", "read_noise_e"} <= set(numbers_of(report).pixel)
+
+
+def test_five_makers_or_more_are_shipped():
+    assert len({read_report(path).maker for path in REPORTS}) >= 5
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "camera: None"),
+        ("camera = 5", "camera: 5"),
+        (HEAD, "report: None"),
+        (HEAD + "report = 5", "report: 5"),
+        (HEAD + "[report]\nsigma = 2", "symbol: 'sigma' is unknown"),
+        (HEAD + "[report]\nsigma_d = -2", "sigma_d: -2"),
+        (HEAD + "[report]\nsigma_d = true", "sigma_d: None"),
+        (HEAD + "[report]\nsigma_d = nan", "sigma_d: nan"),
+        (HEAD + '[report]\nsigma_d = "2"', "sigma_d: '2'"),
+        (HEAD + "[report]\nPRNU1288 = 1e9", "per cent"),
+        (HEAD + "[report]\neta = 60", "lambda_nm"),
+        (HEAD + "bits = 99\n[report]\n", "bits: 99"),
+        (HEAD + "bits = 8\nblack_level_dn = 255\n[report]\n", "not under the converter's 255"),
+        (HEAD + "extra = 1\n[report]\n", "key: 'extra'"),
+        ("a = " + "[" * 100_000, "nested too deep"),
+        ("\x00", "can't be read"),
+        (HEAD.replace("report 7", "x" * 5000) + "[report]\n", "source:"),
+    ],
+)
+def test_a_hostile_report_is_refused_in_one_line_that_names_it(tmp_path, text, words):
+    with pytest.raises(InputError) as error:
+        read_report(write(tmp_path, text))
+    assert words in str(error.value)
+    assert "report.toml" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_report_that_is_a_folder_or_absent_is_refused(tmp_path):
+    for path in (tmp_path, tmp_path / "absent.toml"):
+        with pytest.raises(InputError, match="can't be read"):
+            read_report(path)
+
+
+def test_a_source_of_many_lines_stays_a_comment(tmp_path):
+    report = (
+        HEAD.replace('"report 7"', '"""a\n[pixel]\nprnu = 0.5\u2028x\\u0007\\u0000"""') + "[report]\nsigma_d = 2.5\n"
+    )
+    text = preset_text("X1", numbers_of(read_report(write(tmp_path, report))), None, "")
+    assert tomllib.loads(text)["pixel"] == {"fill_factor": 1.0, "read_noise_e": 2.5}

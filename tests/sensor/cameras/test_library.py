@@ -1,0 +1,213 @@
+"""Measured responses: conversion of a copy, reading by name, and white balances beside LibRaw's."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from render.illuminants import illuminant
+from render.photometry import photons_per_joule
+from rodcone.errors import InputError
+from sensor.cameras.convert import convert
+from sensor.cameras.library import FILE, VARIABLE, measured_camera, measured_cameras
+from sensor.raw_files.dng import rational
+from sensor.raw_files.tiff import CFA, Values, text, write_mosaic
+
+NM = np.arange(380, 785, 5)
+
+
+def camera_json(**changes):
+    """One camera as rawtoaces-data has it: bell curves, of equal power, green's greatest 1."""
+    peaks = {"R": (600, 0.6), "G": (540, 1.0), "B": (460, 0.8)}
+    curves = [peak * np.exp(-(((NM - at) / 40) ** 2)) for at, peak in peaks.values()]
+    header = {
+        "manufacturer": "Maker",
+        "model": "Model One",
+        "document_creator": "lab",
+        "document_creation_date": "2025-11-09T20:35:04Z",
+        "license": "Apache-2.0",
+        "measurement_equipment": "double monochromator",
+    }
+    rows = {str(nm): [float(curve[index]) for curve in curves] for index, nm in enumerate(NM)}
+    data = {"units": "relative", "index": {"main": ["R", "G", "B"]}, "data": {"main": rows}}
+    content = {"header": header, "spectral_data": data}
+    for path, value in changes.items():
+        part = content
+        *parents, key = path.split("__")
+        for parent in parents:
+            part = part[parent]
+        part[key] = value
+    return content
+
+
+def copy_of(folder: Path, *cameras) -> Path:
+    (folder / "data" / "camera").mkdir(parents=True)
+    (folder / "LICENSE").write_text("Apache License, Version 2.0", "utf-8")
+    for index, each in enumerate(cameras):
+        held = each if isinstance(each, str) else json.dumps(each)
+        (folder / "data" / "camera" / f"{index}.json").write_text(held, "utf-8")
+    return folder
+
+
+@pytest.fixture
+def library(tmp_path, monkeypatch) -> Path:
+    own = camera_json(header__model="Alone", header__document_creator="other")
+    for channel in range(3):
+        most = max(row[channel] for row in own["spectral_data"]["data"]["main"].values())
+        for row in own["spectral_data"]["data"]["main"].values():
+            row[channel] /= most
+    path = convert(copy_of(tmp_path / "copy", camera_json(), own), tmp_path / "made")
+    monkeypatch.setenv(VARIABLE, str(path.parent))
+    return path
+
+
+def test_a_camera_is_what_its_file_says_with_licence_and_notice_beside_it(library):
+    found = measured_camera("maker  MODEL one")
+    assert list(measured_cameras()) == ["Maker Model One", "Maker Alone"]
+    assert (found.maker, found.date, found.licence) == ("Maker", "2025-11-09", "Apache-2.0")
+    assert found.text == "lab, 2025-11-09, double monochromator"
+    green = np.array([row[1] for row in camera_json()["spectral_data"]["data"]["main"].values()])
+    assert np.abs(found.per_power["G"] - green).max() <= 0.5e-5 + 1e-12  # half a step of the file
+    assert sorted(path.name for path in library.parent.iterdir()) == ["LICENSE", "NOTICE", FILE]
+    assert "Apache License" in (library.parent / "NOTICE").read_text("utf-8")
+
+
+def test_electrons_of_equal_photons_are_those_of_equal_power_over_the_wavelength(library):
+    found = measured_camera("Maker Model One")
+    curves = found.responses.curves
+    ratio = curves["R"].values[44] / curves["B"].values[16]  # at 600 and 460 nm
+    assert ratio == pytest.approx(0.6 / 0.8 * 460 / 600, rel=1e-4)
+    assert max(curve.values.max() for curve in curves.values()) == 1.0
+    assert found.responses.relative
+    # a light's photons times the response are its power times the published curve, up to one factor
+    power = illuminant("D65").band_average(NM, 5.0)
+    by_photons = [np.sum(power * photons_per_joule(NM) * curve.values) for curve in curves.values()]
+    by_power = [np.sum(power * curve) for curve in found.per_power.values()]
+    assert np.ptp(np.divide(by_photons, by_power)) < 1e-9 * by_photons[0] / by_power[0]
+
+
+def test_a_camera_whose_channels_were_divided_each_by_its_own_maximum_is_told(library):
+    assert measured_camera("Maker Model One").balanced
+    assert not measured_camera("Maker Alone").balanced
+
+
+@pytest.mark.parametrize(
+    ("camera", "words"),
+    [
+        ("{", "can't be read"),
+        ("[" * 100_000, "can't be read"),
+        ("[]", "TypeError"),
+        (camera_json(header__license="CC-BY-NC"), "licence 'CC-BY-NC'"),
+        (camera_json(spectral_data__units="A/W"), "no relative R, G and B"),
+        (camera_json(spectral_data__data__main={"380": [0.1, 0.2, 0.3]}), "wavelengths"),
+        (camera_json(spectral_data__data__main={str(nm): [0.1, float("nan"), 0.3] for nm in NM}), "not 0 to 1"),
+        (camera_json(spectral_data__data__main={str(nm): [0.1, -0.1, 0.3] for nm in NM}), "not 0 to 1"),
+        (camera_json(spectral_data__data__main={str(nm): [10, 20, 30] for nm in NM}), "not 0 to 1"),
+        (camera_json(header__document_creation_date=5), "TypeError"),
+    ],
+)
+def test_a_damaged_camera_is_refused_in_one_line_and_nothing_is_written(tmp_path, camera, words):
+    copy = copy_of(tmp_path / "copy", camera_json(), camera)
+    with pytest.raises(InputError) as error:
+        convert(copy, tmp_path / "made")
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "made").exists()
+
+
+def test_a_folder_that_is_no_copy_and_one_that_holds_cameras_are_refused(tmp_path, library):
+    with pytest.raises(InputError, match="a copy of rawtoaces-data"):
+        convert(tmp_path / "made", tmp_path / "other")
+    with pytest.raises(InputError, match="exists; allowed"):
+        convert(tmp_path / "copy", library.parent)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\xff\xfe",
+        b"[]",
+        b'{"source": "a", "licence": "b", "range_nm": [380, 780, 1e-9], "cameras": []}',
+        b'{"source": "", "licence": "", "range_nm": [380, 780, 5], "cameras": [{"model": "m", "curves": {"R": [1]}}]}',
+        b'{"source": "a", "licence": "b", "range_nm": [1e400, 780, 5], "cameras": []}',
+        b'{"range_nm": ' + b"[" * 100_000,
+    ],
+)
+def test_a_damaged_library_is_refused_in_one_line(tmp_path, monkeypatch, content):
+    (tmp_path / FILE).write_bytes(content)
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    with pytest.raises(InputError, match=r"measured responses: .* can't be read") as error:
+        measured_cameras()
+    assert "\n" not in str(error.value)
+
+
+def test_an_unknown_name_and_a_library_that_is_not_there_say_what_to_do(tmp_path, monkeypatch, library):
+    with pytest.raises(InputError, match="did you mean 'Maker Alone'"):
+        measured_camera("Maker Alon")
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "nowhere"))
+    with pytest.raises(InputError, match="holds no cameras"):
+        measured_cameras()
+    monkeypatch.delenv(VARIABLE)
+    monkeypatch.setattr("sensor.cameras.library._SHIPPED", tmp_path)
+    assert measured_cameras() == {}
+    with pytest.raises(InputError, match="rodcone new cameras COPY -o FOLDER"):
+        measured_camera("Maker Model One")
+
+
+# The real collection: where RODCONE_CAMERAS names it, or a distribution ships it.
+D65_XYZ = np.array([0.95047, 1.0, 1.08883])
+# Natural logarithm of a response over that by LibRaw's matrix for daylight: 5 % rms in red and 6 % in blue, over the 47
+# cameras that LibRaw knows and whose channels share a unit; the furthest is blue of the EOS R5 Mark II at 0.244.
+MOST_OFF = 0.25
+
+
+def libraw_daylight(path: Path, maker: str, model: str) -> np.ndarray | None:
+    """R and B over G of a white surface under D65, by LibRaw's matrix for a camera's name; None where it has none."""
+    rawpy = pytest.importorskip("rawpy", reason="rodcone[photographs] (LibRaw) is not installed")
+    tags: dict[int, tuple[str, Values]] = {
+        254: ("I", (0,)),
+        271: text(maker),
+        272: text(model),
+        274: ("H", (1,)),
+        33421: ("H", (2, 2)),
+        33422: ("B", bytes((0, 1, 1, 2))),
+        50706: ("B", bytes((1, 4, 0, 0))),
+        50707: ("B", bytes((1, 1, 0, 0))),
+        50708: text(f"{maker} {model}"),
+        50710: ("B", bytes((0, 1, 2))),
+        50711: ("H", (1,)),
+        50714: ("2I", rational((0,))),
+        50717: ("I", (16_000,)),
+    }
+    write_mosaic(path, np.full((40, 60), 1000, np.uint16), CFA, tags, {})
+    with rawpy.imread(str(path)) as opened:
+        white = np.array(opened.rgb_xyz_matrix)[:3] @ D65_XYZ
+    return white[[0, 2]] / white[1] if white[1] else None
+
+
+def test_all_cameras_open_and_their_daylight_balance_is_that_of_libraw(tmp_path):
+    cameras = measured_cameras()
+    if not cameras:
+        pytest.skip(f"no copy of rawtoaces-data here; rodcone new cameras COPY -o FOLDER, then {VARIABLE}=FOLDER")
+    assert len(cameras) >= 51
+    nm = np.arange(380.0, 781.0, 1.0)
+    off = {}
+    for name, camera in cameras.items():
+        curves = camera.responses.curves
+        white = {}
+        for light in ("D65", "A", "LED-B3"):
+            photons = illuminant(light).band_average(nm, 1.0) * photons_per_joule(nm)
+            white[light] = np.array([np.sum(curves[channel].band_average(nm, 1.0) * photons) for channel in "RGB"])
+            assert np.all(white[light] > 0), (name, light)
+        red_over_blue = {light: each[0] / each[2] for light, each in white.items()}
+        assert red_over_blue["A"] > 1.5 * red_over_blue["LED-B3"] > 1.5 * red_over_blue["D65"], name
+        own = white["D65"][[0, 2]] / white["D65"][1]
+        known = libraw_daylight(tmp_path / "a.dng", camera.maker, camera.model)
+        if known is not None and camera.balanced:
+            off[name] = np.log(own / known)
+    assert len(off) >= 40
+    assert {name: value for name, value in off.items() if np.abs(value).max() > MOST_OFF} == {}
+    median = np.median(list(off.values()), axis=0)
+    assert np.abs(median).max() < 0.05  # published as response to photons, they would be 0.08 and -0.09 off

@@ -1,0 +1,141 @@
+"""`rodcone new cameras`, `rodcone new preset --camera --noise`, `rodcone list sensors`: cameras that exist."""
+
+import json
+import tomllib
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import pytest
+
+from sensor.cameras.library import VARIABLE
+from sensor.config_file import read_sensor
+from studies.commands.cli import main
+
+_PATH = Path(__file__).parents[2] / "sensor" / "cameras" / "test_library.py"
+_SPEC = spec_from_file_location("library_sample", _PATH)
+sample = module_from_spec(_SPEC)
+_SPEC.loader.exec_module(sample)
+
+REPORT = Path(__file__).parents[3] / "sensor" / "cameras" / "reports" / "framos_imx900_lcg.toml"
+
+
+def call(capsys, *arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main([str(each) for each in arguments])
+    captured = capsys.readouterr()
+    return int(stopped.value.code or 0), captured.out, captured.err
+
+
+@pytest.fixture
+def cameras(tmp_path, monkeypatch, capsys):
+    copy = sample.copy_of(tmp_path / "copy", sample.camera_json())
+    assert call(capsys, "new", "cameras", copy, "-o", tmp_path / "made")[:2] == (
+        0,
+        f"{tmp_path / 'made/cameras.json'}\n",
+    )
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "made"))
+
+
+@pytest.mark.filterwarnings("default::sensor.curves.RelativeResponsesWarning")
+@pytest.mark.usefixtures("cameras")
+def test_a_measured_camera_is_listed_and_becomes_a_preset(tmp_path, capsys):
+    listed = json.loads(call(capsys, "list", "sensors", "--json")[1])["sensors"]
+    assert listed["Maker Model One"].startswith("Measured response, relative: lab, 2025-11-09")
+    path = tmp_path / "one.toml"
+    code, out, err = call(capsys, "new", "preset", "low_noise", "--camera", "maker model one", "-o", path)
+    assert (code, out, err) == (0, f"{path}\n", "")
+    assert (tmp_path / "one_curves.csv").is_file()
+    code, out, err = call(capsys, "snr", path, "low_noise")
+    assert code == 0
+    assert "hold up to one factor" in err
+    assert f"{path}*" in " ".join(out.split())
+    assert "* its responses are relative" in out
+    found = json.loads(call(capsys, "snr", path, "low_noise", "--json")[1])
+    assert [rows[0]["relative"] for rows in found.values()] == [True, False]
+
+
+@pytest.mark.usefixtures("cameras")
+def test_the_gallery_draws_each_measured_camera(tmp_path, capsys, monkeypatch):
+    path = tmp_path / "cameras.svg"
+    assert call(capsys, "list", "sensors", "-o", path)[0] == 0
+    assert "Maker Model One" in path.read_text("utf-8")
+    for arguments, words in ((("sensors", "-o", "a.png"), ".svg"), (("lights", "-o", path), "nothing to show")):
+        code, out, err = call(capsys, "list", *arguments)
+        assert (code, out, len(err.splitlines())) == (2, "", 1)
+        assert words in err
+    monkeypatch.delenv(VARIABLE)
+    monkeypatch.setattr("sensor.cameras.library._SHIPPED", tmp_path)
+    assert call(capsys, "list", "sensors", "-o", tmp_path / "b.svg")[0] == 2
+    assert not (tmp_path / "b.svg").exists()
+
+
+@pytest.mark.usefixtures("cameras")
+def test_an_anchor_makes_it_absolute_and_what_is_missing_is_told(tmp_path, capsys):
+    path = tmp_path / "one.toml"
+    code, _, err = call(capsys, "new", "preset", "--camera", "Maker Model One", "--anchor", "0.5@540", "-o", path)
+    assert code == 0
+    assert "needed, and told by no source: pitch_um, fill_factor, full_well_e" in err
+    assert tomllib.loads(path.read_text("utf-8"))["responses"]["quantum_efficiency"] == pytest.approx(0.5, rel=0.02)
+
+
+@pytest.mark.usefixtures("cameras")
+def test_a_report_gives_a_camera_of_its_own_or_the_noise_and_the_anchor_of_a_measured_one(tmp_path, capsys):
+    path = tmp_path / "report.toml"
+    assert call(capsys, "new", "preset", "--noise", REPORT, "-o", path)[0] == 0
+    sensor = read_sensor(path)
+    assert (sensor.cfa, sensor.pixel.pitch_um) == (("W",), 2.25)
+    both = tmp_path / "both.toml"
+    assert call(capsys, "new", "preset", "--noise", REPORT, "--camera", "Maker Model One", "-o", both)[0] == 0
+    sensor = read_sensor(both)
+    assert sensor.pixel.read_noise_e == 5.56
+    assert sensor.responses.band_average(("G",), [536.0], [0.1])[0, 0] == pytest.approx(0.9125, rel=2e-3)
+
+
+def test_a_profile_of_darktable_tells_the_noise_of_its_camera(tmp_path, capsys):
+    profiles = tmp_path / "noiseprofiles.json"
+    held = [{"iso": 100, "a": [1e-5, 3e-6, 1e-5], "b": [1e-8, 1e-8, 1e-8]}]
+    content = {"noiseprofiles": [{"maker": "A", "models": [{"model": "B", "profiles": held}]}]}
+    profiles.write_text(json.dumps(content), "utf-8")
+    path = tmp_path / "b.toml"
+    code, _, err = call(capsys, "new", "preset", "--camera", "A B", "--noise", profiles, "--white-e", "5e4", "-o", path)
+    assert code == 0, err
+    assert tomllib.loads(path.read_text("utf-8"))["pixel"]["full_well_e"] == 5e4
+
+
+@pytest.mark.usefixtures("cameras")
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "name: none is given"),
+        (["--anchor", "0.5@530"], "name: none is given"),
+        (["low_nois", "--camera", "Maker Model One"], "did you mean 'low_noise'"),
+        (["--camera", "Maker Model Two"], "did you mean 'Maker Model One'"),
+        (["--camera", "Maker Model One", "--anchor", "0.5"], "such as 0.5@530"),
+        (["--camera", "Maker Model One", "--anchor", "50@530"], "anchor: 50.0"),
+        (["--camera", "Maker Model One", "--anchor", "0.5@nan"], "anchor: nan"),
+        (["--camera", "Maker Model One", "--anchor", "0.5@@530"], "such as 0.5@530"),
+        (["--camera", "Maker Model One", "--iso", "100"], "--iso and --white-e with a noiseprofiles.json"),
+        (["--noise", "absent.toml"], "can't be read"),
+        (["--noise", "absent.json"], "give --camera"),
+        (["--noise", "absent.dng"], "there is no such file"),
+        (["--noise", "noise.xml"], "another ending"),
+    ],
+)
+def test_what_is_not_allowed_is_told_in_one_line_and_nothing_is_written(arguments, words, tmp_path, capsys):
+    code, out, err = call(capsys, "new", "preset", *arguments, "-o", tmp_path / "a.toml")
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert words in err
+    assert not (tmp_path / "a.toml").exists()
+    assert not (tmp_path / "a_curves.csv").exists()
+
+
+@pytest.mark.usefixtures("cameras")
+def test_neither_file_is_written_over(tmp_path, capsys):
+    for name in ("a.toml", "a_curves.csv"):
+        (tmp_path / name).write_text("mine", "utf-8")
+        code, _, err = call(capsys, "new", "preset", "--camera", "Maker Model One", "-o", tmp_path / "a.toml")
+        assert code == 2
+        assert f"{name}' exists" in err
+        assert (tmp_path / name).read_text("utf-8") == "mine"
+        (tmp_path / name).unlink()

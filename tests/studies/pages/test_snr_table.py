@@ -1,0 +1,39 @@
+"""The report's table of light for an SNR, and its plot: numbers of `rodcone snr`, and nothing fetched."""
+
+from base64 import b64decode
+
+from report_sample import sample_pictures, sample_report
+
+from sensor.presets import preset
+from studies.pages.report import render_report
+from studies.pages.report_text import MISSING, significant
+from studies.pages.snr_table import snr_image, snr_rows
+from studies.photograph.snr import light_for_snr
+
+SENSORS = {name: preset(name) for name in ("low_noise", "table1_output")}
+
+
+def test_a_row_a_channel_with_the_numbers_of_the_command():
+    rows = snr_rows(SENSORS)
+    assert [row[:2] for row in rows] == [(name, channel) for name in SENSORS for channel in "RGBW"]
+    green = light_for_snr(10.0, SENSORS["low_noise"], "D65", 0.033)[1]
+    assert rows[1][2:] == tuple(map(significant, (green.electrons, green.luminance_cd_m2, green.illuminance_lux)))
+
+
+def test_an_snr_that_no_light_gives_is_a_dash(monkeypatch):
+    monkeypatch.setattr("studies.pages.snr_table.SNR", 1000.0)
+    assert {row[2:] for row in snr_rows(SENSORS)} == {(MISSING, MISSING, MISSING)}
+
+
+def test_the_plot_lies_in_its_address_and_both_in_the_report():
+    head, _, content = snr_image(SENSORS).partition(",")
+    assert head == "data:image/svg+xml;base64"
+    assert b"low_noise W" in b64decode(content)
+    report = sample_report()
+    page = render_report(report, sample_pictures(report))
+    assert "Light for an SNR of 10" in page
+    assert page.count("data:image/svg+xml;base64") == 1
+
+
+def test_a_sensors_name_is_no_formula():
+    assert b"a$^b$.toml W" in b64decode(snr_image({"a$^b$.toml": SENSORS["low_noise"]}).partition(",")[2])
