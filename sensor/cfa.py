@@ -72,6 +72,15 @@ def channels(tile: Tile) -> tuple[str, ...]:
     return tuple(name for name in "RGBW" if name in present) + tuple(name for name in present if name not in "RGBW")
 
 
+def unit_channel(tile: Tile) -> str:
+    """Channel that exposure, white balance and a picture's scale go by: G, or where there is none the commonest one.
+
+    That is C in RCCB and RCCC, Y in RYYB, W in a camera without colours; of equally common ones the first.
+    """
+    names, sites = channels(tile), "".join(tile)
+    return "G" if "G" in names else max(names, key=sites.count)
+
+
 def is_bayer(tile: Tile) -> bool:
     """Whether a tile is one of Bayer's four phases: 2x2, green on a diagonal, red and blue once."""
     return tile in (("RG", "GB"), ("BG", "GR"), ("GR", "BG"), ("GB", "RG"))

@@ -9,6 +9,7 @@ from sensor.cfa import MOSAICS, RGBW, Tile
 from sensor.config import SensorConfig
 from sensor.curves import Responses, built_in, complementary, neutral_density
 
+OWN = "own"  # the mosaic that the camera has, whatever it is
 CMYW: Tile = ("CM", "YW")  # RGBW with each primary's complement in its place
 
 # Mosaics with filters of their own: their tile, and what makes their responses from the camera's.
@@ -25,7 +26,8 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     sensor : SensorConfig
         With curves of R, G, B and W.
     mosaic : str
-        A name of `sensor.cfa.MOSAICS`, or ``rgbw_nd`` (W behind a neutral density that gives it G's sensitivity) or
+        A name of `sensor.cfa.MOSAICS`; ``own``, the camera's own with its own curves; or ``rgbw_nd`` (W behind a
+        neutral density that gives it G's sensitivity) or
         ``cmyw`` (cyan, magenta, yellow and W); `sensor.curves` states what is assumed of these filters.
 
     Raises
@@ -33,11 +35,13 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     InputError
         For an unknown name, or curves that are missing.
     """
+    if mosaic == OWN:
+        return sensor
     if mosaic in VARIATIONS:
         tile, change = VARIATIONS[mosaic]
         return replace(sensor, cfa=tile, responses=change(sensor.responses))
     if mosaic not in MOSAICS:
-        raise unknown("cfa", mosaic, (*MOSAICS, *VARIATIONS))
+        raise unknown("cfa", mosaic, (*MOSAICS, *VARIATIONS, OWN))
     tile = MOSAICS[mosaic]
     clear = "C" in "".join(tile) and "C" not in sensor.responses.curves
     return replace(sensor, cfa=tile, responses=built_in() if clear else sensor.responses)

@@ -39,7 +39,8 @@ class Processor:
     Attributes
     ----------
     mosaic : str
-        Name that `sensor.variations.vary` takes: one of `sensor.cfa.MOSAICS`, or a variation with curves of its own.
+        Name that `sensor.variations.vary` takes: one of `sensor.cfa.MOSAICS`, a variation with curves of its own, or
+        ``own``, the sensor's own.
     picture : callable
         ``picture(raw, colours, *, balance) -> Picture`` with a `ColourFit` and a `WhiteBalance`; `develop` calls it.
     source : str
@@ -47,9 +48,9 @@ class Processor:
     extra : str or None
         What ``pip install rodcone[...]`` has to bring; None: nothing.
     colours : tuple of str
-        Channels whose balanced planes the matrix takes to linear sRGB.
+        Channels whose balanced planes the matrix takes to linear sRGB; empty: all of the mosaic's.
     unit : str
-        Channel whose electrons a neutral reads in the developed picture.
+        Channel whose electrons a neutral reads in the developed picture; empty: `sensor.cfa.unit_channel`.
     on_backend : bool
         Whether it runs in Dr.Jit where there is a backend; NumPy else.
     noise_gains : NoiseGains or None
@@ -143,8 +144,8 @@ def names() -> tuple[str, ...]:
 
 
 def libraries(name: str) -> tuple[str, ...]:
-    """Libraries that a processor of `PROCESSORS` needs beside rodcone's own."""
-    extra = PROCESSORS[name].extra
+    """Libraries that a processor of `PROCESSORS` needs beside rodcone's own; a user's own file tells none."""
+    extra = PROCESSORS[name].extra if name in PROCESSORS else None
     return () if extra is None else _LIBRARIES[extra]
 
 

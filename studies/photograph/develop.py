@@ -11,7 +11,7 @@ from skimage.transform import resize_local_mean
 from isp.colour.calibrated_colours import fit_of_calibration, neutral_under
 from isp.colour.encoding import encode
 from isp.picture import Picture
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.own import processor_of, require_allowed
 from render.illuminants import illuminant
 from rodcone.brief import brief
 from rodcone.colour_spaces import luminance_of_srgb
@@ -51,6 +51,7 @@ def develop(
     *,
     processor: str | None = None,
     white_balance: str = AS_SHOT,
+    trust_code: bool = False,
 ) -> Picture:
     """Develop a raw image into a linear picture.
 
@@ -60,20 +61,23 @@ def develop(
     calibration : ColourCalibration, optional
         Colours of the camera, as `studies.photograph.calibrate.calibrate` fits them; the raw image's own by default.
     processor : str, optional
-        Of `isp.processors.catalogue.PROCESSORS`; ``bayer`` or ``interleaved``, by the mosaic, where left out.
+        Of `isp.processors.catalogue.PROCESSORS`, or ``mine.py:develop`` (`isp.processors.own.processor_of`); ``bayer``
+        or ``interleaved``, by the mosaic, where left out.
     white_balance : str
         ``as-shot``: the calibration's neutral; an illuminant such as ``D65``: its neutral, from the calibration's
         matrices; or ``gray-world`` as in the paper, with the as-shot neutral where the picture is too dark for that.
+    trust_code : bool
+        Consent to run ``mine.py``, which may do all that its user may.
 
     Raises
     ------
     InputError
-        For an unknown name, a raw image without colours, or a mosaic that the processor doesn't know.
+        For an unknown name, a file of one's own without consent, a raw image without colours, or a mosaic that the
+        processor doesn't know.
     """
     require_kind("raw", raw, RawImage, "give what capture or read_raw gives")
     name = processor or mosaic_processor(raw)
-    if name not in PROCESSORS:
-        raise unknown("isp", name, PROCESSORS)
+    require_allowed("isp", name, trust_code)
     colour = calibration or raw.colour
     if colour is None:
         raise InputError(
@@ -81,7 +85,8 @@ def develop(
             "calibrate(sensor, illuminant('D65')) as well"
         )
     colours = fit_of_calibration(colour, channels(raw.cfa))
-    return PROCESSORS[name].develop(raw, colours, neutral=colour.neutral, balance=_asked_neutral(colour, white_balance))
+    software, asked = processor_of(name), _asked_neutral(colour, white_balance)
+    return software.develop(raw, colours, neutral=colour.neutral, balance=asked)
 
 
 def _asked_neutral(colour: ColourCalibration, white_balance: str) -> Floats | None:
@@ -109,6 +114,7 @@ def develop_file(
     *,
     height: int | None = None,
     width: int | None = None,
+    trust_code: bool = False,
 ) -> Developed:
     """Read a raw file and develop it with its own colour calibration.
 
@@ -117,8 +123,8 @@ def develop_file(
 
     Parameters
     ----------
-    isp : str, optional
-        Of `isp.processors.catalogue.PROCESSORS`; ``bayer`` or ``interleaved``, by the mosaic, where left out.
+    isp, trust_code
+        As `processor` and `trust_code` of `develop`.
     ev : float, optional
         Brightness in stops: at 0 green's full well is white. Left out, the 99th percentile of the picture's luminance
         comes to 90 % of white, which noise raises in the deepest dark; for looking, not for measuring.
@@ -140,7 +146,7 @@ def develop_file(
     raw, file_facts = open_raw(path)
     if raw.colour is None:
         raise InputError(f"{path}: it holds no colour calibration; allowed: a camera with R, G and B; capture with one")
-    picture = develop(raw, processor=isp, white_balance=white_balance)
+    picture = develop(raw, processor=isp, white_balance=white_balance, trust_code=trust_code)
     linear = _scaled(picture.rgb / raw.full_well_e, height, width)
     stops = _stops(linear) if ev is None else ev
     facts = {

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.own import processor_of
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
@@ -24,7 +24,7 @@ from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import develop_to_scale, mean_electrons
 from studies.photograph.clock import timed
 from studies.photograph.png import to_png
-from studies.study.study import AS_SHOT
+from studies.study.study import AS_SHOT, label
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text
 from studies.sweep.provenance import in_words, machine, provenance, threads
 from studies.sweep.row import Row
@@ -50,11 +50,12 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     OSError
         Where the picture can't be written.
     """
+    processor = processor_of(cell.processor, json.loads(cell.made_by.versions))  # a user's own: the same bytes, or none
     _check_provenance(cell)
     if most_threads is not None:
         limit_threads(most_threads)
     truth, truth_png = _truth(cell.truth)
-    sensor, processor, engine = cell.sensor, PROCESSORS[cell.processor], cell.made_by.readout_engine
+    sensor, engine = cell.sensor, cell.made_by.readout_engine
     names = labels(cell.condition)
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
     light = cell.luminance_cd_m2 * cell.exposure_s
@@ -92,7 +93,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     return Row(
         key=cell.key,
         **names,
-        processor=cell.processor,
+        processor=label(cell.processor),
         seed=cell.seed,
         luminance_cd_m2=cell.luminance_cd_m2,
         illuminance_lux=cell.illuminance_lux,
