@@ -27,7 +27,10 @@ MOSAICS: Mapping[str, Tile] = MappingProxyType(
         # Kodak's, after Compton & Hamilton, "Image sensor with improved light sensitivity", US patent 8 139 130; some
         # begin it two rows later, with W B W G.
         "rgbw_4x4": ("WGWR", "GWRW", "WBWG", "BWGW"),
-        "rccc": ("RC", "CC"),  # cameras in cars: one red pixel in four, the others clear (C)
+        # Cameras in cars: one red pixel in four, or one red and one blue, the others clear (C).
+        "rccc": ("RC", "CC"),
+        "rccb": ("RC", "CB"),
+        "ryyb": ("RY", "YB"),  # telephones: yellow, which passes red and green, in green's place
         "mono": ("W",),
     }
 )
@@ -73,12 +76,18 @@ def channels(tile: Tile) -> tuple[str, ...]:
 
 
 def unit_channel(tile: Tile) -> str:
-    """Channel that exposure, white balance and a picture's scale go by: G, or where there is none the commonest one.
+    """Channel that exposure, white balance and a picture's scale go by: G, else W, else the commonest one.
 
     That is C in RCCB and RCCC, Y in RYYB, W in a camera without colours; of equally common ones the first.
     """
     names, sites = channels(tile), "".join(tile)
-    return "G" if "G" in names else max(names, key=sites.count)
+    return next((name for name in "GW" if name in names), max(names, key=sites.count))
+
+
+def colour_channels(tile: Tile) -> tuple[str, ...]:
+    """Channels that saturate together with the picture: all but W beside G, which is full long before."""
+    names = channels(tile)
+    return tuple(name for name in names if name != "W") if "G" in names else names
 
 
 def is_bayer(tile: Tile) -> bool:

@@ -5,9 +5,9 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from rodcone.errors import unknown
-from sensor.cfa import MOSAICS, RGBW, Tile
+from sensor.cfa import MOSAICS, RGBW, Tile, channels
 from sensor.config import SensorConfig
-from sensor.curves import Responses, built_in, complementary, neutral_density
+from sensor.curves import Responses, complementary, neutral_density, with_channels
 
 OWN = "own"  # the mosaic that the camera has, whatever it is
 CMYW: Tile = ("CM", "YW")  # RGBW with each primary's complement in its place
@@ -43,5 +43,4 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     if mosaic not in MOSAICS:
         raise unknown("cfa", mosaic, (*MOSAICS, *VARIATIONS, OWN))
     tile = MOSAICS[mosaic]
-    clear = "C" in "".join(tile) and "C" not in sensor.responses.curves
-    return replace(sensor, cfa=tile, responses=built_in() if clear else sensor.responses)
+    return replace(sensor, cfa=tile, responses=with_channels(sensor.responses, channels(tile)))

@@ -15,6 +15,7 @@ from isp.colour.white_balance import WhiteBalance
 from isp.defects import mend
 from isp.picture import Picture
 from isp.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
+from isp.processors.any_mosaic import picture_any_mosaic
 from isp.processors.bayer_denoised import picture_bayer_nlm, picture_demosaicked_first, picture_denoised_first
 from isp.processors.bm3d import EXTRA as BM3D
 from isp.processors.demosaic import EXTRA as DEMOSAICKING
@@ -28,6 +29,7 @@ from isp.processors.sub_images import hadamard, principal_components
 from rodcone.errors import InputError
 from sensor.cfa import channels
 from sensor.raw import RawImage
+from sensor.variations import OWN
 
 _LIBRARIES = {DEMOSAICKING: ("colour_demosaicing",), BM3D: ("bm3d", "colour_demosaicing")}  # what an extra brings
 
@@ -103,6 +105,7 @@ _PARK = partial(picture_denoised_first, mix=principal_components, demosaic=resid
 _RESIDUAL_BM3D = partial(picture_demosaicked_first, demosaic=residual_interpolation)
 _EARLY = "W as luminance by early fusion"
 _PIECEWISE = "piecewise linear: Yu, Sapiro & Mallat 2012 with a fixed prior, Zoran & Weiss 2011"
+_ANY = "interleaved reconstruction, a matrix over all channels; one or two give a grey picture"
 # As published; the first two are the paper's.
 _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
     {
@@ -128,6 +131,13 @@ _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
         ),
         "rgbw_gindele": Processor("rgbw", picture_gindele, "colours alone where W is full: Gindele & Gallagher 2002"),
         "rgbw_park": Processor("rgbw", picture_rgbw_park, "BM3D as Park et al. 2009, then Gindele", extra=BM3D),
+        **{
+            name: Processor(
+                *(name, partial(picture_any_mosaic, mosaic=name), _ANY), on_backend=True, colours=(), unit=""
+            )
+            for name in ("rccb", "rccc", "ryyb", "mono")
+        },
+        "any_mosaic": Processor(OWN, picture_any_mosaic, _ANY, on_backend=True, colours=(), unit=""),
         "ple_rgbw": Processor("rgbw", picture_ple_rgbw, _PIECEWISE),
         "ple_bayer": Processor("bayer", picture_ple_bayer, _PIECEWISE),
     }

@@ -61,8 +61,6 @@ def develop(
     picture = raw.with_suffix(".png") if out is None else out
     check_picture_file(picture, bits, encoding)
     check_place(picture)
-    developed = develop_file(
-        raw, isp, ev, white_balance, encoding, height=height, width=width, trust_code=trust_code
-    )
+    developed = develop_file(raw, isp, ev, white_balance, encoding, height=height, width=width, trust_code=trust_code)
     write_picture(developed.encoded, picture, bits, encoding)
     print_result(picture, {"path": str(picture), **developed.facts}, json=json)

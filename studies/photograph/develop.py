@@ -41,8 +41,10 @@ class Developed:
 
 
 def mosaic_processor(raw: RawImage) -> str:
-    """Processor that the paper has for a raw image's mosaic."""
-    return "bayer" if is_bayer(raw.cfa) else "interleaved"
+    """Processor that the paper has for a raw image's mosaic; ``any_mosaic`` for those that it doesn't know."""
+    if is_bayer(raw.cfa):
+        return "bayer"
+    return "interleaved" if channels(raw.cfa) == ("R", "G", "B", "W") else "any_mosaic"
 
 
 def develop(
@@ -61,8 +63,8 @@ def develop(
     calibration : ColourCalibration, optional
         Colours of the camera, as `studies.photograph.calibrate.calibrate` fits them; the raw image's own by default.
     processor : str, optional
-        Of `isp.processors.catalogue.PROCESSORS`, or ``mine.py:develop`` (`isp.processors.own.processor_of`); ``bayer``
-        or ``interleaved``, by the mosaic, where left out.
+        Of `isp.processors.catalogue.PROCESSORS`, or ``mine.py:develop`` (`isp.processors.own.processor_of`); ``bayer``,
+        ``interleaved`` or ``any_mosaic``, by the mosaic, where left out.
     white_balance : str
         ``as-shot``: the calibration's neutral; an illuminant such as ``D65``: its neutral, from the calibration's
         matrices; or ``gray-world`` as in the paper, with the as-shot neutral where the picture is too dark for that.
@@ -81,8 +83,7 @@ def develop(
     colour = calibration or raw.colour
     if colour is None:
         raise InputError(
-            "raw: it holds no colour calibration; allowed: one of a camera with R, G and B; give "
-            "calibrate(sensor, illuminant('D65')) as well"
+            "raw: it holds no colour calibration; allowed: one beside it; give calibrate(sensor, illuminant('D65')) too"
         )
     colours = fit_of_calibration(colour, channels(raw.cfa))
     software, asked = processor_of(name), _asked_neutral(colour, white_balance)
@@ -145,7 +146,7 @@ def develop_file(
         require_range("ev", ev, -40.0, 40.0, "give stops")
     raw, file_facts = open_raw(path)
     if raw.colour is None:
-        raise InputError(f"{path}: it holds no colour calibration; allowed: a camera with R, G and B; capture with one")
+        raise InputError(f"{path}: it holds no colour calibration; allowed: one of rodcone capture; capture it anew")
     picture = develop(raw, processor=isp, white_balance=white_balance, trust_code=trust_code)
     linear = _scaled(picture.rgb / raw.full_well_e, height, width)
     stops = _stops(linear) if ev is None else ev

@@ -128,7 +128,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         light, notes = _first_light(opened.scene, spectra)
         notes = [*notes, *opened.notes] if balance is None else [*opened.notes]
         luminance_cd_m2, illuminance_lux = asked_level(opened.scene, order.level)
-    colour = calibrate(sensor, balance or light) if set("RGB") <= set(channels(sensor.cfa)) else None
+    colour = calibrate(sensor, balance or light)
     check_place(out)  # before the render: it may take minutes
     if opened is not None:
         if step:
@@ -235,8 +235,6 @@ def _asked_exposure_s(order: Order, names: tuple[str, ...]) -> float | None:
     time_s = parse_exposure(order.exposure, "exposure")
     if time_s is not None:
         return time_s
-    if "G" not in names:
-        raise InputError(f"cfa: {names} has no G for the auto exposure; allowed: a mosaic with G; give exposure 20ms")
     if order.exposure != AUTO and "W" not in names:
         raise InputError(
             f"exposure: {order.exposure!r} looks at W, which {names} lacks; allowed: a mosaic with W; "

@@ -11,8 +11,7 @@ from render.radiance_files.radiance_source import is_radiance_file
 from render.spectrum import VISIBLE_NM
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, require_whole, unknown
-from sensor.cfa import channels
-from sensor.exposure import AUTO, LONGEST_S, RULES
+from sensor.exposure import AUTO, LONGEST_S
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.study.exposures import parse_exposure
@@ -231,11 +230,6 @@ def _check_cameras(study: Study) -> None:
         processor_of(name)
     for name in study.sensors:
         own = preset(name)
-        automatic = [exposure for exposure in study.exposures if exposure in RULES]
-        if automatic and "G" not in channels(own.cfa):
-            raise InputError(
-                f"exposures: {automatic[0]!r} looks at G, which {label(name)}'s mosaic lacks; give times such as 5ms"
-            )
         for mosaic in mosaics(study):
             vary(own, mosaic)
 
