@@ -15,10 +15,10 @@ from sensor.response import channel_electrons, expected_electrons
 
 LONGEST_S = 0.066  # Parmar & Wandell 2009, Figure 5: 66 ms
 AUTO, AUTO_W, AUTO_INFORMATION = "auto", "auto:W", "auto:information"
-# What a camera exposes for, by the rule's name.
+# What a camera exposes for, by the rule's name; in a mosaic without G `sensor.cfa.unit_channel` is in its place.
 RULES: Mapping[str, str] = MappingProxyType(
     {
-        AUTO: "the 99th percentile of expected G (where there is none, of the commonest channel) at 80 % of the well",
+        AUTO: "the 99th percentile of expected G at 80 % of the well",
         AUTO_W: "the 99th percentile of expected W at 80 % of the well, of G where the mosaic has no W",
         AUTO_INFORMATION: "whichever of these two times gives the samples more information",
     }

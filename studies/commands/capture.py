@@ -21,6 +21,7 @@ def capture(
     exposure_s: Seconds | None = None,
     level: str | None = None,
     light: Several = None,
+    chart: str | None = None,
     white_balance: str = AS_SHOT,
     size: int | None = None,
     height: int | None = None,
@@ -56,7 +57,10 @@ def capture(
         by default.
     light
         ILLUMINANT, such as A, in place of all of the scene's lights, or GROUP=ILLUMINANT in place of one group, each at
-        the same luminance; may be given several times. For a file of radiance the light that it was lit by.
+        the same luminance; may be given several times. An illuminant is a name or a CSV file, such as sky=led.csv. For
+        a file of radiance the light that it was lit by.
+    chart
+        CSV file with the reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
     white_balance
         Illuminant, such as D65, under which the camera shows grey as grey; as-shot for the scene's first light, and
         that of --light, or D65, for a file of radiance.
@@ -89,6 +93,7 @@ def capture(
         exposure=exposure,
         level=level,
         lights=tuple(light or ()),
+        chart=chart,
         white_balance=white_balance,
         size=size,
         height=height,

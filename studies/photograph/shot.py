@@ -57,6 +57,8 @@ class Order:
     lights : tuple of str
         ``GROUP=ILLUMINANT`` or ``ILLUMINANT``, as `studies.study.lit_scene.asked_spectra`; of a file of radiance one
         illuminant, the light that it was lit by.
+    chart : str, optional
+        CSV file with the reflectances of color_checker's patches.
     white_balance : str
         Illuminant that the camera's neutral and colour matrix are set to; ``as-shot`` for the scene's first light.
     size, height, width : int, optional
@@ -76,6 +78,7 @@ class Order:
     exposure: str = AUTO
     level: str | None = None
     lights: tuple[str, ...] = ()
+    chart: str | None = None
     white_balance: str = AS_SHOT
     size: int | None = None
     height: int | None = None
@@ -201,6 +204,8 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     if is_radiance_file(order.source):
         if order.trust:
             raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")
+        if order.chart:
+            raise InputError(f"chart: {order.source!r} is a picture, which has its own; leave --chart out")
         if order.extend:
             raise InputError(f"extend: {order.source!r} is a picture, which has no surfaces; leave --extend out")
         if asked := [name for name in ("size", "height", "width") if getattr(order, name) is not None]:
@@ -215,7 +220,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         require_memory(memory(*file_extent(str(order.source))), order.force)
         return sensor, None, exposure_s
-    opened = open_scene(str(order.source), order.trust, order.extend)
+    opened = open_scene(str(order.source), order.trust, order.extend, chart=order.chart)
     asked_level(opened.scene, order.level)
     height, width = _size(order, opened)
     check_covers(sensor.cfa, (height, width))

@@ -17,7 +17,9 @@ _OTHER_FILES = {
 }
 
 
-def open_scene(source: str, trust: bool = False, extend: str | None = None, light: str | None = None) -> SceneFile:
+def open_scene(
+    source: str, trust: bool = False, extend: str | None = None, light: str | None = None, chart: str | None = None
+) -> SceneFile:
     """Scene, the size of its film and notes.
 
     Parameters
@@ -26,24 +28,27 @@ def open_scene(source: str, trust: bool = False, extend: str | None = None, ligh
         Name in the catalogue, or a Mitsuba scene (``.xml``).
     trust, extend
         As of `load_scene_file`.
-    light : str, optional
-        Option of a catalogue scene's builder.
+    light, chart : str, optional
+        Options of a catalogue scene's builder: its light, and a CSV file of reflectances for color_checker's patches.
 
     Raises
     ------
     InputError
-        For an unknown name, a scene file that isn't allowed, `trust` for a catalogue scene, or `light` for a file.
+        For an unknown name, a scene file that isn't allowed, `trust` for a catalogue scene, or `light` or `chart` for a
+        file.
     """
     if Path(source).suffix.lower() == ".xml":
-        if light is not None:
-            raise InputError(f"scenes: light {light!r} for {source}; allowed: none, a file has its own")
+        for name, value in (("light", light), ("chart", chart)):
+            if value is not None:
+                raise InputError(f"scenes: {name} {value!r} for {source}; allowed: none, a file has its own")
         return load_scene_file(source, trust=trust, extend=extend)
     if trust:
         raise InputError(f"trust-scene: {source!r} is no .xml scene; leave --trust-scene out")
     other = _OTHER_FILES.get(Path(source).suffix.lower())
     if other:
         raise InputError(f"scene: {source!r} is {other}; allowed: {', '.join(_READ)}, or a name of rodcone list scenes")
-    scene = load(source, **({} if light is None else {"light": light}))
+    options = {name: value for name, value in (("light", light), ("chart", chart)) if value is not None}
+    scene = load(source, **options)
     return SceneFile(replace(scene, extend=extend), scene.size, ())
 
 

@@ -21,7 +21,7 @@ from studies.study.light_range import check_known, check_range
 OWN = "own"  # the spectrum that the scene's lights have
 # Gray World from the picture, or the neutral of the scene's light, as a camera notes it in its raw files.
 WHITE_BALANCES = GRAY_WORLD, AS_SHOT = "gray-world", "as-shot"
-FILES = (".xml", ".exr", ".mat", ".toml")  # endings of values that name a file
+FILES = (".xml", ".exr", ".mat", ".toml", ".csv")  # endings of values that name a file
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,19 @@ class SceneChoice:
         Option ``light`` of a catalogue scene's builder; for a picture file the light that its colours are judged under.
     extend : str, optional
         ``hold``: surfaces go on at their end values outside their tables.
+    chart : str, optional
+        CSV file with the reflectances of ``color_checker``'s patches, in place of the ColorChecker's.
     """
 
     source: str
     light: str | None = None
     extend: str | None = None
+    chart: str | None = None
+
+    @property
+    def label(self) -> str:
+        """Name in rows: of the scene, its file or its chart."""
+        return label(self.chart or self.source)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "source", str(self.source))  # from Python it may be a Path
@@ -114,7 +122,7 @@ class Condition:
     ----------
     scene : SceneChoice
     spectrum : str
-        An illuminant's name, or ``own``.
+        An illuminant's name or CSV file, or ``own``.
     level : str
         ``25cd/m2`` (mean scene luminance) or ``500lux`` (on the reference plane).
     exposure : str
@@ -194,7 +202,7 @@ def _check_axes(study: Study) -> None:
     """Check that each axis has values of its own, and that levels, times, seeds and lights are known."""
     for name in ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "seeds"):
         values = getattr(study, name)
-        labels = [label(value.source if isinstance(value, SceneChoice) else value) for value in values]
+        labels = [value.label if isinstance(value, SceneChoice) else label(value) for value in values]
         if not labels or len(set(labels)) != len(labels):
             raise InputError(
                 f"{name}: {labels!r} is not allowed; give one or more, each once, files under names of their own"

@@ -55,7 +55,7 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
         if "trust_code" in content:
             raise InputError("trust_code: no file may ask for it; leave it out, and give --trust-code")
         content["trust_code"] = trust_code
-        for axis in ("scenes", "sensors", "processors"):
+        for axis in ("scenes", "sensors", "spectra", "processors"):
             content |= {axis: _beside(content[axis], Path(path).parent)} if axis in content else {}
         return _CONVERTER.structure(content, Study)
     except ClassValidationError as error:
@@ -86,8 +86,8 @@ def _beside(value: Any, folder: Path) -> Any:
     """Value of an axis in which files are found from anywhere: their names are those of files in the study's folder."""
     if isinstance(value, list):
         return [_beside(each, folder) for each in value]
-    if isinstance(value, dict) and "source" in value:
-        return value | {"source": _beside(value["source"], folder)}
+    if isinstance(value, dict):
+        return value | {key: _beside(value[key], folder) for key in ("source", "light", "chart") if key in value}
     named = isinstance(value, str) and (Path(value).suffix.lower() in FILES or own_file(value))
     return str(folder / value) if named else value
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
 from render.denoised.relight import relight_denoised
+from render.illuminants import illuminant, is_light_file
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
 from rodcone.digests import digest
@@ -81,7 +82,8 @@ def frame_key(
 
     The preset sets the exposure; the sensor is as it is modelled. Of the levels it counts whether one is in lux.
     """
-    return digest([render, opened.identity, spectrum, in_lux(levels), versions(), preset, sensor])
+    light = illuminant(spectrum) if is_light_file(spectrum) else spectrum
+    return digest([render, opened.identity, light, in_lux(levels), versions(), preset, sensor])
 
 
 def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None:

@@ -124,8 +124,9 @@ def sweep(
 
 
 def _noted(study: Study) -> dict[str, Any]:
-    """Study as the results database notes it, with the processors by the names that rows have."""
-    return asdict(study) | {"processors": [label(name) for name in study.processors]}
+    """Study as the results database notes it, with files by the names that rows have."""
+    named = {axis: [label(value) for value in getattr(study, axis)] for axis in ("processors", "spectra")}
+    return asdict(study) | named | {"scenes": [asdict(scene) | {"source": scene.label} for scene in study.scenes]}
 
 
 def _clear(out: Path) -> None:
