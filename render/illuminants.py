@@ -84,7 +84,8 @@ def _measured(path: str) -> Spectrum:
         )
     try:
         nm, values = columns.values()
-        return unit_luminance(Spectrum(nm, values / max(float(values.max()), 1e-300)))  # in any unit, so of any size
+        lamp = Spectrum(nm, values)
+        return unit_luminance(lamp * (1.0 / float(lamp.values.max())))  # in any unit, so of any size
     except (InputError, ZeroDivisionError) as error:
         told = one_line(error) if isinstance(error, InputError) else "it gives no visible light"
         raise InputError(f"illuminant: {path!r}: {told}") from None

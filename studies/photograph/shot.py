@@ -10,13 +10,13 @@ import numpy as np
 from isp.remosaic import remosaic
 from render.engine import render
 from render.illuminants import illuminant
-from render.radiance_files.radiance_source import is_radiance_file
+from render.radiance_files.radiance_source import extent_of, is_radiance_file
 from render.scene import Scene, film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_range, require_whole
 from rodcone.files import check_place
-from rodcone.memory import file_extent, memory, require_memory
+from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
 from sensor.capture import capture
 from sensor.cfa import channels, check_covers, is_rgbw
@@ -218,7 +218,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
                 "it was lit by, such as A; give one"
             )
         check_radiance_file(order.source, () if order.level is None else (order.level,))
-        require_memory(memory(*file_extent(str(order.source))), order.force)
+        require_memory(memory(*extent_of(order.source)), order.force)
         return sensor, None, exposure_s
     opened = open_scene(str(order.source), order.trust, order.extend, chart=order.chart)
     asked_level(opened.scene, order.level)

@@ -14,7 +14,7 @@ from render.engine import render
 from render.illuminants import illuminant
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
-from render.radiance_files.radiance_source import is_radiance_file
+from render.radiance_files.radiance_source import files_of, is_radiance_file
 from render.scene import Scene, film_size
 from render.scene_range import check_range
 from render.spectrum import Floats, Spectrum
@@ -69,7 +69,12 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         check_radiance_file(choice.source, study.levels)
         if choice.chart:
             raise InputError(f"scenes: chart for {choice.source}, a picture; leave it out")
-        identity = digest([digest_file(choice.source), None if choice.light is None else illuminant(choice.light)])
+        identity = digest(
+            [
+                [digest_file(file) for file in files_of(choice.source)],
+                None if choice.light is None else illuminant(choice.light),
+            ]
+        )
         return OpenedScene(choice=choice, scene=None, size=(0, 0), identity=identity)
     opened = open_scene(choice.source, extend=choice.extend, light=choice.light, chart=choice.chart)
     scene = opened.scene

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from render.radiance_files.radiance_source import ENDINGS
 from render.scene import Scene
 from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_parts import SceneFile
@@ -10,7 +11,7 @@ from rodcone.errors import InputError, require_whole
 from scenes.catalog import load
 from studies.study.levels import parse_level
 
-_READ = (".xml", ".exr", ".mat")  # endings of files that are scenes
+_READ = (".xml", *ENDINGS)  # endings of files that are scenes
 _OTHER_FILES = {
     **dict.fromkeys((".dng", ".tif", ".tiff", ".nef", ".cr2", ".cr3", ".arw"), "a raw file, for rodcone develop"),
     ".toml": "a study or a sensor, for rodcone sweep or --sensor",
@@ -44,9 +45,9 @@ def open_scene(
         return load_scene_file(source, trust=trust, extend=extend)
     if trust:
         raise InputError(f"trust-scene: {source!r} is no .xml scene; leave --trust-scene out")
-    other = _OTHER_FILES.get(Path(source).suffix.lower())
-    if other:
-        raise InputError(f"scene: {source!r} is {other}; allowed: {', '.join(_READ)}, or a name of rodcone list scenes")
+    if suffix := Path(source).suffix.lower():
+        what = _OTHER_FILES.get(suffix, f"no file that is a scene ({suffix})")
+        raise InputError(f"scene: {source!r} is {what}; allowed: {', '.join(_READ)}, or a name of rodcone list scenes")
     options = {name: value for name, value in (("light", light), ("chart", chart)) if value is not None}
     scene = load(source, **options)
     return SceneFile(replace(scene, extend=extend), scene.size, ())

@@ -7,7 +7,7 @@ from typing import Any
 
 from isp.processors.own import own_file, processor_of, require_allowed
 from render.illuminants import illuminant
-from render.radiance_files.radiance_source import is_radiance_file
+from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_reflectance
 from render.spectrum import VISIBLE_NM
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, require_whole, unknown
@@ -21,12 +21,14 @@ from studies.study.light_range import check_known, check_range
 OWN = "own"  # the spectrum that the scene's lights have
 # Gray World from the picture, or the neutral of the scene's light, as a camera notes it in its raw files.
 WHITE_BALANCES = GRAY_WORLD, AS_SHOT = "gray-world", "as-shot"
-FILES = (".xml", ".exr", ".mat", ".toml", ".csv")  # endings of values that name a file
+FILES = (".xml", ".toml", ".csv", *ENDINGS)  # endings of values that name a file
 
 
 @dataclass(frozen=True)
 class SceneChoice:
-    """A scene of the catalogue by name, a Mitsuba scene (``.xml``) or a spectral picture (``.exr``, ``.mat``).
+    """A scene of the catalogue by name, a Mitsuba scene (``.xml``) or a picture file.
+
+    Such files hold radiance (``.exr``, ``.mat``, cubes), or reflectances (cubes, photographs) for any light.
 
     Attributes
     ----------
@@ -221,7 +223,7 @@ def _check_axes(study: Study) -> None:
         if spectrum != OWN:
             check_known(spectrum, study.render.range_nm)
             for scene in study.scenes:
-                if is_radiance_file(scene.source):
+                if is_radiance_file(scene.source) and not is_reflectance(scene.source):
                     raise InputError(
                         f"spectra: {spectrum!r} can't relight {scene.source}, a picture whose light is in it; "
                         f"allowed: {OWN}; put the scene into a study of its own"

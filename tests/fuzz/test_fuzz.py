@@ -18,7 +18,8 @@ FUZZ = Path(__file__).parent
 FINDINGS = sorted((FUZZ / "findings").iterdir())
 QUICK = 20  # inputs of each target in `make test`
 NAMES = (
-    *("exr", "mat", "dng", "tiff", "photograph", "noise_profile", "study", "sensor", "curves", "scene", "cache"),
+    *("exr", "mat", "dng", "tiff", "photograph", "noise_profile", "study", "sensor", "cube", "photo", "lamp"),
+    *("curves", "scene", "cache"),
     "ledger",
 )
 

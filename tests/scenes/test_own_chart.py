@@ -35,7 +35,7 @@ def test_two_reflectances_fill_the_first_two_patches_and_are_unknown_beyond_thei
     assert scene.name == "mine"
     assert [key for key in scene.geometry if key.startswith("patch")] == ["patch00", "patch01"]
     check_range(scene, 400.0, 700.0)
-    with pytest.raises(InputError, match="known over 400-700 nm alone; .*extend"):
+    with pytest.raises(InputError, match=r"known over 400-700 nm alone; .*extend"):
         check_range(scene, 380.0, 780.0)
 
 
