@@ -27,6 +27,7 @@ def capture(
     height: int | None = None,
     width: int | None = None,
     spp: int = 64,
+    frames: int = 1,
     seed: int = 0,
     trust_scene: Flag = False,
     extend: str | None = None,
@@ -73,6 +74,8 @@ def capture(
         Pixels; as height.
     spp
         Samples a pixel of the render.
+    frames
+        Exposures of a burst, each in a file of its own, NAME_1, NAME_2 and so on; develop merges them.
     seed
         Seed of the render, the chip and the exposure.
     trust_scene
@@ -99,6 +102,7 @@ def capture(
         height=height,
         width=width,
         spp=spp,
+        frames=frames,
         seed=seed,
         trust=trust_scene,
         extend=extend,

@@ -13,7 +13,7 @@ from studies.study.study import AS_SHOT
 def develop(
     raw: Path,
     /,
-    *,
+    *more: Path,
     out: OutOrNone = None,
     isp: str | None = None,
     bits: int = 8,
@@ -32,6 +32,8 @@ def develop(
     raw
         Raw file: .dng, or .tif with its .json beside it; or a camera's, such as .nef, .cr2 or .dng, which needs
         pip install 'rodcone[photographs]'.
+    more
+        Further raw files of the same camera and scene, such as capture --frames writes: all are merged, then developed.
     out
         Picture to write, .png or .tif; the raw file's name with .png by default.
     isp
@@ -61,6 +63,8 @@ def develop(
     picture = raw.with_suffix(".png") if out is None else out
     check_picture_file(picture, bits, encoding)
     check_place(picture)
-    developed = develop_file(raw, isp, ev, white_balance, encoding, height=height, width=width, trust_code=trust_code)
+    developed = develop_file(
+        (raw, *more), isp, ev, white_balance, encoding, height=height, width=width, trust_code=trust_code
+    )
     write_picture(developed.encoded, picture, bits, encoding)
     print_result(picture, {"path": str(picture), **developed.facts}, json=json)

@@ -1,5 +1,6 @@
 """A raw file developed into a picture for the screen."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from rodcone.brief import brief
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError, require_kind, require_range, unknown
 from rodcone.types import Floats
+from sensor.burst import merged_raw
 from sensor.calibration import ColourCalibration
 from sensor.cfa import channels, is_bayer
 from sensor.raw import RawImage
@@ -107,7 +109,7 @@ def _asked_neutral(colour: ColourCalibration, white_balance: str) -> Floats | No
 
 
 def develop_file(
-    path: str | Path,
+    path: str | Path | Sequence[str | Path],
     isp: str | None = None,
     ev: float | None = None,
     white_balance: str = AS_SHOT,
@@ -124,6 +126,8 @@ def develop_file(
 
     Parameters
     ----------
+    path : path, or sequence of them
+        Frames of a burst or bracket are merged (`sensor.burst.merged_raw`) before they are developed.
     isp, trust_code
         As `processor` and `trust_code` of `develop`.
     ev : float, optional
@@ -144,14 +148,18 @@ def develop_file(
     """
     if ev is not None:
         require_range("ev", ev, -40.0, 40.0, "give stops")
-    raw, file_facts = open_raw(path)
+    paths = [path] if isinstance(path, str | Path) else list(path)
+    opened = [open_raw(each) for each in paths]
+    raw, file_facts = merged_raw([frame for frame, _ in opened]), opened[0][1]
     if raw.colour is None:
-        raise InputError(f"{path}: it holds no colour calibration; allowed: one of rodcone capture; capture it anew")
+        raise InputError(
+            f"{paths[0]}: it holds no colour calibration; allowed: what rodcone capture notes; capture anew"
+        )
     picture = develop(raw, processor=isp, white_balance=white_balance, trust_code=trust_code)
     linear = _scaled(picture.rgb / raw.full_well_e, height, width)
     stops = _stops(linear) if ev is None else ev
     facts = {
-        "raw": str(path),
+        "raw": str(paths[0]) if len(paths) == 1 else [str(each) for each in paths],
         "isp": isp or mosaic_processor(raw),
         "engine": picture.engine,
         "ev": stops,

@@ -18,7 +18,7 @@ from rodcone.errors import InputError, require_range, require_whole
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
-from sensor.capture import capture
+from sensor.burst import burst
 from sensor.cfa import channels, check_covers, is_rgbw
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -32,7 +32,7 @@ from studies.study.levels import parse_level
 from studies.study.lit_scene import asked_spectra
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.study.scene_source import asked_level, asked_size, open_scene
-from studies.study.study import AS_SHOT, GRAY_WORLD
+from studies.study.study import AS_SHOT, GRAY_WORLD, MOST_FRAMES
 
 MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
 _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
@@ -64,6 +64,8 @@ class Order:
     size, height, width : int, optional
         Longer side in pixels, or height and width, of which one keeps the proportions.
     spp, seed : int
+    frames : int
+        Exposures, with one chip and the scene standing still; each in a file of its own.
     trust, extend
         As of `studies.study.scene_source.open_scene`.
     force : bool
@@ -84,6 +86,7 @@ class Order:
     height: int | None = None
     width: int | None = None
     spp: int = 64
+    frames: int = 1
     seed: int = 0
     trust: bool = False
     extend: str | None = None
@@ -151,9 +154,16 @@ def take(order: Order, step: Step | None = None) -> Taken:
     if exposure_s is None:
         exposure_s = exposure_by_rule_s(order.exposure, form_image(radiance, sensor), sensor)
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
-    raw = capture(radiance, sensor, exposure_s, device, np.random.default_rng([order.seed, _FRAME]))
+    taken = burst(radiance, sensor, [exposure_s] * order.frames, device, np.random.default_rng([order.seed, _FRAME]))
     name = Path(order.sensor).stem.encode("ascii", "replace").decode()
-    raw = replace(raw, camera=name, f_number=sensor.lens.f_number, iso=iso_speed(sensor), colour=colour)
+    noted: dict[str, Any] = {
+        "camera": name,
+        "f_number": sensor.lens.f_number,
+        "iso": iso_speed(sensor),
+        "colour": colour,
+    }
+    raws = [replace(frame, **noted) for frame in taken]
+    raw = raws[0]
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
         notes += [
@@ -162,8 +172,9 @@ def take(order: Order, step: Step | None = None) -> Taken:
         ]
 
     # The files.
-    bayer = remosaic(raw) if out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) else None
-    paths = write_raw(raw, out)
+    places = [out] if order.frames == 1 else [out.with_stem(f"{out.stem}_{n}") for n in range(1, order.frames + 1)]
+    bayer = remosaic(raw) if out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) and order.frames == 1 else None
+    paths = tuple(path for frame, place in zip(raws, places, strict=True) for path in write_raw(frame, place))
     if bayer is not None:
         paths += write_raw(bayer, out.with_stem(out.stem + "_bayer"))
     facts = {
@@ -190,6 +201,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     sensor = preset(order.sensor, order.cfa)
     check_ending(Path(order.out), sensor.cfa)
     require_whole("spp", order.spp, 1, 1 << 16, "give samples per pixel")
+    require_whole("frames", order.frames, 1, MOST_FRAMES, "give exposures of a burst")
     require_whole("seed", order.seed, 0, 2**31, "give a whole number")
     if order.size is not None:
         require_whole("size", order.size, 1, 8192, "give the picture's longer side in pixels")

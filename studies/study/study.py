@@ -19,6 +19,7 @@ from studies.study.levels import parse_level
 from studies.study.light_range import check_known, check_range
 
 OWN = "own"  # the spectrum that the scene's lights have
+MOST_FRAMES = 64
 # Gray World from the picture, or the neutral of the scene's light, as a camera notes it in its raw files.
 WHITE_BALANCES = GRAY_WORLD, AS_SHOT = "gray-world", "as-shot"
 FILES = (".xml", ".toml", ".csv", *ENDINGS)  # endings of values that name a file
@@ -133,6 +134,8 @@ class Condition:
         Preset by name, or a ``.toml`` file.
     white_balance : str
         Of `WHITE_BALANCES`.
+    frames : int
+        Exposures, each of that time, that are merged before they are developed.
     """
 
     scene: SceneChoice
@@ -141,11 +144,12 @@ class Condition:
     exposure: str
     sensor: str
     white_balance: str = GRAY_WORLD
+    frames: int = 1
 
 
 @dataclass(frozen=True)
 class Study:
-    """Axes of a sweep, and how its pictures are made. Every combination of the eight axes is a cell.
+    """Axes of a sweep, and how its pictures are made. Every combination of the nine axes is a cell.
 
     `trust_code` is the consent to run the user's own Python files among `processors`; no study file can give it.
 
@@ -163,6 +167,7 @@ class Study:
     white_balances: tuple[str, ...] = (GRAY_WORLD,)
     processors: tuple[str, ...] = ("interleaved", "bayer")
     seeds: tuple[int, ...] = (0,)
+    frames: tuple[int, ...] = (1,)
     name: str = "study"
     longest_exposure_s: float = LONGEST_S
     render: RenderLimits = field(default_factory=RenderLimits)
@@ -182,7 +187,7 @@ class Study:
 def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:
     """All combinations of scenes (or of one alone) and of the axes that decide a picture; the last varies fastest."""
     scenes = study.scenes if scene is None else (scene,)
-    axes = (scenes, study.spectra, study.levels, study.exposures, study.sensors, study.white_balances)
+    axes = (scenes, study.spectra, study.levels, study.exposures, study.sensors, study.white_balances, study.frames)
     return [Condition(*place) for place in product(*axes)]
 
 
@@ -202,7 +207,17 @@ def label(value: Any) -> str:
 
 def _check_axes(study: Study) -> None:
     """Check that each axis has values of its own, and that levels, times, seeds and lights are known."""
-    for name in ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "seeds"):
+    for name in (
+        "scenes",
+        "spectra",
+        "levels",
+        "exposures",
+        "sensors",
+        "white_balances",
+        "processors",
+        "frames",
+        "seeds",
+    ):
         values = getattr(study, name)
         labels = [value.label if isinstance(value, SceneChoice) else label(value) for value in values]
         if not labels or len(set(labels)) != len(labels):
@@ -213,6 +228,8 @@ def _check_axes(study: Study) -> None:
         parse_level(level)
     for exposure in study.exposures:
         parse_exposure(exposure)
+    for count in study.frames:
+        require_whole("frames", count, 1, MOST_FRAMES, "give exposures of a burst, 1 for none")
     for seed in study.seeds:
         require_whole("seeds", seed, 0, 2**63 - 1, "give whole numbers")
     for scene in study.scenes:

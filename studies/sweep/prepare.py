@@ -13,6 +13,7 @@ from isp.processors.own import own_file, processor_of
 from render.transport import Transport
 from rodcone.digests import digest, digest_bytes
 from rodcone.jit import backend
+from sensor.burst import merged_sensor
 from sensor.config import LensConfig, SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
@@ -105,10 +106,11 @@ def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> flo
         lit = under(transport, spectrum)
         lux = lux_per_cd_m2(lit, study.levels)
         brightest = max(level_luminance(level, lux) for level in study.levels)
-        shares += [
-            render_share(lit, sensor, brightest, study.longest_exposure_s, parse_exposure(exposure))
-            for exposure in study.exposures
-        ]
+        most = max(study.frames)
+        for exposure in study.exposures:
+            time_s, longest_s = parse_exposure(exposure), study.longest_exposure_s * most
+            whole_s = None if time_s is None else time_s * most
+            shares.append(render_share(lit, merged_sensor(sensor, most), brightest, longest_s, whole_s))
     return max(shares)
 
 

@@ -14,8 +14,10 @@ from isp.processors.own import processor_of
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
+from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.device import draw_device
+from sensor.raw import RawImage
 from studies.budget.budget import charged_share
 from studies.metrics.appearance import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure
@@ -63,14 +65,14 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     errors_e = _array(cell.errors) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
-    raw, capture_s, first_capture_s = timed(
-        lambda: expose(
-            *(expected_e, sensor, cell.exposure_s, device),
-            exposure_stream(cell.condition, processor.mosaic, cell.seed),
-            exact=engine == "numpy",
-        ),
-        *("capture", engine, names["sensor"], shape),
-    )
+    frames = cell.condition.frames
+
+    def burst() -> RawImage:
+        stream = exposure_stream(cell.condition, processor.mosaic, cell.seed)
+        asked = expected_e, sensor, cell.exposure_s, device, stream
+        return merged_raw([expose(*asked, exact=engine == "numpy") for _ in range(frames)])
+
+    raw, capture_s, first_capture_s = timed(burst, *("capture", engine, names["sensor"], shape, frames))
     # Develop to linear sRGB in which white is 1.
     saturated = raw.saturated
     # the neutral of the scene's light, as a raw file would note it; else Gray World's, from the picture
@@ -104,7 +106,9 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         lens=json.dumps(vars(cell.sensor.lens)),
         budget_share=cell.budget_share,
         **figures,
-        mc_share=charged_share(errors_e, expected_e, sensor, cell.exposure_s),
+        mc_share=charged_share(
+            errors_e * frames, expected_e * frames, merged_sensor(sensor, frames), cell.exposure_s * frames
+        ),
         snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),
         saturated=float(saturated.mean()),

@@ -667,3 +667,31 @@ def test_other_mosaics_are_captured_and_developed(
     neutral = shown[:4].reshape(-1, 3).mean(axis=0)  # card above the chart
     assert np.ptp(neutral) < 6
     assert (np.ptp(shown, axis=-1).max() == 0) == (cfa in ("rccc", "mono"))
+
+
+def test_a_burst_is_captured_and_its_merged_frames_are_developed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    asked = ["flat_field", "--size", "32", "--spp", "4", "--level", "2cd/m2", "--cfa", "bayer"]
+    assert call(["capture", *asked, "-o", "one.dng"], capsys)[0] == 0
+    assert call(["capture", *asked, "--frames", "4", "-o", "shot.dng"], capsys)[1].split() == [
+        *(f"shot_{n}.dng" for n in (1, 2, 3, 4))
+    ]
+    frames = [read_raw(Path(f"shot_{n}.dng")).dn for n in (1, 2, 3, 4)]
+    assert np.array_equal(frames[0], read_raw(Path("one.dng")).dn)
+    assert not np.array_equal(frames[0], frames[1])
+    assert call(["develop", "one.dng"], capsys)[0] == 0
+    names = [f"shot_{n}.dng" for n in (1, 2, 3, 4)]
+    code, out, _ = call(["develop", *names, "--json"], capsys)
+    assert code == 0
+    assert json.loads(out)["raw"] == names
+    spread = [np.asarray(Image.open(name), dtype=float).std() for name in ("one.png", "shot_1.png")]
+    assert spread[1] < 0.75 * spread[0]
+    assert call(["capture", *asked, "-o", "other.dng", "--cfa", "rgbw"], capsys)[0] == 0
+    code, _, err = call(["develop", "one.dng", "other.dng", "-o", "no.png"], capsys)
+    assert code == 2
+    assert "cfa of frame 1" in err
+    assert not Path("no.png").exists()
+    for count in ("0", "65", "1.5"):
+        assert call(["capture", *asked, "--frames", count, "-o", "no.dng"], capsys)[0] == 2

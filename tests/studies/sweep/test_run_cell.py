@@ -236,3 +236,13 @@ def test_a_processor_of_ones_own_counts_by_its_bytes_and_workers_run_no_others(t
     other = made(tmp_path, **asked)[0]
     assert other.key != cell.key
     assert run_cell(other).picture == row.picture
+
+
+def test_a_burst_is_merged_and_shows_less_noise_and_its_first_frame_is_the_single_one(tmp_path: Path) -> None:
+    cells = made(tmp_path, levels=("1cd/m2",), exposures=("5ms",), seeds=(0,), frames=(1, 16))
+    alone = made(tmp_path, levels=("1cd/m2",), exposures=("5ms",), seeds=(0,))
+    one, many = (run_cell(cell) for cell in cells)
+    assert (one.frames, many.frames) == (1, 16)
+    assert one.picture == run_cell(alone[0]).picture
+    assert (one.exposure_s, many.exposure_s) == (0.005, 0.005)
+    assert many.psnr_db > one.psnr_db + 3.0
