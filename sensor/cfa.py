@@ -11,6 +11,7 @@ from rodcone.errors import InputError, unknown
 
 Tile: TypeAlias = tuple[str, ...]
 
+OWN = "own"  # in place of a mosaic's name: the one that the camera has
 RGBW: Tile = ("RG", "BW")  # Parmar & Wandell 2009, Figure 2
 BAYER: Tile = ("RG", "GB")
 

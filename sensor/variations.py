@@ -5,11 +5,10 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from rodcone.errors import unknown
-from sensor.cfa import MOSAICS, RGBW, Tile, channels
+from sensor.cfa import MOSAICS, OWN, RGBW, Tile, channels
 from sensor.config import SensorConfig
 from sensor.curves import Responses, complementary, neutral_density, with_channels
 
-OWN = "own"  # the mosaic that the camera has, whatever it is
 CMYW: Tile = ("CM", "YW")  # RGBW with each primary's complement in its place
 
 # Mosaics with filters of their own: their tile, and what makes their responses from the camera's.

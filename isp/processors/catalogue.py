@@ -27,9 +27,8 @@ from isp.processors.piecewise import picture_ple_bayer, picture_ple_rgbw
 from isp.processors.residual import residual_interpolation
 from isp.processors.sub_images import hadamard, principal_components
 from rodcone.errors import InputError
-from sensor.cfa import channels
+from sensor.cfa import OWN, channels
 from sensor.raw import RawImage
-from sensor.variations import OWN
 
 _LIBRARIES = {DEMOSAICKING: ("colour_demosaicing",), BM3D: ("bm3d", "colour_demosaicing")}  # what an extra brings
 

@@ -20,8 +20,8 @@ from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS, Processor
 from rodcone.digests import digest_bytes
 from rodcone.errors import InputError, one_line, unknown
+from sensor.cfa import OWN
 from sensor.raw import RawImage
-from sensor.variations import OWN
 
 MOST_BYTES = 1 << 20  # of a file; a processor takes some thousand
 _NAME = re.compile(r"(.+\.py):([A-Za-z_]\w*)")

@@ -13,9 +13,9 @@ from isp.processors.catalogue import FAIR, PROCESSORS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
-from sensor.cfa import BAYER, MOSAICS, RGBW, Tile, channel_map, channels, unit_channel
+from sensor.cfa import BAYER, MOSAICS, OWN, RGBW, Tile, channel_map, channels, unit_channel
 from sensor.raw import RawImage
-from sensor.variations import OWN, VARIATIONS
+from sensor.variations import VARIATIONS
 
 IDENTITY = np.eye(3)
 FULL_E = 15_000.0
