@@ -8,7 +8,8 @@ import numpy as np
 from render.photometry import LUMINOUS_EFFICACY_LM_W, colour_matching_functions, luminance
 from render.published_spectra import published_spectra
 from render.spectrum import Spectrum, black_body, flat, line_spectrum
-from rodcone.errors import InputError, require_range, unknown
+from rodcone.csv_file import read_columns
+from rodcone.errors import InputError, one_line, require_range, unknown
 from rodcone.optional import quietly_imported
 
 # CIE 015:2018 tables in 5 nm steps. F11 stands for narrow-band fluorescent lamps,
@@ -48,7 +49,11 @@ def lines_nm(name: str) -> tuple[float, ...]:
     return _LINES[name][0] if name in _LINES else ()
 
 
-@cache
+def is_light_file(name: str) -> bool:
+    """Whether a light's name is that of a CSV file, a lamp that was measured."""
+    return name.lower().endswith(".csv")
+
+
 def illuminant(name: str) -> Spectrum:
     """Spectrum of a named light with a luminance of 1 cd/m^2.
 
@@ -56,17 +61,38 @@ def illuminant(name: str) -> Spectrum:
     ----------
     name : str
         One of `names()`; or ``3000K`` or ``3000 K``, a black body; or ``D7000K``, daylight of that temperature; or what
-        colour-science calls another of its lights, such as ``FL3.12``, whose import takes 2 s.
+        colour-science calls another of its lights, such as ``FL3.12``, whose import takes 2 s; or a CSV file,
+        ``led.csv``, with the columns ``wavelength_nm`` and one more, in any unit of power. It is read at each call.
 
     Raises
     ------
     InputError
-        Where `name` is unknown or its temperature out of range.
+        Where `name` is unknown or its temperature out of range, or the file is none such, or dark.
     """
     if not isinstance(name, str):
         raise InputError(
             f"illuminant: {name!r} is no name; allowed: names such as D65; write '{name} K' for a black body"
         )
+    return _measured(name) if is_light_file(name) else _named(name)
+
+
+def _measured(path: str) -> Spectrum:
+    columns = read_columns(path, "illuminant", "wavelength_nm")
+    if len(columns) != 2:
+        raise InputError(
+            f"illuminant: {path!r} has {len(columns) - 1} columns beside wavelength_nm; allowed: 1; keep one lamp"
+        )
+    try:
+        nm, values = columns.values()
+        lamp = Spectrum(nm, values)
+        return unit_luminance(lamp * (1.0 / float(lamp.values.max())))  # in any unit, so of any size
+    except (InputError, ZeroDivisionError) as error:
+        told = one_line(error) if isinstance(error, InputError) else "it gives no visible light"
+        raise InputError(f"illuminant: {path!r}: {told}") from None
+
+
+@cache
+def _named(name: str) -> Spectrum:
     if temperature := _TEMPERATURE.fullmatch(name):
         kelvin = float(temperature[2])
         if temperature[1]:

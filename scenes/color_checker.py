@@ -2,17 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from render.geometry import look_at, translate
 from render.scene import Node, Scene
 from render.spectrum import Floats, Spectrum
-from rodcone.errors import require_range
+from rodcone.errors import InputError, require_range
 from scenes.camera_and_sky import camera, under_sky
 from scenes.materials import matte, panel
 from scenes.reflectances import color_checker as patches
-from scenes.reflectances import grey, held
+from scenes.reflectances import grey, held, read_reflectances
 
 PATCH_M, GAP_M = 0.040, 0.005  # the classic chart's 40 mm patches
 COLUMNS, ROWS = 6, 4
@@ -21,7 +22,7 @@ CHART_SIZE = 170, 256  # 3:2, as the chart: a square picture cuts a seventh off 
 FACING = look_at((0, 0, 0), (0, 0, 1))  # towards the camera
 
 
-def color_checker(light: str = "D65", surround: float = 0.2) -> Scene:
+def color_checker(light: str = "D65", surround: float = 0.2, chart: str | None = None) -> Scene:
     """ColorChecker, facing the camera; each patch's radiance is its reflectance times the sky's.
 
     Beyond 780 nm, where its tables end, every surface keeps its reflectance there, up to 1100 nm: an assumption, for
@@ -33,14 +34,23 @@ def color_checker(light: str = "D65", surround: float = 0.2) -> Scene:
         Illuminant of the sky, whose luminance is 100 cd/m^2.
     surround : float
         Reflectance of the grey card around the chart.
+    chart : str, optional
+        CSV file with the reflectances of 1 to 24 patches in place of the ColorChecker's, row by row: ``wavelength_nm``
+        and a column each. Outside their wavelengths they are not known.
     """
     require_range("surround", surround, 0.0, 1.0, "give a reflectance: 18 % is 0.18")
+    if chart is not None:
+        measured = read_reflectances(chart)
+        if len(measured) > ROWS * COLUMNS:
+            raise InputError(f"chart: {chart!r} has {len(measured)} reflectances; allowed: 1 to 24; make two charts")
+        card = Spectrum(measured[0][1].wavelength_nm, np.full(measured[0][1].values.shape, surround))
+        return chart_scene(Path(chart).stem, [curve for _, curve in measured], card, light)
     curves = [held(curve) for _, curve in patches()]
     return chart_scene("color_checker", curves, held(grey(surround)), light)
 
 
 def chart_scene(name: str, curves: Sequence[Spectrum], surround: Spectrum, light: str) -> Scene:
-    """Make a scene of a chart of 24 reflectances on a card, all on one grid, in a constant environment."""
+    """Make a scene of a chart of up to 24 reflectances on a card, all on one grid, in a constant environment."""
     view = camera(20.0, (0, 0, 0.72), (0, 0, 0), CHART_SIZE)
     scene = under_sky(name, view, {"card": panel(FACING, 4.0, 4.0, matte(surround))}, light, reference_plane="card")
     board = Spectrum(surround.wavelength_nm, np.full(surround.values.shape, BOARD))
@@ -53,7 +63,7 @@ def color_checker_nodes(pose: Floats) -> dict[str, Node]:
 
 
 def chart(pose: Floats, curves: Sequence[Spectrum], board: Spectrum) -> dict[str, Node]:
-    """Nodes of a chart's board and 24 patches, row by row, centred on `pose` and facing its +z."""
+    """Nodes of a chart's board and up to 24 patches, row by row, centred on `pose` and facing its +z."""
     step = PATCH_M + GAP_M
     nodes = {"chart_board": panel(pose, COLUMNS * step + GAP_M, ROWS * step + GAP_M, matte(board))}
     for index, reflectance in enumerate(curves):

@@ -1,11 +1,14 @@
 """Spectral reflectances: the ColorChecker, and smooth curves for everything else."""
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
 from render.published_spectra import published_spectra
 from render.spectrum import Floats, Spectrum
+from rodcone.csv_file import read_columns
+from rodcone.errors import InputError
 
 LONGEST_NM = 1100.0  # as far as lights are known (`render.spectrum.flat`), beyond any response here
 _NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all materials keeps scenes quick to compile
@@ -16,6 +19,28 @@ def color_checker() -> tuple[tuple[str, Spectrum], ...]:
     """Name and reflectance of the 24 patches, row by row, 380-780 nm (Ohta 1997)."""
     tables = published_spectra("color_checker")
     return tuple((name, Spectrum(nm, np.clip(values, 0, 1))) for name, (nm, values) in tables.items())
+
+
+def read_reflectances(path: str | Path) -> tuple[tuple[str, Spectrum], ...]:
+    """Name and reflectance of each column of a CSV beside its first, ``wavelength_nm``.
+
+    Raises
+    ------
+    InputError
+        For a file that is none such, or values outside 0 to 1.
+    """
+    columns = read_columns(path, "chart", "wavelength_nm")
+    nm = columns.pop("wavelength_nm")
+    for name, values in columns.items():
+        if not ((values >= 0) & (values <= 1)).all():
+            raise InputError(
+                f"chart: {str(path)!r}: {name} has values of {values.min():g} to {values.max():g}; allowed: "
+                "reflectances from 0 to 1; divide per cent by 100"
+            )
+    try:
+        return tuple((name, Spectrum(nm, values)) for name, values in columns.items())
+    except InputError as error:
+        raise InputError(f"chart: {str(path)!r}: {error}") from None
 
 
 def held(curve: Spectrum) -> Spectrum:

@@ -1,7 +1,8 @@
 """Several exposures of one scene, and their merge into one picture of the light."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from sensor.raw import RawImage
 # A frame counts where the merged rate fills the well to no more than 6 standard deviations under its end: its own
 # noise then clips once in 1e9 pixels.
 CLEAR_SIGMAS = 6.0
+MERGED_WHITE_DN = 65_535.0  # of a merged raw image, whose samples are no whole numbers
 _ROUNDS = 6  # of the weights: a further one changes less than a thousandth of the merged noise
 
 # Fields that all frames must share: what turns DN into electrons, and the noise that weighs them.
@@ -113,6 +115,64 @@ def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merg
     photo_rate = rate - dark_current_e_per_s
     fixed = (first.dsnu_e * per_s) ** 2 + (first.prnu * photo_rate) ** 2
     return Merged(rate_e_per_s=photo_rate, temporal_variance=variance, fixed_variance=fixed, saturated=full)
+
+
+def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> RawImage:
+    """Merge frames into one raw image, which is developed as any other: the exposure that they are together.
+
+    Its electrons are the merged rate times the sum of the exposure times, so that shot noise stays what an exposure of
+    this time has, and the full well is what the shortest frame's stands for. Read noise and DSNU are those of a dark
+    pixel. In a bracket they are too small where a long frame is full; in a burst of equal times they hold everywhere.
+    The scene has to stand still: frames are not aligned.
+
+    Parameters
+    ----------
+    frames : sequence of RawImage
+        As `merge`; one alone is given back as it is.
+    dark_current_e_per_s : float
+        Calibrated dark current, to be subtracted.
+
+    Raises
+    ------
+    InputError
+        As `merge`.
+    """
+    first = frames[0] if len(frames) == 1 and not dark_current_e_per_s else None
+    if first is not None:
+        return first
+    merged = merge(frames, dark_current_e_per_s)
+    times = np.array([frame.exposure_s for frame in frames])
+    whole_s, first = float(times.sum()), frames[0]
+    full_e = first.full_well_e * whole_s / float(times.min())
+    gain_e = full_e / MERGED_WHITE_DN
+    # In the dark a frame's weight goes with the square of its time.
+    squares = float((times**2).sum())
+    temporal_e2 = (first.read_noise_e**2 + first.gain_e_per_dn**2 / 12) * whole_s**2 / squares
+    electrons = np.where(merged.saturated, full_e, np.minimum(merged.rate_e_per_s * whole_s, full_e))
+    return replace(
+        first,
+        dn=electrons / gain_e,  # type: ignore[arg-type]  # finite floats are taken as they are
+        black_dn=0.0,
+        white_dn=MERGED_WHITE_DN,
+        gain_e_per_dn=gain_e,
+        read_noise_e=sqrt(max(temporal_e2 - gain_e**2 / 12, 0.0)),  # `RawImage.dark_noise_e` adds it
+        dsnu_e=first.dsnu_e * whole_s * float(times.sum()) / squares,
+        exposure_s=whole_s,
+    )
+
+
+def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
+    """Sensor whose one exposure of `count` times the time holds the noise that a merged burst of `count` does."""
+    pixel = sensor.pixel
+    return replace(
+        sensor,
+        pixel=replace(
+            pixel,
+            read_noise_e=pixel.read_noise_e * sqrt(count),
+            dsnu_e=pixel.dsnu_e * count,
+            full_well_e=pixel.full_well_e * count,
+        ),
+    )
 
 
 def _grouped(frames: Sequence[RawImage]) -> list[_Group]:

@@ -15,14 +15,16 @@ from rodcone.errors import InputError
 class ColourCalibration:
     """Colour of a camera under illuminants A and D65, and under the light of the exposure.
 
-    Channels stand in the order of `sensor.cfa.channels`; ``R, G, B`` come first.
+    Channels stand in the order of `sensor.cfa.channels`; ``R, G, B`` come first. Where there is no green,
+    `sensor.cfa.unit_channel` is in its place.
 
     Attributes
     ----------
     neutral : (channel,) float64
         Relative response to a spectrally flat surface under the light of the exposure, green 1: the as-shot neutral.
     to_srgb : (3, 3) float64
-        From R, G, B balanced by `neutral` to linear sRGB, adapted from that light to D65; rows sum to 1.
+        From R, G, B (the first three channels) balanced by `neutral` to linear sRGB, adapted from that light to D65;
+        rows sum to 1. (3, channel) for one or two channels, from which grey is made.
     xyz_to_camera_a, xyz_to_camera_d65 : (channel, 3) float64
         From XYZ under the illuminant to the camera's channels, green 1 for its white: DNG's ColorMatrix1 and 2.
     camera_to_xyz_a, camera_to_xyz_d65 : (3, channel) float64
@@ -46,12 +48,12 @@ class ColourCalibration:
     def __post_init__(self) -> None:
         neutral: Any = self.neutral  # from a file it may be anything, a list of lists of unequal length too
         count = len(neutral) if isinstance(neutral, Sequence) else np.size(neutral)
-        shapes = [(count,), (3, 3), (count, 3), (count, 3), (3, count), (3, count)]
+        shapes = [(count,), (3, min(count, 3)), (count, 3), (count, 3), (3, count), (3, count)]
         for field, shape in zip(fields(self), shapes, strict=True):
             object.__setattr__(self, field.name, _numbers(field.name, getattr(self, field.name), shape))
-        if count < 3 or not np.all(self.neutral > 0):
+        if count < 1 or not np.all(self.neutral > 0):
             raise InputError(
-                f"neutral: {self.neutral.tolist()!r} is not allowed; give a positive response of R, G, B and any others"
+                f"neutral: {self.neutral.tolist()!r} is not allowed; give a positive response of each channel"
             )
 
     def part(self, index: Sequence[int]) -> "ColourCalibration":

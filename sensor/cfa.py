@@ -11,6 +11,7 @@ from rodcone.errors import InputError, unknown
 
 Tile: TypeAlias = tuple[str, ...]
 
+OWN = "own"  # in place of a mosaic's name: the one that the camera has
 RGBW: Tile = ("RG", "BW")  # Parmar & Wandell 2009, Figure 2
 BAYER: Tile = ("RG", "GB")
 
@@ -27,7 +28,10 @@ MOSAICS: Mapping[str, Tile] = MappingProxyType(
         # Kodak's, after Compton & Hamilton, "Image sensor with improved light sensitivity", US patent 8 139 130; some
         # begin it two rows later, with W B W G.
         "rgbw_4x4": ("WGWR", "GWRW", "WBWG", "BWGW"),
-        "rccc": ("RC", "CC"),  # cameras in cars: one red pixel in four, the others clear (C)
+        # Cameras in cars: one red pixel in four, or one red and one blue, the others clear (C).
+        "rccc": ("RC", "CC"),
+        "rccb": ("RC", "CB"),
+        "ryyb": ("RY", "YB"),  # telephones: yellow, which passes red and green, in green's place
         "mono": ("W",),
     }
 )
@@ -70,6 +74,21 @@ def channels(tile: Tile) -> tuple[str, ...]:
     """Channels of a tile, each once: R, G, B, W first in this order, any others as they appear row by row."""
     present = dict.fromkeys("".join(tile))
     return tuple(name for name in "RGBW" if name in present) + tuple(name for name in present if name not in "RGBW")
+
+
+def unit_channel(tile: Tile) -> str:
+    """Channel that exposure, white balance and a picture's scale go by: G, else W, else the commonest one.
+
+    That is C in RCCB and RCCC, Y in RYYB, W in a camera without colours; of equally common ones the first.
+    """
+    names, sites = channels(tile), "".join(tile)
+    return next((name for name in "GW" if name in names), max(names, key=sites.count))
+
+
+def colour_channels(tile: Tile) -> tuple[str, ...]:
+    """Channels that saturate together with the picture: all but W beside G, which is full long before."""
+    names = channels(tile)
+    return tuple(name for name in names if name != "W") if "G" in names else names
 
 
 def is_bayer(tile: Tile) -> bool:

@@ -1,11 +1,9 @@
 """Spectral responses of colour channels, in electrons per photon: the built-in ones, other filters, CSV files."""
 
-import csv
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from io import StringIO
 from pathlib import Path
 from types import MappingProxyType
 
@@ -16,6 +14,7 @@ from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
 from rodcone.brief import brief
+from rodcone.csv_file import read_columns
 from rodcone.errors import InputError, require_range, unknown
 from rodcone.plots import Axes, draw_curves
 
@@ -29,7 +28,6 @@ _RGBW_PARAMETERS = {  # peak, centre [nm], left width [nm], left power, right wi
     "W": (1.000, 620.0, 225.131, 1.955, 225.536, 2.052),
 }
 _COMPLEMENTS = {"C": "GB", "M": "RB", "Y": "RG"}
-MOST_BYTES = 1 << 23  # of a file of curves: 100 columns at 0.1 nm over 300-1100 nm take 6 MB
 
 
 @dataclass(frozen=True)
@@ -95,8 +93,24 @@ def rgbw() -> Responses:
 
 @cache
 def built_in() -> Responses:
-    """`rgbw`'s curves, and W's once more as C: the clear pixel of RCCC mosaics."""
-    return Responses({**rgbw().curves, "C": rgbw().curves["W"]})
+    """`rgbw`'s curves, and those of C and Y that `with_channels` makes of them."""
+    return with_channels(rgbw(), ("C", "Y"))
+
+
+def with_channels(responses: Responses, names: Sequence[str]) -> Responses:
+    """Responses with C (the clear pixel of RCCC and RCCB) as W, and Y as R and G together, where asked and missing."""
+    curves = dict(responses.curves)
+    if "C" in names and "W" in curves:
+        curves.setdefault("C", curves["W"])
+    if "Y" in names and "Y" not in curves and {"R", "G"} <= curves.keys():
+        curves["Y"] = _sum(curves["R"], curves["G"])
+    return Responses(curves)
+
+
+def _sum(one: Spectrum, other: Spectrum) -> Spectrum:
+    nm = np.union1d(one.wavelength_nm, other.wavelength_nm)
+    values = [np.interp(nm, part.wavelength_nm, part.values, left=0.0, right=0.0) for part in (one, other)]
+    return Spectrum(nm, values[0] + values[1])
 
 
 def complementary(responses: Responses) -> Responses:
@@ -113,10 +127,7 @@ def complementary(responses: Responses) -> Responses:
     _require_channels(responses, "RGB")
     curves = {}
     for channel, pair in _COMPLEMENTS.items():
-        parts = [responses.curves[primary] for primary in pair]
-        nm = np.union1d(parts[0].wavelength_nm, parts[1].wavelength_nm)
-        values = [np.interp(nm, part.wavelength_nm, part.values, left=0.0, right=0.0) for part in parts]
-        curves[channel] = Spectrum(nm, values[0] + values[1])
+        curves[channel] = _sum(*(responses.curves[primary] for primary in pair))
     if "W" in responses.curves:
         curves["W"] = responses.curves["W"]
     return Responses(curves, responses.relative)
@@ -235,26 +246,9 @@ def read_curve(path: str | Path) -> Spectrum:
 
 def _table(path: str | Path) -> dict[str, Spectrum]:
     """Columns of a CSV by their names."""
-    try:
-        if Path(path).exists() and not Path(path).is_file():  # a pipe or a device may never end
-            raise ValueError("it is a folder or a device")
-        with Path(path).open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
-        if len(content) > MOST_BYTES:
-            raise ValueError(f"it is over {MOST_BYTES} bytes")
-        header, *rows = [row for row in csv.reader(StringIO(content.decode("utf-8-sig"), newline="")) if row]
-        table = np.array([[float(cell) for cell in row] for row in rows], dtype=np.float64)
-    except (OSError, ValueError, csv.Error) as error:
-        raise InputError(
-            f"responses: {str(path)!r} can't be read ({error}); give a CSV of numbers with a header"
-        ) from error
-    names = [name.strip() for name in header]
-    fits = table.ndim == 2 and table.shape[1] == len(names) == len(set(names))
-    if not fits or names[0] != "wavelength_nm" or len(names) < 2:
-        raise InputError(
-            f"responses: {str(path)!r} has header {names}; allowed: wavelength_nm and one channel a column; add it"
-        )
-    return {name: Spectrum(table[:, 0], column) for name, column in zip(names[1:], table.T[1:], strict=True)}
+    columns = read_columns(path, "responses", "wavelength_nm")
+    nm = columns.pop("wavelength_nm")
+    return {name: Spectrum(nm, column) for name, column in columns.items()}
 
 
 def _within(curve: Spectrum, range_nm: tuple[float, float], path: str) -> Spectrum:

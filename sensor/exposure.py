@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError, require_kind, require_range, unknown
-from sensor.cfa import channels
+from sensor.cfa import channels, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.readout import noise_variance
@@ -15,7 +15,7 @@ from sensor.response import channel_electrons, expected_electrons
 
 LONGEST_S = 0.066  # Parmar & Wandell 2009, Figure 5: 66 ms
 AUTO, AUTO_W, AUTO_INFORMATION = "auto", "auto:W", "auto:information"
-# What a camera exposes for, by the rule's name.
+# What a camera exposes for, by the rule's name; in a mosaic without G `sensor.cfa.unit_channel` is in its place.
 RULES: Mapping[str, str] = MappingProxyType(
     {
         AUTO: "the 99th percentile of expected G at 80 % of the well",
@@ -30,7 +30,7 @@ def auto_exposure_s(
     sensor: SensorConfig,
     longest_s: float = LONGEST_S,
     *,
-    channel: str = "G",
+    channel: str | None = None,
     percentile: float = 99.0,
     well_share: float = 0.8,
 ) -> float:
@@ -44,8 +44,8 @@ def auto_exposure_s(
     sensor : SensorConfig
     longest_s : float
         Longest exposure allowed; returned where there is no light [s].
-    channel : str
-        A channel of the mosaic.
+    channel : str, optional
+        A channel of the mosaic; left out, G, or `sensor.cfa.unit_channel` of a mosaic without G.
     percentile : float
         0 to 100, over all pixels as if each had the channel's filter.
     well_share : float
@@ -60,6 +60,7 @@ def auto_exposure_s(
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     require_range("percentile", percentile, 0.0, 100.0, "give per cent of the pixels")
     require_range("well_share", well_share, 1e-6, 1.0, "give a fraction of the well")
+    channel = channel or unit_channel(sensor.cfa)
     if channel not in channels(sensor.cfa):
         raise unknown("exposure: channel", channel, channels(sensor.cfa))
     per_second = channel_electrons(irradiance, sensor, 1.0)[..., channels(sensor.cfa).index(channel)]

@@ -5,9 +5,9 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from rodcone.errors import unknown
-from sensor.cfa import MOSAICS, RGBW, Tile
+from sensor.cfa import MOSAICS, OWN, RGBW, Tile, channels
 from sensor.config import SensorConfig
-from sensor.curves import Responses, built_in, complementary, neutral_density
+from sensor.curves import Responses, complementary, neutral_density, with_channels
 
 CMYW: Tile = ("CM", "YW")  # RGBW with each primary's complement in its place
 
@@ -25,7 +25,8 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     sensor : SensorConfig
         With curves of R, G, B and W.
     mosaic : str
-        A name of `sensor.cfa.MOSAICS`, or ``rgbw_nd`` (W behind a neutral density that gives it G's sensitivity) or
+        A name of `sensor.cfa.MOSAICS`; ``own``, the camera's own with its own curves; or ``rgbw_nd`` (W behind a
+        neutral density that gives it G's sensitivity) or
         ``cmyw`` (cyan, magenta, yellow and W); `sensor.curves` states what is assumed of these filters.
 
     Raises
@@ -33,11 +34,12 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     InputError
         For an unknown name, or curves that are missing.
     """
+    if mosaic == OWN:
+        return sensor
     if mosaic in VARIATIONS:
         tile, change = VARIATIONS[mosaic]
         return replace(sensor, cfa=tile, responses=change(sensor.responses))
     if mosaic not in MOSAICS:
-        raise unknown("cfa", mosaic, (*MOSAICS, *VARIATIONS))
+        raise unknown("cfa", mosaic, (*MOSAICS, *VARIATIONS, OWN))
     tile = MOSAICS[mosaic]
-    clear = "C" in "".join(tile) and "C" not in sensor.responses.curves
-    return replace(sensor, cfa=tile, responses=built_in() if clear else sensor.responses)
+    return replace(sensor, cfa=tile, responses=with_channels(sensor.responses, channels(tile)))

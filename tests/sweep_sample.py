@@ -36,6 +36,7 @@ ROW = Row(
     exposure="auto",
     sensor="low_noise",
     white_balance="gray-world",
+    frames=1,
     processor="bayer",
     seed=2**40,
     luminance_cd_m2=25.0,
@@ -151,6 +152,7 @@ def row(processor: str, seed: int, **values: Any) -> Row:
         "exposure": "auto",
         "sensor": "mine.toml",
         "white_balance": "gray-world",
+        "frames": 1,
     }
     return Row(
         **plain

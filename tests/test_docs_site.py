@@ -113,43 +113,6 @@ def test_the_code_of_a_page_runs(page: Path, figures: Path) -> None:
     make(figures, f"{figures}/{name_of(page)}/ran")
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(300)
-def test_a_processor_added_as_its_page_says_is_one_of_rodcones(tmp_path: Path) -> None:
-    """The page's module and its diff, applied to a copy of the packages, give a new name to `rodcone develop`."""
-    text = (DOCS / "how_to" / "own_processor.md").read_text("utf-8")
-    for package in PACKAGES:
-        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
-    (module,) = re.findall(r'^```python title="isp/two_by_two.py"\n(.*?)^```$', text, re.MULTILINE | re.DOTALL)
-    (tmp_path / "isp" / "two_by_two.py").write_text(module, "utf-8")
-    (change,) = re.findall(r"^```diff\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    for hunk in change.split("@@\n")[1:]:
-        lines = hunk.splitlines(keepends=True)
-        before, after = ("".join(line[1:] for line in lines if line[0] in signs) for signs in (" -", " +"))
-        source = (tmp_path / "isp" / "processors" / "catalogue.py").read_text("utf-8")
-        assert source.count(before) == 1, before
-        (tmp_path / "isp" / "processors" / "catalogue.py").write_text(source.replace(before, after), "utf-8")
-    program = (
-        "from studies.commands.cli import main\n"
-        "for words in ['capture flat_field --cfa bayer --size 32 --spp 4 --level 5cd/m2 -o flat.dng',"
-        " 'develop flat.dng --isp two_by_two']:\n"
-        "    try:\n"
-        "        main(words.split())\n"
-        "    except SystemExit as end:\n"
-        "        assert not end.code, words\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert (tmp_path / "flat.png").is_file()
-
-
 @pytest.fixture(scope="module")
 def site(figures: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site, built strictly: a warning, such as a missing figure or a dead link, ends the build."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from isp.colour.colour_fit import ColourFit
+from isp.colour.colour_fit import ColourFit, grey_of
 from render.photometry import tristimulus
 from render.spectrum import DEFAULT_WAVELENGTH_NM as NM
 from render.spectrum import Floats, Spectrum, band_widths
@@ -24,15 +24,17 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
 
     R, G and B answer to linear sRGB by the inverse of `colour.to_srgb`; any other channel by its row of the matrix from
     XYZ, under the one of A and D65 whose neutral is nearer to the exposure's. What a channel sees beyond three colours
-    is lost; `UNEXPLAINED` stands for it.
+    is lost; `UNEXPLAINED` stands for it. One or two channels, all by their rows, give grey.
 
     Parameters
     ----------
     names : tuple of str
-        The channels, as `sensor.cfa.channels` gives them: R, G and B first.
+        The channels, as `sensor.cfa.channels` gives them: R, G and B first, or others in their place.
     """
-    rows = np.linalg.inv(colour.to_srgb)
-    if len(names) > 3:
+    three = len(names) >= 3
+    rows = np.linalg.inv(colour.to_srgb) if three else np.zeros((0, 3))
+    if len(names) != 3:
+        green = names.index("G") if "G" in names else 0
         # balanced channels of linear sRGB, (channel, 3), and how far their neutral lies from the exposure's, in stops
         found = []
         for name, xy in (("a", A_XY), ("d65", D65_XY)):
@@ -40,11 +42,12 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
             neutral = from_xyz @ white
             to_xyz = np.linalg.inv(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)
             stops = np.log2(np.maximum(neutral, 1e-9) / colour.neutral)
-            found.append((np.abs(stops - stops[1]).max(), from_xyz @ to_xyz / neutral[:, None]))
-        rows = np.vstack([rows, min(found, key=lambda pair: pair[0])[1][3:]])
-    unexplained = np.diag([0.0 if name in "RGB" else UNEXPLAINED**2 for name in names])
+            found.append((np.abs(stops - stops[green]).max(), from_xyz @ to_xyz / neutral[:, None]))
+        rows = np.vstack([rows, min(found, key=lambda pair: pair[0])[1][len(rows) :]])
+    unexplained = np.diag([0.0 if three and index < 3 else UNEXPLAINED**2 for index in range(len(names))])
     cross = rows @ MOMENTS_SRGB
-    return ColourFit(channels=names, mean=rows @ MEAN_SRGB, moments=cross @ rows.T + unexplained, cross=cross)
+    moments = cross @ rows.T + unexplained
+    return ColourFit(names, mean=rows @ MEAN_SRGB, moments=moments, cross=cross if three else grey_of(cross))
 
 
 def neutral_under(colour: ColourCalibration, light: Spectrum) -> Floats:
@@ -62,7 +65,7 @@ def neutral_under(colour: ColourCalibration, light: Spectrum) -> Floats:
     a, d65, at = (_inverse_temperature(xyz) for xyz in (xyz_from_xy(A_XY), xyz_from_xy(D65_XY), white))
     share = float(np.clip((at - d65) / (a - d65), 0.0, 1.0))
     response = (share * colour.xyz_to_camera_a + (1 - share) * colour.xyz_to_camera_d65) @ white
-    return np.asarray(response / response[1])  # R, G, B come first
+    return np.asarray(response / response[min(1, response.size - 1)])  # R, G, B come first
 
 
 def _inverse_temperature(xyz: Floats) -> float:

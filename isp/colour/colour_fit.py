@@ -19,7 +19,7 @@ from render.spectrum import Floats, band_widths
 from rodcone.brief import brief
 from rodcone.colour_spaces import adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from rodcone.errors import InputError
-from sensor.cfa import channels
+from sensor.cfa import channels, unit_channel
 from sensor.raw import RawImage
 
 # Noise variance that is always there, far under any camera's. Under a light of one wavelength balanced channels are all
@@ -35,7 +35,7 @@ class ColourFit:
     Attributes
     ----------
     channels : tuple of str
-        The three colours first.
+        The three colours first, where there are as many.
     mean : (channel,) float64
         Mean balanced signal; a surface that reflects all light reads 1.
     moments : (channel, channel) float64
@@ -123,6 +123,8 @@ def fit_colours(
 ) -> ColourFit:
     """Fit a camera's colours under a light; parameters as `fit_matrix`, the responses those of the channels `names`.
 
+    One or two channels tell no colours: they are fitted to luminance, and the picture is grey.
+
     Raises
     ------
     InputError
@@ -131,9 +133,16 @@ def fit_colours(
     signals, target = training(responses, wavelength_nm, illuminant_spd, reflectances, width_nm)
     if signals.shape[1] != len(names):
         raise InputError(f"responses: {signals.shape[1]} channels don't fit the names {tuple(names)}; give one each")
+    if len(names) < 3:
+        target = grey_of(target)
     count = len(signals)
     moments, cross = signals.T @ signals / count, signals.T @ target / count
     return ColourFit(channels=tuple(names), mean=signals.mean(axis=0), moments=moments, cross=cross)
+
+
+def grey_of(srgb: Floats) -> Floats:
+    """Grey of the same luminance, in the place of linear sRGB (..., 3)."""
+    return np.repeat(luminance_of_srgb(srgb)[..., None], 3, axis=-1)
 
 
 def fit_matrix(
@@ -222,7 +231,8 @@ def relative_noise(
     """Noise variance of a frame's balanced channels, as `ColourFit.matrix` takes it.
 
     One number a channel and frame: a matrix per pixel would flicker. Noise at the frame's mean, over the signal of a
-    surface that reflects all light, on which the frame's mean green would be the training surfaces' mean.
+    surface that reflects all light, on which the frame's mean green (`sensor.cfa.unit_channel`) would be the training
+    surfaces' mean.
 
     Parameters
     ----------
@@ -235,10 +245,11 @@ def relative_noise(
     -------
     (channel,) float64
     """
-    green = channels(raw.cfa).index("G")
+    unit = unit_channel(raw.cfa)
+    green = channels(raw.cfa).index(unit)
     kept = ~raw.saturated if not raw.saturated.all() else np.ones(raw.shape, dtype=bool)
     mean = np.maximum(np.asarray(estimate[kept], dtype=np.float64).mean(axis=0), 0.0)
     variance = (mean + raw.dark_noise_e**2) * np.median(noise_gain[kept], axis=0) * gains**2
-    white = mean[green] * gains[green] / fit.mean[fit.channels.index("G")]
+    white = mean[green] * gains[green] / fit.mean[fit.channels.index(unit)]
     # A frame without any signal is all noise: there W alone decides, whatever the ratio.
     return np.asarray(variance / max(white**2, LEAST_SIGNAL**2 * float(variance.max())))

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from sensor.cfa import channel_map
+from sensor.cfa import channel_map, colour_channels
 from sensor.raw import RawImage
 
 
@@ -14,13 +14,15 @@ def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> 
     Left out, the reach is one tile.
     """
     hit = raw.saturated & np.isin(channel_map(raw.cfa, raw.shape), list(channels))
-    return np.asarray(maximum_filter(hit, size=2 * (len(raw.cfa) - 1 if reach is None else reach) + 1))
+    tile = max(len(raw.cfa), len(raw.cfa[0]))
+    return np.asarray(maximum_filter(hit, size=2 * (tile - 1 if reach is None else reach) + 1))
 
 
 def clip_highlights(raw: RawImage, balanced: NDArray[np.float64], reach: int | None = None) -> NDArray[np.float64]:
     """Hold every balanced colour at green's full well near a saturated colour sample: highlights stay neutral.
 
+    Without green it is the full well of `sensor.cfa.unit_channel`.
     `reach` as in `saturated_nearby`: that of the filter which made the planes.
     """
-    clipped = saturated_nearby(raw, "RGB", reach)
+    clipped = saturated_nearby(raw, "".join(colour_channels(raw.cfa)), reach)
     return np.where(clipped[..., None], np.minimum(balanced, raw.full_well_e), balanced)

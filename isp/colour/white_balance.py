@@ -16,8 +16,8 @@ from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from rodcone.brief import brief
 from rodcone.errors import InputError
-from sensor.cfa import channel_map, channels
-from sensor.curves import Responses, rgbw
+from sensor.cfa import channel_map, channels, colour_channels, unit_channel
+from sensor.curves import Responses, built_in
 from sensor.raw import RawImage
 
 BalanceSource = Literal["gray world", "calibrated", "given"]
@@ -67,7 +67,7 @@ class WhiteBalance:
         Returns
         -------
         (channel,) float64
-            Factor on each channel; green's is 1.
+            Factor on each channel; green's is 1, or that of `sensor.cfa.unit_channel`.
         mapping of str to str
             Where each channel's factor comes from: ``gray world``, ``calibrated`` where the picture was too dark to
             tell, or ``given``.
@@ -78,14 +78,14 @@ class WhiteBalance:
         well. W saturates first; taking its pixels out of the colours' means too would leave them the dark part of the
         scene.
         """
-        names = channels(raw.cfa)
+        names, unit, colours = channels(raw.cfa), unit_channel(raw.cfa), "".join(colour_channels(raw.cfa))
         if self.given is not None:
-            return self.given[names.index("G")] / self.given, dict.fromkeys(names, "given")
+            return self.given[names.index(unit)] / self.given, dict.fromkeys(names, "given")
         neutral = neutral_response(names) if self.neutral is None else self.neutral
-        usable = ~saturated_nearby(raw, "RGB")
-        groups = {"RGB": usable}
-        if "W" in names:  # before the colours, which then say where green's gain comes from
-            groups = {"GW": usable & ~saturated_nearby(raw, "W"), "RGB": usable}
+        usable = ~saturated_nearby(raw, colours)
+        groups = {colours: usable}
+        if "W" not in colours and "W" in names:  # before the colours, which then say where green's gain comes from
+            groups = {unit + "W": usable & ~saturated_nearby(raw, "W"), colours: usable}
         sites = channel_map(raw.cfa, raw.shape)
         factors = np.ones(len(names))
         sources: dict[str, BalanceSource] = dict.fromkeys(names, "calibrated")
@@ -94,7 +94,7 @@ class WhiteBalance:
             samples = np.array([max((pixels & (sites == channel)).sum(), 1) for channel in group])
             means = planes[..., index][pixels].mean(axis=0) if pixels.any() else np.zeros(len(group))
             errors = np.sqrt((np.maximum(means, 0.0) + raw.dark_noise_e**2) / samples)
-            factors[index], certain = gray_world(means, errors, neutral[index], green=group.index("G"))
+            factors[index], certain = gray_world(means, errors, neutral[index], green=group.index(unit))
             for channel, sure in zip(group, certain, strict=True):
                 sources[channel] = "gray world" if sure else "calibrated"
         return factors, sources
@@ -105,7 +105,7 @@ def neutral_response(names: Sequence[str], responses: Responses | None = None) -
     nm = DEFAULT_WAVELENGTH_NM
     width = band_widths(nm)
     light = illuminant("D65").band_average(nm, width) * photons_per_joule(nm)
-    return np.asarray((responses or rgbw()).band_average(tuple(names), nm, width) @ light)
+    return np.asarray((responses or built_in()).band_average(tuple(names), nm, width) @ light)
 
 
 def _response(name: str, values: ArrayLike | None, raw: RawImage) -> Floats | None:

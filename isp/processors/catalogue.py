@@ -15,6 +15,7 @@ from isp.colour.white_balance import WhiteBalance
 from isp.defects import mend
 from isp.picture import Picture
 from isp.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
+from isp.processors.any_mosaic import picture_any_mosaic
 from isp.processors.bayer_denoised import picture_bayer_nlm, picture_demosaicked_first, picture_denoised_first
 from isp.processors.bm3d import EXTRA as BM3D
 from isp.processors.demosaic import EXTRA as DEMOSAICKING
@@ -26,7 +27,7 @@ from isp.processors.piecewise import picture_ple_bayer, picture_ple_rgbw
 from isp.processors.residual import residual_interpolation
 from isp.processors.sub_images import hadamard, principal_components
 from rodcone.errors import InputError
-from sensor.cfa import channels
+from sensor.cfa import OWN, channels
 from sensor.raw import RawImage
 
 _LIBRARIES = {DEMOSAICKING: ("colour_demosaicing",), BM3D: ("bm3d", "colour_demosaicing")}  # what an extra brings
@@ -39,7 +40,8 @@ class Processor:
     Attributes
     ----------
     mosaic : str
-        Name that `sensor.variations.vary` takes: one of `sensor.cfa.MOSAICS`, or a variation with curves of its own.
+        Name that `sensor.variations.vary` takes: one of `sensor.cfa.MOSAICS`, a variation with curves of its own, or
+        ``own``, the sensor's own.
     picture : callable
         ``picture(raw, colours, *, balance) -> Picture`` with a `ColourFit` and a `WhiteBalance`; `develop` calls it.
     source : str
@@ -47,9 +49,9 @@ class Processor:
     extra : str or None
         What ``pip install rodcone[...]`` has to bring; None: nothing.
     colours : tuple of str
-        Channels whose balanced planes the matrix takes to linear sRGB.
+        Channels whose balanced planes the matrix takes to linear sRGB; empty: all of the mosaic's.
     unit : str
-        Channel whose electrons a neutral reads in the developed picture.
+        Channel whose electrons a neutral reads in the developed picture; empty: `sensor.cfa.unit_channel`.
     on_backend : bool
         Whether it runs in Dr.Jit where there is a backend; NumPy else.
     noise_gains : NoiseGains or None
@@ -102,6 +104,7 @@ _PARK = partial(picture_denoised_first, mix=principal_components, demosaic=resid
 _RESIDUAL_BM3D = partial(picture_demosaicked_first, demosaic=residual_interpolation)
 _EARLY = "W as luminance by early fusion"
 _PIECEWISE = "piecewise linear: Yu, Sapiro & Mallat 2012 with a fixed prior, Zoran & Weiss 2011"
+_ANY = "interleaved reconstruction, a matrix over all channels; one or two give a grey picture"
 # As published; the first two are the paper's.
 _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
     {
@@ -127,6 +130,13 @@ _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
         ),
         "rgbw_gindele": Processor("rgbw", picture_gindele, "colours alone where W is full: Gindele & Gallagher 2002"),
         "rgbw_park": Processor("rgbw", picture_rgbw_park, "BM3D as Park et al. 2009, then Gindele", extra=BM3D),
+        **{
+            name: Processor(
+                *(name, partial(picture_any_mosaic, mosaic=name), _ANY), on_backend=True, colours=(), unit=""
+            )
+            for name in ("rccb", "rccc", "ryyb", "mono")
+        },
+        "any_mosaic": Processor(OWN, picture_any_mosaic, _ANY, on_backend=True, colours=(), unit=""),
         "ple_rgbw": Processor("rgbw", picture_ple_rgbw, _PIECEWISE),
         "ple_bayer": Processor("bayer", picture_ple_bayer, _PIECEWISE),
     }
@@ -143,8 +153,8 @@ def names() -> tuple[str, ...]:
 
 
 def libraries(name: str) -> tuple[str, ...]:
-    """Libraries that a processor of `PROCESSORS` needs beside rodcone's own."""
-    extra = PROCESSORS[name].extra
+    """Libraries that a processor of `PROCESSORS` needs beside rodcone's own; a user's own file tells none."""
+    extra = PROCESSORS[name].extra if name in PROCESSORS else None
     return () if extra is None else _LIBRARIES[extra]
 
 

@@ -1,19 +1,32 @@
 """Radiance from a file in place of a rendered scene."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from render.illuminants import illuminant
 from render.level import SceneMeans
 from render.radiance import SpectralRadiance
+from render.radiance_files import cube, photo
+from render.radiance_files.cube import REFLECTANCE, cube_holds, description, read_cube
+from render.radiance_files.envi import data_file
 from render.radiance_files.exr import read_exr
 from render.radiance_files.iset import read_iset_scene
 from render.scene import LightGroup
-from render.spectrum import LONGEST_NM, SHORTEST_NM, Spectrum
+from render.spectrum import DEFAULT_WAVELENGTH_NM, LONGEST_NM, SHORTEST_NM, Spectrum
 from render.transport import Transport
 from rodcone.errors import unknown
+from rodcone.memory import file_extent
 
-_READERS = {".exr": read_exr, ".mat": read_iset_scene}
+WHITE_CD_M2 = 100.0  # luminance of a reflectance of 1, where no level is asked for
+_READERS = {
+    ".exr": read_exr,
+    ".mat": lambda path: read_cube(path) if description(path).is_file() else read_iset_scene(path),
+    **dict.fromkeys((".npy", ".hdr"), read_cube),
+    **dict.fromkeys(photo.EXTENSIONS, photo.read_photo),
+}
+ENDINGS = tuple(_READERS)
 
 
 def is_radiance_file(name: str | Path) -> bool:
@@ -21,14 +34,71 @@ def is_radiance_file(name: str | Path) -> bool:
     return Path(name).suffix.lower() in _READERS
 
 
-def load_radiance(path: str | Path) -> SpectralRadiance:
-    """Read spectral OpenEXR (``.exr``) or an ISETCam scene (``.mat``).
+def is_reflectance(path: str | Path) -> bool:
+    """Whether a file holds reflectances, which any light can light: a photograph, or a cube that says so.
 
     Raises
     ------
     InputError
-        For another ending, and as `read_exr` and `read_iset_scene`.
+        For a cube without a description.
     """
+    suffix = Path(path).suffix.lower()
+    if suffix in cube.EXTENSIONS and (suffix != ".mat" or description(path).is_file()):
+        return cube_holds(path) == REFLECTANCE
+    return suffix in photo.EXTENSIONS
+
+
+def files_of(path: str | Path) -> list[Path]:
+    """All files that a picture is read from: itself, the description beside a cube, and ENVI's numbers."""
+    suffix, described = Path(path).suffix.lower(), description(path)
+    beside = [described] if suffix in cube.EXTENSIONS and described.is_file() else []
+    return [Path(path), *beside, *([data_file(path)] if suffix == ".hdr" else [])]
+
+
+def extent_of(path: str | Path) -> tuple[int, int, int]:
+    """Pixels, bands and light groups that a picture file counts as: a photograph by its header, else by its bytes."""
+    if Path(path).suffix.lower() in photo.EXTENSIONS:
+        height, width = photo.photo_size(path)
+        return height * width, DEFAULT_WAVELENGTH_NM.size, 1
+    pixels, bands, groups = zip(*(file_extent(each) for each in files_of(path)), strict=True)
+    return sum(pixels), bands[0], groups[0]
+
+
+def load_radiance(path: str | Path, light: str = "D65") -> SpectralRadiance:
+    """Read spectral OpenEXR (``.exr``), an ISETCam scene (``.mat``), a cube or a photograph.
+
+    Parameters
+    ----------
+    path : str or Path
+        Beside a cube (``.npy``, ENVI's ``.hdr``, a plain ``.mat``) lies its description
+        (`render.radiance_files.cube.read_cube`); a photograph's (``.jpg``, ``.png``) spectra are upsampled from its
+        colours (`render.radiance_files.photo.read_photo`).
+    light : str
+        Illuminant of reflectances, of which 1 has 100 cd/m^2.
+
+    Raises
+    ------
+    InputError
+        For another ending, and as `read_exr`, `read_iset_scene`, `read_cube` and `read_photo`.
+    """
+    return load_picture(path, illuminant(light)).relight() if is_reflectance(path) else _read(path)
+
+
+def load_picture(path: str | Path, light: Spectrum) -> Transport:
+    """Read a file as `load_radiance` does, as light transport: reflectances can be lit by another light afterwards.
+
+    Parameters
+    ----------
+    light : Spectrum
+        Of 1 cd/m^2; for reflectances alone.
+    """
+    transport = as_transport(_read(path))
+    if not is_reflectance(path):
+        return transport
+    return replace(transport, groups={"light": LightGroup((), light, WHITE_CD_M2)})
+
+
+def _read(path: str | Path) -> SpectralRadiance:
     suffix = Path(path).suffix.lower()
     if suffix not in _READERS:
         raise unknown(f"{path}: ending", suffix, _READERS)
@@ -60,6 +130,7 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
         radiance=planes,
         half_difference=none,
         variance=variance if error else none,
+        relative_mc_error=error,
         coverage=dark[0],
         coverage_difference=dark[0],
         seen=(dark,),

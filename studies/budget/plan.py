@@ -11,6 +11,7 @@ from render.engine import render
 from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.progress import Step
+from sensor.burst import merged_sensor
 from sensor.config import LensConfig
 from sensor.presets import preset
 from sensor.variations import vary
@@ -170,7 +171,8 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
                         exposure_s = parse_exposure(condition.exposure)
                         if exposure_s is None:
                             exposure_s = min(study.longest_exposure_s, auto_s / level)
-                        yield weigh(condition, mosaic, sensor, found, level, exposure_s, noise)
+                        together = merged_sensor(sensor, condition.frames), exposure_s * condition.frames
+                        yield weigh(condition, mosaic, together[0], found, level, together[1], noise)
 
 
 def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:

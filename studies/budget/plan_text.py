@@ -94,7 +94,7 @@ def _cells(row: Ledger) -> list[str]:
 
 def _condition(row: Ledger) -> tuple[str, ...]:
     of = row.condition
-    return label(of.scene.source), of.spectrum, of.level, of.exposure, of.sensor, row.mosaic
+    return of.scene.label, label(of.spectrum), of.level, of.exposure, of.sensor, row.mosaic
 
 
 def _figures(row: Ledger) -> list[str]:
@@ -115,13 +115,13 @@ def reasons(study: Study, plan: Plan, reference: Plan) -> Iterator[str]:
         wide = f"{widths[0]:g}" if len(widths) == 1 else f"{widths[0]:g} to {widths[-1]:g}"
         noise = worst(plan, scene, MONTE_CARLO)
         yield (
-            f"{label(scene.source)}: {len(model.width_nm)} bands of {wide} nm, {model.spp} samples a pixel; render and "
+            f"{scene.label}: {len(model.width_nm)} bands of {wide} nm, {model.spp} samples a pixel; render and "
             f"lens cost about {cost_over_reference(plan, reference, scene):.2g} of the reference's"
         )
         if noise.share > budget.monte_carlo:
             wanted = model.spp * noise.share / budget.monte_carlo
             yield (
-                f"{label(scene.source)}: Monte Carlo noise reaches {_percent(noise.share)} in the worst condition; "
+                f"{scene.label}: Monte Carlo noise reaches {_percent(noise.share)} in the worst condition; "
                 f"{wanted:.2g} samples would keep the aim, and render.spp allows {study.render.spp}"
             )
 

@@ -21,11 +21,13 @@ def capture(
     exposure_s: Seconds | None = None,
     level: str | None = None,
     light: Several = None,
+    chart: str | None = None,
     white_balance: str = AS_SHOT,
     size: int | None = None,
     height: int | None = None,
     width: int | None = None,
     spp: int = 64,
+    frames: int = 1,
     seed: int = 0,
     trust_scene: Flag = False,
     extend: str | None = None,
@@ -56,7 +58,10 @@ def capture(
         by default.
     light
         ILLUMINANT, such as A, in place of all of the scene's lights, or GROUP=ILLUMINANT in place of one group, each at
-        the same luminance; may be given several times. For a file of radiance the light that it was lit by.
+        the same luminance; may be given several times. An illuminant is a name or a CSV file, such as sky=led.csv. For
+        a file of radiance the light that it was lit by.
+    chart
+        CSV file with the reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
     white_balance
         Illuminant, such as D65, under which the camera shows grey as grey; as-shot for the scene's first light, and
         that of --light, or D65, for a file of radiance.
@@ -69,6 +74,8 @@ def capture(
         Pixels; as height.
     spp
         Samples a pixel of the render.
+    frames
+        Exposures of a burst, each in a file of its own, NAME_1, NAME_2 and so on; develop merges them.
     seed
         Seed of the render, the chip and the exposure.
     trust_scene
@@ -89,11 +96,13 @@ def capture(
         exposure=exposure,
         level=level,
         lights=tuple(light or ()),
+        chart=chart,
         white_balance=white_balance,
         size=size,
         height=height,
         width=width,
         spp=spp,
+        frames=frames,
         seed=seed,
         trust=trust_scene,
         extend=extend,

@@ -13,7 +13,7 @@ from studies.study.study import AS_SHOT
 def develop(
     raw: Path,
     /,
-    *,
+    *more: Path,
     out: OutOrNone = None,
     isp: str | None = None,
     bits: int = 8,
@@ -22,6 +22,7 @@ def develop(
     height: int | None = None,
     width: int | None = None,
     encoding: str = "srgb",
+    trust_code: Flag = False,
     json: Flag = False,
 ) -> None:
     """Develop a raw file of `rodcone capture`, or any camera's with a Bayer mosaic, into a picture; prints its path.
@@ -31,10 +32,13 @@ def develop(
     raw
         Raw file: .dng, or .tif with its .json beside it; or a camera's, such as .nef, .cr2 or .dng, which needs
         pip install 'rodcone[photographs]'.
+    more
+        Further raw files of the same camera and scene, such as capture --frames writes: all are merged, then developed.
     out
         Picture to write, .png or .tif; the raw file's name with .png by default.
     isp
         Processor: interleaved (RGBW) or bayer by default, by the file's mosaic; rodcone list processors names them all.
+        Or a function in a Python file of your own, mine.py:develop, with --trust-code.
     bits
         Bits a channel: 8 or 16.
     ev
@@ -49,6 +53,8 @@ def develop(
         Pixels; as height.
     encoding
         Colours of the picture: srgb, or display-p3 for screens with a wider gamut.
+    trust_code
+        Run the Python file that --isp names, which may do all that you may.
     json
         Print one JSON object with the path and the choices made instead of the path.
     """
@@ -57,6 +63,8 @@ def develop(
     picture = raw.with_suffix(".png") if out is None else out
     check_picture_file(picture, bits, encoding)
     check_place(picture)
-    developed = develop_file(raw, isp, ev, white_balance, encoding, height=height, width=width)
+    developed = develop_file(
+        (raw, *more), isp, ev, white_balance, encoding, height=height, width=width, trust_code=trust_code
+    )
     write_picture(developed.encoded, picture, bits, encoding)
     print_result(picture, {"path": str(picture), **developed.facts}, json=json)

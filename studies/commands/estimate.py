@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rodcone.memory import file_extent, memory
+from render.radiance_files.radiance_source import extent_of
+from rodcone.memory import memory
 from studies.budget.model_plan import Plan
 from studies.study.lit_scene import OpenedScene
 from studies.study.study import SceneChoice, Study, conditions
@@ -48,7 +49,7 @@ def estimate(study: Study, plan: Plan, scenes: Mapping[SceneChoice, OpenedScene]
     needs = []
     for choice, opened in scenes.items():
         if opened.scene is None:
-            (pixels, bands, groups), denoised = file_extent(choice.source), False
+            (pixels, bands, groups), denoised = extent_of(choice.source), False
         else:
             model, pixels, groups = plan.renders[choice], opened.size[0] * opened.size[1], len(opened.scene.groups)
             bands, denoised = len(model.wavelength_nm), model.denoise

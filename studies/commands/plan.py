@@ -18,7 +18,14 @@ from studies.study.study_file import read_study
 
 
 def plan(
-    study: Path, /, *, set: Several = None, check: Flag = False, cache: Path | None = None, json: Flag = False
+    study: Path,
+    /,
+    *,
+    set: Several = None,
+    check: Flag = False,
+    cache: Path | None = None,
+    trust_code: Flag = False,
+    json: Flag = False,
 ) -> None:
     """Compute a study's error budget and choose the cheapest model within it.
 
@@ -32,10 +39,12 @@ def plan(
         Render both models as well, and compare their expected electrons with what the budget predicts.
     cache
         Folder of renders to use and to fill.
+    trust_code
+        Run the Python files that the study names as processors (mine.py:develop); they may do all that you may.
     json
         Print one JSON object.
     """
-    task = read_study(study, set or ())
+    task = read_study(study, set or (), trust_code=trust_code)
     everything = reference_plan(task)
     checked = None
     with progress(sys.stderr) as step:

@@ -33,6 +33,7 @@ def render(
     width: int | None = None,
     bands: str | None = None,
     light: Several = None,
+    chart: str | None = None,
     level: str | None = None,
     spp: int | None = None,
     noise: float | None = None,
@@ -67,7 +68,9 @@ def render(
         Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; 380:780:10 by default.
     light
         GROUP=ILLUMINANT, such as lamp=A: another spectrum for a light group, at the same luminance; or ILLUMINANT
-        alone, for all of them; may be given several times.
+        alone, for all of them; may be given several times. An illuminant is a name or a CSV file: lamp=led.csv.
+    chart
+        CSV file with the reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
     level
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
         by default.
@@ -98,7 +101,7 @@ def render(
     # Check what can be checked before the render
     require_ending(out, ".exr")
     wavelength_nm, width_nm = _bands(bands)
-    opened = open_scene(source, trust_scene, extend)
+    opened = open_scene(source, trust_scene, extend, chart=chart)
     scene, size = opened.scene, asked_size(opened.size, height, width)
     spectra = asked_spectra(scene, light or ())
     luminance_cd_m2, illuminance_lux = asked_level(scene, level)

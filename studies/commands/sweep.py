@@ -49,6 +49,7 @@ def sweep(
     as_stated: Flag = False,
     keep_old: Flag = False,
     dry_run: Flag = False,
+    trust_code: Flag = False,
     force: Flag = False,
     json: Flag = False,
 ) -> int:
@@ -77,13 +78,15 @@ def sweep(
         --all; by default they are removed when they are made anew.
     dry_run
         Print cells, renders, and an estimate of time and memory; compute nothing.
+    trust_code
+        Run the Python files that the study names as processors (mine.py:develop); they may do all that you may.
     force
         Run even where the estimate needs more memory than is free.
     json
         Print one JSON object instead of the path.
     """
     clock = Clock()
-    task = read_study(study, set or ())
+    task = read_study(study, set or (), trust_code=trust_code)
     if reference and as_stated:
         raise InputError("reference: it can't go with --as-stated; leave one of them out")
     if cluster is not None and workers is not None:

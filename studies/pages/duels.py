@@ -26,13 +26,14 @@ FEWEST_SEEDS = 2  # that an interval takes
 
 @dataclass(frozen=True)
 class Group:
-    """Scene, spectrum, exposure, sensor and white balance: all that a row of a study's levels has in common."""
+    """Scene, spectrum, exposure, sensor, white balance and frames: all that a row of a study's levels has in common."""
 
     scene: str
     spectrum: str
     exposure: str
     sensor: str
     white_balance: str
+    frames: int = 1
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def contests_of(rows: Sequence[Row]) -> list[Contest]:
     require_alike(rows)
     of_cells = {
         (
-            Group(row.scene, row.spectrum, row.exposure, row.sensor, row.white_balance),
+            Group(row.scene, row.spectrum, row.exposure, row.sensor, row.white_balance, row.frames),
             row.level,
             row.processor,
             row.seed,
@@ -126,9 +127,10 @@ def groups_of(contests: Sequence[Contest]) -> list[Group]:
 def group_name(group: Group, groups: Sequence[Group]) -> str:
     """Name what tells a group from the others; the scene in any case."""
     parts = [group.scene]
-    for name, before in (("spectrum", ""), ("exposure", "exposure "), ("sensor", ""), ("white_balance", "balance ")):
+    told = {"spectrum": "", "exposure": "exposure ", "sensor": "", "white_balance": "balance ", "frames": "frames "}
+    for name, before in told.items():
         if len({getattr(other, name) for other in groups}) > 1:
-            parts.append(before + getattr(group, name))
+            parts.append(f"{before}{getattr(group, name)}")
     return ", ".join(parts)
 
 

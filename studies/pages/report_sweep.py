@@ -96,7 +96,8 @@ def _cells(study: Mapping[str, Any], made: Sequence[Row], names: Sequence[str]) 
     """Return a cell for each combination that was asked for; one that isn't made yet has no figure."""
     sensors = [label(name) for name in study["sensors"]]
     found = {
-        (r.scene, r.spectrum, r.sensor, r.exposure, r.white_balance, r.level, r.processor, r.seed): r for r in made
+        (r.scene, r.spectrum, r.sensor, r.exposure, r.white_balance, r.frames, r.level, r.processor, r.seed): r
+        for r in made
     }
     light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in made}
     views = view_names(names, study["spectra"])
@@ -113,9 +114,9 @@ def _cells(study: Mapping[str, Any], made: Sequence[Row], names: Sequence[str]) 
     return cells
 
 
-def _ways(study: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return each exposure with each white balance; the report's exposures are these."""
-    return list(product(study["exposures"], study["white_balances"]))
+def _ways(study: Mapping[str, Any]) -> list[tuple[str, str, int]]:
+    """Return each exposure with each white balance and number of frames; the report's exposures are these."""
+    return list(product(study["exposures"], study["white_balances"], study["frames"]))
 
 
 def _exposure_rules(study: Mapping[str, Any]) -> str:

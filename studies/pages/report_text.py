@@ -150,9 +150,10 @@ def exposure_name(exposure: str) -> str:
     return (AUTOMATIC[time] if seconds is None else duration(seconds)) + comma + balance
 
 
-def way_name(exposure: str, white_balance: str) -> str:
-    """Write an exposure and how its pictures are balanced, where that isn't Gray World, for `exposure_name`."""
-    return exposure if white_balance == GRAY_WORLD else f"{exposure}, white balance {white_balance}"
+def way_name(exposure: str, white_balance: str, frames: int = 1) -> str:
+    """Write an exposure, how its pictures are balanced, and frames of a burst, but for Gray World and one frame."""
+    balance = "" if white_balance == GRAY_WORLD else f", white balance {white_balance}"
+    return exposure + balance + ("" if frames == 1 else f", {frames} frames")
 
 
 def spectrum_name(spectrum: str) -> str:

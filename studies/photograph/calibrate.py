@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.colour_fit import fit_matrix, fit_through_neutral
+from isp.colour.colour_fit import fit_through_neutral, grey_of, training
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule, tristimulus
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
@@ -11,7 +11,7 @@ from rodcone.colour_spaces import D50_XYZ, adapt_to_d65, xyz_to_srgb
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker
 from sensor.calibration import ColourCalibration
-from sensor.cfa import channels
+from sensor.cfa import channels, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation
 from sensor.presets import preset
@@ -27,19 +27,18 @@ def calibrate(sensor: SensorConfig | str, light: Spectrum | str) -> ColourCalibr
     Parameters
     ----------
     sensor : SensorConfig or str
-        With R, G and B in its mosaic. Channels beyond these get a fitted column from XYZ, and carry no colour back.
+        The first three channels of its mosaic, R, G and B where it has them, tell colours. Channels beyond these get a
+        fitted column from XYZ, and carry no colour back. One or two channels give grey.
     light : Spectrum or str
         What the camera's white balance is set to.
 
     Raises
     ------
     InputError
-        Where a channel is missing, collects nothing, or the three can't tell colours apart.
+        Where a channel collects nothing, or the three can't tell colours apart.
     """
     sensor = preset(sensor) if isinstance(sensor, str) else sensor
     light = illuminant(light) if isinstance(light, str) else light
-    if not set("RGB") <= set(channels(sensor.cfa)):
-        raise InputError(f"cfa: {sensor.cfa} holds no colours to calibrate; allowed: R, G and B; write its raw as .tif")
     neutral, to_srgb, _, _ = _under(sensor, light)
     _, _, to_camera_a, to_xyz_a = _under(sensor, illuminant("A"))
     _, _, to_camera_d65, to_xyz_d65 = _under(sensor, illuminant("D65"))
@@ -79,7 +78,7 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     electrons = electrons_per_irradiance(sensor, nm, width, 1.0)
     response = electrons / (photons_per_joule(nm) * width)  # inside the camera's window
     names = channels(sensor.cfa)
-    rgb = [names.index(channel) for channel in "RGB"]
+    three = list(range(min(len(names), 3)))
     collected = electrons @ light.spectrum
     if not np.all(collected > 0):
         raise InputError(
@@ -87,18 +86,24 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
             "allowed: a channel that sees light; give another curve"
         )
     surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
-    to_srgb = fit_matrix(response[rgb], nm, light.spectrum, surfaces)
-    if np.linalg.cond(to_srgb) > 1e6:
-        raise InputError("responses: R, G and B can't tell colours apart; allowed: three different curves; correct one")
+    signals, colours = training(response[three], nm, light.spectrum, surfaces)
+    to_srgb = fit_through_neutral(signals, colours if len(three) == 3 else grey_of(colours))
+    if len(three) == 3 and np.linalg.cond(to_srgb) > 1e6:
+        raise InputError(
+            f"responses: {', '.join(names[:3])} can't tell colours apart; allowed: three different curves; correct one"
+        )
     white = tristimulus(light.spectrum, nm, width)  # Y = 1
     from_xyz = _srgb_of_xyz(white)
     target = xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light.spectrum, nm, width), white))
     balanced = (surfaces * light.spectrum) @ electrons.T / collected
     from_srgb = fit_through_neutral(target, balanced)
-    from_srgb[rgb] = np.linalg.inv(to_srgb)
-    neutral = collected / collected[names.index("G")]
+    if len(three) == 3:
+        from_srgb[three] = np.linalg.inv(to_srgb)
+    neutral = collected / collected[names.index(unit_channel(sensor.cfa))]
     to_xyz = np.zeros((3, len(names)))
-    to_xyz[:, rgb] = np.linalg.inv(_srgb_of_xyz(D50_XYZ)) @ to_srgb  # D50: the connection space of DNG's ForwardMatrix
+    to_xyz[:, three] = (
+        np.linalg.inv(_srgb_of_xyz(D50_XYZ)) @ to_srgb
+    )  # D50: the connection space of DNG's ForwardMatrix
     return neutral, to_srgb, neutral[:, None] * from_srgb @ from_xyz, to_xyz
 
 

@@ -9,7 +9,7 @@ from isp.colour.colour_fit import ColourFit, fit_colours
 from isp.picture import Picture
 from isp.processors.catalogue import Processor
 from scenes.reflectances import color_checker, held
-from sensor.cfa import channels, mask
+from sensor.cfa import channels, mask, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import falloff
 from sensor.raw import RawImage
@@ -20,7 +20,8 @@ def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> Colo
     """Fit of the processor's balanced colours, and the mosaic's other channels, under a light on the ColorChecker."""
     nm, width = light.wavelength_nm, light.width_nm
     surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker()])
-    names = (*processor.colours, *(x for x in channels(sensor.cfa) if x not in processor.colours))
+    colours = processor.colours or channels(sensor.cfa)
+    names = (*colours, *(x for x in channels(sensor.cfa) if x not in colours))
     responses = sensor.responses.band_average(names, nm, width)
     return fit_colours(names, responses, nm, light.spectrum, surfaces, width)
 
@@ -43,7 +44,7 @@ def develop_to_scale(
     ----------
     raw : RawImage
     processor : Processor
-        Of `isp.processors.catalogue.PROCESSORS`.
+        Of `isp.processors.own.processor_of`.
     colours : ColourFit
         Of the processor's balanced colours; the paper's literal camera has a (3, 3) matrix in its place.
     sensor : SensorConfig
@@ -69,7 +70,7 @@ def develop_to_scale(
     """
     neutral = neutral_electrons(sensor, light, raw.exposure_s)  # of 1 cd/m^2
     picture = processor.develop(raw, colours, neutral=neutral, **options)
-    unit_e = float(neutral[channels(sensor.cfa).index(processor.unit)])
+    unit_e = float(neutral[channels(sensor.cfa).index(processor.unit or unit_channel(sensor.cfa))])
     linear = picture.rgb / (unit_e * white_cd_m2)
     if sensor.lens.horizontal_view_deg:
         linear = linear / falloff(sensor.lens, linear.shape[:2])[..., None]

@@ -1,5 +1,6 @@
 """A raw file developed into a picture for the screen."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,13 @@ from skimage.transform import resize_local_mean
 from isp.colour.calibrated_colours import fit_of_calibration, neutral_under
 from isp.colour.encoding import encode
 from isp.picture import Picture
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.own import processor_of, require_allowed
 from render.illuminants import illuminant
 from rodcone.brief import brief
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError, require_kind, require_range, unknown
 from rodcone.types import Floats
+from sensor.burst import merged_raw
 from sensor.calibration import ColourCalibration
 from sensor.cfa import channels, is_bayer
 from sensor.raw import RawImage
@@ -41,8 +43,10 @@ class Developed:
 
 
 def mosaic_processor(raw: RawImage) -> str:
-    """Processor that the paper has for a raw image's mosaic."""
-    return "bayer" if is_bayer(raw.cfa) else "interleaved"
+    """Processor that the paper has for a raw image's mosaic; ``any_mosaic`` for those that it doesn't know."""
+    if is_bayer(raw.cfa):
+        return "bayer"
+    return "interleaved" if channels(raw.cfa) == ("R", "G", "B", "W") else "any_mosaic"
 
 
 def develop(
@@ -51,6 +55,7 @@ def develop(
     *,
     processor: str | None = None,
     white_balance: str = AS_SHOT,
+    trust_code: bool = False,
 ) -> Picture:
     """Develop a raw image into a linear picture.
 
@@ -60,28 +65,31 @@ def develop(
     calibration : ColourCalibration, optional
         Colours of the camera, as `studies.photograph.calibrate.calibrate` fits them; the raw image's own by default.
     processor : str, optional
-        Of `isp.processors.catalogue.PROCESSORS`; ``bayer`` or ``interleaved``, by the mosaic, where left out.
+        Of `isp.processors.catalogue.PROCESSORS`, or ``mine.py:develop`` (`isp.processors.own.processor_of`); ``bayer``,
+        ``interleaved`` or ``any_mosaic``, by the mosaic, where left out.
     white_balance : str
         ``as-shot``: the calibration's neutral; an illuminant such as ``D65``: its neutral, from the calibration's
         matrices; or ``gray-world`` as in the paper, with the as-shot neutral where the picture is too dark for that.
+    trust_code : bool
+        Consent to run ``mine.py``, which may do all that its user may.
 
     Raises
     ------
     InputError
-        For an unknown name, a raw image without colours, or a mosaic that the processor doesn't know.
+        For an unknown name, a file of one's own without consent, a raw image without colours, or a mosaic that the
+        processor doesn't know.
     """
     require_kind("raw", raw, RawImage, "give what capture or read_raw gives")
     name = processor or mosaic_processor(raw)
-    if name not in PROCESSORS:
-        raise unknown("isp", name, PROCESSORS)
+    require_allowed("isp", name, trust_code)
     colour = calibration or raw.colour
     if colour is None:
         raise InputError(
-            "raw: it holds no colour calibration; allowed: one of a camera with R, G and B; give "
-            "calibrate(sensor, illuminant('D65')) as well"
+            "raw: it holds no colour calibration; allowed: one beside it; give calibrate(sensor, illuminant('D65')) too"
         )
     colours = fit_of_calibration(colour, channels(raw.cfa))
-    return PROCESSORS[name].develop(raw, colours, neutral=colour.neutral, balance=_asked_neutral(colour, white_balance))
+    software, asked = processor_of(name), _asked_neutral(colour, white_balance)
+    return software.develop(raw, colours, neutral=colour.neutral, balance=asked)
 
 
 def _asked_neutral(colour: ColourCalibration, white_balance: str) -> Floats | None:
@@ -101,7 +109,7 @@ def _asked_neutral(colour: ColourCalibration, white_balance: str) -> Floats | No
 
 
 def develop_file(
-    path: str | Path,
+    path: str | Path | Sequence[str | Path],
     isp: str | None = None,
     ev: float | None = None,
     white_balance: str = AS_SHOT,
@@ -109,6 +117,7 @@ def develop_file(
     *,
     height: int | None = None,
     width: int | None = None,
+    trust_code: bool = False,
 ) -> Developed:
     """Read a raw file and develop it with its own colour calibration.
 
@@ -117,8 +126,10 @@ def develop_file(
 
     Parameters
     ----------
-    isp : str, optional
-        Of `isp.processors.catalogue.PROCESSORS`; ``bayer`` or ``interleaved``, by the mosaic, where left out.
+    path : path, or sequence of them
+        Frames of a burst or bracket are merged (`sensor.burst.merged_raw`) before they are developed.
+    isp, trust_code
+        As `processor` and `trust_code` of `develop`.
     ev : float, optional
         Brightness in stops: at 0 green's full well is white. Left out, the 99th percentile of the picture's luminance
         comes to 90 % of white, which noise raises in the deepest dark; for looking, not for measuring.
@@ -137,14 +148,18 @@ def develop_file(
     """
     if ev is not None:
         require_range("ev", ev, -40.0, 40.0, "give stops")
-    raw, file_facts = open_raw(path)
+    paths = [path] if isinstance(path, str | Path) else list(path)
+    opened = [open_raw(each) for each in paths]
+    raw, file_facts = merged_raw([frame for frame, _ in opened]), opened[0][1]
     if raw.colour is None:
-        raise InputError(f"{path}: it holds no colour calibration; allowed: a camera with R, G and B; capture with one")
-    picture = develop(raw, processor=isp, white_balance=white_balance)
+        raise InputError(
+            f"{paths[0]}: it holds no colour calibration; allowed: what rodcone capture notes; capture anew"
+        )
+    picture = develop(raw, processor=isp, white_balance=white_balance, trust_code=trust_code)
     linear = _scaled(picture.rgb / raw.full_well_e, height, width)
     stops = _stops(linear) if ev is None else ev
     facts = {
-        "raw": str(path),
+        "raw": str(paths[0]) if len(paths) == 1 else [str(each) for each in paths],
         "isp": isp or mosaic_processor(raw),
         "engine": picture.engine,
         "ev": stops,

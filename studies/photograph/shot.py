@@ -10,15 +10,15 @@ import numpy as np
 from isp.remosaic import remosaic
 from render.engine import render
 from render.illuminants import illuminant
-from render.radiance_files.radiance_source import is_radiance_file
+from render.radiance_files.radiance_source import extent_of, is_radiance_file
 from render.scene import Scene, film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_range, require_whole
 from rodcone.files import check_place
-from rodcone.memory import file_extent, memory, require_memory
+from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
-from sensor.capture import capture
+from sensor.burst import burst
 from sensor.cfa import channels, check_covers, is_rgbw
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -32,7 +32,7 @@ from studies.study.levels import parse_level
 from studies.study.lit_scene import asked_spectra
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.study.scene_source import asked_level, asked_size, open_scene
-from studies.study.study import AS_SHOT, GRAY_WORLD
+from studies.study.study import AS_SHOT, GRAY_WORLD, MOST_FRAMES
 
 MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
 _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
@@ -57,11 +57,15 @@ class Order:
     lights : tuple of str
         ``GROUP=ILLUMINANT`` or ``ILLUMINANT``, as `studies.study.lit_scene.asked_spectra`; of a file of radiance one
         illuminant, the light that it was lit by.
+    chart : str, optional
+        CSV file with the reflectances of color_checker's patches.
     white_balance : str
         Illuminant that the camera's neutral and colour matrix are set to; ``as-shot`` for the scene's first light.
     size, height, width : int, optional
         Longer side in pixels, or height and width, of which one keeps the proportions.
     spp, seed : int
+    frames : int
+        Exposures, with one chip and the scene standing still; each in a file of its own.
     trust, extend
         As of `studies.study.scene_source.open_scene`.
     force : bool
@@ -76,11 +80,13 @@ class Order:
     exposure: str = AUTO
     level: str | None = None
     lights: tuple[str, ...] = ()
+    chart: str | None = None
     white_balance: str = AS_SHOT
     size: int | None = None
     height: int | None = None
     width: int | None = None
     spp: int = 64
+    frames: int = 1
     seed: int = 0
     trust: bool = False
     extend: str | None = None
@@ -128,7 +134,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         light, notes = _first_light(opened.scene, spectra)
         notes = [*notes, *opened.notes] if balance is None else [*opened.notes]
         luminance_cd_m2, illuminance_lux = asked_level(opened.scene, order.level)
-    colour = calibrate(sensor, balance or light) if set("RGB") <= set(channels(sensor.cfa)) else None
+    colour = calibrate(sensor, balance or light)
     check_place(out)  # before the render: it may take minutes
     if opened is not None:
         if step:
@@ -148,9 +154,16 @@ def take(order: Order, step: Step | None = None) -> Taken:
     if exposure_s is None:
         exposure_s = exposure_by_rule_s(order.exposure, form_image(radiance, sensor), sensor)
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
-    raw = capture(radiance, sensor, exposure_s, device, np.random.default_rng([order.seed, _FRAME]))
+    taken = burst(radiance, sensor, [exposure_s] * order.frames, device, np.random.default_rng([order.seed, _FRAME]))
     name = Path(order.sensor).stem.encode("ascii", "replace").decode()
-    raw = replace(raw, camera=name, f_number=sensor.lens.f_number, iso=iso_speed(sensor), colour=colour)
+    noted: dict[str, Any] = {
+        "camera": name,
+        "f_number": sensor.lens.f_number,
+        "iso": iso_speed(sensor),
+        "colour": colour,
+    }
+    raws = [replace(frame, **noted) for frame in taken]
+    raw = raws[0]
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
         notes += [
@@ -159,8 +172,9 @@ def take(order: Order, step: Step | None = None) -> Taken:
         ]
 
     # The files.
-    bayer = remosaic(raw) if out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) else None
-    paths = write_raw(raw, out)
+    places = [out] if order.frames == 1 else [out.with_stem(f"{out.stem}_{n}") for n in range(1, order.frames + 1)]
+    bayer = remosaic(raw) if out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) and order.frames == 1 else None
+    paths = tuple(path for frame, place in zip(raws, places, strict=True) for path in write_raw(frame, place))
     if bayer is not None:
         paths += write_raw(bayer, out.with_stem(out.stem + "_bayer"))
     facts = {
@@ -187,6 +201,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     sensor = preset(order.sensor, order.cfa)
     check_ending(Path(order.out), sensor.cfa)
     require_whole("spp", order.spp, 1, 1 << 16, "give samples per pixel")
+    require_whole("frames", order.frames, 1, MOST_FRAMES, "give exposures of a burst")
     require_whole("seed", order.seed, 0, 2**31, "give a whole number")
     if order.size is not None:
         require_whole("size", order.size, 1, 8192, "give the picture's longer side in pixels")
@@ -201,6 +216,8 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     if is_radiance_file(order.source):
         if order.trust:
             raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")
+        if order.chart:
+            raise InputError(f"chart: {order.source!r} is a picture, which has its own; leave --chart out")
         if order.extend:
             raise InputError(f"extend: {order.source!r} is a picture, which has no surfaces; leave --extend out")
         if asked := [name for name in ("size", "height", "width") if getattr(order, name) is not None]:
@@ -213,9 +230,9 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
                 "it was lit by, such as A; give one"
             )
         check_radiance_file(order.source, () if order.level is None else (order.level,))
-        require_memory(memory(*file_extent(str(order.source))), order.force)
+        require_memory(memory(*extent_of(order.source)), order.force)
         return sensor, None, exposure_s
-    opened = open_scene(str(order.source), order.trust, order.extend)
+    opened = open_scene(str(order.source), order.trust, order.extend, chart=order.chart)
     asked_level(opened.scene, order.level)
     height, width = _size(order, opened)
     check_covers(sensor.cfa, (height, width))
@@ -235,8 +252,6 @@ def _asked_exposure_s(order: Order, names: tuple[str, ...]) -> float | None:
     time_s = parse_exposure(order.exposure, "exposure")
     if time_s is not None:
         return time_s
-    if "G" not in names:
-        raise InputError(f"cfa: {names} has no G for the auto exposure; allowed: a mosaic with G; give exposure 20ms")
     if order.exposure != AUTO and "W" not in names:
         raise InputError(
             f"exposure: {order.exposure!r} looks at W, which {names} lacks; allowed: a mosaic with W; "

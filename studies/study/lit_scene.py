@@ -14,7 +14,7 @@ from render.engine import render
 from render.illuminants import illuminant
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
-from render.radiance_files.radiance_source import is_radiance_file
+from render.radiance_files.radiance_source import files_of, is_radiance_file
 from render.scene import Scene, film_size
 from render.scene_range import check_range
 from render.spectrum import Floats, Spectrum
@@ -67,9 +67,16 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         if choice.extend:
             raise InputError(f"scenes: extend for {choice.source}, a picture without surfaces; leave it out")
         check_radiance_file(choice.source, study.levels)
-        identity = digest([digest_file(choice.source), choice.light])
+        if choice.chart:
+            raise InputError(f"scenes: chart for {choice.source}, a picture; leave it out")
+        identity = digest(
+            [
+                [digest_file(file) for file in files_of(choice.source)],
+                None if choice.light is None else illuminant(choice.light),
+            ]
+        )
         return OpenedScene(choice=choice, scene=None, size=(0, 0), identity=identity)
-    opened = open_scene(choice.source, extend=choice.extend, light=choice.light)
+    opened = open_scene(choice.source, extend=choice.extend, light=choice.light, chart=choice.chart)
     scene = opened.scene
     for level in study.levels:
         asked_level(scene, level)

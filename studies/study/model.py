@@ -31,7 +31,7 @@ class ImageModel:
     exact: bool = True
 
 
-def unit_exposure_s(radiance: SpectralRadiance, preset: SensorConfig, channel: str = "G") -> float:
+def unit_exposure_s(radiance: SpectralRadiance, preset: SensorConfig, channel: str | None = None) -> float:
     """Auto exposure of a scene at 1 cd/m^2 [s], without a longest time; `_DARK_S` where there is no light.
 
     It is the same for every model of the lens, and for G, with the preset's own mosaic, for every processor, so that

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from render.illuminants import illuminant
 from render.radiance_files.file_checks import require_file
-from render.radiance_files.radiance_source import as_transport, load_radiance
+from render.radiance_files.photo import EXTENSIONS
+from render.radiance_files.radiance_source import is_reflectance, load_picture
 from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.errors import InputError, require_range
@@ -29,21 +30,27 @@ def open_radiance_file(path: str | Path, light: str | None) -> tuple[Transport, 
     Raises
     ------
     InputError
-        As `load_radiance`, for a picture of fewer than 16 or more than 4096 pixels a side, or an unknown light.
+        As `load_picture`, for a picture of fewer than 16 or more than 4096 pixels a side, or an unknown light.
     """
     spectrum = illuminant(light or LIGHT)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        radiance = load_radiance(path)
+        transport = load_picture(path, spectrum)
     name = Path(path).name
-    for side in radiance.shape:
+    for side in transport.counts.shape:
         require_range(f"{name}: side", side, 16, 4096, "a study takes such sides in pixels; crop or scale it")
     assumed = [f"{name}: {warning.message}" for warning in told]
     if light is None:
-        assumed.append(f"{name}: its colours are judged under {LIGHT}; give another light where that isn't so")
-    if radiance.relative_mc_error:
+        use = "it is lit by" if is_reflectance(path) else "its colours are judged under"
+        assumed.append(f"{name}: {use} {LIGHT}; give another light where that isn't so")
+    if Path(path).suffix.lower() in EXTENSIONS:
         assumed.append(
-            f"{name}: it was rendered with noise of {radiance.relative_mc_error:.1%} of the value in a pixel and band; "
-            "pictures of it hold that beside the sensor's noise, and no Monte Carlo share counts it"
+            f"{name}: a photograph doesn't tell spectra; each colour stands for the reflectance that the basis of "
+            "Mallett and Yuksel (2019) gives it"
         )
-    return as_transport(radiance), spectrum, assumed
+    if transport.relative_mc_error:
+        assumed.append(
+            f"{name}: it was rendered with noise of {transport.relative_mc_error:.1%} of the value in a pixel and "
+            "band; pictures of it hold that beside the sensor's noise, and no Monte Carlo share counts it"
+        )
+    return transport, spectrum, assumed

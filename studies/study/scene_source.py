@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+from render.radiance_files.radiance_source import ENDINGS
 from render.scene import Scene
 from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_parts import SceneFile
@@ -10,14 +11,16 @@ from rodcone.errors import InputError, require_whole
 from scenes.catalog import load
 from studies.study.levels import parse_level
 
-_READ = (".xml", ".exr", ".mat")  # endings of files that are scenes
+_READ = (".xml", *ENDINGS)  # endings of files that are scenes
 _OTHER_FILES = {
     **dict.fromkeys((".dng", ".tif", ".tiff", ".nef", ".cr2", ".cr3", ".arw"), "a raw file, for rodcone develop"),
     ".toml": "a study or a sensor, for rodcone sweep or --sensor",
 }
 
 
-def open_scene(source: str, trust: bool = False, extend: str | None = None, light: str | None = None) -> SceneFile:
+def open_scene(
+    source: str, trust: bool = False, extend: str | None = None, light: str | None = None, chart: str | None = None
+) -> SceneFile:
     """Scene, the size of its film and notes.
 
     Parameters
@@ -26,24 +29,27 @@ def open_scene(source: str, trust: bool = False, extend: str | None = None, ligh
         Name in the catalogue, or a Mitsuba scene (``.xml``).
     trust, extend
         As of `load_scene_file`.
-    light : str, optional
-        Option of a catalogue scene's builder.
+    light, chart : str, optional
+        Options of a catalogue scene's builder: its light, and a CSV file of reflectances for color_checker's patches.
 
     Raises
     ------
     InputError
-        For an unknown name, a scene file that isn't allowed, `trust` for a catalogue scene, or `light` for a file.
+        For an unknown name, a scene file that isn't allowed, `trust` for a catalogue scene, or `light` or `chart` for a
+        file.
     """
     if Path(source).suffix.lower() == ".xml":
-        if light is not None:
-            raise InputError(f"scenes: light {light!r} for {source}; allowed: none, a file has its own")
+        for name, value in (("light", light), ("chart", chart)):
+            if value is not None:
+                raise InputError(f"scenes: {name} {value!r} for {source}; allowed: none, a file has its own")
         return load_scene_file(source, trust=trust, extend=extend)
     if trust:
         raise InputError(f"trust-scene: {source!r} is no .xml scene; leave --trust-scene out")
-    other = _OTHER_FILES.get(Path(source).suffix.lower())
-    if other:
-        raise InputError(f"scene: {source!r} is {other}; allowed: {', '.join(_READ)}, or a name of rodcone list scenes")
-    scene = load(source, **({} if light is None else {"light": light}))
+    if suffix := Path(source).suffix.lower():
+        what = _OTHER_FILES.get(suffix, f"no file that is a scene ({suffix})")
+        raise InputError(f"scene: {source!r} is {what}; allowed: {', '.join(_READ)}, or a name of rodcone list scenes")
+    options = {name: value for name, value in (("light", light), ("chart", chart)) if value is not None}
+    scene = load(source, **options)
     return SceneFile(replace(scene, extend=extend), scene.size, ())
 
 

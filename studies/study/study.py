@@ -5,33 +5,31 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from isp.processors.catalogue import PROCESSORS
-from render.illuminants import illuminant, lines_nm
-from render.radiance_files.radiance_source import is_radiance_file
+from isp.processors.own import own_file, processor_of, require_allowed
+from render.illuminants import illuminant
+from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_reflectance
 from render.spectrum import VISIBLE_NM
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, require_whole, unknown
-from sensor.cfa import channels
-from sensor.exposure import AUTO, LONGEST_S, RULES
+from sensor.exposure import AUTO, LONGEST_S
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.study.exposures import parse_exposure
 from studies.study.levels import parse_level
+from studies.study.light_range import check_known, check_range
 
 OWN = "own"  # the spectrum that the scene's lights have
-LOWEST_NM, HIGHEST_NM = 300.0, 1100.0  # of `render.spectrum.flat`, black bodies and the sun's table
-LEAST_RANGE_NM = 100.0  # the widest band that `RenderLimits.band_nm` takes
-# A light whose table ends short of the bands, at no more than this share of its peak, is taken as dark from there on;
-# white LEDs of the CIE end at 780 nm with 0.6 to 5 %.
-_RUN_OUT = 0.01
+MOST_FRAMES = 64
 # Gray World from the picture, or the neutral of the scene's light, as a camera notes it in its raw files.
 WHITE_BALANCES = GRAY_WORLD, AS_SHOT = "gray-world", "as-shot"
-FILES = (".xml", ".exr", ".mat", ".toml")  # endings of values that name a file
+FILES = (".xml", ".toml", ".csv", *ENDINGS)  # endings of values that name a file
 
 
 @dataclass(frozen=True)
 class SceneChoice:
-    """A scene of the catalogue by name, a Mitsuba scene (``.xml``) or a spectral picture (``.exr``, ``.mat``).
+    """A scene of the catalogue by name, a Mitsuba scene (``.xml``) or a picture file.
+
+    Such files hold radiance (``.exr``, ``.mat``, cubes), or reflectances (cubes, photographs) for any light.
 
     Attributes
     ----------
@@ -40,11 +38,19 @@ class SceneChoice:
         Option ``light`` of a catalogue scene's builder; for a picture file the light that its colours are judged under.
     extend : str, optional
         ``hold``: surfaces go on at their end values outside their tables.
+    chart : str, optional
+        CSV file with the reflectances of ``color_checker``'s patches, in place of the ColorChecker's.
     """
 
     source: str
     light: str | None = None
     extend: str | None = None
+    chart: str | None = None
+
+    @property
+    def label(self) -> str:
+        """Name in rows: of the scene, its file or its chart."""
+        return label(self.chart or self.source)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "source", str(self.source))  # from Python it may be a Path
@@ -119,7 +125,7 @@ class Condition:
     ----------
     scene : SceneChoice
     spectrum : str
-        An illuminant's name, or ``own``.
+        An illuminant's name or CSV file, or ``own``.
     level : str
         ``25cd/m2`` (mean scene luminance) or ``500lux`` (on the reference plane).
     exposure : str
@@ -128,6 +134,8 @@ class Condition:
         Preset by name, or a ``.toml`` file.
     white_balance : str
         Of `WHITE_BALANCES`.
+    frames : int
+        Exposures, each of that time, that are merged before they are developed.
     """
 
     scene: SceneChoice
@@ -136,11 +144,14 @@ class Condition:
     exposure: str
     sensor: str
     white_balance: str = GRAY_WORLD
+    frames: int = 1
 
 
 @dataclass(frozen=True)
 class Study:
-    """Axes of a sweep, and how its pictures are made. Every combination of the eight axes is a cell.
+    """Axes of a sweep, and how its pictures are made. Every combination of the nine axes is a cell.
+
+    `trust_code` is the consent to run the user's own Python files among `processors`; no study file can give it.
 
     Raises
     ------
@@ -156,11 +167,13 @@ class Study:
     white_balances: tuple[str, ...] = (GRAY_WORLD,)
     processors: tuple[str, ...] = ("interleaved", "bayer")
     seeds: tuple[int, ...] = (0,)
+    frames: tuple[int, ...] = (1,)
     name: str = "study"
     longest_exposure_s: float = LONGEST_S
     render: RenderLimits = field(default_factory=RenderLimits)
     lens: LensTerms = field(default_factory=LensTerms)
     budget: BudgetShares = field(default_factory=BudgetShares)
+    trust_code: bool = False
 
     __repr__ = brief
 
@@ -174,26 +187,39 @@ class Study:
 def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:
     """All combinations of scenes (or of one alone) and of the axes that decide a picture; the last varies fastest."""
     scenes = study.scenes if scene is None else (scene,)
-    axes = (scenes, study.spectra, study.levels, study.exposures, study.sensors, study.white_balances)
+    axes = (scenes, study.spectra, study.levels, study.exposures, study.sensors, study.white_balances, study.frames)
     return [Condition(*place) for place in product(*axes)]
 
 
 def mosaics(study: Study) -> tuple[str, ...]:
     """Mosaics that the study's processors take, each once."""
-    return tuple(dict.fromkeys(PROCESSORS[name].mosaic for name in study.processors))
+    return tuple(dict.fromkeys(processor_of(name).mosaic for name in study.processors))
 
 
 def label(value: Any) -> str:
     """Name of a value of an axis in rows and seeds: a file's name without its folder, any other value as it is."""
     text = str(value)
+    own = own_file(text)
+    if own is not None:
+        return f"{own[0].name}:{own[1]}"
     return Path(text).name if Path(text).suffix.lower() in FILES else text
 
 
 def _check_axes(study: Study) -> None:
     """Check that each axis has values of its own, and that levels, times, seeds and lights are known."""
-    for name in ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "seeds"):
+    for name in (
+        "scenes",
+        "spectra",
+        "levels",
+        "exposures",
+        "sensors",
+        "white_balances",
+        "processors",
+        "frames",
+        "seeds",
+    ):
         values = getattr(study, name)
-        labels = [label(value.source if isinstance(value, SceneChoice) else value) for value in values]
+        labels = [value.label if isinstance(value, SceneChoice) else label(value) for value in values]
         if not labels or len(set(labels)) != len(labels):
             raise InputError(
                 f"{name}: {labels!r} is not allowed; give one or more, each once, files under names of their own"
@@ -202,17 +228,19 @@ def _check_axes(study: Study) -> None:
         parse_level(level)
     for exposure in study.exposures:
         parse_exposure(exposure)
+    for count in study.frames:
+        require_whole("frames", count, 1, MOST_FRAMES, "give exposures of a burst, 1 for none")
     for seed in study.seeds:
         require_whole("seeds", seed, 0, 2**63 - 1, "give whole numbers")
     for scene in study.scenes:
         if scene.light is not None:
             illuminant(scene.light)
-    _check_range(study.render.range_nm)
+    check_range(study.render.range_nm)
     for spectrum in study.spectra:
         if spectrum != OWN:
-            _check_known(spectrum, study.render.range_nm)
+            check_known(spectrum, study.render.range_nm)
             for scene in study.scenes:
-                if is_radiance_file(scene.source):
+                if is_radiance_file(scene.source) and not is_reflectance(scene.source):
                     raise InputError(
                         f"spectra: {spectrum!r} can't relight {scene.source}, a picture whose light is in it; "
                         f"allowed: {OWN}; put the scene into a study of its own"
@@ -225,15 +253,10 @@ def _check_cameras(study: Study) -> None:
         if balance not in WHITE_BALANCES:
             raise unknown("white_balances", balance, WHITE_BALANCES)
     for name in study.processors:
-        if name not in PROCESSORS:
-            raise unknown("processors", name, PROCESSORS)
+        require_allowed("processors", name, study.trust_code)
+        processor_of(name)
     for name in study.sensors:
         own = preset(name)
-        automatic = [exposure for exposure in study.exposures if exposure in RULES]
-        if automatic and "G" not in channels(own.cfa):
-            raise InputError(
-                f"exposures: {automatic[0]!r} looks at G, which {label(name)}'s mosaic lacks; give times such as 5ms"
-            )
         for mosaic in mosaics(study):
             vary(own, mosaic)
 
@@ -256,28 +279,3 @@ def _check_numbers(study: Study) -> None:
         require_range("lens.horizontal_view_deg", lens.horizontal_view_deg, 0.0, 175.0, "give degrees, 0 for none")
     require_range("budget.total", budget.total, 1e-6, 1e3, "give a share of the noise variance: 10 % is 0.1")
     require_range("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total")
-
-
-def _check_known(spectrum: str, range_nm: tuple[float, float]) -> None:
-    """Raise `InputError` for an unknown light, or one not known as far as a study renders beyond 380-780 nm."""
-    light = illuminant(spectrum)
-    if range_nm[0] >= VISIBLE_NM[0] and range_nm[1] <= VISIBLE_NM[1]:
-        return
-    ends = zip(light.wavelength_nm[[0, -1]], light.values[[0, -1]], (range_nm[0], -range_nm[1]), (1, -1), strict=True)
-    short = [nm for nm, value, asked, sign in ends if sign * nm > asked and value > _RUN_OUT * light.values.max()]
-    if short or lines_nm(spectrum):
-        raise InputError(
-            f"spectra: {spectrum!r} is known over {light.wavelength_nm[0]:g}-{light.wavelength_nm[-1]:g} nm, and "
-            f"render.range_nm asks for {range_nm[0]:g}-{range_nm[1]:g} nm; allowed: sunlight, moonlight, temperatures "
-            "such as 2856K, LEDs that have run out there such as LED-B5; take one of them"
-        )
-
-
-def _check_range(range_nm: tuple[float, ...]) -> None:
-    if len(range_nm) != 2 or not LOWEST_NM <= range_nm[0] < range_nm[1] <= HIGHEST_NM:
-        raise InputError(
-            f"render.range_nm: {list(range_nm)!r} is not allowed; give [shortest, longest] within "
-            f"{LOWEST_NM:g} to {HIGHEST_NM:g} nm, where lights are known"
-        )
-    if range_nm[1] - range_nm[0] < LEAST_RANGE_NM:
-        raise InputError(f"render.range_nm: {list(range_nm)!r} is less than {LEAST_RANGE_NM:g} nm; widen it")

@@ -8,6 +8,7 @@ from typing import Any, get_args, get_origin
 from cattrs import AttributeValidationNote, ClassValidationError, Converter, ForbiddenExtraKeysError
 from cattrs.gen import make_dict_structure_fn
 
+from isp.processors.own import own_file
 from rodcone.errors import InputError, one_line, require_whole, unknown
 from rodcone.toml_file import parse_toml, read_toml
 from studies.study.study import FILES, SceneChoice, Study
@@ -16,7 +17,7 @@ _EXAMPLES = {"levels": '"1lux" or "25cd/m2"', "exposures": '"10ms"'}
 MOST_SEEDS = 100_000
 
 
-def read_study(path: str | Path, changes: Sequence[str] = ()) -> Study:
+def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: bool = False) -> Study:
     """Read and check a study.
 
     Parameters
@@ -25,6 +26,8 @@ def read_study(path: str | Path, changes: Sequence[str] = ()) -> Study:
         TOML with the fields of `Study`; names of files in it are relative to its folder.
     changes : sequence of str
         ``key=value`` such as ``render.spp=64``, the value in TOML's notation, in place of the file's own.
+    trust_code : bool
+        Consent to run the user's own Python files among the processors; the study file itself can't give it.
 
     Raises
     ------
@@ -49,7 +52,10 @@ def read_study(path: str | Path, changes: Sequence[str] = ()) -> Study:
         if isinstance(seeds, int) and not isinstance(seeds, bool):
             require_whole("seeds", seeds, 1, MOST_SEEDS, "give how many, from 0 on, or a list such as [7]")
             content["seeds"] = list(range(seeds))
-        for axis in ("scenes", "sensors"):
+        if "trust_code" in content:
+            raise InputError("trust_code: no file may ask for it; leave it out, and give --trust-code")
+        content["trust_code"] = trust_code
+        for axis in ("scenes", "sensors", "spectra", "processors"):
             content |= {axis: _beside(content[axis], Path(path).parent)} if axis in content else {}
         return _CONVERTER.structure(content, Study)
     except ClassValidationError as error:
@@ -80,9 +86,10 @@ def _beside(value: Any, folder: Path) -> Any:
     """Value of an axis in which files are found from anywhere: their names are those of files in the study's folder."""
     if isinstance(value, list):
         return [_beside(each, folder) for each in value]
-    if isinstance(value, dict) and "source" in value:
-        return value | {"source": _beside(value["source"], folder)}
-    return str(folder / value) if isinstance(value, str) and Path(value).suffix.lower() in FILES else value
+    if isinstance(value, dict):
+        return value | {key: _beside(value[key], folder) for key in ("source", "light", "chart") if key in value}
+    named = isinstance(value, str) and (Path(value).suffix.lower() in FILES or own_file(value))
+    return str(folder / value) if named else value
 
 
 def _strict(kind: type, allowed: tuple[type, ...], words: str) -> Callable[[Any, Any], Any]:

@@ -104,7 +104,8 @@ class Cell:
 
 def labels(condition: Condition) -> dict[str, Any]:
     """Condition as a row names it: a file by its name, without its folder."""
-    return vars(condition) | {"scene": label(condition.scene.source), "sensor": label(condition.sensor)}
+    files = {name: label(getattr(condition, name)) for name in ("spectrum", "sensor")}
+    return vars(condition) | {"scene": condition.scene.label, **files}
 
 
 def cell_key(
@@ -134,7 +135,7 @@ def exposure_stream(condition: Condition, mosaic: str, seed: int) -> np.random.G
     """
     names, (value, unit) = labels(condition), parse_level(condition.level)
     exposure = parse_exposure(condition.exposure)
-    return _stream("exposure", names["scene"], condition.spectrum, value, unit, exposure, names["sensor"], mosaic, seed)
+    return _stream("exposure", names["scene"], names["spectrum"], value, unit, exposure, names["sensor"], mosaic, seed)
 
 
 def _stream(*parts: object) -> np.random.Generator:

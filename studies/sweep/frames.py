@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
 from render.denoised.relight import relight_denoised
+from render.illuminants import illuminant, is_light_file
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
 from rodcone.digests import digest
@@ -50,7 +51,8 @@ class UnitFrame:
     lux_per_cd_m2 : float or None
         Illuminance of the reference plane; None without one, and where no level is in lux.
     auto_s, auto_w_s : float
-        Auto exposures there for G and for W, without a longest time [s]; the same where the mosaic has no W.
+        Auto exposures there without a longest time [s]: for the preset's G, and for the modelled mosaic's W; where that
+        has no W, for its own unit.
     truth : Path
         Linear sRGB of the noise-free scene, not clipped, `white_cd_m2` reads 1, (h, w, 3) float64; the same at every
         level and for every sensor.
@@ -80,7 +82,8 @@ def frame_key(
 
     The preset sets the exposure; the sensor is as it is modelled. Of the levels it counts whether one is in lux.
     """
-    return digest([render, opened.identity, spectrum, in_lux(levels), versions(), preset, sensor])
+    light = illuminant(spectrum) if is_light_file(spectrum) else spectrum
+    return digest([render, opened.identity, light, in_lux(levels), versions(), preset, sensor])
 
 
 def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None:
@@ -133,10 +136,9 @@ def make_frames(
     for key, (preset, sensor) in wanted.items():
         whole, one, other = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in views)
         errors = [(one - other) / 2] if transport.denoised is None else [whole - one, whole - other]
-        auto_s = unit_exposure_s(views[0], preset)
         facts = scene | {
-            "auto_s": auto_s,
-            "auto_w_s": unit_exposure_s(views[0], sensor, "W") if "W" in channels(sensor.cfa) else auto_s,
+            "auto_s": unit_exposure_s(views[0], preset),
+            "auto_w_s": unit_exposure_s(views[0], sensor, "W" if "W" in channels(sensor.cfa) else None),
             "electrons": keep(folder, _npy(whole), ".npy"),
             "errors": keep(folder, _npy(np.stack(errors).astype(np.float32)), ".npy"),
         }

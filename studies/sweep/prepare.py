@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.own import own_file, processor_of
 from render.transport import Transport
 from rodcone.digests import digest, digest_bytes
 from rodcone.jit import backend
+from sensor.burst import merged_sensor
 from sensor.config import LensConfig, SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
@@ -31,7 +32,7 @@ from studies.study.lit_scene import (
     under,
     white_spectrum,
 )
-from studies.study.study import Condition, Study, conditions, mosaics
+from studies.study.study import Condition, Study, conditions, label, mosaics
 from studies.sweep.cells import Cell, RenderRecord, cell_key
 from studies.sweep.database import note_render, render_record
 from studies.sweep.frames import UnitFrame, colours_under, exposure_s_of, frame_key, make_frames, read_frame
@@ -105,10 +106,11 @@ def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> flo
         lit = under(transport, spectrum)
         lux = lux_per_cd_m2(lit, study.levels)
         brightest = max(level_luminance(level, lux) for level in study.levels)
-        shares += [
-            render_share(lit, sensor, brightest, study.longest_exposure_s, parse_exposure(exposure))
-            for exposure in study.exposures
-        ]
+        most = max(study.frames)
+        for exposure in study.exposures:
+            time_s, longest_s = parse_exposure(exposure), study.longest_exposure_s * most
+            whole_s = None if time_s is None else time_s * most
+            shares.append(render_share(lit, merged_sensor(sensor, most), brightest, longest_s, whole_s))
     return max(shares)
 
 
@@ -153,19 +155,20 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
             return None
         frames[imaged] = frame
         for name in job.study.processors:
-            if PROCESSORS[name].mosaic == imaged[-1]:
-                colours[imaged, name] = colours_under(frame.sensor, PROCESSORS[name], white_spectrum(opened, imaged[0]))
+            if processor_of(name).mosaic == imaged[-1]:
+                light = white_spectrum(opened, imaged[0])
+                colours[imaged, name] = colours_under(frame.sensor, processor_of(name), light)
     cells = []
     for condition in conditions(job.study, opened.choice):
         lens = job.plan.images[condition].lens
         for name in job.study.processors:
-            imaged = condition.spectrum, condition.sensor, lens, PROCESSORS[name].mosaic
+            imaged = condition.spectrum, condition.sensor, lens, processor_of(name).mosaic
             frame = frames[imaged]
             luminance = level_luminance(condition.level, frame.lux_per_cd_m2)
             longest_s = job.study.longest_exposure_s
-            light = luminance, exposure_s_of(frame, condition.exposure, luminance, longest_s)
+            shown = luminance, exposure_s_of(frame, condition.exposure, luminance, longest_s)
             for seed in job.study.seeds:
-                cells.append(_cell(job, condition, name, seed, record, frame, colours[imaged, name], light))
+                cells.append(_cell(job, condition, name, seed, record, frame, colours[imaged, name], shown))
     return cells
 
 
@@ -183,9 +186,9 @@ def _cell(
     luminance, exposure_s = light
     made_by = provenance(record.facts.variant, processor, exact=job.plan.images[condition].exact)
     return Cell(
-        key=cell_key(condition, processor, seed, frame.key, luminance, exposure_s, colours, made_by),
+        key=cell_key(condition, label(processor), seed, frame.key, luminance, exposure_s, colours, made_by),
         condition=condition,
-        processor=processor,
+        processor=str(Path(processor).resolve()) if own_file(processor) else processor,
         seed=seed,
         luminance_cd_m2=luminance,
         illuminance_lux=None if frame.lux_per_cd_m2 is None else luminance * frame.lux_per_cd_m2,

@@ -14,7 +14,7 @@ class Row:
     scene ... seed
         Where the cell lies in its study; scene and sensor files by their names.
     luminance_cd_m2, illuminance_lux, exposure_s : float
-        The level in both units (lux where the scene states a plane), and the time.
+        The level in both units (lux where the scene states a plane), and the time of one frame.
     spp : float
         Samples a pixel of the render, in the mean.
     bands : int
@@ -67,6 +67,7 @@ class Row:
     exposure: str
     sensor: str
     white_balance: str
+    frames: int
     processor: str
     seed: int
     luminance_cd_m2: float
@@ -112,4 +113,4 @@ class Row:
     worker: int
 
 
-AXES = ("scene", "spectrum", "level", "exposure", "sensor", "white_balance", "processor")
+AXES = ("scene", "spectrum", "level", "exposure", "sensor", "white_balance", "frames", "processor")

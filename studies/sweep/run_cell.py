@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.own import processor_of
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
+from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.device import draw_device
+from sensor.raw import RawImage
 from studies.budget.budget import charged_share
 from studies.metrics.appearance import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure
@@ -24,7 +26,7 @@ from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import develop_to_scale, mean_electrons
 from studies.photograph.clock import timed
 from studies.photograph.png import to_png
-from studies.study.study import AS_SHOT
+from studies.study.study import AS_SHOT, label
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text
 from studies.sweep.provenance import in_words, machine, provenance, threads
 from studies.sweep.row import Row
@@ -50,11 +52,12 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     OSError
         Where the picture can't be written.
     """
+    processor = processor_of(cell.processor, json.loads(cell.made_by.versions))  # a user's own: the same bytes, or none
     _check_provenance(cell)
     if most_threads is not None:
         limit_threads(most_threads)
     truth, truth_png = _truth(cell.truth)
-    sensor, processor, engine = cell.sensor, PROCESSORS[cell.processor], cell.made_by.readout_engine
+    sensor, engine = cell.sensor, cell.made_by.readout_engine
     names = labels(cell.condition)
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
     light = cell.luminance_cd_m2 * cell.exposure_s
@@ -62,14 +65,14 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     errors_e = _array(cell.errors) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
-    raw, capture_s, first_capture_s = timed(
-        lambda: expose(
-            *(expected_e, sensor, cell.exposure_s, device),
-            exposure_stream(cell.condition, processor.mosaic, cell.seed),
-            exact=engine == "numpy",
-        ),
-        *("capture", engine, names["sensor"], shape),
-    )
+    frames = cell.condition.frames
+
+    def burst() -> RawImage:
+        stream = exposure_stream(cell.condition, processor.mosaic, cell.seed)
+        asked = expected_e, sensor, cell.exposure_s, device, stream
+        return merged_raw([expose(*asked, exact=engine == "numpy") for _ in range(frames)])
+
+    raw, capture_s, first_capture_s = timed(burst, *("capture", engine, names["sensor"], shape, frames))
     # Develop to linear sRGB in which white is 1.
     saturated = raw.saturated
     # the neutral of the scene's light, as a raw file would note it; else Gray World's, from the picture
@@ -92,7 +95,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     return Row(
         key=cell.key,
         **names,
-        processor=cell.processor,
+        processor=label(cell.processor),
         seed=cell.seed,
         luminance_cd_m2=cell.luminance_cd_m2,
         illuminance_lux=cell.illuminance_lux,
@@ -103,7 +106,9 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         lens=json.dumps(vars(cell.sensor.lens)),
         budget_share=cell.budget_share,
         **figures,
-        mc_share=charged_share(errors_e, expected_e, sensor, cell.exposure_s),
+        mc_share=charged_share(
+            errors_e * frames, expected_e * frames, merged_sensor(sensor, frames), cell.exposure_s * frames
+        ),
         snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),
         saturated=float(saturated.mean()),

@@ -10,13 +10,14 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from isp.processors.catalogue import require_libraries
 from rodcone.progress import Step, render_words, told
 from studies.budget.model_plan import Plan
 from studies.photograph.clock import FIRST, Clock
 from studies.study.lit_scene import open_all
-from studies.study.study import Study, conditions
+from studies.study.study import Study, conditions, label
 from studies.sweep.cells import Cell
 from studies.sweep.database import add, done, forget_old, note_run, note_stages, open_results, want
 from studies.sweep.prepare import PICTURES, Job, known_cells, scene_cells
@@ -98,7 +99,7 @@ def sweep(
     with told(step) as show, open_results(out) as base:
         job = Job(study, plan, out, base, clock)
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        run = note_run(base, now, platform.node(), json.dumps(asdict(study)))
+        run = note_run(base, now, platform.node(), json.dumps(_noted(study)))
         found = [known_cells(job, opened) for opened in scenes.values()]
         count = len(conditions(study)) * len(study.processors) * len(study.seeds) // len(scenes)
         keys: list[Sequence[str | None]] = [
@@ -120,6 +121,12 @@ def sweep(
         stages = clock.stages()
         note_stages(base, run, stages)
     return Swept(out, count * len(scenes), made, sum(stages.values()), tuple(notes))
+
+
+def _noted(study: Study) -> dict[str, Any]:
+    """Study as the results database notes it, with files by the names that rows have."""
+    named = {axis: [label(value) for value in getattr(study, axis)] for axis in ("processors", "spectra")}
+    return asdict(study) | named | {"scenes": [asdict(scene) | {"source": scene.label} for scene in study.scenes]}
 
 
 def _clear(out: Path) -> None:

@@ -75,14 +75,14 @@ def lines(
             raise unknown("show", name, (*FIGURES, *CHARTS, TRUE_PAIRS, f"{ELECTRONS}W"))
     groups: dict[tuple[str, ...], list[Row]] = {}
     for row in rows:
-        if all(getattr(row, axis) == value for axis, value in where.items()):
-            groups.setdefault(tuple(getattr(row, axis) for axis in by), []).append(row)
+        if all(str(getattr(row, axis)) == value for axis, value in where.items()):
+            groups.setdefault(tuple(str(getattr(row, axis)) for axis in by), []).append(row)
     require_alike([row for group in groups.values() for row in group])
     if not groups:
         raise InputError(f"where: no cell has {dict(where)}; allowed: values of the study's axes; see rodcone export")
     for at, group in groups.items():
         for axis in AXES:
-            values = list(dict.fromkeys(getattr(row, axis) for row in group))
+            values = list(dict.fromkeys(str(getattr(row, axis)) for row in group))
             if len(values) > 1:
                 raise InputError(
                     f"by: a line of {'/'.join(at) or 'all'} would be a mean over {axis} {', '.join(values)}; allowed: "

@@ -1,9 +1,8 @@
 """Pictures to train on: full-resolution signals of every channel of a camera, under many lights.
 
 Generated ones (dead leaves, after A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 41,
-2001, and gratings), and photographs from scikit-image's wheel, which become spectra by the basis of I. Mallett and C.
-Yuksel, "Spectral primary decomposition for rendering with sRGB reflectance", EGSR 2019. None of the project's scenes is
-among them: what is judged is never trained on.
+2001, and gratings), and photographs from scikit-image's wheel, which become spectra by `render.radiance_files.photo`.
+None of the project's scenes is among them: what is judged is never trained on.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,9 +16,9 @@ from skimage.draw import ellipse, polygon
 
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule
+from render.radiance_files.photo import srgb_basis
 from render.spectrum import Floats, band_widths
 from rodcone.colour_spaces import decode_srgb
-from rodcone.optional import quietly_imported
 from scenes.reflectances import band, edge, grey
 from sensor.config import SensorConfig
 
@@ -182,8 +181,7 @@ def photograph(rng: np.random.Generator, light: KnownLight, name: str) -> Floats
 
     The basis gives each colour one spectrum; a factor a channel stands for the others that look the same.
     """
-    basis = quietly_imported("colour.recovery").MSDS_BASIS_FUNCTIONS_sRGB_MALLETT2019
-    spectra = np.stack([np.interp(_NM, basis.wavelengths, basis.values[:, index]) for index in range(3)])
+    spectra = srgb_basis(_NM)
     encoded = getattr(data, name)() / 255.0
     encoded = encoded if encoded.ndim == 3 else np.repeat(encoded[..., None], 3, axis=2)
     linear = decode_srgb(encoded)

@@ -464,7 +464,7 @@ ISP = (
     _fault(
         "Gray World over saturated pixels",
         "isp/colour/white_balance.py",
-        '        usable = ~saturated_nearby(raw, "RGB")\n',
+        "        usable = ~saturated_nearby(raw, colours)\n",
         "        usable = np.ones(raw.shape, dtype=bool)\n",
         "isp/test_pipeline",
     ),

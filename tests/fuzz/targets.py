@@ -14,12 +14,15 @@ import numpy as np
 from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_elements, pages, tiff_tags
 
 from render.cache import load_transport, save_transport
+from render.illuminants import illuminant
 from render.loader import Film, integrator_name, variant
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import read_exr, write_exr
 from render.radiance_files.iset import read_iset_scene
+from render.radiance_files.radiance_source import load_radiance
 from render.user_scene.scene_file import load_scene_file
 from scenes.catalog import load
+from scenes.reflectances import read_reflectances
 from sensor.calibration import ColourCalibration
 from sensor.cameras.emva_report import numbers_of, read_report
 from sensor.cameras.library import read_library
@@ -235,6 +238,51 @@ ir_cut = "filter.csv"
     return [{"camera.toml": plain}, {"camera.toml": measured, "curves.csv": _CURVES, "filter.csv": curve}]
 
 
+_CUBE = b'holds = "reflectance"\nwavelength_nm = [420, 630]\n'
+_ENVI = b"""ENVI
+samples = 5
+lines = 4
+bands = 4
+header offset = 0
+data type = 4
+interleave = bil
+byte order = 0
+wavelength units = Nanometers
+wavelength = {420, 490, 560, 630}
+"""
+
+
+def _cube_samples() -> list[Sample]:
+    from scipy.io import savemat
+
+    values = np.random.default_rng(5).random((4, 5, 4))
+    coded = (values * 255).astype(np.uint8)
+    named = _CUBE + b'variable = "ref"\naxes = ["height", "width", "wavelength"]\n'
+    return [
+        _made(lambda folder: np.save(folder / "a.npy", values)) | {"a.toml": _CUBE},
+        _made(lambda folder: np.save(folder / "a.npy", coded)) | {"a.toml": _CUBE + b"scale=3.9e-3"},
+        {"a.hdr": _ENVI, "a.img": values.astype("<f4").tobytes(), "a.toml": b'holds = "radiance"'},
+        _made(lambda folder: savemat(folder / "a.mat", {"ref": values})) | {"a.toml": named},
+    ]
+
+
+def _photo_samples() -> list[Sample]:
+    from PIL import Image
+
+    pixels = np.random.default_rng(6).integers(0, 255, (9, 8, 3)).astype(np.uint8)
+    made = [Image.fromarray(pixels), Image.fromarray(pixels[..., 0]), Image.fromarray(pixels[..., 0].astype(np.uint16))]
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    return [
+        *(_made(lambda folder, each=each: each.save(folder / "a.png")) for each in made),
+        _made(lambda folder: made[0].save(folder / "a.jpg", exif=exif)),
+    ]
+
+
+def _lamp_samples() -> list[Sample]:
+    return [{"led.csv": b"wavelength_nm,power\n400,1\n500,0.2\n700,0.5\n"}]
+
+
 def _curve_samples() -> list[Sample]:
     return [{"curves.csv": _CURVES}, {"curves.csv": b"\xef\xbb\xbfwavelength_nm,W\r\n400,0.5\r\n700,1\r\n"}]
 
@@ -396,6 +444,14 @@ TARGETS: dict[str, Target] = {
         lambda path: darktable_numbers(path, "A B", 100.0, 5e4),
     ),
     "library": Target(_library_samples, {".json": json_values}, _read_library),
+    "cube": Target(
+        _cube_samples,
+        {".npy": any_bytes, ".toml": any_text, ".hdr": any_text, ".img": any_bytes, ".mat": mat_elements},
+        load_radiance,
+        in_child=True,
+    ),
+    "photo": Target(_photo_samples, {".png": any_bytes, ".jpg": any_bytes}, load_radiance),
+    "lamp": Target(_lamp_samples, {".csv": any_text}, lambda path: (illuminant(str(path)), read_reflectances(path))),
     "curves": Target(_curve_samples, {".csv": any_text}, _read_curves),
     "scene": Target(_scene_samples, {".xml": any_text, ".spd": any_text}, load_scene_file),
     "cache": Target(_cache_samples, {".npz": any_bytes}, _read_cached),

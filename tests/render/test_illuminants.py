@@ -174,3 +174,43 @@ def test_an_unknown_light_is_refused_and_the_nearest_named(name, nearest):
 def test_names_lists_every_light_once():
     assert len(set(names())) == len(names())
     assert {"A", "D65", "E", "moonlight", "F11"} <= set(names())
+
+
+def lamp(folder, text):
+    path = folder / "led.csv"
+    path.write_text(text, "utf-8")
+    return str(path)
+
+
+def test_a_lamp_of_a_file_has_a_luminance_of_one_in_any_unit_and_is_read_anew(tmp_path):
+    a = illuminant("A")
+    for scale in (1.0, 1e300):
+        rows = "".join(f"{nm},{value}\n" for nm, value in zip(a.wavelength_nm, a.values * scale, strict=True))
+        found = illuminant(lamp(tmp_path, "wavelength_nm,watts\n" + rows))
+        assert found.values == pytest.approx(a.values, rel=1e-12)
+    changed = illuminant(lamp(tmp_path, "wavelength_nm,watts\n400,1\n700,1\n"))
+    assert changed.wavelength_nm.tolist() == [400.0, 700.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("wavelength_nm,a,b\n400,1,1\n700,1,1\n", "has 2 columns beside wavelength_nm; allowed: 1"),
+        ("nm,a\n400,1\n700,1\n", "has header"),
+        ("wavelength_nm,a\n400,1\n700,-1\n", "finite numbers >= 0"),
+        ("wavelength_nm,a\n400,1\n700,nan\n", "finite numbers >= 0"),
+        ("wavelength_nm,a\n0.4,1\n0.7,1\n", "led.csv"),
+        ("wavelength_nm,a\n700,1\n400,1\n", "strictly increasing"),
+        ("wavelength_nm,a\n900,1\n1000,1\n", "it gives no visible light"),
+        ("wavelength_nm,a\n400,0\n700,0\n", "it gives no visible light"),
+        ("wavelength_nm,a\n400,inf\n700,1e308\n", "finite numbers >= 0"),
+        ("wavelength_nm,a\n400,one\n", "can't be read"),
+        ("", "can't be read"),
+    ],
+)
+def test_a_file_that_is_no_lamp_is_refused_by_name_in_one_line(tmp_path, text, words):
+    with pytest.raises(InputError) as error:
+        illuminant(lamp(tmp_path, text))
+    assert words in str(error.value)
+    assert "led.csv" in str(error.value)
+    assert "\n" not in str(error.value)

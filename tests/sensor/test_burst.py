@@ -4,15 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import raw_image
 
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from sensor import burst as module
-from sensor.burst import burst, merge
+from sensor.burst import burst, merge, merged_raw, merged_sensor
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.device import Device, draw_device
 from sensor.exposure import bracket_s
-from sensor.presets import low_noise, table1_pixel
+from sensor.presets import low_noise, preset, table1_pixel
 from sensor.readout import read_out
 
 QUIET = PixelConfig(2.2, 0.9, full_well_e=10_000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
@@ -203,3 +204,48 @@ def test_frames_that_do_not_belong_together_are_refused():
     refused([one, shoot(camera(), 1e4, [0.01], shape=(8, 10))[0]], "shape of frame 1 is (8, 10)")
     refused([one, replace(other, exposure_s=0.0)], "exposure_s of frame 1")
     refused([one], "dark_current_e_per_s", dark_current_e_per_s=-1.0)
+
+
+def test_a_merged_burst_is_one_exposure_of_all_its_time():
+    """n frames of rate r over t, whole: mean n r t, variance n (r t + read^2 + quantisation), offsets n times DSNU."""
+    frames = [raw_image(np.full((8, 10), 1100 + step), prnu=0.01) for step in (0, 4, -4, 0)]
+    raw = merged_raw(frames)
+    assert raw.electrons == pytest.approx(np.full((8, 10), 4000.0), rel=1e-9)
+    assert (raw.exposure_s, raw.cfa, raw.prnu) == (pytest.approx(0.04), frames[0].cfa, 0.01)
+    assert raw.full_well_e == pytest.approx(4 * frames[0].full_well_e)
+    assert raw.dark_noise_e**2 == pytest.approx(4 * (1.0 + 1 / 12) + (4 * 1.0) ** 2)
+    assert merged_raw(frames[:1]) is frames[0]
+    full = merged_raw([raw_image(np.full((8, 10), 15_100))] * 4)
+    assert full.saturated.all()
+
+
+def test_a_merged_bracket_goes_on_above_the_longest_frames_well():
+    """Two frames, 10 and 40 ms, of light that fills the long one: the short one's rate over 50 ms."""
+    long_frame = raw_image(np.full((8, 10), 15_100), exposure_s=0.04)
+    short_frame = raw_image(np.full((8, 10), 100 + 10_000), exposure_s=0.01)
+    raw = merged_raw([long_frame, short_frame])
+    assert raw.electrons == pytest.approx(np.full((8, 10), 10_000 * 5.0), rel=1e-6)
+    assert not raw.saturated.any()
+    assert raw.full_well_e == pytest.approx(15_000 * 5.0)
+
+
+def test_the_noise_of_a_merged_burst_is_what_it_states():
+    """In 64 x 64 pixels over 16 bursts of 4: the variance within 4 standard errors, sqrt(2 / 65536) each."""
+    rng = np.random.default_rng(5)
+    signal_e, bursts = 30.0, []
+    for _ in range(16):
+        e = [rng.poisson(signal_e, (64, 64)) + rng.normal(0, 1.0, (64, 64)) for _ in range(4)]
+        bursts.append(merged_raw([raw_image(np.rint(each) + 100, dsnu_e=0.0) for each in e]))
+    samples = np.array([raw.electrons for raw in bursts])
+    stated = 4 * signal_e + bursts[0].dark_noise_e ** 2
+    assert samples.var() == pytest.approx(stated, rel=4 * np.sqrt(2 / samples.size))
+    assert samples.mean() == pytest.approx(4 * signal_e, abs=4 * np.sqrt(stated / samples.size))
+
+
+def test_a_sensor_of_merged_frames_has_the_bursts_noise():
+    sensor = preset("low_noise")
+    four = merged_sensor(sensor, 4)
+    quiet = replace(sensor.pixel, read_noise_e=2.0, dsnu_e=0.5)
+    merged = merged_sensor(replace(sensor, pixel=quiet), 4).pixel
+    assert (merged.read_noise_e, merged.dsnu_e, merged.full_well_e) == (4.0, 2.0, 4 * quiet.full_well_e)
+    assert four.pixel.prnu == sensor.pixel.prnu

@@ -8,8 +8,9 @@ import pytest
 
 from render.illuminants import illuminant
 from render.spectrum import Spectrum
+from rodcone.csv_file import MOST_BYTES
 from rodcone.errors import InputError
-from sensor.curves import MOST_BYTES, QuantumEfficiencyWarning, Responses, read_csv, read_curve, rgbw
+from sensor.curves import QuantumEfficiencyWarning, Responses, read_csv, read_curve, rgbw
 
 PEAKS = {"R": (0.560, 592.0), "G": (0.678, 540.0), "B": (0.415, 476.0), "W": (1.0, 620.0)}
 

@@ -73,10 +73,12 @@ def test_a_rule_that_cannot_be_is_refused_in_one_line(arguments, words):
     assert "\n" not in str(error.value)
 
 
-def test_a_mosaic_without_green_asks_for_another_channel():
+def test_a_mosaic_without_green_is_exposed_for_its_unit():
+    sensor = preset("low_noise", "rccc")
     with pytest.raises(InputError, match=r"'G' is unknown; allowed: C, R"):
-        auto_exposure_s(ramp(), preset("low_noise", "rccc"))
-    assert auto_exposure_s(ramp(), preset("low_noise", "rccc"), channel="C") > 0
+        auto_exposure_s(ramp(), sensor, channel="G")
+    assert auto_exposure_s(ramp(), sensor) == auto_exposure_s(ramp(), sensor, channel="C") > 0
+    assert auto_exposure_s(ramp(), sensor) != auto_exposure_s(ramp(), sensor, channel="R")
 
 
 def test_a_stop_is_twice_the_time_and_a_burst_a_bracket_of_none():

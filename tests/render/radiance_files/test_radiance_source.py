@@ -69,5 +69,5 @@ def test_ending_tells_the_reader(tmp_path: Path) -> None:
         *(True, True),
         *(False, False, False),
     ]
-    with pytest.raises(InputError, match=r"'\.ext' is unknown; allowed: \.exr, \.mat; did you mean '\.exr'"):
+    with pytest.raises(InputError, match=r"'\.ext' is unknown; allowed: .*; did you mean '\.exr'"):
         load_radiance("a.ext")

@@ -228,7 +228,6 @@ def test_the_file_carries_the_calibration_for_the_white_balance_asked_for(
         (["flat_field", "--extend", "zero"], ["extend: 'zero' is unknown; allowed: hold"]),
         (["none.xml"], ["'none.xml' is missing"]),
         (["flat_field", "--cfa", "rccc"], ["can't hold the mosaic", "shot.tif"]),
-        (["flat_field", "--cfa", "rccc", "-o", "o/shot.tif"], ["has no G", "give exposure 20ms"]),
         (["flat_field", "-o", "o/shot.cr2"], ["another ending", ".dng, .tif, .tiff"]),
         (["flat_field", "--level", "25nits"], ["unit", "'nits'", "cd/m2, lux"]),
         (["flat_field", "--exposure", "auto:V"], ["exposure: 'auto:V' is not a time", "did you mean 'auto:W'"]),
@@ -615,7 +614,7 @@ def test_black_frames_are_black_and_no_division_by_zero(capsys: pytest.CaptureFi
         (["shot.dng", "--isp", "cmyw_yamagami"], ["is not C, M, Y and W"]),
         (["cut.dng"], ["cut.dng", "cut off"]),
         (["mono.tif"], ["no colour calibration"]),
-        (["four.tif"], ["use the other camera's pipeline"]),
+        (["four.tif", "--isp", "interleaved"], ["use the other camera's pipeline"]),
     ],
 )
 def test_what_cannot_be_developed_is_one_line_exit_code_2_and_no_picture(
@@ -654,3 +653,45 @@ def test_from_python_paths_are_texts_or_paths(kind: type, exr: Path, tmp_path: P
     assert (tmp_path / "shot.png").exists()
     study = Study((SceneChoice(kind(exr)),), ("1cd/m2",), sensors=(kind(sensor),))
     assert json.loads(json.dumps(asdict(study)))["sensors"] == [str(sensor)]
+
+
+@pytest.mark.parametrize("cfa", ["rccb", "rccc", "ryyb", "mono"])
+def test_other_mosaics_are_captured_and_developed(
+    cfa: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    asked = ["color_checker", "--cfa", cfa, "--size", "48", "--spp", "4", "--level", "500lux", "-o", "shot.tif"]
+    assert call(["capture", *asked], capsys)[0] == 0
+    assert call(["develop", "shot.tif", "--white-balance", "as-shot"], capsys)[0] == 0
+    shown = np.asarray(Image.open("shot.png"), dtype=float)
+    neutral = shown[:4].reshape(-1, 3).mean(axis=0)  # card above the chart
+    assert np.ptp(neutral) < 6
+    assert (np.ptp(shown, axis=-1).max() == 0) == (cfa in ("rccc", "mono"))
+
+
+def test_a_burst_is_captured_and_its_merged_frames_are_developed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    asked = ["flat_field", "--size", "32", "--spp", "4", "--level", "2cd/m2", "--cfa", "bayer"]
+    assert call(["capture", *asked, "-o", "one.dng"], capsys)[0] == 0
+    assert call(["capture", *asked, "--frames", "4", "-o", "shot.dng"], capsys)[1].split() == [
+        *(f"shot_{n}.dng" for n in (1, 2, 3, 4))
+    ]
+    frames = [read_raw(Path(f"shot_{n}.dng")).dn for n in (1, 2, 3, 4)]
+    assert np.array_equal(frames[0], read_raw(Path("one.dng")).dn)
+    assert not np.array_equal(frames[0], frames[1])
+    assert call(["develop", "one.dng"], capsys)[0] == 0
+    names = [f"shot_{n}.dng" for n in (1, 2, 3, 4)]
+    code, out, _ = call(["develop", *names, "--json"], capsys)
+    assert code == 0
+    assert json.loads(out)["raw"] == names
+    spread = [np.asarray(Image.open(name), dtype=float).std() for name in ("one.png", "shot_1.png")]
+    assert spread[1] < 0.75 * spread[0]
+    assert call(["capture", *asked[:-1], "rgbw", "-o", "other.dng"], capsys)[0] == 0
+    code, _, err = call(["develop", "one.dng", "other.dng", "-o", "no.png"], capsys)
+    assert code == 2
+    assert "cfa of frame 1" in err
+    assert not Path("no.png").exists()
+    for count in ("0", "65"):
+        assert call(["capture", *asked, "--frames", count, "-o", "no.dng"], capsys)[0] == 2

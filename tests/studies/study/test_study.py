@@ -39,13 +39,11 @@ def test_files_are_called_by_their_own_names(value: object, name: str) -> None:
     assert label(value) == name
 
 
-def test_auto_exposure_needs_a_green_in_the_presets_own_mosaic(tmp_path: Path) -> None:
+def test_auto_exposure_goes_without_green(tmp_path: Path) -> None:
     text = preset_file("low_noise").read_text("utf-8").replace('cfa = "rgbw"', 'cfa = ["RB", "BW"]')
     (tmp_path / "mine.toml").write_text(text, "utf-8")
     sensors = (str(tmp_path / "mine.toml"),)
-    with pytest.raises(InputError, match=r"looks at G, which mine.toml's mosaic lacks; give times such as 5ms"):
-        replace(STUDY, sensors=sensors)
-    replace(STUDY, sensors=sensors, exposures=("5ms",))
+    assert replace(STUDY, sensors=sensors).exposures == ("auto",)
 
 
 @pytest.mark.parametrize(

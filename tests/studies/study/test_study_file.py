@@ -124,3 +124,27 @@ def test_a_likely_mistake_is_told_with_its_fix(text: str, words: str, tmp_path: 
     (tmp_path / "study.toml").write_text(text, "utf-8")
     with pytest.raises(InputError, match=words):
         read_study(tmp_path / "study.toml")
+
+
+def test_code_beside_a_study_runs_with_consent_alone(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("from isp.pipeline import picture_bayer as develop\n", "utf-8")
+    changes = ['processors=["mine.py:develop", "bayer"]']
+    with pytest.raises(InputError, match=r"processors: '.*mine.py:develop' is Python code"):
+        read_study(written(tmp_path), changes)
+    for sly in ("trust_code=true", "trust_code=1"):
+        with pytest.raises(InputError, match="trust_code: no file may ask for it"):
+            read_study(written(tmp_path), [*changes, sly])
+    study = read_study(written(tmp_path), changes, trust_code=True)
+    assert study.processors == (f"{tmp_path / 'mine.py'}:develop", "bayer")
+
+
+def test_lamps_and_charts_are_files_beside_the_study(tmp_path: Path) -> None:
+    (tmp_path / "led.csv").write_text("wavelength_nm,watts\n380,1\n780,1\n", "utf-8")
+    changes = ['spectra=["led.csv", "D65"]', 'scenes=[{source="color_checker", light="led.csv", chart="mine.csv"}]']
+    study = read_study(written(tmp_path), changes)
+    assert study.spectra == (str(tmp_path / "led.csv"), "D65")
+    assert study.scenes[0].light == str(tmp_path / "led.csv")
+    assert study.scenes[0].chart == str(tmp_path / "mine.csv")
+    assert study.scenes[0].label == "mine.csv"
+    with pytest.raises(InputError, match=r"illuminant: '.*absent.csv' can't be read"):
+        read_study(written(tmp_path), ['spectra=["absent.csv"]'])

@@ -21,12 +21,13 @@ from render.radiance_files.exr import write_exr
 from render.radiance_files.radiance_source import as_transport, load_radiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.colour_spaces import encode_srgb
+from rodcone.digests import digest_file
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker
 from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
 from sensor.optics import falloff, form_image
-from sensor.presets import preset
+from sensor.presets import preset, preset_file
 from sensor.readout import read_out
 from sensor.response import expected_electrons
 from studies.budget.model_plan import Plan
@@ -217,3 +218,31 @@ def test_targets_have_their_own_figures_on_their_own_scene(tmp_path: Path) -> No
     # Bilinear green keeps less than a pixel's own box does (0.6 cycles a pixel), and more than a box of three pixels.
     assert 0.2 < edge.mtf50_cy_per_px < 0.6
     assert chart.render_s > 0
+
+
+def test_a_processor_of_ones_own_counts_by_its_bytes_and_workers_run_no_others(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.py"
+    mine.write_text("from isp.pipeline import picture_bayer as develop\n", "utf-8")
+    sensor = tmp_path / "bayer.toml"
+    sensor.write_text(preset_file("low_noise").read_text("utf-8").replace('"rgbw"', '"bayer"', 1), "utf-8")
+    asked: dict[str, Any] = {"processors": (f"{mine}:develop",), "trust_code": True, "sensors": (str(sensor),)}
+    cell = made(tmp_path, **asked)[0]
+    row = run_cell(cell)
+    assert row.processor == "mine.py:develop"
+    assert json.loads(row.versions)["mine.py"] == digest_file(mine)
+    mine.write_text(mine.read_text("utf-8") + "# changed\n", "utf-8")
+    with pytest.raises(InputError, match=r"mine.py' on .* isn't the file that the sweep began with"):
+        run_cell(cell)
+    other = made(tmp_path, **asked)[0]
+    assert other.key != cell.key
+    assert run_cell(other).picture == row.picture
+
+
+def test_a_burst_is_merged_and_shows_less_noise_and_its_first_frame_is_the_single_one(tmp_path: Path) -> None:
+    cells = made(tmp_path, levels=("1cd/m2",), exposures=("5ms",), seeds=(0,), frames=(1, 16))
+    alone = made(tmp_path, levels=("1cd/m2",), exposures=("5ms",), seeds=(0,))
+    one, many = (run_cell(cell) for cell in cells)
+    assert (one.frames, many.frames) == (1, 16)
+    assert one.picture == run_cell(alone[0]).picture
+    assert (one.exposure_s, many.exposure_s) == (0.005, 0.005)
+    assert many.psnr_db > one.psnr_db + 3.0

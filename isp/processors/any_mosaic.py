@@ -1,0 +1,68 @@
+"""The interleaved reconstruction for mosaics of any channels: RCCB, RCCC, RYYB, a camera without colours, one's own."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from isp.colour.colour_fit import ColourFit, relative_noise
+from isp.colour.highlights import clip_highlights
+from isp.colour.white_balance import WhiteBalance
+from isp.interleaved import reconstruct_with_noise
+from isp.picture import Picture, require_letters
+from isp.settings import DEFAULTS, Reconstruction, Settings
+from isp.substitution import COLOUR_ERROR
+from sensor.cfa import channels, tile_of, unit_channel
+from sensor.raw import RawImage
+
+
+def picture_any_mosaic(
+    raw: RawImage,
+    colours: ColourFit,
+    *,
+    balance: WhiteBalance,
+    mosaic: str | None = None,
+    settings: Settings = DEFAULTS,
+) -> Picture:
+    """Develop a raw image of any mosaic: eqs. (1)-(6), Gray World, a matrix over all channels that knows their noise.
+
+    With three channels or more the picture has colours as far as these tell them; one or two give a grey picture of
+    luminance. W guides the similarity, or where there is none the mosaic's unit, such as C of RCCB.
+
+    Parameters
+    ----------
+    raw : RawImage
+    colours : ColourFit
+        Of the mosaic's channels.
+    balance : WhiteBalance
+    mosaic : str, optional
+        Name of `sensor.cfa.MOSAICS`; other channels than its own are refused.
+
+    Returns
+    -------
+    Picture
+        A neutral reads the electrons of `sensor.cfa.unit_channel`.
+    """
+    names = channels(raw.cfa)
+    if mosaic is not None:
+        require_letters(raw, channels(tile_of(mosaic)))
+    result = _guided(raw, settings)
+    planes = np.asarray(result.estimate, dtype=np.float64)
+    gains, sources = balance.gains(raw, planes)
+    balanced = clip_highlights(raw, planes * gains)
+    if colours.plain is not None:  # knows three colours, and no noise
+        unit = names.index(unit_channel(raw.cfa))
+        three = balanced[..., :3] if len(names) >= 3 else np.repeat(balanced[..., unit : unit + 1], 3, axis=-1)
+        return Picture(three @ colours.plain.T, sources, engine=result.engine)
+    noise = relative_noise(raw, planes, result.noise_gain, gains, colours)
+    return Picture(balanced @ colours.matrix(names, noise * COLOUR_ERROR).T, sources, engine=result.engine)
+
+
+def _guided(raw: RawImage, settings: Settings) -> Reconstruction:
+    """Reconstruction whose guide is W, or the unit of a mosaic that has neither W nor G, which then goes as W."""
+    names, unit = channels(raw.cfa), unit_channel(raw.cfa)
+    if {"W", "G"} & set(names):
+        return reconstruct_with_noise(raw, settings)
+    renamed = replace(raw, cfa=tuple(row.replace(unit, "W") for row in raw.cfa), colour=None)
+    result = reconstruct_with_noise(renamed, settings)
+    order = [channels(renamed.cfa).index("W" if name == unit else name) for name in names]
+    return replace(result, estimate=result.estimate[..., order], noise_gain=result.noise_gain[..., order])

@@ -1,0 +1,162 @@
+"""Processors by name: of the catalogue, or from a Python file of the user's own, ``mine.py:develop``.
+
+Such a file is code that runs with all that its user may do. The doors (studies, `develop`) ask for consent before
+anything here loads one; a worker of a sweep loads it only where its bytes are those that the sweep began with.
+"""
+
+import platform
+import re
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from isp.picture import Picture
+from isp.processors.catalogue import PROCESSORS, Processor
+from rodcone.digests import digest_bytes
+from rodcone.errors import InputError, one_line, unknown
+from sensor.cfa import OWN
+from sensor.raw import RawImage
+
+MOST_BYTES = 1 << 20  # of a file; a processor takes some thousand
+_NAME = re.compile(r"(.+\.py):([A-Za-z_]\w*)")
+
+
+def own_file(name: str) -> tuple[Path, str] | None:
+    """File and function of a name such as ``mine.py:develop``; None for any other name."""
+    match = _NAME.fullmatch(name)
+    return None if match is None else (Path(match[1]), match[2])
+
+
+def require_allowed(what: str, name: str, trust_code: bool) -> None:
+    """Raise `InputError` for an unknown processor, or one of the user's own without consent to run it."""
+    own = own_file(name)
+    if own is None and name not in PROCESSORS:
+        raise unknown(what, name, PROCESSORS)
+    if own is not None and not trust_code:
+        raise InputError(
+            f"{what}: {name!r} is Python code, which may do all that you may; allowed with consent: read {own[0]}, "
+            "then add --trust-code (in Python trust_code=True)"
+        )
+
+
+def own_version(name: str) -> dict[str, str]:
+    """File of a user's own processor, with the hash of its bytes; nothing for one of the catalogue.
+
+    Raises
+    ------
+    InputError
+        For a file that can't be read.
+    """
+    own = own_file(name)
+    return {} if own is None else {own[0].name: digest_bytes(_read(own[0]))}
+
+
+def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Processor:
+    """Processor by name.
+
+    Parameters
+    ----------
+    name : str
+        Of `PROCESSORS`, or ``FILE.py:NAME`` with a function ``develop(raw, matrix, *, balance)`` that gives a `Picture`
+        or linear sRGB (h, w, 3), or with a `Processor`, which states more. A function develops the sensor's own mosaic.
+        The file's folder is not searched for what it imports.
+    expected : mapping of str to str, optional
+        `own_version` that the file has to have; other bytes are refused before they run.
+
+    Raises
+    ------
+    InputError
+        For a file that can't be read, is another than expected, fails, or holds no such function.
+    """
+    own = own_file(name)
+    if own is None:
+        return PROCESSORS[name]
+    path, attribute = own
+    content = _read(path)
+    if expected is not None and expected.get(path.name) != digest_bytes(content):
+        raise InputError(
+            f"processors: {str(path)!r} on {platform.node()} isn't the file that the sweep began with; allowed: the "
+            "same bytes; run rodcone sweep again, or give the workers the same file"
+        )
+    found = getattr(_module(path, content), attribute, None)
+    stated = found if isinstance(found, Processor) else Processor(OWN, found, path.name, colours=(), unit="")  # type: ignore[arg-type]
+    if not callable(stated.picture) or isinstance(found, type):
+        raise InputError(
+            f"processors: {path} has no function {attribute!r}; allowed: def {attribute}(raw, matrix, *, balance), or "
+            f"a Processor of that name; name what the file defines"
+        )
+
+    def picture(raw: RawImage, colours: Any, **options: Any) -> Picture:
+        return _checked(name, raw, _run(path, stated.picture, raw, colours, **options))
+
+    return replace(stated, picture=picture)
+
+
+def _read(path: Path) -> bytes:
+    try:
+        if path.exists() and not path.is_file():  # a pipe or a device may never end
+            raise ValueError("it is a folder or a device")
+        with path.open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise ValueError(f"it is over {MOST_BYTES} bytes")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"processors: {str(path)!r} can't be read ({one_line(error)}); allowed: FILE.py:FUNCTION; correct the path"
+        ) from error
+    return content
+
+
+@cache
+def _module(path: Path, content: bytes) -> ModuleType:
+    """Module made of a file's bytes, once for each content; what it prints or warns goes where it sends it."""
+    module = ModuleType(f"own_{path.stem}_{digest_bytes(content)}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module  # dataclasses look their module up by its name
+    try:
+        exec(compile(content, str(path), "exec"), module.__dict__)
+    except (Exception, SystemExit) as error:
+        del sys.modules[module.__name__]
+        raise InputError(f"processors: {_failure(path, error)}") from error
+    return module
+
+
+def _run(path: Path, function: Any, *args: Any, **options: Any) -> Any:
+    try:
+        return function(*args, **options)
+    except InputError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise InputError(f"processors: {_failure(path, error)}") from error
+
+
+def _failure(path: Path, error: BaseException) -> str:
+    """Words for an error in a user's file, with the last line of that file that was running."""
+    line, trace = getattr(error, "lineno", None), error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == str(path):
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    where = f" at line {line}" if line else ""
+    return f"{path} fails{where} ({type(error).__name__}: {one_line(error)}); mend it there"
+
+
+def _checked(name: str, raw: RawImage, made: Any) -> Picture:
+    """Picture of what a user's function gave, or `InputError` where that is none."""
+    picture = made if isinstance(made, Picture) else None
+    try:
+        rgb = np.asarray(made.rgb if picture is not None else made, dtype=np.float64)
+    except (TypeError, ValueError):
+        rgb = np.empty(0)
+    if rgb.shape != (*raw.shape, 3) or not np.isfinite(rgb).all():
+        raise InputError(
+            f"processors: {name!r} gave {type(made).__name__} of shape {rgb.shape}; allowed: a Picture, or finite "
+            f"linear sRGB of shape {(*raw.shape, 3)}; return that"
+        )
+    return picture or Picture(rgb, {})

@@ -1,0 +1,171 @@
+"""Cubes of radiance or reflectance: NumPy's ``.npy``, ENVI, and plain ``.mat``, with a TOML beside them that says what
+they hold.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.radiance import SpectralRadiance
+from render.radiance_files.envi import open_envi
+from render.radiance_files.file_checks import bands_between, require_extent, require_file
+from render.radiance_files.mat_file import read_numbers
+from rodcone.errors import InputError, one_line, require_keys, require_range, unknown
+from rodcone.toml_file import read_toml
+from rodcone.types import Floats
+
+KINDS = RADIANCE, REFLECTANCE = "radiance", "reflectance"
+AXES = ("height", "width", "wavelength")
+MOST_OVER_ONE = 0.01  # of a reflectance's values: highlights and noise; more is another unit
+_KEYS = ("holds", "wavelength_nm", "axes", "variable", "scale")
+
+
+@dataclass(frozen=True)
+class Stored:
+    """Numbers of a file as they stand in it: their axes, and wavelengths and scale where the file states them."""
+
+    values: NDArray[Any]
+    axes: tuple[str, ...]
+    wavelength_nm: Floats | None = None
+    scale: float = 1.0
+
+
+def description(path: str | Path) -> Path:
+    """Name of the TOML beside a cube: ``desk.toml`` of ``desk.npy``."""
+    return Path(path).with_suffix(".toml")
+
+
+def cube_holds(path: str | Path) -> str:
+    """What a cube holds, one of `KINDS`.
+
+    Raises
+    ------
+    InputError
+        For a missing or wrong description.
+    """
+    return str(_described(Path(path))["holds"])
+
+
+def read_cube(path: str | Path) -> SpectralRadiance:
+    """Read a cube; a reflectance stands in the place of the radiance.
+
+    Beside it lies a TOML of the same name with ``holds`` ("radiance" [W m^-2 sr^-1 nm^-1] or "reflectance" [0 to 1]);
+    ``wavelength_nm``, one number a band or the first and the last of evenly spaced ones, or in a ``.mat`` the name of a
+    variable (ENVI's header states them); ``axes``, in the order of the array, ``height``, ``width`` and ``wavelength``
+    by default, which a ``.mat`` has to name; ``variable`` of a ``.mat``; ``scale``, what a stored 1 is worth.
+
+    Raises
+    ------
+    InputError
+        For a file or description that can't be read or don't agree, values that are negative or not finite, or
+        reflectances of which over 1 % exceed 1.
+    """
+    path = Path(path)
+    asked = _described(path)
+    try:
+        stored = _READERS[path.suffix.lower()](path, asked)
+        if sorted(stored.axes) != sorted(AXES):
+            raise InputError(f"axes: {list(stored.axes)!r} are not allowed; give {list(AXES)} in the array's own order")
+        if stored.values.ndim != 3 or stored.values.dtype.kind not in "fiu":
+            raise InputError(
+                f"an array of {stored.values.ndim} axes of {stored.values.dtype}; allowed: 3 axes of real numbers; "
+                "save one cube"
+            )
+        values = np.moveaxis(stored.values, [stored.axes.index(name) for name in AXES], (0, 1, 2))
+        require_extent(*values.shape)
+        centres, widths = bands_between(_wavelengths(stored, asked, values.shape[2]))
+        with np.errstate(all="ignore"):  # SpectralRadiance tells where a value isn't finite
+            scaled = np.asarray(values, dtype=np.float32) * np.float32(asked.get("scale", stored.scale))
+        cube = SpectralRadiance(scaled, centres, width_nm=widths)
+        over = float((scaled > 1).mean())
+        if asked["holds"] == REFLECTANCE and over > MOST_OVER_ONE:
+            raise InputError(
+                f"{over:.0%} of its reflectances exceed 1; allowed: {MOST_OVER_ONE:.0%}, of highlights; give scale, "
+                "such as 0.01 for per cent"
+            )
+    except InputError as refused:
+        raise InputError(f"{path}: {refused}") from None
+    return cube
+
+
+def _described(path: Path) -> Mapping[str, Any]:
+    """Content of the TOML beside a cube, checked but for what depends on the array."""
+    require_file(path)
+    beside = description(path)
+    if not beside.is_file():
+        raise InputError(
+            f'{path}: nothing says what it holds; allowed: {beside.name} beside it; write there holds = "reflectance" '
+            '(or "radiance"), and wavelength_nm = [400, 700], the first and the last band'
+        )
+    try:
+        asked = read_toml(beside)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{beside}: can't be read ({one_line(error)}); give holds and wavelength_nm") from None
+    try:
+        require_keys("key", asked, _KEYS)
+        if asked.get("holds") not in KINDS:
+            raise unknown("holds", asked.get("holds"), KINDS)
+        if isinstance(asked.get("scale", 1.0), bool):
+            raise InputError("scale: true is not a number; give what a stored 1 is worth")
+        require_range("scale", asked.get("scale", 1.0), 1e-30, 1e30, "give what a stored 1 is worth")
+        axes = asked.get("axes", list(AXES))
+        if not (isinstance(axes, list) and all(isinstance(name, str) for name in axes)):
+            raise InputError(f"axes: {axes!r} is not a list of names; give {list(AXES)} in the array's own order")
+    except InputError as refused:
+        raise InputError(f"{beside}: {refused}") from None
+    return asked
+
+
+def _wavelengths(stored: Stored, asked: Mapping[str, Any], bands: int) -> Floats:
+    given = asked.get("wavelength_nm", stored.wavelength_nm)
+    if given is None:
+        raise InputError("wavelength_nm: nothing states it; give one number a band, or the first and the last")
+    try:
+        nm = np.array(stored.wavelength_nm if isinstance(given, str) else given, dtype=np.float64).ravel()
+    except (TypeError, ValueError, OverflowError):
+        nm = np.empty(0)
+    if isinstance(given, list) and nm.size == 2 < bands and nm[0] < nm[1]:
+        nm = np.linspace(nm[0], nm[1], bands)
+    if nm.size != bands:
+        raise InputError(
+            f"wavelength_nm: {nm.size} numbers don't fit {bands} bands; give one each, or the first and the last; axes "
+            "says which axis they are"
+        )
+    return nm
+
+
+def _read_npy(path: Path, asked: Mapping[str, Any]) -> Stored:
+    try:
+        values = np.load(path, mmap_mode="r", allow_pickle=False)
+    except Exception as error:  # its header is parsed as Python's literals, which fail in many ways
+        raise InputError(f"NumPy can't read it ({one_line(error)}); give an array saved by numpy.save") from None
+    if not isinstance(values, np.ndarray):
+        raise InputError("it is no array; give one saved by numpy.save")
+    return Stored(values, tuple(asked.get("axes", AXES)))
+
+
+def _read_envi(path: Path, asked: Mapping[str, Any]) -> Stored:
+    envi = open_envi(path)
+    return Stored(envi.values, AXES, envi.wavelength_nm, envi.scale)
+
+
+def _read_mat(path: Path, asked: Mapping[str, Any]) -> Stored:
+    name, nm = asked.get("variable"), asked.get("wavelength_nm")
+    if not isinstance(name, str) or "axes" not in asked:
+        raise InputError(
+            "variable and axes are missing; a .mat doesn't tell which of its arrays is the cube; give "
+            f'variable = "NAME" and axes = {list(AXES)} in the array\'s own order'
+        )
+    found = read_numbers(path, [name, *([nm] if isinstance(nm, str) else [])])
+    for key in (name, nm):
+        if isinstance(key, str) and key not in found:
+            raise InputError(f"it has no numbers {key!r}; give the name of a variable of the file")
+    return Stored(found[name], tuple(asked["axes"]), found[nm] if isinstance(nm, str) else None)
+
+
+_READERS = {".npy": _read_npy, ".hdr": _read_envi, ".mat": _read_mat}
+EXTENSIONS = tuple(_READERS)
