@@ -1,216 +1,333 @@
-"use strict";
-// The viewer: scene and light, level, exposure, sensor, side or wipe, detail. Numbers come ready as text, pictures from
-// the overview's images; those that the page leaves out have none.
-(() => {
-  const byId = (id) => document.getElementById(id);
-  const all = (selector, root = document) => [...root.querySelectorAll(selector)];
-  const data = JSON.parse(byId("data").textContent);
-  const viewer = byId("viewer");
-  const figures = all("#side figure");
-  const thumbs = new Map(all("[data-cell]").map((link) => [Number(link.dataset.cell), link]));
-  const truths = { 0: document.querySelector("[data-truth] img").src };
-  for (const image of all("[data-truth-of]")) truths[image.dataset.truthOf] = image.src;
-  const LOUPE = [32, 16]; // image pixels
-  const state = { view: 0, level: 0, exposure: 0, sensor: 0 };
+// The viewer: what is compared, the condition, wipe, A or B, side by side, error maps and the loupe.
+const byId = (id) => document.getElementById(id);
+const all = (selector, root = document) => [...root.querySelectorAll(selector)];
+const clamp = (value, low, high) => Math.min(Math.max(Math.round(value) || 0, low), high);
+const LOUPE = [32, 16]; // image pixels
+const TRUTH = "truth";
+const KEPT = 24; // pictures that stay decoded
+const { level: firstLevel, look, ...firstComparison } = data.first;
+const of = firstComparison; // which axes are compared, along and rows, and the two values a and b
+const state = { place: moved(lengths.map(() => 0), LEVEL_AXIS, firstLevel), view: "wipe", show: "picture", wipe: 50 };
+let drawing = Promise.resolve(); // the last drawing of the viewer, for who waits for it
 
-  // Cells lie in the order of view (scene and light), sensor, exposure, level, camera.
-  const view = () => data.views[state.view];
-  const group = () => (state.view * data.sensors + state.sensor) * data.exposures.length + state.exposure;
-  const cellIndex = (camera) => (group() * view().levels.length + state.level) * data.cameras.length + camera;
-  const thumb = (camera) => thumbs.get(cellIndex(Number(camera)))?.querySelector("img").src;
-  const source = (camera) => (camera === "truth" ? truths[state.view] : thumb(camera));
-  const clamp = (value, low, high) => Math.min(Math.max(Math.round(value) || 0, low), high);
+const valueName = (value) => (value === TRUTH ? "Truth" : data.axes[of.compared].values[value]);
+const sceneAndLight = (place) => place[0] * lengths[1] + place[1];
+const placeOf = (value) => (value === TRUTH ? state.place : moved(state.place, of.compared, value));
+const size = () => data.sizes[placeOf(of.a)[0]];
 
-  // A picture that the page leaves out has no source; its place says so.
-  function put(image, address) {
-    if (address) image.src = address;
-    else image.removeAttribute("src");
-    image.setAttribute("width", view().width);
-    image.setAttribute("height", view().height);
+// Pictures, decoded once; without pixels where the browser doesn't let a page read files beside it.
+
+const decoded = new Map();
+function decode(address) {
+  if (!decoded.has(address)) decoded.set(address, decodeNow(address));
+  if (decoded.size > KEPT) decoded.delete(decoded.keys().next().value);
+  return decoded.get(address);
+}
+
+async function decodeNow(address) {
+  const image = Object.assign(new Image(), { src: address });
+  await image.decode();
+  const canvas = Object.assign(document.createElement("canvas"), { width: image.width, height: image.height });
+  const context = canvas.getContext("2d", { willReadFrequently: true });
+  context.drawImage(image, 0, 0);
+  try {
+    return { canvas, pixels: context.getImageData(0, 0, image.width, image.height).data };
+  } catch {
+    return { canvas, pixels: null };
   }
+}
 
-  function showFigure(figure, camera) {
-    const cell = data.cells[cellIndex(camera)];
-    const image = figure.querySelector("img");
-    put(image, source(camera));
-    image.parentElement.toggleAttribute("data-absent", !source(camera));
-    image.alt = cell.alt;
-    const file = cell.file ? `: ${cell.file}` : "";
-    figure.querySelector(".gone").textContent = `Not in this page; its numbers are${file}`;
-    for (const row of all("[data-row]", figure)) {
-      row.querySelector("dd").textContent = cell[row.dataset.row];
-      row.hidden = row.dataset.target !== undefined && cell[row.dataset.row] === "—";
-      row.classList.toggle("best", cell.best.includes(row.dataset.row));
+const truthOf = (place) => document.querySelector(`[data-truth="${sceneAndLight(place)}"]`)?.src;
+
+function addressOf(value) {
+  if (value === TRUTH) return truthOf(state.place);
+  const cell = cellAt(placeOf(value));
+  return document.querySelector(`[data-cell="${cell}"] img`)?.src ?? data.cells[cell].file;
+}
+
+// Errors of each pixel of a picture against its own truth; null where they can't be had.
+const errors = new Map();
+async function errorsOf(value, kind) {
+  if (value === TRUTH) return null;
+  const cell = cellAt(placeOf(value));
+  const key = `${kind} ${cell}`;
+  if (!errors.has(key)) {
+    let found = null;
+    if (kind === "flip" && data.flip[cell]) {
+      const { pixels } = await decode(data.flip[cell]);
+      found = new Float32Array(pixels.length / 4).map((_, at) => pixels[4 * at] / 255);
+    } else if (kind === "delta_e" && addressOf(value) && truthOf(placeOf(value))) {
+      const [picture, truth] = await Promise.all([decode(addressOf(value)), decode(truthOf(placeOf(value)))]);
+      if (picture.pixels && truth.pixels) found = deltaEMap(picture.pixels, truth.pixels);
     }
+    errors.set(key, found);
+    if (errors.size > KEPT) errors.delete(errors.keys().next().value);
   }
+  return errors.get(key);
+}
 
-  function showCondition() {
-    const level = view().levels[state.level];
-    viewer.style.setProperty("--w", view().width);
-    viewer.style.setProperty("--h", view().height);
-    if (byId("view")) byId("view").value = state.view;
-    byId("level-name").textContent = level.name;
-    byId("level-light").textContent = level.light ? `${level.light} · ` : "";
-    byId("sensor-name").textContent = data.groups[group()];
-    byId("level-source").textContent = level.source;
-    byId("level").value = state.level;
-    byId("level").setAttribute("aria-valuetext", level.spoken);
-    if (byId("exposure")) {
-      byId("exposure").value = state.exposure;
-      byId("exposure").setAttribute("aria-valuetext", data.exposures[state.exposure]);
-    }
-    for (const guide of all("[data-guide]")) {
-      guide.classList.toggle("current", Number(guide.dataset.guide) === state.level);
-    }
+// What stands for A, B or the truth now: the picture, or its error in colours. Without a canvas it says why.
+async function shownOf(value) {
+  const address = addressOf(value);
+  if (!address) return { told: "This picture is not made yet" };
+  const picture = await decode(address).catch(() => null);
+  if (!picture) return { told: `Not in this page, and its file isn't beside it: ${address}` };
+  if (state.show === "picture" || value === TRUTH) return picture;
+  const found = await errorsOf(value, state.show);
+  if (found) return { canvas: heatCanvas(found, MAP_TOP[state.show], picture.canvas.width, picture.canvas.height) };
+  return { told: "Error maps are of the pictures within the page; rodcone report --pictures N puts more into it" };
+}
+
+function draw(canvas, { canvas: source, told }) {
+  canvas.hidden = !source;
+  if (!source) return told;
+  [canvas.width, canvas.height] = [source.width, source.height];
+  canvas.getContext("2d").drawImage(source, 0, 0);
+  return "";
+}
+
+// The two pictures, the truth, all of them side by side, and what is written beneath.
+
+async function drawPictures() {
+  const now = [of.a, of.b, TRUTH];
+  const asked = JSON.stringify([state, of]);
+  const found = await Promise.all(now.map(shownOf));
+  if (asked !== JSON.stringify([state, of])) return; // the reader went on meanwhile
+  const told = [draw(byId("over"), found[0]), draw(byId("under"), found[1])];
+  byId("gone").textContent = told.filter(Boolean).join(". ");
+  byId("gone").hidden = !byId("gone").textContent;
+  ["A", "B", "T"].forEach((name, index) => (byId(`loupe-${name}`).source = found[index].canvas));
+  if (state.view === "side") await drawSide();
+  await drawLoupe();
+}
+
+async function drawSide() {
+  const values = [...range(lengths[of.compared]), TRUTH];
+  const shown = await Promise.all(values.map(shownOf));
+  byId("side").replaceChildren(...values.map((value, index) => {
+    const canvas = make("canvas", { role: "img", "aria-label": valueName(value) });
+    const told = draw(canvas, shown[index]);
+    return make("figure", {}, make("figcaption", {}, valueName(value)), canvas, ...(told ? [make("p", {}, told)] : []));
+  }));
+}
+
+// The same rectangle of A, B and the truth, one canvas pixel for each, and the values of the pixel in its middle.
+async function drawLoupe() {
+  const [height, width] = size();
+  const [column, row] = [byId("column"), byId("row")].map((input) => Number(input.value));
+  const left = clamp(column - LOUPE[0] / 2, 0, Math.max(width - LOUPE[0], 0));
+  const top = clamp(row - LOUPE[1] / 2, 0, Math.max(height - LOUPE[1], 0));
+  const part = { left: left / width, top: top / height, width: LOUPE[0] / width, height: LOUPE[1] / height };
+  for (const [name, share] of Object.entries(part)) byId("frame").style[name] = `${100 * share}%`;
+  const at = clamp(row, 0, height - 1) * width + clamp(column, 0, width - 1);
+  for (const [name, value] of [["A", of.a], ["B", of.b], ["T", TRUTH]]) {
+    const canvas = byId(`loupe-${name}`);
+    [canvas.width, canvas.height] = LOUPE;
+    if (canvas.source) canvas.getContext("2d").drawImage(canvas.source, left, top, ...LOUPE, 0, 0, ...LOUPE);
+    byId(`pixel-${name}`).textContent = await pixelText(value, at);
   }
+}
 
-  function show() {
-    showCondition();
-    for (const figure of figures) {
-      if (figure.dataset.camera !== undefined) showFigure(figure, Number(figure.dataset.camera));
-      else {
-        put(figure.querySelector("img"), source("truth"));
-        figure.querySelector(".picture").toggleAttribute("data-absent", !source("truth"));
-      }
-    }
-    for (const input of all("[name=sensor]")) input.checked = Number(input.value) === state.sensor;
-    for (const [index, link] of thumbs) {
-      const here = index - cellIndex(0);
-      if (here >= 0 && here < data.cameras.length) link.setAttribute("aria-current", "true");
-      else link.removeAttribute("aria-current");
-    }
-    const said = data.cameras.map((name, camera) => `${name} PSNR ${data.cells[cellIndex(camera)].psnr_db}`);
-    byId("status").textContent = `${view().levels[state.level].spoken}, ${data.groups[group()]}: ${said.join(", ")}`;
-    showWipe();
-    showDetail();
+async function pixelText(value, at) {
+  const picture = addressOf(value) ? await decode(addressOf(value)).catch(() => null) : null;
+  if (!picture?.pixels) return "not readable here";
+  const text = `sRGB ${[...picture.pixels.slice(4 * at, 4 * at + 3)].join(" ")}`;
+  const [colour, flip] = [await errorsOf(value, "delta_e"), await errorsOf(value, "flip")];
+  return text + (colour ? ` · ΔE2000 ${fixed(colour[at], 1)}` : "") + (flip ? ` · FLIP ${fixed(flip[at], 2)}` : "");
+}
+
+const FACTS = { exposure: "Exposure", saturated: "Saturated", mc_share: "Render's noise", substitution: "W as luminance",
+  balance: "White balance" };
+
+function drawNumbers() {
+  const cells = [of.a, of.b].map((value) => (value === TRUTH ? null : cellAt(placeOf(value))));
+  const lines = data.metrics.filter((metric) => cells.some((cell) => cell !== null && data.cells[cell].values[metric.key]))
+    .map((metric) => make("tr", {}, metricHead(metric),
+      ...cells.map((cell) => make("td", { class: "n" }, cell === null ? "—" : figureText({ ...metric, unit: "" }, cell))),
+      verdictCell(metric, cells.includes(null) ? { outcome: "unknown", lead: null } : verdict(metric, ...cells))));
+  const facts = Object.entries(FACTS).map(([key, name]) => make("tr", { class: "fact" }, make("th", { scope: "row" }, name),
+    ...cells.map((cell) => make("td", { class: "n" }, cell === null ? "—" : data.cells[cell][key])), make("td", {})));
+  byId("numbers").replaceChildren(...lines, ...facts);
+}
+
+function drawWipe() {
+  byId("stage").style.setProperty("--wipe", `${state.wipe}%`);
+  byId("wiper").value = state.wipe;
+  const [a, b] = [of.a, of.b].map(valueName);
+  byId("wiper").setAttribute("aria-valuetext", `${state.wipe} % ${a}, ${100 - state.wipe} % ${b}`);
+  byId("flip").textContent = `Show ${state.wipe < 50 ? "A" : "B"} (key x)`;
+  byId("tag-A").hidden = state.wipe < 8;
+  byId("tag-B").hidden = state.wipe > 92;
+}
+
+// Words and controls of the condition; pictures and charts follow.
+function show() {
+  const [height, width] = size();
+  const level = data.levels[sceneAndLight(state.place)][state.place[LEVEL_AXIS]];
+  byId("viewer").style.setProperty("--w", width);
+  byId("viewer").style.setProperty("--h", height);
+  byId("level-name").textContent = level.name;
+  byId("level-light").textContent = [level.light, level.source].filter(Boolean).join(" · ");
+  byId("level").value = state.place[LEVEL_AXIS];
+  byId("level").setAttribute("aria-valuetext", level.spoken);
+  for (const [name, value] of [["A", of.a], ["B", of.b]]) {
+    all(`[data-name="${name}"]`).forEach((place) => (place.textContent = valueName(value)));
   }
-
-  function showWipe() {
-    put(byId("over"), source(byId("left").value));
-    put(byId("under"), source(byId("right").value));
-    document.querySelector(".stage").toggleAttribute("data-absent", !byId("over").src || !byId("under").src);
-    const [left, right] = ["left", "right"].map((id) => byId(id).selectedOptions[0].text);
-    byId("over").alt = `${left}, left of the wipe`;
-    byId("under").alt = `${right}, right of the wipe`;
-    const share = Number(byId("wiper").value);
-    byId("wiper").setAttribute("aria-valuetext", `${share} % ${left}, ${100 - share} % ${right}`);
-    byId("wipe").style.setProperty("--wipe", `${byId("wiper").value}%`);
+  for (const select of all("[data-axis]")) {
+    select.value = state.place[select.dataset.axis];
+    select.closest("label").hidden = Number(select.dataset.axis) === of.compared;
   }
-
-  // The same rectangle of every picture, one canvas pixel for each; the style sheet enlarges it without smoothing.
-  function showDetail() {
-    const { width, height } = view();
-    const left = clamp(byId("column").value - LOUPE[0] / 2, 0, Math.max(width - LOUPE[0], 0));
-    const top = clamp(byId("row").value - LOUPE[1] / 2, 0, Math.max(height - LOUPE[1], 0));
-    for (const figure of figures) {
-      const [image, frame, canvas] = ["img", ".frame", ".loupe"].map((name) => figure.querySelector(name));
-      const place = { left: left / width, top: top / height, width: LOUPE[0] / width, height: LOUPE[1] / height };
-      for (const [name, part] of Object.entries(place)) frame.style[name] = `${100 * part}%`;
-      [canvas.width, canvas.height] = LOUPE;
-      if (image.src) image.decode().then(() => drawDetail(image, canvas, left, top)).catch(() => {});
-    }
+  byId("level").closest(".slider").hidden = lengths[LEVEL_AXIS] < 2 || of.compared === LEVEL_AXIS;
+  byId("side").hidden = state.view !== "side";
+  byId("pair").hidden = state.view === "side";
+  byId("wipe-control").hidden = state.view !== "wipe";
+  byId("key").hidden = state.show === "picture";
+  byId("key-top").textContent = `${MAP_TOP[state.show]} and more`;
+  for (const link of all("[data-cell]")) {
+    const here = [of.a, of.b].some((value) => value !== TRUTH && cellAt(placeOf(value)) === Number(link.dataset.cell));
+    link.toggleAttribute("aria-current", here);
   }
+  const psnr = data.metrics.find((metric) => metric.key === "psnr_db");
+  const said = [of.a, of.b].filter((value) => value !== TRUTH).map((value) => `${valueName(value)} ${
+    psnr ? `PSNR ${figureText(psnr, cellAt(placeOf(value)))}` : ""}`);
+  byId("status").textContent = `${level.spoken}: ${said.join(", ")}`;
+  drawWipe();
+  drawNumbers();
+  drawing = drawPictures();
+}
 
-  function drawDetail(image, canvas, left, top) {
-    canvas.getContext("2d").drawImage(image, left, top, ...LOUPE, 0, 0, ...LOUPE);
+function showComparison() {
+  const pair = of.b !== TRUTH && of.a !== of.b;
+  byId("verdicts").replaceChildren(...(pair ? drawTables(of, state.place) : []));
+  byId("counts").replaceChildren(...(lengths[of.compared] > 2 ? [drawCounts(of)] : []));
+  const chosen = new Set(all("[name=metric]:checked").map((input) => input.value));
+  byId("drawn").replaceChildren(...drawCharts(of, state.place, chosen));
+}
+
+// Whole multiples keep pixels crisp; a picture wider than its place shrinks to fit.
+function fit() {
+  const ratio = window.devicePixelRatio || 1;
+  const [height, width] = size();
+  const room = byId("pair").clientWidth || byId("viewer").clientWidth;
+  const beside = getComputedStyle(byId("pair")).gridTemplateColumns.split(" ").length > 1 ? room - 330 : room;
+  const tall = Math.max(0.86 * window.innerHeight, 512 * (height / width));
+  const factor = Math.floor(Math.min(beside / width, tall / height) * ratio);
+  byId("viewer").style.setProperty("--shown", `${factor >= 1 ? (factor * width) / ratio : Math.min(beside, width)}px`);
+  const scale = factor >= 1 ? `${factor} × ${factor} screen pixels` : "less than a screen pixel";
+  byId("scale").textContent = `${width} × ${height} pixels; one of them takes ${scale}.`;
+}
+
+// Choices
+
+function fillChoices() {
+  const values = data.axes[of.compared].values.map((name, value) => [value, name]);
+  for (const id of ["a", "b"]) {
+    const options = id === "b" || lengths[of.compared] > 1 ? [...values, [TRUTH, "Truth"]] : values;
+    byId(id).replaceChildren(...options.map(([value, name]) => make("option", { value }, name)));
+    byId(id).value = of[id];
   }
-
-  // Whole multiples keep pixels crisp; a picture wider than its column shrinks to fit.
-  function fit() {
-    const ratio = window.devicePixelRatio || 1;
-    const { width, height } = view();
-    const wipe = !byId("wipe").hidden;
-    const area = wipe ? byId("wipe") : figures[0];
-    // A wipe no taller than the window keeps its slider in sight.
-    const tall = wipe ? (0.8 * window.innerHeight) / height : Infinity;
-    const factorIn = (room) => Math.floor(Math.min(room / width, tall) * ratio);
-    const [beside, above] = [false, true].map((top) => {
-      viewer.classList.toggle("top", top);
-      return factorIn(area.clientWidth);
-    });
-    viewer.classList.toggle("top", above > beside);
-    const factor = Math.max(above, beside);
-    viewer.style.setProperty("--shown", `${factor >= 1 ? (factor * width) / ratio : area.clientWidth}px`);
-    const scale = factor >= 1 ? `${factor} × ${factor} screen pixels` : "less than a screen pixel";
-    byId("scale").textContent = `Each picture is ${width} × ${height} pixels; one of them takes ${scale}.`;
+  for (const id of ["rows", "along"]) {
+    const other = id === "rows" ? of.along : of.rows;
+    const free = range(lengths.length).filter((axis) => axis !== of.compared && (axis === of[id] || axis !== other));
+    const options = free.filter((axis) => lengths[axis] > 1 || axis === of[id]);
+    byId(id).replaceChildren(...options.map((axis) => make("option", { value: axis }, data.axes[axis].name)));
+    byId(id).value = of[id];
+    byId(id).closest("label").hidden = options.length < 2;
   }
+}
 
-  for (const part of all("[data-script]")) part.hidden = false;
-  for (const frame of all(".frame")) frame.hidden = false;
+const choose = (id, then) => byId(id)?.addEventListener("input", (event) => {
+  const { value } = event.target;
+  of[id] = value === TRUTH ? value : Number(value);
+  then?.();
+  fillChoices();
+  show();
+  showComparison();
+});
+choose("a");
+choose("b");
+choose("rows");
+choose("along");
+choose("compared", () => {
+  [of.a, of.b] = [0, 1];
+  const free = range(lengths.length).filter((axis) => axis !== of.compared).sort((one, other) =>
+    (lengths[other] > 1) - (lengths[one] > 1) || (other === LEVEL_AXIS) - (one === LEVEL_AXIS));
+  [of.along, of.rows] = free;
+});
 
-  byId("level").addEventListener("input", (event) => {
-    state.level = Number(event.target.value);
-    show();
-  });
-  byId("exposure")?.addEventListener("input", (event) => {
-    state.exposure = Number(event.target.value);
-    show();
-  });
-  for (const input of all("[name=sensor]")) {
-    input.addEventListener("change", () => {
-      state.sensor = Number(input.value);
-      show();
-    });
-  }
-  byId("view")?.addEventListener("input", (event) => {
-    state.view = Number(event.target.value);
+function moveTo(axis, value) {
+  state.place = moved(state.place, axis, value);
+  show();
+  showComparison();
+  fit();
+}
+byId("level").addEventListener("input", (event) => moveTo(LEVEL_AXIS, Number(event.target.value)));
+for (const select of all("[data-axis]")) {
+  select.addEventListener("input", () => moveTo(Number(select.dataset.axis), Number(select.value)));
+}
+for (const input of all("[name=view], [name=show]")) {
+  input.addEventListener("change", () => {
+    state[input.name] = input.value;
+    state.wipe = input.value === "flip" ? 100 : 50;
     show();
     fit();
   });
-  for (const input of all("[name=metric]")) {
-    input.addEventListener("change", () => {
-      for (const chart of all("[data-metric]")) {
-        if (chart.dataset.metric === input.value) chart.hidden = !input.checked;
-      }
-    });
-  }
-  for (const input of all("[name=view]")) {
-    input.addEventListener("change", () => {
-      byId("side").hidden = input.value !== "side";
-      byId("wipe").hidden = input.value !== "wipe";
-      document.querySelector(".detail").hidden = input.value !== "side";
-      fit();
-    });
-  }
-  for (const id of ["left", "right", "wiper"]) byId(id).addEventListener("input", showWipe);
-  for (const id of ["column", "row"]) byId(id).addEventListener("input", showDetail);
-  const stage = document.querySelector(".stage");
-  const drag = (event) => {
-    const box = stage.getBoundingClientRect();
-    byId("wiper").value = clamp((100 * (event.clientX - box.left)) / box.width, 0, 100);
-    showWipe();
-  };
-  stage.addEventListener("pointerdown", (event) => {
-    stage.setPointerCapture(event.pointerId);
-    drag(event);
+}
+for (const input of all("[name=metric]")) input.addEventListener("change", showComparison);
+for (const id of ["column", "row"]) byId(id).addEventListener("input", () => (drawing = drawLoupe()));
+
+// Wipe, and A or B
+
+function wipeTo(percent) {
+  state.wipe = clamp(percent, 0, 100);
+  drawWipe();
+}
+byId("wiper").addEventListener("input", (event) => wipeTo(Number(event.target.value)));
+byId("flip").addEventListener("click", () => wipeTo(state.wipe < 50 ? 100 : 0));
+document.addEventListener("keydown", (event) => {
+  const typing = /^(SELECT|TEXTAREA)$/.test(event.target.tagName) || event.target.type === "number";
+  if (event.key.toLowerCase() !== "x" || typing || event.ctrlKey || event.metaKey || event.altKey) return;
+  wipeTo(state.wipe < 50 ? 100 : 0);
+});
+
+// The pointer: it carries the loupe, and pressed the wipe.
+const stage = byId("stage");
+const point = (event) => {
+  const box = stage.getBoundingClientRect();
+  const [height, width] = size();
+  const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+  byId("column").value = clamp(Math.floor(x * width), 0, width - 1);
+  byId("row").value = clamp(Math.floor(y * height), 0, height - 1);
+  drawing = drawLoupe();
+  if (stage.hasPointerCapture(event.pointerId) && state.view === "wipe") wipeTo(100 * x);
+};
+stage.addEventListener("pointerdown", (event) => {
+  stage.setPointerCapture(event.pointerId);
+  point(event);
+});
+stage.addEventListener("pointermove", point);
+
+for (const link of all("[data-cell]")) {
+  link.addEventListener("click", () => {
+    let index = Number(link.dataset.cell);
+    for (let axis = lengths.length - 1; axis >= 0; axis -= 1) {
+      state.place[axis] = index % lengths[axis];
+      index = Math.floor(index / lengths[axis]);
+    }
+    state.place = [...state.place];
+    of.a = state.place[of.compared];
+    if (of.b === of.a) of.b = TRUTH;
+    fillChoices();
+    show();
+    showComparison();
+    fit();
   });
-  stage.addEventListener("pointermove", (event) => stage.hasPointerCapture(event.pointerId) && drag(event));
-  for (const figure of figures) {
-    const picture = figure.querySelector(".picture");
-    const point = (event) => {
-      const box = picture.getBoundingClientRect();
-      const { width, height } = view();
-      byId("column").value = clamp(((event.clientX - box.left) / box.width) * width, 0, width - 1);
-      byId("row").value = clamp(((event.clientY - box.top) / box.height) * height, 0, height - 1);
-      showDetail();
-    };
-    picture.addEventListener("pointerdown", point);
-    picture.addEventListener("pointermove", (event) => event.pointerType === "mouse" && point(event));
-  }
-  for (const [index, link] of thumbs) {
-    link.addEventListener("click", () => {
-      const condition = Math.floor(index / data.cameras.length);
-      const chosen = Math.floor(condition / view().levels.length);
-      const before = state.view;
-      state.view = Math.floor(chosen / (data.exposures.length * data.sensors));
-      state.sensor = Math.floor(chosen / data.exposures.length) % data.sensors;
-      state.exposure = chosen % data.exposures.length;
-      state.level = condition % view().levels.length;
-      show();
-      if (state.view !== before) fit();
-    });
-  }
-  window.addEventListener("resize", fit);
-  show();
-  fit();
-})();
+}
+
+for (const part of all("[data-script]")) part.hidden = false;
+[byId("column").value, byId("row").value] = look;
+fillChoices();
+show();
+showComparison();
+fit();
+window.addEventListener("resize", fit);
