@@ -34,7 +34,7 @@ from studies.pages.report_pictures import ReportPictures
 from studies.pages.report_speed import speed_rows
 
 SCRIPTS = ("report_numbers.js", "report_colour.js", "report_charts.js", "report.js")  # one script, in this order
-SEEN_DB = 20.0  # PSNR from which on a picture shows what is in it
+SEEN_DB = 22.0  # PSNR from which on a picture shows what is in it
 MOST_NAMED = 3  # cameras in a title
 
 

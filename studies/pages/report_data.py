@@ -121,7 +121,7 @@ class ReportData:
     notes : tuple of str
         What fell back or is missing.
     pictures_left_out : str
-        Which pictures aren't in the page, or are in it with a loss; empty where all are as they were made.
+        Which pictures aren't in the page; empty where all are.
     looked_at : (int, int)
         Column and row of the first picture that the loupe shows at first.
     """

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,11 @@ from studies.pages.report_compare import Comparison
 from studies.sweep.prepare import PICTURES
 from studies.sweep.stored import read_whole
 
-LOSSLESS_PICTURES, LOSSLESS_BYTES = 28, 24e6  # up to both, all pictures go into the page as they were made
+AS_MADE, AS_MADE_BYTES = 28, 24e6  # up to so many pictures and bytes, all of them go into the page as they were made
 SHOWN_BYTES = 6.5e6  # of pictures and maps otherwise: a page of 300 cells stays under 10 MB
-QUALITY = 90  # of WebP
+# Pictures stay lossless: WebP with a loss halves the resolution of colours, which is what mosaics are judged by.
+LOSSLESS = {"lossless": True, "method": 1, "quality": 20}
+OF_MAPS = {"quality": 85, "method": 2}
 LOUPE = (16, 32)  # rows and columns that the loupe shows
 
 
@@ -28,9 +31,9 @@ class ReportPictures:
     Attributes
     ----------
     files : mapping of str to bytes
-        PNG, or WebP where there are too many.
+        PNG, or lossless WebP where there are many.
     flip_maps : mapping of str to bytes
-        LDR-FLIP of each pixel, 255 times, grey, in the same form.
+        LDR-FLIP of each pixel, 255 times, grey: PNG, or WebP with a loss where there are many.
     """
 
     files: Mapping[str, bytes]
@@ -56,39 +59,30 @@ def read_pictures(
     Returns
     -------
     ReportPictures, str
-        And what the page has to say of those that it leaves out or holds with a loss.
+        And what the page has to say of those that it leaves out.
     """
     made = {name: read_whole(folder / PICTURES, name) for name in truths}
     shown = pairs if most is None else pairs[:most]
     sizes = [(folder / PICTURES / name).stat().st_size for name, _ in pairs if (folder / PICTURES / name).is_file()]
-    lossless = len(pairs) <= LOSSLESS_PICTURES and sum(sizes) <= LOSSLESS_BYTES
-    files = {name: content if lossless else as_webp(opened(content)) for name, content in made.items()}
+    as_made = len(pairs) <= AS_MADE and sum(sizes) <= AS_MADE_BYTES
+    files = {name: content if as_made else as_webp(opened(content), **LOSSLESS) for name, content in made.items()}
     maps: dict[str, bytes] = {}
+    held = sum(map(len, files.values()))
     for name, truth in shown:
         content = read_whole(folder / PICTURES, name)
         errors = flip_map(opened(content), opened(made[truth]))
-        if not lossless:
-            content, errors = as_webp(opened(content)), as_webp(opened(errors))
-            held = sum(map(len, (*files.values(), *maps.values(), content, errors)))
-            if most is None and held > SHOWN_BYTES:
+        if not as_made:
+            content, errors = as_webp(opened(content), **LOSSLESS), as_webp(opened(errors), **OF_MAPS)
+            if most is None and held + len(content) + len(errors) > SHOWN_BYTES:
                 break
         files[name], maps[name] = content, errors
-    return ReportPictures(files, maps), _told(len(maps), len(pairs), lossless=lossless)
-
-
-def _told(held: int, count: int, *, lossless: bool) -> str:
-    told = []
-    if held < count:
-        told.append(
-            f"To keep the page small, {held} of {count} pictures are in it, the numbers of all; the page shows the "
-            "others from the folder pictures beside it, and rodcone report --pictures N puts more into it."
-        )
-    if not lossless:
-        told.append(
-            f"The page's pictures are WebP of quality {QUALITY}: its error maps and pixel values have that loss, its "
-            "numbers don't, and the files beside the page are lossless."
-        )
-    return " ".join(told)
+        held += len(content) + len(errors)
+    left_out = sum(name not in maps for name, _ in pairs)
+    told = (
+        f"To keep the page small, {left_out} of {len(pairs)} pictures aren't in it: it shows them from the folder "
+        "pictures beside it, and rodcone report --pictures N puts more into it."
+    )
+    return ReportPictures(files, maps), told if left_out else ""
 
 
 def view_order(shape: Sequence[int], of: Comparison) -> list[int]:
@@ -117,10 +111,10 @@ def opened(content: bytes) -> NDArray[np.uint8]:
         return np.asarray(picture if picture.mode == "L" else picture.convert("RGB"))
 
 
-def as_webp(values: NDArray[np.uint8]) -> bytes:
-    """Return a picture (h, w) or (h, w, 3) as WebP, with a loss."""
+def as_webp(values: NDArray[np.uint8], **options: Any) -> bytes:
+    """Return a picture (h, w) or (h, w, 3) as WebP, with Pillow's options for it."""
     file = BytesIO()
-    Image.fromarray(values).convert("RGB").save(file, "WEBP", quality=QUALITY, method=2)
+    Image.fromarray(values).convert("RGB").save(file, "WEBP", **options)
     return file.getvalue()
 
 
@@ -133,12 +127,11 @@ def flip_map(picture: NDArray[np.uint8], truth: NDArray[np.uint8]) -> bytes:
 
 
 def busiest(truth: NDArray[np.uint8]) -> tuple[int, int]:
-    """Return column and row of the loupe's rectangle in which a picture (h, w, 3) has the most contrast and colours."""
-    values = truth.astype(np.float64)
-    mean = uniform_filter(values, (*LOUPE, 0))
-    spread = np.sqrt(np.maximum(uniform_filter(values**2, (*LOUPE, 0)) - mean**2, 0.0))
-    # the part of it that isn't grey: chroma of the channels against their mean counts as much as lightness
-    colour = values - values.mean(axis=2, keepdims=True)
-    chroma = np.sqrt(uniform_filter((colour**2).sum(axis=2), LOUPE))
-    row, column = np.unravel_index(np.argmax(spread.mean(axis=2) + chroma), chroma.shape)
+    """Return column and row of the middle of the loupe's rectangle in which a picture (h, w, 3) has the most edges.
+
+    There cameras differ most: a chart's, where the scene has one.
+    """
+    values = truth.astype(np.float64).mean(axis=2)
+    edges = sum(np.abs(np.gradient(values, axis=axis)) for axis in (0, 1) if values.shape[axis] > 1)
+    row, column = np.unravel_index(np.argmax(uniform_filter(edges * np.ones_like(values), LOUPE)), values.shape)
     return int(column), int(row)
