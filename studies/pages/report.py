@@ -1,7 +1,7 @@
 """The report of a sweep: one self-contained HTML page from values and pictures. Pure: the caller writes it.
 
-The page's policy refuses every fetch and every script but its own, whose hash stands in the policy. Values reach the
-page only through Jinja's escaping (text) and ``tojson`` (the script's data block).
+The page's policy refuses every fetch (but of pictures beside it, where it leaves some out) and every script but its own,
+whose hash stands in the policy. Values reach the page only through Jinja's escaping (text) and ``tojson`` (the script's data block).
 """
 
 import json
@@ -33,7 +33,8 @@ from studies.pages.report_data import ReportCell, ReportData, ReportLevel
 from studies.pages.report_pictures import ReportPictures
 from studies.pages.report_speed import speed_rows
 
-SCRIPTS = ("report_numbers.js", "report_colour.js", "report_charts.js", "report.js")  # one script, in this order
+# One script, in this order.
+SCRIPTS = ("report_numbers.js", "report_colour.js", "report_charts.js", "report_viewer.js", "report.js")
 SEEN_DB = 22.0  # PSNR from which on a picture shows what is in it
 MOST_NAMED = 3  # cameras in a title
 

@@ -108,7 +108,7 @@ def test_the_report_names_a_level_and_its_source(tmp_path: Path) -> None:
     )
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "moonlight" in page
-    assert "10 photons per um^2 and second" in page
+    assert "10 photons per µm² and second" in page
     assert results(tmp_path)["rows"][0]["luminance_cd_m2"] == 0.036
 
 
