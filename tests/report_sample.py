@@ -196,10 +196,18 @@ def sample_pictures(report: ReportData) -> ReportPictures:
             of_size = np.tile(scene, (1, 2, 1))[:rows, :columns]
             noise = rng.standard_normal(of_size.shape) * 10 ** (-(cell.figures["psnr_db"] or 0) / 20)
             pictures[cell.picture] = _encode(of_size + noise)
-    truth = {cell.picture: opened(pictures[name]) for cell, name in zip(
-        report.cells, np.repeat(report.truths, len(report.cells) // len(report.truths)), strict=True) if cell.picture}
-    maps = {name: flip_map(opened(pictures[name]), truth[name]) for name in truth if name in pictures and not (
-        opened(pictures[name]).shape != truth[name].shape)}
+    truth = {
+        cell.picture: opened(pictures[name])
+        for cell, name in zip(
+            report.cells, np.repeat(report.truths, len(report.cells) // len(report.truths)), strict=True
+        )
+        if cell.picture
+    }
+    maps = {
+        name: flip_map(opened(pictures[name]), truth[name])
+        for name in truth
+        if name in pictures and opened(pictures[name]).shape == truth[name].shape
+    }
     return ReportPictures(pictures, maps)
 
 

@@ -150,8 +150,10 @@ def titles(report: ReportData) -> list[str]:
     if len(compared.values) > MOST_NAMED:
         return [f"{len(compared.values)} {compared.name.lower()}s"]
     cameras = compared.name == "Camera"
-    return [text.CAMERA_TITLES.get(camera, text.camera_name(camera)) for camera in report.cameras] if cameras else list(
-        compared.values
+    return (
+        [text.CAMERA_TITLES.get(camera, text.camera_name(camera)) for camera in report.cameras]
+        if cameras
+        else list(compared.values)
     )
 
 

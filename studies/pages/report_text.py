@@ -84,9 +84,18 @@ def signed(metric: Metric, value: float) -> str:
     return shown if value < 0 else f"+{shown}"
 
 
-def lead_text(metric: Metric, lead: float) -> str:
-    """Write a lead with its sign; one that is written as 0 has none."""
-    shown = fixed(abs(lead), metric.digits)
+def lead_text(metric: Metric, lead: float, *, clear: bool = False) -> str:
+    """Write a lead with its sign; one that is written as 0 has none.
+
+    Parameters
+    ----------
+    metric : Metric
+    lead : float
+    clear : bool
+        Whether its interval is clear of 0: then it has as many decimals, up to three more, as show that it isn't 0.
+    """
+    decimals = range(metric.digits, metric.digits + (4 if clear else 1))
+    shown = next((text for count in decimals if float(text := fixed(abs(lead), count))), fixed(0.0, decimals[-1]))
     return shown if not float(shown) else ("+" if lead > 0 else "\N{MINUS SIGN}") + shown
 
 

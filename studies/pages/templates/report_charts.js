@@ -15,7 +15,7 @@ function verdictCell(metric, { outcome, lead }) {
   if (lead === null) cell.append("—");
   else {
     const mark = make("i", { "aria-hidden": "true" }, MARKS[outcome]);
-    cell.append(make("span", { class: "sr" }, `${outcome}, `), mark, ` ${fixed(lead, metric.digits, true)}`);
+    cell.append(make("span", { class: "sr" }, `${outcome}, `), mark, ` ${leadText(metric, { outcome, lead })}`);
   }
   return cell;
 }

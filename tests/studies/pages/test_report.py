@@ -15,7 +15,7 @@ import report_sample as SAMPLE
 from studies.pages import report_text as text
 from studies.pages.report import render_report
 from studies.pages.report_data import ReportCell, ReportData
-from studies.pages.report_pictures import ReportPictures
+from studies.pages.report_pictures import SHOWN_BYTES, ReportPictures
 from studies.sweep.row import Row
 
 HOSTILE = "</script><b>bold</b><!--\"'&{{ 7*7 }}"
@@ -207,7 +207,11 @@ def test_seeds_and_exposures_stand_in_the_page() -> None:
     assert data["cells"][6]["values"]["psnr_db"] == pytest.approx([psnr_db + step for step in (-0.1, 0.0, 0.1)])
     # Deviation 0.1 dB over 3 seeds: Student's 95 % interval is 4.3027 x 0.1 / sqrt(3) = 0.248 dB wide to each side.
     assert data["t"] == pytest.approx(4.3027, abs=1e-4)
-    row = next(row for row in outline.rows if "Sensor table1_output, exposure 10 ms" in row[0].replace("\N{NO-BREAK SPACE}", " "))
+    row = next(
+        row
+        for row in outline.rows
+        if "Sensor table1_output, exposure 10 ms" in row[0].replace("\N{NO-BREAK SPACE}", " ")
+    )
     found = outline.rows[outline.rows.index(row) + 1][3].replace("\N{NO-BREAK SPACE}", " ")
     assert found == f"{psnr_db:.1f} ± 0.2"
     assert "over 3 seeds" in page
@@ -235,7 +239,10 @@ def test_summary_names_every_metric_by_light_lost_ones_too() -> None:
         ours, scatter = row.processor == "interleaved", 0.01 * (row.seed - 1)
         ahead = (2.0 if row.level in dark else -2.0) if ours else 0.0
         return replace(
-            row, psnr_db=20.0 + ahead + scatter * ours, ssim=0.5 + scatter * ours, flip_mean=0.2 + (0.1 + scatter) * ours
+            row,
+            psnr_db=20.0 + ahead + scatter * ours,
+            ssim=0.5 + scatter * ours,
+            flip_mean=0.2 + (0.1 + scatter) * ours,
         )
 
     of = SAMPLE.sample_report(led, seeds=(0, 1, 2))
@@ -255,9 +262,9 @@ def test_summary_names_every_metric_by_light_lost_ones_too() -> None:
         assert by_metric["FLIP"] == ["behind, ▼ −0.100"] * 7
     total = {outcome: page.count(f'class="n {outcome}"') for outcome in ("ahead", "level", "behind")}
     lede = page[page.index('class="lede"') : page.index("</header>")]
-    assert (
-        f"ahead in {total['ahead']} comparisons, level in {total['level']}, behind in {total['behind']}" in lede
-    ), "rows are all there is here"
+    assert f"ahead in {total['ahead']} comparisons, level in {total['level']}, behind in {total['behind']}" in lede, (
+        "rows are all there is here"
+    )
     assert sum(total.values()) == 8 * 14
 
 
@@ -294,3 +301,12 @@ def test_pictures_beside_the_page_are_the_only_ones_it_may_fetch() -> None:
     assert "img-src data:;" in page_of(of)
     less = replace(of, cells=(replace(of.cells[0], picture=None), *of.cells[1:]))
     assert "img-src data: 'self' file:;" in unescape(page_of(less))
+
+
+def test_numbers_of_300_cells_take_less_than_a_tenth_of_the_page() -> None:
+    """A page of 300 cells is to stay under 10 MB: `SHOWN_BYTES` of pictures are 8.7 MB of it in base64."""
+    cameras = tuple(f"camera_{number}" for number in range(11))
+    of = SAMPLE.sample_report(cameras=cameras, seeds=(0, 1, 2), exposures=("auto", "10ms"))
+    assert len(of.cells) == 308
+    page = page_of(replace(of, cells=tuple(replace(cell, picture=None) for cell in of.cells), truths=(None,)))
+    assert len(page.encode()) + SHOWN_BYTES * 4 / 3 < 1e7

@@ -85,9 +85,7 @@ def row_of(results: ReportData, cell: int) -> list[int]:
 
 def pick(page: Any, control: str, value: object) -> None:
     """Choose a value of a select or an input."""
-    page.value(
-        f"(() => {{ const one = {control}; one.value = {value!r}; one.dispatchEvent(new Event('input')) }})()"
-    )
+    page.value(f"(() => {{ const one = {control}; one.value = {value!r}; one.dispatchEvent(new Event('input')) }})()")
 
 
 def test_page_is_quiet_and_asks_for_nothing(browser: Any, report: Path) -> None:
@@ -355,7 +353,9 @@ def test_a_picture_left_out_is_shown_from_its_file_or_said_to_be_gone(browser: A
     pick(page, "byId('level')", 1)
     found = shown_safely(page)
     assert found["drawn"] == [True, False]
-    assert found["gone"].startswith("Not in this page, and its file isn't beside it: pictures/color_checker/A/1/1/bayer")
+    assert found["gone"].startswith(
+        "Not in this page, and its file isn't beside it: pictures/color_checker/A/1/1/bayer"
+    )
     assert found["psnr"] == f"{10 + 8 + 4 + 2 + 1:.1f}"
     asked = [address.rpartition("/")[2] for address in page.requests()]
     assert set(asked) == {"interleaved", "bayer"}, "nothing but the two pictures"
@@ -416,7 +416,9 @@ def test_everything_is_reached_by_keyboard_and_the_focus_is_seen(browser: Any, a
     reached = []
     for _ in range(16):
         page.press("Tab", 9)
-        reached.append(page.value("document.activeElement.id || document.activeElement.name || document.activeElement.className"))
+        reached.append(
+            page.value("document.activeElement.id || document.activeElement.name || document.activeElement.className")
+        )
         assert page.value("getComputedStyle(document.activeElement).outlineStyle") != "none", reached[-1]
     assert [name for name in reached if name in ("level", "a", "b", "view", "show", "wiper", "flip", "column", "row")] == [
         "level", "a", "b", "view", "show", "wiper", "flip", "column", "row"]  # fmt: skip
@@ -450,7 +452,9 @@ def test_screen_is_not_blank(browser: Any, report: Path, dark: bool) -> None:
 
 def test_without_script_summary_pictures_and_numbers_stand(browser: Any, report: Path) -> None:
     page = Page(browser, report, script=False)
-    visible = "[...document.querySelectorAll('main :is(input, select, button, canvas)')].filter((one) => one.offsetParent)"
+    visible = (
+        "[...document.querySelectorAll('main :is(input, select, button, canvas)')].filter((one) => one.offsetParent)"
+    )
     assert page.value(f"{visible}.length") == 0, "controls that can do nothing are shown"
     assert page.value("document.querySelector('noscript').innerText").startswith("Without JavaScript")
     assert page.value("document.querySelectorAll('.verdicts tbody tr').length") == 2 * 8

@@ -21,16 +21,10 @@ from rodcone.errors import InputError
 from studies.commands.cli import main
 from studies.commands.report import write_report
 from studies.pages.report import render_report
+from studies.pages.report_compare import Comparison
 from studies.pages.report_data import ReportSensor
 from studies.pages.report_facts import sensor_of
-from studies.pages.report_compare import Comparison
-from studies.pages.report_pictures import (
-    AS_MADE,
-    busiest,
-    flip_map,
-    opened,
-    view_order,
-)
+from studies.pages.report_pictures import AS_MADE, busiest, flip_map, opened, view_order
 from studies.pages.report_sweep import sweep_report
 from studies.photograph.picture_file import write_picture
 from studies.study.study import SceneChoice
@@ -172,7 +166,7 @@ def test_cells_come_in_the_order_in_which_the_page_shows_them(
     first = [[int(at) for at in np.unravel_index(cell, shape)] for cell in order[: len({a, b}) * shape[along]]]
     assert {place[compared] for place in first} == {a, b}
     assert all(place[axis] == 0 for place in first for axis in (rows, *axes[3:]))
-    view = {cell for cell in order[: shape[compared] * shape[along] * shape[rows]]}
+    view = set(order[: shape[compared] * shape[along] * shape[rows]])
     assert all(np.unravel_index(cell, shape)[axis] == 0 for cell in view for axis in axes[3:])
 
 

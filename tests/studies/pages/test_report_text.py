@@ -16,6 +16,10 @@ def test_a_lead_that_is_written_as_0_has_no_sign(lead: float, words: str) -> Non
     assert text.lead_text(text.PSNR, lead) == words
 
 
+def test_a_lead_that_is_clear_of_0_is_never_written_as_0() -> None:
+    assert [text.lead_text(text.PSNR, lead, clear=True) for lead in (0.04, -0.0021, 3.0)] == ["+0.04", "−0.002", "+3.0"]
+
+
 def test_powers_have_their_signs() -> None:
     assert text.with_signs("10 photons per um^2, 5 cd/m2, cos^4") == "10 photons per µm², 5 cd/m², cos⁴"
     assert (text.plain_name("quiet.toml"), text.plain_name("low_noise")) == ("quiet", "low_noise")
