@@ -1,7 +1,8 @@
 """The report of a sweep: one self-contained HTML page from values and pictures. Pure: the caller writes it.
 
-The page's policy refuses every fetch (but of pictures beside it, where it leaves some out) and every script but its own,
-whose hash stands in the policy. Values reach the page only through Jinja's escaping (text) and ``tojson`` (the script's data block).
+The page's policy refuses every fetch, but of pictures beside it where it leaves some out, and every script but its own,
+whose hash stands in the policy. Values reach the page only through Jinja's escaping (text) and ``tojson`` (the script's
+data block).
 """
 
 import json

@@ -50,8 +50,8 @@ MEANINGS = {
     S_CIELAB.key: "The same after the eye's own blur: fine noise no longer counts, blotches and casts do.",
     S_CIELAB_95.key: "The same, exceeded in 5 % of the pixels only.",
     FLIP.key: "The difference that is seen when picture and truth alternate on a screen, from 0 to 1.",
-    PU21.key: "What an eye that is adapted to the scene's own light sees of the error: by moonlight it sees so little that "
-    "even a picture full of noise gets some 45 dB, and figures of two light levels don't compare.",
+    PU21.key: "What an eye that is adapted to the scene's own light sees of the error: by moonlight it sees so little "
+    "that even a picture full of noise gets some 45 dB, and figures of two light levels don't compare.",
     MTF50.key: "Spatial frequency at which an edge's contrast has fallen to a half.",
     CHART.key: "Mean difference of colour over the chart's patches.",
     PATCHES.key: "Signal over noise within the chart's patches.",
