@@ -146,7 +146,7 @@ def verdicts(report: ReportData, of: Comparison, metric: text.Metric, row: int) 
     found = []
     for position in range(cells.shape[of.along]):
         place[of.along] = position
-        two = [cells[(*place[:of.compared], value, *place[of.compared + 1:])] for value in (of.a, of.b)]
+        two = [cells[(*place[: of.compared], value, *place[of.compared + 1 :])] for value in (of.a, of.b)]
         found.append(verdict(metric, *two))
     return found
 

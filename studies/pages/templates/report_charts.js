@@ -66,7 +66,7 @@ function drawCounts(of) {
   });
   const names = data.axes[of.compared].values;
   const head = others.map((other) => make("th", { scope: "col" }, `beside ${names[other]}`));
-  return make("table", { class: "cells verdicts counts" },
+  return make("table", { class: "cells verdicts beside-all" },
     make("thead", {}, make("tr", {}, make("th", { scope: "col" }, names[of.a]), ...head)), make("tbody", {}, ...lines));
 }
 

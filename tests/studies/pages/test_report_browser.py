@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from studies.pages import report_text as text
 from studies.pages.report import render_report
 from studies.pages.report_compare import Comparison, counts, first_comparison, verdicts
 from studies.pages.report_data import ReportData
-from studies.pages.report_pictures import opened
+from studies.pages.report_pictures import ReportPictures, opened
 
 HOSTILE = "</script><b>x</b><img src=x onerror=document.title='owned'><script>document.title='owned'</script>"
 
@@ -43,9 +44,8 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of made-up results."""
-    results = SAMPLE.sample_report()
     file: Path = tmp_path_factory.mktemp("report") / "report.html"
-    file.write_text(render_report(results, SAMPLE.sample_pictures(results)), encoding="utf-8")
+    file.write_text(render_report(*standard()), encoding="utf-8")
     return file
 
 
@@ -77,9 +77,18 @@ def shown(page: Any) -> dict[str, Any]:
     return value
 
 
+@cache
+def standard() -> tuple[ReportData, ReportPictures]:
+    """The report of the fixture `report`, and its pictures."""
+    results = SAMPLE.sample_report()
+    return results, SAMPLE.sample_pictures(results)
+
+
 def row_of(results: ReportData, cell: int) -> list[int]:
     """The 5th row of a cell's picture as a canvas gives it."""
-    picture = opened(SAMPLE.sample_pictures(results).files[results.cells[cell].picture or ""])[5]
+    known, pictures = standard()
+    files = pictures.files if known.levels == results.levels else SAMPLE.sample_pictures(results).files
+    picture = opened(files[results.cells[cell].picture or ""])[5]
     return [int(value) for pixel in picture for value in (*pixel, 255)]
 
 
@@ -137,7 +146,7 @@ def test_any_two_are_compared_and_the_truth(browser: Any, report: Path) -> None:
     found = shown(page)
     assert found["names"] == ["A: Interleaved", "B: Truth"]
     assert found["a"] == row_of(results, 14)
-    truth = opened(SAMPLE.sample_pictures(results).files["truth"])[5]
+    truth = opened(standard()[1].files["truth"])[5]
     assert found["b"] == [int(value) for pixel in truth for value in (*pixel, 255)]
     page.value("document.querySelector('[data-cell=\"27\"]').click()")
     assert shown(page)["level"] == "daylight"
@@ -156,7 +165,7 @@ def test_loupe_and_pixel_values_are_those_of_the_picture(browser: Any, report: P
     pick(page, "byId('column')", 100)
     pick(page, "byId('row')", 180)
     shown(page)
-    pictures = SAMPLE.sample_pictures(results)
+    pictures = standard()[1]
     picture, truth = (opened(pictures.files[name]) for name in (results.cells[6].picture or "", "truth"))
     color = page.value("[...byId('loupe-T').getContext('2d').getImageData(0, 0, 1, 1).data].slice(0, 3)")
     assert color == truth[180 - 8, 100 - 16].tolist()
@@ -177,7 +186,7 @@ def test_error_maps_are_ciede2000_and_flip_of_each_pixel(browser: Any, report: P
     page = Page(browser, report)
     results = SAMPLE.sample_report()
     pick(page, "byId('level')", 2)
-    pictures = SAMPLE.sample_pictures(results)
+    pictures = standard()[1]
     picture, truth = (opened(pictures.files[name]) / 255 for name in (results.cells[4].picture or "", "truth"))
     for kind, exact, step in (
         ("delta_e", deltaE_ciede2000(rgb2lab(picture), rgb2lab(truth)), 2e-3),
@@ -464,8 +473,7 @@ def test_without_script_summary_pictures_and_numbers_stand(browser: Any, report:
 
 
 def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
-    results = SAMPLE.sample_report()
-    pictures = SAMPLE.sample_pictures(results)
+    results, pictures = standard()
     results = replace(
         results,
         name=HOSTILE,
