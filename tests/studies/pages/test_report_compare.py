@@ -155,3 +155,6 @@ def test_best_is_ahead_of_every_other_camera() -> None:
     report = SAMPLE.sample_report(led, cameras=tuple(gaps), seeds=SEEDS, levels=2)
     assert best(report, text.PSNR) == {0, 3, 6, 9}
     assert best(SAMPLE.sample_report(led, cameras=tuple(gaps), levels=2), text.PSNR) == set(), "one seed tells nothing"
+    gaps["ple_rgbw"] = 1.0
+    level = SAMPLE.sample_report(led, cameras=tuple(gaps), seeds=SEEDS, levels=2)
+    assert best(level, text.PSNR) == set(), "ahead of one, level with the other"
