@@ -238,6 +238,6 @@ def test_a_level_in_lux_of_a_file_is_refused_before_it_is_read(
 
 @pytest.mark.slow
 def test_demo_s_report_stays_under_10_mb(tmp_path: Path) -> None:
-    """The demo's size, sensors and levels, a map of FLIP a picture; fewer samples leave more noise, which packs worse."""
+    """The demo's own size and levels, a map of FLIP a picture; fewer samples leave more noise, which packs worse."""
     assert call(["--spp", "16", "--max-seconds", "20", "-o", str(tmp_path)]) == 0
     assert 1e6 < (tmp_path / "report.html").stat().st_size < 1e7
