@@ -15,6 +15,7 @@ from sweep_sample import row
 
 from sensor.presets import preset
 from studies.pages.report_data import ReportData, ReportLevel, ReportRender, ReportScene, ReportSensor
+from studies.pages.report_pictures import ReportPictures, flip_map, opened
 from studies.pages.report_sweep import over_seeds
 from studies.pages.report_text import group_names, view_names
 from studies.sweep.row import Row
@@ -173,7 +174,7 @@ def _encode(linear: np.ndarray) -> bytes:
     return file.getvalue()
 
 
-def sample_pictures(report: ReportData) -> dict[str, bytes]:
+def sample_pictures(report: ReportData) -> ReportPictures:
     """Return a coloured test scene under noise that falls with the light."""
     height, width = report.scenes[0].height, report.scenes[0].width
     y, x = np.mgrid[0:height, 0:width] / height
@@ -195,7 +196,19 @@ def sample_pictures(report: ReportData) -> dict[str, bytes]:
             of_size = np.tile(scene, (1, 2, 1))[:rows, :columns]
             noise = rng.standard_normal(of_size.shape) * 10 ** (-(cell.figures["psnr_db"] or 0) / 20)
             pictures[cell.picture] = _encode(of_size + noise)
-    return pictures
+    truth = {
+        cell.picture: opened(pictures[name])
+        for cell, name in zip(
+            report.cells, np.repeat(report.truths, len(report.cells) // len(report.truths)), strict=True
+        )
+        if cell.picture
+    }
+    maps = {
+        name: flip_map(opened(pictures[name]), truth[name])
+        for name in truth
+        if name in pictures and opened(pictures[name]).shape == truth[name].shape
+    }
+    return ReportPictures(pictures, maps)
 
 
 if __name__ == "__main__":

@@ -5,11 +5,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from studies.budget.model_plan import as_stated
+from studies.budget.model_plan import Plan, as_stated
 from studies.commands.console import Flag, Out, Seconds, Several
 from studies.commands.sweep import check_memory, make_all
 from studies.photograph.clock import Clock
-from studies.study.study import SceneChoice
+from studies.study.study import SceneChoice, Study
 from studies.study.study_file import read_study
 from studies.sweep.workers import InThisProcess, run
 
@@ -23,6 +23,7 @@ def demo(
     size: int | None = None,
     sensor: Several = None,
     level: Several = None,
+    processor: Several = None,
     longest_exposure_s: Seconds | None = None,
     spp: int | None = None,
     max_seconds: float | None = None,
@@ -33,7 +34,7 @@ def demo(
 ) -> None:
     """Photograph one scene from moonlight to daylight with both cameras and write a report; prints its path.
 
-    It is a sweep of the study demo (`rodcone new study demo`), as `rodcone sweep --as-stated` makes it.
+    It is a sweep of the study demo (`rodcone new study demo`) as it is stated, without a plan.
 
     Parameters
     ----------
@@ -49,6 +50,9 @@ def demo(
     level
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); may be given
         several times (seven levels from moonlight to daylight by default).
+    processor
+        Processor such as ple_rgbw; may be given several times (interleaved and bayer by default). The page leads with
+        what the white pixel brings where ple_rgbw and ple_bayer are among them: some minutes more.
     longest_exposure_s
         Longest exposure time in seconds or with its unit; 66ms by default.
     spp
@@ -56,7 +60,7 @@ def demo(
     max_seconds
         Time for the render, at most; 65 by default.
     seed
-        Seed of the render, the chips and the exposures.
+        Seed of the render, and the first of three of the chips and the exposures.
     light
         Light of the scene by name, such as A; for a file the light that is shown as neutral (D65 by default).
     denoise
@@ -73,10 +77,19 @@ def demo(
         sensors=study.sensors if sensor is None else tuple(sensor),
         levels=study.levels if level is None else tuple(level),
         longest_exposure_s=study.longest_exposure_s if longest_exposure_s is None else longest_exposure_s,
-        seeds=(seed,),
+        processors=study.processors if processor is None else tuple(processor),
+        seeds=tuple(seed + number for number in study.seeds),
         render=replace(study.render, **{name: value for name, value in changed.items() if value is not None}),
     )
     check_memory(study, out, reference=False, workers=1, force=force)
     runner = partial(run, executor=InThisProcess())
-    _, report = make_all(study, out, lambda step: as_stated(study), runner, clock=clock)
+    _, report = make_all(study, out, lambda step: with_diffraction(as_stated(study), study), runner, clock=clock)
     print(report)
+
+
+def with_diffraction(plan: Plan, study: Study) -> Plan:
+    """Return a plan whose lenses have the study's diffraction, which a sensor's own leaves out."""
+    models = {}
+    for condition, model in plan.images.items():
+        models[condition] = replace(model, lens=replace(model.lens, diffraction=study.lens.diffraction))
+    return replace(plan, images=models)

@@ -11,7 +11,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 
 
 def address(kind: str, picture: bytes) -> str:
-    """Return a picture as a ``data:`` address; `kind` is ``png`` or ``svg+xml``."""
+    """Return a picture as a ``data:`` address; `kind` is ``png``, ``webp`` or ``svg+xml``."""
     return f"data:image/{kind};base64,{b64encode(picture).decode('ascii')}"
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from io import BytesIO
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ from numpy.typing import NDArray
 from rodcone.plots import BLUE as BLUE  # noqa: PLC0414  (pages and figures import the colours from here)
 from rodcone.plots import INK as INK  # noqa: PLC0414
 from rodcone.plots import ORANGE as ORANGE  # noqa: PLC0414
-from studies.pages.charts import spread, tick_text
 
 UNIT = 1 / 72  # inches: lengths below are points, which are the units of Matplotlib's SVG
 SIDE = 192  # width of a picture [points]
@@ -120,3 +120,23 @@ def name_at_ends(axes: Axes, ends: Sequence[tuple[str, float, str]]) -> None:
     wanted = [float(box.transform(axes.transScale.transform((1.0, y)))[1]) * high for _, y, _ in ends]
     for (name, _, colour), height in zip(ends, spread(wanted, LABEL_GAP, 0.0, high), strict=True):
         axes.text(1.02, height / high, name, color=colour, va="center", transform=axes.transAxes)
+
+
+def tick_text(value: float) -> str:
+    """Write a tick without exponent or trailing zeros, thousands apart."""
+    text = f"{value:,.6f}".rstrip("0").rstrip(".").replace(",", "\N{NARROW NO-BREAK SPACE}")
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
+def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list[float]:
+    """Move label positions apart until neighbours are `gap` from each other, within `low`..`high` where that fits."""
+    order = sorted(range(len(wanted)), key=lambda index: wanted[index])
+    placed = list(wanted)
+    for before, after in pairwise(order):
+        placed[after] = max(placed[after], placed[before] + gap)
+    over = max((placed[index] for index in order), default=low) - high
+    if over > 0:
+        placed = [position - over for position in placed]
+        for before, after in pairwise(order[::-1]):
+            placed[after] = min(max(wanted[after], low), placed[before] - gap)
+    return placed

@@ -1,32 +1,43 @@
 """The report of a sweep: one self-contained HTML page from values and pictures. Pure: the caller writes it.
 
-The page's policy refuses every fetch and every script but its own, whose hash stands in the policy. Values reach the
-page only through Jinja's escaping (text) and ``tojson`` (the script's data block).
+The page's policy refuses every fetch, but of pictures beside it where it leaves some out, and every script but its own,
+whose hash stands in the policy. Values reach the page only through Jinja's escaping (text) and ``tojson`` (the script's
+data block).
 """
 
 import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
-from itertools import product
 from math import isfinite
 from typing import Any
 
-from studies.budget.budget import MOST_SHARE, OF_PIXELS
+from markupsafe import Markup
+
+from studies.budget.budget import MOST_SHARE
 from studies.pages import report_text as text
 from studies.pages.page import address, own_file, write_out
-from studies.pages.report_charts import SHARE, group_charts, shown_metrics, speed_charts, speed_rows
+from studies.pages.report_compare import (
+    CAMERA,
+    OUTCOMES,
+    UNKNOWN,
+    WHITE_PIXEL,
+    Comparison,
+    axes_of,
+    best,
+    counts,
+    first_comparison,
+    student_t,
+    verdicts,
+)
 from studies.pages.report_data import ReportCell, ReportData, ReportLevel
+from studies.pages.report_pictures import ReportPictures
+from studies.pages.report_speed import speed_rows
 from studies.pages.snr_table import snr_over_light
 
-# What stands beneath each picture beside the metrics, in this order: key of the cell's view, label.
-FURTHER_ROWS = (
-    ("exposure", "Exposure"),
-    ("saturated", "Saturated"),
-    ("substitution", "Substitution"),
-    ("balance", "White balance"),
-)
-AT_FIRST = (text.PSNR, text.SSIM, text.DELTA_E)  # the metrics shown before others are asked for
+# One script, in this order.
+SCRIPTS = ("report_numbers.js", "report_colour.js", "report_charts.js", "report_viewer.js", "report.js")
+SEEN_DB = 22.0  # PSNR from which on a picture shows what is in it
 MOST_NAMED = 3  # cameras in a title
 
 
@@ -38,13 +49,13 @@ def balance_text(balance: Mapping[str, str]) -> str:
     return "calibrated gains" if len(fallen) == len(balance) else f"calibrated for {', '.join(fallen)}"
 
 
-def cell_view(cell: ReportCell, level: ReportLevel, rivals: Sequence[ReportCell]) -> dict[str, Any]:
-    """Return everything the page says about one cell, as text; `best` names the metrics in which it leads `rivals`."""
+def cell_view(cell: ReportCell, level: ReportLevel) -> dict[str, Any]:
+    """Return what the page says of one picture, as text, and its figures of every seed, as numbers."""
     row, share = cell.first, cell.figures["mc_share"]
     electrons = json.loads(row.mean_electrons) if row else {}
     return {
-        **{metric.key: text.metric_text(metric, cell) for metric in text.METRICS},
-        "snr_db": text.interval_text(cell, "snr_db", 1, "dB"),
+        "x": cell.luminance_cd_m2,
+        "values": {metric.key: cell.by_seed[metric.key] for metric in text.METRICS if metric.key in cell.by_seed},
         "exposure": text.duration(row.exposure_s if row else None),
         "saturated": text.percent(cell.figures["saturated"]),
         "substitution": text.substitution_text(cell.substitution),
@@ -54,7 +65,6 @@ def cell_view(cell: ReportCell, level: ReportLevel, rivals: Sequence[ReportCell]
         "electrons": " ".join(f"{name}\N{NBSP}{text.significant(mean)}" for name, mean in electrons.items()),
         "capture": text.duration(row.capture_s if row else None),
         "develop": text.duration(row.develop_s if row else None),
-        "best": [metric.key for metric in text.METRICS if text.leader(metric, rivals)[0] is cell],
         "file": f"pictures/{row.picture}" if row else "",
         "alt": f"{text.camera_name(cell.camera)} picture, {level.name}, {cell.group}",
     }
@@ -64,69 +74,64 @@ def level_view(level: ReportLevel, cell: ReportCell) -> dict[str, str]:
     """Return a light level's texts, its light being that of a cell."""
     luminance = text.significant(cell.luminance_cd_m2, "cd/m²")
     lux = text.significant(cell.illuminance_lux, "lux")
-    light = [words for words in (luminance, lux) if words not in (level.name, text.MISSING)]
+    words = [luminance, f"{lux} on the scene's reference plane"]
+    known = [said for said, value in zip(words, (luminance, lux), strict=True) if value not in (level.name, "—")]
     return {
         "name": level.name,
-        "light": " · ".join(light),
+        "light": " · ".join(known),
         "source": level.source,
-        "spoken": ", ".join([level.name, *light]),
+        "spoken": ", ".join([level.name, *known]),
     }
 
 
 def viewer_data(report: ReportData) -> dict[str, Any]:
-    """Return what the page's script reads: each scene under each spectrum, its levels, and the texts of all cells."""
-    texts = [
-        cell_view(cell, report.levels[cell.level], condition) for condition in report.conditions for cell in condition
-    ]
-    views = []
-    for index, (scene, spectrum) in enumerate(product(report.scenes, report.spectra)):
-        first = report.by_group[index * len(report.sensors) * len(report.exposures)]
-        levels = zip(report.levels, first[:: len(report.cameras)], strict=True)
-        views.append(
-            {
-                "scene": scene.name,
-                "spectrum": text.spectrum_name(spectrum),
-                "height": scene.height,
-                "width": scene.width,
-                "levels": [level_view(level, cell) for level, cell in levels],
-            }
-        )
+    """Return what the page's script reads: axes, what is compared at first, and all cells in the order of the axes."""
+    of, per_view = first_comparison(report), len(report.cells) // len(report.truths)
+    levels = []
+    for index in range(len(report.truths)):
+        first = report.cells[index * per_view :: len(report.cameras)]
+        levels.append([level_view(*pair) for pair in zip(report.levels, first, strict=False)])
     return {
-        "views": views,
-        "groups": [cells[0].group for cells in report.by_group],
-        "sensors": len(report.sensors),
-        "exposures": [text.exposure_name(exposure) for exposure in report.exposures],
-        "cameras": [text.camera_name(camera) for camera in report.cameras],
-        "cells": texts,
+        "axes": [vars(axis) for axis in axes_of(report)],
+        "first": vars(of) | {"level": seen_level(report), "look": report.looked_at},
+        "sizes": [[scene.height, scene.width] for scene in report.scenes],
+        "metrics": [vars(metric) for metric in shown_metrics(report.cells)],
+        "t": student_t(len(report.seeds)),
+        "levels": levels,
+        "cells": [cell_view(cell, report.levels[cell.level]) for cell in report.cells],
     }
 
 
-def finding_rows(report: ReportData, cells: Sequence[ReportCell]) -> list[list[str]]:
-    """Return a row for each level of a group: who leads in each metric by how much, and what fell back in whom."""
-    rows = []
-    for start in range(0, len(cells), len(report.cameras)):
-        condition = cells[start : start + len(report.cameras)]
-        row = [report.levels[condition[0].level].name]
-        for metric in AT_FIRST:
-            best, lead = text.leader(metric, condition)
-            by = text.fixed(lead, metric.digits, metric.unit)
-            row.append(f"{text.camera_name(best.camera)}, by {by}" if best else text.MISSING)
-        swapped = [
-            text.camera_name(cell.camera) + ("" if cell.substitution == 1 else " (some seeds)")
-            for cell in condition
-            if cell.substitution
-        ]
-        fallen = [text.camera_name(cell.camera) for cell in condition if "calibrated" in cell.balance.values()]
-        row += [", ".join(names) or text.MISSING for names in (swapped, fallen)]
-        rows.append(row)
-    return rows
+def seen_level(report: ReportData) -> int:
+    """Return the darkest level at which some camera's picture, of the first group, shows more scene than noise."""
+    for cell in report.by_group[0]:
+        if (cell.figures["psnr_db"] or 0.0) >= SEEN_DB:
+            return cell.level
+    return len(report.levels) - 1
 
 
-def leads(report: ReportData) -> list[tuple[str, int]]:
-    """Return in how many conditions each camera leads in PSNR, and in how many none does."""
-    leaders = [text.leader(text.PSNR, condition)[0] for condition in report.conditions]
-    led = [cell.camera if cell else "no lead" for cell in leaders]
-    return [(text.camera_name(camera), led.count(camera)) for camera in (*report.cameras, "no lead")]
+def shown_metrics(cells: Sequence[ReportCell]) -> list[text.Metric]:
+    """Return the metrics that are known for some cell: those of targets are so on their own scene alone."""
+    return [metric for metric in text.METRICS if any(cell.figures[metric.key] is not None for cell in cells)]
+
+
+def summary(report: ReportData, of: Comparison) -> dict[str, Any]:
+    """Return what the page says first: verdicts by metric and light, one table a row, and counts over everything."""
+    axes, metrics = axes_of(report), shown_metrics(report.cells)
+    counted = [counts(report, of, metric) for metric in metrics]
+    values = axes[of.compared].values
+    return {
+        "a": values[of.a],
+        "b": values[of.b],
+        "rows": [
+            (name, [(metric, verdicts(report, of, metric, row)) for metric in metrics])
+            for row, name in enumerate(axes[of.rows].values)
+        ],
+        "head": axes[of.along].values,
+        "conditions": len(report.cells) // len(values),
+        "counts": list(zip(metrics, counted, strict=True)),
+        "total": {outcome: sum(found[outcome] for found in counted) for outcome in (*OUTCOMES, UNKNOWN)},
+    }
 
 
 def known_shares(cells: Sequence[ReportCell]) -> list[tuple[float, ReportCell]]:
@@ -141,77 +146,88 @@ def budget_share(report: ReportData) -> float | None:
     return max((share for share in shares if share is not None), default=None)
 
 
-def titles(cameras: Sequence[str]) -> list[str]:
-    """Return the cameras as the title names them: each, or how many they are."""
-    if len(cameras) > MOST_NAMED:
-        return [f"{len(cameras)} cameras"]
-    return [text.CAMERA_TITLES.get(camera, text.camera_name(camera)) for camera in cameras]
+def titles(report: ReportData) -> list[str]:
+    """Return what is compared as the title names it: each, or how many they are."""
+    compared = axes_of(report)[first_comparison(report).compared]
+    if len(compared.values) > MOST_NAMED:
+        return [f"{len(compared.values)} {compared.name.lower()}s"]
+    cameras = compared.name == "Camera"
+    return (
+        [text.CAMERA_TITLES.get(camera, text.camera_name(camera)) for camera in report.cameras]
+        if cameras
+        else list(compared.values)
+    )
 
 
-def render_report(report: ReportData, pictures: Mapping[str, bytes]) -> str:
+def render_report(report: ReportData, pictures: ReportPictures) -> str:
     """Return the report as one self-contained HTML page.
 
     Parameters
     ----------
     report : ReportData
-    pictures : mapping of str to bytes
-        PNG files by the names that cells and truths have for them.
+    pictures : ReportPictures
+        By the names that cells and truths have for them.
 
     Returns
     -------
     str
-        HTML that needs no other file and may fetch none.
+        HTML that may fetch nothing but the pictures beside it, and these only where it leaves some out.
     """
     # What several parts of the page show
-    data = viewer_data(report)
+    data, of = viewer_data(report), first_comparison(report)
     metrics = shown_metrics(report.cells)
-    speed = speed_rows(report)
+    leading = {metric.key: best(report, metric) for metric in metrics}
     view_names = text.view_names([scene.name for scene in report.scenes], report.spectra)
-    per_view, per_cells = len(data["groups"]) // len(view_names), len(report.cells) // len(view_names)
-    addresses = {name: address("png", picture) for name, picture in pictures.items()}
-    script = own_file("report.js")
+    per_view, per_cells = len(report.by_group) // len(view_names), len(report.cells) // len(view_names)
+    addresses = {name: address(_kind(content), content) for name, content in pictures.files.items()}
+    errors = {name: address(_kind(content), content) for name, content in pictures.flip_maps.items()}
+    data["flip"] = [errors.get(cell.picture or "", "") for cell in report.cells]
+    script = "".join(own_file(name) for name in SCRIPTS)
     # The page
     return write_out(
         "report.html.j2",
         style=own_file("report.css"),
-        script=script,
+        script=Markup(script),
         digest=b64encode(sha256(script.encode()).digest()).decode("ascii"),
+        fetched="" if all(cell.picture or not cell.first for cell in report.cells) else " 'self' file:",
         report=report,
         data=data,
+        of=of,
+        varying=sum(len(axis.values) > 1 for axis in axes_of(report)),
+        summary=summary(report, of),
+        white_pixel=of.compared == CAMERA and (report.cameras[of.a], report.cameras[of.b]) == WHITE_PIXEL,
         cells=list(zip(report.cells, data["cells"], strict=True)),
+        leading=leading,
         sources=[addresses[cell.picture] if cell.picture else "" for cell in report.cells],
         truths=[addresses[name] if name else "" for name in report.truths],
-        titles=titles(report.cameras),
-        metrics=metrics,
-        on_targets=[metric.key for metric in text.ON_TARGETS],
-        at_first=AT_FIRST,
-        rows=[(metric.key, metric.name) for metric in metrics] + list(FURTHER_ROWS),
-        leads=leads(report),
-        findings=[finding_rows(report, cells) for cells in report.by_group],
+        titles=titles(report),
         shares=known_shares(report.cells),
         scene_shares=[known_shares(cells) for cells in report.by_scene],
         budget_share=budget_share(report),
         aim=MOST_SHARE,
-        of_pixels=OF_PIXELS,
-        groups=data["groups"],
+        groups=[cells[0].group for cells in report.by_group],
         # Each scene under each spectrum: its title, its groups' indices, their titles within it, its known metrics.
         views=[
             {
                 "name": name,
                 "groups": list(range(index * per_view, (index + 1) * per_view)),
-                "titles": text.group_names([sensor.name for sensor in report.sensors], report.exposures),
+                "titles": text.group_names(
+                    [text.plain_name(sensor.name) for sensor in report.sensors], report.exposures
+                ),
                 "metrics": shown_metrics(report.cells[index * per_cells : (index + 1) * per_cells]),
+                "scene": report.scenes[index // len(report.spectra)],
             }
             for index, name in enumerate(view_names)
         ],
-        # One row of charts for each group; empty where no cell has all of its seeds yet.
-        charts=list(zip(*(group_charts(report, metric) for metric in metrics), strict=True))
-        or [()] * len(data["groups"]),
-        share_charts=group_charts(report, SHARE),
-        speed=speed,
-        speed_charts=speed_charts(speed),
+        speed=speed_rows(report),
+        stages=sorted(report.stages.items(), key=lambda stage: -stage[1]),
         # Effect and cost, as `sensor.optics.left_out` parts them.
         left_out=[line.partition(": ")[::2] for line in report.left_out],
         snr=snr_over_light({each.name: each.config for each in report.sensors if each.config}),
         text=text,
     )
+
+
+def _kind(content: bytes) -> str:
+    """Kind of a picture by its first bytes, for its address."""
+    return "png" if content.startswith(b"\x89PNG") else "webp"

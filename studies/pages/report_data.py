@@ -74,6 +74,8 @@ class ReportCell:
         Means over the seeds; None where a figure is unknown for a seed.
     intervals : mapping of str to (float, float)
         The means' 95 % intervals, with two seeds or more.
+    by_seed : mapping of str to tuple of float
+        The figures of each seed, in the study's order; without those that are unknown or not finite for one of them.
     substitution : float or None
         Share of the seeds in which W stood for luminance.
     balance : mapping of str to str
@@ -90,6 +92,7 @@ class ReportCell:
     first: Row | None
     figures: Mapping[str, float | None]
     intervals: Mapping[str, tuple[float, float]]
+    by_seed: Mapping[str, tuple[float, ...]]
     substitution: float | None
     balance: Mapping[str, str]
     picture: str | None
@@ -119,6 +122,8 @@ class ReportData:
         What fell back or is missing.
     pictures_left_out : str
         Which pictures aren't in the page; empty where all are.
+    looked_at : (int, int)
+        Column and row of the first picture that the loupe shows at first.
     """
 
     rodcone: str
@@ -140,6 +145,7 @@ class ReportData:
     left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     pictures_left_out: str = ""
+    looked_at: tuple[int, int] = (0, 0)
 
     @property
     def conditions(self) -> list[tuple[ReportCell, ...]]:

@@ -11,12 +11,12 @@ from sensor.config import LensConfig
 from sensor.optics import left_out
 from sensor.presets import preset
 from studies.pages.report_data import ReportLevel, ReportRender, ReportSensor
-from studies.pages.report_text import level_text
+from studies.pages.report_text import level_text, with_signs
 from studies.study.study import label
 from studies.sweep.provenance import in_words, made_by
 from studies.sweep.row import Row
 
-NAMED = {level.name: ReportLevel(level.name, level.source) for level in DEMO_LEVELS}
+NAMED = {level.name: ReportLevel(level.name, with_signs(level.source)) for level in DEMO_LEVELS}
 
 
 def render_of(rows: Sequence[Row], scene: str) -> ReportRender:
@@ -71,7 +71,7 @@ def lenses_left_out(rows: Sequence[Row], sensors: Sequence[str]) -> tuple[str, .
         except InputError:
             continue
         lines += left_out(replace(sensor, lens=LensConfig(**json.loads(lens))))
-    return tuple(dict.fromkeys(lines))
+    return tuple(with_signs(line) for line in dict.fromkeys(lines))
 
 
 def configuration(study: Mapping[str, Any]) -> dict[str, str]:

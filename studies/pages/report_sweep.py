@@ -4,16 +4,17 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import metadata
-from io import BytesIO
 from itertools import product
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from PIL import Image
+import numpy as np
+from numpy.typing import NDArray
 
 from sensor.exposure import AUTO, RULES
 from studies.metrics.confidence import mean_with_confidence
+from studies.pages.report_compare import axes_of, first_comparison
 from studies.pages.report_data import ReportCell, ReportData, ReportScene
 from studies.pages.report_facts import (
     configuration,
@@ -24,6 +25,7 @@ from studies.pages.report_facts import (
     render_of,
     sensor_of,
 )
+from studies.pages.report_pictures import ReportPictures, busiest, opened, read_pictures, view_order
 from studies.pages.report_text import METRICS, exposure_name, group_names, view_names, way_name
 from studies.study.study import label
 from studies.sweep.database import last_run
@@ -32,13 +34,11 @@ from studies.sweep.provenance import require_alike
 from studies.sweep.row import Row
 from studies.sweep.stored import read_whole
 
-SHOWN_BYTES = 8e6  # of pictures in a page, where their number isn't given: some 11 MB of HTML, which any browser takes
-
 # What seeds scatter: every figure of a row but its exposure and its electrons, which noise doesn't touch.
 SCATTERED = (*(metric.key for metric in METRICS), "snr_db", "saturated", "mc_share")
 
 
-def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[ReportData, dict[str, bytes]]:
+def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[ReportData, ReportPictures]:
     """Values and pictures of a sweep, as `studies.pages.report.render_report` takes them.
 
     Parameters
@@ -46,7 +46,7 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
     folder : Path
         Of the sweep.
     most_pictures : int, optional
-        Of all cameras together; left out, as many as have `SHOWN_BYTES`. The numbers are of all cells in any case.
+        Beside the truths; left out, as many as a page may hold. The numbers are of all cells in any case.
 
     Raises
     ------
@@ -62,10 +62,8 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
     of_views = {(row.scene, row.spectrum): row.truth for row in made}
     truths = [of_views.get(view) for view in product(names, study["spectra"])]
     cells = _cells(study, made, names)
-    shown, left_out = _choose(folder, cells, study, most_pictures)
-    files = dict.fromkeys(name for name in (*truths, *(cell.picture for cell in shown)) if name)
-    pictures = {name: read_whole(folder / PICTURES, name) for name in files}
-    sizes = [_size(pictures, truths[index * len(study["spectra"])]) for index in range(len(names))]
+    true = {name: opened(read_whole(folder / PICTURES, name)) for name in dict.fromkeys(truths) if name}
+    sizes = [_size(true.get(truths[index * len(study["spectra"])] or "")) for index in range(len(names))]
     missing = run.wanted - len(made)
     unmade = [f"{missing} of {run.wanted} cells are not made yet: rodcone sweep goes on with them."] if missing else []
     data = ReportData(
@@ -78,7 +76,7 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         levels=tuple(level_of(level) for level in study["levels"]),
         cameras=tuple(study["processors"]),
         seeds=tuple(study["seeds"]),
-        cells=tuple(shown),
+        cells=tuple(cells),
         truths=tuple(truths),
         renders=tuple(render_of(made, name) for name in names),
         stages=run.stages,
@@ -87,9 +85,14 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         exposure_rule=_exposure_rules(study),
         left_out=lenses_left_out(made, study["sensors"]),
         notes=(*render_notes(made), *unmade),
-        pictures_left_out=left_out,
+        looked_at=next((busiest(truth) for truth in true.values()), (0, 0)),
     )
-    return data, pictures
+    order = view_order([len(axis.values) for axis in axes_of(data)], first_comparison(data))
+    per_truth = len(cells) // len(truths)
+    pairs = [(name, truth) for at in order if (name := cells[at].picture) and (truth := truths[at // per_truth])]
+    pictures, left_out = read_pictures(folder, pairs, list(true), most_pictures)
+    shown = [cell if cell.picture in pictures.files else replace(cell, picture=None) for cell in cells]
+    return replace(data, cells=tuple(shown), pictures_left_out=left_out), pictures
 
 
 def _cells(study: Mapping[str, Any], made: Sequence[Row], names: Sequence[str]) -> list[ReportCell]:
@@ -143,10 +146,14 @@ def over_seeds(
     """
     figures: dict[str, float | None] = {}
     intervals: dict[str, tuple[float, float]] = {}
+    by_seed: dict[str, tuple[float, ...]] = {}
     for key in SCATTERED:
         values = [value for row in rows if row and (value := getattr(row, key)) is not None]
         figures[key] = values[0] if len(rows) == len(values) == 1 else None
-        if len(rows) > 1 and len(values) == len(rows) and all(map(isfinite, values)):
+        if len(values) != len(rows) or not all(map(isfinite, values)):
+            continue
+        by_seed[key] = tuple(values)
+        if len(rows) > 1:
             estimate = mean_with_confidence(values)
             figures[key], intervals[key] = estimate.mean, (estimate.low, estimate.high)
     states = [row.substitution for row in rows if row is not None and row.substitution is not None]
@@ -162,56 +169,13 @@ def over_seeds(
         first=first,
         figures=figures,
         intervals=intervals,
+        by_seed=by_seed,
         substitution=sum(states) / len(states) if len(states) == len(rows) else None,
         balance=(balances[0] if first else {}) | fallen,
         picture=first.picture if first else None,
     )
 
 
-def _size(pictures: Mapping[str, bytes], name: str | None) -> tuple[int, int]:
+def _size(truth: NDArray[np.uint8] | None) -> tuple[int, int]:
     """Height and width of a picture; of one not made yet 1 each."""
-    if name is None:
-        return 1, 1
-    with Image.open(BytesIO(pictures[name])) as picture:
-        return picture.height, picture.width
-
-
-def _choose(
-    folder: Path, cells: Sequence[ReportCell], study: Mapping[str, Any], most: int | None
-) -> tuple[list[ReportCell], str]:
-    """Leave pictures out of the cells until `most` are left; says in words which."""
-    cameras = len(study["processors"])
-    if most is None:
-        files = [folder / PICTURES / cell.picture for cell in cells if cell.picture]
-        sizes = [file.stat().st_size for file in files if file.is_file()]  # `read_whole` tells of one that is gone
-        most = int(SHOWN_BYTES * len(sizes) / sum(sizes)) if sizes else len(cells)
-    count = len(cells) // cameras
-    chosen = chosen_conditions(count, len(study["levels"]), max(most // cameras, 1))
-    if len(chosen) == count:
-        return list(cells), ""
-    shown = [cell if index // cameras in chosen else replace(cell, picture=None) for index, cell in enumerate(cells)]
-    return shown, (
-        f"To keep the page small, pictures of {len(chosen)} of {count} conditions are in it, numbers of all; the "
-        "others are files beside the results database, and rodcone report --pictures N puts more into the page."
-    )
-
-
-def chosen_conditions(conditions: int, levels: int, most: int) -> set[int]:
-    """Choose conditions, of which `levels` in a row are one group: whole groups, so that the sliders work within them.
-
-    Groups lie evenly over all of them, the first among them; where not even one fits, its levels lie evenly, with
-    the darkest and the brightest.
-
-    Parameters
-    ----------
-    conditions, levels : int
-    most : int
-        1 or more.
-    """
-    if most >= conditions:
-        return set(range(conditions))
-    groups = conditions // levels
-    fitting = most // levels
-    if fitting:
-        return {place * groups // fitting * levels + level for place in range(fitting) for level in range(levels)}
-    return {round(place * (levels - 1) / max(most - 1, 1)) for place in range(most)}
+    return (1, 1) if truth is None else (truth.shape[0], truth.shape[1])

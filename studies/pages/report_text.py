@@ -14,7 +14,7 @@ from studies.study.study import GRAY_WORLD, OWN
 MISSING = "—"
 NBSP = "\N{NO-BREAK SPACE}"
 AUTOMATIC = {AUTO: "automatic", AUTO_W: "automatic for W", AUTO_INFORMATION: "automatic by information"}
-CAMERA_NAMES = {"interleaved": "Interleaved", "bayer": "Bayer"}
+CAMERA_NAMES = {"interleaved": "Interleaved", "bayer": "Bayer", "ple_rgbw": "PLE, RGBW", "ple_bayer": "PLE, Bayer"}
 # As the title writes them; elsewhere the short names stand beside their pictures.
 CAMERA_TITLES = {"interleaved": "Interleaved RGBW"}
 
@@ -42,6 +42,21 @@ MTF50 = Metric("mtf50_cy_per_px", "MTF50", 3, "cy/px", higher=True)
 CHART = Metric("chart_delta_e_mean", "ΔE2000 of the chart", 1, "", higher=False)
 PATCHES = Metric("patch_snr_db", "SNR of the patches", 1, "dB", higher=True)
 ON_TARGETS = (MTF50, CHART, PATCHES)  # known on the scene alone that they are made for
+# What each says, and where it misleads: in one sentence.
+MEANINGS = {
+    PSNR.key: "Mean squared error of the encoded picture: noise counts wherever it is, seen or not.",
+    SSIM.key: "How alike the structure is around each pixel, from 0 to 1; flat surfaces under noise count heavily.",
+    DELTA_E.key: "Difference of colour in half of the pixels, pixel by pixel: of a large patch, 1 is just seen.",
+    DELTA_E_95.key: "The same, exceeded in 5 % of the pixels only: fringes, highlights, lost colours.",
+    S_CIELAB.key: "The same after the eye's own blur: fine noise no longer counts, blotches and casts do.",
+    S_CIELAB_95.key: "The same, exceeded in 5 % of the pixels only.",
+    FLIP.key: "The difference that is seen when picture and truth alternate on a screen, from 0 to 1.",
+    PU21.key: "What an eye that is adapted to the scene's own light sees of the error: by moonlight it sees so little "
+    "that even a picture full of noise gets some 45 dB, and figures of two light levels don't compare.",
+    MTF50.key: "Spatial frequency at which an edge's contrast has fallen to a half.",
+    CHART.key: "Mean difference of colour over the chart's patches.",
+    PATCHES.key: "Signal over noise within the chart's patches.",
+}  # fmt: skip
 METRICS = (PSNR, SSIM, DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, FLIP, PU21, *ON_TARGETS)
 
 
@@ -68,6 +83,21 @@ def signed(metric: Metric, value: float) -> str:
     """Write a difference of a metric's figures, with its sign."""
     shown = fixed(value, metric.digits)
     return shown if value < 0 else f"+{shown}"
+
+
+def lead_text(metric: Metric, lead: float, *, clear: bool = False) -> str:
+    """Write a lead with its sign; one that is written as 0 has none.
+
+    Parameters
+    ----------
+    metric : Metric
+    lead : float
+    clear : bool
+        Whether its interval is clear of 0: then it has as many decimals, up to three more, as show that it isn't 0.
+    """
+    decimals = range(metric.digits, metric.digits + (4 if clear else 1))
+    shown = next((text for count in decimals if float(text := fixed(abs(lead), count))), fixed(0.0, decimals[-1]))
+    return shown if not float(shown) else ("+" if lead > 0 else "\N{MINUS SIGN}") + shown
 
 
 def level_text(level: str) -> str:
@@ -113,21 +143,16 @@ def camera_name(camera: str) -> str:
     return CAMERA_NAMES.get(camera, camera)
 
 
-def leader(metric: Metric, cells: Sequence[ReportCell]) -> tuple[ReportCell | None, float]:
-    """Return the cell that is best in `metric` and its lead over the next; None where none leads.
+def plain_name(name: str) -> str:
+    """Return a sensor's or scene's name without its file's ending."""
+    return name.removesuffix(".toml")
 
-    None leads where the written numbers tie, or where the confidence intervals over seeds overlap. (A test of the
-    difference would find a lead in some cases in which 95 % intervals overlap: overlap is the stricter rule.)
-    """
-    found = ((value, cell) for cell in cells if (value := cell.figures[metric.key]) is not None and not isnan(value))
-    ranked = sorted(found, key=lambda pair: pair[0], reverse=metric.higher)[:2]
-    # Judged on the numbers as printed: nobody should read "leads" beside two equal figures.
-    if len({fixed(value, metric.digits) for value, _ in ranked}) < 2:
-        return None, 0.0
-    intervals = [cell.intervals[metric.key] for _, cell in ranked if metric.key in cell.intervals]
-    if len(intervals) == 2 and max(low for low, _ in intervals) <= min(high for _, high in intervals):
-        return None, 0.0
-    return ranked[0][1], abs(ranked[0][0] - ranked[1][0])
+
+def with_signs(words: str) -> str:
+    """Write the powers in a text of the package's as a page does: um^2 as µm²."""
+    for plain, sign in (("um^2", "µm²"), ("cos^4", "cos⁴"), ("cd/m^2", "cd/m²"), ("m2", "m²")):
+        words = words.replace(plain, sign)
+    return words
 
 
 def view_names(scenes: Sequence[str], spectra: Sequence[str]) -> list[str]:

@@ -21,6 +21,7 @@ from studies.pages.plots import (
     picture_rows,
     plain_ticks,
     png_bytes,
+    spread,
     svg_text,
 )
 
@@ -85,3 +86,9 @@ def test_names_at_the_ends_of_lines_keep_their_order_and_their_distance(log: boo
     assert sorted(heights, key=lambda name: heights[name]) == ["far", "low", "high"]
     points = [height * 72 / figure.dpi for height in sorted(heights.values())]
     assert min(high - low for low, high in pairwise(points)) >= 0.9 * LABEL_GAP
+
+
+def test_labels_keep_their_distance() -> None:
+    placed = spread([100.0, 101.0, 199.0], 15, 0, 200)
+    assert placed == [100.0, 115.0, 199.0]
+    assert spread([199.0, 200.0], 15, 0, 200) == [185.0, 200.0]

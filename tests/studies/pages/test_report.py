@@ -9,21 +9,23 @@ from html import unescape
 from html.parser import HTMLParser
 from typing import Any
 
+import pytest
 import report_sample as SAMPLE
 
 from studies.pages import report_text as text
 from studies.pages.report import render_report
 from studies.pages.report_data import ReportCell, ReportData
+from studies.pages.report_pictures import SHOWN_BYTES, ReportPictures
 from studies.sweep.row import Row
 
 HOSTILE = "</script><b>bold</b><!--\"'&{{ 7*7 }}"
 PNG = b"\x89PNG\r\n\x1a\n" + b"rest"
 
 
-def stubs(of: ReportData) -> dict[str, bytes]:
+def stubs(of: ReportData) -> ReportPictures:
     """A picture for each cell, told apart by its bytes; the page never decodes them."""
     names = [*of.truths, *(cell.picture for cell in of.cells)]
-    return {name: PNG + name.encode() for name in names if name}
+    return ReportPictures({name: PNG + name.encode() for name in names if name}, {})
 
 
 def page_of(of: ReportData) -> str:
@@ -111,7 +113,7 @@ def _poison(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _poison(item) for key, item in value.items()}
     if is_dataclass(value):
-        kept = ("balance", "mean_electrons", "figures", "intervals", "config")
+        kept = ("balance", "mean_electrons", "figures", "intervals", "by_seed", "config")
         own = {field.name: getattr(value, field.name) for field in fields(value)}
         poisoned = {name: item if name in kept else _poison(item) for name, item in own.items()}
         return type(value)(**poisoned)
@@ -124,7 +126,7 @@ def test_hostile_text_stays_text_everywhere() -> None:
     outline, other = Outline(page_of(clean)), Outline(page_of(poisoned))
     assert [tag for tag, _ in other.tags] == [tag for tag, _ in outline.tags]
     assert "<b>bold" not in page_of(poisoned)
-    assert json.loads(other.scripts[0])["views"][0]["levels"][0]["name"] == "moonlight" + HOSTILE
+    assert json.loads(other.scripts[0])["levels"][0][0]["name"] == "moonlight" + HOSTILE
     assert other.scripts[1] == outline.scripts[1]
     assert unescape(page_of(poisoned)).count(HOSTILE) > 100
     # Names of channels and of the environment's entries are keys, not values.
@@ -156,7 +158,7 @@ def test_every_cell_stands_in_the_table() -> None:
 def test_every_picture_is_there() -> None:
     of = SAMPLE.sample_report()
     page = page_of(of)
-    for content in stubs(of).values():
+    for content in stubs(of).files.values():
         assert f"data:image/png;base64,{b64encode(content).decode()}" in page
 
 
@@ -181,7 +183,7 @@ def test_unknown_numbers_become_dashes() -> None:
 def test_error_budget_holds_each_picture_s_share_and_what_is_left_out() -> None:
     of = SAMPLE.sample_report(left_out=("veiling glare: each per cent adds 1 %", "aberrations"))
     page = unescape(page_of(of))
-    budget = page[page.index('<table class="cells budget">') : page.index('<section id="speed"')]
+    budget = page[page.index('<table class="cells budget">') : page.index('<details class="part" id="speed"')]
     rows = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", budget, re.DOTALL)]
     assert rows[0] == ["", "table1_output", "low_noise"]
     assert rows[1] == ["Level", *["Interleaved", "Bayer"] * 2]
@@ -199,23 +201,29 @@ def test_seeds_and_exposures_stand_in_the_page() -> None:
     of = SAMPLE.sample_axes()
     outline, page = Outline(page_of(of)), unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ")
     data = json.loads(outline.scripts[0])
-    assert data["exposures"] == ["automatic", "10\N{NO-BREAK SPACE}ms"]
+    assert data["axes"][3] == {"name": "Exposure", "values": ["automatic", "10\N{NO-BREAK SPACE}ms"]}
     assert len(data["cells"]) == 2 * 3 * 2, "one a picture, not one a seed"
     psnr_db = SAMPLE.sample_row(0, 0, "interleaved").psnr_db - 3.0
+    assert data["cells"][6]["values"]["psnr_db"] == pytest.approx([psnr_db + step for step in (-0.1, 0.0, 0.1)])
     # Deviation 0.1 dB over 3 seeds: Student's 95 % interval is 4.3027 x 0.1 / sqrt(3) = 0.248 dB wide to each side.
-    assert data["cells"][6]["psnr_db"].replace("\N{NO-BREAK SPACE}", " ") == f"{psnr_db:.1f} ± 0.2 dB"
-    assert page.count('class="band"') == 2 * (8 + 1) * 2, "for each exposure, metric (and Monte Carlo share), camera"
-    assert "Means over 3 seeds" in page
+    assert data["t"] == pytest.approx(4.3027, abs=1e-4)
+    row = next(
+        row
+        for row in outline.rows
+        if "Sensor table1_output, exposure 10 ms" in row[0].replace("\N{NO-BREAK SPACE}", " ")
+    )
+    found = outline.rows[outline.rows.index(row) + 1][3].replace("\N{NO-BREAK SPACE}", " ")
+    assert found == f"{psnr_db:.1f} ± 0.2"
+    assert "over 3 seeds" in page
     assert "seeds 5, 6, 7" in page
-    assert "Sensor table1_output, exposure 10 ms" in page
 
 
-def test_one_seed_draws_no_band_and_says_so() -> None:
+def test_one_seed_calls_nothing_ahead_and_says_so() -> None:
     page = page_of(SAMPLE.sample_report())
-    assert 'class="band"' not in page
-    assert "±" not in page
+    assert "±" not in page.split("<main>")[1].split("<script")[0]
     assert "One seed (0)" in page
-    assert 'id="exposure"' not in page
+    assert 'class="n ahead"' not in page
+    assert 'class="n behind"' not in page
 
 
 def test_one_camera_and_one_level_make_a_page() -> None:
@@ -223,37 +231,82 @@ def test_one_camera_and_one_level_make_a_page() -> None:
     assert len(Outline(page_of(of)).rows) == 1 + 2 + 2
 
 
-def test_summary_states_wins_and_losses() -> None:
+def test_summary_names_every_metric_by_light_lost_ones_too() -> None:
+    """PSNR is won in the dark and lost in the light by 2 dB, FLIP lost everywhere, SSIM level: seeds scatter by 1 %."""
     dark = ("moonlight", "street light", "living room")
 
     def led(row: Row) -> Row:
-        ahead = 2.0 if (row.processor == "interleaved") == (row.level in dark) else 0.0
-        psnr_db = 20.0 + ahead + (0.5 if row.level == "daylight" and ahead else 0.0)
-        return replace(row, psnr_db=psnr_db, ssim=0.5, delta_e_median=5.0 if row.processor == "bayer" else 6.5)
+        ours, scatter = row.processor == "interleaved", 0.01 * (row.seed - 1)
+        ahead = (2.0 if row.level in dark else -2.0) if ours else 0.0
+        return replace(
+            row,
+            psnr_db=20.0 + ahead + scatter * ours,
+            ssim=0.5 + scatter * ours,
+            flip_mean=0.2 + (0.1 + scatter) * ours,
+        )
 
-    page = unescape(page_of(SAMPLE.sample_report(led))).replace("\N{NO-BREAK SPACE}", " ")
-    assert "Best PSNR in 14 conditions: Interleaved 6, Bayer 8, no lead 0." in page
-    table = page[page.index('<table class="cells leads">') : page.index("</table>")]
-    rows = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", table)]
-    assert rows[0] == ["Level", *(f"{name} led by" for name in ("PSNR", "SSIM", "ΔE2000, median")),
-                       "W as luminance in", "White balance fell back in"]  # fmt: skip
-    both = "Interleaved, Bayer"
-    assert rows[1] == ["moonlight", "Interleaved, by 2.0 dB", "—", "Bayer, by 1.5", "Interleaved", both]
-    assert rows[3] == ["living room", "Interleaved, by 2.0 dB", "—", "Bayer, by 1.5", "Interleaved", "—"]
-    assert rows[7] == ["daylight", "Bayer, by 2.5 dB", "—", "Bayer, by 1.5", "—", "—"]
-
-
-def test_luminance_substituted_for_some_seeds_is_said_to_be() -> None:
-    of = SAMPLE.sample_report(
-        lambda row: row if row.substitution is None else replace(row, substitution=row.seed), seeds=(0, 1), levels=1
+    of = SAMPLE.sample_report(led, seeds=(0, 1, 2))
+    page = unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ")
+    tables = re.findall(r'<table class="cells verdicts">(.*?)</table>', page, re.DOTALL)
+    assert len(tables) == len(of.sensors)
+    for table in tables:
+        rows = [
+            [re.sub(r"<[^>]+>", "", cell).strip() for cell in re.findall(r"<t[hd].*?</t[hd]>", row, re.DOTALL)]
+            for row in re.findall(r"<tr>(.*?)</tr>", table, re.DOTALL)
+        ]
+        assert rows[0][1:] == [level.name for level in of.levels]
+        by_metric = {row[0].removesuffix(" dB"): row[1:] for row in rows[1:]}
+        assert list(by_metric) == [metric.name for metric in text.METRICS[:8]]
+        assert by_metric["PSNR"] == ["ahead, ▲ +2.0"] * 3 + ["behind, ▼ −2.0"] * 4
+        assert by_metric["SSIM"] == ["level, = 0.000"] * 7
+        assert by_metric["FLIP"] == ["behind, ▼ −0.100"] * 7
+    total = {outcome: page.count(f'class="n {outcome}"') for outcome in ("ahead", "level", "behind")}
+    lede = page[page.index('class="lede"') : page.index("</header>")]
+    assert f"ahead in {total['ahead']} comparisons, level in {total['level']}, behind in {total['behind']}" in lede, (
+        "rows are all there is here"
     )
-    assert page_of(of).count("<td>Interleaved (some seeds)</td>") == len(of.sensors)
+    assert sum(total.values()) == 8 * 14
 
 
-def test_the_largest_monte_carlo_share_is_judged_against_the_aim() -> None:
-    low = SAMPLE.sample_report(lambda row: replace(row, mc_share=0.03))
-    high = SAMPLE.sample_report(lambda row: replace(row, mc_share=0.052 if row.level == "office" else 0.03))
-    pages = [unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ") for of in (low, high)]
-    assert "above the 3 % aim: 0 of 28 pictures." in pages[0]
-    assert "Largest Monte Carlo share: 5.2 % (office, table1_output, Interleaved)" in pages[1]
-    assert "above the 3 % aim: 4 of 28 pictures. There, noise of the render counts as texture" in pages[1]
+def test_the_same_method_on_both_mosaics_leads_the_page() -> None:
+    four = ("interleaved", "bayer", "ple_rgbw", "ple_bayer")
+    page = page_of(SAMPLE.sample_report(cameras=four, seeds=(0, 1)))
+    assert "<h1>What does the white pixel bring?</h1>" in page
+    assert "<b>PLE, RGBW</b> beside <b>PLE, Bayer</b>, by 8 metrics in 14 conditions" in page
+    assert "white pixel" not in page_of(SAMPLE.sample_report(cameras=four[:3], seeds=(0, 1)))
+
+
+def test_a_study_of_sensors_is_answered() -> None:
+    page = page_of(SAMPLE.sample_report(cameras=("interleaved",), exposures=("auto", "10ms"), seeds=(0, 1)))
+    assert "<h1>table1_output against low_noise</h1>" in page
+    assert "<b>table1_output</b> beside <b>low_noise</b>, by 8 metrics in 14 conditions" in page
+    assert page.count('<table class="cells verdicts">') == 2, "one an exposure"
+
+
+def test_every_metric_is_explained() -> None:
+    assert set(text.MEANINGS) == {metric.key for metric in text.METRICS}
+    page = unescape(page_of(SAMPLE.sample_report()))
+    assert "by moonlight it sees so little that even a picture full of noise gets some 45 dB" in page
+
+
+def test_the_largest_share_of_the_renders_noise_is_told_once() -> None:
+    of = SAMPLE.sample_report(lambda row: replace(row, mc_share=0.052 if row.level == "office" else 0.03))
+    page = unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ")
+    assert page.count("at most 5.2 % (office, table1_output, Interleaved)") == 1
+    assert "Up to 3 % it doesn't show" in page
+
+
+def test_pictures_beside_the_page_are_the_only_ones_it_may_fetch() -> None:
+    of = SAMPLE.sample_report()
+    assert "img-src data:;" in page_of(of)
+    less = replace(of, cells=(replace(of.cells[0], picture=None), *of.cells[1:]))
+    assert "img-src data: 'self' file:;" in unescape(page_of(less))
+
+
+def test_numbers_of_300_cells_take_less_than_a_tenth_of_the_page() -> None:
+    """A page of 300 cells is to stay under 10 MB: `SHOWN_BYTES` of pictures are 8.7 MB of it in base64."""
+    cameras = tuple(f"camera_{number}" for number in range(11))
+    of = SAMPLE.sample_report(cameras=cameras, seeds=(0, 1, 2), exposures=("auto", "10ms"))
+    assert len(of.cells) == 308
+    page = page_of(replace(of, cells=tuple(replace(cell, picture=None) for cell in of.cells), truths=(None,)))
+    assert len(page.encode()) + SHOWN_BYTES * 4 / 3 < 1e7

@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
-from io import BytesIO
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,14 @@ import pytest
 import report_browser as CHROME
 import report_sample as SAMPLE
 from PIL import Image
+from skimage.color import deltaE_ciede2000, rgb2lab
 
+from studies.metrics.flip import flip
+from studies.pages import report_text as text
 from studies.pages.report import render_report
+from studies.pages.report_compare import Comparison, counts, first_comparison, verdicts
+from studies.pages.report_data import ReportData
+from studies.pages.report_pictures import ReportPictures, opened
 
 HOSTILE = "</script><b>x</b><img src=x onerror=document.title='owned'><script>document.title='owned'</script>"
 
@@ -38,9 +44,8 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of made-up results."""
-    results = SAMPLE.sample_report()
     file: Path = tmp_path_factory.mktemp("report") / "report.html"
-    file.write_text(render_report(results, SAMPLE.sample_pictures(results)), encoding="utf-8")
+    file.write_text(render_report(*standard()), encoding="utf-8")
     return file
 
 
@@ -54,128 +59,257 @@ def axes(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def shown(page: Any) -> dict[str, Any]:
-    """Return what the viewer shows of its first camera and its level."""
+    """Return what the viewer shows and says, once it is drawn; pictures as the colours of their 5th row."""
     value: dict[str, Any] = page.value(
-        """({level: document.getElementById("level-name").textContent,
-             picture: document.querySelector("#side img").src,
-             psnr: document.querySelector("#side [data-row=psnr_db] dd").textContent,
-             spoken: document.getElementById("level").getAttribute("aria-valuetext"),
-             status: document.getElementById("status").textContent})"""
+        """(async () => {
+             await drawing;
+             const [width] = [byId("under").width];
+             const row = (id) => {
+               const copy = new OffscreenCanvas(width, 1).getContext("2d", {willReadFrequently: true});
+               copy.drawImage(byId(id), 0, -5);
+               return [...copy.getImageData(0, 0, width, 1).data];
+             };
+             return {level: byId("level-name").textContent, a: row("over"), b: row("under"),
+                     names: [...document.querySelectorAll(".tag")].map((tag) => tag.textContent),
+                     psnr: document.querySelector("#numbers td").textContent,
+                     spoken: byId("level").getAttribute("aria-valuetext"), status: byId("status").textContent}})()"""
     )
     return value
+
+
+@cache
+def standard() -> tuple[ReportData, ReportPictures]:
+    """The report of the fixture `report`, and its pictures."""
+    results = SAMPLE.sample_report()
+    return results, SAMPLE.sample_pictures(results)
+
+
+def row_of(results: ReportData, cell: int) -> list[int]:
+    """The 5th row of a cell's picture as a canvas gives it."""
+    known, pictures = standard()
+    files = pictures.files if known.levels == results.levels else SAMPLE.sample_pictures(results).files
+    picture = opened(files[results.cells[cell].picture or ""])[5]
+    return [int(value) for pixel in picture for value in (*pixel, 255)]
+
+
+def pick(page: Any, control: str, value: object) -> None:
+    """Choose a value of a select or an input."""
+    page.value(f"(() => {{ const one = {control}; one.value = {value!r}; one.dispatchEvent(new Event('input')) }})()")
 
 
 def test_page_is_quiet_and_asks_for_nothing(browser: Any, report: Path) -> None:
     page = Page(browser, report)
     page.value("Promise.all([...document.images].map((image) => image.decode()))")
+    shown(page)
     assert page.requests() == []
     assert page.complaints() == []
 
 
+def test_it_opens_with_the_wipe_at_512_pixels_where_something_is_seen(browser: Any, report: Path) -> None:
+    page = Page(browser, report, height=800)
+    results = SAMPLE.sample_report()
+    psnr_db = [cell.figures["psnr_db"] for cell in results.by_group[0]]
+    level = next(index // 2 for index, value in enumerate(psnr_db) if value and value >= 22)
+    found = shown(page)
+    assert found["level"] == results.levels[level].name
+    assert found["a"] == row_of(results, 2 * level)
+    assert found["b"] == row_of(results, 2 * level + 1)
+    box = page.value("(({top, width}) => [top, width])(byId('stage').getBoundingClientRect())")
+    assert box[1] == 512
+    assert box[0] < 400, "half of the window at most stands above the picture"
+    assert page.value("document.documentElement.scrollHeight") < 6 * 800
+
+
 def test_slider_by_keyboard_changes_picture_and_numbers(browser: Any, report: Path) -> None:
     page = Page(browser, report)
-    before = shown(page)
+    results = SAMPLE.sample_report()
     page.value("document.getElementById('level').focus()")
+    page.press("Home", 36)
+    before = shown(page)
     page.press("ArrowRight", 39)
     after = shown(page)
     assert (before["level"], after["level"]) == ("moonlight", "street light")
     psnr_db = SAMPLE.sample_row(1, 0, "interleaved").psnr_db
-    assert after["psnr"] == f"{psnr_db:.1f}\N{NO-BREAK SPACE}dB" != before["psnr"]
+    assert after["psnr"] == f"{psnr_db:.1f}" != before["psnr"]
     assert after["spoken"].startswith("street light, 0.5")
     assert "street light" in after["status"]
-    overview = page.value("document.querySelector('[data-cell=\"2\"] img').src")
-    assert after["picture"] == overview != before["picture"]
+    assert after["a"] == row_of(results, 2) != before["a"]
     assert page.complaints() == []
 
 
-def test_sensor_and_overview_change_what_is_shown(browser: Any, report: Path) -> None:
+def test_any_two_are_compared_and_the_truth(browser: Any, report: Path) -> None:
     page = Page(browser, report)
-    before = shown(page)
-    page.value("document.querySelectorAll('[name=sensor]')[1].click()")
-    other = shown(page)
-    assert page.value("document.getElementById('sensor-name').textContent") == "low_noise"
-    assert other["level"] == before["level"]
-    assert other["picture"] == page.value("document.querySelector('[data-cell=\"14\"] img').src") != before["picture"]
+    results = SAMPLE.sample_report()
+    pick(page, "document.querySelector('[data-axis=\"2\"]')", 1)
+    pick(page, "byId('level')", 0)
+    pick(page, "byId('b')", "truth")
+    found = shown(page)
+    assert found["names"] == ["A: Interleaved", "B: Truth"]
+    assert found["a"] == row_of(results, 14)
+    truth = opened(standard()[1].files["truth"])[5]
+    assert found["b"] == [int(value) for pixel in truth for value in (*pixel, 255)]
     page.value("document.querySelector('[data-cell=\"27\"]').click()")
     assert shown(page)["level"] == "daylight"
-    assert page.value("document.querySelector('[name=sensor]:checked').value") == "1"
+    assert shown(page)["a"] == row_of(results, 27)
+    # Sensors in place of cameras: A and B are the two of them now, and the camera is chosen apart.
+    pick(page, "byId('compared')", 2)
+    assert shown(page)["names"] == ["A: table1_output", "B: low_noise"]
+    assert page.value("document.querySelector('[data-axis=\"2\"]').closest('label').hidden") is True
+    assert page.complaints() == []
 
 
-def test_detail_holds_the_pixels_it_names(browser: Any, report: Path) -> None:
-    page = Page(browser, report)
-    # The canvas's top left pixel against the truth's own pixel there, decoded outside the browser.
-    color = page.value(
-        """(async () => {
-             document.getElementById("column").value = 100; document.getElementById("row").value = 180;
-             document.getElementById("row").dispatchEvent(new Event("input"));
-             await document.querySelector("[data-truth] img").decode();  // the page asked first, and draws first
-             const canvas = document.querySelector("[data-truth] canvas");
-             return [...canvas.getContext("2d").getImageData(0, 0, 1, 1).data].slice(0, 3)})()"""
-    )
-    truth = np.asarray(Image.open(BytesIO(SAMPLE.sample_pictures(SAMPLE.sample_report())["truth"])).convert("RGB"))
+def test_loupe_and_pixel_values_are_those_of_the_picture(browser: Any, report: Path) -> None:
+    page = Page(browser, report, height=800)
+    results = SAMPLE.sample_report()
+    pick(page, "byId('level')", 3)
+    pick(page, "byId('column')", 100)
+    pick(page, "byId('row')", 180)
+    shown(page)
+    pictures = standard()[1]
+    picture, truth = (opened(pictures.files[name]) for name in (results.cells[6].picture or "", "truth"))
+    color = page.value("[...byId('loupe-T').getContext('2d').getImageData(0, 0, 1, 1).data].slice(0, 3)")
     assert color == truth[180 - 8, 100 - 16].tolist()
-    assert page.value("getComputedStyle(document.querySelector('[data-truth] canvas')).imageRendering") == "pixelated"
+    assert page.value("getComputedStyle(byId('loupe-T')).imageRendering") == "pixelated"
+    error = deltaE_ciede2000(rgb2lab(picture[180, 100] / 255), rgb2lab(truth[180, 100] / 255))
+    errors = flip(picture / 255, truth / 255)[180, 100]
+    red, green, blue = picture[180, 100]
+    told = page.value("byId('pixel-A').textContent")
+    assert told == f"sRGB {red} {green} {blue} · ΔE2000 {error:.1f} · FLIP {errors:.2f}"
+    # The pointer carries it.
+    box = page.value("(({left, top}) => [left, top])(byId('stage').getBoundingClientRect())")
+    page.drag((box[0] + 21, box[1] + 31), (box[0] + 41, box[1] + 61))
+    shown(page)
+    assert page.value("[byId('column').value, byId('row').value]") == ["20", "30"], "two screen pixels each"
 
 
-def test_wipe_shows_two_pictures(browser: Any, report: Path) -> None:
+def test_error_maps_are_ciede2000_and_flip_of_each_pixel(browser: Any, report: Path) -> None:
     page = Page(browser, report)
-    page.value("document.querySelector('[name=view][value=wipe]').click()")
-    shown_pair = page.value("[document.getElementById('over').src, document.getElementById('under').src]")
-    cameras = page.value("[...document.querySelectorAll('#side figure[data-camera] img')].map((image) => image.src)")
-    assert shown_pair == cameras
-    assert page.value("getComputedStyle(document.getElementById('side')).display") == "none"
-    page.value(
-        "const wiper = document.getElementById('wiper'); wiper.value = 20; wiper.dispatchEvent(new Event('input'))"
-    )
-    assert "80%" in page.value("getComputedStyle(document.getElementById('over')).clipPath")
-    page.value(
-        "document.documentElement.style.scrollBehavior = 'auto'; document.querySelector('.stage').scrollIntoView()"
-    )
-    box = page.value(
-        "(({left, top, width}) => [left, top, width])(document.querySelector('.stage').getBoundingClientRect())"
-    )
+    results = SAMPLE.sample_report()
+    pick(page, "byId('level')", 2)
+    pictures = standard()[1]
+    picture, truth = (opened(pictures.files[name]) / 255 for name in (results.cells[4].picture or "", "truth"))
+    for kind, exact, step in (
+        ("delta_e", deltaE_ciede2000(rgb2lab(picture), rgb2lab(truth)), 2e-3),
+        ("flip", flip(picture, truth), 0.51 / 255),
+    ):
+        found = np.array(page.value(f"errorsOf(of.a, '{kind}').then((errors) => [...errors])")).reshape(exact.shape)
+        assert np.abs(found - exact).max() < step
+        page.value(f"document.querySelector('[name=show][value={kind}]').click()")
+        assert shown(page)["a"] != row_of(results, 4)
+        assert page.value("byId('key').hidden") is False
+        top = page.value(f"MAP_TOP.{kind}")
+        colours = page.value(f"[0, {top}, {2 * top}].map((error) => heat(error / {top}))")
+        assert colours[0] == [0, 0, 4]
+        assert colours[1] == colours[2] == [252, 253, 191]
+    assert page.complaints() == []
+
+
+def test_ciede2000_is_sharmas_on_colours_where_hues_turn(browser: Any, report: Path) -> None:
+    """Some of the pairs of table 1 of Sharma, Wu & Dalal 2005, made to catch wrong means of hues."""
+    pairs = [
+        ((50, 2.6772, -79.7751), (50, 0, -82.7485), 2.0425),
+        ((50, 2.5, 0), (50, 0, -2.5), 4.3065),
+        ((50, 2.49, -0.001), (50, -2.49, 0.0011), 7.2195),
+        ((50, -1, 2), (50, 0, 0), 2.3669),
+        ((2.0776, 0.0795, -1.135), (0.9033, -0.0636, -0.5514), 0.9082),
+        ((90.8027, -2.0831, 1.441), (91.1528, -1.6435, 0.0447), 1.4441),
+    ]
+    page = Page(browser, report)
+    for one, other, wanted in pairs:
+        assert page.value(f"deltaE({list(one)}, {list(other)}, 0)") == pytest.approx(wanted, abs=1e-4)
+
+
+def test_wipe_and_a_or_b(browser: Any, report: Path) -> None:
+    page = Page(browser, report)
+    page.value("document.documentElement.style.scrollBehavior = 'auto'; byId('stage').scrollIntoView()")
+    box = page.value("(({left, top, width}) => [left, top, width])(byId('stage').getBoundingClientRect())")
     page.drag((box[0] + 0.5 * box[2], box[1] + 50), (box[0] + 0.25 * box[2], box[1] + 60))
-    assert page.value("document.getElementById('wiper').value") == "25"
-    assert "75%" in page.value("getComputedStyle(document.getElementById('over')).clipPath")
-    page.value("document.getElementById('wiper').focus()")
+    assert page.value("byId('wiper').value") == "25"
+    assert "75%" in page.value("getComputedStyle(byId('over')).clipPath")
+    page.value("byId('wiper').focus()")
     page.press("ArrowRight", 39)
-    spoken = page.value("document.getElementById('wiper').getAttribute('aria-valuetext')")
-    assert spoken == "26 % Interleaved, 74 % Bayer"
+    assert page.value("byId('wiper').getAttribute('aria-valuetext')") == "26 % Interleaved, 74 % Bayer"
+    page.value("document.querySelector('[name=view][value=flip]').click(); document.activeElement.blur()")
+    tags = "[byId('tag-A').hidden, byId('tag-B').hidden, byId('flip').textContent]"
+    assert page.value(tags) == [False, True, "Show B (key x)"]
+    for told in ([True, False, "Show A (key x)"], [False, True, "Show B (key x)"]):
+        page.press("x", 88)
+        assert page.value(tags) == told
+    page.value("document.querySelector('[name=view][value=side]').click()")
+    shown(page)
+    names = page.value("[...document.querySelectorAll('#side figcaption')].map((one) => one.textContent)")
+    assert names == ["Interleaved", "Bayer", "Truth"]
+    assert page.value("getComputedStyle(byId('pair')).display") == "none"
 
 
-def test_fits_the_window_with_whole_pixels(browser: Any, report: Path) -> None:
+def test_fits_the_window(browser: Any, report: Path) -> None:
     page = Page(browser, report)
     for dark in (False, True):
-        for width, factor in ((360, 1), (1000, 1), (1280, 1), (1920, 2), (2560, 2)):
-            page.show(width=width, dark=dark)
+        for width, height, wide in ((390, 844, 358), (1280, 800, 512), (1920, 1080, 768), (2560, 1440, 1024)):
+            page.show(width=width, height=height, dark=dark)
             assert page.value("document.documentElement.scrollWidth") <= width
-            assert page.value("document.querySelector('#side img').getBoundingClientRect().width") == 256 * factor
-    assert page.value("document.getElementById('scale').textContent").startswith("Each picture is 256 × 256 pixels")
+            assert page.value("byId('stage').getBoundingClientRect().width") == pytest.approx(wide, abs=2)
+    page.show(width=390)
+    hint = "getComputedStyle(document.querySelector('#verdicts .scroll'), '::before').content"
+    assert "scrolls sideways" in page.value(hint)
+    page.show(width=2560)
+    assert page.value(hint) == "none"
 
 
-def test_exposure_slider_changes_picture_and_numbers_and_nothing_scrolls(browser: Any, axes: Path) -> None:
+def test_verdicts_of_the_script_are_those_of_the_page_and_of_python(browser: Any, tmp_path: Path) -> None:
+    """The script draws the same tables as are written without it; and counts as Python does what it alone shows."""
+    cameras = ("interleaved", "bayer", "ple_rgbw", "ple_bayer")
+
+    def moved(made: Any) -> Any:
+        at = [ord(letter) for letter in f"{made.sensor}{made.level}{made.processor}"]
+        draw = np.random.default_rng([*at, made.seed]).standard_normal
+        known = {metric.key: 20 + 0.3 * at[-1] % 3 + draw() for metric in text.METRICS[:8]}
+        return replace(made, **known)
+
+    results = SAMPLE.sample_report(moved, cameras=cameras, seeds=(0, 1, 2))
+    results = replace(results, cells=tuple(replace(cell, picture=None) for cell in results.cells))
+    file = tmp_path / "report.html"
+    file.write_text(render_report(results, SAMPLE.sample_pictures(results)), encoding="utf-8")
+    read = "[...document.querySelectorAll('#verdicts tr')].map((row) => [...row.children].map((cell) => [cell.className, cell.textContent.trim()]))"  # noqa: E501
+    written = Page(browser, file, script=False).value(read)
+    page = Page(browser, file)
+    assert page.value(read) == written
+    assert len(written) == 2 * 9
+    outcomes = {cell[0].split()[-1] for row in written for cell in row[1:]}
+    assert {"ahead", "level", "behind"} <= outcomes
+    for a, b in ((0, 1), (3, 0)):
+        pick(page, "byId('a')", a)
+        pick(page, "byId('b')", b)
+        of = replace(first_comparison(results), a=a, b=b)
+        drawn = [[cell[0].split()[-1] for cell in row[1:]] for row in page.value(read) if row[1][0] != "n"]
+        wanted = [[one.outcome for one in verdicts(results, of, metric, row)]
+                  for row in range(2) for metric in text.METRICS[:8]]  # fmt: skip
+        assert drawn == wanted
+        table = page.value("[...document.querySelectorAll('#counts tbody tr')].map((row) => [...row.querySelectorAll("
+                           "'td .sr')].map((one) => one.textContent))")  # fmt: skip
+        others = [value for value in range(4) if value != a]
+        assert table == [
+            [_said(counts(results, Comparison(of.compared, of.along, of.rows, a, other), metric)) for other in others]
+            for metric in text.METRICS[:8]
+        ]
+
+
+def _said(found: dict[str, int]) -> str:
+    return ", ".join(f"{found[outcome]} {outcome}" for outcome in ("ahead", "level", "behind"))
+
+
+def test_exposures_are_chosen_and_compared(browser: Any, axes: Path) -> None:
     page = Page(browser, axes)
-    page.press("Tab", 9)  # the skip link; from it on by keyboard alone
-    page.value("document.getElementById('level').focus()")
-    page.press("ArrowRight", 39)
-    before = shown(page)
-    page.press("Tab", 9)
-    assert page.value("document.activeElement.id") == "exposure"
-    assert page.value("getComputedStyle(document.activeElement).outlineStyle") == "solid", "the focus can't be seen"
-    page.press("ArrowRight", 39)
-    after = shown(page)
+    results = SAMPLE.sample_axes()
+    pick(page, "byId('level')", 1)
+    pick(page, "document.querySelector('[data-axis=\"3\"]')", 1)
     mean = SAMPLE.sample_row(1, 0, "interleaved").psnr_db - 3.0
-    assert after["psnr"].replace("\N{NO-BREAK SPACE}", " ") == f"{mean:.1f} ± 0.2 dB"
-    assert page.value("document.getElementById('exposure').getAttribute('aria-valuetext')").startswith("10")
-    assert after["level"] == before["level"] == "street light"
-    assert "exposure 10" in after["status"]
-    # Six cells an exposure, two a level.
-    assert after["picture"] == page.value("document.querySelector('[data-cell=\"8\"] img').src") != before["picture"]
-    page.value("document.querySelector('[data-cell=\"5\"]').click()")
-    assert page.value("[document.getElementById('exposure').value, document.getElementById('level').value]") == [
-        "0",
-        "2",
-    ]
+    assert shown(page)["psnr"] == f"{mean:.1f} ± 0.2"
+    assert shown(page)["a"] == row_of(results, 8)
+    pick(page, "byId('compared')", 3)
+    assert shown(page)["names"] == ["A: automatic", "B: 10\N{NO-BREAK SPACE}ms"]
+    # Seed by seed the second loses 3 dB exactly: the lead has no scatter.
+    assert page.value("document.querySelector('#numbers td:last-child').textContent") == "ahead, ▲ +3.0"
     for width in (360, 1280, 2560):
         page.show(width=width)
         assert page.value("document.documentElement.scrollWidth") <= width
@@ -187,123 +321,128 @@ def test_exposure_slider_changes_picture_and_numbers_and_nothing_scrolls(browser
 def views(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of two scenes under two spectra, of which one condition's pictures are left out."""
     results = SAMPLE.sample_views()
-    file: Path = tmp_path_factory.mktemp("views") / "report.html"
-    file.write_text(render_report(results, SAMPLE.sample_pictures(results)), encoding="utf-8")
+    pictures = SAMPLE.sample_pictures(results)
+    folder = tmp_path_factory.mktemp("views")
+    file: Path = folder / "report.html"
+    file.write_text(render_report(results, pictures), encoding="utf-8")
+    # One of the two that are left out lies beside the page, the other is gone.
+    name = results.cells[-2].first.picture  # type: ignore[union-attr]
+    (folder / "pictures" / name).parent.mkdir(parents=True)
+    Image.new("RGB", (96, 48), (10, 200, 30)).save(folder / "pictures" / name, "PNG")
     return file
-
-
-def choose(page: Any, view: int) -> None:
-    page.value(f"var view = document.getElementById('view'); view.value = {view};"
-               "view.dispatchEvent(new Event('input'))")  # fmt: skip
 
 
 def test_choice_of_scene_and_light_changes_pictures_truth_and_numbers(browser: Any, views: Path) -> None:
     page = Page(browser, views)
-    truth = "document.querySelector('[data-truth] img').src"
-    names = page.value("[...document.getElementById('view').options].map((option) => option.text)")
-    assert names == [
-        f"{scene}, {light}" for scene in ("still_life", "color_checker") for light in ("own light", "under A")
-    ]
+    pick(page, "byId('level')", 0)
+    pick(page, "byId('b')", "truth")
     seen = []
-    for view in range(4):
-        choose(page, view)
-        seen.append((shown(page)["psnr"], shown(page)["picture"], page.value(truth)))
-        assert names[view] in shown(page)["status"]
-    assert [psnr for psnr, _, _ in seen] == [f"{db:.1f}\N{NO-BREAK SPACE}dB" for db in (10, 14, 18, 22)]
+    for scene in range(2):
+        for light in range(2):
+            pick(page, "document.querySelector('[data-axis=\"0\"]')", scene)
+            pick(page, "document.querySelector('[data-axis=\"1\"]')", light)
+            found = shown(page)
+            seen.append((found["psnr"], tuple(found["a"]), tuple(found["b"])))
+    assert [psnr for psnr, _, _ in seen] == ["10.0", "14.0", "18.0", "22.0"]
     assert len({picture for _, picture, _ in seen}) == len({truth for _, _, truth in seen}) == 4
     # The chart's picture is twice as wide as high, and its figure stands on it alone.
-    box = page.value(
-        "(({width, height}) => [width, height])(document.querySelector('#side img').getBoundingClientRect())"
+    box = page.value("(({width, height}) => [width, height])(byId('stage').getBoundingClientRect())")
+    assert box[0] == pytest.approx(2 * box[1], abs=1)
+    assert "ΔE2000 of the chart" in page.value("byId('numbers').textContent")
+    pick(page, "document.querySelector('[data-axis=\"0\"]')", 0)
+    assert "ΔE2000 of the chart" not in page.value("byId('numbers').textContent")
+    assert page.complaints() == []
+    assert page.requests() == []
+
+
+def test_a_picture_left_out_is_shown_from_its_file_or_said_to_be_gone(browser: Any, views: Path) -> None:
+    page = Page(browser, views)
+    for axis, value in ((0, 1), (1, 1), (2, 1)):
+        pick(page, f"document.querySelector('[data-axis=\"{axis}\"]')", value)
+    pick(page, "byId('level')", 1)
+    found = shown_safely(page)
+    assert found["drawn"] == [True, False]
+    assert found["gone"].startswith(
+        "Not in this page, and its file isn't beside it: pictures/color_checker/A/1/1/bayer"
     )
-    assert box[0] == 2 * box[1]
-    target = "document.querySelector('#side [data-row=chart_delta_e_mean]').hidden"
-    assert page.value(target) is False
-    assert page.value("document.querySelector('#side [data-row=chart_delta_e_mean] dd').textContent") == "3.0"
-    choose(page, 0)
-    assert page.value(target) is True
-    # A picture of another scene in the overview, in a part that is folded until it is opened.
-    page.value("document.querySelector('[data-cell=\"9\"]').click()")
-    assert page.value("document.getElementById('view').value") == "1"
-    assert page.complaints() == []
-    assert page.requests() == []
+    assert found["psnr"] == f"{10 + 8 + 4 + 2 + 1:.1f}"
+    asked = [address.rpartition("/")[2] for address in page.requests()]
+    assert set(asked) == {"interleaved", "bayer"}, "nothing but the two pictures"
+    pick(page, "byId('level')", 0)
+    assert shown_safely(page)["gone"] == ""
 
 
-def test_a_picture_left_out_is_said_to_be_and_its_numbers_stand(browser: Any, views: Path) -> None:
+def shown_safely(page: Any) -> dict[str, Any]:
+    """What is drawn, where a picture from a file can't be read back."""
+    value: dict[str, Any] = page.value(
+        """(async () => {
+             await drawing;
+             return {drawn: ["over", "under"].map((id) => !byId(id).hidden), gone: byId("gone").textContent,
+                     psnr: document.querySelector("#numbers td").textContent}})()"""
+    )
+    return value
+
+
+def test_choice_of_metrics_and_rows_shows_their_charts(browser: Any, views: Path) -> None:
     page = Page(browser, views)
-    choose(page, 3)
-    page.value("document.querySelectorAll('[name=sensor]')[1].click(); document.getElementById('level').focus()")
-    gone = "getComputedStyle(document.querySelector('#side .gone')).display"
-    assert page.value(gone) == "none"
-    page.press("ArrowRight", 39)
-    assert page.value(gone) == "grid"
-    words = page.value("document.querySelector('#side .gone').textContent")
-    assert words == "Not in this page; its numbers are: pictures/color_checker/A/1/1/interleaved"
-    assert shown(page)["psnr"] == f"{10 + 8 + 4 + 2 + 1:.1f}\N{NO-BREAK SPACE}dB"
-    assert page.value("document.querySelector('#side img').hasAttribute('src')") is False
-    page.value("document.querySelector('[name=view][value=wipe]').click()")
-    assert page.value("getComputedStyle(document.querySelector('.stage .gone')).display") == "grid"
-    page.value("document.getElementById('level').focus()")
-    page.press("ArrowLeft", 37)
-    assert page.value("getComputedStyle(document.querySelector('.stage .gone')).display") == "none"
-    assert page.complaints() == []
-    assert page.requests() == []
-
-
-def test_choice_of_metrics_shows_their_charts_in_every_group(browser: Any, views: Path) -> None:
-    page = Page(browser, views)
-    page.value("for (const fold of document.querySelectorAll('details')) fold.open = true")
     drawn = "[...document.querySelectorAll('[data-metric=%s]')].filter((one) => one.getClientRects().length).length"
-    assert [page.value(drawn % key) for key in ("psnr_db", "flip_mean", "chart_delta_e_mean")] == [8, 0, 0]
-    for key in ("psnr_db", "flip_mean"):
-        page.value(f"document.querySelector('[name=metric][value={key}]').click()")
-    assert [page.value(drawn % key) for key in ("psnr_db", "flip_mean", "chart_delta_e_mean")] == [0, 8, 0]
+    assert [page.value(drawn % key) for key in ("psnr_db", "flip_mean", "chart_delta_e_mean")] == [2, 2, 0]
+    page.value("document.querySelector('[name=metric][value=psnr_db]').click()")
+    assert [page.value(drawn % key) for key in ("psnr_db", "flip_mean")] == [0, 2]
     assert page.value("document.querySelectorAll('[name=metric]').length") == 9, (
         "the eight of every scene, and the chart's"
     )
-    for width in (360, 1280, 2560):
-        page.show(width=width)
-        assert page.value("document.documentElement.scrollWidth") <= width
-    page.show(width=720, medium="print")
-    assert page.value(drawn % "flip_mean") == 8
+    pick(page, "byId('rows')", 0)
+    titles = page.value("[...document.querySelectorAll('#drawn h3')].map((one) => one.textContent)")
+    assert titles == ["still_life", "color_checker"]
+    lines = "document.querySelector('figure[data-metric=flip_mean]').querySelectorAll('.mark').length"
+    assert page.value(lines) == 2 * 2, "two cameras at two levels"
     assert page.complaints() == []
-
-
-def test_folded_parts_are_printed(browser: Any, views: Path) -> None:
-    page = Page(browser, views, width=720)
-    held = "[...document.querySelectorAll('.sheet img')].filter((one) => one.checkVisibility()).length"
-    assert page.value(held) == 8, "the first scene's, under its own light"
-    page.show(width=720, medium="print")
-    assert page.value(held) == 4 * 8 - 2
 
 
 def test_every_control_has_a_name_for_a_screen_reader(browser: Any, axes: Path) -> None:
     page = Page(browser, axes)
-    page.value("document.querySelector('[name=view][value=wipe]').click()")
+    shown(page)
+    page.value("for (const fold of document.querySelectorAll('details')) fold.open = true")
     nodes = page.send("Accessibility.getFullAXTree")["nodes"]
-    # Level, exposure, wipe; one sensor, two views; left, right; the metrics.
-    wanted = {"slider": 3, "radio": 3, "combobox": 2, "checkbox": 8}
+    # Level, wipe; views and what is shown; compared, A, B, exposure, rows and across; the metrics; column and row.
+    wanted = {"slider": 2, "radio": 6, "checkbox": 8, "spinbutton": 2, "button": 1}
     for role, count in wanted.items():
         names = [node["name"]["value"] for node in nodes if node.get("role", {}).get("value") == role]
         assert len(names) == count, (role, names)
         assert all(names), (role, names)
+    combos = [node["name"]["value"] for node in nodes if node.get("role", {}).get("value") == "combobox"]
+    assert len(combos) >= 4
+    assert all(combos)
     pictures = [node for node in nodes if node.get("role", {}).get("value") == "image" and not node["ignored"]]
     assert len(pictures) > 12
     assert all(node["name"]["value"] for node in pictures)
 
 
+def test_everything_is_reached_by_keyboard_and_the_focus_is_seen(browser: Any, axes: Path) -> None:
+    page = Page(browser, axes)
+    shown(page)
+    reached = []
+    for _ in range(16):
+        page.press("Tab", 9)
+        reached.append(
+            page.value("document.activeElement.id || document.activeElement.name || document.activeElement.className")
+        )
+        assert page.value("getComputedStyle(document.activeElement).outlineStyle") != "none", reached[-1]
+    order = ["level", "a", "b", "view", "show", "wiper", "flip", "column", "row"]
+    assert [name for name in reached if name in order] == order
+
+
 def test_print_holds_every_level_and_no_control(browser: Any, axes: Path) -> None:
     page = Page(browser, axes, width=720)
-    page.value("document.querySelector('[name=view][value=wipe]').click()")
+    shown(page)
     page.show(width=720, medium="print")
-    visible = "[...document.querySelectorAll('%s')].filter((one) => one.getClientRects().length).length"
-    assert page.value(visible % "input, select, button, canvas, nav, .stage") == 0
+    visible = "[...document.querySelectorAll('%s')].filter((one) => one.checkVisibility()).length"
+    assert page.value(visible % "input, select, button") == 0
     assert page.value(visible % ".sheet img") == 12
-    assert page.value(visible % "#side img") == 3
     tops = page.value("[...document.querySelectorAll('.sheet')].map((sheet) => new Set([...sheet.children].map("
                       "(item) => item.getBoundingClientRect().top)).size)")  # fmt: skip
     assert tops == [1, 1], "the levels of a contact sheet stand in one row"
-    wide = "Math.max(...[...document.querySelectorAll('main > section:not(#table)')].map((one) => one.scrollWidth))"
-    assert page.value(wide) <= 720
     # A4 across, less 10 mm to each side, at CSS's 96 pixels an inch.
     assert page.value("document.querySelector('#table table').scrollWidth") <= (297 - 2 * 10) / 25.4 * 96
 
@@ -311,38 +450,30 @@ def test_print_holds_every_level_and_no_control(browser: Any, axes: Path) -> Non
 @pytest.mark.parametrize("dark", [False, True])
 def test_screen_is_not_blank(browser: Any, report: Path, dark: bool) -> None:
     page = Page(browser, report, dark=dark)
+    shown(page)
     top = page.screenshot()
     paper = top[5, 5].mean()
     assert paper < 60 if dark else paper > 200
     assert 0.02 < (np.abs(top.astype(int) - top[5, 5]).max(axis=2) > 60).mean() < 0.6
-    page.value(
-        "document.documentElement.style.scrollBehavior = 'auto'; document.getElementById('pictures').scrollIntoView()"
-    )
-    colours = page.screenshot().astype(np.int64) @ (1 << 16, 1 << 8, 1)
+    colours = top.astype(np.int64) @ (1 << 16, 1 << 8, 1)
     assert np.unique(colours).size > 5000, "noise pictures hold many colours"
 
 
-def test_without_script_the_first_level_stands(browser: Any, report: Path) -> None:
+def test_without_script_summary_pictures_and_numbers_stand(browser: Any, report: Path) -> None:
     page = Page(browser, report, script=False)
-    assert shown(page)["level"] == "moonlight"
-    assert shown(page)["status"] == "", "the script ran"
     visible = (
-        "[...document.querySelectorAll('#pictures input, #pictures canvas')].filter((one) => one.offsetParent).length"
+        "[...document.querySelectorAll('main :is(input, select, button, canvas)')].filter((one) => one.offsetParent)"
     )
-    assert page.value(visible) == 0, "controls that can do nothing are shown"
+    assert page.value(f"{visible}.length") == 0, "controls that can do nothing are shown"
     assert page.value("document.querySelector('noscript').innerText").startswith("Without JavaScript")
-    assert page.value("document.querySelector('#side img').getBoundingClientRect().width") == 256
-    reachable = (
-        "[...document.querySelectorAll('.sheet img')].filter((one) => one.getClientRects().length && one.naturalWidth)"
-    )
-    assert page.value(f"new Set({reachable}.map((one) => one.src)).size") == 28, "every picture can be seen"
-    page.value("document.querySelector('noscript a').click()")
+    assert page.value("document.querySelectorAll('.verdicts tbody tr').length") == 2 * 8
+    assert page.value("document.querySelectorAll('.sheet img').length") == 28
+    page.value("document.querySelector('noscript a[href=\"#overview\"]').click()")
     assert page.value("location.hash") == "#overview"
 
 
 def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
-    results = SAMPLE.sample_report()
-    pictures = SAMPLE.sample_pictures(results)
+    results, pictures = standard()
     results = replace(
         results,
         name=HOSTILE,
@@ -357,6 +488,7 @@ def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
     page = Page(browser, file)
     assert page.value("document.title").startswith(HOSTILE)
     assert page.value("document.querySelectorAll('img[src=x]').length") == 0
+    pick(page, "byId('level')", 0)
     assert shown(page)["level"] == HOSTILE
     assert page.requests() == []
     assert page.complaints() == []

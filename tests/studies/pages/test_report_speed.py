@@ -1,4 +1,4 @@
-"""Speed against error: who is fastest, what the others' time buys, and an axis with ticks for less than a decade."""
+"""Speed: who is fastest, what the others' time buys, and what each render cost."""
 
 import re
 from dataclasses import replace
@@ -7,9 +7,9 @@ from html import unescape
 import pytest
 import report_sample as SAMPLE
 
-from studies.pages.charts import log_ticks
 from studies.pages.report import render_report
-from studies.pages.report_charts import speed_charts, speed_rows
+from studies.pages.report_pictures import ReportPictures
+from studies.pages.report_speed import speed_rows
 from studies.sweep.row import Row
 
 
@@ -55,32 +55,12 @@ def test_no_mean_is_over_conditions_that_other_engines_captured_or_other_variant
             (0.2, 15.0, 2) if slow else (0.02, 20.0, 5)
         )
     assert len(rows) == 2 * len(report.sensors)
-    assert len(speed_charts(speed_rows(report))) == 2 * len(report.sensors)
 
 
-def test_the_chart_has_a_mark_a_camera_slower_ones_to_the_right_and_better_ones_above() -> None:
-    chart = speed_charts(speed_rows(SAMPLE.sample_report(twenty_and_23)))[0]
-    assert [len(line.points) for line in chart.series] == [1, 1]
-    slow, fast = (line.points[0] for line in chart.series)
-    assert slow.x > fast.x
-    assert slow.y < fast.y  # SVG counts downwards
-    assert len(chart.x_ticks) > 1
-    assert chart.x_label == "seconds to develop a picture"
-
-
-def test_an_unknown_time_or_psnr_has_no_mark() -> None:
+def test_an_unknown_time_or_psnr_is_unknown() -> None:
     rows = speed_rows(SAMPLE.sample_report(lambda row: row if row.processor == "interleaved" else None))
     assert [row.develop_s for row in rows] == [pytest.approx(0.11), None] * 2
     assert [row.psnr_db for row in rows] == [None] * 4, "no condition is known for both"
-    assert speed_charts(rows) == []
-    half = [replace(row, psnr_db=20.0) for row in rows]
-    assert [len(chart.series) for chart in speed_charts(half)] == [1, 1]
-
-
-def test_ticks_of_less_than_two_decades_are_1_2_and_5() -> None:
-    assert log_ticks(0.5, 2000.0) == [1.0, 10.0, 100.0, 1000.0]
-    assert log_ticks(0.018, 0.16) == pytest.approx([0.02, 0.05, 0.1])
-    assert log_ticks(18.0, 35.0) == pytest.approx([20.0])
 
 
 def test_each_render_has_its_cost_and_the_worst_share_of_its_pictures() -> None:
@@ -90,10 +70,10 @@ def test_each_render_has_its_cost_and_the_worst_share_of_its_pictures() -> None:
 
     scenes = SAMPLE.sample_views().scenes
     report = SAMPLE.sample_report(shared, 2, scenes=scenes, spectra=("own", "A"), truths=(None,) * 4)
-    pictures = {cell.picture: b"\x89PNG\r\n\x1a\n" for cell in report.cells}
+    pictures = ReportPictures({cell.picture: b"\x89PNG\r\n\x1a\n" for cell in report.cells if cell.picture}, {})
     page = unescape(render_report(report, pictures)).replace("\N{NO-BREAK SPACE}", " ")
     table = page[page.index('id="renders-h"') : page.index('id="time-h"')]
     found = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", table)[1:]]
     assert [row[0] for row in found] == ["still_life", "color_checker"]
     for row, share in zip(found, ("50 %", "2 %"), strict=True):
-        assert row[1:] == ["path + specfilm", "256", "time", "40", "41.2 s", "3.1 %", share, "42 %"]
+        assert row[1:] == ["path + specfilm", "256", "time", "40", "41.2 s", "3.1 %", share]

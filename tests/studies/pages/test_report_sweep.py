@@ -21,9 +21,11 @@ from rodcone.errors import InputError
 from studies.commands.cli import main
 from studies.commands.report import write_report
 from studies.pages.report import render_report
+from studies.pages.report_compare import Comparison
 from studies.pages.report_data import ReportSensor
 from studies.pages.report_facts import sensor_of
-from studies.pages.report_sweep import chosen_conditions, sweep_report
+from studies.pages.report_pictures import AS_MADE, busiest, flip_map, opened, view_order
+from studies.pages.report_sweep import sweep_report
 from studies.photograph.picture_file import write_picture
 from studies.study.study import SceneChoice
 from studies.sweep.database import FILE
@@ -69,7 +71,8 @@ def test_every_row_stands_in_the_report(out: Path) -> None:
         assert cell.picture == both[0].picture
         for name in ("psnr_db", "flip_mean", "s_cielab_p95", "pu21_psnr_db", "mc_share"):
             assert cell.figures[name] == pytest.approx(sum(getattr(row, name) for row in both) / 2)
-    for name, content in pictures.items():
+    assert len(report.cells) <= AS_MADE
+    for name, content in pictures.files.items():
         assert (out / "pictures" / name).read_bytes() == content
     assert [(scene.height, scene.width) for scene in report.scenes] == [(16, 20), (24, 16)]
     assert report.pictures_left_out == ""
@@ -93,14 +96,12 @@ def test_the_page_holds_the_names_as_text_and_the_means_over_seeds(out: Path) ->
     assert "<b>bold" not in page
     assert "<b>study" not in page
     data = json.loads(page.split('id="data">')[1].split("</script>")[0])
-    assert [view["scene"] for view in data["views"]] == list(FILES)
+    assert data["axes"][0]["values"] == list(FILES)
     rows = [
         r for r in read_rows(out) if (r.scene, r.level, r.exposure, r.processor) == (FILES[1], "1cd/m2", "2ms", "bayer")
     ]
     # Cells by scene, exposure, level, camera: 1, 1, 0, 1.
-    assert data["cells"][8 + 4 + 1]["psnr_db"].startswith(
-        f"{(rows[0].psnr_db + rows[1].psnr_db) / 2:.1f}\N{NO-BREAK SPACE}±"
-    )
+    assert data["cells"][8 + 4 + 1]["values"]["psnr_db"] == [row.psnr_db for row in rows]
     assert (
         f"{rows[0].exposure_s * 1e3:g}\N{NO-BREAK SPACE}ms" == data["cells"][13]["exposure"] == "2\N{NO-BREAK SPACE}ms"
     )
@@ -109,34 +110,73 @@ def test_the_page_holds_the_names_as_text_and_the_means_over_seeds(out: Path) ->
     assert "band_nm = 20.0" in page
 
 
-def test_fewer_pictures_than_there_are_leave_whole_groups_and_say_so(out: Path) -> None:
-    results, pictures = sweep_report(out, 8)
-    found = [cell.first for cell in results.cells if cell.picture]
-    levels = {"1cd/m2": 0, "25cd/m2": 1}
-    shown = {(row.scene, row.exposure, levels[row.level]) for row in found if row}
-    # Eight pictures are four conditions of two cameras: of the four groups of two levels the first and the third.
-    assert shown == {(name, "auto", level) for name in FILES for level in (0, 1)}
-    assert len(pictures) == 8 + 2, "and each scene's truth"
-    assert results.pictures_left_out.startswith("To keep the page small, pictures of 4 of 8 conditions are in it")
+def test_pictures_that_are_left_out_are_those_that_the_page_shows_last(out: Path) -> None:
+    results, pictures = sweep_report(out, 6)
+    shown = [cell.first for cell in results.cells if cell.picture]
+    # The first scene at the first exposure, both levels and processors; then, as the next row, its second exposure.
+    assert [(row.scene, row.exposure) for row in shown if row] == [(FILES[0], "auto")] * 4 + [(FILES[0], "2ms")] * 2
+    assert len(pictures.files) == 6 + 2, "and each scene's truth"
+    assert len(pictures.flip_maps) == 6
+    assert results.pictures_left_out.startswith("To keep the page small, 10 of 16 pictures aren't in it")
     page = render_report(results, pictures)
-    assert page.count("data-cell=") == 8
-    assert results.pictures_left_out in page
-    assert len(json.loads(page.split('id="data">')[1].split("</script>")[0])["cells"]) == 16
+    assert page.count('data-cell="') - page.count('[data-cell="') == 6
+    assert unescape(page).count(results.pictures_left_out) == 2, "beside the viewer and above all pictures"
+    data = json.loads(page.split('id="data">')[1].split("</script>")[0])
+    assert [bool(address) for address in data["flip"]] == [bool(cell.picture) for cell in results.cells]
+    assert all((out / cell["file"]).is_file() for cell in data["cells"])
+
+
+def test_many_pictures_are_webp_without_a_loss_up_to_the_page_s_size(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studies.pages.report_pictures.AS_MADE", 15)
+    results, pictures = sweep_report(out)
+    for name, content in pictures.files.items():
+        assert content[8:12] == b"WEBP"
+        assert np.array_equal(opened(content), opened((out / "pictures" / name).read_bytes()))
+    assert len(pictures.files) == 16 + 2
+    whole = sum(map(len, (*pictures.files.values(), *pictures.flip_maps.values())))
+    monkeypatch.setattr("studies.pages.report_pictures.SHOWN_BYTES", whole // 2)
+    results, pictures = sweep_report(out)
+    assert 0 < sum(map(len, (*pictures.files.values(), *pictures.flip_maps.values()))) <= whole // 2
+    assert results.pictures_left_out
+
+
+def test_the_mean_of_a_map_is_the_figure_of_its_picture(out: Path) -> None:
+    """Figures are of pictures before 8 bits, whose steps move FLIP by some thousandths."""
+    results, pictures = sweep_report(out)
+    for cell in results.cells:
+        assert cell.picture
+        assert cell.first
+        mean = float(opened(pictures.flip_maps[cell.picture]).mean()) / 255
+        assert mean == pytest.approx(cell.first.flip_mean, abs=0.005)
+    equal = np.full((8, 8, 3), 100, np.uint8)
+    assert opened(flip_map(equal, equal)).max() == 0
 
 
 @settings(deadline=None)
-@given(st.integers(1, 12), st.integers(1, 9), st.integers(1, 120))
-def test_chosen_conditions_keep_to_their_number_and_take_whole_groups(groups: int, levels: int, most: int) -> None:
-    chosen = chosen_conditions(groups * levels, levels, most)
-    assert chosen <= set(range(groups * levels))
-    assert 0 in chosen
-    assert len(chosen) <= most
-    if most >= levels:
-        assert len(chosen) == levels * min(most // levels, groups) or most >= groups * levels == len(chosen)
-        assert all({place // levels * levels + level for level in range(levels)} <= chosen for place in chosen)
-    else:
-        assert len(chosen) == most
-        assert most == 1 or levels - 1 in chosen, "the brightest too"
+@given(st.lists(st.integers(1, 4), min_size=6, max_size=6), st.permutations(range(6)), st.data())
+def test_cells_come_in_the_order_in_which_the_page_shows_them(
+    shape: list[int], axes: list[int], data: st.DataObject
+) -> None:
+    compared, along, rows = axes[:3]
+    a, b = (data.draw(st.integers(0, shape[compared] - 1)) for _ in range(2))
+    order = view_order(shape, Comparison(compared, along, rows, a, b))
+    assert sorted(order) == list(range(int(np.prod(shape))))
+    first = [[int(at) for at in np.unravel_index(cell, shape)] for cell in order[: len({a, b}) * shape[along]]]
+    assert {place[compared] for place in first} == {a, b}
+    assert all(place[axis] == 0 for place in first for axis in (rows, *axes[3:]))
+    view = set(order[: shape[compared] * shape[along] * shape[rows]])
+    assert all(np.unravel_index(cell, shape)[axis] == 0 for cell in view for axis in axes[3:])
+
+
+def test_the_loupe_begins_where_the_edges_are() -> None:
+    truth = np.full((64, 96, 3), 90, np.uint8)
+    truth[30:40, 60:80:2] = 200
+    column, row = busiest(truth)
+    assert 60 <= column < 80
+    assert 27 <= row <= 43
+    assert busiest(np.zeros((1, 1, 3), np.uint8)) == (0, 0)
 
 
 def test_cells_not_made_yet_are_dashes_and_the_page_says_how_many(out: Path, tmp_path: Path) -> None:

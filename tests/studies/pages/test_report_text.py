@@ -1,33 +1,28 @@
-"""The report's parts: numbers as text, sentences, and the charts' geometry."""
+"""The report's parts: numbers as text, and sentences."""
 
 import pytest
 
 from studies.pages import report_text as text
-from studies.pages.charts import ChartLine, Scale, band_path, line_chart, linear_ticks, spread
 from studies.pages.report_data import ReportCell
 
 
-def cell(
-    camera: str, interval: tuple[float, float] | None = None, key: str = "psnr_db", **figures: float
-) -> ReportCell:
-    """A cell of which nothing else is known."""
-    known = {"psnr_db": interval} if interval else {}
-    return ReportCell("s", 0, camera, None, None, None, figures, known, None, {}, None)
+def test_a_figure_is_written_with_its_interval() -> None:
+    cell = ReportCell("s", 0, "a", None, None, None, {"psnr_db": 20.0}, {"psnr_db": (19.7, 20.3)}, {}, None, {}, None)
+    assert text.metric_text(text.PSNR, cell).replace("\N{NO-BREAK SPACE}", " ") == "20.0 ± 0.3 dB"
 
 
-def test_leads_are_judged_on_printed_numbers() -> None:
-    near = [cell("a", psnr_db=20.01), cell("b", psnr_db=20.04)]
-    assert text.leader(text.PSNR, near) == (None, 0.0)
-    apart = [cell("a", delta_e_median=3.0), cell("b", delta_e_median=2.0)]
-    assert text.leader(text.DELTA_E, apart) == (apart[1], 1.0)
+@pytest.mark.parametrize(("lead", "words"), [(0.04, "0.0"), (-0.04, "0.0"), (0.06, "+0.1"), (-11.94, "−11.9")])
+def test_a_lead_that_is_written_as_0_has_no_sign(lead: float, words: str) -> None:
+    assert text.lead_text(text.PSNR, lead) == words
 
 
-def test_no_camera_leads_where_intervals_overlap() -> None:
-    ahead = cell("a", (20.4, 21.6), psnr_db=21.0)
-    near, apart = cell("b", (19.5, 20.5), psnr_db=20.0), cell("b", (19.7, 20.3), psnr_db=20.0)
-    assert text.leader(text.PSNR, [near, ahead]) == (None, 0.0)
-    assert text.leader(text.PSNR, [apart, ahead]) == (ahead, 1.0)
-    assert text.metric_text(text.PSNR, apart).replace("\N{NO-BREAK SPACE}", " ") == "20.0 ± 0.3 dB"
+def test_a_lead_that_is_clear_of_0_is_never_written_as_0() -> None:
+    assert [text.lead_text(text.PSNR, lead, clear=True) for lead in (0.04, -0.0021, 3.0)] == ["+0.04", "−0.002", "+3.0"]
+
+
+def test_powers_have_their_signs() -> None:
+    assert text.with_signs("10 photons per um^2, 5 cd/m2, cos^4") == "10 photons per µm², 5 cd/m², cos⁴"
+    assert (text.plain_name("quiet.toml"), text.plain_name("low_noise")) == ("quiet", "low_noise")
 
 
 def test_substitution_of_some_seeds_is_told_apart() -> None:
@@ -64,41 +59,6 @@ def test_significant_digits(value: float | None, written: str) -> None:
 def test_times_choose_their_unit() -> None:
     said = [text.duration(seconds).replace("\N{NO-BREAK SPACE}", " ") for seconds in (0.066, 0.00012, 41.23, 0.0)]
     assert said == ["66 ms", "0.12 ms", "41.2 s", "0 s"]
-
-
-def test_chart_keeps_order_scale_and_gaps() -> None:
-    line = ChartLine("a", [3.0, None, 1.0, 2.0], ["", "", "", ""])
-    chart = line_chart("t", "d", [1000.0, 100.0, 1.0, 10.0], [line])
-    points = chart.series[0].points
-    assert [point.x for point in points] == sorted(point.x for point in points)
-    # Decades lie at equal distances, and larger values higher up.
-    ticks = {tick.text: tick.at for tick in chart.x_ticks}
-    assert ticks["10"] - ticks["1"] == pytest.approx(ticks["100"] - ticks["10"], abs=0.02)
-    assert points[0].y > points[1].y > points[2].y
-    assert chart.series[0].path.count("M") == 2, "the gap is not bridged"
-    assert all(chart.top <= point.y <= chart.bottom for point in points)
-
-
-def test_band_outlines_each_run_of_intervals() -> None:
-    scale = Scale(0.0, 10.0, 100.0, 0.0)
-    assert band_path([1, 2, 3, 4], [(1, 2), (3, 5), None, (4, 6)], scale) == "M1 80L2 50L2 70L1 90Z M4 40L4 60Z"
-    chart = line_chart("t", "d", [1.0, 10.0], [ChartLine("a", [5.0, 5.0], ["", ""], [(-3.0, 13.0), (4.0, 6.0)])])
-    ticks = [float(tick.text.replace("\N{MINUS SIGN}", "-")) for tick in chart.y_ticks]
-    assert ticks[0] <= -3.0 <= 13.0 <= ticks[-1], "the axis holds the band"
-    assert chart.series[0].band.startswith("M")
-
-
-def test_ticks_enclose_the_values() -> None:
-    for low, high in ((7.0, 34.6), (0.18, 0.74), (5.0, 5.0), (-3.0, 2.0), (0.0, 0.0)):
-        ticks = linear_ticks(low, high)
-        assert ticks[0] <= low <= high <= ticks[-1]
-        assert 2 <= len(ticks) <= 8
-
-
-def test_labels_keep_their_distance() -> None:
-    placed = spread([100.0, 101.0, 199.0], 15, 0, 200)
-    assert placed == [100.0, 115.0, 199.0]
-    assert spread([199.0, 200.0], 15, 0, 200) == [185.0, 200.0]
 
 
 def test_an_exposure_is_named_with_a_white_balance_that_isnt_gray_worlds() -> None:
