@@ -1,7 +1,7 @@
 """Several exposures of one scene, and their merge into one picture of the light."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,34 @@ def burst(
 ) -> tuple[RawImage, ...]:
     """Take one frame for each exposure time (`sensor.exposure.bracket_s`), one after the other with one chip."""
     return tuple(capture(radiance, sensor, exposure_s, device, rng) for exposure_s in exposures_s)
+
+
+def sum_frames(frames: Sequence[RawImage]) -> RawImage:
+    """One raw image of equal exposures: their electrons, times and noise summed, as one with a well so much larger.
+
+    Digital numbers are the frames' mean, no longer whole. Offsets are common to all frames and sum as such; the noise
+    of the converter counts as if it were common too, which overstates it.
+
+    Raises
+    ------
+    InputError
+        For no frames, or frames of different cameras or times.
+    """
+    groups = _grouped(frames)
+    if len(groups) > 1:
+        times = ", ".join(f"{group.exposure_s:g} s" for group in groups)
+        raise InputError(f"frames: they have exposures of {times}; allowed: one time for all; merge them instead")
+    first, count = frames[0], len(frames)
+    if count == 1:
+        return first
+    return replace(
+        first,
+        dn=np.mean([frame.dn for frame in frames], axis=0),
+        gain_e_per_dn=count * first.gain_e_per_dn,
+        read_noise_e=count**0.5 * first.read_noise_e,
+        dsnu_e=count * first.dsnu_e,
+        exposure_s=count * first.exposure_s,
+    )
 
 
 def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merged:

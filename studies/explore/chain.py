@@ -1,0 +1,314 @@
+"""From a rendered scene and the controls to a picture, in stages of which each is computed again only when it has to.
+
+Light adds up: every light group goes through lens and filters by itself, at power 1 and for 1 s, and is kept. Power,
+level and exposure are factors on these, as in a sweep, whose frames are those of 1 cd/m^2 and 1 s.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.picture import Picture
+from isp.processors.catalogue import PROCESSORS
+from render.illuminants import illuminant
+from render.scene import LightGroup
+from render.spectrum import Spectrum
+from render.transport import Transport
+from rodcone.colour_spaces import encode_srgb
+from rodcone.errors import InputError, require_keys
+from sensor.burst import sum_frames
+from sensor.capture import expose
+from sensor.config import SensorConfig
+from sensor.device import Device, draw_device
+from sensor.exposure import exposure_of_electrons_s
+from sensor.optics import SpectralIrradiance, form_image
+from sensor.raw import RawImage
+from sensor.response import behind_filters, channel_electrons
+from studies.explore.controls import TIME, Controls, Lamp, camera_of, options_of
+from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
+from studies.photograph.camera import ColourFit, colour_fit, develop_to_scale
+from studies.study.lit_scene import spectral_luminance
+from studies.study.radiance_file import LIGHT
+from studies.study.study import AS_SHOT, OWN
+
+Image = NDArray[np.float64]
+T = TypeVar("T")
+_CHIP, _FRAME = 0, 1  # second part of the seed, as `studies.photograph.shot` has it
+_KEPT = 8  # results a stage: four light groups before two cameras
+
+
+@dataclass(frozen=True)
+class Memo:
+    """The last results of each stage, by what decides them."""
+
+    stages: dict[str, OrderedDict[Hashable, Any]] = field(default_factory=dict)
+
+    def of(self, stage: str, key: Hashable, make: Callable[[], T]) -> T:
+        """Return the result kept under a key, or make it."""
+        kept = self.stages.setdefault(stage, OrderedDict())
+        if key not in kept:
+            kept[key] = make()
+            if len(kept) > _KEPT:
+                kept.popitem(last=False)
+        kept.move_to_end(key)
+        result: T = kept[key]
+        return result
+
+
+@dataclass(frozen=True)
+class GroupFrame:
+    """One light group at power 1, behind the lens and the filters, in 1 s.
+
+    Attributes
+    ----------
+    irradiance : SpectralIrradiance
+    electrons : (h, w, channel) float64
+    """
+
+    irradiance: SpectralIrradiance
+    electrons: Image
+
+
+@dataclass(frozen=True)
+class Exposed:
+    """What the camera is given, and the raw image that it makes of it.
+
+    Attributes
+    ----------
+    sensor : SensorConfig
+    transport : Transport
+        With the lamps' spectra and powers.
+    light : Light
+        That the camera's colours are set to.
+    scale : float
+        Factor from the lamps' own powers to the level.
+    white_cd_m2 : float
+        Luminance that is shown as white.
+    frames : mapping of str to GroupFrame
+        Light groups that shine, at power 1.
+    exposure_s : float
+        Of each frame of the burst.
+    expected_e : (h, w) float64
+        Photo-electrons of one frame, without dark current.
+    device : Device
+    raw : RawImage
+    """
+
+    sensor: SensorConfig
+    transport: Transport
+    light: Light
+    scale: float
+    white_cd_m2: float
+    frames: dict[str, GroupFrame]
+    exposure_s: float
+    expected_e: Image
+    device: Device
+    raw: RawImage
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a processor is given: enough to develop in another process."""
+
+    processor: str
+    raw: RawImage
+    colours: ColourFit
+    sensor: SensorConfig
+    light: Light
+    white_cd_m2: float
+    options: dict[str, Any]
+
+    def develop(self) -> tuple[Image, Picture]:
+        """Linear sRGB at the scale of the truth, and the processor's own result."""
+        processor = PROCESSORS[self.processor]
+        return develop_to_scale(
+            self.raw, processor, self.colours, self.sensor, self.light, self.white_cd_m2, **self.options
+        )
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A photograph beside its truth.
+
+    Attributes
+    ----------
+    exposed : Exposed
+    linear, true : (h, w, 3) float64
+        Linear sRGB in which `exposed.white_cd_m2` is 1.
+    developed : Picture
+    """
+
+    exposed: Exposed
+    linear: Image
+    true: Image
+    developed: Picture
+
+    @property
+    def picture(self) -> NDArray[np.uint8]:
+        """The picture as the page shows it, sRGB of 8 bits, shape (h, w, 3)."""
+        return to_bytes(self.linear)
+
+    @property
+    def truth(self) -> NDArray[np.uint8]:
+        """The truth likewise."""
+        return to_bytes(self.true)
+
+
+def photograph(transport: Transport, controls: Controls, memo: Memo | None = None) -> Shot:
+    """Photograph a rendered scene and develop the raw image.
+
+    Parameters
+    ----------
+    transport : Transport
+    controls : Controls
+    memo : Memo, optional
+        Results of calls before, for the same transport.
+
+    Raises
+    ------
+    InputError
+        For a light group that the scene hasn't, lamps that give no light, or a value that the chain refuses.
+    """
+    memo = memo or Memo()
+    exposed = expose_scene(transport, controls, memo)
+    linear, picture = job_of(exposed, controls, memo).develop()
+    return Shot(exposed, linear, true_picture_of(exposed, controls, memo), picture)
+
+
+def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposed:
+    """Light the scene, image it and read the chip out."""
+    require_keys("lamps: light group", controls.lamps, transport.groups)
+    lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in transport.groups)
+    camera = (controls.sensor, controls.mosaic, _items(controls.lens), _items(controls.pixel), controls.bits)
+    optics = (controls.sensor, controls.mosaic, _items(controls.lens))
+    spectra = tuple((name, lamp.spectrum, lamp.table) for name, lamp in lamps)
+
+    # Light
+    lit, light, scale_1, white_1 = memo.of("light", lamps, lambda: _light(transport, dict(lamps)))
+    scale = controls.level_cd_m2 * scale_1
+    sensor = memo.of("camera", camera, lambda: camera_of(controls))
+
+    # Lens and filters
+    frames = {}
+    for (name, group), spectrum in zip(lit.groups.items(), spectra, strict=True):
+        if group.power > 0:
+            frames[name] = memo.of("frame", (spectrum, optics), lambda name=name: _group_frame(lit, name, sensor))
+    powers = tuple(lit.groups[name].power for name in frames)
+    per_second_e = memo.of(
+        "electrons", (spectra, powers, optics), lambda: _weighted(powers, [each.electrons for each in frames.values()])
+    )
+    mosaicked_e = memo.of("mosaicked", (spectra, powers, optics), lambda: behind_filters(per_second_e, sensor))
+
+    # Exposure
+    exposure_s = controls.exposure_s
+    if controls.exposure != TIME:
+        exposure_s = exposure_of_electrons_s(controls.exposure, per_second_e * scale, sensor, controls.exposure_s)
+    expected_e = mosaicked_e * (scale * exposure_s)
+    shape = (expected_e.shape[0], expected_e.shape[1])
+    device = memo.of("device", (camera, controls.seed), lambda: draw_device(sensor, shape, _rng(controls.seed, _CHIP)))
+    numbers = range(controls.exposure_number, controls.exposure_number + controls.frames)
+    raw = sum_frames(
+        [expose(expected_e, sensor, exposure_s, device, _rng(controls.seed, _FRAME, number)) for number in numbers]
+    )
+    return Exposed(sensor, lit, light, scale, white_1 * scale, frames, exposure_s, expected_e, device, raw)
+
+
+def job_of(exposed: Exposed, controls: Controls, memo: Memo) -> Job:
+    """What the processor is to do with an exposure."""
+    raw, sensor, light = exposed.raw, exposed.sensor, exposed.light
+    fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes())
+    colours = memo.of("colours", fitted, lambda: colour_fit(sensor, PROCESSORS[controls.processor], light))
+    options = options_of(controls)
+    if controls.white_balance == AS_SHOT:
+        options["balance"] = neutral_electrons(sensor, light, raw.exposure_s)
+    return Job(controls.processor, raw, colours, sensor, light, exposed.white_cd_m2, options)
+
+
+def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
+    """Noise-free picture: of any level the same, since white goes with it."""
+    lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in exposed.transport.groups)
+    light, white = exposed.light, exposed.white_cd_m2 / exposed.scale
+
+    def make() -> Image:
+        groups, planes = exposed.transport.groups, []
+        for name in exposed.frames:
+            lamp = controls.lamps.get(name, Lamp())
+            key = (name, lamp.spectrum, lamp.table, light.spectrum.tobytes())
+            planes.append(
+                memo.of("true", key, lambda name=name: true_srgb(_alone(exposed.transport, name), light, 1.0))
+            )
+        return _weighted([groups[name].power / white for name in exposed.frames], planes)
+
+    return memo.of("truth", lamps, make)
+
+
+def to_bytes(linear: Image) -> NDArray[np.uint8]:
+    """Linear sRGB encoded in 8 bits."""
+    return np.asarray(np.rint(encode_srgb(linear) * 255), dtype=np.uint8)
+
+
+def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:
+    """Light group with a lamp's spectrum, at the luminance of its own, and with its power.
+
+    Raises
+    ------
+    InputError
+        For another spectrum where the group has colours of its own or is dark, or one without light.
+    """
+    power = group.power * lamp.power
+    if lamp.spectrum == OWN and not lamp.table:
+        return replace(group, power=power)
+    own = spectral_luminance(group.spectrum)
+    if group.coloured or own <= 0:
+        why = "has colours of its own" if group.coloured else "is dark"
+        raise InputError(f"lamps: spectrum {lamp.spectrum!r} for a light group that {why}; allowed: {OWN}; leave it")
+    spectrum = Spectrum(*np.transpose(lamp.table)) if lamp.table else illuminant(lamp.spectrum)
+    luminance = spectral_luminance(spectrum)
+    if luminance <= 0:
+        raise InputError("lamps: the table gives no light that an eye sees; allowed: values above 0 within 380-780 nm")
+    return replace(group, spectrum=spectrum * (own / luminance), power=power)
+
+
+# Stages
+
+
+def _light(transport: Transport, lamps: dict[str, Lamp]) -> tuple[Transport, Light, float, float]:
+    """Transport with the lamps, light of the camera's colours, factor to 1 cd/m^2, and white at the lamps' powers."""
+    groups = {name: lit_group(group, lamps[name]) for name, group in transport.groups.items()}
+    lit = replace(transport, groups=groups)
+    level = lit.level().value
+    if level <= 0:
+        raise InputError("lamps: all are off; allowed: one power above 0; raise one")
+    first = next(iter(groups.values()))
+    spectrum = illuminant(LIGHT) if first.coloured else first.spectrum
+    light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
+    return lit, light, 1.0 / level, shown_white_cd_m2(lit, None)
+
+
+def _alone(lit: Transport, name: str) -> Any:
+    """Radiance of one light group at power 1."""
+    return lit.relight(powers={each: float(each == name) for each in lit.groups})
+
+
+def _group_frame(lit: Transport, name: str, sensor: SensorConfig) -> GroupFrame:
+    irradiance = form_image(_alone(lit, name), sensor)
+    return GroupFrame(irradiance, channel_electrons(irradiance, sensor, 1.0))
+
+
+def _weighted(weights: Any, planes: list[Image]) -> Image:
+    total = weights[0] * planes[0]
+    for weight, plane in zip(weights[1:], planes[1:], strict=True):
+        total += weight * plane
+    return np.asarray(total)
+
+
+def _rng(*seed: int) -> np.random.Generator:
+    return np.random.default_rng(list(seed))
+
+
+def _items(terms: Any) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted(terms.items()))
