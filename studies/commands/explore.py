@@ -47,9 +47,7 @@ def explore(
     force
         Run even where more memory is needed than is free.
     """
-    opened = open_source(
-        source, Limits(size=size, spp=spp, band_nm=band_nm, seed=seed, trust=trust_scene, force=force)
-    )
+    opened = open_source(source, Limits(size=size, spp=spp, band_nm=band_nm, seed=seed, trust=trust_scene, force=force))
     say(*opened.notes)
     with listen(port) as listener:
         session = Session(opened)

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant
@@ -30,7 +31,7 @@ from sensor.raw import RawImage
 from sensor.response import behind_filters, channel_electrons
 from studies.explore.controls import TIME, Controls, Lamp, camera_of, options_of
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
-from studies.photograph.camera import ColourFit, colour_fit, develop_to_scale
+from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.lit_scene import spectral_luminance
 from studies.study.radiance_file import LIGHT
 from studies.study.study import AS_SHOT, OWN
@@ -47,16 +48,20 @@ class Memo:
 
     stages: dict[str, OrderedDict[Hashable, Any]] = field(default_factory=dict)
 
-    def of(self, stage: str, key: Hashable, make: Callable[[], T]) -> T:
-        """Return the result kept under a key, or make it."""
+    def of(self, stage: str, key: Hashable, make: Callable[..., T], *arguments: Any) -> T:
+        """Return the result kept under a key, or make it of the arguments."""
         kept = self.stages.setdefault(stage, OrderedDict())
         if key not in kept:
-            kept[key] = make()
+            kept[key] = make(*arguments)
             if len(kept) > _KEPT:
                 kept.popitem(last=False)
         kept.move_to_end(key)
         result: T = kept[key]
         return result
+
+    def kept(self, stage: str, key: Hashable) -> Any:
+        """Return the result kept under a key; None where there is none."""
+        return self.stages.get(stage, {}).get(key)
 
 
 @dataclass(frozen=True)
@@ -86,8 +91,8 @@ class Exposed:
         That the camera's colours are set to.
     scale : float
         Factor from the lamps' own powers to the level.
-    white_cd_m2 : float
-        Luminance that is shown as white.
+    white_at_own_cd_m2 : float
+        Luminance that is shown as white at the lamps' own powers.
     frames : mapping of str to GroupFrame
         Light groups that shine, at power 1.
     exposure_s : float
@@ -102,12 +107,17 @@ class Exposed:
     transport: Transport
     light: Light
     scale: float
-    white_cd_m2: float
+    white_at_own_cd_m2: float
     frames: dict[str, GroupFrame]
     exposure_s: float
     expected_e: Image
     device: Device
     raw: RawImage
+
+    @property
+    def white_cd_m2(self) -> float:
+        """Luminance that is shown as white."""
+        return self.white_at_own_cd_m2 * self.scale
 
 
 @dataclass(frozen=True)
@@ -188,20 +198,19 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     spectra = tuple((name, lamp.spectrum, lamp.table) for name, lamp in lamps)
 
     # Light
-    lit, light, scale_1, white_1 = memo.of("light", lamps, lambda: _light(transport, dict(lamps)))
+    lit, light, scale_1, white_1 = memo.of("light", lamps, _light, transport, dict(lamps))
     scale = controls.level_cd_m2 * scale_1
-    sensor = memo.of("camera", camera, lambda: camera_of(controls))
+    sensor = memo.of("camera", camera, camera_of, controls)
 
     # Lens and filters
     frames = {}
     for (name, group), spectrum in zip(lit.groups.items(), spectra, strict=True):
         if group.power > 0:
-            frames[name] = memo.of("frame", (spectrum, optics), lambda name=name: _group_frame(lit, name, sensor))
+            frames[name] = memo.of("frame", (spectrum, optics), _group_frame, lit, name, sensor)
     powers = tuple(lit.groups[name].power for name in frames)
-    per_second_e = memo.of(
-        "electrons", (spectra, powers, optics), lambda: _weighted(powers, [each.electrons for each in frames.values()])
-    )
-    mosaicked_e = memo.of("mosaicked", (spectra, powers, optics), lambda: behind_filters(per_second_e, sensor))
+    lit_so = (spectra, powers, optics)
+    per_second_e = memo.of("electrons", lit_so, _weighted, powers, [each.electrons for each in frames.values()])
+    mosaicked_e = memo.of("mosaicked", lit_so, behind_filters, per_second_e, sensor)
 
     # Exposure
     exposure_s = controls.exposure_s
@@ -209,19 +218,19 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
         exposure_s = exposure_of_electrons_s(controls.exposure, per_second_e * scale, sensor, controls.exposure_s)
     expected_e = mosaicked_e * (scale * exposure_s)
     shape = (expected_e.shape[0], expected_e.shape[1])
-    device = memo.of("device", (camera, controls.seed), lambda: draw_device(sensor, shape, _rng(controls.seed, _CHIP)))
+    device = memo.of("device", (camera, controls.seed), _chip, sensor, shape, controls.seed)
     numbers = range(controls.exposure_number, controls.exposure_number + controls.frames)
     raw = sum_frames(
         [expose(expected_e, sensor, exposure_s, device, _rng(controls.seed, _FRAME, number)) for number in numbers]
     )
-    return Exposed(sensor, lit, light, scale, white_1 * scale, frames, exposure_s, expected_e, device, raw)
+    return Exposed(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw)
 
 
 def job_of(exposed: Exposed, controls: Controls, memo: Memo) -> Job:
     """What the processor is to do with an exposure."""
     raw, sensor, light = exposed.raw, exposed.sensor, exposed.light
     fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes())
-    colours = memo.of("colours", fitted, lambda: colour_fit(sensor, PROCESSORS[controls.processor], light))
+    colours = memo.of("colours", fitted, colour_fit, sensor, PROCESSORS[controls.processor], light)
     options = options_of(controls)
     if controls.white_balance == AS_SHOT:
         options["balance"] = neutral_electrons(sensor, light, raw.exposure_s)
@@ -231,19 +240,7 @@ def job_of(exposed: Exposed, controls: Controls, memo: Memo) -> Job:
 def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
     """Noise-free picture: of any level the same, since white goes with it."""
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in exposed.transport.groups)
-    light, white = exposed.light, exposed.white_cd_m2 / exposed.scale
-
-    def make() -> Image:
-        groups, planes = exposed.transport.groups, []
-        for name in exposed.frames:
-            lamp = controls.lamps.get(name, Lamp())
-            key = (name, lamp.spectrum, lamp.table, light.spectrum.tobytes())
-            planes.append(
-                memo.of("true", key, lambda name=name: true_srgb(_alone(exposed.transport, name), light, 1.0))
-            )
-        return _weighted([groups[name].power / white for name in exposed.frames], planes)
-
-    return memo.of("truth", lamps, make)
+    return memo.of("truth", lamps, _truth, exposed, controls, memo)
 
 
 def to_bytes(linear: Image) -> NDArray[np.uint8]:
@@ -297,6 +294,23 @@ def _alone(lit: Transport, name: str) -> Any:
 def _group_frame(lit: Transport, name: str, sensor: SensorConfig) -> GroupFrame:
     irradiance = form_image(_alone(lit, name), sensor)
     return GroupFrame(irradiance, channel_electrons(irradiance, sensor, 1.0))
+
+
+def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
+    groups, light, planes = exposed.transport.groups, exposed.light, []
+    for name in exposed.frames:
+        lamp = controls.lamps.get(name, Lamp())
+        key = (name, lamp.spectrum, lamp.table, light.spectrum.tobytes())
+        planes.append(memo.of("true", key, _true_group, exposed.transport, name, light))
+    return _weighted([groups[name].power / exposed.white_at_own_cd_m2 for name in exposed.frames], planes)
+
+
+def _true_group(lit: Transport, name: str, light: Light) -> Image:
+    return true_srgb(_alone(lit, name), light, 1.0)
+
+
+def _chip(sensor: SensorConfig, shape: tuple[int, int], seed: int) -> Device:
+    return draw_device(sensor, shape, _rng(seed, _CHIP))
 
 
 def _weighted(weights: Any, planes: list[Image]) -> Image:

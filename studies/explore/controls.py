@@ -145,7 +145,9 @@ def options_of(controls: Controls) -> dict[str, Any]:
     """Options of the processor: its settings where they differ from its own."""
     if not controls.settings:
         return {}
-    changed = {name: int(x) if name in ("neighbourhood", "patch") else x for name, x in controls.settings.items()}
+    changed: dict[str, Any] = {
+        name: int(x) if name in ("neighbourhood", "patch") else x for name, x in controls.settings.items()
+    }
     settings = replace(ADJUSTABLE[controls.processor], **changed)
     require_range("settings.neighbourhood", settings.neighbourhood, 3, WIDEST, "give an odd width in pixels")
     require_range("settings.patch", settings.patch, 1, 9, "give an odd width in pixels")
@@ -249,8 +251,10 @@ def _lamp(name: str, value: Any) -> Lamp:
     given = _object(name, value)
     require_keys(name, given, ("spectrum", "power", "table"))
     points = given.get("table", [])
-    if not isinstance(points, list) or len(points) > MOST_POINTS or any(
-        not isinstance(point, list) or len(point) != 2 for point in points
+    if (
+        not isinstance(points, list)
+        or len(points) > MOST_POINTS
+        or any(not isinstance(point, list) or len(point) != 2 for point in points)
     ):
         raise InputError(f"{name}.table: it is no list of [nm, value]; allowed: {MOST_POINTS} of them at most; mend it")
     table = tuple((_number(f"{name}.table", nm), _number(f"{name}.table", value)) for nm, value in points)

@@ -22,16 +22,7 @@ from rodcone.errors import InputError, require_keys, require_whole, unknown
 from sensor.exposure import RULES
 from sensor.presets import names as sensors
 from sensor.presets import preset
-from studies.explore.chain import (
-    Exposed,
-    Image,
-    Memo,
-    Shot,
-    expose_scene,
-    job_of,
-    photograph,
-    true_picture_of,
-)
+from studies.explore.chain import Exposed, Image, Memo, Shot, expose_scene, job_of, photograph, true_picture_of
 from studies.explore.controls import (
     ADJUSTABLE,
     LENS,
@@ -148,7 +139,9 @@ class Session:
                     if message is not None:
                         header, buffers = self._answer(message)
                         notes = sorted({str(each.message) for each in told})
-                        self._send(header | {"kind": message["kind"], "number": message["number"], "notes": notes}, buffers)
+                        self._send(
+                            header | {"kind": message["kind"], "number": message["number"], "notes": notes}, buffers
+                        )
                     elif self._rest_until is not None:
                         self._begin_slow()
                     else:
@@ -172,30 +165,35 @@ class Session:
 
     def _answer(self, message: Header) -> Answer:
         kind = message["kind"]
-        if kind == "hello":
-            return hello(self._source), ()
-        if kind == "cancel":
-            return {}, ()
+        if kind in ("hello", "cancel"):
+            return (hello(self._source) if kind == "hello" else {}), ()
         rendered = self._rendered
         assert rendered is not None  # `_work` waits for the first state
         cameras = [controls_from(each, self._sensors()) for each in message["cameras"]]
         if kind == "show":
             return self._show(message, cameras, rendered)
-        own = cameras[0]
+        header, buffers = self._written(message, cameras[0], rendered)
+        return header | {"cameras": [{"controls": to_json(cameras[0])}]}, buffers
+
+    def _written(self, message: Header, controls: Controls, rendered: Rendered) -> Answer:
+        """Figures, text and files of one camera."""
+        kind = message["kind"]
+        answer: Answer = {}, ()
         if kind == "python":
-            return {"text": python_of(rendered.code, own, _view(message["view"]))}, ()
+            return {"text": python_of(rendered.code, controls, _view(message["view"]))}, ()
         if kind == "study":
-            return {"files": self._study(own, rendered)}, ()
-        exposed = expose_scene(rendered.transport, own, self._memo)
-        made_with = {"cameras": [to_json(own)]}
+            return {"files": self._study(controls, rendered)}, ()
+        exposed = expose_scene(rendered.transport, controls, self._memo)
         if kind == "pixel":
-            return made_with | {"pixel": pixel(exposed, message["row"], message["column"])}, ()
-        if kind == "histogram":
-            return made_with | {"histogram": histogram(exposed.raw)}, ()
-        if kind == "dng":
-            return {"name": "explored.dng"}, (dng_of(exposed, own),)
-        shot = self._shot(own, exposed) or photograph(rendered.transport, own, self._memo)
-        return {"name": "explored.png"}, (png_of(VIEWS[_view(message["view"])](shot)),)
+            answer = {"pixel": pixel(exposed, message["row"], message["column"])}, ()
+        elif kind == "histogram":
+            answer = {"histogram": histogram(exposed.raw)}, ()
+        elif kind == "dng":
+            answer = {"name": "explored.dng"}, (dng_of(exposed, controls),)
+        elif kind == "png":
+            shot = self._shot(controls, exposed) or photograph(rendered.transport, controls, self._memo)
+            answer = {"name": "explored.png"}, (png_of(VIEWS[_view(message["view"])](shot)),)
+        return answer
 
     def _show(self, message: Header, cameras: Sequence[Controls], rendered: Rendered) -> Answer:
         """Pictures of each view that is asked for; slow processors are left for later."""
@@ -232,7 +230,7 @@ class Session:
             job = job_of(exposed, controls, self._memo)
             linear, picture = job.develop()
         else:
-            found = self._memo.stages.get("slow", {}).get(_key(controls))
+            found = self._memo.kept("slow", _key(controls))
             if found is None:
                 return None
             if isinstance(found, InputError):
@@ -249,12 +247,12 @@ class Session:
             return
         for controls in [controls_from(each, self._sensors()) for each in shown["cameras"]]:
             key, memo = _key(controls), self._memo
-            if is_slow(controls.processor) and key not in memo.stages.get("slow", {}) and key not in self._slow:
+            if is_slow(controls.processor) and memo.kept("slow", key) is None and key not in self._slow:
 
                 def done(result: tuple[Image, Picture] | InputError, key: str = key, memo: Memo = memo) -> None:
                     with self._changed:
                         self._slow.pop(key, None)
-                        memo.of("slow", key, lambda: result)
+                        memo.of("slow", key, lambda: result)  # kept as an answer is, errors too
                         if self._shown is shown:
                             self._pending.setdefault("show", shown)
                         self._changed.notify()

@@ -1,8 +1,9 @@
 """What is explored: a scene, a file of radiance or a study, and the Python that makes its transport."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -59,7 +60,7 @@ class Source:
     title: str
     states: Callable[[], Iterator[Rendered]]
     groups: Mapping[str, bool]
-    controls: Controls = Controls()
+    controls: Controls = field(default_factory=Controls)
     scene: str | None = None
     size: int = 256
     band_nm: float = 20.0
@@ -194,14 +195,12 @@ def _states(
         steps.insert(0, (size, FIRST_SPP))
     if max(size) > 2 * FIRST_SIDE:
         steps.insert(0, (film_size(size, FIRST_SIDE), FIRST_SPP))
-    earlier = None
+    done: dict[tuple[int, int], Transport] = {}
     for number, (film, spp) in enumerate(steps, 1):
-        resume = earlier if earlier is not None and earlier.coverage.shape == tuple(film) else None
-        earlier = render(
-            scene, film, wavelength_nm=bands[0], width_nm=bands[1], spp=spp, seed=limits.seed, resume=resume
-        )
-        call = f"transport = rodcone.render(scene, {tuple(film)!r}, spp={spp}, seed={limits.seed}, **bands)\n"
-        yield Rendered(earlier, code + call, number == len(steps))
+        asked: dict[str, Any] = {"wavelength_nm": bands[0], "width_nm": bands[1], "spp": spp, "seed": limits.seed}
+        done[film] = render(scene, film, resume=done.get(film), **asked)
+        call = f"transport = rodcone.render(scene, {film!r}, spp={spp}, seed={limits.seed}, **bands)\n"
+        yield Rendered(done[film], code + call, number == len(steps))
 
 
 def _coloured(groups: Mapping[str, LightGroup]) -> dict[str, bool]:

@@ -124,7 +124,8 @@ def facts(shot: Shot) -> dict[str, Any]:
         "substitution": picture.substitution,
         "engine": picture.engine,
         "mean_e": {
-            channel: float(exposed.expected_e[mask(raw.cfa, channel, raw.shape)].mean()) for channel in channels(raw.cfa)
+            channel: float(exposed.expected_e[mask(raw.cfa, channel, raw.shape)].mean())
+            for channel in channels(raw.cfa)
         },
         "noise_e": noise_scale_e(exposed),
     }

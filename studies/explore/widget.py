@@ -34,9 +34,7 @@ def explore(transport: Transport) -> Any:
         raise InputError(f"transport: a {type(given).__name__} is none; allowed: a Transport; give rodcone.render(...)")
     anywidget = optional_library("anywidget", "explore")
     kind = type(
-        "Explorer",
-        (anywidget.AnyWidget,),
-        {"_esm": str(own_file("explore.js")), "_css": str(own_file("explore.css"))},
+        "Explorer", (anywidget.AnyWidget,), {"_esm": str(own_file("explore.js")), "_css": str(own_file("explore.css"))}
     )
     widget, session = kind(), Session(of_transport(transport))
     loop = _running_loop()

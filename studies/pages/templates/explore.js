@@ -398,6 +398,8 @@ function drawHistogram(svg, { edges_e, counts, well_e, floor_e }) {
   Object.entries(counts).forEach(([channel, of]) => {
     const points = of.flatMap((count, index) => [[edges_e[index], count], [edges_e[index + 1], count]]).map(([e, count]) => `${x(e).toFixed(1)},${y(count).toFixed(1)}`);
     add(svg, "polyline", { points: points.join(" "), class: "curve", style: `stroke: ${CHANNELS[channel]}` });
+    const top = of.indexOf(Math.max(...of));
+    add(svg, "text", { x: x(edges_e[top]) - 4, y: y(of[top]) + 8, class: "middle letter", style: `fill: ${CHANNELS[channel]}` }, channel);
   });
   [[well_e, "well", "end"], [floor_e, "noise floor", "start"]].forEach(([e, name, anchor]) => {
     add(svg, "line", { x1: x(e), x2: x(e), y1: 5, y2: 165, class: "mark" });
@@ -422,7 +424,11 @@ function drawPixel(budget, svg, pixel) {
     add(svg, "text", { x: x(at), y: 180, class: "middle" }, at);
   }
   line(pixel.photons_nm, most, { class: "curve dashed" });
-  Object.entries(pixel.electrons_nm).forEach(([channel, values]) => line(values, most, { class: "curve", style: `stroke: ${CHANNELS[channel]}` }));
+  Object.entries(pixel.electrons_nm).forEach(([channel, values]) => {
+    line(values, most, { class: "curve", style: `stroke: ${CHANNELS[channel]}` });
+    const top = values.indexOf(Math.max(...values));
+    add(svg, "text", { x: x(nm[top]), y: 160 - 150 * values[top] / most, class: "middle letter", style: `fill: ${CHANNELS[channel]}` }, channel);
+  });
   add(svg, "text", { x: 390, y: 196, style: "text-anchor: end" }, `nm; dashed: photons, at most ${format(most)} a nm; lines: electrons of each channel`);
 }
 const round = number => Number(number.toPrecision(4));
