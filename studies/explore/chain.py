@@ -6,7 +6,7 @@ level and exposure are factors on these, as in a sweep, whose frames are those o
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,12 +15,9 @@ from numpy.typing import NDArray
 from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
-from render.illuminants import illuminant
-from render.scene import LightGroup
-from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb
-from rodcone.errors import InputError, require_keys
+from rodcone.errors import require_keys
 from sensor.burst import sum_frames
 from sensor.capture import expose
 from sensor.config import SensorConfig
@@ -30,11 +27,10 @@ from sensor.optics import SpectralIrradiance, form_image
 from sensor.raw import RawImage
 from sensor.response import behind_filters, channel_electrons
 from studies.explore.controls import TIME, Controls, Lamp, camera_of, options_of
-from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
+from studies.explore.lamps import lit_transport
+from studies.metrics.truth import Light, neutral_electrons, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
-from studies.study.lit_scene import spectral_luminance
-from studies.study.radiance_file import LIGHT
-from studies.study.study import AS_SHOT, OWN
+from studies.study.study import AS_SHOT
 
 Image = NDArray[np.float64]
 T = TypeVar("T")
@@ -61,7 +57,7 @@ class Memo:
 
     def kept(self, stage: str, key: Hashable) -> Any:
         """Return the result kept under a key; None where there is none."""
-        return self.stages.get(stage, {}).get(key)
+        return self.stages[stage].get(key) if stage in self.stages else None
 
 
 @dataclass(frozen=True)
@@ -198,7 +194,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     spectra = tuple((name, lamp.spectrum, lamp.table) for name, lamp in lamps)
 
     # Light
-    lit, light, scale_1, white_1 = memo.of("light", lamps, _light, transport, dict(lamps))
+    lit, light, scale_1, white_1 = memo.of("light", lamps, lit_transport, transport, dict(lamps))
     scale = controls.level_cd_m2 * scale_1
     sensor = memo.of("camera", camera, camera_of, controls)
 
@@ -248,42 +244,7 @@ def to_bytes(linear: Image) -> NDArray[np.uint8]:
     return np.asarray(np.rint(encode_srgb(linear) * 255), dtype=np.uint8)
 
 
-def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:
-    """Light group with a lamp's spectrum, at the luminance of its own, and with its power.
-
-    Raises
-    ------
-    InputError
-        For another spectrum where the group has colours of its own or is dark, or one without light.
-    """
-    power = group.power * lamp.power
-    if lamp.spectrum == OWN and not lamp.table:
-        return replace(group, power=power)
-    own = spectral_luminance(group.spectrum)
-    if group.coloured or own <= 0:
-        why = "has colours of its own" if group.coloured else "is dark"
-        raise InputError(f"lamps: spectrum {lamp.spectrum!r} for a light group that {why}; allowed: {OWN}; leave it")
-    spectrum = Spectrum(*np.transpose(lamp.table)) if lamp.table else illuminant(lamp.spectrum)
-    luminance = spectral_luminance(spectrum)
-    if luminance <= 0:
-        raise InputError("lamps: the table gives no light that an eye sees; allowed: values above 0 within 380-780 nm")
-    return replace(group, spectrum=spectrum * (own / luminance), power=power)
-
-
 # Stages
-
-
-def _light(transport: Transport, lamps: dict[str, Lamp]) -> tuple[Transport, Light, float, float]:
-    """Transport with the lamps, light of the camera's colours, factor to 1 cd/m^2, and white at the lamps' powers."""
-    groups = {name: lit_group(group, lamps[name]) for name, group in transport.groups.items()}
-    lit = replace(transport, groups=groups)
-    level = lit.level().value
-    if level <= 0:
-        raise InputError("lamps: all are off; allowed: one power above 0; raise one")
-    first = next(iter(groups.values()))
-    spectrum = illuminant(LIGHT) if first.coloured else first.spectrum
-    light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
-    return lit, light, 1.0 / level, shown_white_cd_m2(lit, None)
 
 
 def _alone(lit: Transport, name: str) -> Any:

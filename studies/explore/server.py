@@ -10,7 +10,8 @@ from collections.abc import Awaitable, Callable, MutableMapping, Sequence
 from typing import Any
 
 from rodcone.optional import optional_library
-from studies.explore.session import MOST_CHARACTERS, Header, Session
+from studies.explore.messages import MOST_CHARACTERS, Header
+from studies.explore.session import Session
 from studies.pages.page import TEMPLATES
 
 HOST = "127.0.0.1"

@@ -4,64 +4,42 @@ Of requests of one kind only the newest is answered: what a slider has left behi
 number of its request and the controls that it was made with; the page shows none that is older than its last question.
 """
 
-import json
 import sys
 import threading
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from isp.picture import Picture
-from isp.processors.catalogue import PROCESSORS, libraries
-from render.illuminants import names as illuminants
-from rodcone.errors import InputError, require_keys, require_whole, unknown
-from sensor.exposure import RULES
+from rodcone.errors import InputError
 from sensor.presets import names as sensors
-from sensor.presets import preset
 from studies.explore.chain import Exposed, Image, Memo, Shot, expose_scene, job_of, photograph, true_picture_of
-from studies.explore.controls import (
-    ADJUSTABLE,
-    LENS,
-    PIXEL,
-    SETTINGS,
-    TIME,
-    Controls,
-    Lamp,
-    controls_from,
-    mosaics_of,
-    to_json,
-)
+from studies.explore.controls import Controls, Lamp, controls_from, to_json
 from studies.explore.files import dng_of, png_of
+from studies.explore.messages import KINDS, Header, hello, read_message, read_view, read_views
 from studies.explore.slow import begin, is_slow, stand_in
 from studies.explore.source import Rendered, Source
 from studies.explore.views import VIEWS, facts, histogram, pixel
 from studies.explore.written import python_of, study_of
-from studies.study.study import WHITE_BALANCES
 
-Header: TypeAlias = dict[str, Any]
 Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 Send: TypeAlias = Callable[[Header, Sequence[bytes]], None]
 
-MOST_CHARACTERS = 200_000  # of a message: three tables of spectra fit
-REST_S = 0.4  # without a new setting, after which a slow processor begins
-# Keys of each kind of message beside `kind` and `number`; in this order they are answered.
-KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
-    {
-        "hello": (),
-        "cancel": (),
-        "show": ("cameras", "views"),
-        "pixel": ("cameras", "row", "column"),
-        "histogram": ("cameras",),
-        "python": ("cameras", "view"),
-        "study": ("cameras",),
-        "dng": ("cameras",),
-        "png": ("cameras", "view"),
-    }
+# Terms and processors that have kernels of their own: these are compiled while nobody asks, not under a slider.
+_HOT = {"hot_pixel_share": 0.01, "hot_pixel_dark_current_e_per_s": 100.0}
+_COLUMNS = {"column_gain_spread": 0.01}
+WARM = (
+    *(Controls(pixel=terms) for terms in ({"crosstalk": 0.01}, _HOT, _COLUMNS, _HOT | _COLUMNS)),
+    *(Controls(settings={"neighbourhood": width}) for width in (3.0, 11.0, 41.0)),
+    *(Controls(settings={"patch": width}) for width in (3.0, 5.0)),
+    Controls(mosaic="rgbw_4x4"),
+    Controls(processor="interleaved_paper"),
+    Controls(processor="bayer_nlm", mosaic="bayer"),
 )
+REST_S = 0.4  # without a new setting, after which a slow processor begins
 
 
 class Session:
@@ -76,11 +54,13 @@ class Session:
         self._source, self._states = source, source.states()
         self._rendered: Rendered | None = None
         self._memo = Memo()
+        self._cold = list(WARM)
         self._pending: dict[str, Header] = {}
         self._shown: Header | None = None
         self._slow: dict[str, Callable[[], None]] = {}  # what ends each job at work, by its camera
         self._send: Send = lambda header, buffers: None
-        self._rest_until: float | None = None
+        self._slow_wanted = False
+        self._asked_s = -REST_S  # when the last picture was asked for
         self._closed = False
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._work, daemon=True, name="explorer")
@@ -95,7 +75,7 @@ class Session:
         """Take a message; it is answered from the session's thread. What isn't allowed is told at once."""
         number: Any = None
         try:
-            message = _message(text)
+            message = read_message(text)
             number = message["number"]
         except InputError as error:
             self._send({"kind": "error", "number": number, "message": str(error)}, ())
@@ -103,6 +83,7 @@ class Session:
         with self._changed:
             self._pending[message["kind"]] = message
             if message["kind"] in ("show", "cancel"):
+                self._asked_s = time.monotonic()
                 self._end_slow()
             self._changed.notify()
 
@@ -118,39 +99,48 @@ class Session:
         for end in self._slow.values():
             end()
         self._slow.clear()
-        self._rest_until = None
+        self._slow_wanted = False
 
     def _work(self) -> None:
-        """Answer what is asked; where nothing is, render the next state."""
+        """Answer what is asked; where nothing is, do what is left to do."""
         while not self._closed:
-            message, rendered_all = None, self._rendered is not None and self._rendered.last
-            with self._changed:
-                kind = next((kind for kind in KINDS if kind in self._pending), None)
-                if kind is not None and (self._rendered is not None or kind == "hello"):
-                    message = self._pending.pop(kind)
-                elif rendered_all or self._rest_until is not None:
-                    rest_s = None if self._rest_until is None else self._rest_until - time.monotonic()
-                    if rest_s is None or rest_s > 0:
-                        self._changed.wait(rest_s)
-                        continue
+            message, act = self._next()
             with warnings.catch_warnings(record=True) as told:
                 warnings.simplefilter("always")
                 try:
                     if message is not None:
                         header, buffers = self._answer(message)
                         notes = sorted({str(each.message) for each in told})
-                        self._send(
-                            header | {"kind": message["kind"], "number": message["number"], "notes": notes}, buffers
-                        )
-                    elif self._rest_until is not None:
-                        self._begin_slow()
+                        whose = {"kind": message["kind"], "number": message["number"], "notes": notes}
+                        self._send(header | whose, buffers)
                     else:
-                        self._render_on()
+                        act()
                 except InputError as error:
                     self._fail(message, str(error))
                 except Exception as error:  # the page goes on; the terminal has the place
                     traceback.print_exc(file=sys.stderr)
                     self._fail(message, f"the program failed: {type(error).__name__}: {error}; see its terminal")
+
+    def _next(self) -> tuple[Header | None, Callable[[], None]]:
+        """Take the message to answer, or what to do while nothing is asked; waits for one of them."""
+        with self._changed:
+            while not self._closed:
+                kind = next((kind for kind in KINDS if kind in self._pending), None)
+                if kind is not None and (self._rendered is not None or kind == "hello"):
+                    return self._pending.pop(kind), _nothing
+                act, left_s = self._left_to_do(), self._asked_s + REST_S - time.monotonic()
+                if act is not None and (left_s <= 0 or self._rendered is None):
+                    return None, act
+                self._changed.wait(None if act is None else left_s)
+        return None, _nothing
+
+    def _left_to_do(self) -> Callable[[], None] | None:
+        """What waits for the sliders to rest: a finer render, slow processors, kernels to compile."""
+        if self._rendered is None or not self._rendered.last:
+            return self._render_on
+        if self._slow_wanted:
+            return self._begin_slow
+        return self._warm_up if self._cold else None
 
     def _fail(self, message: Header | None, words: str) -> None:
         self._send({"kind": "error", "number": message and message["number"], "message": words}, ())
@@ -162,6 +152,11 @@ class Session:
         with self._changed:
             if self._shown is not None:
                 self._pending.setdefault("show", self._shown)
+
+    def _warm_up(self) -> None:
+        """Compile the kernels of one of `WARM`."""
+        assert self._rendered is not None
+        photograph(self._rendered.transport, self._cold.pop(), Memo())
 
     def _answer(self, message: Header) -> Answer:
         kind = message["kind"]
@@ -180,7 +175,7 @@ class Session:
         kind = message["kind"]
         answer: Answer = {}, ()
         if kind == "python":
-            return {"text": python_of(rendered.code, controls, _view(message["view"]))}, ()
+            return {"text": python_of(rendered.code, controls, read_view(message["view"]))}, ()
         if kind == "study":
             return {"files": self._study(controls, rendered)}, ()
         exposed = expose_scene(rendered.transport, controls, self._memo)
@@ -192,12 +187,12 @@ class Session:
             answer = {"name": "explored.dng"}, (dng_of(exposed, controls),)
         elif kind == "png":
             shot = self._shot(controls, exposed) or photograph(rendered.transport, controls, self._memo)
-            answer = {"name": "explored.png"}, (png_of(VIEWS[_view(message["view"])](shot)),)
+            answer = {"name": "explored.png"}, (png_of(VIEWS[read_view(message["view"])](shot)),)
         return answer
 
     def _show(self, message: Header, cameras: Sequence[Controls], rendered: Rendered) -> Answer:
         """Pictures of each view that is asked for; slow processors are left for later."""
-        views = _views(message["views"], len(cameras))
+        views = read_views(message["views"], len(cameras))
         self._shown = message
         shots, told = [], []
         for controls in cameras:
@@ -208,8 +203,7 @@ class Session:
                 assert quick is not None  # every mosaic of a slow processor has a quick one
                 shown = replace(controls, processor=quick, settings={})
                 shot = photograph(rendered.transport, shown, self._memo)
-                with self._changed:
-                    self._rest_until = time.monotonic() + REST_S
+                self._slow_wanted = True
             shots.append(shot)
             told.append({"controls": to_json(shown), "waiting_for": controls.processor if shown != controls else None})
         pictures = [VIEWS[view](shots[camera]) for camera, view in views]
@@ -230,7 +224,7 @@ class Session:
             job = job_of(exposed, controls, self._memo)
             linear, picture = job.develop()
         else:
-            found = self._memo.kept("slow", _key(controls))
+            found = self._memo.kept("slow", repr(controls))
             if found is None:
                 return None
             if isinstance(found, InputError):
@@ -240,13 +234,11 @@ class Session:
 
     def _begin_slow(self) -> None:
         """Set the slow processors of what is shown to work."""
-        shown, rendered = self._shown, self._rendered
-        with self._changed:
-            self._rest_until = None
+        self._slow_wanted, shown, rendered = False, self._shown, self._rendered
         if shown is None or rendered is None:
             return
         for controls in [controls_from(each, self._sensors()) for each in shown["cameras"]]:
-            key, memo = _key(controls), self._memo
+            key, memo = repr(controls), self._memo
             if is_slow(controls.processor) and memo.kept("slow", key) is None and key not in self._slow:
 
                 def done(result: tuple[Image, Picture] | InputError, key: str = key, memo: Memo = memo) -> None:
@@ -273,96 +265,5 @@ class Session:
         return study_of(source.scene, source.size, source.band_nm, source.spp, replace(controls, lamps=lamps))
 
 
-def hello(source: Source) -> Header:
-    """What the page builds its controls from."""
-    named = tuple(dict.fromkeys((*sensors(), source.controls.sensor)))
-    own = {name: preset(name) for name in named}
-    return {
-        "title": source.title,
-        "controls": to_json(source.controls),
-        "defaults": to_json(Controls()),
-        "groups": source.groups,
-        "illuminants": list(illuminants()),
-        "rules": [*RULES, TIME],
-        "white_balances": list(WHITE_BALANCES),
-        "sensors": {
-            name: {
-                "lens": {term: getattr(each.lens, term) for term in LENS},
-                "pixel": {term: getattr(each.pixel, term) for term in PIXEL},
-                "bits": each.bits,
-            }
-            for name, each in own.items()
-        },
-        "processors": {
-            name: {
-                "mosaics": list(mosaics_of(each)),
-                "slow": is_slow(name),
-                "source": each.source,
-                "settings": {key: getattr(ADJUSTABLE[name], key) for key in SETTINGS} if name in ADJUSTABLE else {},
-            }
-            for name, each in PROCESSORS.items()
-            if not _missing(name)
-        },
-        "views": list(VIEWS),
-        "assumed": list(source.notes),
-        "saves": {"study": source.scene is not None},
-    }
-
-
-def _missing(processor: str) -> bool:
-    """Whether a processor needs a library that isn't installed."""
-    from importlib.util import find_spec
-
-    return any(find_spec(library) is None for library in libraries(processor))
-
-
-def _key(controls: Controls) -> str:
-    return json.dumps(to_json(controls), sort_keys=True)
-
-
-def _message(text: str) -> Header:
-    """Check a message's frame: its kind, its keys, its number."""
-    if len(text) > MOST_CHARACTERS:
-        raise InputError(f"message: {len(text)} characters; allowed: {MOST_CHARACTERS}; send a shorter table")
-    try:
-        message = json.loads(text, parse_constant=_refuse)
-    except (ValueError, RecursionError):
-        raise InputError("message: it is no JSON; allowed: an object; send one") from None
-    if not isinstance(message, dict) or not isinstance(message.get("kind"), str):
-        raise InputError("message: it has no kind; allowed: an object with a kind; send one")
-    if message["kind"] not in KINDS:
-        raise unknown("message: kind", message["kind"], KINDS)
-    keys = ("kind", "number", *KINDS[message["kind"]])
-    require_keys("message", message, keys)
-    if set(keys) - message.keys():
-        raise InputError(f"message: {sorted(set(keys) - message.keys())[0]!r} is missing; add it")
-    require_whole("number", message["number"], 0, 2**53, "count requests")
-    cameras = message.get("cameras", [{}])
-    if not isinstance(cameras, list) or not 1 <= len(cameras) <= 2:
-        raise InputError("cameras: they are no list of one or two; send one or two")
-    return message
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(constant)
-
-
-def _view(value: Any) -> str:
-    """Name of a view, or of a figure that Python can make."""
-    if isinstance(value, str) and value in VIEWS:
-        return value
-    words = value.split(" ") if isinstance(value, str) else []
-    if words == ["histogram"] or (len(words) == 3 and words[0] == "pixel" and all(x.isdecimal() for x in words[1:])):
-        return " ".join(words)
-    raise unknown("view", value, (*VIEWS, "histogram", "pixel ROW COLUMN"))
-
-
-def _views(value: Any, cameras: int) -> list[tuple[int, str]]:
-    """Camera and name of each view."""
-    pairs = value if isinstance(value, list) and 1 <= len(value) <= 4 else [None]
-    found = []
-    for pair in pairs:
-        if not isinstance(pair, list) or len(pair) != 2 or pair[0] not in range(cameras) or pair[1] not in VIEWS:
-            raise InputError(f"views: {pair!r} is not allowed; give up to four of [camera, view], cameras from 0")
-        found.append((int(pair[0]), str(pair[1])))
-    return found
+def _nothing() -> None:
+    """Nothing to do."""

@@ -7,7 +7,8 @@ from typing import Any
 from render.transport import Transport
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
-from studies.explore.session import Header, Session
+from studies.explore.messages import Header
+from studies.explore.session import Session
 from studies.explore.source import of_transport
 from studies.pages.page import own_file
 
