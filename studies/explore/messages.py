@@ -120,7 +120,8 @@ def read_views(value: Any, cameras: int) -> list[tuple[int, str]]:
     pairs = value if isinstance(value, list) and 1 <= len(value) <= 4 else [None]
     found = []
     for pair in pairs:
-        if not isinstance(pair, list) or len(pair) != 2 or pair[0] not in range(cameras) or pair[1] not in VIEWS:
+        fits = isinstance(pair, list) and len(pair) == 2 and type(pair[0]) is int and isinstance(pair[1], str)
+        if not fits or pair[0] not in range(cameras) or pair[1] not in VIEWS:
             raise InputError(f"views: {pair!r} is not allowed; give up to four of [camera, view], cameras from 0")
         found.append((int(pair[0]), str(pair[1])))
     return found

@@ -1,4 +1,4 @@
-"""The staged chain: what is kept changes no bit, a stage is the public chain's, no kernel is compiled under a slider."""
+"""The staged chain: what is kept changes no bit, stages are the public chain's, sliding compiles no kernel."""
 
 import random
 from dataclasses import replace
