@@ -22,7 +22,7 @@ from sensor.burst import sum_frames
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
-from sensor.exposure import exposure_of_electrons_s
+from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from sensor.optics import SpectralIrradiance, form_image
 from sensor.raw import RawImage
 from sensor.response import behind_filters, channel_electrons
@@ -35,6 +35,7 @@ from studies.study.study import AS_SHOT
 Image = NDArray[np.float64]
 T = TypeVar("T")
 _CHIP, _FRAME = 0, 1  # second part of the seed, as `studies.photograph.shot` has it
+_LONGEST_S = 1e7
 _KEPT = 8  # results a stage: four light groups before two cameras
 
 
@@ -194,7 +195,9 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     spectra = tuple((name, lamp.spectrum, lamp.table) for name, lamp in lamps)
 
     # Light
-    lit, light, scale_1, white_1 = memo.of("light", lamps, lit_transport, transport, dict(lamps))
+    lit, light, scale_1, white_1 = memo.of(
+        "light", (lamps, controls.reference_light), lit_transport, transport, dict(lamps), controls.reference_light
+    )
     scale = controls.level_cd_m2 * scale_1
     sensor = memo.of("camera", camera, camera_of, controls)
 
@@ -210,8 +213,12 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
 
     # Exposure
     exposure_s = controls.exposure_s
-    if controls.exposure != TIME:
-        exposure_s = exposure_of_electrons_s(controls.exposure, per_second_e * scale, sensor, controls.exposure_s)
+    if controls.exposure == AUTO_INFORMATION:
+        exposure_s = exposure_of_electrons_s(controls.exposure, per_second_e * scale, sensor, exposure_s)
+    elif controls.exposure != TIME:  # these two look at a percentile, which goes with the level
+        rule = (lit_so, controls.exposure, sensor.pixel.full_well_e)
+        unit_s = memo.of("rule", rule, exposure_of_electrons_s, controls.exposure, per_second_e, sensor, _LONGEST_S)
+        exposure_s = min(exposure_s, unit_s / scale)
     expected_e = mosaicked_e * (scale * exposure_s)
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = memo.of("device", (camera, controls.seed), _chip, sensor, shape, controls.seed)
@@ -236,7 +243,7 @@ def job_of(exposed: Exposed, controls: Controls, memo: Memo) -> Job:
 def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
     """Noise-free picture: of any level the same, since white goes with it."""
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in exposed.transport.groups)
-    return memo.of("truth", lamps, _truth, exposed, controls, memo)
+    return memo.of("truth", (lamps, controls.reference_light), _truth, exposed, controls, memo)
 
 
 def to_bytes(linear: Image) -> NDArray[np.uint8]:

@@ -8,12 +8,14 @@ from typing import Any
 
 from isp.processors.catalogue import PROCESSORS, Processor
 from isp.settings import DEFAULTS, PAPER, Settings
+from render.illuminants import illuminant
 from rodcone.errors import InputError, require_keys, require_range, require_whole, unknown
 from sensor.cfa import MOSAICS, channels
 from sensor.config import SensorConfig
 from sensor.exposure import AUTO, LONGEST_S, RULES
 from sensor.presets import names, preset
 from sensor.variations import VARIATIONS, vary
+from studies.study.radiance_file import LIGHT
 from studies.study.study import GRAY_WORLD, OWN, WHITE_BALANCES
 
 TIME = "time"  # as an exposure: the time that `exposure_s` states
@@ -59,6 +61,8 @@ class Controls:
         By light group; groups that are left out stay as they are.
     level_cd_m2 : float
         Mean luminance of the scene.
+    reference_light : str
+        Illuminant that colours are judged under where the first light group has colours of its own, as a file has.
     exposure : str
         A rule of `sensor.exposure.RULES`, or ``time``.
     exposure_s : float
@@ -92,6 +96,7 @@ class Controls:
 
     lamps: Mapping[str, Lamp] = field(default_factory=dict)
     level_cd_m2: float = 25.0
+    reference_light: str = LIGHT
     exposure: str = AUTO
     exposure_s: float = LONGEST_S
     sensor: str = "low_noise"
@@ -121,6 +126,7 @@ class Controls:
         for name, value, allowed in known:
             if value not in allowed:
                 raise unknown(name, value, allowed)
+        illuminant(self.reference_light)
         for name, lamp in self.lamps.items():
             require_range(f"lamps[{name!r}].power", lamp.power, 0.0, 1e9, "give a factor of 0 or more")
         for what, given, allowed in (("lens", self.lens, LENS), ("pixel", self.pixel, PIXEL)):
@@ -210,7 +216,7 @@ def to_json(controls: Controls) -> dict[str, Any]:
 
 def _readers() -> dict[str, Callable[[str, Any], Any]]:
     numbers = dict.fromkeys(("level_cd_m2", "exposure_s"), _number)
-    texts = dict.fromkeys(("exposure", "sensor", "mosaic", "processor", "white_balance"), _text)
+    texts = dict.fromkeys(("reference_light", "exposure", "sensor", "mosaic", "processor", "white_balance"), _text)
     wholes = dict.fromkeys(("seed", "exposure_number", "frames"), _whole)
     tables = dict.fromkeys(("lens", "pixel", "settings"), _numbers)
     bits = {"bits": lambda name, value: None if value is None else _whole(name, value)}

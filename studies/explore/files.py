@@ -14,7 +14,6 @@ from studies.explore.chain import Exposed
 from studies.explore.controls import Controls
 from studies.photograph.calibrate import calibrate, iso_speed
 from studies.photograph.png import to_png
-from studies.study.radiance_file import LIGHT
 
 
 def dng_of(exposed: Exposed, controls: Controls) -> bytes:
@@ -28,7 +27,7 @@ def dng_of(exposed: Exposed, controls: Controls) -> bytes:
     if controls.frames > 1:
         raise InputError("dng: a burst's sum is no raw file; allowed: 1 frame; save the exposures one by one")
     first = next(iter(exposed.transport.groups.values()))
-    light = illuminant(LIGHT) if first.coloured else first.spectrum
+    light = illuminant(controls.reference_light) if first.coloured else first.spectrum
     raw = replace(
         exposed.raw,
         camera=Path(controls.sensor).stem.encode("ascii", "replace").decode(),

@@ -12,11 +12,12 @@ from rodcone.errors import InputError
 from studies.explore.controls import Lamp
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2
 from studies.study.lit_scene import spectral_luminance
-from studies.study.radiance_file import LIGHT
 from studies.study.study import OWN
 
 
-def lit_transport(transport: Transport, lamps: dict[str, Lamp]) -> tuple[Transport, Light, float, float]:
+def lit_transport(
+    transport: Transport, lamps: dict[str, Lamp], reference_light: str
+) -> tuple[Transport, Light, float, float]:
     """Transport with the lamps, light of the camera's colours, factor to 1 cd/m^2, and white at the lamps' powers."""
     groups = {name: lit_group(group, lamps[name]) for name, group in transport.groups.items()}
     lit = replace(transport, groups=groups)
@@ -24,7 +25,7 @@ def lit_transport(transport: Transport, lamps: dict[str, Lamp]) -> tuple[Transpo
     if level <= 0:
         raise InputError("lamps: all are off; allowed: one power above 0; raise one")
     first = next(iter(groups.values()))
-    spectrum = illuminant(LIGHT) if first.coloured else first.spectrum
+    spectrum = illuminant(reference_light) if first.coloured else first.spectrum
     light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
     return lit, light, 1.0 / level, shown_white_cd_m2(lit, None)
 

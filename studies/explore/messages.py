@@ -117,11 +117,11 @@ def read_view(value: Any) -> str:
 
 def read_views(value: Any, cameras: int) -> list[tuple[int, str]]:
     """Camera and name of each view."""
-    pairs = value if isinstance(value, list) and 1 <= len(value) <= 4 else [None]
+    pairs = value if isinstance(value, list) and 1 <= len(value) <= 4 else [value]
     found = []
     for pair in pairs:
-        fits = isinstance(pair, list) and len(pair) == 2 and type(pair[0]) is int and isinstance(pair[1], str)
-        if not fits or pair[0] not in range(cameras) or pair[1] not in VIEWS:
+        camera, view = pair if isinstance(pair, list) and len(pair) == 2 else (None, None)
+        if type(camera) is not int or camera not in range(cameras) or not isinstance(view, str) or view not in VIEWS:
             raise InputError(f"views: {pair!r} is not allowed; give up to four of [camera, view], cameras from 0")
-        found.append((int(pair[0]), str(pair[1])))
+        found.append((camera, view))
     return found

@@ -9,6 +9,7 @@ import struct
 from collections.abc import Awaitable, Callable, MutableMapping, Sequence
 from typing import Any
 
+from rodcone.errors import InputError, require_whole
 from rodcone.optional import optional_library
 from studies.explore.messages import MOST_CHARACTERS, Header
 from studies.explore.session import Session
@@ -130,10 +131,21 @@ def packed(header: Header, buffers: Sequence[bytes]) -> bytes:
 
 
 def listen(port: int) -> socket.socket:
-    """Socket of this machine alone; port 0 takes a free one."""
+    """Socket of this machine alone; port 0 takes a free one.
+
+    Raises
+    ------
+    InputError
+        For no port, or one that is taken.
+    """
+    require_whole("port", port, 0, 65_535, "give a port of this machine, 0 for a free one")
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    listener.bind((HOST, port))
+    try:
+        listener.bind((HOST, port))
+    except OSError as error:
+        listener.close()
+        raise InputError(f"port: {port} can't be listened on ({error.strerror}); leave it out for a free one") from None
     return listener
 
 

@@ -20,7 +20,7 @@ from sensor.presets import preset
 from studies.explore.controls import TIME, Controls, Lamp
 from studies.explore.written import GIVEN
 from studies.study.levels import parse_level
-from studies.study.radiance_file import open_radiance_file
+from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.study.scene_source import film_size, open_scene
 from studies.study.study import OWN, SceneChoice, Study, parse_exposure
 from studies.study.study_file import read_study
@@ -110,6 +110,13 @@ def open_source(source: str, limits: Limits) -> Source:
     return _of_choice(SceneChoice(source), limits)
 
 
+def file_transport(path: str, light: str | None = None) -> tuple[Transport, tuple[str, ...]]:
+    """Transport of a file of radiance, whose light is in it, and what had to be assumed."""
+    transport, _, notes = open_radiance_file(path, light)
+    groups = {name: replace(group, coloured=True) for name, group in transport.groups.items()}
+    return replace(transport, groups=groups), tuple(notes)
+
+
 def _of_study(study: Study, limits: Limits, source: str) -> Source:
     """The study's first scene and condition; the page goes on from there."""
     limits = replace(limits, seed=study.render.seed, spp=study.render.spp, range_nm=study.render.range_nm)
@@ -127,7 +134,8 @@ def _of_study(study: Study, limits: Limits, source: str) -> Source:
     lamps = {}
     if study.spectra[0] != OWN and opened.scene is not None:
         lamps = {name: Lamp(study.spectra[0]) for name in opened.groups}
-    controls = Controls(
+    controls = replace(
+        opened.controls,
         lamps=lamps,
         level_cd_m2=level,
         exposure=exposure if exposure in RULES else TIME,
@@ -144,19 +152,20 @@ def _of_study(study: Study, limits: Limits, source: str) -> Source:
 
 def _of_choice(choice: SceneChoice, limits: Limits) -> Source:
     if is_radiance_file(choice.source):
+        check_radiance_file(choice.source, ())
         require_memory(memory(*file_extent(choice.source)), limits.force)
-        transport, _, notes = open_radiance_file(choice.source, choice.light)
+        transport, notes = file_transport(choice.source, choice.light)
         code = (
-            "from studies.study.radiance_file import open_radiance_file\n\n"
-            f"transport, _, _ = open_radiance_file({choice.source!r}, {choice.light!r})\n"
+            f"from studies.explore.source import file_transport\n\ntransport, _ = file_transport({choice.source!r})\n"
         )
         return Source(
             Path(choice.source).name,
             lambda: iter((Rendered(transport, code, True),)),
             _coloured(transport.groups),
+            Controls(reference_light=choice.light or LIGHT),
             scene=choice.source,
             size=max(transport.coverage.shape),
-            notes=tuple(notes),
+            notes=notes,
         )
     opened = open_scene(choice.source, limits.trust, choice.extend, choice.light)
     size = film_size(opened.size, limits.size)

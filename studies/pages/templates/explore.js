@@ -223,7 +223,9 @@ function render({ model, el }) {
     parts.controls.replaceChildren(...[
       group("Light",
         slider(["Level", 1e-4, 1e5, "log", "cd/m²"], state.a.level_cd_m2, value => { state.a.level_cd_m2 = value; change(); }, "level"),
-        ...Object.entries(hello.groups).flatMap(([name, coloured]) => lamp(name, coloured))),
+        ...Object.entries(hello.groups).flatMap(([name, coloured]) => lamp(name, coloured)),
+        Object.values(hello.groups)[0] && choice("Judged under", hello.illuminants.map(each => [each, each]), state.a.reference_light,
+          value => { state.a.reference_light = value; change(); }, "reference_light")),
       make("fieldset", { class: "tabs" }, make("legend", {}, "Camera"), ...["a", "b"].map(side => {
         const radio = make("input", { type: "radio", name: "camera", value: side, "data-key": `camera ${side}` });
         radio.checked = edited === side;
