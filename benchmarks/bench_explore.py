@@ -24,7 +24,7 @@ from environment import print_environment
 
 import studies.explore.session as SESSION
 from rodcone.jit import backend, dr
-from studies.explore.source import Limits, open_source
+from studies.explore.source import RenderOptions, open_source
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
@@ -100,7 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     asked = parser.parse_args(arguments)
     print_environment()
     kernels = CompiledKernels()
-    source = open_source(asked.scene, Limits(size=asked.size, spp=asked.spp))
+    source = open_source(asked.scene, RenderOptions(size=asked.size, spp=asked.spp))
     with TemporaryDirectory() as profile, EXPLORE.served(source) as address:
         browser = CHROME.Browser(Path(profile))
         try:

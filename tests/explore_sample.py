@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-import rodcone
+import rodcone as public
 from render.transport import Transport
 from studies.explore.controls import TIME, Controls, Lamp
 
@@ -22,7 +22,7 @@ GAUSSIAN = tuple((float(nm), float(np.exp(-(((nm - 600) / 40) ** 2)))) for nm in
 @cache
 def small_transport() -> Transport:
     """What `RENDER` makes."""
-    return rodcone.render("still_life_outdoor", (40, 48), spp=4, **BANDS)
+    return public.render("still_life_outdoor", (40, 48), spp=4, **BANDS)
 
 
 def random_controls(rng: random.Random) -> Controls:

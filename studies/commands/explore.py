@@ -5,7 +5,7 @@ import webbrowser
 from studies.commands.console import Flag, say
 from studies.explore.server import listen, make_server
 from studies.explore.session import Session
-from studies.explore.source import Limits, open_source
+from studies.explore.source import RenderOptions, open_source
 
 
 def explore(
@@ -47,7 +47,9 @@ def explore(
     force
         Run even where more memory is needed than is free.
     """
-    opened = open_source(source, Limits(size=size, spp=spp, band_nm=band_nm, seed=seed, trust=trust_scene, force=force))
+    opened = open_source(
+        source, RenderOptions(size=size, spp=spp, band_nm=band_nm, seed=seed, trust=trust_scene, force=force)
+    )
     say(*opened.notes)
     with listen(port) as listener:
         session = Session(opened)

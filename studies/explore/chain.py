@@ -118,7 +118,7 @@ class Exposed:
 
 
 @dataclass(frozen=True)
-class Job:
+class Development:
     """What a processor is given: enough to develop in another process."""
 
     processor: str
@@ -182,7 +182,7 @@ def photograph(transport: Transport, controls: Controls, memo: Memo | None = Non
     """
     memo = memo or Memo()
     exposed = expose_scene(transport, controls, memo)
-    linear, picture = job_of(exposed, controls, memo).develop()
+    linear, picture = development_of(exposed, controls, memo).develop()
     return Shot(exposed, linear, true_picture_of(exposed, controls, memo), picture)
 
 
@@ -229,7 +229,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     return Exposed(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw)
 
 
-def job_of(exposed: Exposed, controls: Controls, memo: Memo) -> Job:
+def development_of(exposed: Exposed, controls: Controls, memo: Memo) -> Development:
     """What the processor is to do with an exposure."""
     raw, sensor, light = exposed.raw, exposed.sensor, exposed.light
     fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes())
@@ -237,7 +237,7 @@ def job_of(exposed: Exposed, controls: Controls, memo: Memo) -> Job:
     options = options_of(controls)
     if controls.white_balance == AS_SHOT:
         options["balance"] = neutral_electrons(sensor, light, raw.exposure_s)
-    return Job(controls.processor, raw, colours, sensor, light, exposed.white_cd_m2, options)
+    return Development(controls.processor, raw, colours, sensor, light, exposed.white_cd_m2, options)
 
 
 def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> Image:

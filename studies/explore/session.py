@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 from isp.picture import Picture
 from rodcone.errors import InputError
 from sensor.presets import names as sensors
-from studies.explore.chain import Exposed, Image, Memo, Shot, expose_scene, job_of, photograph, true_picture_of
+from studies.explore.chain import Exposed, Image, Memo, Shot, development_of, expose_scene, photograph, true_picture_of
 from studies.explore.controls import Controls, Lamp, controls_from, to_json
 from studies.explore.files import dng_of, png_of
 from studies.explore.messages import KINDS, Header, hello, read_message, read_view, read_views
@@ -221,8 +221,8 @@ class Session:
     def _shot(self, controls: Controls, exposed: Exposed) -> Shot | None:
         """Shot of an exposure; None where its processor is slow and hasn't been at work."""
         if not is_slow(controls.processor):
-            job = job_of(exposed, controls, self._memo)
-            linear, picture = job.develop()
+            development = development_of(exposed, controls, self._memo)
+            linear, picture = development.develop()
         else:
             found = self._memo.kept("slow", repr(controls))
             if found is None:
@@ -249,7 +249,7 @@ class Session:
                             self._pending.setdefault("show", shown)
                         self._changed.notify()
 
-                end = begin(job_of(expose_scene(rendered.transport, controls, memo), controls, memo), done)
+                end = begin(development_of(expose_scene(rendered.transport, controls, memo), controls, memo), done)
                 with self._changed:
                     self._slow[key] = end
 

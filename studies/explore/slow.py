@@ -10,7 +10,7 @@ from isp.picture import Picture
 from isp.processors.bm3d import EXTRA as BM3D
 from isp.processors.catalogue import PROCESSORS
 from rodcone.errors import InputError
-from studies.explore.chain import Image, Job
+from studies.explore.chain import Development, Image
 
 _RUN = "from studies.explore.slow import work; work()"
 
@@ -26,12 +26,12 @@ def stand_in(processor: str) -> str | None:
     return next((name for name, each in PROCESSORS.items() if each.mosaic == mosaic and not is_slow(name)), None)
 
 
-def begin(job: Job, done: Callable[[tuple[Image, Picture] | InputError], None]) -> Callable[[], None]:
+def begin(development: Development, done: Callable[[tuple[Image, Picture] | InputError], None]) -> Callable[[], None]:
     """Develop in a process of its own; returns what ends it.
 
     Parameters
     ----------
-    job : Job
+    development : Development
     done : callable
         Called in a thread of its own with what came of it; not where it was ended.
     """
@@ -39,11 +39,15 @@ def begin(job: Job, done: Callable[[tuple[Image, Picture] | InputError], None]) 
     ended = threading.Event()
 
     def wait() -> None:
-        output, _ = process.communicate(pickle.dumps(job))
+        output, _ = process.communicate(pickle.dumps(development))
         if ended.is_set():
             return
         if process.returncode:
-            done(InputError(f"processor: {job.processor} ended with code {process.returncode}; see the messages above"))
+            done(
+                InputError(
+                    f"processor: {development.processor} ended with code {process.returncode}; see the messages above"
+                )
+            )
         else:
             done(pickle.loads(output))
 
@@ -56,10 +60,10 @@ def begin(job: Job, done: Callable[[tuple[Image, Picture] | InputError], None]) 
 
 
 def work() -> None:
-    """Develop the job on standard input; what comes of it goes to standard output."""
-    job: Job = pickle.load(sys.stdin.buffer)
+    """Develop what standard input holds; what comes of it goes to standard output."""
+    development: Development = pickle.load(sys.stdin.buffer)
     try:
-        result: tuple[Image, Picture] | InputError = job.develop()
+        result: tuple[Image, Picture] | InputError = development.develop()
     except InputError as error:
         result = error
     sys.stdout.buffer.write(pickle.dumps(result))

@@ -69,7 +69,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Limits:
+class RenderOptions:
     """How a scene is rendered: longer side in pixels (None: its film's), samples a pixel, band width, seed."""
 
     size: int | None = None
@@ -91,7 +91,7 @@ def of_transport(transport: Transport) -> Source:
     )
 
 
-def open_source(source: str, limits: Limits) -> Source:
+def open_source(source: str, limits: RenderOptions) -> Source:
     """Open a scene by name or file (``.xml``), a file of radiance (``.exr``, ``.mat``) or a study (``.toml``).
 
     Raises
@@ -117,7 +117,7 @@ def file_transport(path: str, light: str | None = None) -> tuple[Transport, tupl
     return replace(transport, groups=groups), tuple(notes)
 
 
-def _of_study(study: Study, limits: Limits, source: str) -> Source:
+def _of_study(study: Study, limits: RenderOptions, source: str) -> Source:
     """The study's first scene and condition; the page goes on from there."""
     limits = replace(limits, seed=study.render.seed, spp=study.render.spp, range_nm=study.render.range_nm)
     opened = _of_choice(study.scenes[0], limits)
@@ -150,7 +150,7 @@ def _of_study(study: Study, limits: Limits, source: str) -> Source:
     return replace(opened, title=f"{study.name}: {opened.title}", controls=controls, notes=tuple(notes))
 
 
-def _of_choice(choice: SceneChoice, limits: Limits) -> Source:
+def _of_choice(choice: SceneChoice, limits: RenderOptions) -> Source:
     if is_radiance_file(choice.source):
         check_radiance_file(choice.source, ())
         require_memory(memory(*file_extent(choice.source)), limits.force)
@@ -196,7 +196,7 @@ def _of_choice(choice: SceneChoice, limits: Limits) -> Source:
 
 
 def _states(
-    scene: Scene, size: tuple[int, int], bands: tuple[Floats, Floats], limits: Limits, code: str
+    scene: Scene, size: tuple[int, int], bands: tuple[Floats, Floats], limits: RenderOptions, code: str
 ) -> Iterator[Rendered]:
     """Render a few pixels, then all of them, then with all samples."""
     steps = [(size, limits.spp)]
@@ -216,7 +216,7 @@ def _coloured(groups: Mapping[str, LightGroup]) -> dict[str, bool]:
     return {name: group.coloured for name, group in groups.items()}
 
 
-def _bands(limits: Limits) -> tuple[Floats, Floats]:
+def _bands(limits: RenderOptions) -> tuple[Floats, Floats]:
     """Centres and widths of even bands, as near the asked width as whole ones come."""
     first, last = limits.range_nm
     count = max(_LEAST_BANDS, round((last - first) / limits.band_nm))

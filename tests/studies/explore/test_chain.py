@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from explore_sample import GAUSSIAN, random_controls, small_transport
 
-import rodcone
+import rodcone as public
 from isp.processors.catalogue import PROCESSORS
 from render.photometry import luminance
 from rodcone.errors import InputError
@@ -44,9 +44,9 @@ def test_the_stages_are_the_public_chain():
     transport, controls = small_transport(), Controls(level_cd_m2=3.0, lens={"diffraction": 1.0})
     exposed = photograph(transport, controls).exposed
     radiance = transport.relight(luminance_cd_m2=3.0)
-    sensor = rodcone.low_noise()
+    sensor = public.low_noise()
     sensor = replace(sensor, lens=replace(sensor.lens, diffraction=1.0))
-    exposure_s = rodcone.auto_exposure_s(form_image(radiance, sensor), sensor)
+    exposure_s = public.auto_exposure_s(form_image(radiance, sensor), sensor)
     # The undershoot of a group alone is not that of the sum: a hundredth of the brightest pixels' light at most.
     assert exposed.exposure_s == pytest.approx(exposure_s, rel=1e-3)
     from sensor.response import expected_electrons

@@ -15,7 +15,7 @@ pytest.importorskip("websockets", reason="needs rodcone[explore]")
 import explore_browser as EXPLORE
 
 import render.engine as ENGINE
-from studies.explore.source import Limits, open_source
+from studies.explore.source import RenderOptions, open_source
 
 pytestmark = pytest.mark.skipif(
     CHROME.CHROMIUM is None or sys.platform == "win32",
@@ -33,7 +33,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    with EXPLORE.served(open_source("still_life_outdoor", Limits(size=48, spp=4, band_nm=50.0))) as address:
+    with EXPLORE.served(open_source("still_life_outdoor", RenderOptions(size=48, spp=4, band_nm=50.0))) as address:
         yield address
 
 

@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import rodcone
+import rodcone as public
 from studies.commands.cli import main
 from studies.explore.chain import photograph
-from studies.explore.source import FIRST_SIDE, Limits, open_source
+from studies.explore.source import FIRST_SIDE, RenderOptions, open_source
 from studies.explore.written import python_of
 
 
 def test_a_scene_is_shown_small_first_and_then_whole():
-    states = open_source("flat_field", Limits(size=136, spp=2, band_nm=100.0)).states()
+    states = open_source("flat_field", RenderOptions(size=136, spp=2, band_nm=100.0)).states()
     first, last = next(states), next(states)
     assert (first.transport.coverage.shape, first.last) == ((FIRST_SIDE, FIRST_SIDE), False)
     assert (last.transport.coverage.shape, last.last) == ((136, 136), True)
@@ -22,10 +22,10 @@ def test_a_scene_is_shown_small_first_and_then_whole():
 
 
 def test_a_file_of_radiance_is_photographed_as_it_is(tmp_path: Path):
-    radiance = rodcone.render("flat_field", (16, 20), wavelength_nm=np.arange(400.0, 780.0, 40.0), spp=2).relight()
+    radiance = public.render("flat_field", (16, 20), wavelength_nm=np.arange(400.0, 780.0, 40.0), spp=2).relight()
     path = tmp_path / "seen.exr"
-    rodcone.write_exr(path, radiance)
-    source = open_source(str(path), Limits())
+    public.write_exr(path, radiance)
+    source = open_source(str(path), RenderOptions())
     (state,) = source.states()
     assert source.groups == {next(iter(state.transport.groups)): True}
     assert photograph(state.transport, source.controls).picture.shape == (16, 20, 3)
@@ -42,7 +42,7 @@ def test_a_study_is_where_the_page_begins(tmp_path: Path):
         "[render]\nsize = 32\nspp = 2\nband_nm = 80\n[lens]\nveiling_glare = 0.02\n",
         "utf-8",
     )
-    source = open_source(str(path), Limits())
+    source = open_source(str(path), RenderOptions())
     own = source.controls
     assert (own.level_cd_m2, own.exposure, own.exposure_s, own.seed) == (3.0, "time", 0.005, 3)
     assert (own.sensor, own.mosaic, own.processor) == ("table1_output", "bayer", "bayer")

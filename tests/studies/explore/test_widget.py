@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from explore_sample import small_transport
 
-import rodcone
+import rodcone as public
 from rodcone.errors import InputError
 from studies.explore.chain import photograph
 from studies.explore.controls import Controls
@@ -18,7 +18,7 @@ pytest.importorskip("anywidget", reason="needs rodcone[explore]")
 @pytest.fixture
 def widget(monkeypatch: pytest.MonkeyPatch):
     """A widget, what it sent, and an event that says that it sent something."""
-    made = rodcone.explore(small_transport())
+    made = public.explore(small_transport())
     sent: list[tuple[dict[str, Any], list[bytes]]] = []
     came = threading.Event()
 
@@ -64,4 +64,4 @@ def test_the_widget_brings_the_pages_module_and_style(widget):
 
 def test_other_objects_are_refused():
     with pytest.raises(InputError, match=r"give rodcone\.render"):
-        rodcone.explore(np.ones((3, 3)))  # type: ignore[arg-type]
+        public.explore(np.ones((3, 3)))  # type: ignore[arg-type]

@@ -11,7 +11,7 @@ from rodcone.errors import InputError
 from sensor.presets import preset
 from studies.explore.chain import photograph
 from studies.explore.controls import Controls, Lamp, camera_of
-from studies.explore.source import Limits, of_transport, open_source
+from studies.explore.source import RenderOptions, of_transport, open_source
 from studies.explore.views import VIEWS, histogram, pixel
 from studies.explore.written import GIVEN, python_of, study_of
 from studies.study.study_file import read_study
@@ -38,7 +38,7 @@ def test_the_python_of_figures_makes_their_numbers():
 
 
 def test_the_python_of_a_source_makes_its_transport():
-    source = open_source("still_life", Limits(size=20, spp=20, band_nm=80.0))
+    source = open_source("still_life", RenderOptions(size=20, spp=20, band_nm=80.0))
     states = list(source.states())
     assert [state.last for state in states] == [False, True]
     for state in states:
@@ -74,7 +74,7 @@ def test_a_study_asks_the_same(tmp_path: Path):
     assert (study.processors, study.render.size, study.render.spp) == (("bayer",), 96, 16)
     own, asked = preset(study.sensors[0], "bayer"), camera_of(controls)
     assert (own.pixel, own.bits, own.lens.f_number) == (asked.pixel, asked.bits, 4.0)
-    again = open_source(str(tmp_path / "study.toml"), Limits())
+    again = open_source(str(tmp_path / "study.toml"), RenderOptions())
     assert again.controls.level_cd_m2 == controls.level_cd_m2
     assert again.controls.exposure_s == pytest.approx(controls.exposure_s, rel=1e-12)
     assert camera_of(again.controls).lens == asked.lens
