@@ -151,7 +151,7 @@ function render({ model, el }) {
       make("div", { class: "bench" }, parts.controls, parts.stage));
     buildStage();
     buildControls();
-    if (header.assumed.length) status(header.assumed.join(" "));
+    status(["The first picture is on its way.", ...header.assumed].join(" "));
     change();
   }
 
