@@ -135,7 +135,7 @@ function render({ model, el }) {
   }
 
   // The page
-  const parts = { canvases: [], captions: [], marks: [] };
+  const parts = { canvases: [], captions: [], selects: [] };
   function begin(header) {
     hello = header;
     state = { a: header.controls, b: { ...pick(header.controls, CAMERA), mosaic: "bayer", processor: "bayer", settings: {} },
@@ -160,7 +160,7 @@ function render({ model, el }) {
       .map(view => [`${side} ${view}`, view === "truth" ? TITLES.truth : `${side.toUpperCase()}: ${TITLES[view]}`]));
     const figures = [0, 1].map(index => {
       const canvas = make("canvas", { tabindex: "0", "aria-label": `${index ? "Second" : "First"} picture; arrow keys move the pixel that is measured` });
-      const select = choice(index ? "Beside" : "View", options, state.views[index].join(" "), value => { state.views[index] = split(value); change(); });
+      parts.selects[index] = choice(index ? "Beside" : "View", options, state.views[index].join(" "), value => { state.views[index] = split(value); change(); });
       canvas.onpointermove = canvas.onpointerdown = event => {
         const box = canvas.getBoundingClientRect();
         point(index, Math.floor((event.clientY - box.top) / box.height * pictureSize[0]), Math.floor((event.clientX - box.left) / box.width * pictureSize[1]));
@@ -176,7 +176,7 @@ function render({ model, el }) {
       parts.captions[index] = make("figcaption", {});
       const buttons = make("div", { class: "buttons" },
         button("Copy Python", () => python(index, state.views[index][1])), button("PNG", () => save({ kind: "png", cameras: [controls(state.views[index][0])], view: state.views[index][1] }, "image/png")));
-      return make("figure", {}, select, canvas, parts.captions[index], buttons);
+      return make("figure", {}, canvas, parts.captions[index], buttons);
     });
     parts.pictures = make("div", { class: "pictures side" }, ...figures);
     parts.wipe = make("input", { type: "range", min: "0", max: "100", value: "50", "aria-label": "Wipe between the two pictures" });
@@ -193,7 +193,7 @@ function render({ model, el }) {
       panel("Histogram", parts.histogram, button("Copy Python", () => python(0, "histogram"))),
       panel("Light budget of the pixel", parts.budget, button("Copy Python", () => cursor && python(cursor.side, `pixel ${cursor.row} ${cursor.column}`))),
       panel("Its spectrum through the filters", parts.spectrum));
-    parts.stage.append(make("div", { class: "bar" }, layout, parts.wipeRow), parts.pictures, parts.figures);
+    parts.stage.append(make("div", { class: "bar" }, ...parts.selects, layout, parts.wipeRow), parts.pictures, parts.figures);
     root.addEventListener("keydown", event => {
       if (event.target.matches("input:not([type=range]), select, textarea") || event.ctrlKey || event.metaKey || event.altKey) return;
       if (event.key === "f") parts.pictures.classList.toggle("second");
