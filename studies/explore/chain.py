@@ -4,10 +4,8 @@ Light adds up: every light group goes through lens and filters by itself, at pow
 level and exposure are factors on these, as in a sweep, whose frames are those of 1 cd/m^2 and 1 s.
 """
 
-from collections import OrderedDict
-from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,38 +25,15 @@ from sensor.optics import SpectralIrradiance, form_image
 from sensor.raw import RawImage
 from sensor.response import behind_filters, channel_electrons
 from studies.explore.controls import TIME, Controls, Lamp, camera_of, options_of
-from studies.explore.lamps import lit_transport
-from studies.metrics.truth import Light, neutral_electrons, true_srgb
+from studies.explore.lamps import alone, lit_transport
+from studies.explore.memo import Memo
+from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of
 from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.study import AS_SHOT
 
 Image = NDArray[np.float64]
-T = TypeVar("T")
 _CHIP, _FRAME = 0, 1  # second part of the seed, as `studies.photograph.shot` has it
 _LONGEST_S = 1e7
-_KEPT = 8  # results a stage: four light groups before two cameras
-
-
-@dataclass(frozen=True)
-class Memo:
-    """The last results of each stage, by what decides them."""
-
-    stages: dict[str, OrderedDict[Hashable, Any]] = field(default_factory=dict)
-
-    def of(self, stage: str, key: Hashable, make: Callable[..., T], *arguments: Any) -> T:
-        """Return the result kept under a key, or make it of the arguments."""
-        kept = self.stages.setdefault(stage, OrderedDict())
-        if key not in kept:
-            kept[key] = make(*arguments)
-            if len(kept) > _KEPT:
-                kept.popitem(last=False)
-        kept.move_to_end(key)
-        result: T = kept[key]
-        return result
-
-    def kept(self, stage: str, key: Hashable) -> Any:
-        """Return the result kept under a key; None where there is none."""
-        return self.stages[stage].get(key) if stage in self.stages else None
 
 
 @dataclass(frozen=True)
@@ -195,7 +170,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     spectra = tuple((name, lamp.spectrum, lamp.table) for name, lamp in lamps)
 
     # Light
-    lit, light, scale_1, white_1 = memo.of(
+    lit, light, scale_1 = memo.of(
         "light", (lamps, controls.reference_light), lit_transport, transport, dict(lamps), controls.reference_light
     )
     scale = controls.level_cd_m2 * scale_1
@@ -208,6 +183,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
             frames[name] = memo.of("frame", (spectrum, optics), _group_frame, lit, name, sensor)
     powers = tuple(lit.groups[name].power for name in frames)
     lit_so = (spectra, powers, optics)
+    white_1 = memo.of("white", (spectra, powers), _white, lit, spectra, memo)
     per_second_e = memo.of("electrons", lit_so, _weighted, powers, [each.electrons for each in frames.values()])
     mosaicked_e = memo.of("mosaicked", lit_so, behind_filters, per_second_e, sensor)
 
@@ -254,13 +230,8 @@ def to_bytes(linear: Image) -> NDArray[np.uint8]:
 # Stages
 
 
-def _alone(lit: Transport, name: str) -> Any:
-    """Radiance of one light group at power 1."""
-    return lit.relight(powers={each: float(each == name) for each in lit.groups})
-
-
 def _group_frame(lit: Transport, name: str, sensor: SensorConfig) -> GroupFrame:
-    irradiance = form_image(_alone(lit, name), sensor)
+    irradiance = form_image(alone(lit, name).relight(), sensor)
     return GroupFrame(irradiance, channel_electrons(irradiance, sensor, 1.0))
 
 
@@ -274,7 +245,17 @@ def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
 
 
 def _true_group(lit: Transport, name: str, light: Light) -> Image:
-    return true_srgb(_alone(lit, name), light, 1.0)
+    return true_srgb(alone(lit, name).relight(), light, 1.0)
+
+
+def _white(lit: Transport, spectra: tuple[tuple[str, Any, Any], ...], memo: Memo) -> float:
+    shining = [spectrum for spectrum in spectra if lit.groups[spectrum[0]].power > 0]
+    planes = [memo.of("scattered", each, _scattered_luminance, lit, each[0]) for each in shining]
+    return white_of(_weighted([lit.groups[each[0]].power for each in shining], planes), lit.coverage)
+
+
+def _scattered_luminance(lit: Transport, name: str) -> Image:
+    return alone(lit, name).scattered_luminance()
 
 
 def _chip(sensor: SensorConfig, shape: tuple[int, int], seed: int) -> Device:

@@ -10,15 +10,13 @@ from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.errors import InputError
 from studies.explore.controls import Lamp
-from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2
+from studies.metrics.truth import Light, light_in_bands
 from studies.study.lit_scene import spectral_luminance
 from studies.study.study import OWN
 
 
-def lit_transport(
-    transport: Transport, lamps: dict[str, Lamp], reference_light: str
-) -> tuple[Transport, Light, float, float]:
-    """Transport with the lamps, light of the camera's colours, factor to 1 cd/m^2, and white at the lamps' powers."""
+def lit_transport(transport: Transport, lamps: dict[str, Lamp], reference_light: str) -> tuple[Transport, Light, float]:
+    """Transport with the lamps, light of the camera's colours, and factor to 1 cd/m^2."""
     groups = {name: lit_group(group, lamps[name]) for name, group in transport.groups.items()}
     lit = replace(transport, groups=groups)
     level = lit.level().value
@@ -27,7 +25,13 @@ def lit_transport(
     first = next(iter(groups.values()))
     spectrum = illuminant(reference_light) if first.coloured else first.spectrum
     light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
-    return lit, light, 1.0 / level, shown_white_cd_m2(lit, None)
+    return lit, light, 1.0 / level
+
+
+def alone(lit: Transport, name: str) -> Transport:
+    """Transport of which one light group shines, at power 1."""
+    groups = {each: replace(group, power=float(each == name)) for each, group in lit.groups.items()}
+    return replace(lit, groups=groups)
 
 
 def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:

@@ -16,9 +16,10 @@ from typing import Any, TypeAlias
 from isp.picture import Picture
 from rodcone.errors import InputError
 from sensor.presets import names as sensors
-from studies.explore.chain import Exposed, Image, Memo, Shot, development_of, expose_scene, photograph, true_picture_of
+from studies.explore.chain import Exposed, Image, Shot, development_of, expose_scene, photograph, true_picture_of
 from studies.explore.controls import Controls, Lamp, controls_from, to_json
 from studies.explore.files import dng_of, png_of
+from studies.explore.memo import Memo
 from studies.explore.messages import KINDS, Header, hello, read_message, read_view, read_views
 from studies.explore.slow import begin, is_slow, stand_in
 from studies.explore.source import Rendered, Source

@@ -13,8 +13,9 @@ from render.photometry import luminance
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.optics import form_image
-from studies.explore.chain import Memo, photograph
+from studies.explore.chain import photograph
 from studies.explore.controls import Controls, Lamp
+from studies.explore.memo import Memo
 from studies.explore.slow import is_slow, stand_in
 from studies.explore.views import VIEWS
 from studies.metrics.truth import light_in_bands, shown_white_cd_m2, true_srgb
