@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import raw_image
 
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from sensor import burst as module
-from sensor.burst import burst, merge
+from sensor.burst import burst, merge, sum_frames
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.device import Device, draw_device
 from sensor.exposure import bracket_s
@@ -203,3 +204,24 @@ def test_frames_that_do_not_belong_together_are_refused():
     refused([one, shoot(camera(), 1e4, [0.01], shape=(8, 10))[0]], "shape of frame 1 is (8, 10)")
     refused([one, replace(other, exposure_s=0.0)], "exposure_s of frame 1")
     refused([one], "dark_current_e_per_s", dark_current_e_per_s=-1.0)
+
+
+def test_the_sum_of_a_burst_is_one_longer_exposure():
+    """Electrons, time and well add up; dark noise of independent frames by its square, offsets of one chip linearly."""
+    rng = np.random.default_rng(3)
+    frames = [
+        raw_image(rng.integers(60, 4000, (8, 6)), read_noise_e=2.0, dsnu_e=1.5, exposure_s=0.01) for _ in range(4)
+    ]
+    whole = sum_frames(frames)
+    assert np.allclose(whole.electrons, sum(frame.electrons for frame in frames), rtol=1e-12)
+    assert whole.full_well_e == pytest.approx(4 * frames[0].full_well_e, rel=1e-12)
+    assert (whole.exposure_s, whole.read_noise_e, whole.dsnu_e) == pytest.approx((0.04, 4.0, 6.0), rel=1e-12)
+    assert sum_frames(frames[:1]) is frames[0]
+
+
+def test_frames_of_unequal_times_are_not_summed():
+    frames = [raw_image(np.full((4, 4), 100), exposure_s=time_s) for time_s in (0.01, 0.02)]
+    with pytest.raises(InputError, match="one time for all"):
+        sum_frames(frames)
+    with pytest.raises(InputError, match="none were given"):
+        sum_frames([])
