@@ -10,7 +10,7 @@ import numpy as np
 from isp.processors.catalogue import PROCESSORS
 from render.engine import render
 from render.radiance_files.radiance_source import is_radiance_file
-from render.scene import LightGroup, Scene
+from render.scene import LightGroup, Scene, film_size
 from render.spectrum import VISIBLE_NM, Floats
 from render.transport import Transport
 from rodcone.errors import InputError, require_range, require_whole
@@ -19,10 +19,11 @@ from sensor.exposure import RULES
 from sensor.presets import preset
 from studies.explore.controls import TIME, Controls, Lamp
 from studies.explore.written import GIVEN
+from studies.study.exposures import parse_exposure
 from studies.study.levels import parse_level
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
-from studies.study.scene_source import film_size, open_scene
-from studies.study.study import OWN, SceneChoice, Study, parse_exposure
+from studies.study.scene_source import open_scene
+from studies.study.study import OWN, SceneChoice, Study
 from studies.study.study_file import read_study
 
 FIRST_SIDE, FIRST_SPP = 64, 16  # of the first picture, which is there at once
