@@ -101,7 +101,8 @@ function render({ model, el }) {
     status(few + (slow.length ? `${slow.join(", ")} is at work; the picture is ${header.cameras.map(each => each.controls.processor).join(", ")}'s. ` : "")
       + header.notes.join(" "));
     root.dispatchEvent(new CustomEvent("painted", { detail: header, bubbles: true }));
-    refreshFigures();
+    // after the frame: what they take is not taken from the picture's
+    requestAnimationFrame(() => setTimeout(() => { if (header.number === latest) refreshFigures(); }));
   }
   function caption(header, camera, view, side) {
     const told = header.cameras[camera].controls, facts = header.facts[camera];
