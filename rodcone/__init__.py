@@ -53,6 +53,7 @@ _PUBLIC = {
     "sweep": ("studies.sweep.run_sweep", "sweep"),
     "run": ("studies.sweep.workers", "run"),
     "read_rows": ("studies.sweep.export", "read_rows"),
+    "explore": ("studies.explore.widget", "explore"),
     "report": ("studies.commands.report", "write_report"),
 }
 

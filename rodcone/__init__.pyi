@@ -27,6 +27,7 @@ from sensor.raw_files.raw_file import read_raw as read_raw
 from sensor.raw_files.raw_file import write_raw as write_raw
 from studies.budget.plan import plan as plan
 from studies.commands.report import write_report as report
+from studies.explore.widget import explore as explore
 from studies.photograph.calibrate import calibrate as calibrate
 from studies.photograph.develop import develop as develop
 from studies.photograph.picture_file import write_picture as write_picture
@@ -49,6 +50,7 @@ __all__ = [
     "develop",
     "draw_device",
     "encode_srgb",
+    "explore",
     "expose",
     "illuminant",
     "illuminants",

@@ -104,7 +104,7 @@ def with_channels(responses: Responses, names: Sequence[str]) -> Responses:
         curves.setdefault("C", curves["W"])
     if "Y" in names and "Y" not in curves and {"R", "G"} <= curves.keys():
         curves["Y"] = _sum(curves["R"], curves["G"])
-    return Responses(curves)
+    return Responses(curves, responses.relative)
 
 
 def _sum(one: Spectrum, other: Spectrum) -> Spectrum:
@@ -125,9 +125,8 @@ def complementary(responses: Responses) -> Responses:
         Where R, G or B is missing, or two of them add up to more than one electron a photon.
     """
     _require_channels(responses, "RGB")
-    curves = {}
-    for channel, pair in _COMPLEMENTS.items():
-        curves[channel] = _sum(*(responses.curves[primary] for primary in pair))
+    own = responses.curves
+    curves = {channel: _sum(*(own[primary] for primary in pair)) for channel, pair in _COMPLEMENTS.items()}
     if "W" in responses.curves:
         curves["W"] = responses.curves["W"]
     return Responses(curves, responses.relative)

@@ -1,6 +1,7 @@
 """One chip: its fixed patterns, which stay the same over exposures."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from sensor.cfa import check_covers
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.random import NoiseTerm, draw_key, normals
+
+_MOST_KEPT = 1 << 18  # pixels of a chip whose draws are kept: 2 MB each
 
 
 @dataclass(frozen=True)
@@ -54,8 +57,9 @@ def draw_device(sensor: SensorConfig | str, shape: tuple[int, int], rng: np.rand
     check_covers(sensor.cfa, tuple(shape))
     key, one_row = draw_key(rng), (1, shape[1])
     pixel = sensor.pixel
-    response = np.maximum(1.0 + pixel.prnu * normals(key, NoiseTerm.PRNU, shape), 0.0)
-    offset_e = pixel.dsnu_e * normals(key, NoiseTerm.DSNU, shape)
+    draws = _normals_kept if shape[0] * shape[1] <= _MOST_KEPT else normals
+    response = np.maximum(1.0 + pixel.prnu * draws(key, NoiseTerm.PRNU, shape), 0.0)
+    offset_e = pixel.dsnu_e * draws(key, NoiseTerm.DSNU, shape)
     column_gain = hot = None
     if pixel.column_offset_e:
         offset_e += pixel.column_offset_e * normals(key, NoiseTerm.COLUMN_OFFSET, one_row)
@@ -64,3 +68,11 @@ def draw_device(sensor: SensorConfig | str, shape: tuple[int, int], rng: np.rand
     if pixel.hot_pixel_share:
         hot = normals(key, NoiseTerm.HOT, shape) < ndtri(pixel.hot_pixel_share)
     return Device(photo_response=response, dark_offset_e=offset_e, column_gain=column_gain, hot=hot)
+
+
+@lru_cache(maxsize=8)
+def _normals_kept(key: int, term: NoiseTerm, shape: tuple[int, int]) -> NDArray[np.float64]:
+    """`normals` of a chip whose PRNU or DSNU alone may change next: they are most of a small chip's time."""
+    draws = normals(key, term, shape)
+    draws.flags.writeable = False
+    return draws

@@ -11,7 +11,7 @@ from sensor.cfa import channels, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.readout import noise_variance
-from sensor.response import channel_electrons, expected_electrons
+from sensor.response import behind_filters, channel_electrons
 
 LONGEST_S = 0.066  # Parmar & Wandell 2009, Figure 5: 66 ms
 AUTO, AUTO_W, AUTO_INFORMATION = "auto", "auto:W", "auto:information"
@@ -63,8 +63,18 @@ def auto_exposure_s(
     channel = channel or unit_channel(sensor.cfa)
     if channel not in channels(sensor.cfa):
         raise unknown("exposure: channel", channel, channels(sensor.cfa))
-    per_second = channel_electrons(irradiance, sensor, 1.0)[..., channels(sensor.cfa).index(channel)]
-    bright = float(np.percentile(per_second, percentile))
+    per_second_e = channel_electrons(irradiance, sensor, 1.0)[..., channels(sensor.cfa).index(channel)]
+    return _share_of_well_s(per_second_e, sensor, longest_s, percentile, well_share)
+
+
+def _share_of_well_s(
+    per_second_e: NDArray[np.float64],
+    sensor: SensorConfig,
+    longest_s: float,
+    percentile: float = 99.0,
+    well_share: float = 0.8,
+) -> float:
+    bright = float(np.percentile(per_second_e, percentile))
     return min(longest_s, well_share * sensor.pixel.full_well_e / bright) if bright > 0 else longest_s
 
 
@@ -78,15 +88,32 @@ def exposure_by_rule_s(
     InputError
         For an unknown rule, or a mosaic without the channel that it looks at.
     """
+    return exposure_of_electrons_s(rule, channel_electrons(irradiance, sensor, 1.0), sensor, longest_s)
+
+
+def exposure_of_electrons_s(
+    rule: str, per_second_e: NDArray[np.float64], sensor: SensorConfig, longest_s: float = LONGEST_S
+) -> float:
+    """Exposure by one of `RULES` [s], from the electrons of each channel in a second, shape (h, w, channel).
+
+    Raises
+    ------
+    InputError
+        As `exposure_by_rule_s`.
+    """
     if rule not in RULES:
         raise unknown("exposure", rule, RULES)
-    for_green_s = auto_exposure_s(irradiance, sensor, longest_s)
-    if rule == AUTO or "W" not in channels(sensor.cfa):
+    require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
+    names = channels(sensor.cfa)
+    if "G" not in names:
+        raise unknown("exposure: channel", "G", names)
+    for_green_s = _share_of_well_s(per_second_e[..., names.index("G")], sensor, longest_s)
+    if rule == AUTO or "W" not in names:
         return for_green_s
-    for_white_s = auto_exposure_s(irradiance, sensor, longest_s, channel="W")
+    for_white_s = _share_of_well_s(per_second_e[..., names.index("W")], sensor, longest_s)
     if rule == AUTO_W:
         return for_white_s
-    return most_informative_s(expected_electrons(irradiance, sensor, 1.0), sensor, (for_green_s, for_white_s))
+    return most_informative_s(behind_filters(per_second_e, sensor), sensor, (for_green_s, for_white_s))
 
 
 def most_informative_s(per_second_e: NDArray[np.float64], sensor: SensorConfig, times_s: Sequence[float]) -> float:

@@ -69,7 +69,17 @@ def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exp
     InputError
         For a negative exposure, a frame smaller than the mosaic's tile, and as `electrons_per_irradiance`.
     """
-    electrons = channel_electrons(irradiance, sensor, exposure_s)
+    return behind_filters(channel_electrons(irradiance, sensor, exposure_s), sensor)
+
+
+def behind_filters(electrons: NDArray[np.float64], sensor: SensorConfig) -> NDArray[np.float64]:
+    """Electrons behind each pixel's own filter, shape (h, w), of those of every channel, shape (h, w, channel).
+
+    Raises
+    ------
+    InputError
+        For a frame smaller than the mosaic's tile.
+    """
     shape = (electrons.shape[0], electrons.shape[1])
     check_covers(sensor.cfa, shape)
     result = np.empty(shape)

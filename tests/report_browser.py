@@ -1,4 +1,4 @@
-"""Headless Chromium over its debugging pipe, for the report's tests; needs nothing but the standard library."""
+"""Headless Chromium over its debugging pipe, for tests of pages; needs nothing but the standard library."""
 
 import json
 import os
@@ -88,12 +88,12 @@ class Browser:
 
 
 class Page:
-    """One tab with a loaded file."""
+    """One tab with a loaded file, or an address."""
 
     def __init__(
         self,
         browser: Browser,
-        file: Path,
+        file: Path | str,
         *,
         width: int = 1280,
         height: int = 900,
@@ -108,7 +108,7 @@ class Page:
             self.send(f"{domain}.enable")
         self.show(width=width, height=height, dark=dark)
         self.send("Emulation.setScriptExecutionDisabled", value=not script)
-        self.address = file.resolve().as_uri()
+        self.address = file if isinstance(file, str) else file.resolve().as_uri()
         self.send("Page.navigate", url=self.address)
         browser.wait_for("Page.loadEventFired")
 

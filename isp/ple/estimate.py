@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from isp.ple.pick import BLOCK, blocks, pick
-from isp.ple.prior import Prior
+from isp.ple.prior import PATCH, Prior
 from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, window
 
 STRIDE = 2  # pixels from patch to patch: one tile
 STRIP = 100_000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons
+COARSE_STEPS = 3  # of light from table to table where a scale only tells the finer one
 DOUBT = 2.0
 INFLATE = 2.0
 LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of noise^2]
@@ -103,7 +104,8 @@ def estimate(
     """
     size = sampling.size
     shape, (ny, nx) = samples.shape[:2], light.shape
-    steps = np.round(np.log(np.maximum(light, LEAST_LIGHT)) / np.log(STEP)).astype(np.int32)
+    coarse = 1 if size == PATCH else COARSE_STEPS
+    steps = np.round(np.log(np.maximum(light, LEAST_LIGHT)) / np.log(STEP) / coarse).astype(np.int32) * coarse
     wide, wide_full = padded(samples, size), padded(full, size)
     rows = max(1, STRIP // nx)
 

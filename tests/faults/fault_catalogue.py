@@ -122,8 +122,8 @@ SENSOR = (
     _fault(
         "DSNU drawn with PRNU's numbers",
         "sensor/device.py",
-        "normals(key, NoiseTerm.DSNU, shape)",
-        "normals(key, NoiseTerm.PRNU, shape)",
+        "draws(key, NoiseTerm.DSNU, shape)",
+        "draws(key, NoiseTerm.PRNU, shape)",
         "sensor/test_device",
         *_READOUT,
     ),
@@ -574,8 +574,8 @@ STUDIES = (
     _fault(
         "white among the lamps",
         "studies/metrics/truth.py",
-        "weights = 1.0 - transport.coverage.astype(np.float64)",
-        "weights, luminance = None, transport.relight().luminance()",
+        "white_of(transport.scattered_luminance(luminance_cd_m2=luminance_cd_m2), transport.coverage)",
+        "white_of(transport.relight().luminance(), 0 * transport.coverage)",
         "studies/metrics/test_truth_metrics",
         "studies/study/test_lit_scene",
     ),

@@ -168,3 +168,19 @@ def test_rules_by_name():
     with pytest.raises(InputError, match=r"exposure: 'auto:w' is unknown; .*did you mean 'auto:W'") as error:
         exposure_by_rule_s("auto:w", light, sensor)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("rule", ["auto", "auto:W", "auto:information"])
+def test_electrons_that_are_there_already_give_the_rules_time(rule):
+    from sensor.exposure import exposure_by_rule_s, exposure_of_electrons_s
+    from sensor.optics import SpectralIrradiance
+    from sensor.presets import low_noise
+    from sensor.response import channel_electrons
+
+    rng, sensor = np.random.default_rng(4), low_noise()
+    light = SpectralIrradiance(rng.random((16, 16, 40)) * 1e-3, np.arange(385.0, 780.0, 10.0), 2.2)
+    per_second_e = channel_electrons(light, sensor, 1.0)
+    assert exposure_of_electrons_s(rule, per_second_e, sensor) == exposure_by_rule_s(rule, light, sensor)
+    # twice the light: half the time, unless the longest one is reached
+    by_rule = exposure_of_electrons_s(rule, per_second_e, sensor, 1e6)
+    assert exposure_of_electrons_s(rule, 2 * per_second_e, sensor, 1e6) == pytest.approx(by_rule / 2, rel=1e-12)

@@ -1,0 +1,1 @@
+"""The live explorer: a camera whose picture answers while a control moves."""

@@ -1,0 +1,277 @@
+"""From a rendered scene and the controls to a picture, in stages of which each is computed again only when it has to.
+
+Light adds up: every light group goes through lens and filters by itself, at power 1 and for 1 s, and is kept. Power,
+level and exposure are factors on these, as in a sweep, whose frames are those of 1 cd/m^2 and 1 s.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.colour.colour_fit import ColourFit
+from isp.picture import Picture
+from isp.processors.catalogue import PROCESSORS
+from render.transport import Transport
+from rodcone.colour_spaces import encode_srgb
+from rodcone.errors import require_keys
+from sensor.burst import merged_raw
+from sensor.capture import expose
+from sensor.config import SensorConfig
+from sensor.device import Device, draw_device
+from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
+from sensor.optics import SpectralIrradiance, form_image
+from sensor.raw import RawImage
+from sensor.response import behind_filters, channel_electrons
+from studies.explore.controls import TIME, Controls, Lamp, camera_of, options_of
+from studies.explore.lamps import alone, lit_transport
+from studies.explore.memo import Memo
+from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of
+from studies.photograph.camera import colour_fit, develop_to_scale
+from studies.study.study import AS_SHOT
+
+Image = NDArray[np.float64]
+_CHIP, _FRAME = 0, 1  # second part of the seed, as `studies.photograph.shot` has it
+_LONGEST_S = 1e7
+
+
+@dataclass(frozen=True)
+class GroupFrame:
+    """One light group at power 1, behind the lens and the filters, in 1 s.
+
+    Attributes
+    ----------
+    irradiance : SpectralIrradiance
+    electrons : (h, w, channel) float64
+    """
+
+    irradiance: SpectralIrradiance
+    electrons: Image
+
+
+@dataclass(frozen=True)
+class Exposed:
+    """What the camera is given, and the raw image that it makes of it.
+
+    Attributes
+    ----------
+    sensor : SensorConfig
+    transport : Transport
+        With the lamps' spectra and powers.
+    light : Light
+        That the camera's colours are set to.
+    scale : float
+        Factor from the lamps' own powers to the level.
+    white_at_own_cd_m2 : float
+        Luminance that is shown as white at the lamps' own powers.
+    frames : mapping of str to GroupFrame
+        Light groups that shine, at power 1.
+    exposure_s : float
+        Of each frame of the burst.
+    expected_e : (h, w) float64
+        Photo-electrons of one frame, without dark current.
+    device : Device
+    raw : RawImage
+    """
+
+    sensor: SensorConfig
+    transport: Transport
+    light: Light
+    scale: float
+    white_at_own_cd_m2: float
+    frames: dict[str, GroupFrame]
+    exposure_s: float
+    expected_e: Image
+    device: Device
+    raw: RawImage
+
+    @property
+    def white_cd_m2(self) -> float:
+        """Luminance that is shown as white."""
+        return self.white_at_own_cd_m2 * self.scale
+
+
+@dataclass(frozen=True)
+class Development:
+    """What a processor is given: enough to develop in another process."""
+
+    processor: str
+    raw: RawImage
+    colours: ColourFit
+    sensor: SensorConfig
+    light: Light
+    white_cd_m2: float
+    options: dict[str, Any]
+
+    def develop(self) -> tuple[Image, Picture]:
+        """Linear sRGB at the scale of the truth, and the processor's own result."""
+        processor = PROCESSORS[self.processor]
+        return develop_to_scale(
+            self.raw, processor, self.colours, self.sensor, self.light, self.white_cd_m2, **self.options
+        )
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A photograph beside its truth.
+
+    Attributes
+    ----------
+    exposed : Exposed
+    linear, true : (h, w, 3) float64
+        Linear sRGB in which `exposed.white_cd_m2` is 1.
+    developed : Picture
+    """
+
+    exposed: Exposed
+    linear: Image
+    true: Image
+    developed: Picture
+
+    @property
+    def picture(self) -> NDArray[np.uint8]:
+        """The picture as the page shows it, sRGB of 8 bits, shape (h, w, 3)."""
+        return to_bytes(self.linear)
+
+    @property
+    def truth(self) -> NDArray[np.uint8]:
+        """The truth likewise."""
+        return to_bytes(self.true)
+
+
+def photograph(transport: Transport, controls: Controls, memo: Memo | None = None) -> Shot:
+    """Photograph a rendered scene and develop the raw image.
+
+    Parameters
+    ----------
+    transport : Transport
+    controls : Controls
+    memo : Memo, optional
+        Results of calls before, for the same transport.
+
+    Raises
+    ------
+    InputError
+        For a light group that the scene hasn't, lamps that give no light, or a value that the chain refuses.
+    """
+    memo = memo or Memo()
+    exposed = expose_scene(transport, controls, memo)
+    linear, picture = development_of(exposed, controls, memo).develop()
+    return Shot(exposed, linear, true_picture_of(exposed, controls, memo), picture)
+
+
+def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposed:
+    """Light the scene, image it and read the chip out."""
+    require_keys("lamps: light group", controls.lamps, transport.groups)
+    lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in transport.groups)
+    camera = (controls.sensor, controls.mosaic, _items(controls.lens), _items(controls.pixel), controls.bits)
+    optics = (controls.sensor, controls.mosaic, _items(controls.lens))
+    spectra = tuple((name, lamp.spectrum, lamp.table) for name, lamp in lamps)
+
+    # Light
+    lit, light, scale_1 = memo.of(
+        "light", (lamps, controls.reference_light), lit_transport, transport, dict(lamps), controls.reference_light
+    )
+    scale = controls.level_cd_m2 * scale_1
+    sensor = memo.of("camera", camera, camera_of, controls)
+
+    # Lens and filters
+    frames = {}
+    for (name, group), spectrum in zip(lit.groups.items(), spectra, strict=True):
+        if group.power > 0:
+            frames[name] = memo.of("frame", (spectrum, optics), _group_frame, lit, name, sensor)
+    powers = tuple(lit.groups[name].power for name in frames)
+    lit_so = (spectra, powers, optics)
+    white_1 = memo.of("white", (spectra, powers), _white, lit, spectra, memo)
+    per_second_e = memo.of("electrons", lit_so, _weighted, powers, [each.electrons for each in frames.values()])
+    mosaicked_e = memo.of("mosaicked", lit_so, behind_filters, per_second_e, sensor)
+
+    # Exposure
+    exposure_s = controls.exposure_s
+    if controls.exposure == AUTO_INFORMATION:
+        exposure_s = exposure_of_electrons_s(controls.exposure, per_second_e * scale, sensor, exposure_s)
+    elif controls.exposure != TIME:  # these two look at a percentile, which goes with the level
+        rule = (lit_so, controls.exposure, sensor.pixel.full_well_e)
+        unit_s = memo.of("rule", rule, exposure_of_electrons_s, controls.exposure, per_second_e, sensor, _LONGEST_S)
+        exposure_s = min(exposure_s, unit_s / scale)
+    expected_e = mosaicked_e * (scale * exposure_s)
+    shape = (expected_e.shape[0], expected_e.shape[1])
+    device = memo.of("device", (camera, controls.seed), _chip, sensor, shape, controls.seed)
+    numbers = range(controls.exposure_number, controls.exposure_number + controls.frames)
+    raw = merged_raw(
+        [expose(expected_e, sensor, exposure_s, device, _rng(controls.seed, _FRAME, number)) for number in numbers]
+    )
+    return Exposed(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw)
+
+
+def development_of(exposed: Exposed, controls: Controls, memo: Memo) -> Development:
+    """What the processor is to do with an exposure."""
+    raw, sensor, light = exposed.raw, exposed.sensor, exposed.light
+    fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes())
+    colours = memo.of("colours", fitted, colour_fit, sensor, PROCESSORS[controls.processor], light)
+    options = options_of(controls)
+    if controls.white_balance == AS_SHOT:
+        options["balance"] = neutral_electrons(sensor, light, raw.exposure_s)
+    return Development(controls.processor, raw, colours, sensor, light, exposed.white_cd_m2, options)
+
+
+def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
+    """Noise-free picture: of any level the same, since white goes with it."""
+    lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in exposed.transport.groups)
+    return memo.of("truth", (lamps, controls.reference_light), _truth, exposed, controls, memo)
+
+
+def to_bytes(linear: Image) -> NDArray[np.uint8]:
+    """Linear sRGB encoded in 8 bits."""
+    return np.asarray(np.rint(encode_srgb(linear) * 255), dtype=np.uint8)
+
+
+# Stages
+
+
+def _group_frame(lit: Transport, name: str, sensor: SensorConfig) -> GroupFrame:
+    irradiance = form_image(alone(lit, name).relight(), sensor)
+    return GroupFrame(irradiance, channel_electrons(irradiance, sensor, 1.0))
+
+
+def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
+    groups, light, planes = exposed.transport.groups, exposed.light, []
+    for name in exposed.frames:
+        lamp = controls.lamps.get(name, Lamp())
+        key = (name, lamp.spectrum, lamp.table, light.spectrum.tobytes())
+        planes.append(memo.of("true", key, _true_group, exposed.transport, name, light))
+    return _weighted([groups[name].power / exposed.white_at_own_cd_m2 for name in exposed.frames], planes)
+
+
+def _true_group(lit: Transport, name: str, light: Light) -> Image:
+    return true_srgb(alone(lit, name).relight(), light, 1.0)
+
+
+def _white(lit: Transport, spectra: tuple[tuple[str, Any, Any], ...], memo: Memo) -> float:
+    shining = [spectrum for spectrum in spectra if lit.groups[spectrum[0]].power > 0]
+    planes = [memo.of("scattered", each, _scattered_luminance, lit, each[0]) for each in shining]
+    return white_of(_weighted([lit.groups[each[0]].power for each in shining], planes), lit.coverage)
+
+
+def _scattered_luminance(lit: Transport, name: str) -> Image:
+    return alone(lit, name).scattered_luminance()
+
+
+def _chip(sensor: SensorConfig, shape: tuple[int, int], seed: int) -> Device:
+    return draw_device(sensor, shape, _rng(seed, _CHIP))
+
+
+def _weighted(weights: Any, planes: list[Image]) -> Image:
+    total = weights[0] * planes[0]
+    for weight, plane in zip(weights[1:], planes[1:], strict=True):
+        total += weight * plane
+    return np.asarray(total)
+
+
+def _rng(*seed: int) -> np.random.Generator:
+    return np.random.default_rng(list(seed))
+
+
+def _items(terms: Any) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted(terms.items()))

@@ -1,0 +1,267 @@
+"""What the explorer's controls are set to, as one value, and how it is read from a message."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
+from typing import Any
+
+from isp.processors.catalogue import PROCESSORS, Processor
+from isp.settings import DEFAULTS, PAPER, Settings
+from render.illuminants import illuminant
+from rodcone.errors import InputError, require_keys, require_range, require_whole, unknown
+from sensor.cfa import MOSAICS, channels
+from sensor.config import SensorConfig
+from sensor.exposure import AUTO, LONGEST_S, RULES
+from sensor.presets import names, preset
+from sensor.variations import VARIATIONS, vary
+from studies.study.radiance_file import LIGHT
+from studies.study.study import GRAY_WORLD, OWN, WHITE_BALANCES
+
+TIME = "time"  # as an exposure: the time that `exposure_s` states
+LENS = ("f_number", "defocus_um", "diffraction", "veiling_glare")
+PIXEL = (
+    *("read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s", "column_gain_spread", "column_offset_e"),
+    *("hot_pixel_share", "hot_pixel_dark_current_e_per_s", "crosstalk", "full_well_e"),
+)
+SETTINGS = ("neighbourhood", "patch", "sigma_d", "sigma_s")
+# Processors with settings of their own, and what these are by default.
+ADJUSTABLE: Mapping[str, Settings] = MappingProxyType({"interleaved": DEFAULTS, "interleaved_paper": PAPER})
+MOST_FRAMES = 16
+MOST_POINTS = 2000  # of a spectrum from a file
+WIDEST = 41  # pixels of Omega: four times the default's time
+
+
+@dataclass(frozen=True)
+class Lamp:
+    """What a light group emits.
+
+    Attributes
+    ----------
+    spectrum : str
+        ``own``, or an illuminant's name such as ``A`` or ``3000K``, at the luminance of the group's own spectrum.
+    power : float
+        Factor on the group's own power; what counts beside a level is its share.
+    table : tuple of (float, float)
+        Wavelength [nm] and value, from a file, in place of `spectrum`; at the same luminance.
+    """
+
+    spectrum: str = OWN
+    power: float = 1.0
+    table: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Controls:
+    """All that decides a picture of a scene that is rendered already.
+
+    Attributes
+    ----------
+    lamps : mapping of str to Lamp
+        By light group; groups that are left out stay as they are.
+    level_cd_m2 : float
+        Mean luminance of the scene.
+    reference_light : str
+        Illuminant that colours are judged under where the first light group has colours of its own, as a file has.
+    exposure : str
+        A rule of `sensor.exposure.RULES`, or ``time``.
+    exposure_s : float
+        Where `exposure` is ``time``; else the longest that the rule may choose.
+    sensor : str
+        A preset's name, or a ``.toml`` file.
+    mosaic : str
+        A name of `sensor.cfa.MOSAICS` or `sensor.variations.VARIATIONS`.
+    lens, pixel : mapping of str to float
+        Fields of `LensConfig` (`LENS`) and `PixelConfig` (`PIXEL`) that differ from the preset's.
+    bits : int or None
+        Of the converter; None takes the preset's.
+    processor : str
+        Of `isp.processors.catalogue.PROCESSORS`.
+    settings : mapping of str to float
+        Fields of `isp.settings.Settings` (`SETTINGS`) that differ from the processor's.
+    white_balance : str
+        Of `studies.study.study.WHITE_BALANCES`.
+    seed : int
+        Of the chip's patterns and of the exposures' noise.
+    exposure_number : int
+        Which exposure of that chip: each has noise of its own.
+    frames : int
+        Exposures of a burst, summed.
+
+    Raises
+    ------
+    InputError
+        For a value that isn't allowed and can be told without the scene.
+    """
+
+    lamps: Mapping[str, Lamp] = field(default_factory=dict)
+    level_cd_m2: float = 25.0
+    reference_light: str = LIGHT
+    exposure: str = AUTO
+    exposure_s: float = LONGEST_S
+    sensor: str = "low_noise"
+    mosaic: str = "rgbw"
+    lens: Mapping[str, float] = field(default_factory=dict)
+    pixel: Mapping[str, float] = field(default_factory=dict)
+    bits: int | None = None
+    processor: str = "interleaved"
+    settings: Mapping[str, float] = field(default_factory=dict)
+    white_balance: str = GRAY_WORLD
+    seed: int = 0
+    exposure_number: int = 0
+    frames: int = 1
+
+    def __post_init__(self) -> None:
+        require_range("level_cd_m2", self.level_cd_m2, 1e-6, 1e9, "give a mean luminance above 0")
+        require_range("exposure_s", self.exposure_s, 1e-9, 1e4, "give seconds above 0")
+        require_whole("seed", self.seed, 0, 2**31, "give a whole number")
+        require_whole("exposure_number", self.exposure_number, 0, 2**31, "give a whole number")
+        require_whole("frames", self.frames, 1, MOST_FRAMES, "give the exposures of a burst")
+        known = (
+            ("exposure", self.exposure, (*RULES, TIME)),
+            ("processor", self.processor, PROCESSORS),
+            ("white_balance", self.white_balance, WHITE_BALANCES),
+            ("mosaic", self.mosaic, (*MOSAICS, *VARIATIONS)),
+        )
+        for name, value, allowed in known:
+            if value not in allowed:
+                raise unknown(name, value, allowed)
+        illuminant(self.reference_light)
+        for name, lamp in self.lamps.items():
+            require_range(f"lamps[{name!r}].power", lamp.power, 0.0, 1e9, "give a factor of 0 or more")
+        for what, given, allowed in (("lens", self.lens, LENS), ("pixel", self.pixel, PIXEL)):
+            require_keys(what, given, allowed)
+        require_keys("settings", self.settings, SETTINGS if self.processor in ADJUSTABLE else ())
+        options_of(self)
+        if self.mosaic not in mosaics_of(PROCESSORS[self.processor]):
+            raise InputError(
+                f"mosaic: {self.mosaic!r} is not one that {self.processor} develops; allowed: "
+                f"{', '.join(mosaics_of(PROCESSORS[self.processor]))}; take one, or another processor"
+            )
+
+
+def mosaics_of(processor: Processor) -> tuple[str, ...]:
+    """Mosaics that a processor develops: its own, and for those that take any tile of R, G, B and W, these."""
+    if processor.on_backend and processor.mosaic == "rgbw":
+        return tuple(name for name, tile in MOSAICS.items() if set(channels(tile)) == set("RGBW"))
+    return (processor.mosaic,)
+
+
+def options_of(controls: Controls) -> dict[str, Any]:
+    """Options of the processor: its settings where they differ from its own."""
+    if not controls.settings:
+        return {}
+    changed: dict[str, Any] = {
+        name: int(x) if name in ("neighbourhood", "patch") else x for name, x in controls.settings.items()
+    }
+    settings = replace(ADJUSTABLE[controls.processor], **changed)
+    require_range("settings.neighbourhood", settings.neighbourhood, 3, WIDEST, "give an odd width in pixels")
+    require_range("settings.patch", settings.patch, 1, 9, "give an odd width in pixels")
+    return {"settings": settings}
+
+
+def camera_of(controls: Controls) -> SensorConfig:
+    """Sensor with its lens as the controls have it.
+
+    Raises
+    ------
+    InputError
+        For a file that describes no camera, or a term out of range.
+    """
+    own = vary(preset(controls.sensor), controls.mosaic)
+    return replace(
+        own,
+        lens=replace(own.lens, **controls.lens),
+        pixel=replace(own.pixel, **controls.pixel),
+        bits=own.bits if controls.bits is None else controls.bits,
+    )
+
+
+# From and to JSON
+
+
+def controls_from(content: Any, sensors: tuple[str, ...] = names()) -> Controls:
+    """Check and read the controls of a message.
+
+    Parameters
+    ----------
+    content : decoded JSON
+        An object with fields of `Controls`; those that are left out have their defaults.
+    sensors : tuple of str
+        Sensors that may be named: a message may not make the program read other files.
+
+    Raises
+    ------
+    InputError
+        For anything else.
+    """
+    given = dict(_object("controls", content))
+    readers = _readers()
+    require_keys("controls", given, readers)
+    values = {name: readers[name](name, value) for name, value in given.items()}
+    if values.get("sensor", sensors[0]) not in sensors:
+        raise unknown("sensor", values["sensor"], sensors)
+    return Controls(**values)
+
+
+def to_json(controls: Controls) -> dict[str, Any]:
+    """Controls as `controls_from` reads them."""
+    plain = {each.name: getattr(controls, each.name) for each in fields(controls)}
+    plain["lamps"] = {name: {**vars(lamp), "table": list(lamp.table)} for name, lamp in controls.lamps.items()}
+    for name in ("lens", "pixel", "settings"):
+        plain[name] = dict(plain[name])
+    result: dict[str, Any] = json.loads(json.dumps(plain, allow_nan=False))
+    return result
+
+
+def _readers() -> dict[str, Callable[[str, Any], Any]]:
+    numbers = dict.fromkeys(("level_cd_m2", "exposure_s"), _number)
+    texts = dict.fromkeys(("reference_light", "exposure", "sensor", "mosaic", "processor", "white_balance"), _text)
+    wholes = dict.fromkeys(("seed", "exposure_number", "frames"), _whole)
+    tables = dict.fromkeys(("lens", "pixel", "settings"), _numbers)
+    bits = {"bits": lambda name, value: None if value is None else _whole(name, value)}
+    return {"lamps": _lamps, **numbers, **texts, **wholes, **tables, **bits}
+
+
+def _object(name: str, value: Any) -> Mapping[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(f"{name}: {value!r} is not allowed; give an object of keys and values")
+    return value
+
+
+def _number(name: str, value: Any) -> float:
+    require_range(name, None if isinstance(value, bool) else value, -1e300, 1e300, "give a number")
+    return float(value)
+
+
+def _whole(name: str, value: Any) -> int:
+    require_whole(name, None if isinstance(value, bool) else value, 0, 2**31, "give a whole number")
+    return int(value)
+
+
+def _text(name: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise InputError(f"{name}: {value!r} is not allowed; give a text")
+    return value
+
+
+def _numbers(name: str, value: Any) -> dict[str, float]:
+    return {key: _number(f"{name}.{key}", each) for key, each in sorted(_object(name, value).items())}
+
+
+def _lamps(name: str, value: Any) -> dict[str, Lamp]:
+    return {group: _lamp(f"{name}[{group!r}]", each) for group, each in _object(name, value).items()}
+
+
+def _lamp(name: str, value: Any) -> Lamp:
+    given = _object(name, value)
+    require_keys(name, given, ("spectrum", "power", "table"))
+    points = given.get("table", [])
+    if (
+        not isinstance(points, list)
+        or len(points) > MOST_POINTS
+        or any(not isinstance(point, list) or len(point) != 2 for point in points)
+    ):
+        raise InputError(f"{name}.table: it is no list of [nm, value]; allowed: {MOST_POINTS} of them at most; mend it")
+    table = tuple((_number(f"{name}.table", nm), _number(f"{name}.table", value)) for nm, value in points)
+    return Lamp(_text(name, given.get("spectrum", OWN)), _number(f"{name}.power", given.get("power", 1.0)), table)

@@ -1,0 +1,56 @@
+"""The lamps of a scene as the controls have them, and the light that its colours are judged under."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from render.illuminants import illuminant
+from render.scene import LightGroup
+from render.spectrum import Spectrum
+from render.transport import Transport
+from rodcone.errors import InputError
+from studies.explore.controls import Lamp
+from studies.metrics.truth import Light, light_in_bands
+from studies.study.lit_scene import spectral_luminance
+from studies.study.study import OWN
+
+
+def lit_transport(transport: Transport, lamps: dict[str, Lamp], reference_light: str) -> tuple[Transport, Light, float]:
+    """Transport with the lamps, light of the camera's colours, and factor to 1 cd/m^2."""
+    groups = {name: lit_group(group, lamps[name]) for name, group in transport.groups.items()}
+    lit = replace(transport, groups=groups)
+    level = lit.level().value
+    if level <= 0:
+        raise InputError("lamps: all are off; allowed: one power above 0; raise one")
+    first = next(iter(groups.values()))
+    spectrum = illuminant(reference_light) if first.coloured else first.spectrum
+    light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
+    return lit, light, 1.0 / level
+
+
+def alone(lit: Transport, name: str) -> Transport:
+    """Transport of which one light group shines, at power 1."""
+    groups = {each: replace(group, power=float(each == name)) for each, group in lit.groups.items()}
+    return replace(lit, groups=groups)
+
+
+def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:
+    """Light group with a lamp's spectrum, at the luminance of its own, and with its power.
+
+    Raises
+    ------
+    InputError
+        For another spectrum where the group has colours of its own or is dark, or one without light.
+    """
+    power = group.power * lamp.power
+    if lamp.spectrum == OWN and not lamp.table:
+        return replace(group, power=power)
+    own = spectral_luminance(group.spectrum)
+    if group.coloured or own <= 0:
+        why = "has colours of its own" if group.coloured else "is dark"
+        raise InputError(f"lamps: spectrum {lamp.spectrum!r} for a light group that {why}; allowed: {OWN}; leave it")
+    spectrum = Spectrum(*np.transpose(lamp.table)) if lamp.table else illuminant(lamp.spectrum)
+    luminance = spectral_luminance(spectrum)
+    if luminance <= 0:
+        raise InputError("lamps: the table gives no light that an eye sees; allowed: values above 0 within 380-780 nm")
+    return replace(group, spectrum=spectrum * (own / luminance), power=power)

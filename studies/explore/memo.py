@@ -1,0 +1,31 @@
+"""Results that are kept between changes."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+_KEPT = 8  # results a stage: four light groups before two cameras
+
+
+@dataclass(frozen=True)
+class Memo:
+    """The last results of each stage, by what decides them."""
+
+    stages: dict[str, OrderedDict[Hashable, Any]] = field(default_factory=dict)
+
+    def of(self, stage: str, key: Hashable, make: Callable[..., T], *arguments: Any) -> T:
+        """Return the result kept under a key, or make it of the arguments."""
+        kept = self.stages.setdefault(stage, OrderedDict())
+        if key not in kept:
+            kept[key] = make(*arguments)
+            if len(kept) > _KEPT:
+                kept.popitem(last=False)
+        kept.move_to_end(key)
+        result: T = kept[key]
+        return result
+
+    def kept(self, stage: str, key: Hashable) -> Any:
+        """Return the result kept under a key; None where there is none."""
+        return self.stages[stage].get(key) if stage in self.stages else None

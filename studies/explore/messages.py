@@ -1,0 +1,127 @@
+"""Messages of the page: what the program says of itself first, and what is checked of each question."""
+
+import json
+from collections.abc import Mapping
+from importlib.util import find_spec
+from types import MappingProxyType
+from typing import Any, TypeAlias
+
+from isp.processors.catalogue import PROCESSORS, libraries
+from render.illuminants import names as illuminants
+from rodcone.errors import InputError, require_keys, require_whole, unknown
+from sensor.exposure import RULES
+from sensor.presets import names as sensors
+from sensor.presets import preset
+from studies.explore.controls import ADJUSTABLE, LENS, PIXEL, SETTINGS, TIME, Controls, mosaics_of, to_json
+from studies.explore.slow import is_slow
+from studies.explore.source import Source
+from studies.explore.views import VIEWS
+from studies.study.study import WHITE_BALANCES
+
+Header: TypeAlias = dict[str, Any]
+
+MOST_CHARACTERS = 200_000  # of a message: three tables of spectra fit
+# Keys of each kind of message beside `kind` and `number`; in this order they are answered.
+KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "hello": (),
+        "cancel": (),
+        "show": ("cameras", "views"),
+        "pixel": ("cameras", "row", "column"),
+        "histogram": ("cameras",),
+        "python": ("cameras", "view"),
+        "study": ("cameras",),
+        "dng": ("cameras",),
+        "png": ("cameras", "view"),
+    }
+)
+
+
+def hello(source: Source) -> Header:
+    """What the page builds its controls from."""
+    named = tuple(dict.fromkeys((*sensors(), source.controls.sensor)))
+    own = {name: preset(name) for name in named}
+    return {
+        "title": source.title,
+        "controls": to_json(source.controls),
+        "defaults": to_json(Controls()),
+        "groups": source.groups,
+        "illuminants": list(illuminants()),
+        "rules": [*RULES, TIME],
+        "white_balances": list(WHITE_BALANCES),
+        "sensors": {
+            name: {
+                "lens": {term: getattr(each.lens, term) for term in LENS},
+                "pixel": {term: getattr(each.pixel, term) for term in PIXEL},
+                "bits": each.bits,
+            }
+            for name, each in own.items()
+        },
+        "processors": {
+            name: {
+                "mosaics": list(mosaics_of(each)),
+                "slow": is_slow(name),
+                "source": each.source,
+                "settings": {key: getattr(ADJUSTABLE[name], key) for key in SETTINGS} if name in ADJUSTABLE else {},
+            }
+            for name, each in PROCESSORS.items()
+            if not _missing(name)
+        },
+        "views": list(VIEWS),
+        "assumed": list(source.notes),
+        "saves": {"study": source.scene is not None},
+    }
+
+
+def _missing(processor: str) -> bool:
+    """Whether a processor needs a library that isn't installed."""
+    return any(find_spec(library) is None for library in libraries(processor))
+
+
+def read_message(text: str) -> Header:
+    """Check a message's frame: its kind, its keys, its number."""
+    if len(text) > MOST_CHARACTERS:
+        raise InputError(f"message: {len(text)} characters; allowed: {MOST_CHARACTERS}; send a shorter table")
+    try:
+        message = json.loads(text, parse_constant=_refuse)
+    except (ValueError, RecursionError):
+        raise InputError("message: it is no JSON; allowed: an object; send one") from None
+    if not isinstance(message, dict) or not isinstance(message.get("kind"), str):
+        raise InputError("message: it has no kind; allowed: an object with a kind; send one")
+    if message["kind"] not in KINDS:
+        raise unknown("message: kind", message["kind"], KINDS)
+    keys = ("kind", "number", *KINDS[message["kind"]])
+    require_keys("message", message, keys)
+    if set(keys) - message.keys():
+        raise InputError(f"message: {sorted(set(keys) - message.keys())[0]!r} is missing; add it")
+    require_whole("number", message["number"], 0, 2**53, "count requests")
+    cameras = message.get("cameras", [{}])
+    if not isinstance(cameras, list) or not 1 <= len(cameras) <= 2:
+        raise InputError("cameras: they are no list of one or two; send one or two")
+    return message
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(constant)
+
+
+def read_view(value: Any) -> str:
+    """Name of a view, or of a figure that Python can make."""
+    if isinstance(value, str) and value in VIEWS:
+        return value
+    words = value.split(" ") if isinstance(value, str) else []
+    if words == ["histogram"] or (len(words) == 3 and words[0] == "pixel" and all(x.isdecimal() for x in words[1:])):
+        return " ".join(words)
+    raise unknown("view", value, (*VIEWS, "histogram", "pixel ROW COLUMN"))
+
+
+def read_views(value: Any, cameras: int) -> list[tuple[int, str]]:
+    """Camera and name of each view."""
+    pairs = value if isinstance(value, list) and 1 <= len(value) <= 4 else [value]
+    found = []
+    for pair in pairs:
+        camera, view = pair if isinstance(pair, list) and len(pair) == 2 else (None, None)
+        if type(camera) is not int or camera not in range(cameras) or not isinstance(view, str) or view not in VIEWS:
+            raise InputError(f"views: {pair!r} is not allowed; give up to four of [camera, view], cameras from 0")
+        found.append((camera, view))
+    return found

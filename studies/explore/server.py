@@ -1,0 +1,173 @@
+"""The explorer's page on this machine: files and one WebSocket, behind a token, for its own origin alone."""
+
+import asyncio
+import hmac
+import json
+import secrets
+import socket
+import struct
+from collections.abc import Awaitable, Callable, MutableMapping, Sequence
+from typing import Any
+
+from rodcone.errors import InputError, require_whole
+from rodcone.optional import optional_library
+from studies.explore.messages import MOST_CHARACTERS, Header
+from studies.explore.session import Session
+from studies.pages.page import TEMPLATES
+
+HOST = "127.0.0.1"
+FILES = {
+    "": ("explore.html", "text/html"),
+    "explore.js": ("explore.js", "text/javascript"),
+    "explore_page.js": ("explore_page.js", "text/javascript"),
+    "explore.css": ("explore.css", "text/css"),
+}
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+}
+EXTRA = "explore"
+
+Scope = MutableMapping[str, Any]
+App = Callable[[Scope, Any, Any], Awaitable[None]]
+
+
+def make_app(session: Session, port: int, token: str) -> App:
+    """ASGI application: what isn't asked for under the token, by this host's name and from its own page, is refused.
+
+    Parameters
+    ----------
+    session : Session
+    port : int
+        That the server listens on: part of the host and origin that are let in.
+    token : str
+        First part of every path.
+    """
+    applications, responses, routing = (
+        optional_library(f"starlette.{name}", EXTRA) for name in ("applications", "responses", "routing")
+    )
+    hosts = (f"{HOST}:{port}", f"localhost:{port}")
+
+    async def file(request: Any) -> Any:
+        name, kind = FILES[request.path_params.get("name", "")]
+        return responses.Response((TEMPLATES / name).read_bytes(), media_type=kind, headers=HEADERS)
+
+    async def live(socket: Any) -> None:
+        await socket.accept()
+        loop, outgoing = asyncio.get_running_loop(), asyncio.Queue[bytes]()
+
+        def send(header: Header, buffers: Sequence[bytes]) -> None:
+            loop.call_soon_threadsafe(outgoing.put_nowait, packed(header, buffers))
+
+        async def forward() -> None:
+            while True:
+                await socket.send_bytes(await outgoing.get())
+
+        session.connect(send)
+        sending = asyncio.create_task(forward())
+        try:
+            while (message := await socket.receive())["type"] == "websocket.receive":
+                session.take(message.get("text") or "")
+        finally:
+            sending.cancel()
+
+    routes = [
+        routing.Route(f"/{token}/", file),
+        routing.Route(f"/{token}/{{name:str}}", file),
+        routing.WebSocketRoute(f"/{token}/live", live),
+    ]
+    inner = applications.Starlette(routes=routes)
+
+    async def guarded(scope: Scope, receive: Any, send: Any) -> None:
+        if scope["type"] == "lifespan":
+            await inner(scope, receive, send)
+        elif why := refusal(scope, hosts, token):
+            await _refuse(scope, receive, send, responses.PlainTextResponse(f"{why}\n", 403, headers=HEADERS))
+        else:
+            await inner(scope, receive, send)
+
+    return guarded
+
+
+def refusal(scope: Scope, hosts: Sequence[str], token: str) -> str | None:
+    """Why a request is refused; None where it isn't.
+
+    A WebSocket has to state an origin: a browser always does, and another site's page can open one without asking.
+    """
+    headers = [(name.decode("latin-1").lower(), value.decode("latin-1")) for name, value in scope["headers"]]
+    given = {name: [value for other, value in headers if other == name] for name in ("host", "origin")}
+    path = scope["path"].split("/")
+    if len(given["host"]) != 1 or given["host"][0] not in hosts:
+        return "Host: not this machine's address; open the address that rodcone explore printed"
+    origins = [f"http://{given['host'][0]}"]
+    if given["origin"] not in ([origins] if scope["type"] == "websocket" else [[], origins]):
+        return "Origin: not this page's; open the address that rodcone explore printed"
+    if len(path) != 3 or not hmac.compare_digest(path[1].encode(), token.encode()):
+        return "token: wrong or missing; open the address that rodcone explore printed"
+    if scope["type"] == "http" and (scope["method"] not in ("GET", "HEAD") or path[2] not in FILES):
+        return "request: not a file of this page"
+    if scope["type"] == "websocket" and path[2] != "live":
+        return "request: not this page's connection"
+    return None
+
+
+async def _refuse(scope: Scope, receive: Any, send: Any, response: Any) -> None:
+    """Answer before anything is read; a WebSocket is closed before it is opened, which is 403."""
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": 1008})
+    else:
+        await response(scope, receive, send)
+
+
+def packed(header: Header, buffers: Sequence[bytes]) -> bytes:
+    """One message: the header's length as 32 bits, the header with the buffers' lengths as JSON, the buffers."""
+    text = json.dumps(header | {"lengths": [len(each) for each in buffers]}, allow_nan=False).encode()
+    return b"".join((struct.pack("<I", len(text)), text, *buffers))
+
+
+def listen(port: int) -> socket.socket:
+    """Socket of this machine alone; port 0 takes a free one.
+
+    Raises
+    ------
+    InputError
+        For no port, or one that is taken.
+    """
+    require_whole("port", port, 0, 65_535, "give a port of this machine, 0 for a free one")
+    listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((HOST, port))
+    except OSError as error:
+        listener.close()
+        raise InputError(f"port: {port} can't be listened on ({error.strerror}); leave it out for a free one") from None
+    return listener
+
+
+def make_server(session: Session, listener: socket.socket) -> tuple[Any, str]:
+    """Server that `run(sockets=[listener])` starts, and the address to open.
+
+    Raises
+    ------
+    InputError
+        Where the extra isn't installed.
+    """
+    uvicorn = optional_library("uvicorn", EXTRA)
+    optional_library("websockets", EXTRA)
+    token, port = secrets.token_urlsafe(32), listener.getsockname()[1]
+    config = uvicorn.Config(
+        make_app(session, port, token),
+        log_level="warning",
+        access_log=False,
+        ws="websockets-sansio",
+        ws_max_size=4 * MOST_CHARACTERS,
+        ws_per_message_deflate=False,
+        server_header=False,
+        timeout_graceful_shutdown=1,
+    )
+    return uvicorn.Server(config), f"http://{HOST}:{port}/{token}/"

@@ -1,0 +1,270 @@
+"""What the page asks and what it is answered: messages in, pictures and figures out, on one thread of its own.
+
+Of requests of one kind only the newest is answered: what a slider has left behind is not computed. Every answer has the
+number of its request and the controls that it was made with; the page shows none that is older than its last question.
+"""
+
+import sys
+import threading
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+from isp.picture import Picture
+from rodcone.errors import InputError
+from sensor.presets import names as sensors
+from studies.explore.chain import Exposed, Image, Shot, development_of, expose_scene, photograph, true_picture_of
+from studies.explore.controls import Controls, Lamp, controls_from, to_json
+from studies.explore.files import dng_of, png_of
+from studies.explore.memo import Memo
+from studies.explore.messages import KINDS, Header, hello, read_message, read_view, read_views
+from studies.explore.slow import begin, is_slow, stand_in
+from studies.explore.source import Rendered, Source
+from studies.explore.views import VIEWS, facts, histogram, pixel
+from studies.explore.written import python_of, study_of
+
+Answer: TypeAlias = tuple[Header, Sequence[bytes]]
+Send: TypeAlias = Callable[[Header, Sequence[bytes]], None]
+
+# Terms and processors that have kernels of their own: these are compiled while nobody asks, not under a slider.
+_HOT = {"hot_pixel_share": 0.01, "hot_pixel_dark_current_e_per_s": 100.0}
+_COLUMNS = {"column_gain_spread": 0.01}
+WARM = (
+    *(Controls(pixel=terms) for terms in ({"crosstalk": 0.01}, _HOT, _COLUMNS, _HOT | _COLUMNS)),
+    *(Controls(settings={"neighbourhood": width}) for width in (3.0, 11.0, 41.0)),
+    *(Controls(settings={"patch": width}) for width in (3.0, 5.0)),
+    Controls(mosaic="rgbw_4x4"),
+    Controls(processor="interleaved_paper"),
+    Controls(processor="bayer_nlm", mosaic="bayer"),
+)
+REST_S = 0.4  # without a new setting, after which a slow processor begins
+
+
+class Session:
+    """One explorer: its render, what it has computed, and the page that asks.
+
+    Parameters
+    ----------
+    source : Source
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source, self._states = source, source.states()
+        self._rendered: Rendered | None = None
+        self._memo = Memo()
+        self._cold = list(WARM)
+        self._pending: dict[str, Header] = {}
+        self._shown: Header | None = None
+        self._slow: dict[str, Callable[[], None]] = {}  # what ends each job at work, by its camera
+        self._send: Send = lambda header, buffers: None
+        self._slow_wanted = False
+        self._asked_s = -REST_S  # when the last picture was asked for
+        self._closed = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._work, daemon=True, name="explorer")
+        self._thread.start()
+
+    def connect(self, send: Send) -> None:
+        """Answer to another page from now on; the one before is told."""
+        self._send({"kind": "taken over"}, ())
+        self._send = send
+
+    def take(self, text: str) -> None:
+        """Take a message; it is answered from the session's thread. What isn't allowed is told at once."""
+        number: Any = None
+        try:
+            message = read_message(text)
+            number = message["number"]
+        except InputError as error:
+            self._send({"kind": "error", "number": number, "message": str(error)}, ())
+            return
+        with self._changed:
+            self._pending[message["kind"]] = message
+            if message["kind"] in ("show", "cancel"):
+                self._asked_s = time.monotonic()
+                self._end_slow()
+            self._changed.notify()
+
+    def close(self) -> None:
+        """End the thread, and what it has begun."""
+        with self._changed:
+            self._closed = True
+            self._end_slow()
+            self._changed.notify()
+        self._thread.join()
+
+    def _end_slow(self) -> None:
+        for end in self._slow.values():
+            end()
+        self._slow.clear()
+        self._slow_wanted = False
+
+    def _work(self) -> None:
+        """Answer what is asked; where nothing is, do what is left to do."""
+        while not self._closed:
+            message, act = self._next()
+            with warnings.catch_warnings(record=True) as told:
+                warnings.simplefilter("always")
+                try:
+                    if message is not None:
+                        header, buffers = self._answer(message)
+                        notes = sorted({str(each.message) for each in told})
+                        whose = {"kind": message["kind"], "number": message["number"], "notes": notes}
+                        self._send(header | whose, buffers)
+                    else:
+                        act()
+                except InputError as error:
+                    self._fail(message, str(error))
+                except Exception as error:  # the page goes on; the terminal has the place
+                    traceback.print_exc(file=sys.stderr)
+                    self._fail(message, f"the program failed: {type(error).__name__}: {error}; see its terminal")
+
+    def _next(self) -> tuple[Header | None, Callable[[], None]]:
+        """Take the message to answer, or what to do while nothing is asked; waits for one of them."""
+        with self._changed:
+            while not self._closed:
+                kind = next((kind for kind in KINDS if kind in self._pending), None)
+                if kind is not None and (self._rendered is not None or kind == "hello"):
+                    return self._pending.pop(kind), _nothing
+                act, left_s = self._left_to_do(), self._asked_s + REST_S - time.monotonic()
+                if act is not None and (left_s <= 0 or self._rendered is None):
+                    return None, act
+                self._changed.wait(None if act is None else left_s)
+        return None, _nothing
+
+    def _left_to_do(self) -> Callable[[], None] | None:
+        """What waits for the sliders to rest: a finer render, slow processors, kernels to compile."""
+        if self._rendered is None or not self._rendered.last:
+            return self._render_on
+        if self._slow_wanted:
+            return self._begin_slow
+        return self._warm_up if self._cold else None
+
+    def _fail(self, message: Header | None, words: str) -> None:
+        self._send({"kind": "error", "number": message and message["number"], "message": words}, ())
+
+    def _render_on(self) -> None:
+        """Render the next state, and show what is in view again."""
+        self._rendered = next(self._states)
+        self._memo = Memo()
+        with self._changed:
+            if self._shown is not None:
+                self._pending.setdefault("show", self._shown)
+
+    def _warm_up(self) -> None:
+        """Compile the kernels of one of `WARM`."""
+        assert self._rendered is not None
+        photograph(self._rendered.transport, self._cold.pop(), Memo())
+
+    def _answer(self, message: Header) -> Answer:
+        kind = message["kind"]
+        if kind in ("hello", "cancel"):
+            return (hello(self._source) if kind == "hello" else {}), ()
+        rendered = self._rendered
+        assert rendered is not None  # `_work` waits for the first state
+        cameras = [controls_from(each, self._sensors()) for each in message["cameras"]]
+        if kind == "show":
+            return self._show(message, cameras, rendered)
+        header, buffers = self._written(message, cameras[0], rendered)
+        return header | {"cameras": [{"controls": to_json(cameras[0])}]}, buffers
+
+    def _written(self, message: Header, controls: Controls, rendered: Rendered) -> Answer:
+        """Figures, text and files of one camera."""
+        kind = message["kind"]
+        answer: Answer = {}, ()
+        if kind == "python":
+            return {"text": python_of(rendered.code, controls, read_view(message["view"]))}, ()
+        if kind == "study":
+            return {"files": self._study(controls, rendered)}, ()
+        exposed = expose_scene(rendered.transport, controls, self._memo)
+        if kind == "pixel":
+            answer = {"pixel": pixel(exposed, message["row"], message["column"])}, ()
+        elif kind == "histogram":
+            answer = {"histogram": histogram(exposed.raw)}, ()
+        elif kind == "dng":
+            answer = {"name": "explored.dng"}, (dng_of(exposed, controls),)
+        elif kind == "png":
+            shot = self._shot(controls, exposed) or photograph(rendered.transport, controls, self._memo)
+            answer = {"name": "explored.png"}, (png_of(VIEWS[read_view(message["view"])](shot)),)
+        return answer
+
+    def _show(self, message: Header, cameras: Sequence[Controls], rendered: Rendered) -> Answer:
+        """Pictures of each view that is asked for; slow processors are left for later."""
+        views = read_views(message["views"], len(cameras))
+        self._shown = message
+        shots, told = [], []
+        for controls in cameras:
+            exposed = expose_scene(rendered.transport, controls, self._memo)
+            shot, shown = self._shot(controls, exposed), controls
+            if shot is None:
+                quick = stand_in(controls.processor)
+                assert quick is not None  # every mosaic of a slow processor has a quick one
+                shown = replace(controls, processor=quick, settings={})
+                shot = photograph(rendered.transport, shown, self._memo)
+                self._slow_wanted = True
+            shots.append(shot)
+            told.append({"controls": to_json(shown), "waiting_for": controls.processor if shown != controls else None})
+        pictures = [VIEWS[view](shots[camera]) for camera, view in views]
+        height, width = pictures[0].shape[:2]
+        header = {
+            "cameras": told,
+            "views": [list(view) for view in views],
+            "facts": [facts(shot) for shot in shots],
+            "size": [height, width],
+            "spp": rendered.transport.spp,
+            "last": rendered.last,
+        }
+        return header, [picture.tobytes() for picture in pictures]
+
+    def _shot(self, controls: Controls, exposed: Exposed) -> Shot | None:
+        """Shot of an exposure; None where its processor is slow and hasn't been at work."""
+        if not is_slow(controls.processor):
+            development = development_of(exposed, controls, self._memo)
+            linear, picture = development.develop()
+        else:
+            found = self._memo.kept("slow", repr(controls))
+            if found is None:
+                return None
+            if isinstance(found, InputError):
+                raise found
+            linear, picture = found
+        return Shot(exposed, linear, true_picture_of(exposed, controls, self._memo), picture)
+
+    def _begin_slow(self) -> None:
+        """Set the slow processors of what is shown to work."""
+        self._slow_wanted, shown, rendered = False, self._shown, self._rendered
+        if shown is None or rendered is None:
+            return
+        for controls in [controls_from(each, self._sensors()) for each in shown["cameras"]]:
+            key, memo = repr(controls), self._memo
+            if is_slow(controls.processor) and memo.kept("slow", key) is None and key not in self._slow:
+
+                def done(result: tuple[Image, Picture] | InputError, key: str = key, memo: Memo = memo) -> None:
+                    with self._changed:
+                        self._slow.pop(key, None)
+                        memo.of("slow", key, lambda: result)  # kept as an answer is, errors too
+                        if self._shown is shown:
+                            self._pending.setdefault("show", shown)
+                        self._changed.notify()
+
+                end = begin(development_of(expose_scene(rendered.transport, controls, memo), controls, memo), done)
+                with self._changed:
+                    self._slow[key] = end
+
+    def _sensors(self) -> tuple[str, ...]:
+        """Presets, and the file that the command named; a page names no others."""
+        return tuple(dict.fromkeys((*sensors(), self._source.controls.sensor)))
+
+    def _study(self, controls: Controls, rendered: Rendered) -> dict[str, str]:
+        source = self._source
+        if source.scene is None:
+            raise InputError("study: a transport has no name that a study could say; allowed: rodcone explore SCENE")
+        lamps = {name: controls.lamps.get(name, Lamp()) for name in rendered.transport.groups}
+        return study_of(source.scene, source.size, source.band_nm, source.spp, replace(controls, lamps=lamps))
+
+
+def _nothing() -> None:
+    """Nothing to do."""

@@ -1,0 +1,224 @@
+"""What a shot is shown as: pictures of 8 bits, and figures as plain numbers."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from skimage.color import deltaE_ciede2000, rgb2lab
+
+from render.photometry import photons_per_joule
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
+from rodcone.errors import require_whole
+from sensor.cfa import channel_map, channels, mask
+from sensor.config import SensorConfig
+from sensor.raw import RawImage
+from sensor.readout import noise_variance, spread_charge
+from sensor.response import electrons_per_irradiance
+from studies.explore.chain import Exposed, GroupFrame, Shot
+from studies.metrics.flip import flip
+
+Bytes = NDArray[np.uint8]
+Image = NDArray[np.float64]
+
+MOST_SIGMAS = 4.0  # of the noise that is black or white
+MOST_LUMINANCE_ERROR = 0.25  # of white
+MOST_DELTA_E, MOST_SNR_DB = 10.0, 40.0
+BINS, LEAST_E = 80, 0.5  # of the histogram
+# Colours of the channels in the raw mosaic, linear; W's is white.
+_TINTS = {"R": (1, 0.1, 0.1), "G": (0.1, 1, 0.1), "B": (0.15, 0.2, 1), "C": (0, 1, 1), "M": (1, 0, 1), "Y": (1, 1, 0)}
+
+
+# Pictures
+
+
+def raw_picture(shot: Shot) -> Bytes:
+    """The mosaic, each pixel in its channel's colour, encoded as sRGB; a full well is white."""
+    raw = shot.exposed.raw
+    share = np.clip(raw.electrons / raw.full_well_e, 0.0, 1.0)
+    tints = np.array([_TINTS.get(channel, (1, 1, 1)) for channel in channels(raw.cfa)])
+    index = np.vectorize(channels(raw.cfa).index)(channel_map(raw.cfa, raw.shape))
+    return _bytes(encode_srgb(share[..., None] * tints[index]))
+
+
+def noise_picture(shot: Shot) -> Bytes:
+    """Raw image less the expected electrons: grey is none, black and white are four standard deviations."""
+    exposed = shot.exposed
+    frames = round(exposed.raw.exposure_s / exposed.exposure_s)
+    dark_e = exposed.sensor.pixel.dark_current_e_per_s * exposed.exposure_s
+    noise_e = exposed.raw.electrons - frames * (exposed.expected_e + dark_e)
+    return _grey(0.5 + 0.5 * noise_e / (MOST_SIGMAS * frames**0.5 * noise_scale_e(exposed)))
+
+
+def luminance_error_picture(shot: Shot) -> Bytes:
+    """Luminance of the picture less the truth's: grey is none, white and black are a quarter of white."""
+    error = luminance_of_srgb(shot.linear) - luminance_of_srgb(shot.true)
+    return _grey(0.5 + 0.5 * error / MOST_LUMINANCE_ERROR)
+
+
+def colour_error_picture(shot: Shot) -> Bytes:
+    """CIEDE2000 between the encoded picture and the truth: 0 is dark, 10 and more are bright."""
+    error = deltaE_ciede2000(rgb2lab(encode_srgb(shot.linear)), rgb2lab(encode_srgb(shot.true)))
+    return _coloured(error / MOST_DELTA_E)
+
+
+def flip_picture(shot: Shot) -> Bytes:
+    """FLIP between the encoded picture and the truth: 0 is dark, 1 is bright."""
+    return _coloured(flip(encode_srgb(shot.linear), encode_srgb(shot.true)))
+
+
+def snr_picture(shot: Shot) -> Bytes:
+    """Expected electrons over the noise of a pixel, of one frame: 0 dB is dark, 40 dB and more are bright."""
+    exposed = shot.exposed
+    variance = noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
+    with np.errstate(divide="ignore"):
+        snr_db = 10 * np.log10(exposed.expected_e**2 / variance)
+    return _coloured(snr_db / MOST_SNR_DB)
+
+
+VIEWS: Mapping[str, Callable[[Shot], Bytes]] = MappingProxyType(
+    {
+        "picture": lambda shot: shot.picture,
+        "truth": lambda shot: shot.truth,
+        "raw": raw_picture,
+        "noise": noise_picture,
+        "luminance error": luminance_error_picture,
+        "colour error": colour_error_picture,
+        "flip": flip_picture,
+        "snr": snr_picture,
+    }
+)
+
+
+def noise_scale_e(exposed: Exposed) -> float:
+    """Standard deviation of the noise of one frame [e-], root mean square over the pixels."""
+    return float(np.sqrt(noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s).mean()))
+
+
+def _grey(share: Image) -> Bytes:
+    return _bytes(np.repeat(np.clip(share, 0.0, 1.0)[..., None], 3, axis=2))
+
+
+def _coloured(share: Image) -> Bytes:
+    from matplotlib import colormaps  # late: it takes a while to load, and few views need it
+
+    return np.asarray(colormaps["viridis"](np.clip(np.nan_to_num(share, neginf=0.0), 0.0, 1.0), bytes=True)[..., :3])
+
+
+def _bytes(encoded: Image) -> Bytes:
+    return np.asarray(np.rint(encoded * 255), dtype=np.uint8)
+
+
+# Figures
+
+
+def facts(shot: Shot) -> dict[str, Any]:
+    """What the page says of a shot in words and numbers."""
+    exposed, raw, picture = shot.exposed, shot.exposed.raw, shot.developed
+    return {
+        "exposure_s": exposed.exposure_s,
+        "white_cd_m2": exposed.white_cd_m2,
+        "saturated": float(raw.saturated.mean()),
+        "snr_db": picture.snr_db,
+        "substitution": picture.substitution,
+        "engine": picture.engine,
+        "mean_e": {
+            channel: float(exposed.expected_e[mask(raw.cfa, channel, raw.shape)].mean())
+            for channel in channels(raw.cfa)
+        },
+        "noise_e": noise_scale_e(exposed),
+    }
+
+
+def histogram(raw: RawImage) -> dict[str, Any]:
+    """Samples of each channel by their electrons, in bins of equal width on a logarithmic scale.
+
+    Returns
+    -------
+    dict
+        ``edges_e`` (n + 1,); ``counts`` by channel, (n,), what lies under the first edge or over the last in the first
+        and the last bin; ``well_e``, ``saturation_e`` and ``floor_e``, the dark noise of a pixel.
+    """
+    edges = np.geomspace(LEAST_E, 1.05 * raw.full_well_e, BINS + 1)
+    electrons = np.clip(raw.electrons, edges[0], edges[-1])
+    counts = {
+        channel: np.histogram(electrons[mask(raw.cfa, channel, raw.shape)], edges)[0].tolist()
+        for channel in channels(raw.cfa)
+    }
+    return {
+        "edges_e": edges.tolist(),
+        "counts": counts,
+        "well_e": raw.full_well_e,
+        "saturation_e": raw.saturation_e,
+        "floor_e": raw.dark_noise_e,
+    }
+
+
+def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
+    """Light budget and spectrum of one pixel in one frame.
+
+    Returns
+    -------
+    dict
+        ``photons`` on the pixel's area; ``electrons`` by channel, as if the pixel had its filter; ``channel``, its own;
+        ``read_e``, what the raw image reads there; ``noise_e``, the standard deviation of each source [e-], and
+        ``total`` of `sensor.readout.noise_variance`. ``wavelength_nm``, ``photons_nm`` (by band, a nanometre) and
+        ``electrons_nm`` (by channel and band, a nanometre) are its spectrum, and what the filters make of it.
+
+    Raises
+    ------
+    InputError
+        For a pixel outside the frame.
+    """
+    sensor, raw, time_s = exposed.sensor, exposed.raw, exposed.exposure_s
+    require_whole("row", row, 0, raw.shape[0] - 1, "give a row of the frame")
+    require_whole("column", column, 0, raw.shape[1] - 1, "give a column of the frame")
+    nm, width = exposed.transport.wavelength_nm, exposed.transport.width_nm
+
+    # Light of all groups on the pixel
+    def light(name: str, frame: GroupFrame) -> Image:
+        factor = exposed.transport.groups[name].power * exposed.scale
+        return factor * np.asarray(frame.irradiance.values[row, column], dtype=np.float64)
+
+    irradiance = np.sum([light(name, frame) for name, frame in exposed.frames.items()], axis=0)
+    area_m2 = (sensor.pixel.pitch_um * 1e-6) ** 2
+    photons = irradiance * photons_per_joule(nm) * width * area_m2 * time_s
+    electrons = electrons_per_irradiance(sensor, nm, width, time_s) * irradiance
+    names = channels(sensor.cfa)
+    return {
+        "row": row,
+        "column": column,
+        "channel": str(channel_map(sensor.cfa, raw.shape)[row, column]),
+        "photons": float(photons.sum()),
+        "electrons": dict(zip(names, electrons.sum(axis=1).tolist(), strict=True)),
+        "read_e": float(raw.electrons[row, column]),
+        "well_e": sensor.pixel.full_well_e,
+        "noise_e": noise_sources_e(exposed.expected_e, sensor, time_s, row, column),
+        "wavelength_nm": nm.tolist(),
+        "photons_nm": (photons / width).tolist(),
+        "electrons_nm": dict(zip(names, (electrons / width).tolist(), strict=True)),
+    }
+
+
+def noise_sources_e(
+    expected_e: Image, sensor: SensorConfig, exposure_s: float, row: int, column: int
+) -> dict[str, float]:
+    """Standard deviation of each noise source of one pixel of a chip drawn at random [e-], and of all together."""
+    own = sensor.pixel
+    total = float(noise_variance(expected_e, sensor, exposure_s)[row, column])
+    signal = float(spread_charge(expected_e, own.crosstalk)[row, column])
+    dark, hot = own.dark_current_e_per_s * exposure_s, own.hot_pixel_dark_current_e_per_s * exposure_s
+    share = own.hot_pixel_share
+    variances = {
+        "shot noise": signal,
+        "dark current": dark,
+        "hot pixels": share * hot + share * (1 - share) * hot**2,
+        "PRNU": (own.prnu * signal) ** 2,
+        "DSNU": own.dsnu_e**2,
+        "column offsets": own.column_offset_e**2,
+        "read noise": own.read_noise_e**2,
+        "quantisation": sensor.gain_e_per_dn**2 / 12,
+    }
+    variances["column gains"] = max(total - sum(variances.values()), 0.0) if own.column_gain_spread else 0.0
+    return {**{name: value**0.5 for name, value in variances.items()}, "total": total**0.5}

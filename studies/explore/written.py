@@ -1,0 +1,133 @@
+"""What a shot is written as: Python that makes it again to the bit, and a study that asks the same question."""
+
+from dataclasses import fields
+from typing import Any
+
+from rodcone.errors import InputError
+from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.presets import preset, preset_file
+from studies.explore.controls import TIME, Controls, Lamp, camera_of
+from studies.study.study import OWN
+
+GIVEN = "transport = ...  # the one that was given to rodcone.explore\n"
+
+
+def python_of(render: str, controls: Controls, view: str = "picture") -> str:
+    """Python that makes a picture of the page again, to the bit.
+
+    Parameters
+    ----------
+    render : str
+        Lines that make `transport` (`studies.explore.source.Source`), or `GIVEN`.
+    controls : Controls
+    view : str
+        Of `studies.explore.views.VIEWS`, ``histogram``, or ``pixel ROW COLUMN``.
+    """
+    changed = {
+        each.name: getattr(controls, each.name)
+        for each in fields(controls)
+        if getattr(controls, each.name) != getattr(Controls(), each.name)
+    }
+    written = "".join(f"    {name}={value!r},\n" for name, value in changed.items())
+    lamp = ", Lamp" if "lamps" in changed else ""
+    name, *place = view.split(" ") if view.startswith("pixel ") else (view,)
+    if name == "pixel":
+        row, column = map(int, place)
+        taken, last = "pixel", f"figure = pixel(shot.exposed, {row}, {column})\n"
+    elif name == "histogram":
+        taken, last = "histogram", "figure = histogram(shot.exposed.raw)\n"
+    else:
+        taken, last = "VIEWS", f"picture = VIEWS[{view!r}](shot)  # (h, w, 3) uint8\n"
+    lines = (
+        f"{render}controls = Controls({f'{chr(10)}{written}' if written else ''})\n"
+        f"shot = photograph(transport, controls)\n{last}"
+    ).splitlines()
+    own = (
+        "from studies.explore.chain import photograph",
+        f"from studies.explore.controls import Controls{lamp}",
+        f"from studies.explore.views import {taken}",
+    )
+    imports = sorted(line for line in (*own, *lines) if line.startswith("from "))
+    numpy = ["import numpy as np"] if "import numpy as np" in lines else []
+    code = [line for line in lines if line and not line.startswith(("from ", "import "))]
+    return "\n".join([*numpy, "import rodcone", *imports, "", *code, ""])
+
+
+def study_of(scene: str, size: int, band_nm: float, spp: int, controls: Controls) -> dict[str, str]:
+    """Files of a study that asks for this scene, light and camera: ``study.toml`` and, with own terms, ``sensor.toml``.
+
+    Raises
+    ------
+    InputError
+        Where a study can't say it: lamps of their own, a burst, or settings of the processor.
+    """
+    spectrum = _one_spectrum(controls)
+    for name, what in (("settings", "settings of a processor"), ("frames", "bursts")):
+        if getattr(controls, name) != getattr(Controls(), name):
+            raise InputError(f"study: a study has no {what}; allowed: none; set {name} back, or copy the Python")
+    own = preset(controls.sensor)
+    sensor = camera_of(controls)
+    terms = dict(controls.lens) | dict(controls.pixel)
+    changed = bool(terms.keys() - {"diffraction", "veiling_glare"}) or controls.bits is not None
+    exposure = f"{controls.exposure_s * 1e6!r}us" if controls.exposure == TIME else controls.exposure
+    longest = "" if controls.exposure == TIME else f"longest_exposure_s = {controls.exposure_s!r}\n"
+    lines = (
+        f"# From the explorer: seed {controls.seed}, exposure {controls.exposure_number}.\n"
+        f"#   rodcone sweep study.toml -o out/study\n\n"
+        f'name = "explored"\nscenes = [{_text(scene)}]\nspectra = [{_text(spectrum)}]\n'
+        f'levels = ["{controls.level_cd_m2:.12g}cd/m2"]\nexposures = [{_text(exposure)}]\n'
+        f"sensors = [{_text('sensor.toml' if changed else controls.sensor)}]\n"
+        f"white_balances = [{_text(controls.white_balance)}]\nprocessors = [{_text(controls.processor)}]\n"
+        f"seeds = [{controls.seed}]\n{longest}\n"
+        f"[render]\nsize = {size}\nband_nm = {band_nm!r}\nspp = {spp}\n\n"
+        f"[lens]\ndiffraction = {sensor.lens.diffraction!r}\nveiling_glare = {sensor.lens.veiling_glare!r}\n"
+        f"horizontal_view_deg = {sensor.lens.horizontal_view_deg!r}\n"
+    )
+    if not changed:
+        return {"study.toml": lines}
+    return {"study.toml": lines, "sensor.toml": _sensor_file(controls, own, sensor)}
+
+
+def _one_spectrum(controls: Controls) -> str:
+    """The spectrum of all lamps as a study names it."""
+    lamps = list(controls.lamps.values()) or [Lamp()]
+    if len({lamp.spectrum for lamp in lamps}) > 1 or any(lamp.table or lamp.power != 1 for lamp in lamps):
+        raise InputError(
+            "study: its lights have one spectrum for all, by name, and their own powers; allowed: such lamps; set "
+            "them so, or copy the Python"
+        )
+    return lamps[0].spectrum if lamps else OWN
+
+
+def _sensor_file(controls: Controls, own: SensorConfig, sensor: SensorConfig) -> str:
+    """Sensor file of a preset with other terms: the preset's lines, with the numbers that differ."""
+    if controls.sensor.endswith(".toml"):
+        raise InputError(
+            f"study: {controls.sensor} with other terms is no preset; allowed: a preset; change the file itself"
+        )
+    lines = preset_file(controls.sensor).read_text("utf-8").splitlines()
+    found: list[str] = []
+    wanted: dict[str, Any] = {}
+    for part, kind in (("pixel", PixelConfig), ("lens", LensConfig)):
+        for each in fields(kind):
+            before, now = (getattr(getattr(x, part), each.name) for x in (own, sensor))
+            if before != now:
+                wanted[each.name] = (part, now)
+    for line in lines:
+        key = line.partition("=")[0].strip()
+        if key in wanted:
+            found.append(f"{key} = {wanted.pop(key)[1]!r}")
+        elif key == "bits":
+            found.append(f"bits = {sensor.bits}")
+        else:
+            found.append(line)
+        for name in [name for name, (part, _) in wanted.items() if line.strip() == f"[{part}]"]:
+            if not any(each.partition("=")[0].strip() == name for each in lines):
+                found.append(f"{name} = {wanted.pop(name)[1]!r}")
+    return "\n".join(found) + "\n"
+
+
+def _text(value: str) -> str:
+    """A text as TOML quotes it."""
+    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'

@@ -1,0 +1,444 @@
+// The explorer: builds its controls from what the program says of itself, asks for a picture at every change, and shows
+// an answer only where nothing newer has been asked. `render` is what a notebook's widget calls, and the page too.
+
+const CAMERA = ["exposure", "exposure_s", "sensor", "mosaic", "lens", "pixel", "bits", "processor", "settings",
+  "white_balance", "seed", "exposure_number", "frames"];
+const TITLES = {
+  picture: "Picture", truth: "Truth", raw: "Raw mosaic", noise: "Noise only", "luminance error": "Error of luminance",
+  "colour error": "Error of colour, CIEDE2000", flip: "Error as seen, FLIP", snr: "SNR map",
+};
+const SCALES = {
+  truth: "noise-free, in the scene's light", raw: "white: full well",
+  noise: "grey: none; black and white: 4 standard deviations", "luminance error": "grey: none; white: +25 % of white",
+  "colour error": "dark: 0; yellow: 10 and more", flip: "dark: 0; yellow: 1", snr: "dark: 0 dB; yellow: 40 dB and more",
+};
+// Slider of a number: from, to, how it runs ("log", "cube" for 0 and small values, "even"), unit.
+const LENS = {
+  f_number: ["Aperture f/", 0.7, 32, "log", ""], defocus_um: ["Focus, blur disc", 0, 60, "cube", "µm"],
+  diffraction: ["Diffraction, 1: ideal lens", 0, 4, "even", "×"], veiling_glare: ["Veiling glare", 0, 0.3, "cube", ""],
+};
+const PIXEL = {
+  read_noise_e: ["Read noise", 0, 300, "cube", "e⁻"], dsnu_e: ["DSNU", 0, 300, "cube", "e⁻"],
+  prnu: ["PRNU", 0, 0.2, "cube", ""], dark_current_e_per_s: ["Dark current", 0, 1e5, "cube", "e⁻/s"],
+  column_gain_spread: ["Column gains", 0, 0.1, "cube", ""], column_offset_e: ["Column offsets", 0, 100, "cube", "e⁻"],
+  hot_pixel_share: ["Hot pixels, share", 0, 0.05, "cube", ""],
+  hot_pixel_dark_current_e_per_s: ["Hot pixels, current", 0, 1e6, "cube", "e⁻/s"],
+  crosstalk: ["Crosstalk", 0, 0.2, "cube", ""], full_well_e: ["Full well", 100, 1e6, "log", "e⁻"],
+};
+const SETTINGS = {
+  neighbourhood: ["Neighbourhood", 3, 41, "odd", "px"], patch: ["Patch", 1, 9, "odd", "px"],
+  sigma_d: ["σ of distance", 0.3, 30, "log", "px"], sigma_s: ["σ of similarity", 0.1, 3000, "log", "noise"],
+};
+const CHANNELS = { R: "var(--red)", G: "var(--green)", B: "var(--blue)", W: "var(--ink)", C: "var(--blue)", M: "var(--red)", Y: "var(--green)" };
+const STEPS = 1000;
+
+function render({ model, el }) {
+  let number = 0, latest = 0, hello, state, edited = "a", cursor = null, stale, pictureSize = [1, 1];
+  const waits = new Map(); // number -> what to do with the answer
+  const root = make("div", { class: "explore" });
+  el.append(root);
+
+  // Messages
+  const ask = (message, then) => {
+    message.number = ++number;
+    if (then) waits.set(number, then);
+    model.send(message);
+    return number;
+  };
+  model.on("msg:custom", (header, buffers) => {
+    if (header.kind === "hello") begin(header);
+    else if (header.kind === "show") { if (header.number === latest) paint(header, buffers); }
+    else if (header.kind === "error") fail(header);
+    else if (header.kind === "taken over") status("Another page has taken over; reload this one to take it back.", true);
+    else if (header.kind === "ended") status("The program has ended; nothing here is computed any more.", true);
+    else waits.get(header.number)?.(header, buffers);
+    waits.delete(header.number);
+  });
+  ask({ kind: "hello" });
+
+  // What is asked
+  const controls = side => side === "b" ? { ...state.a, ...state.b } : state.a;
+  const sides = () => [...new Set(state.views.map(([side]) => side))];
+  function change() {
+    const used = sides();
+    latest = ask({
+      kind: "show", cameras: used.map(controls), views: state.views.map(([side, view]) => [used.indexOf(side), view]),
+    });
+    root.dataset.asked = latest;
+    clearTimeout(stale);
+    stale = setTimeout(() => root.classList.add("waiting"), 150);
+  }
+  function fail({ number: of, message }) {
+    status(message, true);
+    if (of === latest) { clearTimeout(stale); root.classList.add("waiting"); root.dataset.failed = of; }
+  }
+  function status(text, bad = false) {
+    parts.status.textContent = text;
+    parts.status.classList.toggle("bad", bad);
+  }
+
+  // What is shown
+  function paint(header, buffers) {
+    const [height, width] = pictureSize = header.size;
+    header.views.forEach(([camera, view], index) => {
+      const canvas = parts.canvases[index], rgb = new Uint8Array(buffers[index].buffer, buffers[index].byteOffset, 3 * width * height);
+      if (canvas.width !== width || canvas.height !== height) {
+        Object.assign(canvas, { width, height });
+        canvas.style.setProperty("--ratio", width / height);
+      }
+      const image = new ImageData(width, height), rgba = new Uint32Array(image.data.buffer);
+      for (let i = 0, j = 0; i < rgba.length; i++, j += 3) rgba[i] = 0xff000000 | rgb[j + 2] << 16 | rgb[j + 1] << 8 | rgb[j];
+      canvas.getContext("2d").putImageData(image, 0, 0);
+      parts.captions[index].textContent = caption(header, camera, view, sides()[camera]);
+    });
+    clearTimeout(stale);
+    root.classList.remove("waiting");
+    root.dataset.painted = header.number;
+    root.dataset.last = header.last;
+    const slow = header.cameras.map(each => each.waiting_for).filter(Boolean);
+    parts.cancel.hidden = !slow.length;
+    const few = header.last ? "" : `Preview, ${width} × ${height} pixels at ${format(header.spp)} samples; a finer one is being rendered. `;
+    status(few + (slow.length ? `${slow.join(", ")} is at work; the picture is ${header.cameras.map(each => each.controls.processor).join(", ")}'s. ` : "")
+      + header.notes.join(" "));
+    root.dispatchEvent(new CustomEvent("painted", { detail: header, bubbles: true }));
+    // after the frame: what they take is not taken from the picture's
+    requestAnimationFrame(() => setTimeout(() => { if (header.number === latest) refreshFigures(); }));
+  }
+  function caption(header, camera, view, side) {
+    const told = header.cameras[camera].controls, facts = header.facts[camera];
+    const name = view === "truth" ? TITLES[view] : `${side.toUpperCase()}: ${TITLES[view]}`;
+    if (view !== "picture") return `${name}: ${SCALES[view]}`;
+    const snr = facts.snr_db === null ? "" : `, green's SNR ${facts.snr_db.toFixed(1)} dB`;
+    return `${name}: ${told.processor}, ${seconds(facts.exposure_s)}, ${(100 * facts.saturated).toPrecision(2)} % full${snr}`;
+  }
+
+  // Figures follow the picture: asked once it is painted, dim until theirs is there
+  function refreshFigures() {
+    const [side] = state.views[0], of = latest;
+    parts.figures.classList.add("waiting");
+    ask({ kind: "histogram", cameras: [controls(side)] }, ({ histogram }) => {
+      if (of !== latest) return;
+      drawHistogram(parts.histogram, histogram);
+      parts.figures.classList.remove("waiting");
+      root.dataset.figures = of;
+    });
+    if (cursor) askPixel();
+  }
+  function askPixel() {
+    const of = latest, { side, row, column } = cursor;
+    if (row >= pictureSize[0] || column >= pictureSize[1]) return;
+    ask({ kind: "pixel", cameras: [controls(side)], row, column }, ({ pixel }) => { if (of === latest) drawPixel(parts.budget, parts.spectrum, pixel); });
+  }
+  function point(index, row, column) {
+    const [height, width] = pictureSize;
+    cursor = { side: state.views[index][0], row: clamp(row, 0, height - 1), column: clamp(column, 0, width - 1) };
+    askPixel();
+  }
+
+  // The page
+  const parts = { canvases: [], captions: [], selects: [] };
+  function begin(header) {
+    hello = header;
+    state = { a: header.controls, b: { ...pick(header.controls, CAMERA), mosaic: "bayer", processor: "bayer", settings: {} },
+      views: [["a", "picture"], ["a", "truth"]] };
+    parts.status = make("p", { class: "status", role: "status" });
+    parts.cancel = make("button", { type: "button", hidden: "" }, "Cancel");
+    parts.cancel.onclick = () => { ask({ kind: "cancel" }); parts.cancel.hidden = true; status("Cancelled: the picture is the quick processor's."); };
+    parts.controls = make("form", { class: "controls", "aria-label": "Controls" });
+    parts.controls.onsubmit = event => event.preventDefault();
+    parts.stage = make("section", { class: "stage", "aria-label": "Pictures" });
+    root.replaceChildren(
+      make("header", {}, make("h1", {}, header.title), make("div", { class: "said" }, parts.status, parts.cancel)),
+      make("div", { class: "bench" }, parts.controls, parts.stage));
+    buildStage();
+    buildControls();
+    status(["The first picture is on its way.", ...header.assumed].join(" "));
+    change();
+  }
+
+  function buildStage() {
+    const options = ["a", "b"].flatMap(side => hello.views.filter(view => side === "a" || view !== "truth")
+      .map(view => [`${side} ${view}`, view === "truth" ? TITLES.truth : `${side.toUpperCase()}: ${TITLES[view]}`]));
+    const figures = [0, 1].map(index => {
+      const canvas = make("canvas", { tabindex: "0", "aria-label": `${index ? "Second" : "First"} picture; arrow keys move the pixel that is measured` });
+      parts.selects[index] = choice(index ? "Beside" : "View", options, state.views[index].join(" "), value => { state.views[index] = split(value); change(); });
+      canvas.onpointermove = canvas.onpointerdown = event => {
+        const box = canvas.getBoundingClientRect();
+        point(index, Math.floor((event.clientY - box.top) / box.height * pictureSize[0]), Math.floor((event.clientX - box.left) / box.width * pictureSize[1]));
+      };
+      canvas.onkeydown = event => {
+        const step = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] }[event.key];
+        if (!step) return;
+        event.preventDefault();
+        const { row, column } = cursor ?? { row: pictureSize[0] >> 1, column: pictureSize[1] >> 1 };
+        point(index, row + step[0], column + step[1]);
+      };
+      parts.canvases[index] = canvas;
+      parts.captions[index] = make("figcaption", {});
+      const buttons = make("div", { class: "buttons" },
+        button("Copy Python", () => python(index, state.views[index][1])), button("PNG", () => save({ kind: "png", cameras: [controls(state.views[index][0])], view: state.views[index][1] }, "image/png")));
+      return make("figure", {}, canvas, parts.captions[index], buttons);
+    });
+    parts.pictures = make("div", { class: "pictures side" }, ...figures);
+    parts.wipe = make("input", { type: "range", min: "0", max: "100", value: "50", "aria-label": "Wipe between the two pictures" });
+    parts.wipe.oninput = () => parts.pictures.style.setProperty("--wipe", `${parts.wipe.value}%`);
+    parts.wipeRow = make("label", { class: "wipe", hidden: "" }, "Wipe", parts.wipe);
+    const layout = choice("Layout", [["side", "Side by side"], ["over", "Wipe"], ["flip", "A/B (F flips)"]], "side", value => {
+      parts.pictures.className = `pictures ${value}`;
+      parts.wipeRow.hidden = value !== "over";
+    });
+    parts.histogram = drawing("Histogram of the raw image in electrons");
+    parts.budget = make("div", { class: "budget" }, "Point at a pixel.");
+    parts.spectrum = drawing("Spectrum of the pixel, and its electrons by channel");
+    parts.figures = make("div", { class: "figures" },
+      panel("Histogram", parts.histogram, button("Copy Python", () => python(0, "histogram"))),
+      panel("Light budget of the pixel", parts.budget, button("Copy Python", () => cursor && python(cursor.side, `pixel ${cursor.row} ${cursor.column}`))),
+      panel("Its spectrum through the filters", parts.spectrum));
+    parts.stage.append(make("div", { class: "bar" }, ...parts.selects, layout, parts.wipeRow), parts.pictures, parts.figures);
+    root.addEventListener("keydown", event => {
+      if (event.target.matches("input:not([type=range]), select, textarea") || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.key === "f") parts.pictures.classList.toggle("second");
+      if (event.key === "e") another();
+    });
+  }
+
+  // Controls
+  const target = () => edited === "a" ? state.a : state.b;
+  const another = () => { target().exposure_number += 1; buildControls(); change(); };
+  function buildControls() {
+    const camera = target(), preset = hello.sensors[camera.sensor], processors = Object.entries(hello.processors);
+    const open = new Set([...parts.controls.querySelectorAll("details[open]")].map(each => each.dataset.name));
+    const focused = document.activeElement?.dataset?.key;
+    const set = (name, value, rebuild) => { camera[name] = value; if (rebuild) buildControls(); change(); };
+    const terms = (name, sliders, own) => Object.entries(own).map(([key, base]) => slider(sliders[key], camera[name][key] ?? base, value => {
+      if (value === base) delete camera[name][key]; else camera[name][key] = value;
+      change();
+    }, `${name}.${key}`, sliders[key][1] === 0));
+    const mosaics = [...new Set(processors.flatMap(([, each]) => each.mosaics))];
+    const rule = camera.exposure === "time";
+    const group = (name, ...children) => {
+      const details = make("details", { "data-name": name }, make("summary", {}, name), ...children);
+      details.open = parts.controls.children.length ? open.has(name) : true;
+      return details;
+    };
+    parts.controls.replaceChildren(...[
+      group("Light",
+        slider(["Level", 1e-4, 1e5, "log", "cd/m²"], state.a.level_cd_m2, value => { state.a.level_cd_m2 = value; change(); }, "level"),
+        ...Object.entries(hello.groups).flatMap(([name, coloured]) => lamp(name, coloured)),
+        Object.values(hello.groups)[0] && choice("Judged under", hello.illuminants.map(each => [each, each]), state.a.reference_light,
+          value => { state.a.reference_light = value; change(); }, "reference_light")),
+      make("fieldset", { class: "tabs" }, make("legend", {}, "Camera"), ...["a", "b"].map(side => {
+        const radio = make("input", { type: "radio", name: "camera", value: side, "data-key": `camera ${side}` });
+        radio.checked = edited === side;
+        radio.onchange = () => { edited = side; buildControls(); };
+        return make("label", {}, radio, `Camera ${side.toUpperCase()}`);
+      }), button("A to B", () => { state.b = structuredClone(pick(state.a, CAMERA)); buildControls(); change(); })),
+      group("Exposure",
+        choice("Rule", hello.rules.map(each => [each, each]), camera.exposure, value => set("exposure", value, true), "exposure"),
+        slider([rule ? "Time" : "Longest time", 1e-6, 100, "log", "s"], camera.exposure_s, value => set("exposure_s", value), "exposure_s"),
+        slider(["Burst, exposures", 1, 16, "whole", ""], camera.frames, value => set("frames", value), "frames"),
+        numberBox("Seed", camera.seed, value => set("seed", value), "seed"),
+        make("div", { class: "row" }, button("Another exposure (E)", another), make("small", {}, `number ${camera.exposure_number}`))),
+      group("Lens", ...terms("lens", LENS, preset.lens)),
+      group("Sensor",
+        choice("Preset", Object.keys(hello.sensors).map(each => [each, each]), camera.sensor,
+          value => { Object.assign(camera, { lens: {}, pixel: {}, bits: null }); set("sensor", value, true); }, "sensor"),
+        choice("Mosaic", mosaics.map(each => [each, each]), camera.mosaic, value => {
+          if (!hello.processors[camera.processor].mosaics.includes(value)) {
+            camera.processor = processors.find(([, each]) => each.mosaics.includes(value))[0];
+            camera.settings = {};
+          }
+          set("mosaic", value, true);
+        }, "mosaic"),
+        slider(["Converter", 1, 16, "whole", "bit"], camera.bits ?? preset.bits, value => set("bits", value === preset.bits ? null : value), "bits"),
+        ...terms("pixel", PIXEL, preset.pixel)),
+      group("Processor",
+        choice("Processor", processors.map(([name, each]) => [name, each.slow ? `${name} (slow)` : name]), camera.processor, value => {
+          const { mosaics } = hello.processors[value];
+          if (!mosaics.includes(camera.mosaic)) camera.mosaic = mosaics[0];
+          camera.settings = {};
+          set("processor", value, true);
+        }, "processor"),
+        make("small", {}, hello.processors[camera.processor].source),
+        choice("White balance", hello.white_balances.map(each => [each, each]), camera.white_balance, value => set("white_balance", value), "white_balance"),
+        ...terms("settings", SETTINGS, hello.processors[camera.processor].settings)),
+      group("Save",
+        make("div", { class: "buttons" },
+          button("Raw as DNG", () => save({ kind: "dng", cameras: [controls(edited)] }, "image/x-adobe-dng")),
+          hello.saves.study && button("Study as TOML", () => ask({ kind: "study", cameras: [controls(edited)] }, ({ files }) => {
+            Object.entries(files).forEach(([name, text]) => download(name, new Blob([text], { type: "text/plain" })));
+          })))),
+    ]);
+    if (focused) parts.controls.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
+  }
+  function lamp(name, coloured) {
+    const own = () => state.a.lamps[name] ??= { spectrum: "own", power: 1, table: [] };
+    const now = state.a.lamps[name] ?? { spectrum: "own", power: 1, table: [] };
+    const kelvin = /^(\d+)K$/.exec(now.spectrum);
+    const value = now.table.length ? "file" : kelvin ? "body" : now.spectrum;
+    const options = [["own", "its own"], ["body", "black body"], ["file", "from a CSV file"], ...hello.illuminants.map(each => [each, each])];
+    const many = Object.keys(hello.groups).length > 1;
+    const file = make("input", { type: "file", accept: ".csv,text/csv,text/plain", hidden: "", "aria-label": `CSV file of ${name}'s spectrum` });
+    file.onchange = async () => {
+      const rows = (await file.files[0].text()).split(/\r?\n/).map(line => line.split(/[,;\t]/).map(cell => cell.trim() === "" ? NaN : Number(cell)));
+      const table = rows.filter(row => row.length >= 2 && row.slice(0, 2).every(Number.isFinite)).map(row => row.slice(0, 2));
+      if (table.length < 2) return status(`${name}: the file holds no rows of wavelength in nm and value.`, true);
+      Object.assign(own(), { spectrum: "own", table });
+      buildControls();
+      change();
+    };
+    const select = choice(`${name}: spectrum`, options, value, picked => {
+      if (picked === "file") { file.click(); return; }
+      Object.assign(own(), { spectrum: picked === "body" ? "3000K" : picked, table: [] });
+      buildControls();
+      change();
+    }, `spectrum ${name}`);
+    select.querySelector("select").disabled = coloured;
+    return [
+      select, file,
+      kelvin && slider([`${name}: temperature`, 1000, 20000, "log", "K"], +kelvin[1], kelvins => { own().spectrum = `${Math.round(kelvins)}K`; change(); }, `kelvin ${name}`),
+      many && slider([`${name}: power`, 0, 64, "cube", "×"], now.power, power => { own().power = power; change(); }, `power ${name}`, true),
+    ].filter(Boolean);
+  }
+
+  // Saving
+  function python(side, view) {
+    const of = typeof side === "number" ? state.views[side][0] : side;
+    ask({ kind: "python", cameras: [controls(of)], view }, ({ text }) => {
+      root.dataset.python = text;
+      const area = make("textarea", { readonly: "", rows: "18", cols: "90", "aria-label": "Python" });
+      area.value = text;
+      const dialog = make("dialog", {}, make("h2", {}, "Python that makes it again, to the bit"), area,
+        make("form", { method: "dialog" }, make("button", {}, "Close")));
+      dialog.onclose = () => dialog.remove();
+      root.append(dialog);
+      dialog.showModal();
+      area.select();
+      navigator.clipboard?.writeText(text).then(() => status("Copied."), () => status("Copy it from the window: the browser doesn't let the page."));
+    });
+  }
+  const save = (message, type) => ask(message, ({ name }, [bytes]) => download(name, new Blob([bytes], { type })));
+  function download(name, blob) {
+    const link = make("a", { href: URL.createObjectURL(blob), download: name });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  }
+}
+
+// Parts of the page
+function make(tag, attributes = {}, ...children) {
+  const element = document.createElement(tag);
+  Object.entries(attributes).forEach(([name, value]) => element.setAttribute(name, value));
+  element.append(...children.filter(child => child || child === 0));
+  return element;
+}
+function button(text, act) {
+  const element = make("button", { type: "button" }, text);
+  element.onclick = act;
+  return element;
+}
+function panel(title, ...children) { return make("section", {}, make("h2", {}, title), ...children); }
+function choice(title, options, value, act, key = title) {
+  const select = make("select", { "data-key": key }, ...options.map(([name, text]) => make("option", { value: name }, text)));
+  select.value = value;
+  select.onchange = () => act(select.value);
+  return make("label", { class: "choice" }, make("span", {}, title), select);
+}
+function numberBox(title, value, act, key) {
+  const box = make("input", { type: "number", min: "0", step: "1", value, "data-key": key });
+  box.oninput = () => box.checkValidity() && box.value !== "" && act(Number(box.value));
+  return make("label", { class: "choice" }, make("span", {}, title), box);
+}
+// A range beside a number box; both say the same value, the box to the digit.
+function slider([title, from, to, way, unit], value, act, key, off = false) {
+  const at = {
+    log: share => round(from * (to / from) ** share), cube: share => round(from + (to - from) * share ** 3),
+    even: share => round(from + (to - from) * share), whole: share => Math.round(from + (to - from) * share),
+    odd: share => from + 2 * Math.round((to - from) / 2 * share),
+  }[way];
+  const place = number => ({
+    log: () => Math.log(number / from) / Math.log(to / from), cube: () => Math.cbrt((number - from) / (to - from)),
+  }[way] ?? (() => (number - from) / (to - from)))();
+  const range = make("input", { type: "range", min: "0", max: STEPS, step: "1", "data-key": key, "aria-label": title });
+  const box = make("input", { type: "number", step: "any", value, "data-key": `${key} box`, "aria-label": `${title}${unit ? `, ${unit}` : ""}` });
+  const tell = number => range.setAttribute("aria-valuetext", `${format(number)} ${unit}`);
+  range.value = STEPS * clamp(place(value), 0, 1);
+  tell(value);
+  range.oninput = () => { const number = at(range.value / STEPS); box.value = number; tell(number); act(number); };
+  box.oninput = () => {
+    if (box.value === "" || !Number.isFinite(Number(box.value))) return;
+    range.value = STEPS * clamp(place(Number(box.value)), 0, 1) || 0;
+    tell(Number(box.value));
+    act(Number(box.value));
+  };
+  const zero = off && button("off", () => { box.value = 0; box.oninput(); });
+  return make("div", { class: "slider" }, make("span", {}, title), box, make("small", {}, unit), zero, range);
+}
+function drawing(title) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  element.setAttribute("viewBox", "0 0 400 200");
+  element.setAttribute("role", "img");
+  element.setAttribute("aria-label", title);
+  return element;
+}
+function add(svg, tag, attributes, text) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  const { style = "", ...others } = attributes;
+  element.style.cssText = style; // as an attribute the page's security policy refuses it
+  Object.entries(others).forEach(([name, value]) => element.setAttribute(name, value));
+  if (text !== undefined) element.textContent = text;
+  svg.append(element);
+}
+function drawHistogram(svg, { edges_e, counts, well_e, floor_e }) {
+  svg.replaceChildren();
+  const low = Math.log(edges_e[0]), high = Math.log(edges_e.at(-1));
+  const x = electrons => 10 + 380 * (Math.log(Math.max(electrons, edges_e[0])) - low) / (high - low);
+  const most = Math.max(...Object.values(counts).flat(), 1), y = count => 165 - 150 * Math.sqrt(count / most);
+  for (let decade = 1; decade <= edges_e.at(-1); decade *= 10) {
+    add(svg, "line", { x1: x(decade), x2: x(decade), y1: 15, y2: 165, class: "grid" });
+    add(svg, "text", { x: x(decade), y: 180, class: "middle" }, decade >= 1e3 ? `${decade / 1e3}k` : decade);
+  }
+  Object.entries(counts).forEach(([channel, of]) => {
+    const points = of.flatMap((count, index) => [[edges_e[index], count], [edges_e[index + 1], count]]).map(([e, count]) => `${x(e).toFixed(1)},${y(count).toFixed(1)}`);
+    add(svg, "polyline", { points: points.join(" "), class: "curve", style: `stroke: ${CHANNELS[channel]}` });
+    const top = of.indexOf(Math.max(...of));
+    add(svg, "text", { x: x(edges_e[top]) - 4, y: y(of[top]) + 8, class: "middle letter", style: `fill: ${CHANNELS[channel]}` }, channel);
+  });
+  [[well_e, "well", "end"], [floor_e, "noise floor", "start"]].forEach(([e, name, anchor]) => {
+    add(svg, "line", { x1: x(e), x2: x(e), y1: 5, y2: 165, class: "mark" });
+    add(svg, "text", { x: x(e) + (anchor === "end" ? -3 : 3), y: 12, style: `text-anchor: ${anchor}` }, `${name} ${format(e)}`);
+  });
+  add(svg, "text", { x: 390, y: 196, style: "text-anchor: end" }, "electrons; samples on a square-root scale");
+}
+function drawPixel(budget, svg, pixel) {
+  const rows = [["Photons on the pixel", format(pixel.photons)],
+    ...Object.entries(pixel.electrons).map(([name, value]) => [`Electrons behind ${name}${name === pixel.channel ? ", its own" : ""}`, format(value)]),
+    ["Read out", `${format(pixel.read_e)} of ${format(pixel.well_e)}`],
+    ...Object.entries(pixel.noise_e).map(([name, value]) => [name === "total" ? "All noise" : `σ of ${name}`, `${format(value)} e⁻`])];
+  budget.replaceChildren(make("p", {}, `Row ${pixel.row}, column ${pixel.column}, channel ${pixel.channel}`),
+    make("table", {}, ...rows.map(([name, value]) => make("tr", {}, make("th", { scope: "row" }, name), make("td", {}, value)))));
+  svg.replaceChildren();
+  const nm = pixel.wavelength_nm, x = at => 20 + 370 * (at - nm[0]) / (nm.at(-1) - nm[0] || 1);
+  const line = (values, most, attributes) => add(svg, "polyline", { ...attributes, points: values.map((value, index) => `${x(nm[index]).toFixed(1)},${(165 - 150 * value / most).toFixed(1)}`).join(" ") });
+  const most = Math.max(...pixel.photons_nm, 1e-30);
+  for (let at = 400; at <= nm.at(-1); at += 100) {
+    if (at < nm[0]) continue;
+    add(svg, "line", { x1: x(at), x2: x(at), y1: 15, y2: 165, class: "grid" });
+    add(svg, "text", { x: x(at), y: 180, class: "middle" }, at);
+  }
+  line(pixel.photons_nm, most, { class: "curve dashed" });
+  Object.entries(pixel.electrons_nm).forEach(([channel, values]) => {
+    line(values, most, { class: "curve", style: `stroke: ${CHANNELS[channel]}` });
+    const top = values.indexOf(Math.max(...values));
+    add(svg, "text", { x: x(nm[top]), y: 160 - 150 * values[top] / most, class: "middle letter", style: `fill: ${CHANNELS[channel]}` }, channel);
+  });
+  add(svg, "text", { x: 390, y: 196, style: "text-anchor: end" }, `nm; dashed: photons, at most ${format(most)} a nm; lines: electrons of each channel`);
+}
+const round = number => Number(number.toPrecision(4));
+const format = number => number === 0 ? "0" : Math.abs(number) >= 1e5 || Math.abs(number) < 1e-3 ? number.toExponential(2) : String(Number(number.toPrecision(4)));
+const seconds = time => time >= 1 ? `${format(time)} s` : time >= 1e-3 ? `${format(time * 1e3)} ms` : `${format(time * 1e6)} µs`;
+const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
+const pick = (from, names) => structuredClone(Object.fromEntries(names.map(name => [name, from[name]])));
+const split = value => [value.slice(0, 1), value.slice(2)];
+
+export default { render };

@@ -1,0 +1,96 @@
+"""The explorer in headless Chromium: a served page, its controls moved as a user moves them, its pictures read back."""
+
+import threading
+import time
+from base64 import b64decode
+from collections.abc import Iterator
+from contextlib import contextmanager
+from random import Random
+from typing import Any
+
+import numpy as np
+import report_browser as CHROME
+from numpy.typing import NDArray
+
+from studies.explore.server import listen, make_server
+from studies.explore.session import Session
+from studies.explore.source import Source
+
+# Waits for the picture of the newest settings (of the last state of the render), or for what was refused.
+SETTLED = """new Promise((done, fail) => { const start = Date.now(); (function look() {
+  const root = document.querySelector(".explore"), { asked, painted, failed, last, figures } = root?.dataset ?? {};
+  if (asked && failed === asked) done("failed");
+  else if (asked && painted === asked && (last === "true" || !%s) && (figures === asked || !%s)) done("painted");
+  else if (Date.now() - start > 25000) fail(new Error(document.body.innerText.slice(0, 500)));
+  else setTimeout(look, 5);
+})() })"""
+# Moves one control to a random place, as its own events do; says which.
+MOVE = """((pick, share) => {
+  const all = [...document.querySelectorAll(".explore .controls [data-key]:enabled:not([type=radio])")];
+  const control = all[Math.floor(pick * all.length)];
+  if (control.tagName === "SELECT") {
+    const options = [...control.options].filter(each => each.value !== "file" && !each.text.includes("slow"));
+    control.value = options[Math.floor(share * options.length)].value;
+    control.dispatchEvent(new Event("change"));
+  } else {
+    control.value = control.type === "range" ? Math.round(share * control.max) : control.value;
+    control.dispatchEvent(new Event("input"));
+  }
+  return `${control.dataset.key} ${control.value}`;
+})(%r, %r)"""
+PIXELS = """((canvas) => { const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  let text = ""; for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));
+  return [canvas.width, canvas.height, btoa(text)]; })(document.querySelectorAll(".explore canvas")[%d])"""
+COPY = """new Promise(done => { const root = document.querySelector(".explore"); delete root.dataset.python;
+  root.querySelectorAll(".pictures figure")[%d].querySelector("button").click();
+  (function look() { if (!root.dataset.python) return setTimeout(look, 5);
+    root.querySelectorAll("dialog").forEach(each => each.close()); done(root.dataset.python); })(); })"""
+
+
+@contextmanager
+def served(source: Source) -> Iterator[str]:
+    """Address of an explorer that runs in this process."""
+    session = Session(source)
+    with listen(0) as listener:
+        server, address = make_server(session, listener)
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+        thread.start()
+        while not server.started:
+            time.sleep(0.01)
+        try:
+            yield address
+        finally:
+            server.should_exit = True
+            thread.join()
+            session.close()
+
+
+def settle(page: CHROME.Page, *, last: bool = True, figures: bool = False) -> str:
+    """Wait for the page's newest picture; "painted", or "failed" where its settings were refused."""
+    said: str = page.value(SETTLED % (str(last).lower(), str(figures).lower()))
+    return said
+
+
+def move(page: CHROME.Page, rng: Random) -> str:
+    """Move a control at random."""
+    said: str = page.value(MOVE % (rng.random(), rng.random()))
+    return said
+
+
+def picture(page: CHROME.Page, index: int = 0) -> NDArray[np.uint8]:
+    """The pixels of a canvas, (h, w, 3)."""
+    width, height, text = page.value(PIXELS % index)
+    return np.frombuffer(b64decode(text), np.uint8).reshape(height, width, 4)[..., :3]
+
+
+def copied_python(page: CHROME.Page, index: int = 0) -> str:
+    """What the button under a picture copies."""
+    text: str = page.value(COPY % index)
+    return text
+
+
+def ran(code: str) -> Any:
+    """The picture that a copied program makes."""
+    names: dict[str, Any] = {}
+    exec(code, names)
+    return names["picture"]

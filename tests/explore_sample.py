@@ -1,0 +1,62 @@
+"""A small rendered scene of two lights, and random settings of the explorer's controls."""
+
+import random
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+import rodcone as public
+from render.transport import Transport
+from studies.explore.controls import TIME, Controls, Lamp
+
+BANDS = {"wavelength_nm": np.arange(405.0, 780.0, 50.0), "width_nm": np.full(8, 50.0)}
+RENDER = (
+    "import numpy as np\n"
+    "bands = {'wavelength_nm': np.arange(405.0, 780.0, 50.0), 'width_nm': np.full(8, 50.0)}\n"
+    "transport = rodcone.render('still_life_outdoor', (40, 48), spp=4, **bands)\n"
+)
+GAUSSIAN = tuple((float(nm), float(np.exp(-(((nm - 600) / 40) ** 2)))) for nm in range(380, 790, 10))
+
+
+@cache
+def small_transport() -> Transport:
+    """What `RENDER` makes."""
+    return public.render("still_life_outdoor", (40, 48), spp=4, **BANDS)
+
+
+def random_controls(rng: random.Random) -> Controls:
+    """Controls of which each may have been moved; processors that answer at once."""
+    lamp = Lamp("own", 2 ** rng.uniform(-5, 5))
+    lamps: list[dict[str, Lamp]] = [
+        {}, {"sun": lamp}, {"sun": Lamp("A")}, {"sky": Lamp(f"{rng.randrange(2000, 9000)}K", 3.0)},
+        {"sun": Lamp(power=0.0)}, {"sky": Lamp(table=GAUSSIAN)},
+    ]  # fmt: skip
+    pixel: list[dict[str, float]] = [
+        {}, {"read_noise_e": rng.uniform(0, 20)}, {"dsnu_e": 0.0, "prnu": 0.03}, {"crosstalk": 0.05},
+        {"column_gain_spread": 0.02, "column_offset_e": 3.0}, {"full_well_e": 2000.0, "dark_current_e_per_s": 500.0},
+        {"hot_pixel_share": 0.01, "hot_pixel_dark_current_e_per_s": 1e5},
+    ]  # fmt: skip
+    lens: list[dict[str, float]] = [
+        {}, {"f_number": rng.uniform(1, 16)}, {"diffraction": 1.0, "f_number": 8.0}, {"defocus_um": rng.uniform(0, 20)},
+        {"veiling_glare": 0.05},
+    ]  # fmt: skip
+    cameras: list[dict[str, Any]] = [
+        {}, {}, {"settings": {"sigma_s": rng.uniform(1, 6)}}, {"settings": {"neighbourhood": 11.0, "sigma_d": 3.0}},
+        {"mosaic": "bayer", "processor": "bayer"}, {"processor": "rgbw_gindele"}, {"mosaic": "rgbw_4x4"},
+    ]  # fmt: skip
+    return Controls(
+        lamps=rng.choice(lamps),
+        level_cd_m2=10 ** rng.uniform(-4, 5),
+        exposure=rng.choice(["auto", "auto", "auto:W", "auto:information", TIME]),
+        exposure_s=10 ** rng.uniform(-4, -0.5),
+        sensor=rng.choice(["low_noise", "low_noise", "table1_output"]),
+        pixel=rng.choice(pixel),
+        lens=rng.choice(lens),
+        bits=rng.choice([None, None, 10]),
+        white_balance=rng.choice(["gray-world", "as-shot"]),
+        seed=rng.randrange(50),
+        exposure_number=rng.randrange(50),
+        frames=rng.choice([1, 1, 1, 3]),
+        **rng.choice(cameras),
+    )

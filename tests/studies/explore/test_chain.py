@@ -1,0 +1,143 @@
+"""The staged chain: what is kept changes no bit, stages are the public chain's, sliding compiles no kernel."""
+
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from explore_sample import GAUSSIAN, random_controls, small_transport
+
+import rodcone as public
+from isp.processors.catalogue import PROCESSORS
+from render.photometry import luminance
+from rodcone.errors import InputError
+from rodcone.jit import backend, dr
+from sensor.optics import form_image
+from studies.explore.chain import photograph
+from studies.explore.controls import Controls, Lamp
+from studies.explore.memo import Memo
+from studies.explore.slow import is_slow, stand_in
+from studies.explore.views import VIEWS
+from studies.metrics.truth import light_in_bands, shown_white_cd_m2, true_srgb
+
+
+def test_what_is_kept_changes_no_bit():
+    """After any changes, in any order, pictures and figures are those of an empty memory."""
+    transport, memo, rng = small_transport(), Memo(), random.Random(1)
+    for _ in range(40):
+        controls = random_controls(rng)
+        kept, fresh = photograph(transport, controls, memo), photograph(transport, controls)
+        assert np.array_equal(kept.exposed.raw.dn, fresh.exposed.raw.dn), controls
+        assert np.array_equal(kept.linear, fresh.linear), controls
+        assert np.array_equal(kept.true, fresh.true), controls
+        assert kept.exposed.exposure_s == fresh.exposed.exposure_s
+
+
+def test_the_memory_is_bounded():
+    transport, memo = small_transport(), Memo()
+    for seed in range(30):
+        photograph(transport, Controls(seed=seed, level_cd_m2=1.0 + seed, lens={"f_number": 2.0 + seed}), memo)
+    assert max(len(kept) for kept in memo.stages.values()) <= 8
+
+
+def test_the_stages_are_the_public_chain():
+    """Light, exposure and truth of the scene's own lamps, against the functions that a script would call."""
+    transport, controls = small_transport(), Controls(level_cd_m2=3.0, lens={"diffraction": 1.0})
+    exposed = photograph(transport, controls).exposed
+    radiance = transport.relight(luminance_cd_m2=3.0)
+    sensor = public.low_noise()
+    sensor = replace(sensor, lens=replace(sensor.lens, diffraction=1.0))
+    exposure_s = public.auto_exposure_s(form_image(radiance, sensor), sensor)
+    # The undershoot of a group alone is not that of the sum: a hundredth of the brightest pixels' light at most.
+    assert exposed.exposure_s == pytest.approx(exposure_s, rel=1e-3)
+    from sensor.response import expected_electrons
+
+    expected = expected_electrons(form_image(radiance, sensor), sensor, exposed.exposure_s)
+    assert np.abs(exposed.expected_e - expected).max() < 0.01 * expected.max()
+    assert np.sum(exposed.expected_e) == pytest.approx(expected.sum(), rel=1e-5)
+    first = next(iter(transport.groups.values()))
+    light = light_in_bands(first.spectrum, transport.wavelength_nm, transport.width_nm)
+    truth = true_srgb(radiance, light, shown_white_cd_m2(transport, 3.0))
+    assert np.allclose(photograph(transport, controls).true, truth, rtol=1e-4, atol=1e-6)
+
+
+def test_the_level_is_reached_and_powers_are_shares():
+    transport = small_transport()
+    exposed = photograph(transport, Controls(lamps={"sun": Lamp(power=0.25)}, level_cd_m2=7.0)).exposed
+    lit = exposed.transport
+    assert lit.level().value * exposed.scale == pytest.approx(7.0, rel=1e-12)
+    ratio = lit.groups["sun"].power / transport.groups["sun"].power
+    assert ratio == 0.25
+    twice = photograph(transport, Controls(lamps={name: Lamp(power=2.0) for name in transport.groups}))
+    once = photograph(transport, Controls())
+    assert np.allclose(twice.exposed.expected_e, once.exposed.expected_e, rtol=1e-12)
+
+
+@pytest.mark.parametrize("lamp", [Lamp("A"), Lamp("6500K"), Lamp(table=GAUSSIAN)])
+def test_another_spectrum_keeps_the_groups_luminance(lamp):
+    transport = small_transport()
+    lit = photograph(transport, Controls(lamps={"sky": lamp})).exposed.transport
+    nm, width = np.arange(360.5, 830.0), np.ones(470)
+    before, after = (
+        luminance(each.groups["sky"].spectrum.band_average(nm, width), nm, width) for each in (transport, lit)
+    )
+    assert after == pytest.approx(before, rel=1e-9)
+
+
+def test_lamps_that_give_no_light_are_refused():
+    transport = small_transport()
+    for lamps, words in (
+        ({name: Lamp(power=0.0) for name in transport.groups}, "all are off"),
+        ({"moon": Lamp()}, "'moon' is unknown"),
+        ({"sun": Lamp(table=((900.0, 1.0), (950.0, 1.0)))}, "no light"),
+    ):
+        with pytest.raises(InputError, match=words):
+            photograph(transport, Controls(lamps=lamps))
+
+
+def test_another_exposure_is_of_the_same_chip_and_another_seed_is_another_chip():
+    transport = small_transport()
+    first, second, other = (
+        photograph(transport, controls).exposed
+        for controls in (Controls(), Controls(exposure_number=1), Controls(seed=1))
+    )
+    assert np.array_equal(first.device.dark_offset_e, second.device.dark_offset_e)
+    assert not np.array_equal(first.raw.dn, second.raw.dn)
+    assert not np.array_equal(first.device.dark_offset_e, other.device.dark_offset_e)
+
+
+@pytest.mark.skipif(backend() == "numpy", reason="no Dr.Jit backend, no kernels")
+def test_no_kernel_is_compiled_after_the_first_changes():
+    """Of 60 changes of all controls the last 40 compile nothing: every value is an argument of a kernel."""
+    transport, memo, rng = small_transport(), Memo(), random.Random(3)
+    moves = [random_controls(rng) for _ in range(20)] + [random_controls(rng) for _ in range(40)]
+
+    def compiled() -> int:
+        return sum(not kernel["cache_hit"] for kernel in dr.kernel_history([dr.KernelType.JIT]))
+
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        for controls in moves[:20]:
+            photograph(transport, controls, memo)
+        assert len(dr.kernel_history([dr.KernelType.JIT])) > 100
+        for controls in moves[20:]:
+            photograph(transport, controls, memo)
+            assert compiled() == 0, controls
+
+
+def test_every_view_is_a_picture_of_the_frames_size():
+    shot = photograph(small_transport(), Controls(frames=2, pixel={"column_gain_spread": 0.01}))
+    for name, view in VIEWS.items():
+        picture = view(shot)
+        assert (picture.shape, picture.dtype) == ((40, 48, 3), np.uint8), name
+        assert picture.std() > 1, name
+
+
+def test_each_slow_processor_has_a_quick_one_of_its_mosaic():
+    slow = [name for name in PROCESSORS if is_slow(name)]
+    assert {"ple_rgbw", "ple_bayer", "bayer_bm3d", "rgbw_park_fair"} <= set(slow)
+    assert "interleaved" not in slow
+    for name in slow:
+        quick = stand_in(name)
+        assert quick is not None
+        assert PROCESSORS[quick].mosaic == PROCESSORS[name].mosaic

@@ -1,0 +1,189 @@
+"""The explorer in headless Chromium: every picture is that of the copied Python, nothing else is asked of any host."""
+
+import json
+import sys
+from collections.abc import Iterator
+from random import Random
+from typing import Any
+
+import numpy as np
+import pytest
+import report_browser as CHROME
+
+pytest.importorskip("uvicorn", reason="needs rodcone[explore]")
+pytest.importorskip("websockets", reason="needs rodcone[explore]")
+
+import explore_browser as EXPLORE
+
+import render.engine as ENGINE
+from studies.explore.messages import hello
+from studies.explore.source import RenderOptions, open_source
+
+pytestmark = pytest.mark.skipif(
+    CHROME.CHROMIUM is None or sys.platform == "win32",
+    reason="needs `chromium` on PATH (Debian: apt install chromium) and POSIX file descriptors",
+)
+MODES = [(1280, False), (1280, True), (1920, False), (1920, True), (390, False), (390, True)]
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    started = CHROME.Browser(tmp_path_factory.mktemp("profile"))
+    yield started
+    started.close()
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    with EXPLORE.served(open_source("still_life_outdoor", RenderOptions(size=48, spp=4, band_nm=50.0))) as address:
+        yield address
+
+
+@pytest.fixture
+def one_render(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each render that copied Python asks for is made once: `test_written` shows that a second one is the same."""
+    render = ENGINE.render
+    made: dict[str, Any] = {}
+
+    def rendered(*arguments: Any, **options: Any) -> Any:
+        key = repr((arguments[0].name, arguments[1:], options))
+        return made[key] if key in made else made.setdefault(key, render(*arguments, **options))
+
+    monkeypatch.setattr(ENGINE, "render", rendered)
+
+
+def check_changes(page: Any, count: int, seed: int) -> int:
+    """Move controls at random; give how many of the settings made a picture."""
+    rng, painted, told = Random(seed), 0, []
+    for number in range(count):
+        told.append(EXPLORE.move(page, rng))
+        if number % 10 == 9:  # a burst of changes, of which the last alone counts
+            told += [EXPLORE.move(page, rng) for _ in range(5)]
+        if EXPLORE.settle(page) == "failed":
+            assert page.value("document.querySelector('.explore').classList.contains('waiting')")
+            continue
+        painted += 1
+        index = number % 2
+        code = EXPLORE.copied_python(page, index)
+        assert np.array_equal(EXPLORE.picture(page, index), EXPLORE.ran(code)), (told, code)
+    return painted
+
+
+def test_each_picture_is_that_of_the_copied_python(browser, address, one_render):
+    page = CHROME.Page(browser, address)
+    EXPLORE.settle(page)
+    assert check_changes(page, 12, seed=1) >= 8
+
+
+@pytest.mark.slow
+def test_each_of_200_pictures_is_that_of_the_copied_python(browser, address, one_render):
+    page = CHROME.Page(browser, address)
+    EXPLORE.settle(page)
+    assert check_changes(page, 200, seed=2) >= 150
+
+
+def test_the_page_asks_no_other_host(browser, address):
+    page = CHROME.Page(browser, address)
+    EXPLORE.settle(page, figures=True)
+    asked = page.requests()
+    assert asked
+    assert all(each.startswith(address) for each in asked), asked
+    assert page.complaints() == []
+
+
+@pytest.mark.parametrize(("width", "dark"), MODES)
+def test_the_page_fits_and_is_readable(browser, address, width, dark):
+    page = CHROME.Page(browser, address, width=width, dark=dark)
+    EXPLORE.settle(page, figures=True)
+    assert page.value("document.documentElement.scrollWidth") <= width
+    background = page.screenshot()[2, 2].astype(int)
+    assert (background.mean() < 60) if dark else (background.mean() > 200)
+    unnamed = page.value(
+        """[...document.querySelectorAll(".explore :is(input, select, button, canvas, textarea, svg)")].filter(each =>
+           !each.getAttribute("aria-label") && !each.closest("label")?.textContent.trim() && !each.textContent.trim())
+           .map(each => each.outerHTML)"""
+    )
+    assert unnamed == []
+    boxes = page.value(
+        "[...document.querySelectorAll('.explore canvas')].map(each => each.getBoundingClientRect().width)"
+    )
+    assert min(boxes) > 100
+
+
+def test_an_old_answer_is_never_shown(browser, address):
+    """The page's module with a program that answers the older of two questions last, and first."""
+    page = CHROME.Page(browser, address)
+    EXPLORE.settle(page)
+    said = hello(open_source("still_life_outdoor", RenderOptions(size=48, spp=4)))
+    controls = said["controls"]
+    answer = {
+        "kind": "show", "cameras": [{"controls": controls, "waiting_for": None}], "views": [[0, "picture"]],
+        "facts": [{"exposure_s": 0.01, "saturated": 0.0, "snr_db": None}],
+        "size": [1, 1], "spp": 4, "last": True, "notes": [],
+    }  # fmt: skip
+    painted = page.value(
+        f"""(async () => {{
+          const {{ default: explorer }} = await import(new URL("explore.js", location.href));
+          const asked = [], el = document.createElement("div"), seen = [];
+          let tell;
+          document.body.append(el);
+          explorer.render({{ model: {{ send: each => asked.push(each), on: (_, listener) => tell = listener }}, el }});
+          tell({json.dumps({**said, "kind": "hello"})}, []);
+          const root = el.firstChild, level = el.querySelector("[data-key=level]");
+          level.value = 900;
+          level.dispatchEvent(new Event("input"));
+          const [old, young] = asked.filter(each => each.kind === "show").map(each => each.number);
+          for (const number of [old, young, old]) {{
+            tell({{ ...{json.dumps(answer)}, number }}, [new DataView(new ArrayBuffer(3))]);
+            seen.push(root.dataset.painted ?? "none");
+          }}
+          return [old, young, seen];
+        }})()"""
+    )
+    old, young, seen = painted
+    assert old < young
+    assert seen == ["none", str(young), str(young)]
+
+
+def test_keys_move_the_measured_pixel_and_take_another_exposure(browser, address):
+    page = CHROME.Page(browser, address)
+    EXPLORE.settle(page, figures=True)
+    page.value("document.querySelector('.explore canvas').focus()")
+    page.press("ArrowDown", 40)
+    said = page.value(
+        """new Promise(done => (function look() { const text = document.querySelector(".budget p")?.textContent;
+           text ? done(text) : setTimeout(look, 20); })())"""
+    )
+    assert said.startswith("Row 25, column 24")
+    first = EXPLORE.picture(page)
+    page.press("e", 69)
+    page.value(
+        "document.querySelector('.explore').dispatchEvent(new KeyboardEvent('keydown', {key: 'e', bubbles: true}))"
+    )
+    EXPLORE.settle(page)
+    assert not np.array_equal(first, EXPLORE.picture(page))
+
+
+def test_a_slow_processor_can_be_cancelled_and_its_picture_comes_when_the_sliders_rest(browser, address, one_render):
+    page = CHROME.Page(browser, address)
+    EXPLORE.settle(page)
+    choose = """(() => { const select = document.querySelector("[data-key=processor]");
+        select.value = %r; select.dispatchEvent(new Event("change")); })()"""
+    waiting = "!document.querySelector('.said button').hidden"
+    page.value(choose % "ple_rgbw")
+    EXPLORE.settle(page)
+    assert page.value(waiting)
+    assert "interleaved" in page.value("document.querySelector('.explore figcaption').textContent")
+    page.value("document.querySelector('.said button').click()")
+    assert not page.value(waiting)
+    page.value(choose % "interleaved")
+    EXPLORE.settle(page)
+    page.value(choose % "ple_rgbw")
+    EXPLORE.settle(page)
+    page.value(
+        """new Promise(done => (function look() {
+            document.querySelector(".said button").hidden ? done() : setTimeout(look, 50); })())"""
+    )
+    code = EXPLORE.copied_python(page)
+    assert "ple_rgbw" in code
+    assert np.array_equal(EXPLORE.picture(page), EXPLORE.ran(code))

@@ -1,0 +1,188 @@
+"""The explorer's door: host, origin, token, paths, methods, and messages that no page of ours sends."""
+
+import json
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from http.client import HTTPConnection
+from typing import Any
+
+import pytest
+from explore_sample import small_transport
+
+pytest.importorskip("uvicorn", reason="needs rodcone[explore]")
+pytest.importorskip("websockets", reason="needs rodcone[explore]")
+
+from rodcone.errors import InputError
+from studies.explore.controls import Controls, controls_from, to_json
+from studies.explore.messages import read_message
+from studies.explore.server import listen, make_server
+from studies.explore.session import Session
+from studies.explore.source import of_transport
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[tuple[int, str]]:
+    """Port and token of an explorer."""
+    session = Session(of_transport(small_transport()))
+    with listen(0) as listener:
+        server, address = make_server(session, listener)
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+        thread.start()
+        while not server.started:
+            time.sleep(0.01)
+        yield listener.getsockname()[1], address.split("/")[3]
+        server.should_exit = True
+        thread.join()
+    session.close()
+
+
+def asked(port: int, path: str, method: str = "GET", **headers: str) -> tuple[int, Any]:
+    connection = HTTPConnection("127.0.0.1", port, timeout=20)
+    connection.request(method, path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+    answer = connection.getresponse()
+    answer.read()
+    connection.close()
+    return answer.status, answer.headers
+
+
+def test_the_page_and_its_files_are_served_with_a_policy(served):
+    port, token = served
+    for name in ("", "explore.js", "explore_page.js", "explore.css"):
+        status, headers = asked(port, f"/{token}/{name}")
+        assert status == 200, name
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy
+        assert "unsafe" not in policy
+        assert "http" not in policy
+        assert headers["Referrer-Policy"] == "no-referrer"
+    assert asked(port, f"/{token}/", Host=f"localhost:{port}")[0] == 200
+
+
+def test_the_server_listens_on_this_machine_alone(served):
+    with listen(0) as listener:
+        assert listener.getsockname()[0] == "127.0.0.1"
+    own = {each[4][0] for each in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {"127.0.0.1"}
+    for address in own:
+        if not address.startswith("127."):
+            with pytest.raises(OSError), socket.create_connection((address, served[0]), timeout=2):  # noqa: PT011
+                pass
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:{port}", "127.0.0.1", "127.0.0.1:1", ""])
+def test_other_hosts_names_are_refused(served, host):
+    port, token = served
+    assert asked(port, f"/{token}/", Host=host.format(port=port))[0] in (400, 403)
+
+
+def test_other_origins_tokens_paths_and_methods_are_refused(served):
+    port, token = served
+    assert asked(port, f"/{token}/", Origin="http://evil.example")[0] == 403
+    assert asked(port, f"/{token}/", Origin="null")[0] == 403
+    beside = (f"/{token[:-1]}/", f"/{token}x/", f"/{token}", f"/{token}/../{token}/x", "/", "/explore.js", "/%00/")
+    under = ("report.html.j2", "..%2f..%2fpage.py", "explore.js/", "live/", "%2e%2e/")
+    for path in (*beside, *(f"/{token}/{name}" for name in under)):
+        assert asked(port, path)[0] == 403, path
+    for method in ("POST", "PUT", "DELETE", "OPTIONS"):
+        assert asked(port, f"/{token}/", method)[0] == 403, method
+
+
+def connected(port: int, path: str, **options: Any) -> Any:
+    from websockets.sync.client import connect
+
+    return connect(f"ws://127.0.0.1:{port}{path}", open_timeout=20, compression=None, **options)
+
+
+@pytest.mark.parametrize(
+    ("path", "options"),
+    [
+        ("/{token}/live", {}),
+        ("/{token}/live", {"origin": "http://evil.example"}),
+        ("/{token}/live", {"origin": "null"}),
+        ("/{token}/live", {"origin": "https://127.0.0.1:{port}"}),
+        ("/wrong/live", {"origin": "http://127.0.0.1:{port}"}),
+        ("/{token}/", {"origin": "http://127.0.0.1:{port}"}),
+    ],
+)
+def test_a_socket_of_another_page_is_refused(served, path, options):
+    from websockets.exceptions import InvalidStatus
+
+    port, token = served
+    filled = {name: value.format(port=port) for name, value in options.items()}
+    with pytest.raises(InvalidStatus) as caught, connected(port, path.format(token=token), **filled):
+        pass
+    assert caught.value.response.status_code == 403
+
+
+def received(connection: Any) -> dict[str, Any]:
+    data = connection.recv(timeout=60)
+    length = int.from_bytes(data[:4], "little")
+    header: dict[str, Any] = json.loads(data[4 : 4 + length])
+    assert sum(header["lengths"]) == len(data) - 4 - length
+    return header
+
+
+HOSTILE = [
+    "", "{", "[]", "null", "7", '"show"', "{}", '{"kind": "show"}', '{"kind": "eval", "number": 1}', "[" * 100_000,
+    '{"kind": ["show"], "number": 1}', '{"kind": "hello", "number": -1}', '{"kind": "hello", "number": 1e400}',
+    '{"kind": "hello", "number": NaN}', '{"kind": "hello", "number": 1, "more": 2}', "x" * 300_000,
+    '{"kind": "show", "number": 1, "cameras": [], "views": [[0, "picture"]]}',
+    '{"kind": "show", "number": 1, "cameras": [{}], "views": [[1, "picture"]]}',
+    '{"kind": "show", "number": 1, "cameras": [{}], "views": [[0, "__class__"]]}',
+    '{"kind": "show", "number": 1, "cameras": [{}], "views": [[0, ["picture"]]]}',
+    '{"kind": "show", "number": 1, "cameras": [{"sensor": "../secret.toml"}], "views": [[0, "raw"]]}',
+    '{"kind": "show", "number": 1, "cameras": [{"frames": 100000}], "views": [[0, "raw"]]}',
+    '{"kind": "show", "number": 1, "cameras": [{"settings": {"neighbourhood": 1e9}}], "views": [[0, "raw"]]}',
+    '{"kind": "pixel", "number": 1, "cameras": [{}], "row": "0", "column": 0}',
+    '{"kind": "pixel", "number": 1, "cameras": [{}], "row": 1e9, "column": 0}',
+    '{"kind": "python", "number": 1, "cameras": [{}], "view": "picture\'; import os"}',
+    '{"kind": "python", "number": 1, "cameras": [{}], "view": "pixel 1 2); import os"}',
+    '{"kind": "study", "number": 1, "cameras": [{}]}',
+]  # fmt: skip
+
+
+def test_hostile_messages_get_one_line_and_the_next_is_answered(served):
+    port, token = served
+    with connected(port, f"/{token}/live", origin=f"http://127.0.0.1:{port}", max_size=None) as connection:
+        for text in HOSTILE:
+            connection.send(text)
+            header = received(connection)
+            assert header["kind"] == "error", text[:80]
+            assert "\n" not in header["message"]
+            assert "program failed" not in header["message"], header
+        connection.send(b"\x00\x01")
+        assert received(connection)["kind"] == "error"
+        connection.send('{"kind": "show", "number": 5, "cameras": [{}], "views": [[0, "picture"]]}')
+        header = received(connection)
+        assert (header["kind"], header["number"], header["size"]) == ("show", 5, [40, 48])
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        [], None, {"level_cd_m2": "25"}, {"level_cd_m2": True}, {"level_cd_m2": -1}, {"seed": 0.5}, {"seed": True},
+        {"seed": -1}, {"bits": 99.5}, {"lamps": []}, {"lamps": {"sun": 3}}, {"lamps": {"sun": {"power": "x"}}},
+        {"lamps": {"sun": {"table": [[1]]}}}, {"lamps": {"sun": {"table": [[1, 2]] * 3000}}}, {"lens": {"nope": 1}},
+        {"pixel": {"pitch_um": 1}}, {"processor": "no"}, {"processor": 3}, {"mosaic": "mono"}, {"exposure": "auto:Z"},
+        {"settings": {"sigma_d": 0}}, {"settings": {"patch": 2}}, {"unknown": 1}, {"exposure_s": 0},
+        {"processor": "bayer", "mosaic": "bayer", "settings": {"patch": 3}},
+    ],
+)  # fmt: skip
+def test_controls_that_are_not_allowed_are_refused(content):
+    with pytest.raises(InputError) as caught:
+        controls_from(content)
+    assert "\n" not in str(caught.value)
+
+
+def test_controls_come_back_from_json():
+    import random
+
+    from explore_sample import random_controls
+
+    rng = random.Random(5)
+    for _ in range(30):
+        controls = random_controls(rng)
+        assert controls_from(json.loads(json.dumps(to_json(controls)))) == controls
+    assert controls_from({}) == Controls()
+    assert read_message('{"kind": "hello", "number": 3}')["number"] == 3

@@ -1,0 +1,78 @@
+"""Figures of a shot against closed forms."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from explore_sample import small_transport
+
+from render.photometry import photons_per_joule
+from rodcone.errors import InputError
+from sensor.readout import noise_variance
+from studies.explore.chain import photograph
+from studies.explore.controls import TIME, Controls
+from studies.explore.views import MOST_SIGMAS, VIEWS, histogram, noise_scale_e, noise_sources_e, pixel
+
+ALL_TERMS = {
+    "read_noise_e": 3.0, "dsnu_e": 2.0, "prnu": 0.02, "dark_current_e_per_s": 100.0, "column_gain_spread": 0.01,
+    "column_offset_e": 1.5, "hot_pixel_share": 0.01, "hot_pixel_dark_current_e_per_s": 1e4, "crosstalk": 0.05,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("terms", [{}, ALL_TERMS, {"crosstalk": 0.1}, {"column_gain_spread": 0.02}])
+def test_the_sources_of_noise_add_up_to_the_noise_model(terms):
+    exposed = photograph(small_transport(), Controls(pixel=terms)).exposed
+    variance = noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
+    for row, column in ((0, 0), (13, 21), (39, 47)):
+        sources = noise_sources_e(exposed.expected_e, exposed.sensor, exposed.exposure_s, row, column)
+        total = sources.pop("total")
+        assert total**2 == pytest.approx(variance[row, column], rel=1e-12)
+        assert sum(sigma**2 for sigma in sources.values()) == pytest.approx(total**2, rel=1e-9)
+
+
+def test_the_light_budget_of_a_pixel():
+    """Photons from the radiance by the camera equation; the own filter's electrons are the expected ones."""
+    controls = Controls(exposure=TIME, exposure_s=0.01, lens={"f_number": 4.0})
+    exposed = photograph(small_transport(), controls).exposed
+    row, column = 20, 11
+    told = pixel(exposed, row, column)
+    transport = small_transport()
+    radiance = transport.relight(luminance_cd_m2=25.0).values[row, column].astype(float)
+    nm, width = transport.wavelength_nm, transport.width_nm
+    pitch_m = exposed.sensor.pixel.pitch_um * 1e-6
+    irradiance = radiance * np.pi / (1 + 4 * 4.0**2)
+    photons = (irradiance * photons_per_joule(nm) * width).sum() * pitch_m**2 * 0.01
+    assert told["photons"] == pytest.approx(photons, rel=1e-5)
+    assert told["electrons"][told["channel"]] == pytest.approx(exposed.expected_e[row, column], rel=1e-6)
+    assert np.sum(told["photons_nm"] * width) == pytest.approx(told["photons"], rel=1e-12)
+    for channel, by_band in told["electrons_nm"].items():
+        assert np.sum(by_band * width) == pytest.approx(told["electrons"][channel], rel=1e-12)
+    with pytest.raises(InputError, match="row"):
+        pixel(exposed, 40, 0)
+
+
+def test_the_histogram_counts_every_sample_once():
+    raw = photograph(small_transport(), Controls(level_cd_m2=3000.0)).exposed.raw
+    told = histogram(raw)
+    assert {name: sum(counts) for name, counts in told["counts"].items()} == dict.fromkeys("RGBW", 40 * 48 // 4)
+    edges = np.array(told["edges_e"])
+    full = (raw.electrons >= edges[-2]).sum()
+    assert sum(counts[-1] for counts in told["counts"].values()) == full
+    assert told["well_e"] == pytest.approx(15000.0, rel=1e-9)
+    assert told["floor_e"] == raw.dark_noise_e
+
+
+def test_noise_is_grey_on_average_and_its_spread_is_the_models():
+    """4 standard deviations are half of the range; the mean over 1920 pixels is known to 1 of 8 bits."""
+    shot = photograph(small_transport(), Controls(level_cd_m2=1.0))
+    grey = VIEWS["noise"](shot)[..., 0].astype(float)
+    assert grey.mean() == pytest.approx(127.5, abs=3.0)
+    assert grey.std() == pytest.approx(127.5 / MOST_SIGMAS, rel=0.1)
+    assert noise_scale_e(shot.exposed) > 0
+
+
+def test_the_truth_has_no_error():
+    shot = photograph(small_transport(), Controls())
+    perfect = replace(shot, linear=shot.true)
+    for view in ("luminance error", "colour error", "flip"):
+        assert not np.ptp(VIEWS[view](perfect), axis=(0, 1)).any(), view

@@ -1,0 +1,94 @@
+"""Python and studies that the explorer writes: the Python makes the same bits, the study is read and asks the same."""
+
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from explore_sample import RENDER, random_controls, small_transport
+
+from rodcone.errors import InputError
+from sensor.presets import preset
+from studies.explore.chain import photograph
+from studies.explore.controls import Controls, Lamp, camera_of
+from studies.explore.source import RenderOptions, of_transport, open_source
+from studies.explore.views import VIEWS, histogram, pixel
+from studies.explore.written import GIVEN, python_of, study_of
+from studies.study.study_file import read_study
+
+
+def ran(code: str) -> dict[str, object]:
+    names: dict[str, object] = {}
+    exec(code, names)
+    return names
+
+
+@pytest.mark.parametrize("view", [*VIEWS])
+def test_the_python_of_a_view_makes_its_bits(view):
+    controls = random_controls(random.Random(view))
+    shot = photograph(small_transport(), controls)
+    assert np.array_equal(ran(python_of(RENDER, controls, view))["picture"], VIEWS[view](shot))
+
+
+def test_the_python_of_figures_makes_their_numbers():
+    controls = random_controls(random.Random(7))
+    exposed = photograph(small_transport(), controls).exposed
+    assert ran(python_of(RENDER, controls, "histogram"))["figure"] == histogram(exposed.raw)
+    assert ran(python_of(RENDER, controls, "pixel 3 5"))["figure"] == pixel(exposed, 3, 5)
+
+
+def test_the_python_of_a_source_makes_its_transport():
+    source = open_source("still_life", RenderOptions(size=20, spp=20, band_nm=80.0))
+    states = list(source.states())
+    assert [state.last for state in states] == [False, True]
+    for state in states:
+        names = ran(python_of(state.code, Controls()))
+        assert np.array_equal(names["transport"].radiance, state.transport.radiance)  # type: ignore[attr-defined]
+        code = python_of(state.code, Controls())
+        assert code.index("import rodcone") < code.index("from studies") < code.index("transport =")
+
+
+def test_a_transports_python_says_that_it_was_given():
+    (state,) = of_transport(small_transport()).states()
+    assert state.code == GIVEN
+    assert "transport = ..." in python_of(state.code, Controls())
+
+
+def test_a_study_asks_the_same(tmp_path: Path):
+    controls = Controls(
+        lamps={"softbox": Lamp("A")},
+        level_cd_m2=0.0123,
+        exposure="time",
+        exposure_s=0.0125,
+        lens={"f_number": 4.0, "diffraction": 1.0},
+        pixel={"read_noise_e": 0.25, "crosstalk": 0.03},
+        bits=12,
+        mosaic="bayer",
+        processor="bayer",
+        seed=7,
+    )
+    for name, text in study_of("still_life", 96, 40.0, 16, controls).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    study = read_study(tmp_path / "study.toml")
+    assert (study.spectra, study.levels, study.seeds) == (("A",), ("0.0123cd/m2",), (7,))
+    assert (study.processors, study.render.size, study.render.spp) == (("bayer",), 96, 16)
+    own, asked = preset(study.sensors[0], "bayer"), camera_of(controls)
+    assert (own.pixel, own.bits, own.lens.f_number) == (asked.pixel, asked.bits, 4.0)
+    again = open_source(str(tmp_path / "study.toml"), RenderOptions())
+    assert again.controls.level_cd_m2 == controls.level_cd_m2
+    assert again.controls.exposure_s == pytest.approx(controls.exposure_s, rel=1e-12)
+    assert camera_of(again.controls).lens == asked.lens
+    assert again.controls.lamps == controls.lamps
+
+
+@pytest.mark.parametrize(
+    ("controls", "words"),
+    [
+        (Controls(lamps={"softbox": Lamp(power=2.0)}), "one spectrum for all"),
+        (Controls(frames=2), "no bursts"),
+        (Controls(settings={"sigma_s": 2.0}), "no settings of a processor"),
+    ],
+)
+def test_what_a_study_can_not_say_is_refused(controls, words):
+    with pytest.raises(InputError, match=words):
+        study_of("still_life", 96, 20.0, 16, controls)
