@@ -7,7 +7,9 @@ the first call in a fresh process with an empty kernel cache, then
 - the time of other programs: OpenCV's ``fastNlMeansDenoising`` on one 8-bit plane with the same windows (the yardstick
   of the ratios) and ``fastNlMeansDenoisingColored``, where `cv2` is installed, and scikit-image's ``denoise_nl_means``
   on four planes;
-- frames from 0.25 megapixels up.
+- frames from 0.25 megapixels up;
+- `ple_rgbw` on light and dark frames beside `bayer_park`, nearly all of which is BM3D, where that is installed:
+  processor seconds a megapixel. ``--piecewise`` runs this alone.
 
 `rodcone bench` measures speed against error by patch and neighbourhood.
 
@@ -29,9 +31,11 @@ from environment import beside, in_turn, print_environment, seconds_of
 from skimage.restoration import denoise_nl_means
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
+from isp.ple.tables import table
+from isp.processors.catalogue import PROCESSORS
 from isp.settings import Settings
 from rodcone.jit import backend
-from sensor.cfa import RGBW, channel_map
+from sensor.cfa import BAYER, RGBW, channel_map
 from sensor.raw import RawImage
 
 SIZE = 1024
@@ -119,14 +123,40 @@ def sizes(yardstick: Call, large: bool) -> None:
         compare(name, partial(reconstruct, raw, PATCHES), yardstick, 3 if width > 3000 else 9)
 
 
+def piecewise(large: bool) -> None:
+    """Processor seconds a megapixel of `ple_rgbw`, tables made and to be made, beside BM3D's."""
+    print()
+    sides = [(1024, 1024), (2048, 2048), *([(6000, 4000)] if large else [])]
+    colours = np.eye(3)
+    yard = None
+    if find_spec("bm3d") is not None:
+        raw = replace(frame(300.0, size=384), cfa=BAYER)
+        yard = seconds_of(partial(PROCESSORS["bayer_park"].develop, raw, colours))[1] / raw.dn.size * 1e6
+        print(f"bayer_park (BM3D on one thread), 384 x 384: {yard:.1f} s/Mpx")
+    for mean_w_e, (width, height) in [(300.0, side) for side in sides] + [(5.0, sides[0])]:
+        table.cache_clear()
+        raw = frame(mean_w_e, size=width, height=height)
+        for name in ("first", "again"):
+            clock_s, processor_s = seconds_of(partial(PROCESSORS["ple_rgbw"].develop, raw, colours))
+            each = processor_s / raw.dn.size * 1e6
+            ratio = "" if yard is None else f", 1/{yard / each:.1f} of BM3D's"
+            print(
+                f"ple_rgbw, {mean_w_e:g} e-, {width} x {height}, {name}: {each:.2f} s/Mpx{ratio}; {clock_s:.1f} s",
+                flush=True,
+            )
+
+
 def main() -> None:
     print_environment()
     print(f"backend: {backend()}")
+    if "--piecewise" in sys.argv[1:]:
+        return piecewise("--large" in sys.argv[1:])
     with tempfile.TemporaryDirectory() as home:
         subprocess.run([sys.executable, __file__, "--first-call"], check=True, env={**os.environ, "HOME": home})
     yardstick = others()
     ways(yardstick)
     sizes(yardstick, "--large" in sys.argv[1:])
+    return piecewise("--large" in sys.argv[1:])
 
 
 if __name__ == "__main__":

@@ -105,9 +105,7 @@ def exposure_of_electrons_s(
         raise unknown("exposure", rule, RULES)
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     names = channels(sensor.cfa)
-    if "G" not in names:
-        raise unknown("exposure: channel", "G", names)
-    for_green_s = _share_of_well_s(per_second_e[..., names.index("G")], sensor, longest_s)
+    for_green_s = _share_of_well_s(per_second_e[..., names.index(unit_channel(sensor.cfa))], sensor, longest_s)
     if rule == AUTO or "W" not in names:
         return for_green_s
     for_white_s = _share_of_well_s(per_second_e[..., names.index("W")], sensor, longest_s)

@@ -22,7 +22,9 @@ TOLD = {name for one in STATED for name in one.told_by}
 LIGHT = {"radiance", "coverage", "seen", "scene_means", "meter", "groups", "wavelength_nm", "width_nm", "shared"}
 LIGHT |= {"integrator", "seen_difference", "coverage_difference", "denoised"}
 # What a cell is, what it is made from, and the figures of its picture.
-ASKED = {"key", "scene", "spectrum", "level", "exposure", "sensor", "white_balance", "processor", "seed", "lens"}
+ASKED = {"key", "scene", "spectrum", "level", "exposure", "sensor", "white_balance", "frames", "processor", "seed"} | {
+    "lens"
+}
 ASKED |= {"budget_share"}
 FIGURES = {
     "psnr_db", "ssim", "delta_e_median", "delta_e_p95", "s_cielab_median", "s_cielab_p95", "flip_mean", "pu21_psnr_db",

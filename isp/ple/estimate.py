@@ -18,7 +18,7 @@ from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table
 STRIDE = 2  # pixels from patch to patch: one tile
 STRIP = 100_000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons
-COARSE_STEPS = 3  # of light from table to table where a scale only tells the finer one
+COARSE_STEPS = 2  # of light from table to table where a scale only tells the finer one
 DOUBT = 2.0
 INFLATE = 2.0
 LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of noise^2]

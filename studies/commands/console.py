@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rodcone.errors import InputError
-from studies.study.exposures import parse_time
+from rodcone.time_text import parse_time
 
 Out = Annotated[Path, Parameter(name=["--out", "-o"])]
 OutOrNone = Annotated[Path | None, Parameter(name=["--out", "-o"])]

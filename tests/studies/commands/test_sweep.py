@@ -56,7 +56,7 @@ def test_sweep_prints_the_ledger_alone_and_the_table_follows(
     assert call(["export", str(out), "-o", str(tmp_path / "t.csv")], capsys) == (0, f"{tmp_path / 't.csv'}\n", "")
     header, *table = (tmp_path / "t.csv").read_text("utf-8").splitlines()
     assert header.startswith(
-        "key,scene,spectrum,level,exposure,sensor,white_balance,processor,seed,luminance_cd_m2,illuminance"
+        "key,scene,spectrum,level,exposure,sensor,white_balance,frames,processor,seed,luminance_cd_m2,illuminance"
     )
     assert [line.split(",")[3] for line in table] == ["1cd/m2", "25cd/m2"]
 
@@ -84,7 +84,7 @@ def test_dry_run_counts_and_computes_nothing(study: Path, tmp_path: Path, capsys
     command = ["sweep", str(study), "-o", str(out), "--dry-run", "--set", "seeds=[0, 1, 2]"]
     code, text, err = call(command, capsys)
     assert (code, err) == (0, "")
-    assert text.startswith("6 cells, 0 in the ledger from the last run; 0 renders\nabout ")
+    assert text.startswith("6 cells, 0 in the ledger from the last run; 0 to render\nabout ")
     assert not out.exists()
     still = ["--set", 'scenes=["still_life"]', "--set", "render.spp=64", "--json", "--workers", "2"]
     code, text, _ = call([*command, *still], capsys)

@@ -87,4 +87,5 @@ def test_a_row_names_files_without_their_folder() -> None:
         "exposure": "auto",
         "sensor": "mine.toml",
         "white_balance": "gray-world",
+        "frames": 1,
     }
