@@ -11,7 +11,7 @@ from studies.commands.sweep import check_memory, make_all
 from studies.photograph.clock import Clock
 from studies.study.study import SceneChoice, Study
 from studies.study.study_file import read_study
-from studies.sweep.workers import InThisProcess, run
+from studies.sweep.workers import cores, run_in_processes
 
 STUDY = Path(__file__).parent.parent / "configs" / "demo.toml"
 
@@ -81,8 +81,8 @@ def demo(
         seeds=tuple(seed + number for number in study.seeds),
         render=replace(study.render, **{name: value for name, value in changed.items() if value is not None}),
     )
-    check_memory(study, out, reference=False, workers=1, force=force)
-    runner = partial(run, executor=InThisProcess())
+    check_memory(study, out, reference=False, workers=cores(), force=force)
+    runner = partial(run_in_processes, workers=cores())
     _, report = make_all(study, out, lambda step: with_diffraction(as_stated(study), study), runner, clock=clock)
     print(report)
 
