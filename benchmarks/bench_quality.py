@@ -42,7 +42,7 @@ from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
 from sensor.capture import expose
-from sensor.cfa import mask
+from sensor.cfa import channels, mask, unit_channel
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
 from sensor.exposure import auto_exposure_s, information_bits
@@ -315,7 +315,8 @@ def fringes(bench: SceneAndSensor, names: Sequence[str], levels: Sequence[float]
     near = np.hypot(y - 70.8, x - 57.3) < 30.0
     for level in levels:
         for name in names:
-            for channel in "GW"[: 1 + (PROCESSORS[name].mosaic == "rgbw")]:
+            cfa = bench.camera(name, 0).sensor.cfa
+            for channel in dict.fromkeys((unit_channel(cfa), "W" if "W" in channels(cfa) else unit_channel(cfa))):
                 found = []
                 for seed in range(seeds):
                     camera = bench.camera(name, seed)

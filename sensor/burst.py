@@ -137,18 +137,18 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
     InputError
         As `merge`.
     """
-    first = frames[0] if len(frames) == 1 and not dark_current_e_per_s else None
-    if first is not None:
-        return first
-    merged = merge(frames, dark_current_e_per_s)
+    if len(frames) == 1 and not dark_current_e_per_s:
+        return frames[0]
+    merged, first = merge(frames, dark_current_e_per_s), frames[0]
     times = np.array([frame.exposure_s for frame in frames])
-    whole_s, first = float(times.sum()), frames[0]
+    whole_s = float(times.sum())
     full_e = first.full_well_e * whole_s / float(times.min())
     gain_e = full_e / MERGED_WHITE_DN
     # In the dark a frame's weight goes with the square of its time.
     squares = float((times**2).sum())
     temporal_e2 = (first.read_noise_e**2 + first.gain_e_per_dn**2 / 12) * whole_s**2 / squares
-    electrons = np.where(merged.saturated, full_e, np.minimum(merged.rate_e_per_s * whole_s, full_e))
+    full = np.all([frame.saturated for frame in frames if frame.exposure_s == times.min()], axis=0)
+    electrons = np.where(full, full_e, np.minimum(merged.rate_e_per_s * whole_s, full_e))
     return replace(
         first,
         dn=electrons / gain_e,  # type: ignore[arg-type]  # finite floats are taken as they are

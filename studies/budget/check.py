@@ -93,7 +93,7 @@ def check_plan(
             if row.condition.scene == choice:
                 expected = model_electrons(made["planned"], row, planned.images[row.condition])
                 true = model_electrons(made["reference"], row, reference.images[row.condition])
-                below = true < preset(row.condition.sensor).pixel.full_well_e
+                below = true < preset(row.condition.sensor).pixel.full_well_e * row.condition.frames
                 measured = float(np.sqrt(np.mean((expected - true)[below] ** 2))) if below.any() else 0.0
                 # The reference has noise of its own, of its samples and of its level.
                 rms_e = {term.name: term.rms_e for term in row.terms}

@@ -68,8 +68,10 @@ def characterise(
             raise InputError(f"preset: {preset!r} beside raw files; allowed: a preset, or --from and --dark; give one")
         _measure_files(flats or [], dark or [], window, out, json)
         return
-    if preset is None or window is not None:
+    if preset is None:
         raise InputError("preset: none is given; allowed: PRESET, or raw files by --from and --dark; give one")
+    if window is not None:
+        raise InputError(f"window: {window} for {preset!r}; allowed with --from and --dark; leave it out")
     sensor = sensor_preset(preset)
     if out is not None:
         require_ending(out, ".svg")

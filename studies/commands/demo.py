@@ -26,7 +26,7 @@ def demo(
     processor: Several = None,
     longest_exposure_s: Seconds | None = None,
     spp: int | None = None,
-    max_seconds: float | None = None,
+    max_seconds: Seconds | None = None,
     seed: int = 0,
     light: str | None = None,
     denoise: Flag = False,

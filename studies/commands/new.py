@@ -62,8 +62,13 @@ def preset(
         Electrons at which the camera reads white there, which such a profile doesn't tell.
     """
     if camera is None and noise is None:
-        if name is None or anchor is not None:
+        if name is None:
             raise InputError("name: none is given; allowed: a preset's name, --camera or --noise; give one")
+        for option, value in (("anchor", anchor), ("iso", iso), ("white-e", white_e)):
+            if value is not None:
+                raise InputError(
+                    f"{option}: {value} for {name!r}; allowed with --camera or --noise; add one, or leave it out"
+                )
         _copy(preset_file(name), out, ".toml")
         return
     _require_new(out, ".toml")

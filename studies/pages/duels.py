@@ -9,6 +9,7 @@ import numpy as np
 
 from isp.processors.catalogue import FAIR, PROCESSORS
 from rodcone.errors import InputError, unknown
+from sensor.burst import merged_sensor
 from sensor.presets import names, preset
 from sensor.readout import as_raw
 from sensor.variations import vary
@@ -190,14 +191,17 @@ def is_ranked(contest: Contest, camera: str) -> bool:
 def snr_db(contest: Contest, camera: str, channel: str) -> float:
     """SNR of a channel's mean expected electrons [dB], shot and dark noise; NaN where channel or noise isn't known.
 
-    A sensor of the user's own file is known to the results database by its name alone.
+    A burst's is that of its frames together. A sensor or processor of the user's own file is known to the results
+    database by its name alone.
     """
     row = contest.rows[camera][0]
     electrons = json.loads(row.mean_electrons).get(channel)
-    if electrons is None or electrons <= 0 or row.sensor not in names():
+    if electrons is None or electrons <= 0 or row.sensor not in names() or camera not in PROCESSORS:
         return nan
-    sensor = vary(preset(row.sensor), PROCESSORS[camera].mosaic)
+    electrons *= row.frames
+    sensor = merged_sensor(vary(preset(row.sensor), PROCESSORS[camera].mosaic), row.frames)
+    exposure_s = row.exposure_s * row.frames
     dark_e = as_raw(
-        np.zeros((len(sensor.cfa), len(sensor.cfa[0])), np.uint16), sensor, row.exposure_s, row.readout_engine
+        np.zeros((len(sensor.cfa), len(sensor.cfa[0])), np.uint16), sensor, exposure_s, row.readout_engine
     ).dark_noise_e
     return 20 * log10(electrons / sqrt(electrons + dark_e**2))

@@ -10,7 +10,7 @@ import numpy as np
 from isp.remosaic import remosaic
 from render.engine import render
 from render.illuminants import illuminant
-from render.radiance_files.radiance_source import extent_of, is_radiance_file
+from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reflectance
 from render.scene import Scene, film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.user_scene.scene_parts import SceneFile
@@ -124,7 +124,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
     # What is looked at, and the light that the camera's colours are set to.
     if opened is None:
         stated = order.lights[0] if order.lights else None
-        known = stated or (None if balance is None else order.white_balance)
+        known = stated or (None if balance is None or is_reflectance(order.source) else order.white_balance)
         transport, light, notes = open_radiance_file(order.source, known)
         spectra: dict[str, Spectrum] = {}
         luminance_cd_m2 = None if order.level is None else parse_level(order.level)[0]

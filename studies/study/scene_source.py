@@ -11,9 +11,9 @@ from rodcone.errors import InputError, require_whole
 from scenes.catalog import load
 from studies.study.levels import parse_level
 
-_READ = (".xml", *ENDINGS)  # endings of files that are scenes
 _OTHER_FILES = {
     **dict.fromkeys((".dng", ".tif", ".tiff", ".nef", ".cr2", ".cr3", ".arw"), "a raw file, for rodcone develop"),
+    **dict.fromkeys(ENDINGS, "a picture, for rodcone capture or a study"),
     ".toml": "a study or a sensor, for rodcone sweep or --sensor",
 }
 
@@ -47,7 +47,8 @@ def open_scene(
         raise InputError(f"trust-scene: {source!r} is no .xml scene; leave --trust-scene out")
     if suffix := Path(source).suffix.lower():
         what = _OTHER_FILES.get(suffix, f"no file that is a scene ({suffix})")
-        raise InputError(f"scene: {source!r} is {what}; allowed: {', '.join(_READ)}, or a name of rodcone list scenes")
+        read = (".xml",) if suffix in ENDINGS else (".xml", *ENDINGS)
+        raise InputError(f"scene: {source!r} is {what}; allowed: {', '.join(read)}, or a name of rodcone list scenes")
     options = {name: value for name, value in (("light", light), ("chart", chart)) if value is not None}
     scene = load(source, **options)
     return SceneFile(replace(scene, extend=extend), scene.size, ())

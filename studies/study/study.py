@@ -1,4 +1,4 @@
-"""A study: scenes, spectra, levels, exposures, sensors, processors and seeds, of which every combination is a cell."""
+"""A study: scenes, spectra, levels, exposures, sensors, ..., processors and seeds; every combination is a cell."""
 
 from dataclasses import dataclass, field
 from itertools import product

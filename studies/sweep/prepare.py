@@ -3,13 +3,14 @@
 import sqlite3
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit
-from isp.processors.own import own_file, processor_of
+from isp.processors.catalogue import Processor
+from isp.processors.own import own_file, own_version, processor_of
 from render.transport import Transport
 from rodcone.digests import digest, digest_bytes
 from rodcone.jit import backend
@@ -55,6 +56,16 @@ class Job:
     out: Path
     base: sqlite3.Connection
     clock: Clock = field(default_factory=Clock)
+
+    @cached_property
+    def own(self) -> dict[str, dict[str, str]]:
+        """`own_version` of each processor as the sweep begins: a file that changes meanwhile is refused."""
+        return {name: own_version(name) for name in self.study.processors}
+
+    @cached_property
+    def software(self) -> dict[str, Processor]:
+        """Each processor, loaded once."""
+        return {name: processor_of(name, own) for name, own in self.own.items()}
 
 
 Imaged = tuple[str, str, LensConfig, str]  # spectrum, sensor, modelled lens and mosaic: what a frame belongs to
@@ -155,14 +166,14 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
             return None
         frames[imaged] = frame
         for name in job.study.processors:
-            if processor_of(name).mosaic == imaged[-1]:
+            if job.software[name].mosaic == imaged[-1]:
                 light = white_spectrum(opened, imaged[0])
-                colours[imaged, name] = colours_under(frame.sensor, processor_of(name), light)
+                colours[imaged, name] = colours_under(frame.sensor, job.software[name], light)
     cells = []
     for condition in conditions(job.study, opened.choice):
         lens = job.plan.images[condition].lens
         for name in job.study.processors:
-            imaged = condition.spectrum, condition.sensor, lens, processor_of(name).mosaic
+            imaged = condition.spectrum, condition.sensor, lens, job.software[name].mosaic
             frame = frames[imaged]
             luminance = level_luminance(condition.level, frame.lux_per_cd_m2)
             longest_s = job.study.longest_exposure_s
@@ -184,7 +195,8 @@ def _cell(
 ) -> Cell:
     """One cell; `light` is the mean luminance [cd/m^2] and the exposure time [s]."""
     luminance, exposure_s = light
-    made_by = provenance(record.facts.variant, processor, exact=job.plan.images[condition].exact)
+    software, exact = job.software[processor], job.plan.images[condition].exact
+    made_by = provenance(record.facts.variant, processor, software.on_backend, job.own[processor], exact)
     return Cell(
         key=cell_key(condition, label(processor), seed, frame.key, luminance, exposure_s, colours, made_by),
         condition=condition,

@@ -2,13 +2,12 @@
 
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import metadata
 
 from isp.processors.catalogue import libraries
-from isp.processors.own import own_version, processor_of
 from rodcone.errors import InputError
 from rodcone.jit import backend, compiler_version, dr
 from studies.sweep.code_version import code_version
@@ -37,17 +36,16 @@ class Provenance:
     versions: str
 
 
-def provenance(variant: str, processor: str, exact: bool) -> Provenance:
+def provenance(variant: str, processor: str, on_backend: bool, own: Mapping[str, str], exact: bool) -> Provenance:
     """Provenance of a cell made in this process; `exact` as `studies.study.model.ImageModel`.
 
-    A processor's own file is in it by the hash of its bytes; what it imports isn't.
+    A user's own processor is in it by `own`, its `isp.processors.own.own_version`; what its file imports isn't.
     """
-    own = own_version(processor)
     return Provenance(
         variant=variant,
         readout_engine="numpy" if exact else backend(),
-        development_engine=backend() if processor_of(processor).on_backend else "numpy",
-        versions=json.dumps(versions(processor) | own, sort_keys=True),
+        development_engine=backend() if on_backend else "numpy",
+        versions=json.dumps({**versions(processor), **own}, sort_keys=True),
     )
 
 

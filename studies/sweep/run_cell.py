@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.processors.own import processor_of
+from isp.processors.catalogue import Processor
+from isp.processors.own import own_version, processor_of
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
@@ -53,7 +54,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         Where the picture can't be written.
     """
     processor = processor_of(cell.processor, json.loads(cell.made_by.versions))  # a user's own: the same bytes, or none
-    _check_provenance(cell)
+    _check_provenance(cell, processor)
     if most_threads is not None:
         limit_threads(most_threads)
     truth, truth_png = _truth(cell.truth)
@@ -140,8 +141,9 @@ def limit_threads(most: int) -> None:
         dr.set_thread_count(most)
 
 
-def _check_provenance(cell: Cell) -> None:
-    own = in_words(provenance(cell.made_by.variant, cell.processor, exact=cell.made_by.readout_engine == "numpy"))
+def _check_provenance(cell: Cell, processor: Processor) -> None:
+    exact, name = cell.made_by.readout_engine == "numpy", cell.processor
+    own = in_words(provenance(cell.made_by.variant, name, processor.on_backend, own_version(name), exact))
     for name, asked in in_words(cell.made_by).items():
         if own.get(name) != asked:
             raise InputError(

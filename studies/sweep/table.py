@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from render.illuminants import is_light_file
 from rodcone.colour_spaces import decode_srgb
 from rodcone.errors import InputError, unknown
 from scenes.catalog import load, names
@@ -123,6 +124,11 @@ def _figure(row: Row, name: str, folder: Path) -> float | None:
     scene, measure = CHARTS.get(name, ("metamers", pair_delta_e))
     if row.scene != scene or row.scene not in names():
         raise InputError(f"show: {name} is known of scene {scene}, not of {row.scene}; leave it out, or give --where")
+    if name == TRUE_PAIRS and is_light_file(row.spectrum):
+        raise InputError(
+            f"show: {name} under {row.spectrum}, whose file isn't in the database; allowed: lights by name; "
+            "leave it out, or give --where"
+        )
     if name == TRUE_PAIRS:
         return float(true_pair_delta_e(TWINS_UNDER if row.spectrum == OWN else row.spectrum).mean())
     with Image.open(BytesIO(read_whole(folder / PICTURES, row.picture))) as file:

@@ -215,6 +215,9 @@ def test_a_merged_burst_is_one_exposure_of_all_its_time():
     assert raw.full_well_e == pytest.approx(4 * frames[0].full_well_e)
     assert raw.dark_noise_e**2 == pytest.approx(4 * (1.0 + 1 / 12) + (4 * 1.0) ** 2)
     assert merged_raw(frames[:1]) is frames[0]
+    bright = merged_raw([raw_image(np.full((8, 10), 14_800))] * 4)
+    assert bright.electrons == pytest.approx(np.full((8, 10), 4 * 14_700.0), rel=1e-6)
+    assert not bright.saturated.any()
     full = merged_raw([raw_image(np.full((8, 10), 15_100))] * 4)
     assert full.saturated.all()
 

@@ -58,7 +58,7 @@ def test_what_is_not_allowed_is_told_in_one_line(frames, tmp_path, capsys):
         (["--from", *flats, "--dark", darks[0], tmp_path / "absent.dng"], "there is no such file"),
         (["--from", *flats, "--dark", darks[0], tmp_path / "broken.dng"], "broken.dng"),
         (["--from", *flats, "--dark", *darks, "--window", "0"], "window: 0 pixels"),
-        (["low_noise", "--window", "20"], "preset: none is given"),
+        (["low_noise", "--window", "20"], "window: 20"),
     ):
         code, out, err = call(capsys, *arguments)
         assert (code, out) == (2, ""), arguments
