@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 from isp.picture import Picture
-from rodcone.errors import InputError
+from rodcone.errors import InputError, one_line
 from sensor.presets import names as sensors
 from studies.explore.chain import Exposed, Image, Shot, development_of, expose_scene, photograph, true_picture_of
 from studies.explore.controls import Controls, Lamp, controls_from, to_json
@@ -54,6 +54,7 @@ class Session:
     def __init__(self, source: Source) -> None:
         self._source, self._states = source, source.states()
         self._rendered: Rendered | None = None
+        self._rendering, self._failure = True, ""  # whether a finer state follows, and why none does
         self._memo = Memo()
         self._cold = list(WARM)
         self._pending: dict[str, Header] = {}
@@ -111,7 +112,7 @@ class Session:
                 try:
                     if message is not None:
                         header, buffers = self._answer(message)
-                        notes = sorted({str(each.message) for each in told})
+                        notes = sorted({str(each.message) for each in told}) + [self._failure] * bool(self._failure)
                         whose = {"kind": message["kind"], "number": message["number"], "notes": notes}
                         self._send(header | whose, buffers)
                     else:
@@ -127,7 +128,7 @@ class Session:
         with self._changed:
             while not self._closed:
                 kind = next((kind for kind in KINDS if kind in self._pending), None)
-                if kind is not None and (self._rendered is not None or kind == "hello"):
+                if kind is not None and (self._rendered is not None or not self._rendering or kind == "hello"):
                     return self._pending.pop(kind), _nothing
                 act, left_s = self._left_to_do(), self._asked_s + REST_S - time.monotonic()
                 if act is not None and (left_s <= 0 or self._rendered is None):
@@ -137,18 +138,24 @@ class Session:
 
     def _left_to_do(self) -> Callable[[], None] | None:
         """What waits for the sliders to rest: a finer render, slow processors, kernels to compile."""
-        if self._rendered is None or not self._rendered.last:
+        if self._rendering:
             return self._render_on
         if self._slow_wanted:
             return self._begin_slow
-        return self._warm_up if self._cold else None
+        return self._warm_up if self._cold and self._rendered is not None else None
 
     def _fail(self, message: Header | None, words: str) -> None:
         self._send({"kind": "error", "number": message and message["number"], "message": words}, ())
 
     def _render_on(self) -> None:
         """Render the next state, and show what is in view again."""
-        self._rendered = next(self._states)
+        self._rendering = False  # where this fails, none follows: a generator that raised is at its end
+        try:
+            self._rendered = next(self._states)
+        except Exception as error:
+            self._failure = f"the render ended with {type(error).__name__}: {one_line(error)}"
+            raise
+        self._rendering = not self._rendered.last
         self._memo = Memo()
         with self._changed:
             if self._shown is not None:
@@ -164,7 +171,8 @@ class Session:
         if kind in ("hello", "cancel"):
             return (hello(self._source) if kind == "hello" else {}), ()
         rendered = self._rendered
-        assert rendered is not None  # `_work` waits for the first state
+        if rendered is None:
+            raise InputError(f"scene: {self._failure}; nothing can be shown; mend the scene and start again")
         cameras = [controls_from(each, self._sensors()) for each in message["cameras"]]
         if kind == "show":
             return self._show(message, cameras, rendered)
@@ -215,7 +223,7 @@ class Session:
             "facts": [facts(shot) for shot in shots],
             "size": [height, width],
             "spp": rendered.transport.spp,
-            "last": rendered.last,
+            "last": not self._rendering,
         }
         return header, [picture.tobytes() for picture in pictures]
 

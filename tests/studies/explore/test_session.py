@@ -1,0 +1,75 @@
+"""One explorer's thread: a render that fails, pages that take over from one another."""
+
+import json
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from explore_sample import small_transport
+
+from rodcone.errors import InputError
+from studies.explore.session import Session
+from studies.explore.source import Rendered, of_transport
+
+
+class Page:
+    """What one page is sent."""
+
+    def __init__(self) -> None:
+        self.headers: list[dict[str, Any]] = []
+        self.came = threading.Condition()
+
+    def send(self, header: dict[str, Any], buffers: Any) -> None:
+        with self.came:
+            self.headers.append(header)
+            self.came.notify_all()
+
+    def wait(self, kind: str, number: int | None) -> dict[str, Any]:
+        """The answer of that kind and number, once it is there."""
+
+        def found() -> list[dict[str, Any]]:
+            return [each for each in self.headers if (each["kind"], each.get("number")) == (kind, number)]
+
+        with self.came:
+            assert self.came.wait_for(found, 30), self.headers
+            return found()[-1]
+
+
+def message(kind: str, number: int, **more: Any) -> str:
+    shown = {"cameras": [{}], "views": [[0, "picture"]]} if kind == "show" else {}
+    return json.dumps({"kind": kind, "number": number} | shown | more)
+
+
+@pytest.mark.parametrize("good_states", [0, 1])
+def test_a_render_that_fails_is_told_and_asked_for_once(good_states):
+    failed, once = 0, threading.Event()
+
+    class Failing(Iterator[Rendered]):
+        def __init__(self) -> None:
+            self.left = good_states
+
+        def __next__(self) -> Rendered:
+            nonlocal failed
+            if self.left:
+                self.left -= 1
+                return Rendered(small_transport(), "", False)
+            failed += 1
+            once.set()
+            raise InputError("wall: it has no material") if failed == 1 else StopIteration
+
+    page = Page()
+    session = Session(replace(of_transport(small_transport()), states=Failing))
+    session.connect(page.send)
+    session.take(message("hello", 1))
+    page.wait("hello", 1)
+    assert once.wait(20)
+    for number in (2, 3):
+        session.take(message("show", number))
+        if good_states:
+            assert "it has no material" in page.wait("show", number)["notes"][-1]
+        else:
+            assert "it has no material" in page.wait("error", number)["message"]
+    session.close()
+    assert failed == 1
