@@ -8,9 +8,10 @@ from typing import Any
 
 from isp.processors.catalogue import PROCESSORS, Processor
 from isp.settings import DEFAULTS, PAPER, Settings
-from render.illuminants import illuminant
+from render.illuminants import illuminant, is_light_file
 from rodcone.errors import InputError, require_keys, require_range, require_whole, unknown
 from sensor.cfa import MOSAICS, channels
+from sensor.cfa import OWN as OWN_MOSAIC
 from sensor.config import SensorConfig
 from sensor.exposure import AUTO, LONGEST_S, RULES
 from sensor.presets import names, preset
@@ -70,7 +71,7 @@ class Controls:
     sensor : str
         A preset's name, or a ``.toml`` file.
     mosaic : str
-        A name of `sensor.cfa.MOSAICS` or `sensor.variations.VARIATIONS`.
+        A name of `sensor.cfa.MOSAICS` or `sensor.variations.VARIATIONS`, or ``own``, the sensor's own.
     lens, pixel : mapping of str to float
         Fields of `LensConfig` (`LENS`) and `PixelConfig` (`PIXEL`) that differ from the preset's.
     bits : int or None
@@ -121,7 +122,7 @@ class Controls:
             ("exposure", self.exposure, (*RULES, TIME)),
             ("processor", self.processor, PROCESSORS),
             ("white_balance", self.white_balance, WHITE_BALANCES),
-            ("mosaic", self.mosaic, (*MOSAICS, *VARIATIONS)),
+            ("mosaic", self.mosaic, (*MOSAICS, *VARIATIONS, OWN_MOSAIC)),
         )
         for name, value, allowed in known:
             if value not in allowed:
@@ -180,15 +181,16 @@ def camera_of(controls: Controls) -> SensorConfig:
 # From and to JSON
 
 
-def controls_from(content: Any, sensors: tuple[str, ...] = names()) -> Controls:
+def controls_from(content: Any, own: Controls = Controls()) -> Controls:  # noqa: B008 (it is frozen)
     """Check and read the controls of a message.
 
     Parameters
     ----------
     content : decoded JSON
         An object with fields of `Controls`; those that are left out have their defaults.
-    sensors : tuple of str
-        Sensors that may be named: a message may not make the program read other files.
+    own : Controls
+        What the page began with. The files that it names may be named again: a message may not make the program read
+        others.
 
     Raises
     ------
@@ -199,9 +201,22 @@ def controls_from(content: Any, sensors: tuple[str, ...] = names()) -> Controls:
     readers = _readers()
     require_keys("controls", given, readers)
     values = {name: readers[name](name, value) for name, value in given.items()}
-    if values.get("sensor", sensors[0]) not in sensors:
-        raise unknown("sensor", values["sensor"], sensors)
+    if values.get("sensor", own.sensor) not in (*names(), own.sensor):
+        raise unknown("sensor", values["sensor"], {*names(), own.sensor})
+    lamps = {f"lamps[{group!r}].spectrum": lamp.spectrum for group, lamp in values.get("lamps", {}).items()}
+    for name, light in {"reference_light": values.get("reference_light", LIGHT), **lamps}.items():
+        if is_light_file(light) and light not in light_files(own):
+            raise InputError(
+                f"{name}: {light!r} is a file that the command didn't name; allowed: an illuminant's name; load the "
+                "file on the page, as a table"
+            )
     return Controls(**values)
+
+
+def light_files(controls: Controls) -> tuple[str, ...]:
+    """Files among the lights of some controls, each once."""
+    lights = (controls.reference_light, *(lamp.spectrum for lamp in controls.lamps.values()))
+    return tuple(dict.fromkeys(light for light in lights if is_light_file(light)))
 
 
 def to_json(controls: Controls) -> dict[str, Any]:

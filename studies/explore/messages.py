@@ -12,7 +12,7 @@ from rodcone.errors import InputError, require_keys, require_whole, unknown
 from sensor.exposure import RULES
 from sensor.presets import names as sensors
 from sensor.presets import preset
-from studies.explore.controls import ADJUSTABLE, LENS, PIXEL, SETTINGS, TIME, Controls, mosaics_of, to_json
+from studies.explore.controls import ADJUSTABLE, LENS, PIXEL, SETTINGS, TIME, Controls, light_files, mosaics_of, to_json
 from studies.explore.slow import is_slow
 from studies.explore.source import Source
 from studies.explore.views import VIEWS
@@ -46,7 +46,7 @@ def hello(source: Source) -> Header:
         "controls": to_json(source.controls),
         "defaults": to_json(Controls()),
         "groups": source.groups,
-        "illuminants": list(illuminants()),
+        "illuminants": list(dict.fromkeys((*illuminants(), *light_files(source.controls)))),
         "rules": [*RULES, TIME],
         "white_balances": list(WHITE_BALANCES),
         "sensors": {

@@ -15,7 +15,6 @@ from typing import Any, TypeAlias
 
 from isp.picture import Picture
 from rodcone.errors import InputError, one_line
-from sensor.presets import names as sensors
 from studies.explore.chain import Exposed, Image, Shot, development_of, expose_scene, photograph, true_picture_of
 from studies.explore.controls import Controls, Lamp, controls_from, to_json
 from studies.explore.files import dng_of, png_of
@@ -173,7 +172,7 @@ class Session:
         rendered = self._rendered
         if rendered is None:
             raise InputError(f"scene: {self._failure}; nothing can be shown; mend the scene and start again")
-        cameras = [controls_from(each, self._sensors()) for each in message["cameras"]]
+        cameras = [controls_from(each, self._source.controls) for each in message["cameras"]]
         if kind == "show":
             return self._show(message, cameras, rendered)
         header, buffers = self._written(message, cameras[0], rendered)
@@ -246,7 +245,7 @@ class Session:
         self._slow_wanted, shown, rendered = False, self._shown, self._rendered
         if shown is None or rendered is None:
             return
-        for controls in [controls_from(each, self._sensors()) for each in shown["cameras"]]:
+        for controls in [controls_from(each, self._source.controls) for each in shown["cameras"]]:
             key, memo = repr(controls), self._memo
             if is_slow(controls.processor) and memo.kept("slow", key) is None and key not in self._slow:
 
@@ -261,10 +260,6 @@ class Session:
                 end = begin(development_of(expose_scene(rendered.transport, controls, memo), controls, memo), done)
                 with self._changed:
                     self._slow[key] = end
-
-    def _sensors(self) -> tuple[str, ...]:
-        """Presets, and the file that the command named; a page names no others."""
-        return tuple(dict.fromkeys((*sensors(), self._source.controls.sensor)))
 
     def _study(self, controls: Controls, rendered: Rendered) -> dict[str, str]:
         source = self._source

@@ -15,7 +15,7 @@ pytest.importorskip("uvicorn", reason="needs rodcone[explore]")
 pytest.importorskip("websockets", reason="needs rodcone[explore]")
 
 from rodcone.errors import InputError
-from studies.explore.controls import Controls, controls_from, to_json
+from studies.explore.controls import Controls, Lamp, controls_from, to_json
 from studies.explore.messages import read_message
 from studies.explore.server import listen, make_server
 from studies.explore.session import Session
@@ -132,6 +132,8 @@ HOSTILE = [
     '{"kind": "show", "number": 1, "cameras": [{}], "views": [[0, "__class__"]]}',
     '{"kind": "show", "number": 1, "cameras": [{}], "views": [[0, ["picture"]]]}',
     '{"kind": "show", "number": 1, "cameras": [{"sensor": "../secret.toml"}], "views": [[0, "raw"]]}',
+    '{"kind": "show", "number": 1, "cameras": [{"reference_light": "SECRET"}], "views": [[0, "raw"]]}',
+    '{"kind": "show", "number": 1, "cameras": [{"lamps": {"sun": {"spectrum": "SECRET"}}}], "views": [[0, "raw"]]}',
     '{"kind": "show", "number": 1, "cameras": [{"frames": 100000}], "views": [[0, "raw"]]}',
     '{"kind": "show", "number": 1, "cameras": [{"settings": {"neighbourhood": 1e9}}], "views": [[0, "raw"]]}',
     '{"kind": "pixel", "number": 1, "cameras": [{}], "row": "0", "column": 0}',
@@ -142,15 +144,18 @@ HOSTILE = [
 ]  # fmt: skip
 
 
-def test_hostile_messages_get_one_line_and_the_next_is_answered(served):
+def test_hostile_messages_get_one_line_and_the_next_is_answered(served, tmp_path):
     port, token = served
+    secret = tmp_path / "secret.CSV"
+    secret.write_text("password,hunter2\n1,2\n", "utf-8")
     with connected(port, f"/{token}/live", origin=f"http://127.0.0.1:{port}", max_size=None) as connection:
         for text in HOSTILE:
-            connection.send(text)
+            connection.send(text.replace("SECRET", secret.as_posix()))
             header = received(connection)
             assert header["kind"] == "error", text[:80]
             assert "\n" not in header["message"]
             assert "program failed" not in header["message"], header
+            assert "password" not in header["message"], header
         connection.send(b"\x00\x01")
         assert received(connection)["kind"] == "error"
         connection.send('{"kind": "show", "number": 5, "cameras": [{}], "views": [[0, "picture"]]}')
@@ -173,6 +178,15 @@ def test_controls_that_are_not_allowed_are_refused(content):
     with pytest.raises(InputError) as caught:
         controls_from(content)
     assert "\n" not in str(caught.value)
+
+
+def test_files_that_the_command_named_may_be_named_again(tmp_path):
+    path = tmp_path / "led.csv"
+    path.write_text("wavelength_nm,power\n400,1\n700,1\n", "utf-8")
+    own = Controls(lamps={"sun": Lamp(str(path))}, reference_light=str(path))
+    assert controls_from(to_json(own), own) == own
+    with pytest.raises(InputError, match="the command didn't name"):
+        controls_from(to_json(own))
 
 
 def test_controls_come_back_from_json():
