@@ -17,7 +17,7 @@ from sensor.exposure import AUTO, LONGEST_S, RULES
 from sensor.presets import names, preset
 from sensor.variations import VARIATIONS, vary
 from studies.study.radiance_file import LIGHT
-from studies.study.study import GRAY_WORLD, OWN, WHITE_BALANCES
+from studies.study.study import GRAY_WORLD, MOST_FRAMES, OWN, WHITE_BALANCES
 
 TIME = "time"  # as an exposure: the time that `exposure_s` states
 LENS = ("f_number", "defocus_um", "diffraction", "veiling_glare")
@@ -28,7 +28,6 @@ PIXEL = (
 SETTINGS = ("neighbourhood", "patch", "sigma_d", "sigma_s")
 # Processors with settings of their own, and what these are by default.
 ADJUSTABLE: Mapping[str, Settings] = MappingProxyType({"interleaved": DEFAULTS, "interleaved_paper": PAPER})
-MOST_FRAMES = 16
 MOST_POINTS = 2000  # of a spectrum from a file
 WIDEST = 41  # pixels of Omega: four times the default's time
 
@@ -87,7 +86,7 @@ class Controls:
     exposure_number : int
         Which exposure of that chip: each has noise of its own.
     frames : int
-        Exposures of a burst, summed.
+        Exposures of a burst, merged into one (`sensor.burst.merged_raw`).
 
     Raises
     ------

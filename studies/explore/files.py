@@ -22,10 +22,10 @@ def dng_of(exposed: Exposed, controls: Controls) -> bytes:
     Raises
     ------
     InputError
-        For a burst, whose sum is no negative's whole numbers, or a mosaic that DNG doesn't hold.
+        For a burst, whose merged samples are no whole numbers as a negative's are, or a mosaic that DNG doesn't hold.
     """
     if controls.frames > 1:
-        raise InputError("dng: a burst's sum is no raw file; allowed: 1 frame; save the exposures one by one")
+        raise InputError("dng: a merged burst is no raw file; allowed: 1 frame; save the exposures one by one")
     first = next(iter(exposed.transport.groups.values()))
     light = illuminant(controls.reference_light) if first.coloured else first.spectrum
     raw = replace(

@@ -265,8 +265,9 @@ class Session:
         source = self._source
         if source.scene is None:
             raise InputError("study: a transport has no name that a study could say; allowed: rodcone explore SCENE")
+        judged = next(iter(rendered.transport.groups.values())).coloured
         lamps = {name: controls.lamps.get(name, Lamp()) for name in rendered.transport.groups}
-        return study_of(source.scene, source.size, source.band_nm, source.spp, replace(controls, lamps=lamps))
+        return study_of(source.scene, source.render, replace(controls, lamps=lamps), judged)
 
 
 def _nothing() -> None:

@@ -9,12 +9,12 @@ import numpy as np
 
 from isp.processors.catalogue import PROCESSORS
 from render.engine import render
-from render.radiance_files.radiance_source import is_radiance_file
+from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reflectance
 from render.scene import LightGroup, Scene, film_size
 from render.spectrum import VISIBLE_NM, Floats
 from render.transport import Transport
 from rodcone.errors import InputError, require_range, require_whole
-from rodcone.memory import file_extent, memory, require_memory
+from rodcone.memory import memory, require_memory
 from sensor.exposure import RULES
 from sensor.presets import preset
 from studies.explore.controls import TIME, Controls, Lamp
@@ -23,7 +23,7 @@ from studies.study.exposures import parse_exposure
 from studies.study.levels import parse_level
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.study.scene_source import open_scene
-from studies.study.study import OWN, SceneChoice, Study
+from studies.study.study import OWN, RenderLimits, SceneChoice, Study
 from studies.study.study_file import read_study
 
 FIRST_SIDE, FIRST_SPP = 64, 16  # of the first picture, which is there at once
@@ -52,8 +52,10 @@ class Source:
         Light groups, and whether one has colours of its own.
     controls : Controls
         To begin with.
-    scene, size, band_nm, spp
-        What a study of it would say; scene is None where nothing but the transport is known.
+    scene : SceneChoice, optional
+        As a study names it; None where nothing but the transport is known.
+    render : RenderLimits
+        As a study would have it.
     notes : tuple of str
         What had to be assumed.
     """
@@ -62,10 +64,8 @@ class Source:
     states: Callable[[], Iterator[Rendered]]
     groups: Mapping[str, bool]
     controls: Controls = field(default_factory=Controls)
-    scene: str | None = None
-    size: int = 256
-    band_nm: float = 20.0
-    spp: int = 64
+    scene: SceneChoice | None = None
+    render: RenderLimits = field(default_factory=RenderLimits)
     notes: tuple[str, ...] = ()
 
 
@@ -88,7 +88,6 @@ def of_transport(transport: Transport) -> Source:
         "transport",
         lambda: iter((Rendered(transport, GIVEN, True),)),
         _coloured(transport.groups),
-        size=max(transport.coverage.shape),
     )
 
 
@@ -112,8 +111,17 @@ def open_source(source: str, limits: RenderOptions) -> Source:
 
 
 def file_transport(path: str, light: str | None = None) -> tuple[Transport, tuple[str, ...]]:
-    """Transport of a file of radiance, whose light is in it, and what had to be assumed."""
+    """Transport of a picture file, and what had to be assumed; radiance has its light in it, which is marked so.
+
+    Parameters
+    ----------
+    path : str
+    light : str, optional
+        That lights reflectances, at first.
+    """
     transport, _, notes = open_radiance_file(path, light)
+    if is_reflectance(path):
+        return transport, tuple(notes)
     groups = {name: replace(group, coloured=True) for name, group in transport.groups.items()}
     return replace(transport, groups=groups), tuple(notes)
 
@@ -147,6 +155,7 @@ def _of_study(study: Study, limits: RenderOptions, source: str) -> Source:
         processor=study.processors[0],
         white_balance=study.white_balances[0],
         seed=study.seeds[0],
+        frames=study.frames[0],
     )
     return replace(opened, title=f"{study.name}: {opened.title}", controls=controls, notes=tuple(notes))
 
@@ -154,28 +163,30 @@ def _of_study(study: Study, limits: RenderOptions, source: str) -> Source:
 def _of_choice(choice: SceneChoice, limits: RenderOptions) -> Source:
     if is_radiance_file(choice.source):
         check_radiance_file(choice.source, ())
-        require_memory(memory(*file_extent(choice.source)), limits.force)
+        require_memory(memory(*extent_of(choice.source)), limits.force)
         transport, notes = file_transport(choice.source, choice.light)
+        lit_by = f", {choice.light!r}" if choice.light else ""
         code = (
-            f"from studies.explore.source import file_transport\n\ntransport, _ = file_transport({choice.source!r})\n"
+            "from studies.explore.source import file_transport\n\n"
+            f"transport, _ = file_transport({choice.source!r}{lit_by})\n"
         )
         return Source(
             Path(choice.source).name,
             lambda: iter((Rendered(transport, code, True),)),
             _coloured(transport.groups),
             Controls(reference_light=choice.light or LIGHT),
-            scene=choice.source,
-            size=max(transport.coverage.shape),
+            scene=choice,
+            render=RenderLimits(size=max(transport.coverage.shape)),
             notes=notes,
         )
-    opened = open_scene(choice.source, limits.trust, choice.extend, choice.light)
+    opened = open_scene(choice.source, limits.trust, choice.extend, choice.light, choice.chart)
     size = film_size(opened.size, limits.size)
     bands = _bands(limits)
     require_memory(memory(size[0] * size[1], bands[0].size, len(opened.scene.groups)), limits.force)
     named = "".join(
         f", {name}={value!r}"
-        for name, value in (("trust", limits.trust), ("extend", choice.extend), ("light", choice.light))
-        if value
+        for name, value in {"trust": limits.trust, **vars(choice)}.items()
+        if value and name != "source"
     )
     first, last = limits.range_nm
     code = (
@@ -188,10 +199,8 @@ def _of_choice(choice: SceneChoice, limits: RenderOptions) -> Source:
         opened.scene.name,
         lambda: _states(opened.scene, size, bands, limits, code),
         _coloured(opened.scene.groups),
-        scene=choice.source,
-        size=max(size),
-        band_nm=limits.band_nm,
-        spp=limits.spp,
+        scene=choice,
+        render=RenderLimits(max(size), limits.band_nm, limits.spp, seed=limits.seed, range_nm=limits.range_nm),
         notes=tuple(opened.notes),
     )
 

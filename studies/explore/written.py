@@ -1,13 +1,17 @@
 """What a shot is written as: Python that makes it again to the bit, and a study that asks the same question."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
+from pathlib import Path
 from typing import Any
 
+from isp.processors.catalogue import PROCESSORS
+from render.radiance_files.radiance_source import is_radiance_file
 from rodcone.errors import InputError
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.presets import preset, preset_file
 from studies.explore.controls import TIME, Controls, Lamp, camera_of
-from studies.study.study import OWN
+from studies.study.radiance_file import LIGHT
+from studies.study.study import FILES, OWN, RenderLimits, SceneChoice
 
 GIVEN = "transport = ...  # the one that was given to rodcone.explore\n"
 
@@ -53,18 +57,39 @@ def python_of(render: str, controls: Controls, view: str = "picture") -> str:
     return "\n".join([*numpy, "import rodcone", *imports, "", *code, ""])
 
 
-def study_of(scene: str, size: int, band_nm: float, spp: int, controls: Controls) -> dict[str, str]:
+def study_of(scene: SceneChoice, render: RenderLimits, controls: Controls, coloured: bool = False) -> dict[str, str]:
     """Files of a study that asks for this scene, light and camera: ``study.toml`` and, with own terms, ``sensor.toml``.
+
+    Parameters
+    ----------
+    scene : SceneChoice
+    render : RenderLimits
+    controls : Controls
+    coloured : bool
+        Whether the first light group has colours of its own, which are judged under ``reference_light``.
 
     Raises
     ------
     InputError
-        Where a study can't say it: lamps of their own, a burst, or settings of the processor.
+        Where a study can't say it: lamps of their own, another mosaic than the processor's, settings of the processor,
+        or another reference light of a scene's own colours.
     """
-    spectrum = _one_spectrum(controls)
-    for name, what in (("settings", "settings of a processor"), ("frames", "bursts")):
-        if getattr(controls, name) != getattr(Controls(), name):
-            raise InputError(f"study: a study has no {what}; allowed: none; set {name} back, or copy the Python")
+    spectrum, own_mosaic = _one_spectrum(controls), PROCESSORS[controls.processor].mosaic
+    if controls.settings:
+        raise InputError("study: a study has no settings of a processor; allowed: none; set them back, or copy the Python")
+    if controls.mosaic != own_mosaic:
+        raise InputError(
+            f"study: mosaic {controls.mosaic!r} with {controls.processor}; allowed: {own_mosaic!r}, the processor's "
+            "own; choose it, or copy the Python"
+        )
+    if is_radiance_file(scene.source):
+        if coloured:  # a file's light is the one that its colours are judged under
+            scene = replace(scene, light=controls.reference_light)
+    elif coloured and controls.reference_light != LIGHT:
+        raise InputError(
+            f"study: reference_light {controls.reference_light!r} for a scene with colours of its own; allowed: {LIGHT}; "
+            "choose it, or copy the Python"
+        )
     own = preset(controls.sensor)
     sensor = camera_of(controls)
     terms = dict(controls.lens) | dict(controls.pixel)
@@ -74,12 +99,13 @@ def study_of(scene: str, size: int, band_nm: float, spp: int, controls: Controls
     lines = (
         f"# From the explorer: seed {controls.seed}, exposure {controls.exposure_number}.\n"
         f"#   rodcone sweep study.toml -o out/study\n\n"
-        f'name = "explored"\nscenes = [{_text(scene)}]\nspectra = [{_text(spectrum)}]\n'
+        f'name = "explored"\nscenes = [{_scene(scene)}]\nspectra = [{_file(spectrum)}]\n'
         f'levels = ["{controls.level_cd_m2:.12g}cd/m2"]\nexposures = [{_text(exposure)}]\n'
-        f"sensors = [{_text('sensor.toml' if changed else controls.sensor)}]\n"
+        f"sensors = [{_text('sensor.toml') if changed else _file(controls.sensor)}]\n"
         f"white_balances = [{_text(controls.white_balance)}]\nprocessors = [{_text(controls.processor)}]\n"
-        f"seeds = [{controls.seed}]\n{longest}\n"
-        f"[render]\nsize = {size}\nband_nm = {band_nm!r}\nspp = {spp}\n\n"
+        f"seeds = [{controls.seed}]\nframes = [{controls.frames}]\n{longest}\n"
+        f"[render]\nsize = {render.size}\nband_nm = {render.band_nm!r}\nspp = {render.spp}\nseed = {render.seed}\n"
+        f"range_nm = {[float(nm) for nm in render.range_nm]!r}\n\n"
         f"[lens]\ndiffraction = {sensor.lens.diffraction!r}\nveiling_glare = {sensor.lens.veiling_glare!r}\n"
         f"horizontal_view_deg = {sensor.lens.horizontal_view_deg!r}\n"
     )
@@ -125,6 +151,19 @@ def _sensor_file(controls: Controls, own: SensorConfig, sensor: SensorConfig) ->
             if not any(each.partition("=")[0].strip() == name for each in lines):
                 found.append(f"{name} = {wanted.pop(name)[1]!r}")
     return "\n".join(found) + "\n"
+
+
+def _scene(scene: SceneChoice) -> str:
+    """A scene as a study names it: by its source alone, or as a table."""
+    given = {name: value for name, value in vars(scene).items() if value is not None}
+    if given.keys() == {"source"}:
+        return _file(scene.source)
+    return "{ " + ", ".join(f"{name} = {_file(value)}" for name, value in given.items()) + " }"
+
+
+def _file(value: str) -> str:
+    """A text in which a file has its whole path: a study looks for files in its own folder."""
+    return _text(str(Path(value).absolute()) if Path(value).suffix.lower() in FILES else value)
 
 
 def _text(value: str) -> str:

@@ -236,7 +236,7 @@ function render({ model, el }) {
       group("Exposure",
         choice("Rule", hello.rules.map(each => [each, each]), camera.exposure, value => set("exposure", value, true), "exposure"),
         slider([rule ? "Time" : "Longest time", 1e-6, 100, "log", "s"], camera.exposure_s, value => set("exposure_s", value), "exposure_s"),
-        slider(["Burst, exposures", 1, 16, "whole", ""], camera.frames, value => set("frames", value), "frames"),
+        slider(["Burst, exposures", 1, 64, "whole", ""], camera.frames, value => set("frames", value), "frames"),
         numberBox("Seed", camera.seed, value => set("seed", value), "seed"),
         make("div", { class: "row" }, button("Another exposure (E)", another), make("small", {}, `number ${camera.exposure_number}`))),
       group("Lens", ...terms("lens", LENS, preset.lens)),

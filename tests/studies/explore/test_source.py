@@ -1,15 +1,21 @@
 """What the command opens: scenes, files, studies; and what it refuses before anything is rendered."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rodcone as public
+from render.spectrum import DEFAULT_WAVELENGTH_NM
+from rodcone.memory import memory
 from studies.commands.cli import main
 from studies.explore.chain import photograph
+from studies.explore.controls import Lamp
 from studies.explore.source import FIRST_SIDE, RenderOptions, open_source
 from studies.explore.written import python_of
+from studies.photograph.png import to_png
+from studies.study.study import SceneChoice
 
 
 def test_a_scene_is_shown_small_first_and_then_whole():
@@ -34,6 +40,56 @@ def test_a_file_of_radiance_is_photographed_as_it_is(tmp_path: Path):
     assert np.array_equal(names["picture"], photograph(state.transport, source.controls).picture)  # type: ignore[arg-type]
 
 
+def test_reflectances_take_other_lamps_and_the_copied_python_has_their_light(tmp_path: Path):
+    path, study = tmp_path / "seen.png", tmp_path / "study.toml"
+    rng = np.random.default_rng(1)
+    path.write_bytes(to_png(rng.uniform(0.2, 0.8, (16, 20, 3))))
+    study.write_text(
+        'levels = ["25cd/m2"]\nspectra = ["A"]\nscenes = [{ source = "seen.png", light = "D50" }]\n', "utf-8"
+    )
+    source = open_source(str(study), RenderOptions())
+    (state,) = source.states()
+    assert source.groups == {"light": False}
+    assert dict(source.controls.lamps) == {"light": Lamp("A")}
+    shot = photograph(state.transport, source.controls)
+    assert np.ptp(shot.picture) > 0
+    names: dict[str, object] = {}
+    exec(python_of(state.code, replace(source.controls, lamps={})), names)
+    own = photograph(state.transport, replace(source.controls, lamps={}))
+    assert np.array_equal(names["picture"], own.picture)  # type: ignore[arg-type]
+    assert not np.array_equal(own.exposed.light.spectrum, shot.exposed.light.spectrum)
+
+
+def test_memory_for_a_photograph_is_that_of_its_pixels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A photograph of one colour is packed to a few hundred bytes, by which it would seem to need nothing."""
+    path, asked = tmp_path / "plain.png", []
+    path.write_bytes(to_png(np.full((64, 48, 3), 0.4)))
+    monkeypatch.setattr("studies.explore.source.require_memory", lambda need, force: asked.append(need))
+    open_source(str(path), RenderOptions())
+    assert asked == [memory(64 * 48, DEFAULT_WAVELENGTH_NM.size, 1)]
+
+
+def test_the_chart_of_a_scene_is_opened_and_copied(tmp_path: Path):
+    chart, study = tmp_path / "chart.csv", tmp_path / "study.toml"
+    patches = ",".join(f"p{number}" for number in range(24))
+    rows = "".join(f"{nm}," + ",".join(["0.5"] * 24) + "\n" for nm in range(380, 790, 10))
+    chart.write_text(f"wavelength_nm,{patches}\n{rows}", "utf-8")
+    study.write_text(
+        'levels = ["25cd/m2"]\nframes = [4, 1]\nscenes = [{ source = "color_checker", chart = "chart.csv" }]\n'
+        "[render]\nsize = 24\nspp = 2\nband_nm = 100\n",
+        "utf-8",
+    )
+    source = open_source(str(study), RenderOptions())
+    (state,) = source.states()
+    assert source.controls.frames == 4
+    assert source.scene == SceneChoice("color_checker", chart=str(chart))
+    names: dict[str, object] = {}
+    exec(state.code.replace("import numpy", "import rodcone\nimport numpy"), names)
+    assert np.array_equal(names["transport"].radiance, state.transport.radiance)  # type: ignore[attr-defined]
+    (colours,) = open_source("color_checker", RenderOptions(size=24, spp=2, band_nm=100.0)).states()
+    assert not np.array_equal(colours.transport.radiance, state.transport.radiance)
+
+
 def test_a_study_is_where_the_page_begins(tmp_path: Path):
     path = tmp_path / "study.toml"
     path.write_text(
@@ -48,7 +104,7 @@ def test_a_study_is_where_the_page_begins(tmp_path: Path):
     assert (own.sensor, own.mosaic, own.processor) == ("table1_output", "bayer", "bayer")
     assert dict(own.lens) == {"diffraction": 1.0, "veiling_glare": 0.02}
     assert own.lamps["softbox"].spectrum == "A"
-    assert (source.size, source.spp) == (32, 2)
+    assert (source.render.size, source.render.spp) == (32, 2)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Python and studies that the explorer writes: the Python makes the same bits, the study is read and asks the same."""
 
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from studies.explore.controls import Controls, Lamp, camera_of
 from studies.explore.source import RenderOptions, of_transport, open_source
 from studies.explore.views import VIEWS, histogram, pixel
 from studies.explore.written import GIVEN, python_of, study_of
+from studies.study.study import RenderLimits, SceneChoice
 from studies.study.study_file import read_study
 
 
@@ -66,12 +68,14 @@ def test_a_study_asks_the_same(tmp_path: Path):
         mosaic="bayer",
         processor="bayer",
         seed=7,
+        frames=4,
     )
-    for name, text in study_of("still_life", 96, 40.0, 16, controls).items():
+    limits = RenderLimits(96, 40.0, 16, seed=5, range_nm=(400.0, 720.0))
+    for name, text in study_of(SceneChoice("still_life"), limits, controls).items():
         (tmp_path / name).write_text(text, encoding="utf-8")
     study = read_study(tmp_path / "study.toml")
     assert (study.spectra, study.levels, study.seeds) == (("A",), ("0.0123cd/m2",), (7,))
-    assert (study.processors, study.render.size, study.render.spp) == (("bayer",), 96, 16)
+    assert (study.processors, study.frames, study.render) == (("bayer",), (4,), limits)
     own, asked = preset(study.sensors[0], "bayer"), camera_of(controls)
     assert (own.pixel, own.bits, own.lens.f_number) == (asked.pixel, asked.bits, 4.0)
     again = open_source(str(tmp_path / "study.toml"), RenderOptions())
@@ -79,16 +83,42 @@ def test_a_study_asks_the_same(tmp_path: Path):
     assert again.controls.exposure_s == pytest.approx(controls.exposure_s, rel=1e-12)
     assert camera_of(again.controls).lens == asked.lens
     assert again.controls.lamps == controls.lamps
+    assert (again.controls.frames, again.render) == (4, limits)
+
+
+@pytest.mark.parametrize(
+    ("scene", "coloured", "controls"),
+    [
+        (SceneChoice("color_checker", light="A", chart="CHART"), False, Controls()),
+        (SceneChoice("SCENE.xml", extend="hold"), False, Controls()),
+        (SceneChoice("RADIANCE.exr", light="A"), True, Controls(reference_light="A")),
+        (SceneChoice("still_life"), False, Controls(lamps={"softbox": Lamp("LAMP.csv")})),
+    ],
+)
+def test_a_study_names_the_scene_with_its_options_and_files_by_their_whole_path(scene, coloured, controls, tmp_path):
+    def placed(name: str) -> str:
+        return str(tmp_path / f"{name.lower()}") if name.isupper() or name.split(".")[0].isupper() else name
+
+    (tmp_path / "lamp.csv").write_text("wavelength_nm,power\n400,1\n700,1\n", "utf-8")
+    chart = None if scene.chart is None else str(tmp_path / "chart.csv")
+    scene = replace(scene, source=placed(scene.source), chart=chart)
+    controls = replace(controls, lamps={name: Lamp(placed(each.spectrum)) for name, each in controls.lamps.items()})
+    files = study_of(scene, RenderLimits(96), controls, coloured)
+    (tmp_path / "study.toml").write_text(files["study.toml"], "utf-8")
+    study = read_study(tmp_path / "study.toml")
+    assert study.scenes == (scene,)
+    assert study.spectra == (tuple(each.spectrum for each in controls.lamps.values()) or ("own",))
 
 
 @pytest.mark.parametrize(
     ("controls", "words"),
     [
+        (Controls(mosaic="rgbw_4x4"), "mosaic 'rgbw_4x4'"),
+        (Controls(reference_light="A"), "reference_light 'A'"),
         (Controls(lamps={"softbox": Lamp(power=2.0)}), "one spectrum for all"),
-        (Controls(frames=2), "no bursts"),
         (Controls(settings={"sigma_s": 2.0}), "no settings of a processor"),
     ],
 )
 def test_what_a_study_can_not_say_is_refused(controls, words):
     with pytest.raises(InputError, match=words):
-        study_of("still_life", 96, 20.0, 16, controls)
+        study_of(SceneChoice("still_life"), RenderLimits(96), controls, coloured=True)
