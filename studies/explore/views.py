@@ -47,7 +47,7 @@ def noise_picture(shot: Shot) -> Bytes:
     exposed = shot.exposed
     frames = round(exposed.raw.exposure_s / exposed.exposure_s)
     dark_e = exposed.sensor.pixel.dark_current_e_per_s * exposed.exposure_s
-    noise_e = exposed.raw.electrons - frames * (exposed.expected_e + dark_e)
+    noise_e = exposed.raw.electrons - frames * (_collected_e(exposed) + dark_e)
     return _grey(0.5 + 0.5 * noise_e / (MOST_SIGMAS * frames**0.5 * noise_scale_e(exposed)))
 
 
@@ -73,7 +73,7 @@ def snr_picture(shot: Shot) -> Bytes:
     exposed = shot.exposed
     variance = noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
     with np.errstate(divide="ignore"):
-        snr_db = 10 * np.log10(exposed.expected_e**2 / variance)
+        snr_db = 10 * np.log10(_collected_e(exposed) ** 2 / variance)
     return _coloured(snr_db / MOST_SNR_DB)
 
 
@@ -94,6 +94,11 @@ VIEWS: Mapping[str, Callable[[Shot], Bytes]] = MappingProxyType(
 def noise_scale_e(exposed: Exposed) -> float:
     """Standard deviation of the noise of one frame [e-], root mean square over the pixels."""
     return float(np.sqrt(noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s).mean()))
+
+
+def _collected_e(exposed: Exposed) -> Image:
+    """Expected photo-electrons of a pixel of one frame, its neighbours' crosstalk among them."""
+    return spread_charge(exposed.expected_e, exposed.sensor.pixel.crosstalk)
 
 
 def _grey(share: Image) -> Bytes:
@@ -162,7 +167,7 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
     -------
     dict
         ``photons`` on the pixel's area; ``electrons`` by channel, as if the pixel had its filter; ``channel``, its own;
-        ``read_e``, what the raw image reads there; ``noise_e``, the standard deviation of each source [e-], and
+        ``read_e``, what the raw image of the whole burst reads there, and ``well_e``, what it can; ``noise_e``, the standard deviation of each source [e-], and
         ``total`` of `sensor.readout.noise_variance`. ``wavelength_nm``, ``photons_nm`` (by band, a nanometre) and
         ``electrons_nm`` (by channel and band, a nanometre) are its spectrum, and what the filters make of it.
 
@@ -193,7 +198,7 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
         "photons": float(photons.sum()),
         "electrons": dict(zip(names, electrons.sum(axis=1).tolist(), strict=True)),
         "read_e": float(raw.electrons[row, column]),
-        "well_e": sensor.pixel.full_well_e,
+        "well_e": raw.full_well_e,
         "noise_e": noise_sources_e(exposed.expected_e, sensor, time_s, row, column),
         "wavelength_nm": nm.tolist(),
         "photons_nm": (photons / width).tolist(),

@@ -8,13 +8,13 @@ import pytest
 from explore_sample import GAUSSIAN, random_controls, small_transport
 
 import rodcone as public
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.catalogue import PROCESSORS, libraries
 from render.photometry import luminance
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.optics import form_image
 from studies.explore.chain import photograph
-from studies.explore.controls import Controls, Lamp
+from studies.explore.controls import Controls, Lamp, controls_from, mosaics_of
 from studies.explore.memo import Memo
 from studies.explore.slow import is_slow, stand_in
 from studies.explore.views import VIEWS
@@ -31,6 +31,13 @@ def test_what_is_kept_changes_no_bit():
         assert np.array_equal(kept.linear, fresh.linear), controls
         assert np.array_equal(kept.true, fresh.true), controls
         assert kept.exposed.exposure_s == fresh.exposed.exposure_s
+
+
+@pytest.mark.parametrize("processor", [name for name in PROCESSORS if not libraries(name) and not is_slow(name)])
+def test_every_mosaic_that_the_page_offers_is_developed(processor):
+    for mosaic in mosaics_of(PROCESSORS[processor]):
+        controls = controls_from({"processor": processor, "mosaic": mosaic})
+        assert np.ptp(photograph(small_transport(), controls).picture) > 0, mosaic
 
 
 def test_the_memory_is_bounded():

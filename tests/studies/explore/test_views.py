@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from explore_sample import small_transport
+from matplotlib import colormaps
 
 from render.photometry import photons_per_joule
 from rodcone.errors import InputError
 from sensor.readout import noise_variance
 from studies.explore.chain import photograph
 from studies.explore.controls import TIME, Controls
-from studies.explore.views import MOST_SIGMAS, VIEWS, histogram, noise_scale_e, noise_sources_e, pixel
+from studies.explore.views import MOST_SIGMAS, MOST_SNR_DB, VIEWS, histogram, noise_scale_e, noise_sources_e, pixel
 
 ALL_TERMS = {
     "read_noise_e": 3.0, "dsnu_e": 2.0, "prnu": 0.02, "dark_current_e_per_s": 100.0, "column_gain_spread": 0.01,
@@ -69,6 +70,39 @@ def test_noise_is_grey_on_average_and_its_spread_is_the_models():
     assert grey.mean() == pytest.approx(127.5, abs=3.0)
     assert grey.std() == pytest.approx(127.5 / MOST_SIGMAS, rel=0.1)
     assert noise_scale_e(shot.exposed) > 0
+
+
+@pytest.mark.parametrize("crosstalk", [0.0, 0.2])
+def test_crosstalk_is_no_noise(crosstalk):
+    """Where light alone is noisy, noise over the square root of what each pixel collects has a variance of 1."""
+    quiet = {"read_noise_e": 0.0, "dsnu_e": 0.0, "prnu": 0.0, "dark_current_e_per_s": 0.0, "crosstalk": crosstalk}
+    controls = Controls(pixel=quiet, exposure=TIME, exposure_s=0.01, level_cd_m2=3.0)
+    shot = photograph(small_transport(), controls)
+    exposed = shot.exposed
+    sigma_e = noise_scale_e(exposed)
+    seen_e = (VIEWS["noise"](shot)[..., 0] / 127.5 - 1) * MOST_SIGMAS * sigma_e
+    variance = noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
+    # The mean of 1920 squares spreads by 3.2 %, noise beyond black and white and steps of 8 bits move it by 2 %.
+    assert (seen_e**2 / variance).mean() == pytest.approx(1.0, abs=0.2)
+
+
+def test_snr_is_of_what_a_pixel_collects():
+    """Of light alone it is the square root of the electrons, which crosstalk makes those of the neighbours too."""
+    quiet = {"read_noise_e": 0.0, "dsnu_e": 0.0, "prnu": 0.0, "dark_current_e_per_s": 0.0, "crosstalk": 0.2}
+    controls = Controls(pixel=quiet, exposure=TIME, exposure_s=0.01, level_cd_m2=3.0, bits=16)
+    shot = photograph(small_transport(), controls)
+    quantised = shot.exposed.sensor.gain_e_per_dn**2 / 12
+    collected_e = noise_variance(shot.exposed.expected_e, shot.exposed.sensor, 0.01) - quantised
+    share = 10 * np.log10(collected_e**2 / (collected_e + quantised)) / MOST_SNR_DB
+    wanted = np.rint(255 * colormaps["viridis"](np.clip(share, 0.0, 1.0))[..., :3])
+    assert np.abs(VIEWS["snr"](shot) - wanted).max() <= 1
+
+
+def test_a_bursts_pixel_is_read_beside_the_bursts_well():
+    exposed = photograph(small_transport(), Controls(level_cd_m2=1e5, exposure=TIME, exposure_s=0.1, frames=4)).exposed
+    told = pixel(exposed, 20, 11)
+    assert told["well_e"] == exposed.raw.full_well_e == pytest.approx(4 * exposed.sensor.pixel.full_well_e, rel=1e-9)
+    assert 0.9 < told["read_e"] / told["well_e"] < 1.1
 
 
 def test_the_truth_has_no_error():
