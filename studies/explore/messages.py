@@ -21,7 +21,9 @@ from studies.study.study import WHITE_BALANCES
 Header: TypeAlias = dict[str, Any]
 
 MOST_CHARACTERS = 200_000  # of a message: three tables of spectra fit
-# Keys of each kind of message beside `kind` and `number`; in this order they are answered.
+MOST_OF_A_PAGE = 40  # characters of its name
+# Keys of each kind of message beside `kind`, `number` and, where several pages share a connection, `page`; in this order
+# they are answered.
 KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "hello": (),
@@ -91,7 +93,10 @@ def read_message(text: str) -> Header:
     if message["kind"] not in KINDS:
         raise unknown("message: kind", message["kind"], KINDS)
     keys = ("kind", "number", *KINDS[message["kind"]])
-    require_keys("message", message, keys)
+    require_keys("message", message, (*keys, "page"))
+    page = message.get("page", "")
+    if not isinstance(page, str) or len(page) > MOST_OF_A_PAGE:
+        raise InputError(f"page: it is no short text; allowed: {MOST_OF_A_PAGE} characters; draw a name at random")
     if set(keys) - message.keys():
         raise InputError(f"message: {sorted(set(keys) - message.keys())[0]!r} is missing; add it")
     require_whole("number", message["number"], 0, 2**53, "count requests")

@@ -72,7 +72,7 @@ def make_app(session: Session, port: int, token: str) -> App:
         sending = asyncio.create_task(forward())
         try:
             while (message := await socket.receive())["type"] == "websocket.receive":
-                session.take(message.get("text") or "")
+                session.take(message.get("text") or "", send)
         finally:
             sending.cancel()
 

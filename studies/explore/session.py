@@ -58,6 +58,7 @@ class Session:
         self._cold = list(WARM)
         self._pending: dict[str, Header] = {}
         self._shown: Header | None = None
+        self._page = ""  # that asks
         self._slow: dict[str, Callable[[], None]] = {}  # what ends each job at work, by its camera
         self._send: Send = lambda header, buffers: None
         self._slow_wanted = False
@@ -68,20 +69,33 @@ class Session:
         self._thread.start()
 
     def connect(self, send: Send) -> None:
-        """Answer to another page from now on; the one before is told."""
-        self._send({"kind": "taken over"}, ())
-        self._send = send
+        """Answer to another connection from now on; the one before is told."""
+        with self._changed:
+            self._send({"kind": "taken over"}, ())
+            self._send = send
+            self._begin_page("")
 
-    def take(self, text: str) -> None:
-        """Take a message; it is answered from the session's thread. What isn't allowed is told at once."""
-        number: Any = None
+    def take(self, text: str, send: Send) -> None:
+        """Take a message; it is answered from the session's thread. What isn't allowed is told at once.
+
+        Parameters
+        ----------
+        text : str
+        send : callable
+            Of the connection that it came by; one that was taken over is not listened to.
+        """
         try:
             message = read_message(text)
-            number = message["number"]
         except InputError as error:
-            self._send({"kind": "error", "number": number, "message": str(error)}, ())
+            send({"kind": "error", "number": None, "message": str(error)}, ())
             return
         with self._changed:
+            page = message.get("page", "")
+            if send is not self._send or (page != self._page and message["kind"] != "hello"):
+                return
+            if page != self._page:  # a notebook shows one widget as often as it is asked, over one connection
+                send({"kind": "taken over", "page": page}, ())
+                self._begin_page(page)
             self._pending[message["kind"]] = message
             if message["kind"] in ("show", "cancel"):
                 self._asked_s = time.monotonic()
@@ -95,6 +109,12 @@ class Session:
             self._end_slow()
             self._changed.notify()
         self._thread.join()
+
+    def _begin_page(self, page: str) -> None:
+        """Forget what another page asked."""
+        self._page, self._shown = page, None
+        self._pending.clear()
+        self._end_slow()
 
     def _end_slow(self) -> None:
         for end in self._slow.values():
@@ -112,8 +132,7 @@ class Session:
                     if message is not None:
                         header, buffers = self._answer(message)
                         notes = sorted({str(each.message) for each in told}) + [self._failure] * bool(self._failure)
-                        whose = {"kind": message["kind"], "number": message["number"], "notes": notes}
-                        self._send(header | whose, buffers)
+                        self._send(header | _whose(message) | {"notes": notes}, buffers)
                     else:
                         act()
                 except InputError as error:
@@ -144,7 +163,8 @@ class Session:
         return self._warm_up if self._cold and self._rendered is not None else None
 
     def _fail(self, message: Header | None, words: str) -> None:
-        self._send({"kind": "error", "number": message and message["number"], "message": words}, ())
+        whose = {"number": None} if message is None else _whose(message)
+        self._send(whose | {"kind": "error", "message": words}, ())
 
     def _render_on(self) -> None:
         """Render the next state, and show what is in view again."""
@@ -201,7 +221,9 @@ class Session:
     def _show(self, message: Header, cameras: Sequence[Controls], rendered: Rendered) -> Answer:
         """Pictures of each view that is asked for; slow processors are left for later."""
         views = read_views(message["views"], len(cameras))
-        self._shown = message
+        with self._changed:
+            if message.get("page", "") == self._page:
+                self._shown = message
         shots, told = [], []
         for controls in cameras:
             exposed = expose_scene(rendered.transport, controls, self._memo)
@@ -268,6 +290,11 @@ class Session:
         judged = next(iter(rendered.transport.groups.values())).coloured
         lamps = {name: controls.lamps.get(name, Lamp()) for name in rendered.transport.groups}
         return study_of(source.scene, source.render, replace(controls, lamps=lamps), judged)
+
+
+def _whose(message: Header) -> Header:
+    """What tells the page that it is an answer of its own."""
+    return {key: message[key] for key in ("kind", "number", "page") if key in message}
 
 
 def _nothing() -> None:

@@ -47,7 +47,7 @@ def explore(transport: Transport) -> Any:
             loop.call_soon_threadsafe(widget.send, header, list(buffers))
 
     session.connect(send)
-    widget.on_msg(lambda _, content, __: session.take(json.dumps(content)))
+    widget.on_msg(lambda _, content, __: session.take(json.dumps(content), send))
     widget.session = session  # lives as long as the widget
     return widget
 

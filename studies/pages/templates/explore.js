@@ -34,22 +34,24 @@ const STEPS = 1000;
 
 function render({ model, el }) {
   let number = 0, latest = 0, hello, state, edited = "a", cursor = null, stale, pictureSize = [1, 1];
+  const page = Math.random().toString(36).slice(2); // a notebook sends every view of a widget all its messages
   const waits = new Map(); // number -> what to do with the answer
   const root = make("div", { class: "explore" });
   el.append(root);
 
   // Messages
   const ask = (message, then) => {
-    message.number = ++number;
+    Object.assign(message, { number: ++number, page });
     if (then) waits.set(number, then);
     model.send(message);
     return number;
   };
   model.on("msg:custom", (header, buffers) => {
+    if ("page" in header && (header.page === page) === (header.kind === "taken over")) return;
     if (header.kind === "hello") begin(header);
     else if (header.kind === "show") { if (header.number === latest) paint(header, buffers); }
     else if (header.kind === "error") fail(header);
-    else if (header.kind === "taken over") status("Another page has taken over; reload this one to take it back.", true);
+    else if (header.kind === "taken over") status("Another page has taken over; open this one again to take it back.", true);
     else if (header.kind === "ended") status("The program has ended; nothing here is computed any more.", true);
     else waits.get(header.number)?.(header, buffers);
     waits.delete(header.number);

@@ -126,6 +126,7 @@ def received(connection: Any) -> dict[str, Any]:
 HOSTILE = [
     "", "{", "[]", "null", "7", '"show"', "{}", '{"kind": "show"}', '{"kind": "eval", "number": 1}', "[" * 100_000,
     '{"kind": ["show"], "number": 1}', '{"kind": "hello", "number": -1}', '{"kind": "hello", "number": 1e400}',
+    '{"kind": "hello", "number": 1, "page": 3}', '{"kind": "hello", "number": 1, "page": "' + "x" * 99 + '"}',
     '{"kind": "hello", "number": NaN}', '{"kind": "hello", "number": 1, "more": 2}', "x" * 300_000,
     '{"kind": "show", "number": 1, "cameras": [], "views": [[0, "picture"]]}',
     '{"kind": "show", "number": 1, "cameras": [{}], "views": [[1, "picture"]]}',

@@ -61,15 +61,56 @@ def test_a_render_that_fails_is_told_and_asked_for_once(good_states):
 
     page = Page()
     session = Session(replace(of_transport(small_transport()), states=Failing))
-    session.connect(page.send)
-    session.take(message("hello", 1))
+    send = page.send  # one value: a method is another at each look
+    session.connect(send)
+    session.take(message("hello", 1), send)
     page.wait("hello", 1)
     assert once.wait(20)
     for number in (2, 3):
-        session.take(message("show", number))
+        session.take(message("show", number), send)
         if good_states:
             assert "it has no material" in page.wait("show", number)["notes"][-1]
         else:
             assert "it has no material" in page.wait("error", number)["message"]
     session.close()
     assert failed == 1
+
+
+@pytest.fixture
+def session() -> Iterator[Session]:
+    made = Session(of_transport(small_transport()))
+    yield made
+    made.close()
+
+
+def test_a_connection_that_was_taken_over_is_not_listened_to(session):
+    old, new = Page(), Page()
+    send_old, send_new = old.send, new.send
+    session.connect(send_old)
+    session.take(message("show", 1), send_old)
+    old.wait("show", 1)
+    session.connect(send_new)
+    old.wait("taken over", None)
+    session.take(message("show", 2), send_old)
+    session.take(message("hello", 3), send_old)
+    session.take(message("show", 1), send_new)
+    new.wait("show", 1)
+    assert [each["number"] for each in new.headers] == [1]
+    assert [each.get("number") for each in old.headers] == [1, None]
+
+
+def test_another_view_of_one_connection_takes_over(session):
+    """As a notebook's widget that is shown twice: both count their requests from 1."""
+    page = Page()
+    send = page.send
+    session.connect(send)
+    for view in ("first", "second"):
+        session.take(message("hello", 1, page=view), send)
+        session.take(message("show", 2, page=view), send)
+        assert page.wait("show", 2)["page"] == view
+        page.headers = [each for each in page.headers if each["kind"] != "show"]
+    assert [each["page"] for each in page.headers if each["kind"] == "taken over"] == ["first", "second"]
+    session.take(message("show", 3, page="first"), send)
+    session.take(message("show", 3, page="second"), send)
+    assert page.wait("show", 3)["page"] == "second"
+    assert [each["page"] for each in page.headers if each["kind"] == "show"] == ["second"]
