@@ -180,7 +180,7 @@ def camera_of(controls: Controls) -> SensorConfig:
 # From and to JSON
 
 
-def controls_from(content: Any, own: Controls = Controls()) -> Controls:  # noqa: B008 (it is frozen)
+def controls_from(content: Any, own: Controls = Controls()) -> Controls:
     """Check and read the controls of a message.
 
     Parameters

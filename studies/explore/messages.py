@@ -22,8 +22,8 @@ Header: TypeAlias = dict[str, Any]
 
 MOST_CHARACTERS = 200_000  # of a message: three tables of spectra fit
 MOST_OF_A_PAGE = 40  # characters of its name
-# Keys of each kind of message beside `kind`, `number` and, where several pages share a connection, `page`; in this order
-# they are answered.
+# Keys of each kind of message beside `kind`, `number` and, where pages share a connection, `page`; in this order they
+# are answered.
 KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "hello": (),

@@ -11,7 +11,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from isp.picture import Picture
 from rodcone.errors import InputError, one_line
@@ -76,13 +76,9 @@ class Session:
             self._begin_page("")
 
     def take(self, text: str, send: Send) -> None:
-        """Take a message; it is answered from the session's thread. What isn't allowed is told at once.
+        """Take a message of the connection that `send` belongs to; one that was taken over is not listened to.
 
-        Parameters
-        ----------
-        text : str
-        send : callable
-            Of the connection that it came by; one that was taken over is not listened to.
+        It is answered from the session's thread. What isn't allowed is told at once.
         """
         try:
             message = read_message(text)

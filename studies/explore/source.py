@@ -84,11 +84,7 @@ class RenderOptions:
 
 def of_transport(transport: Transport) -> Source:
     """A transport that is there already."""
-    return Source(
-        "transport",
-        lambda: iter((Rendered(transport, GIVEN, True),)),
-        _coloured(transport.groups),
-    )
+    return Source("transport", lambda: iter((Rendered(transport, GIVEN, True),)), _coloured(transport.groups))
 
 
 def open_source(source: str, limits: RenderOptions) -> Source:

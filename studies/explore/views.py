@@ -167,8 +167,9 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
     -------
     dict
         ``photons`` on the pixel's area; ``electrons`` by channel, as if the pixel had its filter; ``channel``, its own;
-        ``read_e``, what the raw image of the whole burst reads there, and ``well_e``, what it can; ``noise_e``, the standard deviation of each source [e-], and
-        ``total`` of `sensor.readout.noise_variance`. ``wavelength_nm``, ``photons_nm`` (by band, a nanometre) and
+        ``read_e``, what the raw image (of a burst all of it) reads there, and ``well_e``, the most that it can;
+        ``noise_e``, the standard deviation of each source [e-], and ``total`` of `sensor.readout.noise_variance`.
+        ``wavelength_nm``, ``photons_nm`` (by band, a nanometre) and
         ``electrons_nm`` (by channel and band, a nanometre) are its spectrum, and what the filters make of it.
 
     Raises

@@ -76,7 +76,7 @@ def study_of(scene: SceneChoice, render: RenderLimits, controls: Controls, colou
     """
     spectrum, own_mosaic = _one_spectrum(controls), PROCESSORS[controls.processor].mosaic
     if controls.settings:
-        raise InputError("study: a study has no settings of a processor; allowed: none; set them back, or copy the Python")
+        raise InputError("study: it has no settings of a processor; allowed: none; set them back, or copy the Python")
     if controls.mosaic != own_mosaic:
         raise InputError(
             f"study: mosaic {controls.mosaic!r} with {controls.processor}; allowed: {own_mosaic!r}, the processor's "
@@ -87,8 +87,8 @@ def study_of(scene: SceneChoice, render: RenderLimits, controls: Controls, colou
             scene = replace(scene, light=controls.reference_light)
     elif coloured and controls.reference_light != LIGHT:
         raise InputError(
-            f"study: reference_light {controls.reference_light!r} for a scene with colours of its own; allowed: {LIGHT}; "
-            "choose it, or copy the Python"
+            f"study: reference_light {controls.reference_light!r} for a scene with colours of its own; allowed: "
+            f"{LIGHT}; choose it, or copy the Python"
         )
     own = preset(controls.sensor)
     sensor = camera_of(controls)

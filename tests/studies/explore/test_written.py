@@ -89,18 +89,18 @@ def test_a_study_asks_the_same(tmp_path: Path):
 @pytest.mark.parametrize(
     ("scene", "coloured", "controls"),
     [
-        (SceneChoice("color_checker", light="A", chart="CHART"), False, Controls()),
-        (SceneChoice("SCENE.xml", extend="hold"), False, Controls()),
-        (SceneChoice("RADIANCE.exr", light="A"), True, Controls(reference_light="A")),
-        (SceneChoice("still_life"), False, Controls(lamps={"softbox": Lamp("LAMP.csv")})),
+        (SceneChoice("color_checker", light="A", chart="chart.csv"), False, Controls()),
+        (SceneChoice("scene.xml", extend="hold"), False, Controls()),
+        (SceneChoice("radiance.exr", light="A"), True, Controls(reference_light="A")),
+        (SceneChoice("still_life"), False, Controls(lamps={"softbox": Lamp("lamp.csv")})),
     ],
 )
 def test_a_study_names_the_scene_with_its_options_and_files_by_their_whole_path(scene, coloured, controls, tmp_path):
     def placed(name: str) -> str:
-        return str(tmp_path / f"{name.lower()}") if name.isupper() or name.split(".")[0].isupper() else name
+        return str(tmp_path / name) if "." in name else name
 
     (tmp_path / "lamp.csv").write_text("wavelength_nm,power\n400,1\n700,1\n", "utf-8")
-    chart = None if scene.chart is None else str(tmp_path / "chart.csv")
+    chart = None if scene.chart is None else placed(scene.chart)
     scene = replace(scene, source=placed(scene.source), chart=chart)
     controls = replace(controls, lamps={name: Lamp(placed(each.spectrum)) for name, each in controls.lamps.items()})
     files = study_of(scene, RenderLimits(96), controls, coloured)
