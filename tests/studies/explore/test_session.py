@@ -114,3 +114,26 @@ def test_another_view_of_one_connection_takes_over(session):
     session.take(message("show", 3, page="second"), send)
     assert page.wait("show", 3)["page"] == "second"
     assert [each["page"] for each in page.headers if each["kind"] == "show"] == ["second"]
+
+
+def test_what_another_page_asked_is_not_answered_to_the_new_one():
+    """Neither what waits for the first picture nor, at the next state of the render, what was shown."""
+    go = [threading.Event(), threading.Event()]
+
+    def states() -> Iterator[Rendered]:
+        for number, event in enumerate(go):
+            assert event.wait(30)
+            yield Rendered(small_transport(), "", number == 1)
+
+    old, new = Page(), Page()
+    send_old, send_new = old.send, new.send
+    session = Session(replace(of_transport(small_transport()), states=states))
+    session.connect(send_old)
+    session.take(message("show", 1), send_old)
+    session.connect(send_new)
+    for event in go:
+        event.set()
+    session.take(message("histogram", 2, cameras=[{}]), send_new)
+    new.wait("histogram", 2)
+    session.close()
+    assert [each["kind"] for each in new.headers] == ["histogram"]
