@@ -19,7 +19,9 @@ from render.loader import Film, integrator_name, variant
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import read_exr, write_exr
 from render.radiance_files.iset import read_iset_scene
+from render.radiance_files.photo import srgb_basis
 from render.radiance_files.radiance_source import load_radiance
+from render.spectrum import DEFAULT_WAVELENGTH_NM
 from render.user_scene.scene_file import load_scene_file
 from scenes.catalog import load
 from scenes.reflectances import read_reflectances
@@ -269,6 +271,7 @@ def _cube_samples() -> list[Sample]:
 def _photo_samples() -> list[Sample]:
     from PIL import Image
 
+    srgb_basis(DEFAULT_WAVELENGTH_NM)  # the library's first import makes a folder at home, which reading never does
     pixels = np.random.default_rng(6).integers(0, 255, (9, 8, 3)).astype(np.uint8)
     made = [Image.fromarray(pixels), Image.fromarray(pixels[..., 0]), Image.fromarray(pixels[..., 0].astype(np.uint16))]
     exif = Image.Exif()
