@@ -95,7 +95,8 @@ def page_of(
     worst = max((row.mc_share, contest.level) for contest in contests for rows in contest.rows.values() for row in rows)
     parts = [
         f"# {code(camera)} beside its opponents",
-        f"    rodcone sweep STUDY.toml -o {folder} --as-stated\n    rodcone opponents {folder} -o {out.name}",
+        f"    rodcone sweep STUDY.toml -o {folder} --as-stated\n"
+        f"    rodcone opponents {folder} -o {out.name} --camera {camera}",
         facts_table(contests, study),
         f"{ranked} of {len(contests)} conditions are ranked: those in which W's SNR under {code(camera)} is 1 or more, "
         "or not known. Pictures are measured against the noise-free truth at the known exposure scale.",
