@@ -150,16 +150,18 @@ def noise_sources(expected_e: float, sensor: SensorConfig, exposure_s: float) ->
     """
     pixel = sensor.pixel
     hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
-    dark_e = pixel.dark_current_e_per_s * exposure_s + hot_share * hot_e
+    dark_e = pixel.dark_current_e_per_s * exposure_s
     variance_e2 = {
         "shot noise": expected_e,
-        "dark current": dark_e + hot_share * (1 - hot_share) * hot_e**2,
+        "dark current": dark_e,
+        "hot pixels": hot_share * hot_e + hot_share * (1 - hot_share) * hot_e**2,
         "PRNU": (pixel.prnu * expected_e) ** 2,
     }
-    collected_e2 = sum(variance_e2.values()) + (expected_e + dark_e) ** 2
+    collected_e2 = sum(variance_e2.values()) + (expected_e + dark_e + hot_share * hot_e) ** 2
     variance_e2 |= {
         "column gains": pixel.column_gain_spread**2 * collected_e2,
-        "DSNU and column offsets": pixel.fixed_dark_e**2,
+        "DSNU": pixel.dsnu_e**2,
+        "column offsets": pixel.column_offset_e**2,
         "read noise": pixel.read_noise_e**2,
         "quantisation": sensor.gain_e_per_dn**2 / 12,
     }

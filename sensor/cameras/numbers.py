@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -192,8 +191,3 @@ def _line(key: str, each: Sourced) -> str:
 def _plain(text: str) -> str:
     """Words of a text on one line, without what TOML forbids in a comment."""
     return " ".join("".join(each if each.isprintable() else " " for each in text).split())
-
-
-def file_name(path: Path) -> str:
-    """Name of the CSV beside a preset file."""
-    return f"{path.stem}_curves.csv"

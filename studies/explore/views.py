@@ -1,6 +1,7 @@
 """What a shot is shown as: pictures of 8 bits, and figures as plain numbers."""
 
 from collections.abc import Callable, Mapping
+from math import hypot
 from types import MappingProxyType
 from typing import Any
 
@@ -14,7 +15,7 @@ from rodcone.errors import require_whole
 from sensor.cfa import channel_map, channels, mask
 from sensor.config import SensorConfig
 from sensor.raw import RawImage
-from sensor.readout import noise_variance, spread_charge
+from sensor.readout import noise_sources, noise_variance, spread_charge
 from sensor.response import electrons_per_irradiance
 from studies.explore.chain import Exposed, GroupFrame, Shot
 from studies.metrics.flip import flip
@@ -211,20 +212,6 @@ def noise_sources_e(
     expected_e: Image, sensor: SensorConfig, exposure_s: float, row: int, column: int
 ) -> dict[str, float]:
     """Standard deviation of each noise source of one pixel of a chip drawn at random [e-], and of all together."""
-    own = sensor.pixel
-    total = float(noise_variance(expected_e, sensor, exposure_s)[row, column])
-    signal = float(spread_charge(expected_e, own.crosstalk)[row, column])
-    dark, hot = own.dark_current_e_per_s * exposure_s, own.hot_pixel_dark_current_e_per_s * exposure_s
-    share = own.hot_pixel_share
-    variances = {
-        "shot noise": signal,
-        "dark current": dark,
-        "hot pixels": share * hot + share * (1 - share) * hot**2,
-        "PRNU": (own.prnu * signal) ** 2,
-        "DSNU": own.dsnu_e**2,
-        "column offsets": own.column_offset_e**2,
-        "read noise": own.read_noise_e**2,
-        "quantisation": sensor.gain_e_per_dn**2 / 12,
-    }
-    variances["column gains"] = max(total - sum(variances.values()), 0.0) if own.column_gain_spread else 0.0
-    return {**{name: value**0.5 for name, value in variances.items()}, "total": total**0.5}
+    signal_e = float(spread_charge(expected_e, sensor.pixel.crosstalk)[row, column])
+    sources = noise_sources(signal_e, sensor, exposure_s)
+    return {**sources, "total": hypot(*sources.values())}
