@@ -27,15 +27,15 @@ MOST_BYTES = 1 << 20  # of a file; a processor takes some thousand
 _NAME = re.compile(r"(.+\.py):([A-Za-z_]\w*)")
 
 
-def own_file(name: str) -> tuple[Path, str] | None:
+def user_file(name: str) -> tuple[Path, str] | None:
     """File and function of a name such as ``mine.py:develop``; None for any other name."""
     match = _NAME.fullmatch(name)
     return None if match is None else (Path(match[1]), match[2])
 
 
-def require_allowed(what: str, name: str, trust_code: bool) -> None:
+def require_consent(what: str, name: str, trust_code: bool) -> None:
     """Raise `InputError` for an unknown processor, or one of the user's own without consent to run it."""
-    own = own_file(name)
+    own = user_file(name)
     if own is None and name not in PROCESSORS:
         raise unknown(what, name, PROCESSORS)
     if own is not None and not trust_code:
@@ -53,7 +53,7 @@ def own_version(name: str) -> dict[str, str]:
     InputError
         For a file that can't be read.
     """
-    own = own_file(name)
+    own = user_file(name)
     return {} if own is None else {own[0].name: digest_bytes(_read(own[0]))}
 
 
@@ -74,7 +74,7 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
     InputError
         For a file that can't be read, is another than expected, fails, or holds no such function.
     """
-    own = own_file(name)
+    own = user_file(name)
     if own is None:
         return PROCESSORS[name]
     path, attribute = own

@@ -12,7 +12,7 @@ from skimage.transform import resize_local_mean
 from isp.colour.calibrated_colours import fit_of_calibration, neutral_under
 from isp.colour.encoding import encode
 from isp.picture import Picture
-from isp.processors.own import processor_of, require_allowed
+from isp.processors.own import processor_of, require_consent
 from render.illuminants import illuminant
 from rodcone.brief import brief
 from rodcone.colour_spaces import luminance_of_srgb
@@ -81,7 +81,7 @@ def develop(
     """
     require_kind("raw", raw, RawImage, "give what capture or read_raw gives")
     name = processor or mosaic_processor(raw)
-    require_allowed("isp", name, trust_code)
+    require_consent("isp", name, trust_code)
     colour = calibration or raw.colour
     if colour is None:
         raise InputError(

@@ -5,7 +5,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from isp.processors.own import own_file, processor_of, require_allowed
+from isp.processors.own import processor_of, require_consent, user_file
 from render.illuminants import illuminant
 from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_reflectance
 from render.spectrum import VISIBLE_NM
@@ -199,7 +199,7 @@ def mosaics(study: Study) -> tuple[str, ...]:
 def label(value: Any) -> str:
     """Name of a value of an axis in rows and seeds: a file's name without its folder, any other value as it is."""
     text = str(value)
-    own = own_file(text)
+    own = user_file(text)
     if own is not None:
         return f"{own[0].name}:{own[1]}"
     return Path(text).name if Path(text).suffix.lower() in FILES else text
@@ -253,7 +253,7 @@ def _check_cameras(study: Study) -> None:
         if balance not in WHITE_BALANCES:
             raise unknown("white_balances", balance, WHITE_BALANCES)
     for name in study.processors:
-        require_allowed("processors", name, study.trust_code)
+        require_consent("processors", name, study.trust_code)
         processor_of(name)
     for name in study.sensors:
         own = preset(name)

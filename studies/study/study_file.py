@@ -8,7 +8,7 @@ from typing import Any, get_args, get_origin
 from cattrs import AttributeValidationNote, ClassValidationError, Converter, ForbiddenExtraKeysError
 from cattrs.gen import make_dict_structure_fn
 
-from isp.processors.own import own_file
+from isp.processors.own import user_file
 from rodcone.errors import InputError, one_line, require_whole, unknown
 from rodcone.toml_file import parse_toml, read_toml
 from studies.study.study import FILES, SceneChoice, Study
@@ -88,7 +88,7 @@ def _beside(value: Any, folder: Path) -> Any:
         return [_beside(each, folder) for each in value]
     if isinstance(value, dict):
         return value | {key: _beside(value[key], folder) for key in ("source", "light", "chart") if key in value}
-    named = isinstance(value, str) and (Path(value).suffix.lower() in FILES or own_file(value))
+    named = isinstance(value, str) and (Path(value).suffix.lower() in FILES or user_file(value))
     return str(folder / value) if named else value
 
 

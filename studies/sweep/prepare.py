@@ -10,7 +10,7 @@ import numpy as np
 
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
-from isp.processors.own import own_file, own_version, processor_of
+from isp.processors.own import own_version, processor_of, user_file
 from render.transport import Transport
 from rodcone.digests import digest, digest_bytes
 from rodcone.jit import backend
@@ -200,7 +200,7 @@ def _cell(
     return Cell(
         key=cell_key(condition, label(processor), seed, frame.key, luminance, exposure_s, colours, made_by),
         condition=condition,
-        processor=str(Path(processor).resolve()) if own_file(processor) else processor,
+        processor=str(Path(processor).resolve()) if user_file(processor) else processor,
         seed=seed,
         luminance_cd_m2=luminance,
         illuminance_lux=None if frame.lux_per_cd_m2 is None else luminance * frame.lux_per_cd_m2,

@@ -9,7 +9,7 @@ from builders import raw_image
 
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import PROCESSORS
-from isp.processors.own import MOST_BYTES, own_file, own_version, processor_of, require_allowed
+from isp.processors.own import MOST_BYTES, own_version, processor_of, require_consent, user_file
 from rodcone.digests import digest_file
 from rodcone.errors import InputError
 from sensor.cfa import BAYER
@@ -56,7 +56,7 @@ def test_nothing_runs_without_consent_nor_where_the_bytes_are_others(tmp_path: P
         "mine.py.ran",
     )
     with pytest.raises(InputError, match=r"^isp: .*mine.py:develop' is Python code.*--trust-code .*trust_code=True"):
-        require_allowed("isp", name, trust_code=False)
+        require_consent("isp", name, trust_code=False)
     assert own_version(name) == {"mine.py": digest_file(tmp_path / "mine.py")}
     for expected in ({}, {"mine.py": "0" * 32}, {"other.py": digest_file(tmp_path / "mine.py")}):
         with pytest.raises(InputError, match="isn't the file that the sweep began with"):
@@ -102,4 +102,4 @@ def test_what_is_no_plain_file_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["bayer", "mine.py", "mine.py:", "mine.py:a.b", "mine.py:a b", ":develop", ".py:f"])
 def test_other_names_are_no_files(name: str) -> None:
-    assert own_file(name) is None
+    assert user_file(name) is None
