@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from os import cpu_count
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from isp.ple.pick import BLOCK, blocks, pick
 from isp.ple.prior import PATCH, Prior
@@ -125,7 +126,7 @@ def estimate(
     variance = np.zeros((total.shape[0] // STRIDE, total.shape[1] // STRIDE, 4), np.float32)
     cells, noise = np.zeros(variance.shape[:2], np.float32), []
     # BLAS's own threads would wait for each other.
-    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(cpu_count()) as threads:
+    with _blas().limit(limits=1), ThreadPoolExecutor(cpu_count()) as threads:
         for first, (values, weights, inner, count, each) in zip(
             range(0, ny, rows), threads.map(strip, range(0, ny, rows)), strict=True
         ):
@@ -143,6 +144,12 @@ def estimate(
     inside = total[edge : edge + shape[0], edge : edge + shape[1]]
     kept = tuple(slice(edge // STRIDE, edge // STRIDE + -(-length // STRIDE)) for length in shape)
     return ScaleEstimate(inside, variance[kept], np.median(np.concatenate(noise), axis=0))
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """BLAS as loaded here; looking for it takes milliseconds."""
+    return ThreadpoolController().select(user_api="blas")
 
 
 def _windows(values: NDArray[Any], size: int) -> NDArray[Any]:

@@ -98,8 +98,12 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
 def _sampling(
     raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]
 ) -> Sampling:
-    dark = raw.dark_noise_e * np.sqrt(counts)
-    return Sampling(size, rows, tuple((np.asarray(white_e) * counts).tolist()), tuple(dark.tolist()), raw.prnu)
+    # In six digits: exposures of other times differ in the last bits, and would each have tables of their own.
+    gains, dark_e = (
+        tuple(float(f"{value:.6g}") for value in values)
+        for values in (np.asarray(white_e) * counts, raw.dark_noise_e * np.sqrt(counts))
+    )
+    return Sampling(size=size, rows=rows, gains=gains, dark_e=dark_e, prnu=raw.prnu)
 
 
 def _pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray[np.bool_]) -> list[Cells]:
