@@ -32,7 +32,7 @@ def demo(
     denoise: Flag = False,
     force: Flag = False,
 ) -> None:
-    """Photograph one scene from moonlight to daylight with both cameras and write a report; prints its path.
+    """Photograph one scene from moonlight to daylight with RGBW and Bayer and write a report; prints its path.
 
     It is a sweep of the study demo (`rodcone new study demo`) as it is stated, without a plan.
 
@@ -46,13 +46,13 @@ def demo(
     size
         Longer side of the picture in pixels, 256 by default; a picture file has its own.
     sensor
-        Sensor preset; may be given several times (low_noise and table1_output by default).
+        Sensor preset; may be given several times (low_noise by default).
     level
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); may be given
         several times (seven levels from moonlight to daylight by default).
     processor
-        Processor such as ple_rgbw; may be given several times (interleaved and bayer by default). The page leads with
-        what the white pixel brings where ple_rgbw and ple_bayer are among them: some minutes more.
+        Processor such as bayer_menon; may be given several times. By default interleaved and bayer, the paper's method
+        and its reference, and ple_rgbw and ple_bayer, one method on both mosaics, with which the page leads.
     longest_exposure_s
         Longest exposure time in seconds or with its unit; 66ms by default.
     spp

@@ -56,9 +56,9 @@ def test_seven_levels_run_from_moonlight_to_daylight() -> None:
 def test_every_condition_has_a_row_and_a_picture(folder: Path) -> None:
     rows = results(folder)["rows"]
     assert {(row["level"], row["processor"], row["seed"]) for row in rows} == set(
-        product(("0.5cd/m2", "500lux"), ("interleaved", "bayer"), (0, 1, 2))
+        product(("0.5cd/m2", "500lux"), ("interleaved", "bayer", "ple_rgbw", "ple_bayer"), (0, 1, 2))
     )
-    assert len(rows) == 12
+    assert len(rows) == 24
     assert all((folder / "pictures" / row["picture"]).is_file() for row in rows)
 
 
@@ -77,7 +77,7 @@ def test_dim_picture_is_better_from_the_interleaved_camera(folder: Path) -> None
 def test_the_lens_is_an_ideal_one_and_the_page_says_what_is_compared(folder: Path) -> None:
     assert {row["lens"]["diffraction"] for row in results(folder)["rows"]} == {1.0}
     page = (folder / "report.html").read_text("utf-8")
-    assert "<h1>Interleaved RGBW against Bayer</h1>" in page
+    assert "<h1>What does the white pixel bring?</h1>" in page
     assert "over 3 seeds" in page
 
 
@@ -105,10 +105,12 @@ def test_same_seed_gives_the_same_numbers(folder: Path, tmp_path: Path) -> None:
 def test_the_report_and_the_overview_stand_beside_the_results(folder: Path) -> None:
     assert (folder / "report.html").read_text("utf-8").lstrip().lower().startswith("<!doctype html>")
     with Image.open(folder / "overview.png") as sheet:
-        assert sheet.size == (2 * 48 + 4, 2 * 48 + 4)
+        assert sheet.size == (2 * 48 + 4, 4 * 48 + 3 * 4)
         shown = np.asarray(sheet)
-    rows = results(folder)["rows"]  # of the brighter level's Bayer the first seed: the last column of the last line
-    row = next(row for row in rows if (row["level"], row["processor"], row["seed"]) == ("500lux", "bayer", 0))
+    rows = results(folder)[
+        "rows"
+    ]  # the last column of the last line: of the brighter level the last processor, its first seed
+    row = next(row for row in rows if (row["level"], row["processor"], row["seed"]) == ("500lux", "ple_bayer", 0))
     with Image.open(folder / "pictures" / row["picture"]) as picture:
         assert np.array_equal(shown[-48:, -48:], np.asarray(picture))
 
@@ -202,7 +204,7 @@ def of_file(path: Path, out: Path, *more: str) -> dict[str, Any]:
 
 def test_demo_runs_from_a_file_in_the_files_own_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = of_file(ramp(tmp_path / "my scene.exr", error=0.25), tmp_path / "out", "--light", "E")
-    assert len(found["rows"]) == 2 * 3
+    assert len(found["rows"]) == 4 * 3
     for row in found["rows"]:
         assert (row["scene"], row["illuminance_lux"], row["bands"]) == ("my scene.exr", None, 40)
         assert row["render"]["integrator"] == "file"
