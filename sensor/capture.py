@@ -7,7 +7,8 @@ from render.radiance import SpectralRadiance
 from rodcone.errors import InputError, require_kind
 from rodcone.jit import backend
 from sensor.config import SensorConfig
-from sensor.device import Device
+from sensor.device import Device, draw_device
+from sensor.exposure import auto_exposure_s
 from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.presets import preset
@@ -19,14 +20,16 @@ from sensor.response import electrons_per_irradiance, expected_electrons
 def capture(
     radiance: SpectralRadiance,
     sensor: SensorConfig | str,
-    exposure_s: float,
-    device: Device,
-    rng: np.random.Generator,
+    exposure_s: float | None = None,
+    device: Device | None = None,
+    rng: np.random.Generator | None = None,
     *,
     exact: bool = False,
     samples_per_pixel: int = 1,
 ) -> RawImage:
     """Take one exposure: optics, expected electrons, readout.
+
+    Radiance and sensor alone give the frame of `rodcone capture` with its defaults, the same at every call.
 
     With Dr.Jit on LLVM or CUDA all of it runs there: signal in single precision, shot noise as
     `sensor.kernel.poisson` says (exact under 30 e-, distribution function within 5e-6 above). Otherwise, and with
@@ -39,12 +42,12 @@ def capture(
         Quickest as float32 with band-planar memory, as renders are.
     sensor : SensorConfig or str
         A sensor, or a preset by name or path.
-    exposure_s : float
-        0 or more [s].
-    device : Device
-        The chip, of the frame's size.
-    rng : numpy.random.Generator
-        Gives one key; draws depend on key, row, column and term alone.
+    exposure_s : float, optional
+        0 or more [s]; left out, by `sensor.exposure.auto_exposure_s`.
+    device : Device, optional
+        The chip, of the frame's size; left out, the one that ``default_rng([0, 0])`` draws.
+    rng : numpy.random.Generator, optional
+        Gives one key; draws depend on key, row, column and term alone. Left out, ``default_rng([0, 1])``.
     exact : bool
     samples_per_pixel : int
         As `form_image` takes it.
@@ -65,6 +68,12 @@ def capture(
         sensor = preset(sensor)
     fix = "call its relight()" if hasattr(radiance, "relight") else "give SpectralRadiance(values, wavelength_nm)"
     require_kind("radiance", radiance, SpectralRadiance, fix)
+    if exposure_s is None:
+        exposure_s = auto_exposure_s(form_image(radiance, sensor, samples_per_pixel), sensor)
+    if device is None:
+        shape = radiance.shape[0] // samples_per_pixel, radiance.shape[1] // samples_per_pixel
+        device = draw_device(sensor, shape, np.random.default_rng([0, 0]))
+    rng = np.random.default_rng([0, 1]) if rng is None else rng
     require_kind("device", device, Device, "give draw_device(sensor, radiance.shape, rng)")
     numpy_runs, scaled = exact or backend() == "numpy", samples_per_pixel == 1 and not spreads(sensor.lens)
     light: SpectralRadiance | SpectralIrradiance = radiance

@@ -14,9 +14,10 @@ from isp.colour.encoding import encode
 from render.illuminants import illuminant
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
-from render.radiance_files.exr import write_exr
+from render.radiance_files.exr import read_exr, write_exr
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.colour_spaces import decode_srgb, encode_srgb
+from sensor.capture import capture
 from sensor.cfa import BAYER, RGBW, mask
 from sensor.optics import form_image, left_out
 from sensor.presets import preset, preset_file
@@ -695,3 +696,10 @@ def test_a_burst_is_captured_and_its_merged_frames_are_developed(
     assert not Path("no.png").exists()
     for count in ("0", "65"):
         assert call(["capture", *asked, "--frames", count, "-o", "no.dng"], capsys)[0] == 2
+
+
+def test_capture_in_python_gives_the_commands_frame(exr: Path, tmp_path: Path) -> None:
+    take(Order(exr, tmp_path / "shot.dng"))
+    ours, theirs = capture(read_exr(exr), "low_noise"), read_raw(tmp_path / "shot.dng")
+    assert ours.exposure_s == pytest.approx(theirs.exposure_s, rel=1e-6)
+    assert np.array_equal(ours.dn, theirs.dn)

@@ -107,9 +107,7 @@ def test_the_report_and_the_overview_stand_beside_the_results(folder: Path) -> N
     with Image.open(folder / "overview.png") as sheet:
         assert sheet.size == (2 * 48 + 4, 4 * 48 + 3 * 4)
         shown = np.asarray(sheet)
-    rows = results(folder)[
-        "rows"
-    ]  # the last column of the last line: of the brighter level the last processor, its first seed
+    rows = results(folder)["rows"]  # last column, last line: the brighter level by the last processor, its first seed
     row = next(row for row in rows if (row["level"], row["processor"], row["seed"]) == ("500lux", "ple_bayer", 0))
     with Image.open(folder / "pictures" / row["picture"]) as picture:
         assert np.array_equal(shown[-48:, -48:], np.asarray(picture))
