@@ -61,5 +61,6 @@ def unstabilise(stable: NDArray[np.floating], dark_noise_e: float) -> NDArray[np
         Electrons; not under ``-dark_noise_e**2``, where the transform ends.
     """
     root = np.maximum(np.asarray(stable, dtype=np.float64), _LEAST)
-    series = root**2 / 4 - 0.125 + np.sqrt(1.5) / 4 / root - 1.375 / root**2 + 0.625 * np.sqrt(1.5) / root**3
-    return np.asarray(series - dark_noise_e**2)
+    inverse = 1.0 / root
+    series = inverse * (np.sqrt(1.5) / 4 + inverse * (0.625 * np.sqrt(1.5) * inverse - 1.375))
+    return np.asarray(0.25 * root * root - (0.125 + dark_noise_e**2) + series)

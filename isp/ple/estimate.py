@@ -62,7 +62,7 @@ class ScaleEstimate:
 
 @dataclass(frozen=True)
 class Patches:
-    """Estimates of some patches; arrays over the patches first."""
+    """Estimates of some patches, values times weight; arrays over the patches first."""
 
     values: Singles
     weight: Singles
@@ -178,7 +178,7 @@ def _solve(
         blind = Sampling(sampling.size, tuple(rows[kept].tolist()), sampling.gains, sampling.dark_e, sampling.prnu)
         some = np.flatnonzero(hit)
         _solve_by_light(prior, blind, y[:, kept], steps, pilot, some, found)
-        guess = found.values[np.ix_(some, rows)] / window(sampling.size).ravel()[rows // 4]
+        guess = found.values[np.ix_(some, rows)] / (window(sampling.size).ravel()[rows // 4] * found.weight[some, None])
         y = y.copy()
         y[some] = np.where(full[some], np.maximum(y[some], guess), y[some])
     _solve_by_light(prior, sampling, y, steps, pilot, np.arange(count), found)
@@ -230,7 +230,8 @@ def _solve_one_light(at: Table, y: Singles, pilot: PatchPilot | None, index: NDA
             found.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
             found.noise[place] = variance * (by.noise / by.variance)
             np.take(known, some, axis=0, out=taken[: some.size], mode="clip")
-            found.values[place] = np.matmul(taken[: some.size], linear, out=values[: some.size])
+            product = np.matmul(taken[: some.size], linear, out=values[: some.size])
+            found.values[place] = np.multiply(product, found.weight[place, None], out=product)
 
 
 def _overlapped(found: Patches, shape: tuple[int, int], size: int) -> tuple[Singles, ...]:
@@ -240,16 +241,17 @@ def _overlapped(found: Patches, shape: tuple[int, int], size: int) -> tuple[Sing
     weight = np.zeros((len(total), nx - 1 + across, STRIDE), np.float32)
     cells = np.zeros((ny - 1 + across, nx - 1 + across), np.float32)
     variance = np.zeros((*cells.shape, 4), np.float32)
-    values = found.values
-    values *= found.weight[:, None]
-    values = values.reshape(ny, nx, size, across, 4 * STRIDE)
+    values = found.values.reshape(ny, nx, size, across, 4 * STRIDE)
     each, inner = found.weight.reshape(ny, nx), (found.inner * found.weight[:, None]).reshape(ny, nx, 4)
     taper = window(size).reshape(size, across, STRIDE)
-    for i in range(size):
-        for j in range(across):
-            rows = slice(i, i + (ny - 1) * STRIDE + 1, STRIDE)
-            total[rows, j : j + nx] += values[:, :, i, j]
-            weight[rows, j : j + nx] += each[..., None] * taper[i, j]
+    # Some rows of patches at once, so that values are read once.
+    for first in range(0, ny, max(1, BLOCK // nx)):
+        some = slice(first, min(first + max(1, BLOCK // nx), ny))
+        for i in range(size):
+            rows = slice(first * STRIDE + i, (some.stop - 1) * STRIDE + i + 1, STRIDE)
+            for j in range(across):
+                total[rows, j : j + nx] += values[some, :, i, j]
+                weight[rows, j : j + nx] += each[some, :, None] * taper[i, j]
     for i in range(across):
         for j in range(across):
             cells[i : i + ny, j : j + nx] += each

@@ -19,6 +19,7 @@ from sensor.raw import RawImage
 SCALES = 4  # coarser ones
 CELLS = 4  # a side of a coarse patch
 LEAST_CELLS = 5  # a side of the coarsest scale
+TOGETHER = 32  # rows that stay in a core's cache while they are worked on
 COLOUR_SPREAD = 0.2  # relative standard deviation of the light that a patch's own sums show, by its colour
 
 
@@ -90,8 +91,8 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     light, pilot = _told(found, cells.sampling, sampling, own)
     found = estimate(prior, sampling, lift(electrons, raw.dark_noise_e), full, light, pilot)
     planes = found.planes[..., cells.index]
-    for first in range(0, len(planes), 256):
-        planes[first : first + 256] = unlift(planes[first : first + 256], raw.dark_noise_e)
+    for first in range(0, len(planes), TOGETHER):
+        planes[first : first + TOGETHER] = unlift(planes[first : first + TOGETHER], raw.dark_noise_e)
     return planes, found.noise[list(cells.index)]
 
 
@@ -169,23 +170,34 @@ def _told(coarse: ScaleEstimate, before: Sampling, now: Sampling, own: PatchLigh
 
     A patch of the finer scale covers 4x4 cells of the coarser one, or 2x2 where it is of cells itself.
     """
-    old, new, share = np.array(before.dark_e), np.array(now.dark_e), np.array(now.gains) / np.array(before.gains)
-    electrons = np.stack([unlift(coarse.planes[..., c], old[c]) for c in range(4)], axis=-1)
-    finer = electrons * share
-    noise = np.maximum(finer, 0) + (LIFT * new) ** 2 + 0.375
-    # A posterior variance counts in the finer scale's units of noise.
-    wide = np.repeat(np.repeat(coarse.variance, STRIDE, 0), STRIDE, 1)[: finer.shape[0], : finer.shape[1]]
-    wide = wide * (share**2 * (np.maximum(electrons, 0) + (LIFT * old) ** 2 + 0.375) / noise)
-    light = finer[..., 3] / now.gains[3]
-    light_variance = wide[..., 3] * noise[..., 3] / now.gains[3] ** 2 + (PILOT_ERROR * light) ** 2
-    roots = 2.0 * lifted_root(np.maximum(finer, 0.0), new)
-    held = np.concatenate([roots, np.stack([wide.mean(axis=-1), light, light_variance], axis=-1)], axis=-1)
-    means = _patch_means(held.astype(np.float32), own.mean.shape, now.size)
+    held = np.empty((*coarse.planes.shape[:2], 7), np.float32)
+    for first in range(0, len(held), TOGETHER):
+        part = slice(first, first + TOGETHER)
+        wide = np.repeat(np.repeat(coarse.variance[first // STRIDE : -(-part.stop // STRIDE)], STRIDE, 0), STRIDE, 1)
+        planes = coarse.planes[part]
+        held[part] = _held(planes, wide[: len(planes), : planes.shape[1]], before, now)
+    means = _patch_means(held, own.mean.shape, now.size)
     light, light_variance = means[..., 5], means[..., 6]
     most = np.maximum(np.maximum(own.mean, light), 0.0)
     own_variance = own.shot * most + own.floor + (COLOUR_SPREAD * most) ** 2
     both = (light * own_variance + own.mean * light_variance) / (own_variance + light_variance)
     return both.astype(np.float32), PatchPilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
+
+
+def _held(planes: Singles, variance: Singles, before: Sampling, now: Sampling) -> NDArray[np.float64]:
+    """Of a coarser scale's cells: half roots by channel, their variance, light and its variance, in a finer scale's units.
+
+    A posterior variance counts in these units of noise too.
+    """
+    old, new, share = np.array(before.dark_e), np.array(now.dark_e), np.array(now.gains) / np.array(before.gains)
+    electrons = np.stack([unlift(planes[..., c], old[c]) for c in range(4)], axis=-1)
+    finer = electrons * share
+    noise = np.maximum(finer, 0) + (LIFT * new) ** 2 + 0.375
+    wide = variance * (share**2 * (np.maximum(electrons, 0) + (LIFT * old) ** 2 + 0.375) / noise)
+    light = finer[..., 3] / now.gains[3]
+    light_variance = wide[..., 3] * noise[..., 3] / now.gains[3] ** 2 + (PILOT_ERROR * light) ** 2
+    roots = 2.0 * lifted_root(np.maximum(finer, 0.0), new)
+    return np.concatenate([roots, np.stack([wide.mean(axis=-1), light, light_variance], axis=-1)], axis=-1)
 
 
 def _patch_means(values: Singles, shape: tuple[int, ...], size: int) -> Singles:
@@ -199,5 +211,10 @@ def _patch_means(values: Singles, shape: tuple[int, ...], size: int) -> Singles:
 def _sums(values: NDArray[Any], stride: int, side: int = CELLS) -> Singles:
     """Sums over `side` x `side`, `stride` apart."""
     ends = [(length - side) // stride * stride + 1 for length in values.shape[:2]]
-    rows = np.add.reduce([values[i : i + ends[0] : stride].astype(np.float32) for i in range(side)])
-    return np.asarray(np.add.reduce([rows[:, j : j + ends[1] : stride] for j in range(side)]))
+    rows = values[: ends[0] : stride].astype(np.float32)
+    for i in range(1, side):
+        rows += values[i : i + ends[0] : stride]
+    sums = rows[:, : ends[1] : stride].copy()
+    for j in range(1, side):
+        sums += rows[:, j : j + ends[1] : stride]
+    return sums
