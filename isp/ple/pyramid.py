@@ -185,7 +185,7 @@ def _told(coarse: ScaleEstimate, before: Sampling, now: Sampling, own: PatchLigh
 
 
 def _held(planes: Singles, variance: Singles, before: Sampling, now: Sampling) -> NDArray[np.float64]:
-    """A coarser scale's cells in a finer scale's units of noise: roots by channel, their variance, light, its variance."""
+    """Cells of a scale in a finer one's units of noise: roots by channel, their variance, light, its variance."""
     old, new, share = np.array(before.dark_e), np.array(now.dark_e), np.array(now.gains) / np.array(before.gains)
     electrons = np.stack([unlift(planes[..., c], old[c]) for c in range(4)], axis=-1)
     finer = electrons * share
