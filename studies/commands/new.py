@@ -122,8 +122,8 @@ def study(name: str = "light_levels", /, *, out: Out) -> None:
         light_levels (moonlight to daylight), spectra (one scene under several lights at equal lux), metamers (pairs
         that look alike under D65), infrared_cut (a filter in or out), responses (broad filters or narrow ones),
         exposures (exposure times and fixed patterns on Table 1's pixel), opponents (every processor, for rodcone
-        opponents), white_pixel (one method with and without W), demo (what rodcone demo makes), or paper_1b and paper_6
-        (of the paper's figures).
+        opponents), white_pixel (one method with and without W), white_pixel_lights (the same under four lights), demo
+        (what rodcone demo makes), or paper_1b and paper_6 (of the paper's figures).
     out
         File to write, ending in .toml; one that exists is left alone. Sensors and their curves go into the folder
         sensors beside it, where files of the same content are kept.

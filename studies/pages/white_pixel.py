@@ -7,6 +7,7 @@ import numpy as np
 from studies.metrics.confidence import SeedMean, mean_with_confidence
 from studies.pages.duels import METRICS, Contest
 from studies.pages.report_text import MISSING, Metric, fixed, level_text, signed, table
+from studies.study.study import OWN
 
 RGBW, BAYER = "ple_rgbw", "ple_bayer"
 DRAWN = "generated"  # how the names of scenes begin that are drawn from a number
@@ -40,13 +41,12 @@ TEXT = (
 def _rows(contests: Sequence[Contest], levels: Sequence[str], metric: Metric) -> list[list[str]]:
     rows = []
     for group in dict.fromkeys(map(_group, contests)):
-        sensor, exposure, balance, drawn = group
+        sensor, exposure, balance, spectrum, drawn = group
         own = [x for x in contests if _group(x) == group]
         scenes = len({x.group.scene for x in own})
         cells = [_cell([x for x in own if x.level == level], metric) for level in levels]
-        rows.append(
-            [f"`{sensor}`", f"`{exposure}`", f"`{balance}`", f"{scenes} {'drawn' if drawn else 'named'}", *cells]
-        )
+        told = f"{scenes} {'drawn' if drawn else 'named'}" + (f", `{spectrum}`" if spectrum != OWN else "")
+        rows.append([f"`{sensor}`", f"`{exposure}`", f"`{balance}`", told, *cells])
     return rows
 
 
@@ -67,7 +67,7 @@ def _cell(contests: Sequence[Contest], metric: Metric) -> str:
     return f"({shown})" if found.low <= 0 <= found.high else shown
 
 
-def _group(contest: Contest) -> tuple[str, str, str, bool]:
-    """Sensor, exposure, white balance, and whether the scene was drawn."""
+def _group(contest: Contest) -> tuple[str, str, str, str, bool]:
+    """Sensor, exposure, white balance, light, and whether the scene was drawn."""
     of = contest.group
-    return of.sensor, of.exposure, of.white_balance, of.scene.startswith(DRAWN)
+    return of.sensor, of.exposure, of.white_balance, of.spectrum, of.scene.startswith(DRAWN)

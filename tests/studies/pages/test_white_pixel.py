@@ -1,5 +1,7 @@
 """What the W pixel brings: leads worked out by hand, scenes apart by who drew them, intervals over seeds."""
 
+from dataclasses import replace
+
 import pytest
 import sweep_sample as SAMPLE
 
@@ -39,6 +41,12 @@ def test_scenes_that_were_drawn_stand_apart() -> None:
     drawn = [line for line in table if "1 drawn" in line]
     assert named[0].endswith("| +2.0 ± 0.3 | −1.0 ± 0.3 |")
     assert drawn[0].endswith("| +6.0 ± 0.3 | +3.0 ± 0.3 |")
+
+
+def test_lights_stand_apart() -> None:
+    rows = [replace(row, spectrum=light) for row in made(scenes=("still_life",)) for light in ("own", "sodium_high")]
+    table = next(part for part in white_pixel_tables(contests_of(rows)) if part.startswith("| PSNR"))
+    assert [line.split(" | ")[3] for line in table.splitlines()[2:]] == ["1 named", "1 named, `sodium_high`"]
 
 
 def test_nothing_is_said_where_one_of_the_two_is_missing() -> None:

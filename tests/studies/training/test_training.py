@@ -6,11 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isp.ple.prior import mixture
+from isp.ple.prior import mixture, own_prior
+from isp.ple.pyramid import reconstruct
+from render.engine import render
+from scenes.catalog import load
+from sensor.capture import capture
+from sensor.optics import form_image
 from sensor.presets import preset
+from sensor.response import channel_electrons
 from studies.training import em, pictures
 from studies.training.em import draw_patches, fit_prior
 from studies.training.pictures import PHOTOGRAPHS, draw_light, draw_surface, neutral_electrons, photograph
+from studies.training.train import train_prior
 
 
 def test_white_reads_1_in_every_channel_where_the_camera_knows_the_light(monkeypatch):
@@ -76,3 +83,19 @@ def test_the_mixtures_mean_and_covariance_are_the_patches(monkeypatch):
     off = held.means - mean
     covariance = np.tensordot(weights, held.covariances, 1) + (off.T * weights) @ off
     assert covariance == pytest.approx(np.cov(patches.T), abs=0.02)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_a_prior_trained_anew_is_as_good_as_the_one_that_ships():
+    ours, anew = own_prior(), train_prior(preset("low_noise"), "low_noise", 1)
+    transport = render(load("still_life"), (96, 96), spp=64)
+    for cfa, luminance_cd_m2 in (("rgbw", 0.2), ("rgbw", 25.0), ("bayer", 0.2), ("bayer", 25.0)):
+        sensor, radiance = preset("low_noise", cfa), transport.relight(luminance_cd_m2=luminance_cd_m2)
+        raw = capture(radiance, sensor)
+        truth = channel_electrons(form_image(radiance, sensor), sensor, raw.exposure_s)
+        psnr_db = [
+            -10 * np.log10(np.mean((reconstruct(raw, prior, prior.neutral_e)[0] - truth) ** 2))
+            for prior in (ours, anew)
+        ]
+        assert abs(psnr_db[1] - psnr_db[0]) < 0.05
