@@ -95,10 +95,12 @@ def read_results(folder: Path) -> Iterator[sqlite3.Connection]:
     path = folder / FILE
     if not path.is_file():
         raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
-    # SQLite reads the write-ahead log too, and makes one. Where the folder can't be written and has no log, nobody else
-    # writes, and the file alone is read.
-    still = not os.access(folder, os.W_OK) and not path.with_name(f"{FILE}-wal").exists()
-    with _connected(path, "mode=ro&immutable=1" if still else "mode=ro") as base:
+    # SQLite reads the write-ahead log too, and makes one, which only a connection that may write takes away again. Where
+    # the folder can't be written and has no log, nobody else writes, and the file alone is read.
+    log = path.with_name(f"{FILE}-wal")
+    options = "mode=rw" if os.access(folder, os.W_OK) else "mode=ro" if log.exists() else "mode=ro&immutable=1"
+    with _connected(path, options) as base:
+        base.execute("PRAGMA query_only = ON")
         if not _has_tables(base, path):
             raise InputError(f"{path}: it is no results database (it is empty); run the sweep again in another folder")
         _check_whole(base, path)

@@ -50,6 +50,16 @@ def test_a_second_process_reads_while_the_first_is_open(tmp_path: Path) -> None:
             assert rows(reader, everything=True) == [ROW]
 
 
+def test_who_reads_writes_nothing_and_leaves_nothing_beside_the_file(tmp_path: Path) -> None:
+    with open_results(tmp_path) as base:
+        add(base, ROW)
+    with read_results(tmp_path) as base:
+        assert rows(base, everything=True) == [ROW]
+        with pytest.raises(sqlite3.OperationalError, match="readonly"):
+            add(base, ROW)
+    assert [path.name for path in tmp_path.iterdir()] == [FILE]
+
+
 @pytest.mark.parametrize("column", ["picture", "truth"])
 def test_a_row_counts_as_done_only_with_whole_pictures(column: str, tmp_path: Path) -> None:
     """Content cut to a byte, to none, or of one bit more is another file's; each is named after what was written."""
