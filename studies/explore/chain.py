@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
+from render.radiance import SpectralRadiance
 from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import require_keys
@@ -24,7 +25,7 @@ from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from sensor.optics import SpectralIrradiance, form_image
 from sensor.raw import RawImage
 from sensor.response import behind_filters, channel_electrons
-from studies.explore.controls import TIME, Controls, Lamp, camera_of, options_of
+from studies.explore.controls import TIME, Controls, Lamp, camera_of, options_of, own_camera
 from studies.explore.lamps import alone, lit_transport
 from studies.explore.memo import Memo
 from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of
@@ -174,13 +175,15 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
         "light", (lamps, controls.reference_light), lit_transport, transport, dict(lamps), controls.reference_light
     )
     scale = controls.level_cd_m2 * scale_1
-    sensor = memo.of("camera", camera, camera_of, controls)
+    own = memo.of("own camera", (controls.sensor, controls.mosaic), own_camera, controls.sensor, controls.mosaic)
+    sensor = memo.of("camera", camera, camera_of, controls, own)
 
     # Lens and filters
     frames = {}
     for (name, group), spectrum in zip(lit.groups.items(), spectra, strict=True):
         if group.power > 0:
-            frames[name] = memo.of("frame", (spectrum, optics), _group_frame, lit, name, sensor)
+            radiance = memo.of("radiance", spectrum, _radiance, lit, name)
+            frames[name] = memo.of("frame", (spectrum, optics), _group_frame, radiance, sensor)
     powers = tuple(lit.groups[name].power for name in frames)
     lit_so = (spectra, powers, optics)
     white_1 = memo.of("white", (spectra, powers), _white, lit, spectra, memo)
@@ -230,8 +233,12 @@ def to_bytes(linear: Image) -> NDArray[np.uint8]:
 # Stages
 
 
-def _group_frame(lit: Transport, name: str, sensor: SensorConfig) -> GroupFrame:
-    irradiance = form_image(alone(lit, name).relight(), sensor)
+def _radiance(lit: Transport, name: str) -> SpectralRadiance:
+    return alone(lit, name).relight()
+
+
+def _group_frame(radiance: SpectralRadiance, sensor: SensorConfig) -> GroupFrame:
+    irradiance = form_image(radiance, sensor)
     return GroupFrame(irradiance, channel_electrons(irradiance, sensor, 1.0))
 
 
@@ -239,13 +246,10 @@ def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
     groups, light, planes = exposed.transport.groups, exposed.light, []
     for name in exposed.frames:
         lamp = controls.lamps.get(name, Lamp())
-        key = (name, lamp.spectrum, lamp.table, light.spectrum.tobytes())
-        planes.append(memo.of("true", key, _true_group, exposed.transport, name, light))
+        spectrum = (name, lamp.spectrum, lamp.table)
+        radiance = memo.of("radiance", spectrum, _radiance, exposed.transport, name)
+        planes.append(memo.of("true", (spectrum, light.spectrum.tobytes()), true_srgb, radiance, light, 1.0))
     return _weighted([groups[name].power / exposed.white_at_own_cd_m2 for name in exposed.frames], planes)
-
-
-def _true_group(lit: Transport, name: str, light: Light) -> Image:
-    return true_srgb(alone(lit, name).relight(), light, 1.0)
 
 
 def _white(lit: Transport, spectra: tuple[tuple[str, Any, Any], ...], memo: Memo) -> float:

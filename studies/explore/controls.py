@@ -160,15 +160,32 @@ def options_of(controls: Controls) -> dict[str, Any]:
     return {"settings": settings}
 
 
-def camera_of(controls: Controls) -> SensorConfig:
-    """Sensor with its lens as the controls have it.
+def own_camera(sensor: str, mosaic: str) -> SensorConfig:
+    """Sensor of a preset's name or a file, with a mosaic.
 
     Raises
     ------
     InputError
-        For a file that describes no camera, or a term out of range.
+        For a file that describes no camera.
     """
-    own = vary(preset(controls.sensor), controls.mosaic)
+    return vary(preset(sensor), mosaic)
+
+
+def camera_of(controls: Controls, own: SensorConfig | None = None) -> SensorConfig:
+    """Sensor with its lens as the controls have it.
+
+    Parameters
+    ----------
+    controls : Controls
+    own : SensorConfig, optional
+        Of `own_camera`, where it has been read before.
+
+    Raises
+    ------
+    InputError
+        As `own_camera`, or for a term out of range.
+    """
+    own = own or own_camera(controls.sensor, controls.mosaic)
     return replace(
         own,
         lens=replace(own.lens, **controls.lens),
