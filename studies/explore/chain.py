@@ -200,7 +200,8 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
         exposure_s = min(exposure_s, unit_s / scale)
     expected_e = mosaicked_e * (scale * exposure_s)
     shape = (expected_e.shape[0], expected_e.shape[1])
-    device = memo.of("device", (camera, controls.seed), _chip, sensor, shape, controls.seed)
+    chip = (controls.sensor, controls.mosaic, _items(controls.pixel), controls.seed)
+    device = memo.of("device", chip, _chip, sensor, shape, controls.seed)
     numbers = range(controls.exposure_number, controls.exposure_number + controls.frames)
     raw = merged_raw(
         [expose(expected_e, sensor, exposure_s, device, _rng(controls.seed, _FRAME, number)) for number in numbers]
