@@ -122,23 +122,21 @@ class Shot:
     exposed : Exposed
     linear, true : (h, w, 3) float64
         Linear sRGB in which `exposed.white_cd_m2` is 1.
+    truth : (h, w, 3) uint8
+        `true` as the page shows it, sRGB of 8 bits.
     developed : Picture
     """
 
     exposed: Exposed
     linear: Image
     true: Image
+    truth: NDArray[np.uint8]
     developed: Picture
 
     @property
     def picture(self) -> NDArray[np.uint8]:
         """The picture as the page shows it, sRGB of 8 bits, shape (h, w, 3)."""
         return to_bytes(self.linear)
-
-    @property
-    def truth(self) -> NDArray[np.uint8]:
-        """The truth likewise."""
-        return to_bytes(self.true)
 
 
 def photograph(transport: Transport, controls: Controls, memo: Memo | None = None) -> Shot:
@@ -159,7 +157,7 @@ def photograph(transport: Transport, controls: Controls, memo: Memo | None = Non
     memo = memo or Memo()
     exposed = expose_scene(transport, controls, memo)
     linear, picture = development_of(exposed, controls, memo).develop()
-    return Shot(exposed, linear, true_picture_of(exposed, controls, memo), picture)
+    return Shot(exposed, linear, *true_picture_of(exposed, controls, memo), picture)
 
 
 def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposed:
@@ -220,8 +218,8 @@ def development_of(exposed: Exposed, controls: Controls, memo: Memo) -> Developm
     return Development(controls.processor, raw, colours, sensor, light, exposed.white_cd_m2, options)
 
 
-def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
-    """Noise-free picture: of any level the same, since white goes with it."""
+def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
+    """Noise-free picture, linear and as shown: of any level the same, since white goes with it."""
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in exposed.transport.groups)
     return memo.of("truth", (lamps, controls.reference_light), _truth, exposed, controls, memo)
 
@@ -243,14 +241,15 @@ def _group_frame(radiance: SpectralRadiance, sensor: SensorConfig) -> GroupFrame
     return GroupFrame(irradiance, channel_electrons(irradiance, sensor, 1.0))
 
 
-def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
+def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
     groups, light, planes = exposed.transport.groups, exposed.light, []
     for name in exposed.frames:
         lamp = controls.lamps.get(name, Lamp())
         spectrum = (name, lamp.spectrum, lamp.table)
         radiance = memo.of("radiance", spectrum, _radiance, exposed.transport, name)
         planes.append(memo.of("true", (spectrum, light.spectrum.tobytes()), true_srgb, radiance, light, 1.0))
-    return _weighted([groups[name].power / exposed.white_at_own_cd_m2 for name in exposed.frames], planes)
+    true = _weighted([groups[name].power / exposed.white_at_own_cd_m2 for name in exposed.frames], planes)
+    return true, to_bytes(true)
 
 
 def _white(lit: Transport, spectra: tuple[tuple[str, Any, Any], ...], memo: Memo) -> float:

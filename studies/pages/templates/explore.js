@@ -36,6 +36,7 @@ function render({ model, el }) {
   let number = 0, latest = 0, hello, state, edited = "a", cursor = null, stale, pictureSize = [1, 1];
   const page = Math.random().toString(36).slice(2); // a notebook sends every view of a widget all its messages
   const waits = new Map(); // number -> what to do with the answer
+  const held = []; // the last picture of each view: one that stays as it is comes without bytes
   const root = make("div", { class: "explore" });
   el.append(root);
 
@@ -49,7 +50,10 @@ function render({ model, el }) {
   model.on("msg:custom", (header, buffers) => {
     if ("page" in header && (header.page === page) === (header.kind === "taken over")) return;
     if (header.kind === "hello") begin(header);
-    else if (header.kind === "show") { if (header.number === latest) paint(header, buffers); }
+    else if (header.kind === "show") {
+      buffers.forEach((bytes, index) => { if (bytes.byteLength) held[index] = bytes; });
+      if (header.number === latest) paint(header);
+    }
     else if (header.kind === "error") fail(header);
     else if (header.kind === "taken over") status("Another page has taken over; open this one again to take it back.", true);
     else if (header.kind === "ended") status("The program has ended; nothing here is computed any more.", true);
@@ -80,18 +84,21 @@ function render({ model, el }) {
   }
 
   // What is shown
-  function paint(header, buffers) {
+  function paint(header) {
     const [height, width] = pictureSize = header.size;
     header.views.forEach(([camera, view], index) => {
-      const canvas = parts.canvases[index], rgb = new Uint8Array(buffers[index].buffer, buffers[index].byteOffset, 3 * width * height);
+      parts.captions[index].textContent = caption(header, camera, view, sides()[camera]);
+      const canvas = parts.canvases[index], bytes = held[index];
+      if (canvas.shows === bytes) return;
+      canvas.shows = bytes;
       if (canvas.width !== width || canvas.height !== height) {
         Object.assign(canvas, { width, height });
         canvas.style.setProperty("--ratio", width / height);
       }
       const image = new ImageData(width, height), rgba = new Uint32Array(image.data.buffer);
+      const rgb = new Uint8Array(bytes.buffer, bytes.byteOffset, bytes.byteLength);
       for (let i = 0, j = 0; i < rgba.length; i++, j += 3) rgba[i] = 0xff000000 | rgb[j + 2] << 16 | rgb[j + 1] << 8 | rgb[j];
       canvas.getContext("2d").putImageData(image, 0, 0);
-      parts.captions[index].textContent = caption(header, camera, view, sides()[camera]);
     });
     clearTimeout(stale);
     root.classList.remove("waiting");
