@@ -5,6 +5,7 @@ level and exposure are factors on these, as in a sweep, whose frames are those o
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from sensor.device import Device, draw_device
 from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from sensor.optics import SpectralIrradiance, form_image
 from sensor.raw import RawImage
+from sensor.readout import draw_mean_frame, read_out
 from sensor.response import behind_filters, channel_electrons
 from studies.explore.controls import TIME, Controls, Lamp, camera_of, options_of, own_camera
 from studies.explore.lamps import alone, lit_transport
@@ -74,6 +76,8 @@ class Exposed:
         Photo-electrons of one frame, without dark current.
     device : Device
     raw : RawImage
+    shot_noise : bool
+        Of `Controls`.
     """
 
     sensor: SensorConfig
@@ -86,6 +90,7 @@ class Exposed:
     expected_e: Image
     device: Device
     raw: RawImage
+    shot_noise: bool
 
     @property
     def white_cd_m2(self) -> float:
@@ -201,10 +206,12 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     chip = (controls.sensor, controls.mosaic, _items(controls.pixel), controls.seed)
     device = memo.of("device", chip, _chip, sensor, shape, controls.seed)
     numbers = range(controls.exposure_number, controls.exposure_number + controls.frames)
-    raw = merged_raw(
-        [expose(expected_e, sensor, exposure_s, device, _rng(controls.seed, _FRAME, number)) for number in numbers]
+    take = expose if controls.shot_noise else partial(read_out, draw=draw_mean_frame)
+    rngs = [_rng(controls.seed, _FRAME, number) for number in numbers]
+    raw = merged_raw([take(expected_e, sensor, exposure_s=exposure_s, device=device, rng=rng) for rng in rngs])
+    return Exposed(
+        *(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw, controls.shot_noise)
     )
-    return Exposed(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw)
 
 
 def development_of(exposed: Exposed, controls: Controls, memo: Memo) -> Development:

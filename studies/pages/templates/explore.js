@@ -2,7 +2,7 @@
 // an answer only where nothing newer has been asked. `render` is what a notebook's widget calls, and the page too.
 
 const CAMERA = ["exposure", "exposure_s", "sensor", "mosaic", "lens", "pixel", "bits", "processor", "settings",
-  "white_balance", "seed", "exposure_number", "frames"];
+  "white_balance", "shot_noise", "seed", "exposure_number", "frames"];
 const TITLES = {
   picture: "Picture", truth: "Truth", raw: "Raw mosaic", noise: "Noise only", "luminance error": "Error of luminance",
   "colour error": "Error of colour, CIEDE2000", flip: "Error as seen, FLIP", snr: "SNR map",
@@ -260,6 +260,7 @@ function render({ model, el }) {
           set("mosaic", value, true);
         }, "mosaic"),
         slider(["Converter", 1, 16, "whole", "bit"], camera.bits ?? preset.bits, value => set("bits", value === preset.bits ? null : value), "bits"),
+        checkbox("Shot noise", camera.shot_noise, value => set("shot_noise", value), "shot_noise"),
         ...terms("pixel", PIXEL, preset.pixel)),
       group("Processor",
         choice("Processor", processors.map(([name, each]) => [name, each.slow ? `${name} (slow)` : name]), camera.processor, value => {
@@ -352,6 +353,12 @@ function choice(title, options, value, act, key = title) {
   select.value = value;
   select.onchange = () => act(select.value);
   return make("label", { class: "choice" }, make("span", {}, title), select);
+}
+function checkbox(title, value, act, key) {
+  const box = make("input", { type: "checkbox", "data-key": key });
+  box.checked = value;
+  box.oninput = () => act(box.checked);
+  return make("label", { class: "check" }, box, title);
 }
 function numberBox(title, value, act, key) {
   const box = make("input", { type: "number", min: "0", step: "1", value, "data-key": key });
