@@ -285,20 +285,23 @@ function render({ model, el }) {
     const own = () => state.a.lamps[name] ??= { spectrum: "own", power: 1, table: [] };
     const now = state.a.lamps[name] ?? { spectrum: "own", power: 1, table: [] };
     const kelvin = /^(\d+)K$/.exec(now.spectrum);
-    const value = now.table.length ? "file" : kelvin ? "body" : now.spectrum;
-    const options = [["own", "its own"], ["body", "black body"], ["file", "from a CSV file"], ...hello.illuminants.map(each => [each, each])];
+    const value = now.table.length ? "table" : kelvin ? "body" : now.spectrum;
+    const options = [["own", "its own"], ["body", "black body"], ...now.table.length ? [["table", `a CSV file's ${now.table.length} points`]] : [],
+      ["file", "from a CSV file …"], ...hello.illuminants.map(each => [each, each])];
     const many = Object.keys(hello.groups).length > 1;
     const file = make("input", { type: "file", accept: ".csv,text/csv,text/plain", hidden: "", "aria-label": `CSV file of ${name}'s spectrum` });
     file.onchange = async () => {
-      const rows = (await file.files[0].text()).split(/\r?\n/).map(line => line.split(/[,;\t]/).map(cell => cell.trim() === "" ? NaN : Number(cell)));
-      const table = rows.filter(row => row.length >= 2 && row.slice(0, 2).every(Number.isFinite)).map(row => row.slice(0, 2));
-      if (table.length < 2) return status(`${name}: the file holds no rows of wavelength in nm and value.`, true);
+      const [table, bad] = tableOf(await file.files[0].text());
+      if (bad) return status(`${name}: line ${bad} of ${file.files[0].name} is no wavelength in nm and value; correct it.`, true);
+      if (table.length < 2) return status(`${name}: ${file.files[0].name} holds fewer than two rows of wavelength in nm and value.`, true);
       Object.assign(own(), { spectrum: "own", table });
       buildControls();
       change();
     };
     const select = choice(`${name}: spectrum`, options, value, picked => {
-      if (picked === "file") { file.click(); return; }
+      select.querySelector("select").value = value; // until a file is read
+      if (picked === "file") file.click();
+      if (["file", "table"].includes(picked)) return;
       Object.assign(own(), { spectrum: picked === "body" ? "3000K" : picked, table: [] });
       buildControls();
       change();
@@ -359,6 +362,16 @@ function checkbox(title, value, act, key) {
   box.checked = value;
   box.oninput = () => act(box.checked);
   return make("label", { class: "check" }, box, title);
+}
+// Rows of wavelength and value of a CSV, under a line of names or none; or the number of the first line that is no such row.
+function tableOf(text) {
+  const table = [];
+  for (const [index, line] of text.split(/\r?\n/).entries()) {
+    const row = line.split(/[,;\t]/).slice(0, 2).map(cell => cell.trim() === "" ? NaN : Number(cell));
+    if (row.length === 2 && row.every(Number.isFinite)) table.push(row);
+    else if (line.trim() && !line.startsWith("#") && (table.length || index)) return [table, index + 1];
+  }
+  return [table, 0];
 }
 function numberBox(title, value, act, key) {
   const box = make("input", { type: "number", min: "0", step: "1", value, "data-key": key });
