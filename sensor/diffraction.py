@@ -1,5 +1,6 @@
 """Transfer functions of diffraction and defocus."""
 
+from collections.abc import Callable
 from math import inf
 
 import numpy as np
@@ -36,9 +37,11 @@ def defocus_otf(frequency_per_um: Floats, diameter_um: float) -> Floats:
 
 
 def sampled_otf(
-    shape: tuple[int, int], step_um: float, wavelength_nm: float, lens: LensConfig, folded: bool
-) -> NDArray[np.float64]:
-    """Transfer at the cosines' frequencies of a picture with samples `step_um` apart, shape `shape`, 1 at the first.
+    shape: tuple[int, int], step_um: float, lens: LensConfig, folded: bool
+) -> Callable[[float], NDArray[np.float64]]:
+    """Transfer at the cosines' frequencies of a picture with samples `step_um` apart, as a function of the wavelength.
+
+    The function gives an array of shape `shape`, 1 at the first. What all bands share is computed once.
 
     Parameters
     ----------
@@ -48,15 +51,23 @@ def sampled_otf(
         negative, and below the pixels' Nyquist frequency the same wherever the lens's limit lies under the sampling
         frequency less that.
     """
-
-    def lens_otf(frequency_per_um: Floats) -> Floats:
-        return diffraction_otf(frequency_per_um, wavelength_nm, lens) * defocus_otf(frequency_per_um, lens.defocus_um)
-
     rows, columns = (np.arange(size) / (2 * size * step_um) for size in shape)
-    limit = limit_per_um(wavelength_nm, lens)
-    total = lens_otf(np.hypot(rows[:, None], columns))
-    for down, across in ((-1, 0), (0, -1), (-1, -1)) if folded else ():
-        nearest = np.hypot(rows[-1] * bool(down), columns[-1] * bool(across))  # where a copy comes closest to 0
-        if nearest < limit < inf:
-            total += lens_otf(np.hypot(rows[:, None] + down / step_um, columns + across / step_um))
-    return total
+    copies = [(0, 0), (-1, 0), (0, -1), (-1, -1)] if folded and lens.diffraction else [(0, 0)]
+
+    def frequency_per_um(down: int, across: int) -> Floats:
+        return np.asarray(np.hypot(rows[:, None] + down / step_um, columns + across / step_um))
+
+    discs = [defocus_otf(frequency_per_um(*copy), lens.defocus_um) for copy in copies if lens.defocus_um]
+
+    def of_band(wavelength_nm: float) -> Floats:
+        if not lens.diffraction:
+            return discs[0] if discs else np.ones(shape)
+        limit, total = limit_per_um(wavelength_nm, lens), np.zeros(shape)
+        for number, (down, across) in enumerate(copies):
+            nearest = np.hypot(rows[-1] * bool(down), columns[-1] * bool(across))  # where a copy comes closest to 0
+            if nearest < limit:
+                transfer = diffraction_otf(frequency_per_um(down, across), wavelength_nm, lens)
+                total += transfer * discs[number] if discs else transfer
+        return total
+
+    return of_band

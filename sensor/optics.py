@@ -147,18 +147,20 @@ def spread_light(radiance: SpectralRadiance, sensor: SensorConfig, samples: int)
     per_radiance = camera_equation(lens) * falloff(lens, radiance.shape)
     height, width = (size // samples for size in radiance.shape)
     planes = np.empty((radiance.wavelength_nm.size, height, width), dtype=radiance.values.dtype)
+    blurs = bool(lens.diffraction or lens.defocus_um)
+    otf = sampled_otf(radiance.shape, sensor.pixel.pitch_um / samples, lens, folded=samples > 1) if blurs else None
 
     def one_band(band: int) -> None:
         light = radiance.values[..., band] * per_radiance
-        if lens.diffraction or lens.defocus_um:
-            nm, step_um = float(radiance.wavelength_nm[band]), sensor.pixel.pitch_um / samples
+        if otf is not None:
             spectrum = dctn(light, type=2)
-            spectrum *= sampled_otf(radiance.shape, step_um, nm, lens, folded=samples > 1)
+            spectrum *= otf(float(radiance.wavelength_nm[band]))
             light = idctn(spectrum, type=2, overwrite_x=True)
             if light.min() < 0 and not radiance.signed:  # undershoot becomes 0, the sum of the light stays
                 total, kept = light.sum(), np.maximum(light, 0.0)
                 light = kept * (total / kept.sum() if total > 0 else 0.0)
-        light = light.reshape(height, samples, width, samples).mean(axis=(1, 3))
+        if samples > 1:
+            light = light.reshape(height, samples, width, samples).mean(axis=(1, 3))
         planes[band] = (1 - lens.veiling_glare) * light + lens.veiling_glare * light.mean()
 
     with ThreadPoolExecutor(min(os.cpu_count() or 1, 1 + len(planes) // _BANDS_A_THREAD)) as threads:
@@ -209,8 +211,8 @@ def negative_lobe_share(sensor: SensorConfig) -> float:
     """Share of a point's light in the negative lobes of its image, at one sample a pixel and within 32 pixels."""
     point = np.zeros((64, 64))
     point[32, 32] = 1.0
-    transfer = sampled_otf((64, 64), sensor.pixel.pitch_um, WAVELENGTH_NM, sensor.lens, folded=False)
-    image = idctn(dctn(point) * transfer)
+    otf = sampled_otf((64, 64), sensor.pixel.pitch_um, sensor.lens, folded=False)
+    image = idctn(dctn(point) * otf(WAVELENGTH_NM))
     return float(-image[image < 0].sum())
 
 

@@ -1,7 +1,7 @@
 """From expected photo-electrons to digital numbers: every noise source in physical order, and their variance."""
 
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,12 @@ DrawFrame: TypeAlias = Callable[[NDArray[np.floating], SensorConfig, Device, flo
 
 
 def draw_frame(
-    expected_e: NDArray[np.floating], sensor: SensorConfig, device: Device, exposure_s: float, key: int
+    expected_e: NDArray[np.floating],
+    sensor: SensorConfig,
+    device: Device,
+    exposure_s: float,
+    key: int,
+    counts: Callable[[int, NoiseTerm, NDArray[np.float64]], NDArray[Any]] = poisson,
 ) -> NDArray[np.uint16]:
     """Digital numbers of one exposure, shape (h, w), with NumPy's exact Poisson sampler.
 
@@ -34,7 +39,7 @@ def draw_frame(
     if device.hot is not None:
         mean_e[device.hot] += pixel.hot_pixel_dark_current_e_per_s * exposure_s
     # Poisson far above the well is the well with certainty; the bound keeps the draw inside 64-bit integers.
-    collected_e = poisson(key, NoiseTerm.SHOT, np.minimum(mean_e, 2 * pixel.full_well_e + 1e4)).astype(np.float64)
+    collected_e = counts(key, NoiseTerm.SHOT, np.minimum(mean_e, 2 * pixel.full_well_e + 1e4)).astype(np.float64)
     np.minimum(collected_e, pixel.full_well_e, out=collected_e)
     if device.column_gain is not None:
         collected_e *= device.column_gain
@@ -43,6 +48,16 @@ def draw_frame(
         collected_e += pixel.read_noise_e * normals(key, NoiseTerm.READ, expected.shape)
     dn = np.rint(collected_e / sensor.gain_e_per_dn + sensor.black_dn)
     return np.clip(dn, 0, sensor.white_dn).astype(np.uint16)
+
+
+def draw_mean_frame(
+    expected_e: NDArray[np.floating], sensor: SensorConfig, device: Device, exposure_s: float, key: int
+) -> NDArray[np.uint16]:
+    """`draw_frame` without shot noise: a pixel collects the mean of its Poisson draw, fractions of electrons too.
+
+    No camera does; it shows what the other terms do alone. Both draw the same read noise for a key.
+    """
+    return draw_frame(expected_e, sensor, device, exposure_s, key, counts=lambda key, term, mean_e: mean_e)
 
 
 def read_out(

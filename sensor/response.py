@@ -84,8 +84,7 @@ def behind_filters(electrons: NDArray[np.float64], sensor: SensorConfig) -> NDAr
     check_covers(sensor.cfa, shape)
     result = np.empty(shape)
     for index, channel in enumerate(channels(sensor.cfa)):
-        sampled = mask(sensor.cfa, channel, shape)
-        result[sampled] = electrons[sampled, index]
+        np.copyto(result, electrons[..., index], where=mask(sensor.cfa, channel, shape))
     return result
 
 

@@ -33,10 +33,11 @@ MOVE = """((pick, share) => {
     control.value = options[Math.floor(share * options.length)].value;
     control.dispatchEvent(new Event("change"));
   } else {
+    if (control.type === "checkbox") control.checked = share < 0.5;
     control.value = control.type === "range" ? Math.round(share * control.max) : control.value;
     control.dispatchEvent(new Event("input"));
   }
-  return `${control.dataset.key} ${control.value}`;
+  return `${control.dataset.key} ${control.type === "checkbox" ? control.checked : control.value}`;
 })(%r, %r)"""
 PIXELS = """((canvas) => { const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
   let text = ""; for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));

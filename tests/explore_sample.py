@@ -58,5 +58,6 @@ def random_controls(rng: random.Random) -> Controls:
         seed=rng.randrange(50),
         exposure_number=rng.randrange(50),
         frames=rng.choice([1, 1, 1, 3]),
+        shot_noise=rng.random() < 0.8,
         **rng.choice(cameras),
     )

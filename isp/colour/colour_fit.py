@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from isp.planes import rows_at
 from render.photometry import photons_per_joule, tristimulus
 from render.spectrum import Floats, band_widths
 from rodcone.brief import brief
@@ -247,9 +248,12 @@ def relative_noise(
     """
     unit = unit_channel(raw.cfa)
     green = channels(raw.cfa).index(unit)
-    kept = ~raw.saturated if not raw.saturated.all() else np.ones(raw.shape, dtype=bool)
-    mean = np.maximum(np.asarray(estimate[kept], dtype=np.float64).mean(axis=0), 0.0)
-    variance = (mean + raw.dark_noise_e**2) * np.median(noise_gain[kept], axis=0) * gains**2
+    saturated = raw.saturated
+    kept = ~saturated if not saturated.all() else np.ones(raw.shape, dtype=bool)
+    rows = np.asarray(rows_at(estimate, kept), dtype=np.float64)
+    mean = np.maximum(np.einsum("nc->c", rows) / len(rows), 0.0)
+    noise_gains = np.ascontiguousarray(rows_at(noise_gain, kept).T)
+    variance = (mean + raw.dark_noise_e**2) * np.median(noise_gains, axis=1, overwrite_input=True) * gains**2
     white = mean[green] * gains[green] / fit.mean[fit.channels.index(unit)]
     # A frame without any signal is all noise: there W alone decides, whatever the ratio.
     return np.asarray(variance / max(white**2, LEAST_SIGNAL**2 * float(variance.max())))

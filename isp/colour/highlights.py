@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from sensor.cfa import channel_map, colour_channels
+from isp.planes import rows_at
+from sensor.cfa import colour_channels, mask
 from sensor.raw import RawImage
 
 
@@ -13,7 +14,9 @@ def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> 
 
     Left out, the reach is one tile.
     """
-    hit = raw.saturated & np.isin(channel_map(raw.cfa, raw.shape), list(channels))
+    hit = raw.saturated & mask(raw.cfa, channels, raw.shape)
+    if not hit.any():
+        return hit
     tile = max(len(raw.cfa), len(raw.cfa[0]))
     return np.asarray(maximum_filter(hit, size=2 * (tile - 1 if reach is None else reach) + 1))
 
@@ -25,4 +28,6 @@ def clip_highlights(raw: RawImage, balanced: NDArray[np.float64], reach: int | N
     `reach` as in `saturated_nearby`: that of the filter which made the planes.
     """
     clipped = saturated_nearby(raw, "".join(colour_channels(raw.cfa)), reach)
-    return np.where(clipped[..., None], np.minimum(balanced, raw.full_well_e), balanced)
+    held = balanced.copy()
+    held[clipped] = np.minimum(rows_at(balanced, clipped), raw.full_well_e)
+    return held

@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from isp.colour.gray_world import gray_world
 from isp.colour.highlights import saturated_nearby
+from isp.planes import rows_at
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from rodcone.brief import brief
 from rodcone.errors import InputError
-from sensor.cfa import channel_map, channels, colour_channels, unit_channel
+from sensor.cfa import channels, colour_channels, mask, unit_channel
 from sensor.curves import Responses, built_in
 from sensor.raw import RawImage
 
@@ -86,13 +87,13 @@ class WhiteBalance:
         groups = {colours: usable}
         if "W" not in colours and "W" in names:  # before the colours, which then say where green's gain comes from
             groups = {unit + "W": usable & ~saturated_nearby(raw, "W"), colours: usable}
-        sites = channel_map(raw.cfa, raw.shape)
         factors = np.ones(len(names))
         sources: dict[str, BalanceSource] = dict.fromkeys(names, "calibrated")
         for group, pixels in groups.items():
             index = [names.index(channel) for channel in group]
-            samples = np.array([max((pixels & (sites == channel)).sum(), 1) for channel in group])
-            means = planes[..., index][pixels].mean(axis=0) if pixels.any() else np.zeros(len(group))
+            samples = np.maximum([np.sum(pixels & mask(raw.cfa, channel, raw.shape)) for channel in group], 1)
+            rows = rows_at(planes, pixels)
+            means = np.einsum("nc->c", rows)[index] / max(len(rows), 1)
             errors = np.sqrt((np.maximum(means, 0.0) + raw.dark_noise_e**2) / samples)
             factors[index], certain = gray_world(means, errors, neutral[index], green=group.index(unit))
             for channel, sure in zip(group, certain, strict=True):

@@ -7,6 +7,7 @@ channel at y is known when the kernel is compiled, and each pair (x, y) is met o
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -85,6 +86,7 @@ def make_pattern(cfa: Tile) -> Pattern:
     )
 
 
+@lru_cache(maxsize=32)
 def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Every offset of Omega, phase by phase.
 
@@ -125,6 +127,7 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
     entries = np.zeros((len(lists), int(counts.max()), lists[0].shape[1]), dtype=np.float32)
     for target, table in zip(entries, lists, strict=True):
         target[: len(table)] = table
+    entries.flags.writeable = counts.flags.writeable = False  # they are kept
     return entries, counts
 
 
@@ -160,12 +163,14 @@ def list_threads(
     whole = some
     if pattern.white is not None and alpha is not None:
         # What a block may reach in any phase: [first - (tile - 1) - reach, first + block + reach).
-        boxes = [
-            [slice(max(low - size + 1 - reach - first, 0), low + block + reach - first) for low in line]
-            for line, size, block, first in zip(lines, pattern.tile, pattern.block, (first_row, 0), strict=True)
-        ]
-        some = _over_boxes(np.max, alpha, boxes, initial=0.0) > 0.0
-        whole = _over_boxes(np.min, alpha, boxes, initial=1.0) == 1.0
+        rows_of, columns_of = (
+            np.clip([line - size + 1 - reach - first, line + block + reach - first], 0, length)
+            for line, size, block, first, length in zip(
+                lines, pattern.tile, pattern.block, (first_row, 0), alpha.shape, strict=True
+            )
+        )
+        some = _count_in_boxes(alpha > 0.0, rows_of, columns_of) > 0
+        whole = _count_in_boxes(alpha < 1.0, rows_of, columns_of) == 0
     white = [cell for cell, channel in enumerate(pattern.cells) if channel == pattern.white]
     colours = [cell for cell, channel in enumerate(pattern.cells) if channel != pattern.white]
     shares: dict[Guide, list[tuple[NDArray[np.bool_], list[int]]]] = {
@@ -176,10 +181,11 @@ def list_threads(
     return {guide: _threads(pattern, lines, share, ends, guide) for guide, share in shares.items()}
 
 
-def _over_boxes(reduce: Any, values: NDArray[Any], boxes: list[list[slice]], initial: float) -> NDArray[Any]:
-    """Largest or smallest value in each box of rows and columns; `initial` in empty ones."""
-    lines = np.stack([reduce(values[rows], axis=0, initial=initial) for rows in boxes[0]])
-    return np.stack([reduce(lines[:, columns], axis=1, initial=initial) for columns in boxes[1]], axis=1)
+def _count_in_boxes(marked: NDArray[np.bool_], rows: NDArray[Any], columns: NDArray[Any]) -> NDArray[np.int32]:
+    """Marked pixels in each box, from row rows[0][i] and column columns[0][j] up to rows[1][i] and columns[1][j]."""
+    total = np.pad(marked.cumsum(axis=0, dtype=np.int32).cumsum(axis=1, dtype=np.int32), ((1, 0), (1, 0)))
+    upper, lower = total[rows[0]], total[rows[1]]
+    return np.asarray((lower - upper)[:, columns[1]] - (lower - upper)[:, columns[0]])
 
 
 def _threads(

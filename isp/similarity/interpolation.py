@@ -50,9 +50,9 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
         V(x) [noise variances], 0 or more. Pairs that the border cuts count as noise; patches go on by reflection.
     """
     total, (height, width) = np.zeros_like(mosaic), mosaic.shape
-    phases = np.arange(BLOCK_ROWS + len(tile))[:, None] % len(tile), np.arange(width) % len(tile[0])
+    repeats = BLOCK_ROWS // len(tile) + 2, width // len(tile[0]) + 1
     for (row, column), weight in opposite_pairs(tile).items():
-        across, shares = abs(column), (weight / 4.0).astype(mosaic.dtype)[phases]  # of half the change, squared
+        across, shares = abs(column), np.tile((weight / 4.0).astype(mosaic.dtype), repeats)  # of half the change, squared
         left, right = slice(None, max(width - 2 * across, 0)), slice(2 * across, None)
         before, behind = (left, right) if column >= 0 else (right, left)
         for first in range(row, height - row, BLOCK_ROWS):
@@ -61,7 +61,7 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
             change *= change
             change -= 2.0  # the noise of both, of unit variance
             own, inside = first % len(tile), slice(across, max(width - across, across))
-            change *= shares[own : own + last - first, inside]
+            change *= shares[own : own + last - first, :width][:, inside]
             total[first:last, inside] += change
     if patch > 1:
         total = box_sums(np.pad(total, patch // 2, mode="reflect"), (patch, patch))

@@ -5,6 +5,7 @@ level and exposure are factors on these, as in a sweep, whose frames are those o
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
+from render.radiance import SpectralRadiance
 from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import require_keys
@@ -23,8 +25,9 @@ from sensor.device import Device, draw_device
 from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from sensor.optics import SpectralIrradiance, form_image
 from sensor.raw import RawImage
+from sensor.readout import draw_mean_frame, read_out
 from sensor.response import behind_filters, channel_electrons
-from studies.explore.controls import TIME, Controls, Lamp, camera_of, options_of
+from studies.explore.controls import TIME, Controls, Lamp, camera_of, options_of, own_camera
 from studies.explore.lamps import alone, lit_transport
 from studies.explore.memo import Memo
 from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of
@@ -73,6 +76,8 @@ class Exposed:
         Photo-electrons of one frame, without dark current.
     device : Device
     raw : RawImage
+    shot_noise : bool
+        Of `Controls`.
     """
 
     sensor: SensorConfig
@@ -85,6 +90,7 @@ class Exposed:
     expected_e: Image
     device: Device
     raw: RawImage
+    shot_noise: bool
 
     @property
     def white_cd_m2(self) -> float:
@@ -121,23 +127,21 @@ class Shot:
     exposed : Exposed
     linear, true : (h, w, 3) float64
         Linear sRGB in which `exposed.white_cd_m2` is 1.
+    truth : (h, w, 3) uint8
+        `true` as the page shows it, sRGB of 8 bits.
     developed : Picture
     """
 
     exposed: Exposed
     linear: Image
     true: Image
+    truth: NDArray[np.uint8]
     developed: Picture
 
     @property
     def picture(self) -> NDArray[np.uint8]:
         """The picture as the page shows it, sRGB of 8 bits, shape (h, w, 3)."""
         return to_bytes(self.linear)
-
-    @property
-    def truth(self) -> NDArray[np.uint8]:
-        """The truth likewise."""
-        return to_bytes(self.true)
 
 
 def photograph(transport: Transport, controls: Controls, memo: Memo | None = None) -> Shot:
@@ -158,7 +162,7 @@ def photograph(transport: Transport, controls: Controls, memo: Memo | None = Non
     memo = memo or Memo()
     exposed = expose_scene(transport, controls, memo)
     linear, picture = development_of(exposed, controls, memo).develop()
-    return Shot(exposed, linear, true_picture_of(exposed, controls, memo), picture)
+    return Shot(exposed, linear, *true_picture_of(exposed, controls, memo), picture)
 
 
 def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposed:
@@ -174,13 +178,15 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
         "light", (lamps, controls.reference_light), lit_transport, transport, dict(lamps), controls.reference_light
     )
     scale = controls.level_cd_m2 * scale_1
-    sensor = memo.of("camera", camera, camera_of, controls)
+    own = memo.of("own camera", (controls.sensor, controls.mosaic), own_camera, controls.sensor, controls.mosaic)
+    sensor = memo.of("camera", camera, camera_of, controls, own)
 
     # Lens and filters
     frames = {}
     for (name, group), spectrum in zip(lit.groups.items(), spectra, strict=True):
         if group.power > 0:
-            frames[name] = memo.of("frame", (spectrum, optics), _group_frame, lit, name, sensor)
+            radiance = memo.of("radiance", spectrum, _radiance, lit, name)
+            frames[name] = memo.of("frame", (spectrum, optics), _group_frame, radiance, sensor)
     powers = tuple(lit.groups[name].power for name in frames)
     lit_so = (spectra, powers, optics)
     white_1 = memo.of("white", (spectra, powers), _white, lit, spectra, memo)
@@ -197,12 +203,15 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
         exposure_s = min(exposure_s, unit_s / scale)
     expected_e = mosaicked_e * (scale * exposure_s)
     shape = (expected_e.shape[0], expected_e.shape[1])
-    device = memo.of("device", (camera, controls.seed), _chip, sensor, shape, controls.seed)
+    chip = (controls.sensor, controls.mosaic, _items(controls.pixel), controls.seed)
+    device = memo.of("device", chip, _chip, sensor, shape, controls.seed)
     numbers = range(controls.exposure_number, controls.exposure_number + controls.frames)
-    raw = merged_raw(
-        [expose(expected_e, sensor, exposure_s, device, _rng(controls.seed, _FRAME, number)) for number in numbers]
+    take = expose if controls.shot_noise else partial(read_out, draw=draw_mean_frame)
+    rngs = [_rng(controls.seed, _FRAME, number) for number in numbers]
+    raw = merged_raw([take(expected_e, sensor, exposure_s=exposure_s, device=device, rng=rng) for rng in rngs])
+    return Exposed(
+        *(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw, controls.shot_noise)
     )
-    return Exposed(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw)
 
 
 def development_of(exposed: Exposed, controls: Controls, memo: Memo) -> Development:
@@ -216,8 +225,8 @@ def development_of(exposed: Exposed, controls: Controls, memo: Memo) -> Developm
     return Development(controls.processor, raw, colours, sensor, light, exposed.white_cd_m2, options)
 
 
-def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
-    """Noise-free picture: of any level the same, since white goes with it."""
+def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
+    """Noise-free picture, linear and as shown: of any level the same, since white goes with it."""
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in exposed.transport.groups)
     return memo.of("truth", (lamps, controls.reference_light), _truth, exposed, controls, memo)
 
@@ -230,22 +239,24 @@ def to_bytes(linear: Image) -> NDArray[np.uint8]:
 # Stages
 
 
-def _group_frame(lit: Transport, name: str, sensor: SensorConfig) -> GroupFrame:
-    irradiance = form_image(alone(lit, name).relight(), sensor)
+def _radiance(lit: Transport, name: str) -> SpectralRadiance:
+    return alone(lit, name).relight()
+
+
+def _group_frame(radiance: SpectralRadiance, sensor: SensorConfig) -> GroupFrame:
+    irradiance = form_image(radiance, sensor)
     return GroupFrame(irradiance, channel_electrons(irradiance, sensor, 1.0))
 
 
-def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> Image:
+def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
     groups, light, planes = exposed.transport.groups, exposed.light, []
     for name in exposed.frames:
         lamp = controls.lamps.get(name, Lamp())
-        key = (name, lamp.spectrum, lamp.table, light.spectrum.tobytes())
-        planes.append(memo.of("true", key, _true_group, exposed.transport, name, light))
-    return _weighted([groups[name].power / exposed.white_at_own_cd_m2 for name in exposed.frames], planes)
-
-
-def _true_group(lit: Transport, name: str, light: Light) -> Image:
-    return true_srgb(alone(lit, name).relight(), light, 1.0)
+        spectrum = (name, lamp.spectrum, lamp.table)
+        radiance = memo.of("radiance", spectrum, _radiance, exposed.transport, name)
+        planes.append(memo.of("true", (spectrum, light.spectrum.tobytes()), true_srgb, radiance, light, 1.0))
+    true = _weighted([groups[name].power / exposed.white_at_own_cd_m2 for name in exposed.frames], planes)
+    return true, to_bytes(true)
 
 
 def _white(lit: Transport, spectra: tuple[tuple[str, Any, Any], ...], memo: Memo) -> float:

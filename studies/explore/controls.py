@@ -75,6 +75,8 @@ class Controls:
         Fields of `LensConfig` (`LENS`) and `PixelConfig` (`PIXEL`) that differ from the preset's.
     bits : int or None
         Of the converter; None takes the preset's.
+    shot_noise : bool
+        Whether light and dark current come as Poisson counts; False, which no camera does, takes their means.
     processor : str
         Of `isp.processors.catalogue.PROCESSORS`.
     settings : mapping of str to float
@@ -104,6 +106,7 @@ class Controls:
     lens: Mapping[str, float] = field(default_factory=dict)
     pixel: Mapping[str, float] = field(default_factory=dict)
     bits: int | None = None
+    shot_noise: bool = True
     processor: str = "interleaved"
     settings: Mapping[str, float] = field(default_factory=dict)
     white_balance: str = GRAY_WORLD
@@ -160,15 +163,20 @@ def options_of(controls: Controls) -> dict[str, Any]:
     return {"settings": settings}
 
 
-def camera_of(controls: Controls) -> SensorConfig:
-    """Sensor with its lens as the controls have it.
+def own_camera(sensor: str, mosaic: str) -> SensorConfig:
+    """Sensor of a preset's name or a file, with a mosaic."""
+    return vary(preset(sensor), mosaic)
+
+
+def camera_of(controls: Controls, own: SensorConfig | None = None) -> SensorConfig:
+    """Sensor with its lens as the controls have it; `own` is that of `own_camera`, where it has been read before.
 
     Raises
     ------
     InputError
         For a file that describes no camera, or a term out of range.
     """
-    own = vary(preset(controls.sensor), controls.mosaic)
+    own = own or own_camera(controls.sensor, controls.mosaic)
     return replace(
         own,
         lens=replace(own.lens, **controls.lens),
@@ -234,7 +242,7 @@ def _readers() -> dict[str, Callable[[str, Any], Any]]:
     wholes = dict.fromkeys(("seed", "exposure_number", "frames"), _whole)
     tables = dict.fromkeys(("lens", "pixel", "settings"), _numbers)
     bits = {"bits": lambda name, value: None if value is None else _whole(name, value)}
-    return {"lamps": _lamps, **numbers, **texts, **wholes, **tables, **bits}
+    return {"lamps": _lamps, **numbers, **texts, **wholes, **tables, **bits, "shot_noise": _flag}
 
 
 def _object(name: str, value: Any) -> Mapping[str, Any]:
@@ -251,6 +259,12 @@ def _number(name: str, value: Any) -> float:
 def _whole(name: str, value: Any) -> int:
     require_whole(name, None if isinstance(value, bool) else value, 0, 2**31, "give a whole number")
     return int(value)
+
+
+def _flag(name: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise InputError(f"{name}: {value!r} is not allowed; give true or false")
+    return value
 
 
 def _text(name: str, value: Any) -> str:

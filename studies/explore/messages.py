@@ -1,10 +1,12 @@
 """Messages of the page: what the program says of itself first, and what is checked of each question."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any, TypeAlias
+
+import numpy as np
 
 from isp.processors.catalogue import PROCESSORS, libraries
 from render.illuminants import names as illuminants
@@ -15,7 +17,7 @@ from sensor.presets import preset
 from studies.explore.controls import ADJUSTABLE, LENS, PIXEL, SETTINGS, TIME, Controls, light_files, mosaics_of, to_json
 from studies.explore.slow import is_slow
 from studies.explore.source import Source
-from studies.explore.views import VIEWS
+from studies.explore.views import VIEWS, Bytes
 from studies.study.study import WHITE_BALANCES
 
 Header: TypeAlias = dict[str, Any]
@@ -78,6 +80,13 @@ def hello(source: Source) -> Header:
 def _missing(processor: str) -> bool:
     """Whether a processor needs a library that isn't installed."""
     return any(find_spec(library) is None for library in libraries(processor))
+
+
+def unsent(pictures: Sequence[Bytes], sent: list[Bytes]) -> list[bytes]:
+    """Bytes of pictures, none of those that the page has already; `sent`, what it has, is brought up to date."""
+    known = [len(sent) > place and np.array_equal(sent[place], picture) for place, picture in enumerate(pictures)]
+    sent[:] = pictures
+    return [b"" if same else picture.tobytes() for same, picture in zip(known, pictures, strict=True)]
 
 
 def read_message(text: str) -> Header:

@@ -19,10 +19,10 @@ from studies.explore.chain import Exposed, Image, Shot, development_of, expose_s
 from studies.explore.controls import Controls, Lamp, controls_from, to_json
 from studies.explore.files import dng_of, png_of
 from studies.explore.memo import Memo
-from studies.explore.messages import KINDS, Header, hello, read_message, read_view, read_views
+from studies.explore.messages import KINDS, Header, hello, read_message, read_view, read_views, unsent
 from studies.explore.slow import begin, is_slow, stand_in
 from studies.explore.source import Rendered, Source
-from studies.explore.views import VIEWS, facts, histogram, pixel
+from studies.explore.views import VIEWS, Bytes, facts, histogram, pixel
 from studies.explore.written import python_of, study_of
 
 Answer: TypeAlias = tuple[Header, Sequence[bytes]]
@@ -59,6 +59,7 @@ class Session:
         self._pending: dict[str, Header] = {}
         self._shown: Header | None = None
         self._page = ""  # that asks
+        self._sent: list[Bytes] = []  # pictures that it has
         self._slow: dict[str, Callable[[], None]] = {}  # what ends each job at work, by its camera
         self._send: Send = lambda header, buffers: None
         self._slow_wanted = False
@@ -108,7 +109,7 @@ class Session:
 
     def _begin_page(self, page: str) -> None:
         """Forget what another page asked."""
-        self._page, self._shown = page, None
+        self._page, self._shown, self._sent = page, None, []
         self._pending.clear()
         self._end_slow()
 
@@ -218,8 +219,9 @@ class Session:
         """Pictures of each view that is asked for; slow processors are left for later."""
         views = read_views(message["views"], len(cameras))
         with self._changed:
+            sent: list[Bytes] = []
             if message.get("page", "") == self._page:
-                self._shown = message
+                self._shown, sent = message, self._sent
         shots, told = [], []
         for controls in cameras:
             exposed = expose_scene(rendered.transport, controls, self._memo)
@@ -242,7 +244,7 @@ class Session:
             "spp": rendered.transport.spp,
             "last": not self._rendering,
         }
-        return header, [picture.tobytes() for picture in pictures]
+        return header, unsent(pictures, sent)
 
     def _shot(self, controls: Controls, exposed: Exposed) -> Shot | None:
         """Shot of an exposure; None where its processor is slow and hasn't been at work."""
@@ -256,7 +258,7 @@ class Session:
             if isinstance(found, InputError):
                 raise found
             linear, picture = found
-        return Shot(exposed, linear, true_picture_of(exposed, controls, self._memo), picture)
+        return Shot(exposed, linear, *true_picture_of(exposed, controls, self._memo), picture)
 
     def _begin_slow(self) -> None:
         """Set the slow processors of what is shown to work."""

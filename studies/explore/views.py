@@ -13,7 +13,6 @@ from render.photometry import photons_per_joule
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_whole
 from sensor.cfa import channel_map, channels, mask
-from sensor.config import SensorConfig
 from sensor.raw import RawImage
 from sensor.readout import noise_sources, noise_variance, spread_charge
 from sensor.response import electrons_per_irradiance
@@ -72,9 +71,8 @@ def flip_picture(shot: Shot) -> Bytes:
 def snr_picture(shot: Shot) -> Bytes:
     """Expected electrons over the noise of a pixel, of one frame: 0 dB is dark, 40 dB and more are bright."""
     exposed = shot.exposed
-    variance = noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
     with np.errstate(divide="ignore"):
-        snr_db = 10 * np.log10(_collected_e(exposed) ** 2 / variance)
+        snr_db = 10 * np.log10(_collected_e(exposed) ** 2 / _variance_e2(exposed))
     return _coloured(snr_db / MOST_SNR_DB)
 
 
@@ -94,7 +92,17 @@ VIEWS: Mapping[str, Callable[[Shot], Bytes]] = MappingProxyType(
 
 def noise_scale_e(exposed: Exposed) -> float:
     """Standard deviation of the noise of one frame [e-], root mean square over the pixels."""
-    return float(np.sqrt(noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s).mean()))
+    return float(np.sqrt(_variance_e2(exposed).mean()))
+
+
+def _variance_e2(exposed: Exposed) -> Image:
+    """Variance of each pixel of one frame [e-^2], without shot noise less that of the Poisson counts."""
+    pixel, variance = exposed.sensor.pixel, noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
+    if exposed.shot_noise:
+        return variance
+    hot_e_per_s = pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s
+    counted_e = _collected_e(exposed) + (pixel.dark_current_e_per_s + hot_e_per_s) * exposed.exposure_s
+    return variance - (1 + pixel.column_gain_spread**2) * counted_e
 
 
 def _collected_e(exposed: Exposed) -> Image:
@@ -201,17 +209,21 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
         "electrons": dict(zip(names, electrons.sum(axis=1).tolist(), strict=True)),
         "read_e": float(raw.electrons[row, column]),
         "well_e": raw.full_well_e,
-        "noise_e": noise_sources_e(exposed.expected_e, sensor, time_s, row, column),
+        "noise_e": noise_sources_e(exposed, row, column),
         "wavelength_nm": nm.tolist(),
         "photons_nm": (photons / width).tolist(),
         "electrons_nm": dict(zip(names, (electrons / width).tolist(), strict=True)),
     }
 
 
-def noise_sources_e(
-    expected_e: Image, sensor: SensorConfig, exposure_s: float, row: int, column: int
-) -> dict[str, float]:
+def noise_sources_e(exposed: Exposed, row: int, column: int) -> dict[str, float]:
     """Standard deviation of each noise source of one pixel of a chip drawn at random [e-], and of all together."""
-    signal_e = float(spread_charge(expected_e, sensor.pixel.crosstalk)[row, column])
-    sources = noise_sources(signal_e, sensor, exposure_s)
+    pixel, time_s, signal_e = exposed.sensor.pixel, exposed.exposure_s, float(_collected_e(exposed)[row, column])
+    sources = noise_sources(signal_e, exposed.sensor, time_s)
+    if not exposed.shot_noise:
+        share, hot_e = pixel.hot_pixel_share, pixel.hot_pixel_dark_current_e_per_s * time_s
+        counted_e = signal_e + pixel.dark_current_e_per_s * time_s + share * hot_e
+        gains_e2 = sources["column gains"] ** 2 - pixel.column_gain_spread**2 * counted_e
+        sources |= {"shot noise": 0.0, "dark current": 0.0, "hot pixels": (share * (1 - share)) ** 0.5 * hot_e}
+        sources["column gains"] = max(gains_e2, 0.0) ** 0.5
     return {**sources, "total": hypot(*sources.values())}

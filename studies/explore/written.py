@@ -72,11 +72,13 @@ def study_of(scene: SceneChoice, render: RenderLimits, controls: Controls, colou
     ------
     InputError
         Where a study can't say it: lamps of their own, another mosaic than the processor's, settings of the processor,
-        or another reference light of a scene's own colours.
+        no shot noise, or another reference light of a scene's own colours.
     """
     spectrum, own_mosaic = _one_spectrum(controls), PROCESSORS[controls.processor].mosaic
     if controls.settings:
         raise InputError("study: it has no settings of a processor; allowed: none; set them back, or copy the Python")
+    if not controls.shot_noise:
+        raise InputError("study: no camera is without shot noise; allowed: with it; switch it on, or copy the Python")
     if controls.mosaic != own_mosaic:
         raise InputError(
             f"study: mosaic {controls.mosaic!r} with {controls.processor}; allowed: {own_mosaic!r}, the processor's "

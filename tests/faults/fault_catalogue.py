@@ -471,8 +471,8 @@ ISP = (
     _fault(
         "highlights not held",
         "isp/colour/highlights.py",
-        "np.where(clipped[..., None], np.minimum(balanced, raw.full_well_e), balanced)",
-        "balanced",
+        "np.minimum(rows_at(balanced, clipped), raw.full_well_e)",
+        "rows_at(balanced, clipped)",
         "isp/test_pipeline",
         "isp/processors/test_catalogue",
     ),

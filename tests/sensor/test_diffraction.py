@@ -75,10 +75,10 @@ def test_folded_copies_are_the_transform_of_the_airy_pattern_at_the_samples(f_nu
     frequency = np.arange(12) / (2 * 12 * step_um)
     cosines = np.cos(2 * pi * frequency[:, None] * x)
     direct = cosines @ airy @ cosines.T
-    made = sampled_otf((12, 12), step_um, 550.0, lens, folded=True)
+    made = sampled_otf((12, 12), step_um, lens, folded=True)(550.0)
     # beyond 96 samples lie 2 N lambda / (pi^2 96 step) of the light, 0.3 %
     np.testing.assert_allclose(made / made[0, 0], direct / direct[0, 0], atol=6e-3)
-    assert np.abs(sampled_otf((12, 12), step_um, 550.0, lens, folded=False) - direct / direct[0, 0]).max() > 0.1
+    assert np.abs(sampled_otf((12, 12), step_um, lens, folded=False)(550.0) - direct / direct[0, 0]).max() > 0.1
 
 
 # Light

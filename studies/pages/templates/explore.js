@@ -2,7 +2,7 @@
 // an answer only where nothing newer has been asked. `render` is what a notebook's widget calls, and the page too.
 
 const CAMERA = ["exposure", "exposure_s", "sensor", "mosaic", "lens", "pixel", "bits", "processor", "settings",
-  "white_balance", "seed", "exposure_number", "frames"];
+  "white_balance", "shot_noise", "seed", "exposure_number", "frames"];
 const TITLES = {
   picture: "Picture", truth: "Truth", raw: "Raw mosaic", noise: "Noise only", "luminance error": "Error of luminance",
   "colour error": "Error of colour, CIEDE2000", flip: "Error as seen, FLIP", snr: "SNR map",
@@ -36,6 +36,7 @@ function render({ model, el }) {
   let number = 0, latest = 0, hello, state, edited = "a", cursor = null, stale, pictureSize = [1, 1];
   const page = Math.random().toString(36).slice(2); // a notebook sends every view of a widget all its messages
   const waits = new Map(); // number -> what to do with the answer
+  const held = []; // the last picture of each view: one that stays as it is comes without bytes
   const root = make("div", { class: "explore" });
   el.append(root);
 
@@ -49,7 +50,10 @@ function render({ model, el }) {
   model.on("msg:custom", (header, buffers) => {
     if ("page" in header && (header.page === page) === (header.kind === "taken over")) return;
     if (header.kind === "hello") begin(header);
-    else if (header.kind === "show") { if (header.number === latest) paint(header, buffers); }
+    else if (header.kind === "show") {
+      buffers.forEach((bytes, index) => { if (bytes.byteLength) held[index] = bytes; });
+      if (header.number === latest) paint(header);
+    }
     else if (header.kind === "error") fail(header);
     else if (header.kind === "taken over") status("Another page has taken over; open this one again to take it back.", true);
     else if (header.kind === "ended") status("The program has ended; nothing here is computed any more.", true);
@@ -80,18 +84,21 @@ function render({ model, el }) {
   }
 
   // What is shown
-  function paint(header, buffers) {
+  function paint(header) {
     const [height, width] = pictureSize = header.size;
     header.views.forEach(([camera, view], index) => {
-      const canvas = parts.canvases[index], rgb = new Uint8Array(buffers[index].buffer, buffers[index].byteOffset, 3 * width * height);
+      parts.captions[index].textContent = caption(header, camera, view, sides()[camera]);
+      const canvas = parts.canvases[index], bytes = held[index];
+      if (canvas.shows === bytes) return;
+      canvas.shows = bytes;
       if (canvas.width !== width || canvas.height !== height) {
         Object.assign(canvas, { width, height });
         canvas.style.setProperty("--ratio", width / height);
       }
       const image = new ImageData(width, height), rgba = new Uint32Array(image.data.buffer);
+      const rgb = new Uint8Array(bytes.buffer, bytes.byteOffset, bytes.byteLength);
       for (let i = 0, j = 0; i < rgba.length; i++, j += 3) rgba[i] = 0xff000000 | rgb[j + 2] << 16 | rgb[j + 1] << 8 | rgb[j];
       canvas.getContext("2d").putImageData(image, 0, 0);
-      parts.captions[index].textContent = caption(header, camera, view, sides()[camera]);
     });
     clearTimeout(stale);
     root.classList.remove("waiting");
@@ -253,6 +260,7 @@ function render({ model, el }) {
           set("mosaic", value, true);
         }, "mosaic"),
         slider(["Converter", 1, 16, "whole", "bit"], camera.bits ?? preset.bits, value => set("bits", value === preset.bits ? null : value), "bits"),
+        checkbox("Shot noise", camera.shot_noise, value => set("shot_noise", value), "shot_noise"),
         ...terms("pixel", PIXEL, preset.pixel)),
       group("Processor",
         choice("Processor", processors.map(([name, each]) => [name, each.slow ? `${name} (slow)` : name]), camera.processor, value => {
@@ -277,20 +285,23 @@ function render({ model, el }) {
     const own = () => state.a.lamps[name] ??= { spectrum: "own", power: 1, table: [] };
     const now = state.a.lamps[name] ?? { spectrum: "own", power: 1, table: [] };
     const kelvin = /^(\d+)K$/.exec(now.spectrum);
-    const value = now.table.length ? "file" : kelvin ? "body" : now.spectrum;
-    const options = [["own", "its own"], ["body", "black body"], ["file", "from a CSV file"], ...hello.illuminants.map(each => [each, each])];
+    const value = now.table.length ? "table" : kelvin ? "body" : now.spectrum;
+    const options = [["own", "its own"], ["body", "black body"], ...now.table.length ? [["table", `a CSV file's ${now.table.length} points`]] : [],
+      ["file", "from a CSV file …"], ...hello.illuminants.map(each => [each, each])];
     const many = Object.keys(hello.groups).length > 1;
     const file = make("input", { type: "file", accept: ".csv,text/csv,text/plain", hidden: "", "aria-label": `CSV file of ${name}'s spectrum` });
     file.onchange = async () => {
-      const rows = (await file.files[0].text()).split(/\r?\n/).map(line => line.split(/[,;\t]/).map(cell => cell.trim() === "" ? NaN : Number(cell)));
-      const table = rows.filter(row => row.length >= 2 && row.slice(0, 2).every(Number.isFinite)).map(row => row.slice(0, 2));
-      if (table.length < 2) return status(`${name}: the file holds no rows of wavelength in nm and value.`, true);
+      const [table, bad] = tableOf(await file.files[0].text());
+      if (bad) return status(`${name}: line ${bad} of ${file.files[0].name} is no wavelength in nm and value; correct it.`, true);
+      if (table.length < 2) return status(`${name}: ${file.files[0].name} holds fewer than two rows of wavelength in nm and value.`, true);
       Object.assign(own(), { spectrum: "own", table });
       buildControls();
       change();
     };
     const select = choice(`${name}: spectrum`, options, value, picked => {
-      if (picked === "file") { file.click(); return; }
+      select.querySelector("select").value = value; // until a file is read
+      if (picked === "file") file.click();
+      if (["file", "table"].includes(picked)) return;
       Object.assign(own(), { spectrum: picked === "body" ? "3000K" : picked, table: [] });
       buildControls();
       change();
@@ -345,6 +356,22 @@ function choice(title, options, value, act, key = title) {
   select.value = value;
   select.onchange = () => act(select.value);
   return make("label", { class: "choice" }, make("span", {}, title), select);
+}
+function checkbox(title, value, act, key) {
+  const box = make("input", { type: "checkbox", "data-key": key });
+  box.checked = value;
+  box.oninput = () => act(box.checked);
+  return make("label", { class: "check" }, box, title);
+}
+// Rows of wavelength and value of a CSV, under a line of names or none; or the number of the first line that is no such row.
+function tableOf(text) {
+  const table = [];
+  for (const [index, line] of text.split(/\r?\n/).entries()) {
+    const row = line.split(/[,;\t]/).slice(0, 2).map(cell => cell.trim() === "" ? NaN : Number(cell));
+    if (row.length === 2 && row.every(Number.isFinite)) table.push(row);
+    else if (line.trim() && !line.startsWith("#") && (table.length || index)) return [table, index + 1];
+  }
+  return [table, 0];
 }
 function numberBox(title, value, act, key) {
   const box = make("input", { type: "number", min: "0", step: "1", value, "data-key": key });

@@ -14,7 +14,7 @@ from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.optics import form_image
 from studies.explore.chain import photograph
-from studies.explore.controls import Controls, Lamp, controls_from, mosaics_of
+from studies.explore.controls import TIME, Controls, Lamp, controls_from, mosaics_of
 from studies.explore.memo import Memo
 from studies.explore.slow import is_slow, stand_in
 from studies.explore.views import VIEWS
@@ -38,6 +38,35 @@ def test_every_mosaic_that_the_page_offers_is_developed(processor):
     for mosaic in mosaics_of(PROCESSORS[processor]):
         controls = controls_from({"processor": processor, "mosaic": mosaic})
         assert np.ptp(photograph(small_transport(), controls).picture) > 0, mosaic
+
+
+@pytest.mark.parametrize("frames", [1, 3])
+def test_without_any_noise_raw_is_the_rounded_expectation(frames):
+    """Shot noise and all other terms off; a full well is the converter's top."""
+    quiet = dict.fromkeys(("read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s"), 0.0)
+    for level in (0.01, 25.0, 3000.0):
+        controls = Controls(level_cd_m2=level, pixel=quiet, shot_noise=False, frames=frames, seed=3)
+        exposed = photograph(small_transport(), controls).exposed
+        sensor, raw = exposed.sensor, exposed.raw
+        collected_e = np.minimum(exposed.expected_e, sensor.pixel.full_well_e)
+        wanted_dn = np.rint(collected_e / sensor.gain_e_per_dn)
+        assert sensor.black_dn == 0  # five standard deviations of nothing
+        np.testing.assert_allclose(raw.electrons, frames * wanted_dn * sensor.gain_e_per_dn, rtol=1e-12)
+
+
+def test_without_shot_noise_read_noise_is_all_that_moves():
+    """Its standard deviation over 1920 pixels of a grey frame is known to 1.6 %; four of these are allowed."""
+    terms = {"read_noise_e": 6.0, "dsnu_e": 0.0, "prnu": 0.0, "dark_current_e_per_s": 0.0}
+    still = Controls(pixel=terms | {"read_noise_e": 0.0}, shot_noise=False, bits=16, exposure=TIME, exposure_s=0.002)
+    expected = photograph(small_transport(), still).exposed
+    first = photograph(small_transport(), replace(still, pixel=terms)).exposed
+    noise_e = first.raw.electrons - expected.expected_e
+    kept = expected.expected_e < 0.9 * expected.raw.full_well_e
+    assert noise_e[kept].std() == pytest.approx(6.0, rel=0.065)
+    again = photograph(small_transport(), replace(still, pixel=terms, exposure_number=1)).exposed
+    assert not np.array_equal(first.raw.dn, again.raw.dn)
+    steady = photograph(small_transport(), replace(still, exposure_number=1)).exposed
+    assert np.array_equal(steady.raw.dn, expected.raw.dn)
 
 
 def test_the_memory_is_bounded():

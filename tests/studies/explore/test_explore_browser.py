@@ -145,6 +145,63 @@ def test_an_old_answer_is_never_shown(browser, address):
     assert seen == ["none", str(young), str(young)]
 
 
+LOAD = """new Promise(done => {
+  const file = document.querySelector(".explore input[type=file]"), given = new DataTransfer();
+  given.items.add(new File([%r], "lamp.csv"));
+  file.files = given.files;
+  file.dispatchEvent(new Event("change"));
+  setTimeout(() => done(document.querySelector(".explore .status").textContent), 100);
+})"""
+
+
+def test_a_lamp_from_a_csv_file_is_in_the_copied_python(browser, address, one_render):
+    page = CHROME.Page(browser, address)
+    EXPLORE.settle(page)
+    before = EXPLORE.picture(page)
+    for text, line in (("400,1\n500,x\n700,2\n", 2), ("nm,value\n400;1\n\n500\n", 4), ("nm,value\nW,m2\n400,1\n", 2)):
+        assert f"line {line} of lamp.csv" in page.value(LOAD % text)
+    assert "fewer than two" in page.value(LOAD % "nm,value\n400,1\n")
+    EXPLORE.settle(page)
+    assert np.array_equal(EXPLORE.picture(page), before)
+    page.value(LOAD % "nm;value;remark\r\n380;0.25;blue\r\n# measured\r\n650;1e0\r\n780;2\r\n")
+    EXPLORE.settle(page)
+    code = EXPLORE.copied_python(page)
+    assert "table=((380.0, 0.25), (650.0, 1.0), (780.0, 2.0))" in code
+    assert np.array_equal(EXPLORE.picture(page), EXPLORE.ran(code))
+    assert not np.array_equal(EXPLORE.picture(page), before)
+
+
+def test_a_picture_without_bytes_is_the_last_one_sent_even_where_that_came_too_late(browser, address):
+    page = CHROME.Page(browser, address)
+    EXPLORE.settle(page)
+    said = hello(open_source("still_life_outdoor", RenderOptions(size=48, spp=4)))
+    answer = {
+        "kind": "show", "cameras": [{"controls": said["controls"], "waiting_for": None}],
+        "views": [[0, "picture"], [0, "truth"]], "facts": [{"exposure_s": 0.01, "saturated": 0.0, "snr_db": None}],
+        "size": [1, 1], "spp": 4, "last": True, "notes": [],
+    }  # fmt: skip
+    seen = page.value(
+        f"""(async () => {{
+          const {{ default: explorer }} = await import(new URL("explore.js", location.href));
+          const asked = [], el = document.createElement("div"), seen = [];
+          let tell;
+          document.body.append(el);
+          explorer.render({{ model: {{ send: each => asked.push(each), on: (_, listener) => tell = listener }}, el }});
+          tell({json.dumps({**said, "kind": "hello"})}, []);
+          const level = el.querySelector("[data-key=level]"), grey = value => new DataView(new Uint8Array([value, value, value]).buffer);
+          const look = () => seen.push([...el.querySelectorAll("canvas")].map(each => each.getContext("2d").getImageData(0, 0, 1, 1).data[0]));
+          level.dispatchEvent(new Event("input"));
+          const [old, young] = asked.filter(each => each.kind === "show").map(each => each.number), none = new DataView(new ArrayBuffer(0));
+          tell({{ ...{json.dumps(answer)}, number: old }}, [grey(10), grey(20)]);
+          look();
+          tell({{ ...{json.dumps(answer)}, number: young }}, [grey(30), none]);
+          look();
+          return seen;
+        }})()"""
+    )
+    assert seen == [[0, 0], [30, 20]]
+
+
 def test_two_views_over_one_connection_take_no_answers_of_each_other(browser, address):
     """As a notebook's widget that is shown twice: both are sent all messages, and both count requests from 1."""
     page = CHROME.Page(browser, address)

@@ -172,7 +172,7 @@ def test_hostile_messages_get_one_line_and_the_next_is_answered(served, tmp_path
         {"lamps": {"sun": {"table": [[1]]}}}, {"lamps": {"sun": {"table": [[1, 2]] * 3000}}}, {"lens": {"nope": 1}},
         {"pixel": {"pitch_um": 1}}, {"processor": "no"}, {"processor": 3}, {"mosaic": "mono"}, {"exposure": "auto:Z"},
         {"settings": {"sigma_d": 0}}, {"settings": {"patch": 2}}, {"unknown": 1}, {"exposure_s": 0},
-        {"processor": "bayer", "mosaic": "bayer", "settings": {"patch": 3}},
+        {"processor": "bayer", "mosaic": "bayer", "settings": {"patch": 3}}, {"shot_noise": 1}, {"shot_noise": "off"},
     ],
 )  # fmt: skip
 def test_controls_that_are_not_allowed_are_refused(content):

@@ -19,11 +19,13 @@ class Page:
 
     def __init__(self) -> None:
         self.headers: list[dict[str, Any]] = []
+        self.buffers: list[Any] = []
         self.came = threading.Condition()
 
     def send(self, header: dict[str, Any], buffers: Any) -> None:
         with self.came:
             self.headers.append(header)
+            self.buffers.append(buffers)
             self.came.notify_all()
 
     def wait(self, kind: str, number: int | None) -> dict[str, Any]:
@@ -97,6 +99,24 @@ def test_a_connection_that_was_taken_over_is_not_listened_to(session):
     new.wait("show", 1)
     assert [each["number"] for each in new.headers] == [1]
     assert [each.get("number") for each in old.headers] == [1, None]
+
+
+def test_a_picture_that_stays_as_it_is_is_sent_to_a_page_once(session):
+    """The truth of another exposure is the same; a page that comes later is sent it anew."""
+    first, second = Page(), Page()
+    views: list[Any] = [[0, "picture"], [0, "truth"]]
+    for page in (first, second):
+        send = page.send
+        session.connect(send)
+        for number in (1, 2):
+            session.take(message("show", number, cameras=[{"exposure_number": number}], views=views), send)
+            page.wait("show", number)
+        lengths = [[len(each) for each in buffers] for buffers in page.buffers if buffers]
+        assert lengths == [[40 * 48 * 3] * 2, [40 * 48 * 3, 0]]
+    session.take(message("show", 3, cameras=[{"exposure_number": 2}], views=views[::-1]), send)
+    second.wait("show", 3)
+    assert [len(each) for each in second.buffers[-1]] == [40 * 48 * 3] * 2
+    assert second.buffers[-1][1] == second.buffers[-2][0]
 
 
 def test_another_view_of_one_connection_takes_over(session):

@@ -9,7 +9,7 @@ from matplotlib import colormaps
 
 from render.photometry import photons_per_joule
 from rodcone.errors import InputError
-from sensor.readout import noise_variance
+from sensor.readout import noise_variance, spread_charge
 from studies.explore.chain import photograph
 from studies.explore.controls import TIME, Controls
 from studies.explore.views import MOST_SIGMAS, MOST_SNR_DB, VIEWS, histogram, noise_scale_e, noise_sources_e, pixel
@@ -25,10 +25,29 @@ def test_the_sources_of_noise_add_up_to_the_noise_model(terms):
     exposed = photograph(small_transport(), Controls(pixel=terms)).exposed
     variance = noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
     for row, column in ((0, 0), (13, 21), (39, 47)):
-        sources = noise_sources_e(exposed.expected_e, exposed.sensor, exposed.exposure_s, row, column)
+        sources = noise_sources_e(exposed, row, column)
         total = sources.pop("total")
         assert total**2 == pytest.approx(variance[row, column], rel=1e-12)
         assert sum(sigma**2 for sigma in sources.values()) == pytest.approx(total**2, rel=1e-9)
+
+
+@pytest.mark.parametrize("terms", [{}, ALL_TERMS, {"column_gain_spread": 0.02, "hot_pixel_share": 0.0}])
+def test_without_shot_noise_the_budget_is_that_of_the_other_terms(terms):
+    """By hand: PRNU, hot pixels as a chip has them, column gains, fixed offsets, read noise, steps of the converter."""
+    exposed = photograph(small_transport(), Controls(pixel=terms, shot_noise=False)).exposed
+    pixel_, time_s, sources = exposed.sensor.pixel, exposed.exposure_s, noise_sources_e(exposed, 13, 21)
+    signal_e = spread_charge(exposed.expected_e, pixel_.crosstalk)[13, 21]
+    share, hot_e = pixel_.hot_pixel_share, pixel_.hot_pixel_dark_current_e_per_s * time_s
+    collected_e2 = (pixel_.prnu * signal_e) ** 2 + share * (1 - share) * hot_e**2
+    mean_e = signal_e + pixel_.dark_current_e_per_s * time_s + share * hot_e
+    gains_e2 = pixel_.column_gain_spread**2 * (collected_e2 + mean_e**2)
+    dark_e2 = pixel_.read_noise_e**2 + pixel_.fixed_dark_e**2 + exposed.sensor.gain_e_per_dn**2 / 12
+    assert (sources["shot noise"], sources["dark current"]) == (0.0, 0.0)
+    assert sources["total"] == pytest.approx((collected_e2 + gains_e2 + dark_e2) ** 0.5, rel=1e-9)
+    noisy = replace(exposed, shot_noise=True)
+    drawn_e = (exposed.expected_e + pixel_.dark_current_e_per_s * time_s + share * hot_e).mean()
+    less = noise_scale_e(noisy) ** 2 - noise_scale_e(exposed) ** 2
+    assert less == pytest.approx((1 + pixel_.column_gain_spread**2) * drawn_e, rel=1e-9)
 
 
 def test_the_light_budget_of_a_pixel():

@@ -117,6 +117,7 @@ def test_a_study_names_the_scene_with_its_options_and_files_by_their_whole_path(
         (Controls(reference_light="A"), "reference_light 'A'"),
         (Controls(lamps={"softbox": Lamp(power=2.0)}), "one spectrum for all"),
         (Controls(settings={"sigma_s": 2.0}), "no settings of a processor"),
+        (Controls(shot_noise=False), "without shot noise"),
     ],
 )
 def test_what_a_study_can_not_say_is_refused(controls, words):
