@@ -19,6 +19,7 @@ from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
 from sensor.burst import burst
+from sensor.binning import as_read, check_blocks
 from sensor.cfa import channels, check_covers, is_rgbw
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -199,7 +200,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
 def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     """Sensor, scene (None: a stored radiance) and exposure time (None: by a rule), or `InputError`."""
     sensor = preset(order.sensor, order.cfa)
-    check_ending(Path(order.out), sensor.cfa)
+    check_ending(Path(order.out), as_read(sensor).cfa)
     require_whole("spp", order.spp, 1, 1 << 16, "give samples per pixel")
     require_whole("frames", order.frames, 1, MOST_FRAMES, "give exposures of a burst")
     require_whole("seed", order.seed, 0, 2**31, "give a whole number")
@@ -236,6 +237,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     asked_level(opened.scene, order.level)
     height, width = _size(order, opened)
     check_covers(sensor.cfa, (height, width))
+    check_blocks(sensor, (height, width))
     require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
     return sensor, opened, exposure_s
 
