@@ -21,9 +21,10 @@ from sensor.config import CHARGE, SensorConfig
 def as_read(sensor: SensorConfig) -> SensorConfig:
     """Camera whose pixels are those of the raw image: for one that bins, of 2x2 pixels each; else the camera itself.
 
-    Its numbers are those of four pixels: mean, temporal and fixed variance of an evenly lit pixel are exact below
-    the well. Its read noise in digital numbers holds three of the four roundings, for a raw image's noise counts one. Its
-    share of hot pixels and their dark current give the sum's mean and variance. Crosstalk is what leaves the four.
+    Its numbers are those of four pixels: mean and variance of an evenly lit pixel are exact below the well, but that
+    column gains in digital numbers miss half of their spread's square of the shot noise. Its read noise there holds three
+    of the four roundings, for the noise of a raw image counts one. Its share of hot pixels and their dark current give
+    the sum's mean and variance. Its crosstalk is what leaves the four.
     """
     if not sensor.binning:
         return sensor
