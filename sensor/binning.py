@@ -63,7 +63,14 @@ def as_read(sensor: SensorConfig) -> SensorConfig:
 
 
 def of_read_pixels(values: NDArray[Any], sensor: SensorConfig) -> NDArray[Any]:
-    """What the raw image's pixels hold together, shape (..., h, w): sums over 2x2 where the sensor bins."""
+    """What the raw image's pixels hold together, shape (..., h, w): sums over 2x2 where the sensor bins.
+
+    Raises
+    ------
+    InputError
+        As `check_blocks`: a picture from a file may have any size.
+    """
+    check_blocks(sensor, values.shape[-2:])
     return block_sums(values) if sensor.binning else values
 
 

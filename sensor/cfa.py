@@ -128,6 +128,12 @@ def is_bayer(tile: Tile) -> bool:
     return tile in (("RG", "GB"), ("BG", "GR"), ("GR", "BG"), ("GB", "RG"))
 
 
+def plain(tile: Tile) -> Tile:
+    """Tile that `tile` is the `quad` of, or the tile itself."""
+    half = tuple(row[::2] for row in tile[::2])
+    return half if quad(half) == tile else tile
+
+
 def is_rgbw(tile: Tile) -> bool:
     """Whether a tile is 2x2 with R, G, B and W once each."""
     return len(tile) == 2 and len(tile[0]) == 2 and sorted("".join(tile)) == list("BGRW")
