@@ -2,8 +2,8 @@
 
 Channels are taken for random fields that vary together around a plane of their own, whose three numbers are unknown:
 so weights are found that give back every mosaic of planes, constant or linear, exactly, and among these the ones of
-least error. A sample's noise is known. Nothing is decided pixel by pixel: where the interleaved reconstruction chooses
-among samples that look alike, this one is a fixed filter for each pixel of the tile.
+least error. Samples are weighed in units of their noise (`isp.anscombe`). Nothing is decided pixel by pixel: where the
+interleaved reconstruction chooses among samples that look alike, this is one fixed filter for each pixel of the tile.
 """
 
 from functools import lru_cache
@@ -12,69 +12,72 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
+from isp.anscombe import stabilise, unstabilise
+from isp.settings import Reconstruction
 from sensor.cfa import Tile, channels, mask
 from sensor.raw import RawImage
 
 Plane = NDArray[np.float64]
 
-RADIUS = 4  # of the window that samples are taken from [pixels]: a tile of 4x4 shows every channel on all sides
-# Of 4 correlations x 2 lengths on three scenes, quad and Bayer, best or within 0.2 dB (docs/decisions/0048).
+# Found on still_life, siemens_star and night_street in two lights, quad and Bayer (docs/decisions/0048).
+RADIUS = 6  # of the window that samples are taken from [pixels]
 CORRELATION = 0.97  # of two channels' values at one pixel
 LENGTH = 6.0  # of the exponential covariance [pixels]
+LEAST_DEVIATION = 0.1  # of what a channel shows [standard deviations of noise]: a flat field shows nothing
 
 
-def reconstruct_linear(raw: RawImage) -> Plane:
-    """Every channel at every pixel of a raw image [e-], shape (h, w, channel), as `sensor.cfa.channels` orders them.
+def reconstruct_linear(raw: RawImage) -> Reconstruction:
+    """Estimate every channel at every pixel of a raw image of any mosaic.
 
-    What channels show and how noisy they are is taken from their samples, over the whole frame. Where a saturated pixel
-    lies in the window each channel is estimated from its own samples alone: a full W says nothing of G.
+    How much channels show beside noise is taken from the middle two thirds of their samples: a lamp is no measure of
+    the dark around it. Where a saturated pixel lies in the window each channel is estimated from its own samples alone,
+    for a full W says nothing of G.
     """
-    electrons, names = raw.electrons, channels(raw.cfa)
-    samples = [electrons[mask(raw.cfa, name, raw.shape)] for name in names]
-    noise = np.sqrt([max(x.mean(), 0.0) + raw.dark_noise_e**2 for x in samples])
-    # A channel that shows nothing but noise counts as faint, not as dark: weights over 0 are not defined.
-    deviation = np.sqrt([max(x.var() - y**2, 1e-4 * y**2) for x, y in zip(samples, noise, strict=True)])
-    together = krige(electrons, raw.cfa, deviation, noise)
-    full = maximum_filter(raw.saturated, size=2 * RADIUS + 1)
-    if not full.any():
-        return together
-    return np.where(full[..., None], krige(electrons, raw.cfa, deviation, noise, 0.0), together)
+    values = stabilise(raw.electrons, raw.dark_noise_e, 0.0)
+    samples = [values[mask(raw.cfa, name, raw.shape)] for name in channels(raw.cfa)]
+    spread = np.array([np.diff(np.percentile(x, (15.9, 84.1)))[0] / 2 for x in samples])
+    deviation = np.sqrt(np.maximum(spread**2 - 1.0, LEAST_DEVIATION**2))
+    estimate, noise_gain = krige(values, raw.cfa, deviation)
+    full = maximum_filter(raw.saturated, size=2 * RADIUS + 1)[..., None]
+    if full.any():
+        apart = krige(values, raw.cfa, deviation, 0.0)
+        estimate, noise_gain = np.where(full, apart[0], estimate), np.where(full, apart[1], noise_gain)
+    return Reconstruction(unstabilise(estimate, raw.dark_noise_e), noise_gain, engine="numpy")
 
 
-def krige(values: Plane, tile: Tile, deviation: Plane, noise: Plane, correlation: float = CORRELATION) -> Plane:
-    """Estimate every channel at every pixel.
+def krige(values: Plane, tile: Tile, deviation: Plane, correlation: float = CORRELATION) -> tuple[Plane, Plane]:
+    """Estimate every channel at every pixel of a mosaic whose samples have noise of variance 1.
 
     Parameters
     ----------
     values : (h, w) float64
-        Mosaic that begins at the tile's first pixel.
+        Begins at the tile's first pixel.
     tile : tuple of str
-    deviation, noise : (channel,) float64
-        Standard deviation of what each channel shows, above 0, and of one sample's noise, in units of `values`.
+    deviation : (channel,) float64
+        Standard deviation of what each channel shows, above 0.
     correlation : float
         Of two channels at one pixel.
 
     Returns
     -------
-    (h, w, channel) float64
-        Channels in the order of `sensor.cfa.channels`.
+    estimate, noise_gain : (h, w, channel) float64
+        Channels in the order of `sensor.cfa.channels`; sum of the squared weights, the noise's variance in it.
     """
     height, width = values.shape
-    names = channels(tile)
-    scales = tuple((deviation / deviation.max()).tolist()), tuple((noise / deviation.max()).tolist()), correlation
-    result = np.empty((len(names), height, width))
+    count, scales = len(channels(tile)), (*deviation.tolist(), correlation)
+    estimate, noise_gain = np.empty((count, height, width)), np.empty((count, height, width))
     for rows in _alike(height, len(tile)):
         for columns in _alike(width, len(tile[0])):
             first = rows.start, columns.start
             down, across = (_reach(at, side) for at, side in zip(first, values.shape, strict=True))
-            phase = first[0] % len(tile), first[1] % len(tile[0])
-            weights = _weights(tile, phase, down, across, scales)
-            total = np.zeros((len(names), len(range(height)[rows]), len(range(width)[columns])))
+            weights = _weights(tile, (first[0] % len(tile), first[1] % len(tile[0])), down, across, scales)
+            total = np.zeros((count, len(range(height)[rows]), len(range(width)[columns])))
             for number, (i, j) in enumerate(np.ndindex(down[1] - down[0], across[1] - across[0])):
                 seen = values[_moved(rows, down[0] + i), _moved(columns, across[0] + j)]
                 total += weights[:, number, None, None] * seen
-            result[:, rows, columns] = total
-    return np.moveaxis(result, 0, -1)
+            estimate[:, rows, columns] = total
+            noise_gain[:, rows, columns] = (weights**2).sum(axis=1)[:, None, None]
+    return np.moveaxis(estimate, 0, -1), np.moveaxis(noise_gain, 0, -1)
 
 
 def _reach(at: int, side: int) -> tuple[int, int]:
@@ -96,28 +99,27 @@ def _moved(positions: slice, offset: int) -> slice:
 
 @lru_cache(maxsize=1024)
 def _weights(
-    tile: Tile,
-    phase: tuple[int, int],
-    down: tuple[int, int],
-    across: tuple[int, int],
-    scales: tuple[tuple[float, ...], tuple[float, ...], float],
+    tile: Tile, phase: tuple[int, int], down: tuple[int, int], across: tuple[int, int], scales: tuple[float, ...]
 ) -> Plane:
     """Weights of the window's samples, row by row, for each channel, shape (channel, sample)."""
-    names, (deviation, noise) = channels(tile), (np.array(scale) for scale in scales[:2])
+    names, (*deviation, correlation) = channels(tile), scales
     rows, columns = (x.ravel() for x in np.mgrid[slice(*down), slice(*across)])
-    letters = [tile[(phase[0] + i) % len(tile)][(phase[1] + j) % len(tile[0])] for i, j in zip(rows, columns)]
-    channel = np.array([names.index(letter) for letter in letters])
+    cells = np.array([[names.index(name) for name in row] for row in tile])
+    channel = cells[(phase[0] + rows) % len(tile), (phase[1] + columns) % len(tile[0])]
 
     # Covariance between samples, and of samples with what is asked for.
-    between = np.where(np.eye(len(names)), 1.0, scales[2]) * np.outer(deviation, deviation)
+    between = np.where(np.eye(len(names)), 1.0, correlation) * np.outer(deviation, deviation)
     distance = np.hypot(rows[:, None] - rows, columns[:, None] - columns)
-    covariance = between[channel[:, None], channel] * np.exp(-distance / LENGTH) + np.diag(noise[channel] ** 2)
+    covariance = between[channel[:, None], channel] * np.exp(-distance / LENGTH) + np.eye(rows.size)
     asked = between[:, channel] * np.exp(-np.hypot(rows, columns) / LENGTH)
 
-    # Planes of each channel by itself have to come out exactly: Lagrange's multipliers.
+    # Lagrange's multipliers: planes of each channel by itself come out exactly.
     own = channel == np.arange(len(names))[:, None]
     planes = np.concatenate([own, own * rows, own * columns]).astype(np.float64)
     system = np.block([[covariance, planes.T], [planes, np.zeros((len(planes), len(planes)))]])
     target = np.concatenate([np.eye(len(names)), np.zeros((len(names), 2 * len(names)))], axis=1)
-    solved = np.linalg.lstsq(system, np.concatenate([asked, target], axis=1).T, rcond=None)[0]
-    return np.asarray(solved[: rows.size].T)
+    wanted = np.concatenate([asked, target], axis=1).T
+    if np.linalg.matrix_rank(planes) == len(planes):
+        return np.asarray(np.linalg.solve(system, wanted)[: rows.size].T)
+    # A small frame shows too few samples of a channel for its slope: the least squares then.
+    return np.asarray(np.linalg.lstsq(system, wanted, rcond=None)[0][: rows.size].T)

@@ -56,7 +56,7 @@ def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
     """
     tile = bayer_tile(raw.cfa) if tile is None else tile
     raw = mend(raw)
-    estimate_dn = reconstruct_linear(raw) / raw.gain_e_per_dn + raw.black_dn
+    estimate_dn = reconstruct_linear(raw).estimate / raw.gain_e_per_dn + raw.black_dn
     dn = raw.dn.copy()
     for index, channel in enumerate(channels(raw.cfa)):
         moved = mask(tile, channel, raw.shape) & ~mask(raw.cfa, channel, raw.shape)
