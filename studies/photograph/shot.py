@@ -20,7 +20,7 @@ from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
 from sensor.burst import burst
 from sensor.binning import as_read, check_blocks
-from sensor.cfa import channels, check_covers, is_rgbw
+from sensor.cfa import channels, check_covers, is_bayer
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.exposure import AUTO, exposure_by_rule_s
@@ -104,7 +104,7 @@ class Taken:
 
 
 def take(order: Order, step: Step | None = None) -> Taken:
-    """Photograph and write; a 2x2 RGBW negative gets a re-mosaiced Bayer one beside it, ``NAME_bayer.dng``.
+    """Photograph and write; a negative of RGBW or a quad mosaic gets a Bayer one beside it, ``NAME_bayer.dng``.
 
     Parameters
     ----------
@@ -174,7 +174,8 @@ def take(order: Order, step: Step | None = None) -> Taken:
 
     # The files.
     places = [out] if order.frames == 1 else [out.with_stem(f"{out.stem}_{n}") for n in range(1, order.frames + 1)]
-    bayer = remosaic(raw) if out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) and order.frames == 1 else None
+    known = is_bayer(raw.cfa) or out.suffix.lower() != ".dng"  # to raw converters
+    bayer = remosaic(raw) if not known and order.frames == 1 else None
     paths = tuple(path for frame, place in zip(raws, places, strict=True) for path in write_raw(frame, place))
     if bayer is not None:
         paths += write_raw(bayer, out.with_stem(out.stem + "_bayer"))
