@@ -1,49 +1,65 @@
-"""RGBW 2x2 turned into Bayer, for programs that know no W: "re-mosaic", as chips do it inside (arXiv:2209.08471)."""
+"""Mosaics turned into others, for programs that know no W and no 4x4 tile: "re-mosaic", as chips do it inside
+(arXiv:2209.08471).
+"""
 
 from dataclasses import replace
 
 import numpy as np
 
 from isp.defects import mend
-from isp.interleaved import reconstruct
+from isp.kriging import reconstruct_linear
 from rodcone.errors import InputError
-from sensor.cfa import Tile, channels, is_rgbw, mask
+from sensor.cfa import Tile, channels, is_bayer, is_rgbw, mask, plain
 from sensor.raw import RawImage
 
 
 def bayer_tile(tile: Tile) -> Tile:
-    """Bayer phase with R where the RGBW tile has it: B on R's diagonal, G at the two other sites.
+    """Bayer phase that a mosaic becomes.
+
+    Of quad Bayer the plain one. Of RGBW, 2x2 or quad, R where the (plain) tile has it, B on R's diagonal, G at the two
+    other sites.
 
     Raises
     ------
     InputError
-        Where the tile is not 2x2 with R, G, B and W once each.
+        For another mosaic.
     """
-    if not is_rgbw(tile):
-        raise InputError(f"cfa: {tile} can't become Bayer; allowed: 2x2 with R, G, B and W; use its raw file as it is")
-    row, column = divmod("".join(tile).index("R"), 2)
+    if is_bayer(plain(tile)) and tile != plain(tile):
+        return plain(tile)
+    if not is_rgbw(plain(tile)):
+        raise InputError(
+            f"cfa: {tile} can't become Bayer; allowed: 2x2 with R, G, B and W, quad_rgbw, quad_bayer; use its raw file "
+            "as it is"
+        )
+    row, column = divmod("".join(plain(tile)).index("R"), 2)
     colours = {(row, column): "R", (1 - row, 1 - column): "B"}
     return tuple("".join(colours.get((y, x), "G") for x in range(2)) for y in range(2))
 
 
-def remosaic(raw: RawImage) -> RawImage:
-    """Bayer raw image of an RGBW one, of the same size and levels.
+def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
+    """Raw image of another mosaic, of the same size and levels.
 
-    Where the two mosaics agree the sample stays as it is; elsewhere (W's sites, and B's where B has to move) stands the
-    interleaved reconstruction of that channel, a weighted mean of its samples that W's detail guides. Those pixels hold
-    less noise than the noise profile says, and are correlated with their neighbours. Defective pixels are mended first.
+    Where the two mosaics agree the sample stays as it is; elsewhere stands the best linear estimate of that channel
+    (`isp.kriging`). Those pixels hold other noise than the noise profile says, and are correlated with their
+    neighbours. Defective pixels are mended first.
+
+    Parameters
+    ----------
+    raw : RawImage
+    tile : tuple of str, optional
+        Mosaic to get, of channels that `raw` has; left out, `bayer_tile`.
 
     Raises
     ------
     InputError
-        Where the mosaic is not 2x2 RGBW.
+        Where no tile is given, and the mosaic is neither RGBW nor quad Bayer.
     """
-    tile = bayer_tile(raw.cfa)
+    tile = bayer_tile(raw.cfa) if tile is None else tile
     raw = mend(raw)
-    estimate_dn = np.asarray(reconstruct(raw), dtype=np.float64) / raw.gain_e_per_dn + raw.black_dn
+    estimate_dn = reconstruct_linear(raw).estimate / raw.gain_e_per_dn + raw.black_dn
     dn = raw.dn.copy()
     for index, channel in enumerate(channels(raw.cfa)):
         moved = mask(tile, channel, raw.shape) & ~mask(raw.cfa, channel, raw.shape)
         dn[moved] = np.rint(np.clip(estimate_dn[moved, index], 0.0, raw.white_dn)).astype(np.uint16)
-    kept = [channels(raw.cfa).index(channel) for channel in "RGB"]
+    kept = [channels(raw.cfa).index(channel) for channel in channels(tile)]
     return replace(raw, dn=dn, cfa=tile, colour=None if raw.colour is None else raw.colour.part(kept))

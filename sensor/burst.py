@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from render.radiance import SpectralRadiance
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_range
+from sensor.binning import as_read
 from sensor.capture import capture
 from sensor.config import SensorConfig
 from sensor.device import Device
@@ -162,7 +163,11 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
 
 
 def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
-    """Sensor whose one exposure of `count` times the time holds the noise that a merged burst of `count` does."""
+    """Sensor whose one exposure of `count` times the time holds the noise that a merged burst of `count` does.
+
+    Of a sensor that bins, the one `sensor.binning.as_read`.
+    """
+    sensor = as_read(sensor)
     pixel = sensor.pixel
     return replace(
         sensor,

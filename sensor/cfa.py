@@ -1,6 +1,7 @@
 """Colour filter arrays: a tile of channels, one letter each, that repeats over the sensor."""
 
 from collections.abc import Mapping, Sequence
+from math import lcm
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -14,6 +15,12 @@ Tile: TypeAlias = tuple[str, ...]
 OWN = "own"  # in place of a mosaic's name: the one that the camera has
 RGBW: Tile = ("RG", "BW")  # Parmar & Wandell 2009, Figure 2
 BAYER: Tile = ("RG", "GB")
+
+
+def quad(tile: Tile) -> Tile:
+    """Tile of twice the height and width, in which 2x2 pixels stand for each of `tile`."""
+    return tuple("".join(2 * channel for channel in row) for row in tile for _ in range(2))
+
 
 # Mosaics by name; any other tile will do, with a response for each channel.
 MOSAICS: Mapping[str, Tile] = MappingProxyType(
@@ -33,6 +40,12 @@ MOSAICS: Mapping[str, Tile] = MappingProxyType(
         "rccb": ("RC", "CB"),
         "ryyb": ("RY", "YB"),  # telephones: yellow, which passes red and green, in green's place
         "mono": ("W",),
+        # Telephones with pixels of 1 um and less: 2x2 pixels under one filter, which bin to the plain mosaic. Bayer's is
+        # Sony's Quad Bayer (IMX586, 2018) and Samsung's Tetracell. RGBW of 2x2 cells of one colour, so that all four
+        # share a floating diffusion, is proposed by Singh, "Double binnable RGB, RGBW and LMS color filter arrays",
+        # arXiv:2306.17078, with a tile of 8x8; here the cells are those of Parmar & Wandell's tile.
+        "quad_bayer": quad(BAYER),
+        "quad_rgbw": quad(RGBW),
     }
 )
 
@@ -70,6 +83,25 @@ def check_tile(tile: Sequence[str]) -> Tile:
     return rows
 
 
+def binned_tile(tile: Tile) -> Tile:
+    """Tile of half the height and width whose pixels are 2x2 of `tile`: `quad` undone.
+
+    Raises
+    ------
+    InputError
+        Where 2x2 pixels, counted from the first, aren't of one channel.
+    """
+    size = (lcm(len(tile), 2), lcm(len(tile[0]), 2))
+    cells = channel_map(tile, size)
+    first = cells[::2, ::2]
+    if np.any(cells != first.repeat(2, 0).repeat(2, 1)):
+        raise InputError(
+            f"binning: 2x2 pixels of the mosaic {tile} aren't of one channel; allowed: mosaics such as quad_bayer, "
+            "quad_rgbw and mono; give one, or leave binning out"
+        )
+    return tuple("".join(row) for row in first)
+
+
 def channels(tile: Tile) -> tuple[str, ...]:
     """Channels of a tile, each once: R, G, B, W first in this order, any others as they appear row by row."""
     present = dict.fromkeys("".join(tile))
@@ -94,6 +126,12 @@ def colour_channels(tile: Tile) -> tuple[str, ...]:
 def is_bayer(tile: Tile) -> bool:
     """Whether a tile is one of Bayer's four phases: 2x2, green on a diagonal, red and blue once."""
     return tile in (("RG", "GB"), ("BG", "GR"), ("GR", "BG"), ("GB", "RG"))
+
+
+def plain(tile: Tile) -> Tile:
+    """Tile that `tile` is the `quad` of, or the tile itself."""
+    half = tuple(row[::2] for row in tile[::2])
+    return half if quad(half) == tile else tile
 
 
 def is_rgbw(tile: Tile) -> bool:

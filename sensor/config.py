@@ -7,13 +7,15 @@ from numbers import Real
 
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from rodcone.brief import brief
-from rodcone.errors import InputError, require_range, require_whole
+from rodcone.errors import InputError, require_range, require_whole, unknown
 from rodcone.notebook import html_of
 from rodcone.plots import png_of
-from sensor.cfa import RGBW, Tile, channels, check_tile
+from sensor.cfa import RGBW, Tile, binned_tile, channels, check_tile
 from sensor.curves import Responses, rgbw
 
 SHOWN_EXPOSURE_S = 0.033  # of the noise that a notebook shows
+CHARGE, DIGITAL = BINNINGS = ("charge", "digital")
+MOST_BITS_SUMMED = 14  # of a converter whose readings are summed by four: a raw image holds 16
 BLACK_SIGMAS = 5.0  # black level in dark standard deviations, so that clipping at 0 doesn't bias darks
 
 
@@ -44,6 +46,9 @@ class PixelConfig:
         Share of pixels that leak, and the dark current that they have on top of the others'.
     crosstalk : float
         Share of a pixel's photo-electrons that each of its four neighbours collects instead.
+    binned_well_e : float
+        Electrons at which the sum of four pixels clips where they bin in charge: what the floating diffusion that they
+        share holds. 0 for four times the well.
     """
 
     pitch_um: float
@@ -61,6 +66,7 @@ class PixelConfig:
     hot_pixel_share: float = 0.0
     hot_pixel_dark_current_e_per_s: float = 0.0
     crosstalk: float = 0.0
+    binned_well_e: float = 0.0
 
     __repr__ = brief
 
@@ -84,6 +90,9 @@ class PixelConfig:
         }
         for name, (low, high, fix) in limits.items():
             require_range(name, getattr(self, name), low, high, fix)
+        if self.binned_well_e:
+            fix = "the floating diffusion holds one full well at least; give electrons, 0 for four wells"
+            require_range("binned_well_e", self.binned_well_e, self.full_well_e, 1e12, fix)
         require_range("prnu with column_gain_spread", self.fixed_gain, 0.0, 1.0, "make the root of their squares less")
 
     @property
@@ -162,6 +171,11 @@ class SensorConfig:
         Reading of no light; None gives five standard deviations of the dark, rounded up.
     window_nm : (float, float)
         Wavelengths that the camera lets in: an ideal filter in front of the responses.
+    white_level_dn : int or None
+        Reading of a full well, at which the converter clips; None gives its top.
+    binning : {"", "charge", "digital"}
+        How 2x2 pixels of one channel become one of the raw image: summed as charge on their floating diffusion and
+        read once, or read one by one and summed in digital numbers. Empty: not at all. `sensor.binning` says more.
     """
 
     pixel: PixelConfig
@@ -171,12 +185,16 @@ class SensorConfig:
     bits: int = 14
     black_level_dn: int | None = None
     window_nm: tuple[float, float] = VISIBLE_NM
+    white_level_dn: int | None = None
+    binning: str = ""
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
         require_whole("bits", self.bits, 1, 16, "give the converter's resolution")
+        if self.white_level_dn is not None:
+            require_whole("white_level_dn", self.white_level_dn, 1, 2**self.bits - 1, "give DN up to the converter's top")
         if self.black_level_dn is not None:
             require_whole("black_level_dn", self.black_level_dn, 0, self.white_dn - 1, "give DN under the white level")
         pair = self.window_nm if isinstance(self.window_nm, tuple | list) and len(self.window_nm) == 2 else (0, 0)
@@ -184,6 +202,15 @@ class SensorConfig:
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give [shortest, longest] in 100-20000 nm")
         object.__setattr__(self, "window_nm", (float(pair[0]), float(pair[1])))
         self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every channel needs a curve
+        if self.binning != "":
+            if self.binning not in BINNINGS:
+                raise unknown("binning", self.binning, BINNINGS)
+            binned_tile(self.cfa)
+            if self.binning == DIGITAL and self.bits > MOST_BITS_SUMMED:
+                raise InputError(
+                    f"bits: {self.bits} with binning {DIGITAL!r}: four readings sum to two bits more than a raw file's "
+                    f"16; allowed: up to {MOST_BITS_SUMMED}; give fewer bits, or binning {CHARGE!r}"
+                )
 
     def _repr_html_(self) -> str:
         from sensor.readout import noise_sources  # late: it imports this module
@@ -204,8 +231,8 @@ class SensorConfig:
 
     @property
     def white_dn(self) -> int:
-        """Reading of a full well: the converter's top."""
-        return int(2**self.bits - 1)
+        """Reading of a full well."""
+        return int(2**self.bits - 1 if self.white_level_dn is None else self.white_level_dn)
 
     @property
     def black_dn(self) -> int:

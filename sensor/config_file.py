@@ -13,7 +13,7 @@ from sensor.cfa import Tile, channels, tile_of
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_csv, read_curve, rgbw
 
-_SETTINGS = ("bits", "black_level_dn", "window_nm")
+_SETTINGS = ("bits", "black_level_dn", "white_level_dn", "window_nm", "binning")
 _KEYS = ("cfa", *_SETTINGS, "pixel", "lens", "responses")
 _RESPONSE_KEYS = ("csv", "range_nm", "quantum_efficiency", "ir_cut")
 
@@ -25,9 +25,10 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     ----------
     path : str or Path
         TOML with the tables ``[pixel]`` and ``[lens]`` (fields of `PixelConfig` and `LensConfig`), optionally ``cfa``
-        (a name of `sensor.cfa.MOSAICS`, or rows of channels), ``bits``, ``black_level_dn``, ``window_nm``, and
-        ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency`` ("included", "relative", a number, or a
-        CSV) and ``ir_cut`` (nm, or a CSV). Names of CSV files are relative to the TOML's folder.
+        (a name of `sensor.cfa.MOSAICS`, or rows of channels), ``bits``, ``black_level_dn``, ``white_level_dn``,
+        ``window_nm``, ``binning`` ("charge" or "digital"), and ``[responses]``: ``csv``, its ``range_nm``, its
+        ``quantum_efficiency`` ("included", "relative", a number, or a CSV) and ``ir_cut`` (nm, or a CSV). Names of CSV
+        files are relative to the TOML's folder.
     cfa : str or sequence of str, optional
         Mosaic to use in place of the file's.
 

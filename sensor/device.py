@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from rodcone.brief import brief
+from sensor.binning import block_sums, check_blocks
 from sensor.cfa import check_covers
-from sensor.config import SensorConfig
+from sensor.config import CHARGE, SensorConfig
 from sensor.presets import preset
 from sensor.random import NoiseTerm, draw_key, normals
 
@@ -25,9 +26,10 @@ class Device:
     photo_response : (h, w) float64
         Relative gain of each pixel's photo-electrons, mean 1 and standard deviation PRNU; not negative.
     dark_offset_e : (h, w) float64
-        Fixed offset of each pixel [e-], mean 0: DSNU and its column's offset.
+        Fixed offset of each reading [e-], mean 0: DSNU and its column's offset. (h / 2, w / 2) where 2x2 pixels are
+        read as one: binned in charge.
     column_gain : (w,) float64, optional
-        Relative gain of each column's amplifier, mean 1; not negative. None where all are 1.
+        Relative gain of each column's amplifier, mean 1; not negative. None where all are 1. (w / 2,) as above.
     hot : (h, w) bool, optional
         Where a pixel is hot: a defect map as a camera's calibration holds it. None where no pixel is.
     """
@@ -51,15 +53,18 @@ def draw_device(sensor: SensorConfig | str, shape: tuple[int, int], rng: np.rand
     Raises
     ------
     InputError
-        Where the shape doesn't hold a tile of the mosaic, or `rng` isn't a Generator.
+        Where the shape doesn't hold a tile of the mosaic, is odd for a sensor that bins, or `rng` isn't a Generator.
     """
     sensor = preset(sensor) if isinstance(sensor, str) else sensor
     check_covers(sensor.cfa, tuple(shape))
-    key, one_row = draw_key(rng), (1, shape[1])
+    check_blocks(sensor, tuple(shape))
+    in_charge = sensor.binning == CHARGE
+    key, one_row = draw_key(rng), (1, shape[1] // 2 if in_charge else shape[1])
     pixel = sensor.pixel
     draws = _normals_kept if shape[0] * shape[1] <= _MOST_KEPT else normals
     response = np.maximum(1.0 + pixel.prnu * draws(key, NoiseTerm.PRNU, shape), 0.0)
     offset_e = pixel.dsnu_e * draws(key, NoiseTerm.DSNU, shape)
+    offset_e = block_sums(offset_e) if in_charge else offset_e
     column_gain = hot = None
     if pixel.column_offset_e:
         offset_e += pixel.column_offset_e * normals(key, NoiseTerm.COLUMN_OFFSET, one_row)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError, require_kind, require_range, unknown
+from sensor.binning import as_read, of_read_pixels
 from sensor.cfa import channels, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
@@ -74,8 +75,8 @@ def _share_of_well_s(
     percentile: float = 99.0,
     well_share: float = 0.8,
 ) -> float:
-    bright = float(np.percentile(per_second_e, percentile))
-    return min(longest_s, well_share * sensor.pixel.full_well_e / bright) if bright > 0 else longest_s
+    bright = float(np.percentile(of_read_pixels(per_second_e, sensor), percentile))
+    return min(longest_s, well_share * as_read(sensor).pixel.full_well_e / bright) if bright > 0 else longest_s
 
 
 def exposure_by_rule_s(
@@ -125,6 +126,7 @@ def most_informative_s(per_second_e: NDArray[np.float64], sensor: SensorConfig, 
     times_s : sequence of float
         Each above 0.
     """
+    per_second_e, sensor = of_read_pixels(per_second_e, sensor), as_read(sensor)
     return max(times_s, key=lambda time_s: information_bits(per_second_e * time_s, sensor, time_s))
 
 

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError, require_range
-from sensor.config import SensorConfig
+from sensor.binning import as_read, block_sums
+from sensor.config import CHARGE, DIGITAL, SensorConfig
 from sensor.device import Device
 from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
@@ -24,11 +25,10 @@ def draw_frame(
     key: int,
     counts: Callable[[int, NoiseTerm, NDArray[np.float64]], NDArray[Any]] = poisson,
 ) -> NDArray[np.uint16]:
-    """Digital numbers of one exposure, shape (h, w), with NumPy's exact Poisson sampler.
+    """Digital numbers of one exposure, shape (h, w), with NumPy's exact Poisson sampler; binned, (h / 2, w / 2).
 
     In physical order: crosstalk and PRNU move the photo-electrons' means, dark current and hot pixels add to them, then
-    one Poisson draw; the well clips; the column's amplifier multiplies what the well gave; fixed offsets and read noise
-    are added; the converter rounds and clips.
+    one Poisson draw; the well clips; pixels that bin in charge are summed; the rest is `convert`.
     """
     pixel, expected = sensor.pixel, np.asarray(expected_e, dtype=np.float64)
 
@@ -41,13 +41,28 @@ def draw_frame(
     # Poisson far above the well is the well with certainty; the bound keeps the draw inside 64-bit integers.
     collected_e = counts(key, NoiseTerm.SHOT, np.minimum(mean_e, 2 * pixel.full_well_e + 1e4)).astype(np.float64)
     np.minimum(collected_e, pixel.full_well_e, out=collected_e)
-    if device.column_gain is not None:
-        collected_e *= device.column_gain
-    collected_e += device.dark_offset_e
-    if pixel.read_noise_e:
-        collected_e += pixel.read_noise_e * normals(key, NoiseTerm.READ, expected.shape)
-    dn = np.rint(collected_e / sensor.gain_e_per_dn + sensor.black_dn)
-    return np.clip(dn, 0, sensor.white_dn).astype(np.uint16)
+    return convert(collected_e, sensor, device, key)
+
+
+def convert(
+    collected_e: NDArray[np.float64], sensor: SensorConfig, device: Device, key: int
+) -> NDArray[np.uint16]:
+    """Digital numbers of what the wells hold, shape (h, w); binned, (h / 2, w / 2).
+
+    Pixels that bin in charge are summed, and their floating diffusion clips; the column's amplifier multiplies; fixed
+    offsets and read noise are added; the converter rounds and clips; readings that bin in digital numbers are summed.
+    """
+    reading = sensor
+    if sensor.binning == CHARGE:
+        reading = as_read(sensor)
+        collected_e = np.minimum(block_sums(collected_e), reading.pixel.full_well_e)
+    read_e = collected_e if device.column_gain is None else collected_e * device.column_gain
+    read_e = read_e + device.dark_offset_e
+    if reading.pixel.read_noise_e:
+        read_e += reading.pixel.read_noise_e * normals(key, NoiseTerm.READ, read_e.shape)
+    dn = np.rint(read_e / reading.gain_e_per_dn + reading.black_dn)
+    dn = np.clip(dn, 0, reading.white_dn).astype(np.uint16)
+    return block_sums(dn) if sensor.binning == DIGITAL else dn
 
 
 def draw_mean_frame(
@@ -75,7 +90,7 @@ def read_out(
     Parameters
     ----------
     expected_e : (h, w) array
-        Expected photo-electrons of each pixel, without dark current.
+        Expected photo-electrons of each pixel, without dark current; before binning.
     sensor : SensorConfig
     device : Device
         The chip; its patterns are not drawn again.
@@ -142,11 +157,13 @@ def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposu
     Parameters
     ----------
     expected_e : (h, w) float64
-        Expected photo-electrons as `read_out` takes them: before crosstalk.
+        Expected photo-electrons as `read_out` takes them: before crosstalk. Of a sensor that bins, those of a raw
+        image's pixel (`sensor.binning.of_read_pixels`).
     sensor : SensorConfig
     exposure_s : float
         For the dark current [s].
     """
+    sensor = as_read(sensor)
     pixel = sensor.pixel
     signal = spread_charge(np.asarray(expected_e, dtype=np.float64), pixel.crosstalk)
     hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
@@ -163,6 +180,7 @@ def noise_sources(expected_e: float, sensor: SensorConfig, exposure_s: float) ->
 
     Their squares sum to `noise_variance`, which says what each of them is.
     """
+    sensor = as_read(sensor)
     pixel = sensor.pixel
     hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
     dark_e = pixel.dark_current_e_per_s * exposure_s
@@ -189,6 +207,7 @@ def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float) -> flo
     The variance is a + b e + c e^2, so that e solves (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. Beyond an SNR of
     1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before.
     """
+    sensor = as_read(sensor)
     scale_e = sensor.pixel.full_well_e  # three points give the parabola; so far apart, no digits are lost
     a, half, full = (float(noise_variance(np.full((1, 1), x * scale_e), sensor, exposure_s)[0, 0]) for x in (0, 0.5, 1))
     c = (full - 2 * half + a) * 2 / scale_e**2
@@ -205,6 +224,9 @@ def as_raw(
     dn: NDArray[np.uint16], sensor: SensorConfig, exposure_s: float, engine: str, hot: NDArray[np.bool_] | None = None
 ) -> RawImage:
     """Raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels."""
+    if hot is not None and sensor.binning:
+        hot = block_sums(hot)
+    sensor = as_read(sensor)
     pixel = sensor.pixel
     return RawImage(
         dn=dn,

@@ -5,7 +5,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from rodcone.errors import unknown
-from sensor.cfa import MOSAICS, OWN, RGBW, Tile, channels
+from sensor.cfa import MOSAICS, OWN, RGBW, Tile, channels, quad
 from sensor.config import SensorConfig
 from sensor.curves import Responses, complementary, neutral_density, with_channels
 
@@ -19,6 +19,8 @@ VARIATIONS: Mapping[str, tuple[Tile, Callable[[Responses], Responses]]] = Mappin
 
 def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     """Give a camera another mosaic: the same pixel, well, lens and converter.
+
+    A camera that bins has four pixels for each of that mosaic's, which is the one that its raw image shows.
 
     Parameters
     ----------
@@ -36,10 +38,12 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     """
     if mosaic == OWN:
         return sensor
+    if mosaic not in (*VARIATIONS, *MOSAICS):
+        raise unknown("cfa", mosaic, (*MOSAICS, *VARIATIONS, OWN))
     if mosaic in VARIATIONS:
         tile, change = VARIATIONS[mosaic]
-        return replace(sensor, cfa=tile, responses=change(sensor.responses))
-    if mosaic not in MOSAICS:
-        raise unknown("cfa", mosaic, (*MOSAICS, *VARIATIONS, OWN))
-    tile = MOSAICS[mosaic]
-    return replace(sensor, cfa=tile, responses=with_channels(sensor.responses, channels(tile)))
+        responses = change(sensor.responses)
+    else:
+        tile = MOSAICS[mosaic]
+        responses = with_channels(sensor.responses, channels(tile))
+    return replace(sensor, cfa=quad(tile) if sensor.binning else tile, responses=responses)

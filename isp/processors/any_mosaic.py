@@ -1,4 +1,4 @@
-"""The interleaved reconstruction for mosaics of any channels: RCCB, RCCC, RYYB, a camera without colours, one's own."""
+"""Mosaics of any channels, RCCB, RCCC, RYYB, quads, a camera without colours, one's own: interleaved, or linear."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
+from isp.kriging import reconstruct_linear
 from isp.picture import Picture, require_letters
 from isp.settings import DEFAULTS, Reconstruction, Settings
 from isp.substitution import COLOUR_ERROR
@@ -42,10 +43,19 @@ def picture_any_mosaic(
     Picture
         A neutral reads the electrons of `sensor.cfa.unit_channel`.
     """
-    names = channels(raw.cfa)
     if mosaic is not None:
         require_letters(raw, channels(tile_of(mosaic)))
-    result = _guided(raw, settings)
+    return _coloured(raw, _guided(raw, settings), colours, balance)
+
+
+def picture_kriging(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
+    """Develop a raw image of any mosaic by the best linear estimate (`isp.kriging`); else as `picture_any_mosaic`."""
+    return _coloured(raw, reconstruct_linear(raw), colours, balance)
+
+
+def _coloured(raw: RawImage, result: Reconstruction, colours: ColourFit, balance: WhiteBalance) -> Picture:
+    """Balance reconstructed planes, and take them to linear sRGB by a matrix that knows their noise."""
+    names = channels(raw.cfa)
     planes = np.asarray(result.estimate, dtype=np.float64)
     gains, sources = balance.gains(raw, planes)
     balanced = clip_highlights(raw, planes * gains)

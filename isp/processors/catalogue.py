@@ -15,7 +15,7 @@ from isp.colour.white_balance import WhiteBalance
 from isp.defects import mend
 from isp.picture import Picture
 from isp.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
-from isp.processors.any_mosaic import picture_any_mosaic
+from isp.processors.any_mosaic import picture_any_mosaic, picture_kriging
 from isp.processors.bayer_denoised import picture_bayer_nlm, picture_demosaicked_first, picture_denoised_first
 from isp.processors.bm3d import EXTRA as BM3D
 from isp.processors.demosaic import EXTRA as DEMOSAICKING
@@ -104,6 +104,7 @@ _PARK = partial(picture_denoised_first, mix=principal_components, demosaic=resid
 _RESIDUAL_BM3D = partial(picture_demosaicked_first, demosaic=residual_interpolation)
 _EARLY = "W as luminance by early fusion"
 _PIECEWISE = "piecewise linear: Yu, Sapiro & Mallat 2012 with a fixed prior, Zoran & Weiss 2011"
+_LINEAR = "any mosaic's best linear estimate: universal kriging, Matheron 1969"
 _ANY = "interleaved reconstruction, a matrix over all channels; one or two give a grey picture"
 # As published; the first two are the paper's.
 _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
@@ -137,6 +138,7 @@ _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
             for name in ("rccb", "rccc", "ryyb", "mono")
         },
         "any_mosaic": Processor(OWN, picture_any_mosaic, _ANY, on_backend=True, colours=(), unit=""),
+        "kriging": Processor(OWN, picture_kriging, _LINEAR, colours=(), unit=""),
         "ple_rgbw": Processor("rgbw", picture_ple_rgbw, _PIECEWISE),
         "ple_bayer": Processor("bayer", picture_ple_bayer, _PIECEWISE),
     }

@@ -11,6 +11,7 @@ from rodcone.brief import brief
 from rodcone.errors import require_range, require_whole
 from rodcone.jit import backend
 from rodcone.plots import BLUE, ORANGE, Axes, draw_curves
+from sensor.binning import as_read
 from sensor.config import SensorConfig
 from sensor.emva1288 import estimators as emva
 from sensor.emva1288.photon_transfer import Expose, Transfer, bench, dark_slopes, take_stack, take_transfer
@@ -115,9 +116,11 @@ def characterise(
         require_whole(name, side, 16, 1 << 14, "give the frame's side in pixels")
     require_whole("seed", seed, 0, 2**31, "give a whole number")
     require_range("exposure_s", exposure_s, 0.0, 1e6, "give seconds, 0 or more")
-    result = measure(bench(sensor, shape, seed, exact), plan_for(sensor, exposure_s), sensor)
+    read = as_read(sensor)
+    result = measure(bench(sensor, shape, seed, exact), plan_for(read, exposure_s), read)
     engine = "numpy" if exact else backend()
-    return replace(result, notes=(*result.notes, f"frames were drawn by {engine}"))
+    binned = (f"figures are of 2x2 pixels, binned: {sensor.binning}",) if sensor.binning else ()
+    return replace(result, notes=(*result.notes, *binned, f"frames were drawn by {engine}"))
 
 
 def plan_for(sensor: SensorConfig, exposure_s: float = 0.01, levels: int = 55, frames: int = 32) -> ExposurePlan:

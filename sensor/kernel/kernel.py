@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from rodcone.device_arrays import ALIGNMENT, aligned, divide, divisor, tile_cell, upload
 from rodcone.jit import arrays, dr
+from sensor.binning import of_read_pixels
 from sensor.cfa import channel_map, channels, check_covers
-from sensor.config import SensorConfig
+from sensor.config import CHARGE, SensorConfig
 from sensor.device import Device
 from sensor.kernel.poisson import alias_table, poisson
 from sensor.random import MULTIPLIERS, ROUNDS, WEYL, NoiseTerm
-from sensor.readout import spread_charge
+from sensor.readout import convert, spread_charge
 
 BANDS_AT_ONCE = 8  # a CPU reads ahead in some dozen places; 40 at once take a third longer, and fight for its cache
 LARGEST = np.finfo(np.float32).max
@@ -119,7 +120,10 @@ def _pieces(planes: NDArray[np.float32]) -> list[tuple[int, NDArray[np.float32]]
 def read_frame(
     expected_e: NDArray[np.floating], sensor: SensorConfig, device: Device, exposure_s: float, key: int
 ) -> NDArray[np.uint16]:
-    """Digital numbers of one exposure, shape (h, w): what `sensor.readout.draw_frame` does, with other draws."""
+    """Digital numbers of one exposure: what `sensor.readout.draw_frame` does, with other draws.
+
+    Binned in charge, the wells are filled here and a quarter as many pixels converted in NumPy.
+    """
     expected_e = np.asarray(expected_e, dtype=np.float32)
     jit, pixel = arrays(), sensor.pixel
     if pixel.crosstalk:
@@ -140,15 +144,19 @@ def read_frame(
     most_e = dr.opaque(jit.Float, 2 * pixel.full_well_e + 1e4)
     collected_e = poisson(dr.minimum(mean_e, most_e), shot, words[2:], upload(alias_table()))
 
+    collected_e = dr.minimum(collected_e, dr.opaque(jit.Float, pixel.full_well_e))
+    if sensor.binning == CHARGE:
+        return convert(collected_e.numpy().astype(np.float64).reshape(expected_e.shape), sensor, device, key)
+
     # Double precision behind the well: whole electrons lie on the same DN as in the NumPy form.
-    read_e = jit.Float64(dr.minimum(collected_e, dr.opaque(jit.Float, pixel.full_well_e)))
+    read_e = jit.Float64(collected_e)
     if device.column_gain is not None:
         read_e *= dr.gather(jit.Float64, upload(device.column_gain), column)
     read_noise_e = dr.opaque(jit.Float64, pixel.read_noise_e) * jit.Float64(read)
     read_e += upload(device.dark_offset_e, copy_under=COPY_UNDER) + read_noise_e
     dn = read_e / dr.opaque(jit.Float64, sensor.gain_e_per_dn) + dr.opaque(jit.Float64, sensor.black_dn)
     dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(sensor.white_dn))))
-    return np.asarray(dn.numpy().astype(np.uint16).reshape(expected_e.shape))
+    return of_read_pixels(dn.numpy().astype(np.uint16).reshape(expected_e.shape), sensor)
 
 
 def philox(counter: tuple[Any, ...], key: tuple[Any, Any]) -> tuple[Any, ...]:

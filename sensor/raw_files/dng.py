@@ -1,4 +1,4 @@
-"""A Bayer or 2x2 RGBW mosaic as a digital negative: DNG 1.4, uncompressed, one 16-bit CFA image.
+"""A Bayer or RGBW mosaic, 2x2 or quad, as a digital negative: DNG 1.4, uncompressed, one 16-bit CFA image.
 
 Tags and their meaning: Adobe, "Digital Negative (DNG) Specification", version 1.4.0.0, 2012. What they can't hold
 exactly (most have rationals of 32 bits) is repeated in DNGPrivateData, as JSON behind ``rodcone`` and a zero byte.
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rodcone.errors import InputError
 from rodcone.files import replacing
-from sensor.cfa import channels, is_bayer, is_rgbw
+from sensor.cfa import Tile, channels, is_bayer, is_rgbw, plain
 from sensor.raw import RawImage
 from sensor.raw_files.raw_json import parse_json, raw_image, to_json
 from sensor.raw_files.tiff import CFA, EXIF, Tags, Values, read_mosaic, read_tags, text, write_mosaic
@@ -87,6 +87,11 @@ def read_dng(path: Path) -> RawImage:
     return raw
 
 
+def is_in_dng(tile: Tile) -> bool:
+    """Whether a mosaic is written as DNG: Bayer, 2x2 RGBW, or one of these with 2x2 pixels for each."""
+    return is_bayer(plain(tile)) or is_rgbw(plain(tile))
+
+
 def is_own(path: Path) -> bool:
     """Whether a file says that `write_dng` wrote it, and not a camera or another program."""
     try:
@@ -108,8 +113,10 @@ def dng_tags(raw: RawImage) -> Tags:
     InputError
         For another mosaic, a camera without colour calibration, or levels that DNG can't hold.
     """
-    if not (is_bayer(raw.cfa) or is_rgbw(raw.cfa)):
-        raise InputError(f"cfa: {raw.cfa} is not written as DNG; allowed: Bayer or 2x2 RGBW; write a .tif instead")
+    if not is_in_dng(raw.cfa):
+        raise InputError(
+            f"cfa: {raw.cfa} is not written as DNG; allowed: Bayer, 2x2 RGBW, quads of both; write a .tif instead"
+        )
     if raw.colour is None:
         raise InputError("colour: the raw image holds no colour calibration, which a DNG needs; write a .tif instead")
     if raw.black_dn < 0 or raw.white_dn != int(raw.white_dn):
@@ -123,7 +130,7 @@ def dng_tags(raw: RawImage) -> Tags:
         MAKER: text(MAKE),
         272: text(raw.camera),
         274: ("H", (1,)),  # Orientation: upright
-        CFA_REPEAT: ("H", (2, 2)),
+        CFA_REPEAT: ("H", (len(raw.cfa), len(raw.cfa[0]))),
         CFA_PATTERN: ("B", bytes(_COLOURS[channel] for row in raw.cfa for channel in row)),
         50706: ("B", bytes((1, 4, 0, 0))),  # DNGVersion
         50707: ("B", bytes((1, 1, 0, 0))),  # DNGBackwardVersion: all that is newer may be skipped

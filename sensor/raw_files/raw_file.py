@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from rodcone.errors import InputError
-from sensor.cfa import Tile, is_bayer, is_rgbw
+from sensor.cfa import Tile
 from sensor.raw import RawImage
-from sensor.raw_files.dng import is_own, read_dng, write_dng
+from sensor.raw_files.dng import is_in_dng, is_own, read_dng, write_dng
 from sensor.raw_files.photograph import read_photograph
 from sensor.raw_files.raw_tiff import read_tiff, write_tiff
 
@@ -18,9 +18,9 @@ def check_ending(path: Path, tile: Tile) -> None:
     """Raise `InputError` where a mosaic can't be written under this name."""
     if path.suffix.lower() not in ENDINGS:
         raise InputError(f"raw file: {str(path)!r} has another ending; allowed: {', '.join(ENDINGS)}; rename it")
-    if path.suffix.lower() == ".dng" and not (is_bayer(tile) or is_rgbw(tile)):
+    if path.suffix.lower() == ".dng" and not is_in_dng(tile):
         raise InputError(
-            f"raw file: {str(path)!r} can't hold the mosaic {tile}; allowed as DNG: Bayer, 2x2 RGBW; "
+            f"raw file: {str(path)!r} can't hold the mosaic {tile}; allowed as DNG: Bayer, 2x2 RGBW, quads of both; "
             f"write {path.with_suffix('.tif').name}"
         )
 

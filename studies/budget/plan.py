@@ -11,6 +11,7 @@ from render.engine import render
 from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.progress import Step
+from sensor.binning import as_read
 from sensor.burst import merged_sensor
 from sensor.config import LensConfig
 from sensor.presets import preset
@@ -161,9 +162,9 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
         lux = lux_per_cd_m2(lit, study.levels)
         noise = _pilot_noise(pilot, lit)
         for name in study.sensors:
-            auto_s = unit_exposure_s(lit.relight(luminance_cd_m2=1.0), preset(name))
+            auto_s = unit_exposure_s(lit.relight(luminance_cd_m2=1.0), as_read(preset(name)))
             for mosaic in mosaics(study):
-                sensor = vary(preset(name), mosaic)
+                sensor = as_read(vary(preset(name), mosaic))  # a pilot is coarser anyway
                 found = effects(lit, sensor, full_lens(study, sensor.lens, pilot.opened), pilot.groups, rng)
                 for condition in conditions(study, pilot.opened.choice):
                     if (condition.spectrum, condition.sensor) == (spectrum, name):

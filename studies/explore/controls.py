@@ -177,6 +177,8 @@ def camera_of(controls: Controls, own: SensorConfig | None = None) -> SensorConf
         For a file that describes no camera, or a term out of range.
     """
     own = own or own_camera(controls.sensor, controls.mosaic)
+    if own.binning:
+        raise InputError(f"sensor: {controls.sensor!r} bins, which is not explored; allowed: one without binning")
     return replace(
         own,
         lens=replace(own.lens, **controls.lens),

@@ -11,6 +11,7 @@ from render.spectrum import Floats, Spectrum
 from render.transport import Transport
 from rodcone.brief import brief
 from rodcone.colour_spaces import adapt_to_d65, xyz_to_srgb
+from sensor.binning import as_read
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation
@@ -70,10 +71,11 @@ def true_srgb(radiance: SpectralRadiance, light: Light, white_cd_m2: float) -> N
 
 
 def neutral_electrons(sensor: SensorConfig, light: Light, exposure_s: float) -> Floats:
-    """Expected electrons of each channel from a neutral of 1 cd/m^2 under the light, shape (channel,).
+    """Expected electrons of each channel's raw pixel from a neutral of 1 cd/m^2 under the light, shape (channel,).
 
     Green's is the known scale: a developed picture over it is in cd/m^2, with nothing taken from the noisy picture.
     """
+    sensor = as_read(sensor)
     weights = electrons_per_irradiance(sensor, light.wavelength_nm, light.width_nm, exposure_s)
     return np.asarray(weights @ light.spectrum * camera_equation(sensor.lens))
 

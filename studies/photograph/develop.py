@@ -20,7 +20,7 @@ from rodcone.errors import InputError, require_kind, require_range, unknown
 from rodcone.types import Floats
 from sensor.burst import merged_raw
 from sensor.calibration import ColourCalibration
-from sensor.cfa import channels, is_bayer
+from sensor.cfa import channels, is_bayer, plain
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import open_raw
 from studies.metrics.truth import WHITE_AT, WHITE_PERCENTILE  # the demo's rule, here on the picture's own luminance
@@ -43,9 +43,11 @@ class Developed:
 
 
 def mosaic_processor(raw: RawImage) -> str:
-    """Processor that the paper has for a raw image's mosaic; ``any_mosaic`` for those that it doesn't know."""
+    """Processor that the paper has for a raw image's mosaic; ``any_mosaic`` for others, ``kriging`` for a quad Bayer."""
     if is_bayer(raw.cfa):
         return "bayer"
+    if is_bayer(plain(raw.cfa)):
+        return "kriging"
     return "interleaved" if channels(raw.cfa) == ("R", "G", "B", "W") else "any_mosaic"
 
 
@@ -66,7 +68,7 @@ def develop(
         Colours of the camera, as `studies.photograph.calibrate.calibrate` fits them; the raw image's own by default.
     processor : str, optional
         Of `isp.processors.catalogue.PROCESSORS`, or ``mine.py:develop`` (`isp.processors.own.processor_of`); ``bayer``,
-        ``interleaved`` or ``any_mosaic``, by the mosaic, where left out.
+        ``interleaved``, ``kriging`` or ``any_mosaic``, by the mosaic, where left out.
     white_balance : str
         ``as-shot``: the calibration's neutral; an illuminant such as ``D65``: its neutral, from the calibration's
         matrices; or ``gray-world`` as in the paper, with the as-shot neutral where the picture is too dark for that.

@@ -19,7 +19,8 @@ from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
 from sensor.burst import burst
-from sensor.cfa import channels, check_covers, is_rgbw
+from sensor.binning import as_read, check_blocks
+from sensor.cfa import channels, check_covers, is_bayer
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.exposure import AUTO, exposure_by_rule_s
@@ -103,7 +104,7 @@ class Taken:
 
 
 def take(order: Order, step: Step | None = None) -> Taken:
-    """Photograph and write; a 2x2 RGBW negative gets a re-mosaiced Bayer one beside it, ``NAME_bayer.dng``.
+    """Photograph and write; a negative of RGBW or a quad mosaic gets a Bayer one beside it, ``NAME_bayer.dng``.
 
     Parameters
     ----------
@@ -173,7 +174,8 @@ def take(order: Order, step: Step | None = None) -> Taken:
 
     # The files.
     places = [out] if order.frames == 1 else [out.with_stem(f"{out.stem}_{n}") for n in range(1, order.frames + 1)]
-    bayer = remosaic(raw) if out.suffix.lower() == ".dng" and is_rgbw(raw.cfa) and order.frames == 1 else None
+    known = is_bayer(raw.cfa) or out.suffix.lower() != ".dng"  # to raw converters
+    bayer = remosaic(raw) if not known and order.frames == 1 else None
     paths = tuple(path for frame, place in zip(raws, places, strict=True) for path in write_raw(frame, place))
     if bayer is not None:
         paths += write_raw(bayer, out.with_stem(out.stem + "_bayer"))
@@ -199,7 +201,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
 def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     """Sensor, scene (None: a stored radiance) and exposure time (None: by a rule), or `InputError`."""
     sensor = preset(order.sensor, order.cfa)
-    check_ending(Path(order.out), sensor.cfa)
+    check_ending(Path(order.out), as_read(sensor).cfa)
     require_whole("spp", order.spp, 1, 1 << 16, "give samples per pixel")
     require_whole("frames", order.frames, 1, MOST_FRAMES, "give exposures of a burst")
     require_whole("seed", order.seed, 0, 2**31, "give a whole number")
@@ -236,6 +238,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     asked_level(opened.scene, order.level)
     height, width = _size(order, opened)
     check_covers(sensor.cfa, (height, width))
+    check_blocks(sensor, (height, width))
     require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
     return sensor, opened, exposure_s
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from render.illuminants import illuminant
 from render.spectrum import VISIBLE_NM, Floats
+from sensor.binning import as_read
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.readout import electrons_at_snr, noise_variance
@@ -76,5 +77,5 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
     """SNR of each channel's pixel over light; NaN where its well is full."""
     of = channel_e(sensor, light_of(light), 1.0, exposure_s)
     electrons = dict(zip(channels(sensor.cfa), of[:, None] * luminance_cd_m2, strict=True))
-    full_e = sensor.pixel.full_well_e
+    full_e = as_read(sensor).pixel.full_well_e
     return {name: np.where(e < full_e, snr(e, sensor, exposure_s), np.nan) for name, e in electrons.items()}

@@ -21,6 +21,8 @@ from render.spectrum import Floats, Spectrum
 from render.transport import Transport
 from rodcone.digests import digest, digest_file
 from rodcone.errors import InputError, require_keys
+from sensor.binning import check_blocks
+from sensor.presets import preset
 from studies.study.levels import parse_level
 from studies.study.model import RenderModel
 from studies.study.quiet_render import render_quietly
@@ -60,8 +62,8 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
     Raises
     ------
     InputError
-        For a scene that is unknown or can't be read, a level in lux without a reference plane, or another spectrum for
-        lights that have colours of their own.
+        For a scene that is unknown or can't be read, a level in lux without a reference plane, another spectrum for
+        lights that have colours of their own, or an odd size for a sensor that bins.
     """
     if is_radiance_file(choice.source):
         if choice.extend:
@@ -88,6 +90,8 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
             )
     check_range(scene, *study.render.range_nm)
     size = film_size(opened.size, study.render.size)
+    for name in study.sensors:
+        check_blocks(preset(name), size)
     identity = digest([digest_scene(scene), size])
     return OpenedScene(choice=choice, scene=scene, size=size, identity=identity, notes=tuple(opened.notes))
 

@@ -15,6 +15,7 @@ from isp.processors.own import own_version, processor_of
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
+from sensor.binning import block_sums, of_read_pixels
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.device import draw_device
@@ -57,13 +58,13 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     _check_provenance(cell, processor)
     if most_threads is not None:
         limit_threads(most_threads)
-    truth, truth_png = _truth(cell.truth)
+    truth, truth_png = _truth(cell.truth, bool(cell.sensor.binning))
     sensor, engine = cell.sensor, cell.made_by.readout_engine
     names = labels(cell.condition)
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
     light = cell.luminance_cd_m2 * cell.exposure_s
     expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
-    errors_e = _array(cell.errors) * light
+    errors_e = of_read_pixels(_array(cell.errors), sensor) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
     frames = cell.condition.frames
@@ -108,7 +109,8 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         budget_share=cell.budget_share,
         **figures,
         mc_share=charged_share(
-            errors_e * frames, expected_e * frames, merged_sensor(sensor, frames), cell.exposure_s * frames
+            *(values * frames for values in (errors_e, of_read_pixels(expected_e, sensor))),
+            *(merged_sensor(sensor, frames), cell.exposure_s * frames),
         ),
         snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),
@@ -152,15 +154,18 @@ def _check_provenance(cell: Cell, processor: Processor) -> None:
             )
 
 
-def _truth(path: Path) -> tuple[TruePicture, bytes]:
-    """The truth, and its PNG."""
+def _truth(path: Path, binned: bool) -> tuple[TruePicture, bytes]:
+    """The truth, of 2x2 pixels each where the camera bins, and its PNG."""
     _array(path)  # tells what can't be read
-    return _worked_out(path)
+    return _worked_out(path, binned)
 
 
 @lru_cache(maxsize=2)  # cells of one scene under one spectrum come one after the other
-def _worked_out(path: Path) -> tuple[TruePicture, bytes]:
-    truth = true_picture(np.array(_array(path)))
+def _worked_out(path: Path, binned: bool) -> tuple[TruePicture, bytes]:
+    linear = np.array(_array(path))
+    if binned:
+        linear = np.moveaxis(block_sums(np.moveaxis(linear, -1, 0)) / 4, 0, -1)
+    truth = true_picture(linear)
     return truth, to_png(truth.encoded)
 
 

@@ -9,7 +9,7 @@ from builders import RGBW_PHASES, raw_image
 from isp.remosaic import bayer_tile, remosaic
 from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
-from sensor.cfa import BAYER, MOSAICS, RGBW, Tile, channel_map, channels, is_bayer, mask
+from sensor.cfa import BAYER, MOSAICS, RGBW, Tile, channel_map, channels, is_bayer, mask, plain
 from sensor.raw import RawImage
 
 PHASES = [*RGBW_PHASES, ("RW", "GB"), ("RB", "GW"), ("WG", "BR")]
@@ -85,5 +85,41 @@ def test_calibration_goes_along_without_white() -> None:
 
 @pytest.mark.parametrize("cfa", [BAYER, MOSAICS["rgbw_4x4"]])
 def test_other_mosaics_are_refused(cfa: Tile) -> None:
-    with pytest.raises(InputError, match=r"cfa: .* can't become Bayer; allowed: 2x2 with R, G, B and W"):
+    with pytest.raises(InputError, match=r"cfa: .* can't become Bayer; allowed: 2x2 with R, G, B and W, quad_rgbw, quad_bayer"):
         remosaic(raw(cfa, flat()))
+
+
+# Quads
+
+
+@pytest.mark.parametrize("name", ["quad_bayer", "quad_rgbw"])
+def test_a_quad_becomes_its_plain_mosaic_and_planes_stay_planes(name: str) -> None:
+    cfa = MOSAICS[name]
+    place = np.indices((32, 32))[0]
+    for slope in (0.0, 0.01):
+        scene = {channel: level * (1 + slope * (place - 16)) for channel, level in LEVELS_E.items()}
+        made = remosaic(raw(cfa, scene), plain(cfa))
+        assert (made.cfa, made.shape) == (plain(cfa), (32, 32))
+        for channel in channels(cfa):
+            here = mask(made.cfa, channel, made.shape)
+            # beside half a DN of rounding, of the samples too: a ramp isn't quite one in units of noise
+            expected = scene[channel][here]
+            assert made.dn[here] - 100.0 == pytest.approx(expected, rel=1e-3 if slope else 0.0, abs=0.75), channel
+
+
+@pytest.mark.parametrize("name", ["quad_bayer", "quad_rgbw"])
+def test_a_quad_becomes_bayer(name: str) -> None:
+    made = remosaic(raw(MOSAICS[name], flat((32, 32))))
+    assert made.cfa == BAYER
+    for channel in "RGB":
+        assert set(made.dn[mask(made.cfa, channel, made.shape)].tolist()) == {LEVELS_E[channel] + 100}
+
+
+def test_samples_of_a_quad_that_lie_where_the_plain_mosaic_has_them_stay() -> None:
+    quad = MOSAICS["quad_bayer"]
+    noisy = raw_image(np.random.default_rng(0).integers(400, 900, (32, 32)), quad)
+    made = remosaic(noisy)
+    agree = channel_map(BAYER, (32, 32)) == channel_map(quad, (32, 32))
+    assert agree.mean() == 6 / 16
+    np.testing.assert_array_equal(made.dn[agree], noisy.dn[agree])
+    assert np.any(made.dn[~agree] != noisy.dn[~agree])

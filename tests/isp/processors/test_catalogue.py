@@ -23,6 +23,8 @@ FULL_E = 15_000.0
 NEUTRAL = {"R": 0.5, "G": 1.0, "B": 0.4, "W": 5.0, "C": 0.8, "M": 0.7, "Y": 1.0}
 ENDS_IN_W = ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami")  # whose luminance is W
 SLOW = [name for name in PROCESSORS if PROCESSORS[name].extra == "bm3d"]  # that library takes seconds: test_bm3d
+# Takes samples for noisy ones, whose mean root has lost 1/4 e-: that times the largest gain of a balance, 2.5.
+MISSES_E = {"kriging": 0.65}
 # ple leans on a prior, by up to 1 % where there is no noise: a file of its own
 QUICK = [name for name in PROCESSORS if name not in SLOW and not name.startswith("ple_")]
 
@@ -71,7 +73,7 @@ def test_a_flat_grey_field_stays_flat_and_grey_to_the_border_in_every_phase(name
     require_library(name)
     for tile in phases(tile_of(name)):
         picture = PROCESSORS[name].develop(grey(name, tile, np.full(shape, 1000.0)), IDENTITY)
-        assert picture.rgb == pytest.approx(np.full((*shape, 3), 1000.0), rel=1e-5)
+        assert picture.rgb == pytest.approx(np.full((*shape, 3), 1000.0), rel=1e-5, abs=MISSES_E.get(name, 0.0))
         assert picture.balance == dict.fromkeys(channels(tile), "gray world")
 
 
@@ -126,7 +128,7 @@ def test_a_given_balance_takes_the_place_of_gray_world(name: str) -> None:
     assert unit in names
     # W given as twice as sensitive as it is: half the luminance where W is that, none of a change where it isn't
     expected = 400.0 if name.removesuffix(FAIR) in ENDS_IN_W else 800.0
-    assert level.rgb == pytest.approx(np.full((20, 20, 3), expected), rel=1e-5)
+    assert level.rgb == pytest.approx(np.full((20, 20, 3), expected), rel=1e-5, abs=MISSES_E.get(name, 0.0))
 
 
 @pytest.mark.parametrize("name", QUICK)
@@ -137,7 +139,7 @@ def test_listed_defects_are_mended_before_any_processor_sees_them(name: str) -> 
     raw.dn[tuple(places.T)] = 15_100
     listed = replace(raw, defects=places)
     rgb = PROCESSORS[name].develop(listed, IDENTITY).rgb
-    assert rgb == pytest.approx(np.full((20, 20, 3), 800.0), rel=1e-5)
+    assert rgb == pytest.approx(np.full((20, 20, 3), 800.0), rel=1e-5, abs=MISSES_E.get(name, 0.0))
     assert np.abs(PROCESSORS[name].develop(raw, IDENTITY).rgb - 800.0).max() > 200.0
 
 
@@ -191,7 +193,7 @@ def test_each_processor_whose_colours_know_no_noise_has_a_form_whose_do() -> Non
         "interleaved",
         "interleaved_paper",
         "bayer_nlm",
-        *("rccb", "rccc", "ryyb", "mono", "any_mosaic"),
+        *("rccb", "rccc", "ryyb", "mono", "any_mosaic", "kriging"),
         "ple_rgbw",
         "ple_bayer",
     }

@@ -74,6 +74,21 @@ def same(one: RawImage, other: RawImage) -> bool:
     return True
 
 
+@pytest.mark.parametrize("name", ["quad_bayer", "quad_rgbw"])
+@pytest.mark.parametrize("shape", [(24, 24), (31, 46)])
+def test_a_quad_mosaic_comes_back_bit_for_bit_and_its_tags_say_4x4(
+    name: str, shape: tuple[int, int], tmp_path: Path
+) -> None:
+    raw = exposure(MOSAICS[name], shape)
+    path = write_dng(raw, tmp_path / "quad.dng")
+    assert same(read_dng(path), raw)
+    with tifffile.TiffFile(path) as file:
+        tags = file.pages.first.tags
+        assert tags[33421].value == (4, 4)  # CFARepeatPatternDim: rows, columns
+        pattern = bytes(tags[33422].value)
+    assert pattern == bytes({"R": 0, "G": 1, "B": 2, "W": 6}[x] for row in MOSAICS[name] for x in row)
+
+
 @pytest.mark.parametrize("shape", [(22, 22), (31, 64), (64, 45)])
 @pytest.mark.parametrize("cfa", BAYER_PHASES + RGBW_PHASES)
 def test_libraw_reads_every_phase_bit_for_bit(cfa: Tile, shape: tuple[int, int], tmp_path: Path) -> None:
@@ -214,7 +229,7 @@ def test_tiles_are_told_apart(cfa: Tile, bayer: bool, rgbw: bool) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"cfa": ("RC", "CC"), "colour": None}, r"cfa: .* is not written as DNG; allowed: Bayer or 2x2 RGBW"),
+        ({"cfa": ("RC", "CC"), "colour": None}, r"cfa: .* is not written as DNG; allowed: Bayer, 2x2 RGBW, quads of both"),
         ({"colour": None}, r"colour: the raw image holds no colour calibration"),
         ({"black_dn": -1.0}, r"levels: black -1\.0 .* don't fit a DNG"),
         ({"black_dn": 9.84}, r"black_dn: 9\.84 is no whole number, .* allowed: whole DN; write a \.tif instead"),

@@ -1,0 +1,127 @@
+"""Every channel at every pixel as the best linear estimate from a mosaic of any tile: universal kriging (Matheron 1969).
+
+Channels are taken for random fields that vary together around a plane of their own, whose three numbers are unknown:
+so weights are found that give back every mosaic of planes, constant or linear, exactly, and among these the ones of
+least error. Samples are weighed in units of their noise (`isp.anscombe`). Nothing is decided pixel by pixel: where the
+interleaved reconstruction chooses among samples that look alike, this is one fixed filter for each pixel of the tile.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
+
+from isp.anscombe import stabilise, unstabilise
+from isp.settings import Reconstruction
+from sensor.cfa import Tile, channels, mask
+from sensor.raw import RawImage
+
+Plane = NDArray[np.float64]
+
+# Found on still_life, siemens_star and night_street in two lights, quad and Bayer (docs/decisions/0048).
+RADIUS = 6  # of the window that samples are taken from [pixels]
+CORRELATION = 0.97  # of two channels' values at one pixel
+LENGTH = 6.0  # of the exponential covariance [pixels]
+LEAST_DEVIATION = 0.1  # of what a channel shows [standard deviations of noise]: a flat field shows nothing
+
+
+def reconstruct_linear(raw: RawImage) -> Reconstruction:
+    """Estimate every channel at every pixel of a raw image of any mosaic.
+
+    How much channels show beside noise is taken from the middle two thirds of their samples: a lamp is no measure of
+    the dark around it. Where a saturated pixel lies in the window each channel is estimated from its own samples alone,
+    for a full W says nothing of G. An even field comes out within 0.1 e- of its mean, from the dark on.
+    """
+    values = stabilise(raw.electrons, raw.dark_noise_e, 0.0)
+    samples = [values[mask(raw.cfa, name, raw.shape)] for name in channels(raw.cfa)]
+    spread = np.array([np.diff(np.percentile(x, (15.9, 84.1)))[0] / 2 for x in samples])
+    deviation = np.sqrt(np.maximum(spread**2 - 1.0, LEAST_DEVIATION**2))
+    estimate, noise_gain = krige(values, raw.cfa, deviation)
+    full = maximum_filter(raw.saturated, size=2 * RADIUS + 1)[..., None]
+    if full.any():
+        apart = krige(values, raw.cfa, deviation, 0.0)
+        estimate, noise_gain = np.where(full, apart[0], estimate), np.where(full, apart[1], noise_gain)
+    # The inverse adds the 1/4 e- that a mean of roots has lost, and what the estimate keeps of the noise has not.
+    electrons = unstabilise(estimate, raw.dark_noise_e) - noise_gain / 4
+    return Reconstruction(electrons, noise_gain, engine="numpy")
+
+
+def krige(values: Plane, tile: Tile, deviation: Plane, correlation: float = CORRELATION) -> tuple[Plane, Plane]:
+    """Estimate every channel at every pixel of a mosaic whose samples have noise of variance 1.
+
+    Parameters
+    ----------
+    values : (h, w) float64
+        Begins at the tile's first pixel.
+    tile : tuple of str
+    deviation : (channel,) float64
+        Standard deviation of what each channel shows, above 0.
+    correlation : float
+        Of two channels at one pixel.
+
+    Returns
+    -------
+    estimate, noise_gain : (h, w, channel) float64
+        Channels in the order of `sensor.cfa.channels`; sum of the squared weights, the noise's variance in it.
+    """
+    height, width = values.shape
+    count, scales = len(channels(tile)), (*deviation.tolist(), correlation)
+    estimate, noise_gain = np.empty((count, height, width)), np.empty((count, height, width))
+    for rows in _alike(height, len(tile)):
+        for columns in _alike(width, len(tile[0])):
+            first = rows.start, columns.start
+            down, across = (_reach(at, side) for at, side in zip(first, values.shape, strict=True))
+            weights = _weights(tile, (first[0] % len(tile), first[1] % len(tile[0])), down, across, scales)
+            total = np.zeros((count, len(range(height)[rows]), len(range(width)[columns])))
+            for number, (i, j) in enumerate(np.ndindex(down[1] - down[0], across[1] - across[0])):
+                seen = values[_moved(rows, down[0] + i), _moved(columns, across[0] + j)]
+                total += weights[:, number, None, None] * seen
+            estimate[:, rows, columns] = total
+            noise_gain[:, rows, columns] = (weights**2).sum(axis=1)[:, None, None]
+    return np.moveaxis(estimate, 0, -1), np.moveaxis(noise_gain, 0, -1)
+
+
+def _reach(at: int, side: int) -> tuple[int, int]:
+    """Offsets of the window around a pixel that lie in the frame: first, and one after the last."""
+    return -min(RADIUS, at), min(RADIUS, side - 1 - at) + 1
+
+
+def _alike(side: int, period: int) -> list[slice]:
+    """Positions along one axis that the same weights serve: of one phase inside, each by itself near the border."""
+    inside = range(RADIUS, max(side - RADIUS, RADIUS))
+    border = [at for at in range(side) if at not in inside]
+    phases = [slice(first, inside.stop, period) for first in inside[:period]]
+    return [slice(at, at + 1, period) for at in border] + phases
+
+
+def _moved(positions: slice, offset: int) -> slice:
+    return slice(positions.start + offset, positions.stop + offset, positions.step)
+
+
+@lru_cache(maxsize=1024)
+def _weights(
+    tile: Tile, phase: tuple[int, int], down: tuple[int, int], across: tuple[int, int], scales: tuple[float, ...]
+) -> Plane:
+    """Weights of the window's samples, row by row, for each channel, shape (channel, sample)."""
+    names, (*deviation, correlation) = channels(tile), scales
+    rows, columns = (x.ravel() for x in np.mgrid[slice(*down), slice(*across)])
+    cells = np.array([[names.index(name) for name in row] for row in tile])
+    channel = cells[(phase[0] + rows) % len(tile), (phase[1] + columns) % len(tile[0])]
+
+    # Covariance between samples, and of samples with what is asked for.
+    between = np.where(np.eye(len(names)), 1.0, correlation) * np.outer(deviation, deviation)
+    distance = np.hypot(rows[:, None] - rows, columns[:, None] - columns)
+    covariance = between[channel[:, None], channel] * np.exp(-distance / LENGTH) + np.eye(rows.size)
+    asked = between[:, channel] * np.exp(-np.hypot(rows, columns) / LENGTH)
+
+    # Lagrange's multipliers: planes of each channel by itself come out exactly.
+    own = channel == np.arange(len(names))[:, None]
+    planes = np.concatenate([own, own * rows, own * columns]).astype(np.float64)
+    system = np.block([[covariance, planes.T], [planes, np.zeros((len(planes), len(planes)))]])
+    target = np.concatenate([np.eye(len(names)), np.zeros((len(names), 2 * len(names)))], axis=1)
+    wanted = np.concatenate([asked, target], axis=1).T
+    if np.linalg.matrix_rank(planes) == len(planes):
+        return np.asarray(np.linalg.solve(system, wanted)[: rows.size].T)
+    # A small frame shows too few samples of a channel for its slope: the least squares then.
+    return np.asarray(np.linalg.lstsq(system, wanted, rcond=None)[0][: rows.size].T)

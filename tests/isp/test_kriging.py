@@ -1,0 +1,110 @@
+"""The best linear estimate: planes exact on any tile, noise as stated, what quads resolve, saturation."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import raw_image
+
+from isp.kriging import RADIUS, krige, reconstruct_linear
+from sensor.capture import expose
+from sensor.cfa import MOSAICS, channel_map, channels, mask
+from sensor.device import draw_device
+from sensor.presets import preset
+
+TILES = ["bayer", "rgbw", "quad_bayer", "quad_rgbw", "rgbw_4x4", "rccb", "mono"]
+
+
+def mosaic(planes, tile):
+    """Samples of planes (h, w, channel) behind a tile."""
+    shape = planes.shape[:2]
+    return np.choose(np.vectorize(channels(tile).index)(channel_map(tile, shape)), np.moveaxis(planes, -1, 0))
+
+
+@pytest.mark.parametrize("name", TILES)
+@pytest.mark.parametrize("slopes", [(0.0, 0.0), (0.7, 0.0), (-0.3, 0.5)])
+def test_constant_and_linear_planes_come_out_exactly_to_the_border(name, slopes):
+    tile, (rows, columns) = MOSAICS[name], np.indices((24, 29))
+    level = 40.0 + 10.0 * np.arange(len(channels(tile)))
+    # every channel has a slope of its own: nothing is taken for granted between channels
+    planes = level + (slopes[0] * rows + slopes[1] * columns)[..., None] * (1 + np.arange(level.size))
+    found, _ = krige(mosaic(planes, tile), tile, np.linspace(5.0, 20.0, level.size))
+    np.testing.assert_allclose(found, planes, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["quad_bayer", "quad_rgbw", "bayer"])
+def test_a_raw_image_s_flat_field_stays_flat(name):
+    tile = MOSAICS[name]
+    planes = np.broadcast_to(1000.0 * (1 + np.arange(len(channels(tile)))), (32, 32, len(channels(tile))))
+    found = reconstruct_linear(raw_image(mosaic(planes, tile) + 100, tile)).estimate
+    np.testing.assert_allclose(found, planes, atol=0.3)  # the inverse transform's quarter of an electron of shot noise
+
+
+@pytest.mark.parametrize("name", ["quad_bayer", "quad_rgbw"])
+def test_white_noise_comes_out_with_the_stated_variance(name):
+    tile = MOSAICS[name]
+    noise = np.random.default_rng(0).standard_normal((400, 400))
+    found, gain = krige(noise, tile, np.full(len(channels(tile)), 3.0))
+    inner = np.s_[RADIUS:-RADIUS:4, RADIUS:-RADIUS:4]
+    # one phase of the tile, 97 x 97 pixels whose windows overlap: the variance's standard error is under 4 times that of
+    # as many independent ones. Within 4.5 of it, 3 or 4 channels: false-alarm rate 3e-5
+    error = 4 * np.sqrt(2 / found[inner][..., 0].size)
+    np.testing.assert_allclose((found[inner] ** 2).mean((0, 1)), gain[inner].mean((0, 1)), rtol=4.5 * error)
+
+
+@pytest.mark.parametrize(("name", "period"), [("bayer", 2), ("quad_bayer", 4)])
+def test_grey_detail_at_the_colours_own_period_is_taken_for_colour(name, period):
+    """The limit of what a mosaic tells: 2 pixels a period of Bayer, 4 of quad Bayer, whatever develops it.
+
+    A grey pattern of squares, light ones where R is, dark ones where B is, makes the samples that an even orange field
+    makes; since planes come out exactly, the field is what is found.
+    """
+    tile, (rows, columns) = MOSAICS[name], np.indices((32, 32))
+    wave = sum(np.where(x % period < period // 2, 5.0, -5.0) for x in (rows, columns))
+    grey = np.repeat(100.0 + wave[..., None], 3, axis=-1)
+    orange = np.broadcast_to([110.0, 100.0, 90.0], grey.shape)
+    np.testing.assert_array_equal(mosaic(grey, tile), mosaic(orange, tile))
+    np.testing.assert_allclose(krige(mosaic(grey, tile), tile, np.full(3, 5.0))[0], orange, atol=1e-7)
+
+
+def response(name, period, grey):
+    """Share of a sine's amplitude along x that G comes out with; `grey`: all channels alike, else G alone varies."""
+    tile, wave = MOSAICS[name], np.cos(2 * np.pi * (np.indices((36, 72))[1] + 0.25) / period)
+    planes = np.repeat(100.0 + 20.0 * wave[..., None], len(channels(tile)), axis=-1)
+    if not grey:
+        planes[..., [channel != "G" for channel in channels(tile)]] = 100.0
+    found, _ = krige(mosaic(planes, tile), tile, np.full(len(channels(tile)), 14.0))
+    inner = np.s_[12:-12, 12:-12]  # 48 columns: whole periods of 2, 3, 4, 6, 8 and 16
+    return float(2 * ((found[..., channels(tile).index("G")][inner] - 100.0) / 20.0 * wave[inner]).mean())
+
+
+def test_quad_bayer_resolves_grey_well_and_a_colour_by_itself_half():
+    """Channels are taken to vary together: what one does alone, in pairs of pixels, is told half as strong."""
+    assert response("quad_bayer", 16, grey=True) == pytest.approx(1.0, abs=0.01)
+    assert response("quad_bayer", 8, grey=True) == pytest.approx(1.0, abs=0.03)
+    assert 0.85 < response("quad_bayer", 3, grey=True) < response("bayer", 3, grey=True) < 1.0
+    assert 0.5 < response("quad_bayer", 8, grey=False) < response("bayer", 8, grey=False) < 0.65
+
+
+@pytest.mark.parametrize("name", ["quad_rgbw", "rgbw"])
+def test_a_full_w_does_not_tell_the_others_what_they_are(name):
+    tile = MOSAICS[name]
+    planes = np.broadcast_to([500.0, 1000.0, 400.0, 20_000.0], (32, 32, 4))
+    raw = raw_image(np.minimum(mosaic(planes, tile) + 100, 15_100), tile)
+    ramp = np.linspace(0.5, 1.5, 32)[:, None, None] * planes
+    found = reconstruct_linear(raw_image(np.minimum(mosaic(ramp, tile) + 100, 15_100), tile)).estimate
+    assert raw.saturated[mask(tile, "W", raw.shape)].all()
+    np.testing.assert_allclose(reconstruct_linear(raw).estimate[..., :3], planes[..., :3], rtol=2e-3)
+    np.testing.assert_allclose(found[..., :3], ramp[..., :3], rtol=2e-2)
+
+
+@pytest.mark.parametrize("level_e", [0.0, 1.0, 10.0, 300.0])
+def test_an_even_field_has_no_bias_from_the_dark_on(level_e):
+    sensor = preset("low_noise", "quad_bayer")
+    quiet = replace(sensor, pixel=replace(sensor.pixel, prnu=0.0, dsnu_e=0.0, dark_current_e_per_s=0.0))
+    device = draw_device(quiet, (256, 256), np.random.default_rng(0))
+    raw = expose(np.full((256, 256), level_e), quiet, 0.01, device, np.random.default_rng(1), exact=True)
+    estimate = reconstruct_linear(raw).estimate.mean((0, 1))
+    # stated: 0.1 e-; beside it the mean of a quarter of the frame within 4.5 standard errors: false-alarm rate 8e-5
+    allowed = 0.1 + 4.5 * np.sqrt((level_e + raw.dark_noise_e**2) / (256 * 256 / 4))
+    np.testing.assert_allclose(estimate, level_e, atol=allowed)

@@ -1,0 +1,321 @@
+"""Binning of 2x2 pixels against closed forms, and against chips drawn and read out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rodcone.errors import InputError
+from rodcone.jit import backend
+from sensor.binning import as_read, block_sums, of_read_pixels
+from sensor.capture import expose
+from sensor.cfa import BAYER, MOSAICS, RGBW, binned_tile, quad, tile_of
+from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.config_file import read_sensor
+from sensor.curves import built_in
+from sensor.device import draw_device
+from sensor.readout import electrons_at_snr, noise_sources, noise_variance
+from sensor.variations import vary
+
+QUIET = PixelConfig(1.0, 0.9, full_well_e=8000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
+BOTH = pytest.mark.parametrize("binning", ["charge", "digital"])
+
+
+def camera(binning, cfa="quad_bayer", bits=14, black_level_dn=64, **pixel):
+    return SensorConfig(
+        replace(QUIET, **pixel),
+        LensConfig(2.8),
+        cfa=tile_of(cfa),
+        bits=bits,
+        black_level_dn=black_level_dn,
+        binning=binning,
+    )
+
+
+def even_frame(sensor, photo_e, shape=(64, 64), exposure_s=0.1, seed=1, exact=True):
+    """Raw image of a field that is even, `photo_e` electrons a photodiode."""
+    device = draw_device(sensor, shape, np.random.default_rng(seed))
+    rng = np.random.default_rng(seed + 1)
+    return expose(np.full(shape, float(photo_e)), sensor, exposure_s, device, rng, exact=exact)
+
+
+# Mosaics
+
+
+def test_quad_mosaics_are_the_plain_ones_with_2x2_pixels_for_each():
+    assert MOSAICS["quad_bayer"] == ("RRGG", "RRGG", "GGBB", "GGBB")
+    assert MOSAICS["quad_rgbw"] == ("RRGG", "RRGG", "BBWW", "BBWW")
+
+
+@pytest.mark.parametrize("tile", [BAYER, RGBW, ("W",), ("RC", "CB"), MOSAICS["rgbw_4x4"]])
+def test_binning_undoes_quad(tile):
+    assert binned_tile(quad(tile)) == tile
+
+
+def test_mono_of_one_pixel_bins_to_itself():
+    assert binned_tile(("W",)) == ("W",)
+    assert even_frame(camera("charge", "mono"), 10).cfa == ("W",)
+
+
+@pytest.mark.parametrize("cfa", ["bayer", "rgbw", "rgbw_4x4", "rccb"])
+def test_a_mosaic_whose_2x2_pixels_differ_is_refused_in_one_line(cfa):
+    with pytest.raises(InputError, match=r"binning: 2x2 pixels of the mosaic .* aren't of one channel; allowed") as found:
+        SensorConfig(QUIET, LensConfig(2.8), cfa=tile_of(cfa), responses=built_in(), binning="charge")
+    assert "\n" not in str(found.value)
+
+
+def test_a_tile_of_three_pixels_is_refused_for_what_its_second_repeat_holds():
+    with pytest.raises(InputError, match="aren't of one channel"):
+        binned_tile(("RRG", "RRG", "GGB"))
+
+
+@BOTH
+def test_a_processor_s_mosaic_is_the_raw_image_s(binning):
+    assert vary(camera(binning), "rgbw").cfa == MOSAICS["quad_rgbw"]
+    assert as_read(vary(camera(binning), "bayer")).cfa == BAYER
+    assert as_read(vary(camera(binning), "rgbw_nd")).cfa == RGBW
+
+
+# The raw image
+
+
+@BOTH
+@pytest.mark.parametrize("exact", [True, False])
+def test_the_raw_image_has_half_the_size_the_plain_mosaic_and_its_levels(binning, exact):
+    if not exact and backend() == "numpy":
+        pytest.skip("Dr.Jit has no backend here")
+    raw = even_frame(camera(binning), 100.0, (24, 40), exact=exact)
+    assert raw.shape == (12, 20)
+    assert raw.cfa == BAYER
+    scale = 4 if binning == "digital" else 1
+    assert (raw.black_dn, raw.white_dn) == (scale * 64, scale * (2**14 - 1))
+    assert raw.full_well_e == pytest.approx(4 * 8000.0, rel=1e-12)
+
+
+@BOTH
+def test_a_sum_holds_the_light_of_its_own_four_pixels(binning):
+    """No noise but Poisson's: each block's mean over exposures is the sum of its four means."""
+    sensor, light = camera(binning, black_level_dn=0), np.arange(1.0, 65.0).reshape(8, 8) * 10
+    device = draw_device(sensor, (8, 8), np.random.default_rng(0))
+    rng, n = np.random.default_rng(1), 400
+    mean = sum(expose(light, sensor, 0.1, device, rng, exact=True).electrons for _ in range(n)) / n
+    error = np.sqrt(block_sums(light) / n)
+    assert np.all(np.abs(mean - block_sums(light)) < 5 * error)  # 16 blocks: false-alarm rate 9e-6
+
+
+@BOTH
+@pytest.mark.parametrize("exact", [True, False])
+def test_prnu_of_four_pixels_is_averaged_and_dsnu_added(binning, exact):
+    """What stays of the mean over exposures is the chip's own pattern, to the last digit of its noise."""
+    if not exact and backend() == "numpy":
+        pytest.skip("Dr.Jit has no backend here")
+    pixel = {"prnu": 0.05, "dsnu_e": 20.0, "full_well_e": 8000.0}
+    sensor = camera(binning, **pixel)
+    one = replace(sensor, binning="")
+    chip, apart = (draw_device(s, (64, 64), np.random.default_rng(5)) for s in (sensor, one))
+    np.testing.assert_array_equal(chip.photo_response, apart.photo_response)  # one chip, read in two ways
+    offsets_e = block_sums(apart.dark_offset_e)
+    np.testing.assert_allclose(of_read_pixels(apart.dark_offset_e, sensor), offsets_e)
+    expected = 1000.0 * block_sums(apart.photo_response) + offsets_e
+    rng, n = np.random.default_rng(6), 64
+    frames = [expose(np.full((64, 64), 1000.0), sensor, 0.1, chip, rng, exact=exact).electrons for _ in range(n)]
+    deviation = (np.mean(frames, axis=0) - expected) / np.sqrt(4000.0 / n)
+    # chi-square of 1024 pixels within 4.5 standard errors, and the gain's rounding: false-alarm rate 7e-6
+    assert abs((deviation**2).mean() - 1.0) < 4.5 * np.sqrt(2 / deviation.size) + 0.01
+
+
+@BOTH
+def test_dark_current_of_four_pixels_adds(binning):
+    raw = even_frame(camera(binning, dark_current_e_per_s=500.0), 0.0, (256, 256))
+    assert abs(raw.electrons.mean() - 200.0) < 4.5 * np.sqrt(200.0 / raw.dn.size)  # false-alarm rate 7e-6
+
+
+@BOTH
+def test_a_block_with_a_hot_pixel_is_listed_as_defective(binning):
+    sensor = camera(binning, hot_pixel_share=0.02)
+    device = draw_device(sensor, (64, 64), np.random.default_rng(1))
+    raw = even_frame(sensor, 10.0)
+    np.testing.assert_array_equal(raw.defects, np.unique(np.argwhere(device.hot) // 2, axis=0))
+
+
+# Wells
+
+
+@BOTH
+def test_each_pixel_clips_at_its_own_well_first(binning):
+    """One lamp in a block: it gives its one well, however bright, and its dim neighbours what they hold."""
+    sensor, light = camera(binning), np.zeros((4, 4))
+    light[0, 1] = 1e6
+    device = draw_device(sensor, (4, 4), np.random.default_rng(0))
+    raw = expose(light, sensor, 0.1, device, np.random.default_rng(0), exact=True)
+    np.testing.assert_allclose(raw.electrons, [[8000.0, 0.0], [0.0, 0.0]], atol=4 * raw.gain_e_per_dn)
+
+
+def test_the_floating_diffusion_clips_the_sum_in_charge_and_nothing_else():
+    limited, digital = (even_frame(camera(b, binned_well_e=20_000.0), 7000.0) for b in ("charge", "digital"))
+    assert limited.full_well_e == pytest.approx(20_000.0)
+    assert limited.saturated.all()
+    assert digital.full_well_e == pytest.approx(32_000.0)
+    assert not digital.saturated.any()
+    assert digital.electrons.mean() == pytest.approx(28_000.0, rel=1e-3)
+
+
+@BOTH
+def test_all_full_reads_white(binning):
+    np.testing.assert_array_equal(even_frame(camera(binning), 1e7).dn, 4 * 16_383 if binning == "digital" else 16_383)
+
+
+# Noise
+
+
+@pytest.mark.parametrize(
+    ("pixel", "charge", "digital"),
+    [
+        ({}, 0.0, 0.0),
+        ({"read_noise_e": 3.0}, 9.0, 36.0),  # one read, or four
+        ({"dsnu_e": 4.0}, 64.0, 64.0),  # of four photodiodes
+        ({"column_offset_e": 5.0}, 25.0, 200.0),  # one amplifier, or twice each of two columns'
+        ({"prnu": 0.02}, 4 * 0.0004 * 100.0**2, 4 * 0.0004 * 100.0**2),
+        ({"dark_current_e_per_s": 70.0}, 28.0, 28.0),
+        ({"hot_pixel_share": 0.1, "hot_pixel_dark_current_e_per_s": 70.0}, 20.44, 20.44),  # 4 * (0.7 + 0.09 * 49)
+        # the sum through one amplifier; or through each of two what its two pixels hold, 2 x 0.0009 x (200 + 200^2),
+        # of which `as_read` leaves half of 0.0009 of the shot noise out
+        ({"column_gain_spread": 0.03}, 0.0009 * (400.0 + 400.0**2), 2 * 0.0009 * (200.0 / 2 + 200.0**2)),
+        ({"crosstalk": 0.1}, 0.0, 0.0),
+    ],
+)
+def test_each_term_alone_in_closed_form(pixel, charge, digital):
+    """100 e- a photodiode in 0.1 s, beside 400 of shot noise and the roundings: one of the sum's gain, or four."""
+    for binning, expected in (("charge", charge), ("digital", digital)):
+        sensor = camera(binning, **pixel)
+        gain = (32_000.0 if binning == "charge" else 8000.0) / (16_383 - 64)
+        roundings = gain**2 / 12 * (1 if binning == "charge" else 4)
+        found = noise_variance(np.full((2, 2), 400.0), sensor, 0.1)
+        np.testing.assert_allclose(found, 400.0 + expected + roundings, rtol=1e-12)
+        assert sum(x**2 for x in noise_sources(400.0, sensor, 0.1).values()) == pytest.approx(found[0, 0], rel=1e-12)
+
+
+def test_where_read_noise_rules_charge_gains_12_db_and_digital_6():
+    """Of four times the signal: once the read noise, or twice (Singh, arXiv:2306.17078, section 1)."""
+    signal_e, loud = 1.0, {"read_noise_e": 100.0, "full_well_e": 8000.0}
+    one = noise_variance(np.full((1, 1), signal_e), camera("", **loud), 0.0)[0, 0]
+    for binning, decibels in (("charge", 12.04), ("digital", 6.02)):
+        four = noise_variance(np.full((1, 1), 4 * signal_e), camera(binning, **loud), 0.0)[0, 0]
+        assert 10 * np.log10(16 * one / four) == pytest.approx(decibels, abs=0.01)
+
+
+REAL = {
+    "read_noise_e": 3.0,
+    "dsnu_e": 4.0,
+    "prnu": 0.02,
+    "dark_current_e_per_s": 200.0,
+    "column_gain_spread": 0.01,
+    "column_offset_e": 2.0,
+    "hot_pixel_share": 0.05,
+    "hot_pixel_dark_current_e_per_s": 500.0,
+    "crosstalk": 0.05,
+}
+
+
+@BOTH
+@pytest.mark.parametrize("exact", [True, False])
+@pytest.mark.parametrize("photo_e", [0.0, 5.0, 100.0, 5000.0])
+def test_chips_drawn_at_random_have_the_stated_snr(binning, exact, photo_e):
+    if not exact and backend() == "numpy":
+        pytest.skip("Dr.Jit has no backend here")
+    sensor = camera(binning, black_level_dn=None, **REAL)
+    raw = even_frame(sensor, photo_e, (128, 8192), exact=exact)
+    stated = noise_variance(np.full((1, 1), 4 * photo_e), sensor, 0.1)[0, 0]
+    # Standard error of the mean over columns of (value - mean)^2, as of `test_readout_variance`; raw columns share no
+    # amplifier with their neighbours. Within 4 of it, 16 cases: false-alarm rate 1e-3.
+    squares = ((raw.electrons - raw.electrons.mean()) ** 2).mean(axis=0)
+    error = squares.std() / np.sqrt(squares.size)
+    assert error < 0.03 * stated
+    assert abs(squares.mean() - stated) < 4 * error
+    mean_e = 4 * (photo_e + 20.0 + 0.05 * 50.0)
+    assert abs(raw.electrons.mean() - mean_e) < 4 * raw.electrons.mean(axis=0).std() / np.sqrt(squares.size)
+
+
+@pytest.mark.parametrize(("binning", "bits"), [("charge", 12), ("digital", 10)])  # roundings of 6 % and 19 % of it
+def test_the_raw_image_states_its_own_dark_noise(binning, bits):
+    """Read noise, DSNU and all roundings: what weighs frames, finds saturation and goes into a negative's profile."""
+    raw = even_frame(camera(binning, read_noise_e=3.0, dsnu_e=4.0, bits=bits), 0.0, (512, 512))
+    # of a variance of normal values, within 4.5 standard errors: false-alarm rate 7e-6
+    assert raw.electrons.var() == pytest.approx(raw.dark_noise_e**2, rel=4.5 * np.sqrt(2 / raw.dn.size))
+
+
+@BOTH
+def test_light_for_an_snr_is_of_the_sum(binning):
+    sensor = camera(binning, **{name: REAL[name] for name in ("read_noise_e", "dsnu_e", "prnu")})
+    electrons = electrons_at_snr(10.0, sensor, 0.1)
+    assert electrons / np.sqrt(noise_variance(np.full((1, 1), electrons), sensor, 0.1)[0, 0]) == pytest.approx(10.0)
+
+
+def test_a_sensor_that_does_not_bin_is_read_as_it_is():
+    sensor = camera("")
+    assert as_read(sensor) is sensor
+    assert as_read(as_read(camera("charge"))) == as_read(camera("charge"))
+
+
+# Hostile input
+
+
+@BOTH
+@pytest.mark.parametrize("shape", [(33, 40), (40, 33), (5, 5)])
+def test_an_odd_size_is_refused_in_one_line(binning, shape):
+    with pytest.raises(InputError, match=r"size: \d+ x \d+ pixels with binning .* even height and width; give ") as found:
+        draw_device(camera(binning), shape, np.random.default_rng(0))
+    assert "\n" not in str(found.value)
+
+
+@pytest.mark.parametrize("binning", ["analog", "Charge", 2, None, False, ["charge"]])
+def test_another_binning_is_refused(binning):
+    with pytest.raises(InputError, match=r"binning: .*allowed: charge, digital"):
+        camera(binning)
+
+
+def test_a_sum_beyond_16_bits_is_refused():
+    with pytest.raises(InputError, match=r"bits: 15 with binning 'digital'.*up to 14"):
+        camera("digital", bits=15)
+    assert camera("charge", bits=16).binning == "charge"
+
+
+@pytest.mark.parametrize("binned_well_e", [-1.0, 7999.0, np.nan, 1e13])
+def test_a_floating_diffusion_under_one_well_is_refused(binned_well_e):
+    with pytest.raises(InputError, match="binned_well_e"):
+        camera("charge", binned_well_e=binned_well_e)
+
+
+PRESET = """
+cfa = "{cfa}"
+binning = {binning}
+[pixel]
+pitch_um = 1.0
+fill_factor = 0.9
+full_well_e = 8000
+read_noise_e = 2.0
+dsnu_e = 1.0
+prnu = 0.01
+binned_well_e = 20000
+[lens]
+f_number = 2.0
+"""
+
+
+def test_a_sensor_file_names_binning_and_its_well(tmp_path):
+    path = tmp_path / "quad.toml"
+    path.write_text(PRESET.format(cfa="quad_rgbw", binning='"charge"'))
+    sensor = read_sensor(path)
+    assert (sensor.binning, as_read(sensor).pixel.full_well_e, as_read(sensor).cfa) == ("charge", 20_000.0, RGBW)
+
+
+@pytest.mark.parametrize(
+    ("cfa", "binning"),
+    [("quad_bayer", '"analog"'), ("quad_bayer", "true"), ("quad_bayer", "false"), ("bayer", '"charge"')],
+)
+def test_a_wrong_sensor_file_is_refused_by_name(tmp_path, cfa, binning):
+    path = tmp_path / "quad.toml"
+    path.write_text(PRESET.format(cfa=cfa, binning=binning))
+    with pytest.raises(InputError, match=r"sensor file '.*quad.toml': binning: ") as found:
+        read_sensor(path)
+    assert "\n" not in str(found.value)
