@@ -45,7 +45,7 @@ hard-cases: $(VENV)/installed-dev
 faults: $(VENV)/installed-dev
 	@$(BIN)/python tests/faults/plant_faults.py
 
-# Pages open from the file; the search needs a server: python3 -m http.server -d out/site
+# Pages open from the file, and their search works there too.
 docs: $(VENV)/installed-docs
 	@$(MAKE) --no-print-directory -f docs/figures.mk BIN=$(BIN)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet

@@ -20,6 +20,9 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("rodcone", "render", "scenes", "sensor", "isp", "studies")
 FIGURES = ("*", "demo/*", "paper/*", "tutorial/*/*", "how_to/*/*")  # what docs/figures.mk makes
 SHOWN = (".html", ".png", ".svg")
+# How much a word of a page counts in the search, by the page's folder; elsewhere 1. Who searches wants to do something:
+# how-tos come first, then what can be named; why it is so and the functions within come last.
+BOOSTS = {"how_to": 4.0, "tutorial": 4.0, "gallery": 2.0, "decisions": 0.25, "api": 0.25}
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 NAME = re.compile(rf"(<a\b[^>]*>)?<code>((?:{'|'.join(PACKAGES)})(?:\.\w+)+)</code>")  # a link in front: left alone
 
@@ -57,7 +60,8 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> str:
-    """Show beneath each block that docs/run_page.py ran what it printed."""
+    """Show beneath each block that docs/run_page.py ran what it printed; weigh the page for the search."""
+    page.meta["search"] = {"boost": BOOSTS.get(page.file.src_uri.partition("/")[0], 1.0)}
     outputs = ROOT / config.extra["figures"] / page.file.src_uri.removesuffix(".md") / "output.json"
     if not outputs.is_file():
         return markdown

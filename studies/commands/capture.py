@@ -39,8 +39,8 @@ def capture(
     Parameters
     ----------
     source
-        Scene by name such as color_checker, a Mitsuba scene (.xml), or a file of spectral radiance: .exr, or .mat of
-        ISETCam.
+        Scene by name such as color_checker, a Mitsuba scene (.xml), a file of spectral radiance (.exr, or .mat of
+        ISETCam), a cube described by a .toml beside it (.npy, ENVI's .hdr, .mat), or a photograph (.jpg, .png).
     out
         Raw file to write: .dng for Bayer and 2x2 RGBW (with a re-mosaiced Bayer one beside it, NAME_bayer.dng), .tif
         with a .json beside it for any mosaic.

@@ -13,8 +13,8 @@ from scenes import catalog
 from sensor import cfa, presets
 from sensor.cameras.library import measured_cameras
 from studies.commands.console import Flag, OutOrNone, print_table, require_ending
+from studies.pages.curve_gallery import lights_svg, responses_svg
 from studies.pages.report_text import METRICS
-from studies.pages.response_gallery import gallery_svg
 
 # CIE 015:2018, with the correlated colour temperatures that it states.
 LIGHTS = {
@@ -49,7 +49,7 @@ def list_names(kind: Kind | None = None, /, *, out: OutOrNone = None, json: Flag
     kind
         scenes, lights, sensors, mosaics, processors or metrics; all of them by default.
     out
-        With sensors, gallery of the measured responses to write as well (.svg).
+        With lights or sensors, gallery of their curves to write as well (.svg).
     json
         Print one JSON object: kinds, and in each the names with their texts.
     """
@@ -65,16 +65,20 @@ def list_names(kind: Kind | None = None, /, *, out: OutOrNone = None, json: Flag
 
 
 def _write_gallery(kind: Kind | None, out: Path) -> None:
-    """Draw the measured responses, where there are some."""
+    """Draw the spectra of the lights, or the responses of the sensors."""
     require_ending(out, ".svg")
-    if kind != "sensors" or not measured_cameras():
-        raise InputError(
-            f"out: {str(out)!r} has nothing to show; allowed: with sensors, where measured responses are at hand "
-            "(rodcone new cameras); leave it out"
-        )
+    if kind not in ("lights", "sensors"):
+        raise InputError(f"out: {str(out)!r} has no curves to show; allowed: with lights or sensors; leave it out")
     check_place(out)
+    if kind == "lights":
+        text = lights_svg({name: illuminants.illuminant(name) for name in lights()})
+    else:  # a * where channels don't share a unit
+        measured = {
+            f"{name}{'' if each.balanced else '*'}": each.responses for name, each in measured_cameras().items()
+        }
+        text = responses_svg({"the presets": presets.low_noise().responses, **measured})
     with replacing(out) as (place,):
-        place.write_text(gallery_svg(measured_cameras()), "utf-8")
+        place.write_text(text, "utf-8")
 
 
 def scenes() -> dict[str, str]:

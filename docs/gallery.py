@@ -1,0 +1,210 @@
+"""Make the galleries: `python docs/gallery.py [FOLDER] [SCENE ...]` writes pages, pictures and drawings into docs/gallery.
+
+A picture is made by the very commands that stand beneath it, in a folder that is thrown away. Scenes named on the command
+line are photographed anew, without any all are; the pages' text is always written.
+"""
+
+import inspect
+import shlex
+import subprocess
+import sys
+import tempfile
+from importlib import import_module
+from pathlib import Path
+
+from PIL import Image
+
+from scenes import catalog
+from sensor import cfa, presets
+from studies.commands.list import first_line, lights, sensors
+
+FOLDER = Path(__file__).resolve().parent / "gallery"
+QUALITY = 80  # of the pictures, as WebP counts it
+# What each scene is photographed with: its light, and the exposure where the rule's would be longer than its 66 ms.
+SHOWN = {
+    "color_checker": "--level 500lux",
+    "cornell_box": "--level 300lux",
+    "flat_field": "--level 25cd/m2",
+    "furnace": "--level 25cd/m2",
+    "generated": "--level 200cd/m2",
+    "lit_and_shadowed": "",
+    "metamers": "--level 500lux",
+    "night_street": "--exposure 50ms",
+    "siemens_star": "--level 200cd/m2",
+    "slanted_edge": "--level 200cd/m2",
+    "still_life": "--level 500lux",
+    "still_life_outdoor": "",
+}
+MADE = "Made by `python docs/gallery.py`: each picture by the commands beneath it."
+
+
+def commands(scene: str) -> list[str]:
+    """Commands that photograph a scene of the catalogue."""
+    words = f"{SHOWN[scene]} --size 400 --spp 64".strip()
+    return [f"rodcone capture {scene} {words} -o {scene}.dng", f"rodcone develop {scene}.dng --width 320"]
+
+
+def scenes_page() -> str:
+    """Page of the scenes."""
+    names = catalog.names()
+    sheet = "\n".join(f"[![{name}]({name}.webp){{ width=150 }}](#{name})" for name in names)
+    return f"""# Scenes
+
+What can be photographed by name, in `rodcone capture NAME`, `render`, `explore` and a study's `scenes`; `rodcone list scenes`
+prints the same. {MADE} Each camera is `low_noise` with the RGBW mosaic, except where a command says otherwise. A scene of your
+own: [how to](../how_to/own_scene.md).
+
+{sheet}
+
+{"".join(map(scene_section, names))}"""
+
+
+def scene_section(name: str) -> str:
+    """Section of one scene: picture, facts, commands."""
+    scene = catalog.load(name)
+    module = import_module(f"scenes.{name}")
+    options = inspect.signature(getattr(module, name)).parameters.values()
+    facts = {
+        "lights": ", ".join(f"`{group}`" for group in scene.groups),
+        "proportions": "{1}:{0}".format(*reduced(scene.size)),
+        "levels": "cd/m² and lux" if scene.reference_plane else "cd/m²",
+        "options in Python": ", ".join(f"`{option}`" for option in options) or "none",
+    }
+    told = "; ".join(f"{fact}: {value}" for fact, value in facts.items())
+    return f"""## {name} {{ #{name} }}
+
+{first_line(module.__doc__)}
+
+![{name}]({name}.webp)
+
+{told[0].upper()}{told[1:]}.
+
+```sh
+{chr(10).join(commands(name))}
+```
+
+"""
+
+
+def reduced(size: tuple[int, int]) -> tuple[int, int]:
+    """Proportions in whole numbers."""
+    height, width = size
+    divisor = next(n for n in range(min(size), 0, -1) if height % n == 0 == width % n)
+    return height // divisor, width // divisor
+
+
+def lights_page() -> str:
+    """Page of the lights."""
+    rows = "\n".join(f"| `{name}` | {text} |" for name, text in lights().items())
+    return f"""# Lights
+
+Illuminants by name: `--light A`, `--light sky=D65` and `--white-balance D65` on the command line, `spectra = ["D65", "A"]` in a
+study, `rodcone.illuminant("D65")` in Python. A lamp of your own is a CSV file whose name stands in the same places:
+[lamps and reflectances that were measured](../how_to/own_scene.md#lamps-and-reflectances-that-were-measured).
+
+![Spectra of the illuminants](lights.svg){{ .drawing }}
+
+```sh
+rodcone list lights -o lights.svg
+```
+
+Relative power over wavelength in bands of 5 nm, the greatest 1. Each is scaled to the level that is asked for, in cd/m² or lux,
+when it lights a scene: a render serves all of them.
+
+| name | what |
+|---|---|
+{rows}
+"""
+
+
+def sensors_page() -> str:
+    """Page of the sensors and mosaics."""
+    rows = []
+    for name in presets.names():
+        camera = presets.preset(name)
+        pixel = camera.pixel
+        rows.append(
+            f"| `{name}` | {pixel.pitch_um:g} | {pixel.full_well_e:,.0f} | {pixel.read_noise_e:.3g} | "
+            f"{pixel.dsnu_e:.3g} | {pixel.prnu:.1%} | f/{camera.lens.f_number:g} | {camera.bits} |".replace(",", " ")
+        )
+    texts = "\n".join(f"- `{name}`: {text}" for name, text in sensors().items() if name in presets.names())
+    mosaics = "\n".join(
+        f"| `{name}` | {'<br>'.join(f'`{row}`' for row in cfa.tile_of(name))} |" for name in cfa.mosaics()
+    )
+    table = "\n".join(rows)
+    return f"""# Sensors
+
+Presets by name: `--sensor low_noise`, `sensors = ["low_noise"]` in a study, `rodcone.low_noise()` in Python. `rodcone new preset
+low_noise -o mine.toml` copies one to change, [how to](../how_to/own_sensor.md). 52 cameras whose responses were measured come by
+name from a collection that you copy once: [a camera that exists](../how_to/real_camera.md).
+
+| preset | pitch, µm | full well, e⁻ | read noise, e⁻ | DSNU, e⁻ | PRNU | lens | bits |
+|---|---|---|---|---|---|---|---|
+{table}
+
+{texts}
+
+## Responses
+
+Electrons a photon over wavelength, the same in all presets; with measured cameras at hand the same command draws each of them.
+
+![Responses of R, G, B and W](sensors.svg){{ .drawing }}
+
+```sh
+rodcone list sensors -o sensors.svg
+```
+
+## In how little light
+
+```sh
+rodcone snr low_noise table1_output table1_pixel --at 10 --exposure 33ms -o snr.svg
+```
+
+![SNR over light of three presets](snr.svg){{ .drawing }}
+
+## Mosaics
+
+Any preset goes with any mosaic: `--cfa bayer`. The rows of one tile:
+
+| mosaic | tile |
+|---|---|
+{mosaics}
+"""
+
+
+PAGES = {"scenes.md": scenes_page, "lights.md": lights_page, "sensors.md": sensors_page}
+DRAWINGS = (
+    "rodcone list lights -o lights.svg",
+    "rodcone list sensors -o sensors.svg",
+    "rodcone snr low_noise table1_output table1_pixel --at 10 --exposure 33ms -o snr.svg",
+)
+
+
+def run(command: str, folder: Path) -> None:
+    """Run a command of the page's in a folder."""
+    call = [sys.executable, "-c", "from studies.commands.cli import main; main()", *shlex.split(command)[1:]]
+    subprocess.run(call, cwd=folder, check=True, stdout=subprocess.DEVNULL)
+
+
+def photograph(scene: str, folder: Path) -> None:
+    """Write ``SCENE.webp`` into a folder."""
+    with tempfile.TemporaryDirectory() as scratch:
+        for command in commands(scene):
+            run(command, Path(scratch))
+        with Image.open(Path(scratch) / f"{scene}.png") as picture:
+            picture.convert("RGB").save(folder / f"{scene}.webp", quality=QUALITY, method=6)
+
+
+def main(folder: Path, scenes: tuple[str, ...]) -> None:
+    """Write the pages, the drawings, and the pictures of some scenes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, page in PAGES.items():
+        (folder / name).write_text(page(), "utf-8")
+    for command in DRAWINGS:
+        run(command, folder)
+    for scene in scenes:
+        photograph(scene, folder)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if sys.argv[1:] else FOLDER, tuple(sys.argv[2:]) or catalog.names())
