@@ -47,12 +47,12 @@ def commands(scene: str) -> list[str]:
 def scenes_page() -> str:
     """Page of the scenes."""
     names = catalog.names()
-    sheet = "\n".join(f"[![{name}]({name}.webp){{ width=150 }}](#{name})" for name in names)
+    sheet = "\n".join(f"[![{name}]({name}.webp){{ .thumbnail }}](#{name})" for name in names)
     return f"""# Scenes
 
 What can be photographed by name, in `rodcone capture NAME`, `render`, `explore` and a study's `scenes`; `rodcone list scenes`
-prints the same. {MADE} Each camera is `low_noise` with the RGBW mosaic, except where a command says otherwise. A scene of your
-own: [how to](../how_to/own_scene.md).
+prints the same. {MADE} The camera is `low_noise` with its RGBW mosaic. A scene of your own:
+[how to](../how_to/own_scene.md).
 
 {sheet}
 
@@ -125,7 +125,9 @@ def sensors_page() -> str:
         pixel = camera.pixel
         rows.append(
             f"| `{name}` | {pixel.pitch_um:g} | {pixel.full_well_e:,.0f} | {pixel.read_noise_e:.3g} | "
-            f"{pixel.dsnu_e:.3g} | {pixel.prnu:.1%} | f/{camera.lens.f_number:g} | {camera.bits} |".replace(",", " ")
+            f"{pixel.dsnu_e:.3g} | {pixel.prnu:.1%} | f/{camera.lens.f_number:g} |".replace(
+                ",", "\N{NARROW NO-BREAK SPACE}"
+            )
         )
     texts = "\n".join(f"- `{name}`: {text}" for name, text in sensors().items() if name in presets.names())
     mosaics = "\n".join(
@@ -138,8 +140,8 @@ Presets by name: `--sensor low_noise`, `sensors = ["low_noise"]` in a study, `ro
 low_noise -o mine.toml` copies one to change, [how to](../how_to/own_sensor.md). 52 cameras whose responses were measured come by
 name from a collection that you copy once: [a camera that exists](../how_to/real_camera.md).
 
-| preset | pitch, µm | full well, e⁻ | read noise, e⁻ | DSNU, e⁻ | PRNU | lens | bits |
-|---|---|---|---|---|---|---|---|
+| preset | pitch, µm | full well, e⁻ | read noise, e⁻ | DSNU, e⁻ | PRNU | lens |
+|---|---|---|---|---|---|---|
 {table}
 
 {texts}

@@ -127,13 +127,14 @@ def _module(path: Path, content: bytes) -> ModuleType:
     return module
 
 
-def _run(path: Path, function: Any, *args: Any, **options: Any) -> Any:
+def _run(path: Path, function: Any, raw: RawImage, colours: Any, **options: Any) -> Any:
     try:
-        return function(*args, **options)
+        return function(raw, colours, **options)
     except InputError:
         raise
     except (Exception, SystemExit) as error:
-        raise InputError(f"processors: {_failure(path, error)}") from error
+        told = f"{_failure(path, error)}; it was given a mosaic of {'/'.join(raw.cfa)}"
+        raise InputError(f"processors: {told}") from error
 
 
 def _failure(path: Path, error: BaseException) -> str:

@@ -12,7 +12,7 @@ from rodcone.plots import CHANNEL_COLOURS, INK
 from sensor.curves import Responses
 from studies.pages.plots import STYLE, blank, plain_ticks, svg_text
 
-COLUMNS, WIDTH, HEIGHT = 6, 118.0, 92.0  # panels in a row; size of each [points]
+COLUMNS, WIDTH, HEIGHT = 4, 120.0, 96.0  # panels in a row; size of each [points]
 BAND_NM = 5.0  # lines of lamps are drawn as wide as the published tables' steps
 NM = np.arange(380.0 + BAND_NM / 2, 780.0, BAND_NM)
 
@@ -43,11 +43,11 @@ def _svg(panels: Mapping[str, Curves]) -> str:
     for axes, (name, curves) in zip(grid.flat, panels.items(), strict=False):
         for channel, (nm, values) in curves.items():
             axes.plot(nm, values, color=CHANNEL_COLOURS.get(channel, INK), linewidth=0.9)
-        axes.set_title(name.replace("$", r"\$"), fontsize=7)  # a formula's sign
+        axes.set_title(name.replace("$", r"\$"), fontsize=8)  # a formula's sign
         axes.set(xlim=(380, 780), ylim=(0, 1.05))
-        axes.tick_params(labelsize=6)
+        axes.tick_params(labelsize=7)
         plain_ticks(axes)
     for axes in list(grid.flat)[len(panels) :]:
         axes.set_visible(False)
-    figure.supxlabel("nm", fontsize=7)
+    figure.supxlabel("nm", fontsize=8)
     return svg_text(figure)

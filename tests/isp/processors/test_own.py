@@ -79,6 +79,7 @@ def test_nothing_runs_without_consent_nor_where_the_bytes_are_others(tmp_path: P
         ("def develop(raw): pass", "fails (TypeError"),
         ("def develop(raw, matrix, **options):\n    return {}['x']", "fails at line 2 (KeyError: 'x')"),
         ("def develop(raw, matrix, **options): raise SystemExit", "fails at line 1 (SystemExit"),
+        ("def develop(raw, matrix, **options): raise SystemExit", "it was given a mosaic of RG/"),
         ("def develop(raw, matrix, **options): pass", "gave NoneType of shape ()"),
         ("def develop(raw, matrix, **options): return 'x'", "gave str of shape (0,)"),
         ("def develop(raw, matrix, **options): return raw.electrons", "gave ndarray of shape (8, 10)"),

@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import colour
 import numpy as np
@@ -50,3 +51,39 @@ def test_the_temperatures_are_those_of_the_spectra(name: str) -> None:
     xyz = tristimulus(illuminant(name).band_average(nm, 1.0), nm, np.ones(nm.size))
     found_k = colour.temperature.xy_to_CCT(xyz[:2] / xyz.sum(), method="McCamy 1992")
     assert found_k == pytest.approx(stated_k, rel=0.01)
+
+
+@pytest.mark.parametrize(("kind", "names"), [("lights", [*illuminants.names(), "3000K"]), ("sensors", ["the presets"])])
+def test_curves_are_drawn_with_every_name(
+    kind: str, names: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    printed(capsys, kind, "-o", str(tmp_path / "curves.svg"))
+    drawn = (tmp_path / "curves.svg").read_text("utf-8")
+    assert [name for name in names if f">{name}</text>" not in drawn] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("lights", "-o", "a.png"), ".svg"),
+        (("scenes", "-o", "a.svg"), "no curves to show"),
+        (("-o", "a.svg"), "no curves to show"),
+        (("lights", "-o", "absent/a.svg"), "absent"),
+    ],
+)
+def test_what_has_no_curves_or_no_place_is_refused_in_one_line(
+    arguments: tuple[str, ...],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as end:
+        main(["list", *arguments])
+    told = capsys.readouterr()
+    assert end.value.code in (1, 2)
+    assert told.out == ""
+    assert words in told.err
+    assert len(told.err.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
