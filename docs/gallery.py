@@ -1,7 +1,7 @@
-"""Make the galleries: `python docs/gallery.py [FOLDER] [SCENE ...]` writes pages, pictures and drawings into docs/gallery.
+"""Make the galleries, docs/gallery: `python docs/gallery.py [SCENE ...]` writes pages, drawings and pictures.
 
-A picture is made by the very commands that stand beneath it, in a folder that is thrown away. Scenes named on the command
-line are photographed anew, without any all are; the pages' text is always written.
+A picture is made by the very commands that stand beneath it, in a folder that is thrown away. Scenes that are named are
+photographed anew, without any all are; pages and drawings are always written.
 """
 
 import inspect
@@ -47,12 +47,12 @@ def commands(scene: str) -> list[str]:
 def scenes_page() -> str:
     """Page of the scenes."""
     names = catalog.names()
-    sheet = "\n".join(f"[![{name}]({name}.webp){{ .thumbnail }}](#{name})" for name in names)
+    sheet = "\n".join(f"[![{name}]({name}.webp)](#{name})" for name in names)
     return f"""# Scenes
 
-What can be photographed by name, in `rodcone capture NAME`, `render`, `explore` and a study's `scenes`; `rodcone list scenes`
-prints the same. {MADE} The camera is `low_noise` with its RGBW mosaic. A scene of your own:
-[how to](../how_to/own_scene.md).
+What can be photographed by name, in `rodcone capture NAME`, `render`, `explore` and a study's `scenes`; `rodcone list
+scenes` prints the same. {MADE}
+The camera is `low_noise` with its RGBW mosaic. A scene of your own: [how to](../how_to/own_scene.md).
 
 {sheet}
 
@@ -66,12 +66,12 @@ def scene_section(name: str) -> str:
     options = inspect.signature(getattr(module, name)).parameters.values()
     facts = {
         "lights": ", ".join(f"`{group}`" for group in scene.groups),
-        "proportions": "{1}:{0}".format(*reduced(scene.size)),
+        "width over height": f"{scene.size[1] / scene.size[0]:.2g}",
         "levels": "cd/m² and lux" if scene.reference_plane else "cd/m²",
         "options in Python": ", ".join(f"`{option}`" for option in options) or "none",
     }
     told = "; ".join(f"{fact}: {value}" for fact, value in facts.items())
-    return f"""## {name} {{ #{name} }}
+    return f"""## {name}
 
 {first_line(module.__doc__)}
 
@@ -86,30 +86,23 @@ def scene_section(name: str) -> str:
 """
 
 
-def reduced(size: tuple[int, int]) -> tuple[int, int]:
-    """Proportions in whole numbers."""
-    height, width = size
-    divisor = next(n for n in range(min(size), 0, -1) if height % n == 0 == width % n)
-    return height // divisor, width // divisor
-
-
 def lights_page() -> str:
     """Page of the lights."""
     rows = "\n".join(f"| `{name}` | {text} |" for name, text in lights().items())
     return f"""# Lights
 
-Illuminants by name: `--light A`, `--light sky=D65` and `--white-balance D65` on the command line, `spectra = ["D65", "A"]` in a
-study, `rodcone.illuminant("D65")` in Python. A lamp of your own is a CSV file whose name stands in the same places:
-[lamps and reflectances that were measured](../how_to/own_scene.md#lamps-and-reflectances-that-were-measured).
+Illuminants by name: `--light A`, `--light sky=D65` and `--white-balance D65` on the command line, `spectra = ["D65",
+"A"]` in a study, `rodcone.illuminant("D65")` in Python. A lamp of your own is a CSV file whose name stands in the same
+places: [lamps and reflectances that were measured](../how_to/own_scene.md#lamps-and-reflectances-that-were-measured).
 
-![Spectra of the illuminants](lights.svg){{ .drawing }}
+![Spectra of the illuminants](lights.svg)
 
 ```sh
 rodcone list lights -o lights.svg
 ```
 
-Relative power over wavelength in bands of 5 nm, the greatest 1. Each is scaled to the level that is asked for, in cd/m² or lux,
-when it lights a scene: a render serves all of them.
+Relative power over wavelength in bands of 5 nm, the greatest 1. Each is scaled to the level that is asked for, in cd/m²
+or lux, when it lights a scene: a render serves all of them.
 
 | name | what |
 |---|---|
@@ -136,9 +129,9 @@ def sensors_page() -> str:
     table = "\n".join(rows)
     return f"""# Sensors
 
-Presets by name: `--sensor low_noise`, `sensors = ["low_noise"]` in a study, `rodcone.low_noise()` in Python. `rodcone new preset
-low_noise -o mine.toml` copies one to change, [how to](../how_to/own_sensor.md). 52 cameras whose responses were measured come by
-name from a collection that you copy once: [a camera that exists](../how_to/real_camera.md).
+Presets by name: `--sensor low_noise`, `sensors = ["low_noise"]` in a study, `rodcone.low_noise()` in Python. `rodcone
+new preset low_noise -o mine.toml` copies one to change, [how to](../how_to/own_sensor.md). 52 cameras whose responses
+were measured come by name from a collection that you copy once: [a camera that exists](../how_to/real_camera.md).
 
 | preset | pitch, µm | full well, e⁻ | read noise, e⁻ | DSNU, e⁻ | PRNU | lens |
 |---|---|---|---|---|---|---|
@@ -148,9 +141,10 @@ name from a collection that you copy once: [a camera that exists](../how_to/real
 
 ## Responses
 
-Electrons a photon over wavelength, the same in all presets; with measured cameras at hand the same command draws each of them.
+Electrons a photon over wavelength, the same in all presets; with measured cameras at hand the same command draws each
+of them.
 
-![Responses of R, G, B and W](sensors.svg){{ .drawing }}
+![Responses of R, G, B and W](sensors.svg)
 
 ```sh
 rodcone list sensors -o sensors.svg
@@ -162,7 +156,7 @@ rodcone list sensors -o sensors.svg
 rodcone snr low_noise table1_output table1_pixel --at 10 --exposure 33ms -o snr.svg
 ```
 
-![SNR over light of three presets](snr.svg){{ .drawing }}
+![SNR over light of three presets](snr.svg)
 
 ## Mosaics
 
@@ -197,16 +191,10 @@ def photograph(scene: str, folder: Path) -> None:
             picture.convert("RGB").save(folder / f"{scene}.webp", quality=QUALITY, method=6)
 
 
-def main(folder: Path, scenes: tuple[str, ...]) -> None:
-    """Write the pages, the drawings, and the pictures of some scenes."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, page in PAGES.items():
-        (folder / name).write_text(page(), "utf-8")
-    for command in DRAWINGS:
-        run(command, folder)
-    for scene in scenes:
-        photograph(scene, folder)
-
-
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if sys.argv[1:] else FOLDER, tuple(sys.argv[2:]) or catalog.names())
+    for name, page in PAGES.items():
+        (FOLDER / name).write_text(page(), "utf-8")
+    for command in DRAWINGS:
+        run(command, FOLDER)
+    for scene in sys.argv[1:] or catalog.names():
+        photograph(scene, FOLDER)

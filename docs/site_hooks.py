@@ -14,6 +14,7 @@ from mkdocs.structure.pages import Page
 from mkdocs.utils import get_relative_url
 from run_page import FENCE
 
+from rodcone import _PUBLIC
 from studies.commands.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -133,6 +134,7 @@ def mathml(latex: str, block: bool) -> str:
 
 def linked(name: str, code: str, url: str) -> str:
     """`code` as a link to the page of the module that `name` begins with; as it is where there is none."""
+    name = ".".join(_PUBLIC.get(name.removeprefix("rodcone."), (name,)))
     package, _, inner = name.partition(".")
     found = [module for module in modules(package) if f"{inner}.".startswith(f"{module}.")]
     if not found:

@@ -27,7 +27,7 @@ def test_a_page_is_what_its_command_writes(name: str) -> None:
 def test_every_name_of_the_catalogues_is_shown() -> None:
     pages = {name: (gallery.FOLDER / name).read_text("utf-8") for name in gallery.PAGES}
     assert tuple(gallery.SHOWN) == catalog.names()
-    assert all(f"## {name} {{ #{name} }}" in pages["scenes.md"] for name in catalog.names())
+    assert all(f"## {name}\n" in pages["scenes.md"] for name in catalog.names())
     assert all(f"| `{name}` |" in pages["lights.md"] for name in illuminants.names())
     assert all(f">{name}</text>" in (gallery.FOLDER / "lights.svg").read_text("utf-8") for name in illuminants.names())
     assert all(f"| `{name}` |" in pages["sensors.md"] for name in (*presets.names(), *cfa.mosaics()))
@@ -41,7 +41,7 @@ def test_pictures_are_there_and_small_and_show_something() -> None:
             assert picture.format == "WEBP"
             assert picture.width == 320
             grey = np.asarray(picture.convert("L"))
-        assert 20 < np.percentile(grey, 99), f"{name} is dark"
+        assert np.percentile(grey, 99) > 20, f"{name} is dark"
         assert name in ("flat_field", "furnace") or np.ptp(np.percentile(grey, [5, 95])) > 30, f"{name} is empty"
 
 

@@ -12,7 +12,7 @@ from rodcone.plots import CHANNEL_COLOURS, INK
 from sensor.curves import Responses
 from studies.pages.plots import STYLE, blank, plain_ticks, svg_text
 
-COLUMNS, WIDTH, HEIGHT = 4, 120.0, 96.0  # panels in a row; size of each [points]
+COLUMNS, WIDTH, HIGHEST = 4, 480.0, 200.0  # panels in a row; width of all, and height of the highest [points]
 BAND_NM = 5.0  # lines of lamps are drawn as wide as the published tables' steps
 NM = np.arange(380.0 + BAND_NM / 2, 780.0, BAND_NM)
 
@@ -38,7 +38,7 @@ def responses_svg(responses: Mapping[str, Responses]) -> str:
 @rc_context(STYLE)
 def _svg(panels: Mapping[str, Curves]) -> str:
     rows, columns = ceil(len(panels) / COLUMNS), min(len(panels), COLUMNS)
-    figure = blank(columns * WIDTH, rows * HEIGHT + 20)
+    figure = blank(WIDTH, rows * min(0.8 * WIDTH / columns, HIGHEST) + 20)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for axes, (name, curves) in zip(grid.flat, panels.items(), strict=False):
         for channel, (nm, values) in curves.items():
