@@ -47,6 +47,7 @@ faults: $(VENV)/installed-dev
 
 # Pages open from the file, and their search works there too.
 docs: $(VENV)/installed-docs
+	@echo "Figures that are older than the code are made anew: up to ten minutes on two cores. The pages take one."
 	@$(MAKE) --no-print-directory -f docs/figures.mk BIN=$(BIN)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 	@echo "Documentation: $(abspath out/site)/index.html (open it in a browser)"
