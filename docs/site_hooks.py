@@ -85,7 +85,7 @@ def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
 def modules(package: str) -> list[str]:
     """Modules of a package by their names within it, such as ``capture`` and ``kernel.poisson``."""
     paths = (path.relative_to(ROOT / package).with_suffix("") for path in (ROOT / package).rglob("*.py"))
-    return sorted(".".join(path.parts) for path in paths if path.stem != "__init__")
+    return sorted(".".join(path.parts) for path in paths if not path.stem.startswith("__"))
 
 
 def summary(path: Path) -> str:

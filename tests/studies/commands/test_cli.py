@@ -57,6 +57,11 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["--version"], capsys)[:2] == (0, metadata.version("rodcone") + "\n")
 
 
+def test_the_package_runs_as_the_command() -> None:
+    done = subprocess.run([sys.executable, "-m", "rodcone", "--version"], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == (metadata.version("rodcone") + "\n", "")
+
+
 def test_doctor_names_library_variant_and_packages(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = call(["doctor"], capsys)
     assert code == 0
