@@ -73,7 +73,7 @@ def frame_numbers(figures: FrameFigures, files: Sequence[Path]) -> PixelNumbers:
         "prnu": Sourced(figures.prnu.value, f"PRNU1288 (eq. 67), {_told(figures.prnu)}"),
     }
     settings = {
-        "bits": bits_of(figures.white_dn, "the frames"),
+        "bits": bits_of(figures.white_dn, figures.black_dn, "the frames"),
         "black_level_dn": Sourced(round(figures.black_dn), f"mean of the dark frames, {figures.black_dn:.5g} DN"),
     }
     return PixelNumbers(told, pixel, settings, _UNTOLD, cfa=figures.cfa)

@@ -50,7 +50,7 @@ def dng_numbers(path: Path) -> PixelNumbers:
         "full_well_e": Sourced(white_e, f"electrons at white, 1 / S; {told}; the photodiode may hold more"),
         "read_noise_e": Sourced(read_e, f"{words}; {told}"),
     }
-    settings = {"bits": bits_of(raw.white_dn, path.name)}
+    settings = {"bits": bits_of(raw.white_dn, raw.black_dn, path.name)}
     if raw.black_dn == int(raw.black_dn):
         settings["black_level_dn"] = Sourced(raw.black_dn, f"BlackLevel of {path.name}")
     return PixelNumbers(told, pixel, settings, _UNTOLD, cfa=raw.cfa)

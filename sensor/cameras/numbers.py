@@ -5,9 +5,10 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
+from render.spectrum import Spectrum
 from rodcone.errors import InputError
 from sensor.cameras.library import MeasuredCamera
-from sensor.cfa import Tile
+from sensor.cfa import Tile, channels
 from sensor.config import PixelConfig, SensorConfig
 
 NEEDED = ("pitch_um", "fill_factor", "full_well_e", "read_noise_e", "dsnu_e", "prnu")  # keys without a default
@@ -54,15 +55,57 @@ class PixelNumbers:
     cfa: Tile = ()
 
 
-def bits_of(white_dn: float, source: str) -> Sourced:
-    """Bits of the converter whose top is a white level, or next above it."""
+@dataclass(frozen=True)
+class Curves:
+    """Relative responses that a preset gets.
+
+    Attributes
+    ----------
+    name, source : str
+        Whose they are, and where they come from, on one line.
+    curves : mapping of str to Spectrum
+        Per photon, by channel, on one grid of wavelengths; the greatest value is 1.
+    note : str
+        What is known of the channels' ratios; empty for nothing.
+    lent_cfa : tuple of str
+        Mosaic of the preset that lends the curves; empty for the camera's own curves.
+    """
+
+    name: str
+    source: str
+    curves: Mapping[str, Spectrum]
+    note: str = ""
+    lent_cfa: Tile = ()
+
+
+def measured_curves(camera: MeasuredCamera) -> Curves:
+    """Curves of a measured camera."""
+    note = "per photon, greatest 1: published per radiant power, divided by the wavelength"
+    if not camera.balanced:
+        note += "; each channel was divided by its own maximum: their ratios aren't known"
+    source = f"{camera.source} ({camera.licence}); {camera.text}"
+    return Curves(f"{camera.maker} {camera.model}", source, camera.responses.curves, note)
+
+
+def lent_curves(sensor: SensorConfig, name: str, cfa: Tile) -> Curves:
+    """Curves of another camera, those of the channels that a mosaic has; of all its channels where `cfa` is empty."""
+    curves = sensor.responses.curves
+    own = {channel: curves[channel] for channel in (channels(cfa) if cfa else curves)}
+    greatest = max(float(curve.values.max()) for curve in own.values())
+    shape = {channel: Spectrum(curve.wavelength_nm, curve.values / greatest) for channel, curve in own.items()}
+    return Curves(name, f"shape of {name}'s curves, not of this camera", shape, lent_cfa=cfa or sensor.cfa)
+
+
+def bits_of(white_dn: float, black_dn: float, source: str) -> Sourced:
+    """Bits of the converter whose top is a white level, or next above it.
+
+    White stays the same number of electrons, so K [DN/e-] rises by the range above black: (top - black) / (white -
+    black).
+    """
     bits = int(white_dn).bit_length()
     top = 2**bits - 1
-    finer = (
-        ""
-        if top == white_dn
-        else f"; the simulated converter ends at {top}, so its DN are {top / white_dn:.3f} times as fine"
-    )
+    factor = (top - black_dn) / (white_dn - black_dn)
+    finer = "" if top == white_dn else f"; the simulated converter ends at {top}, so its K is {factor:.3f} times as high"
     return Sourced(bits, f"white level {white_dn:g} of {source}{finer}")
 
 
@@ -77,7 +120,7 @@ def completed(numbers: PixelNumbers, sensor: SensorConfig, name: str) -> PixelNu
     return replace(numbers, pixel={**numbers.pixel, **lent})
 
 
-def preset_text(title: str, numbers: PixelNumbers, camera: MeasuredCamera | None, curves: str) -> str:
+def preset_text(title: str, numbers: PixelNumbers, shape: Curves | None, curves: str) -> str:
     """Preset file as `sensor.config_file.read_sensor` reads it, a source on every number.
 
     Parameters
@@ -92,12 +135,15 @@ def preset_text(title: str, numbers: PixelNumbers, camera: MeasuredCamera | None
         lines.append(
             f"cfa = [{', '.join(f'{chr(34)}{row}{chr(34)}' for row in numbers.cfa)}]  # {_plain(numbers.source)}"
         )
-    elif camera is not None or numbers.efficiency is None:
+    elif shape is not None and shape.lent_cfa:
+        rows = ", ".join(f'"{row}"' for row in shape.lent_cfa)
+        lines.append(f"cfa = [{rows}]  # of {_plain(shape.name)}, not of this camera")
+    elif shape is not None or numbers.efficiency is None:
         lines.append('cfa = "bayer"  # RG over GB: a choice; another phase of it, or another mosaic, is yours to set')
     else:
         lines.append('cfa = ["W"]  # one channel without a filter, named W: numbers of a monochrome chip')
     lines += [_line(key, each) for key, each in numbers.settings.items()]
-    lines += ["", *_responses(numbers, camera, curves), "", "[pixel]"]
+    lines += ["", *_responses(numbers, shape, curves), "", "[pixel]"]
     names = [each.name for each in fields(PixelConfig)]
     lines += [_line(key, numbers.pixel[key]) for key in names if key in numbers.pixel]
     words = dict.fromkeys(missing(numbers), "not told: needed, so give a number")
@@ -106,11 +152,11 @@ def preset_text(title: str, numbers: PixelNumbers, camera: MeasuredCamera | None
     return "\n".join([*lines, "", "[lens]", "f_number = 2.8  # a choice: no source of a sensor tells a lens", ""])
 
 
-def curves_csv(numbers: PixelNumbers, camera: MeasuredCamera | None) -> str:
-    """Responses as CSV: a measured camera's, its greatest 1, or a source's one wavelength; empty without either."""
-    if camera is not None:
-        curves = camera.responses.curves
-        nm, columns = camera.wavelength_nm, {name: curve.values for name, curve in curves.items()}
+def curves_csv(numbers: PixelNumbers, shape: Curves | None) -> str:
+    """Responses as CSV: relative ones, the greatest 1, or a source's one wavelength; empty without either."""
+    if shape is not None:
+        nm = next(iter(shape.curves.values())).wavelength_nm
+        columns = {name: curve.values for name, curve in shape.curves.items()}
     elif numbers.efficiency is not None:
         value, at_nm = numbers.efficiency
         nm, columns = np.array([at_nm - 1, at_nm + 1]), {"W": np.array([value, value])}
@@ -120,46 +166,46 @@ def curves_csv(numbers: PixelNumbers, camera: MeasuredCamera | None) -> str:
     return "\n".join(",".join(row) for row in [["wavelength_nm", *columns], *rows]) + "\n"
 
 
-def greatest_response(numbers: PixelNumbers, camera: MeasuredCamera) -> float | None:
-    """Electrons per photon of a measured camera's greatest response, by a source's at one wavelength.
+def greatest_response(numbers: PixelNumbers, shape: Curves) -> float | None:
+    """Electrons per photon of the greatest response, by a source's at one wavelength.
 
-    The channel that responds most there is taken for the one of which the source speaks. None without a source.
+    The channel that responds most there is taken for the one of which the source speaks. None without a source. Lent
+    curves that would pass one electron a photon stop there: their shape isn't the camera's.
 
     Raises
     ------
     InputError
-        For a wavelength at which the camera hardly responds, or a product over one electron a photon.
+        For a wavelength at which the curves hardly respond, or a product over one electron a photon that is measured.
     """
     if numbers.efficiency is None:
         return None
     value, at_nm = numbers.efficiency
     share = max(
         float(np.interp(at_nm, curve.wavelength_nm, curve.values, left=0.0, right=0.0))
-        for curve in camera.responses.curves.values()
+        for curve in shape.curves.values()
     )
-    if not share > 0.05 or value / share > 1:
+    if not share > 0.05 or (value / share > 1 and not shape.lent_cfa):
         raise InputError(
-            f"anchor: {value:g} electrons a photon at {at_nm:g} nm, where {camera.maker} {camera.model} responds with "
+            f"anchor: {value:g} electrons a photon at {at_nm:g} nm, where {shape.name} responds with "
             f"{share:.3g} of its greatest, is not allowed; give a quantum efficiency near a peak, such as 0.5@530"
         )
     return value / share
 
 
-def _responses(numbers: PixelNumbers, camera: MeasuredCamera | None, curves: str) -> Sequence[str]:
-    if camera is not None:
-        greatest = greatest_response(numbers, camera)
-        by = f"{camera.source} ({camera.licence}); {camera.text}"
-        shared = "" if camera.balanced else "; each channel was divided by its own maximum: their ratios aren't known"
-        known = (
-            'quantum_efficiency = "relative"  # no anchor: electrons hold up to one factor; a number here fixes it'
-            if greatest is None
-            else f"quantum_efficiency = {greatest:.6g}  # of the greatest response: {_anchor(numbers)}"
-        )
+def _responses(numbers: PixelNumbers, shape: Curves | None, curves: str) -> Sequence[str]:
+    if shape is not None:
+        greatest = greatest_response(numbers, shape)
+        known = 'quantum_efficiency = "relative"  # no anchor: electrons hold up to one factor; a number here fixes it'
+        if greatest is not None:
+            least = min(greatest, 1.0)
+            over = f"; asks for {greatest:.4g} of these curves, and 1 is the most" if greatest > 1 else ""
+            known = f"quantum_efficiency = {least:.6g}  # of the greatest response: {_anchor(numbers)}{over}"
+        nm = next(iter(shape.curves.values())).wavelength_nm
         return [
             "[responses]",
-            f'csv = "{curves}"  # {_plain(by)}',
-            f"# per photon, greatest 1: published per radiant power, divided by the wavelength{shared}",
-            _range_line(*camera.wavelength_nm[[0, -1]]),
+            f'csv = "{curves}"  # {_plain(shape.source)}',
+            *([f"# {shape.note}"] if shape.note else []),
+            _range_line(*nm[[0, -1]]),
             known,
         ]
     if numbers.efficiency is None:

@@ -14,7 +14,15 @@ from sensor.cameras.convert import convert
 from sensor.cameras.emva_report import numbers_of, read_report
 from sensor.cameras.library import MeasuredCamera, measured_camera, measured_cameras
 from sensor.cameras.noise_files import darktable_numbers, dng_numbers
-from sensor.cameras.numbers import PixelNumbers, completed, curves_csv, missing, preset_text
+from sensor.cameras.numbers import (
+    PixelNumbers,
+    completed,
+    curves_csv,
+    lent_curves,
+    measured_curves,
+    missing,
+    preset_text,
+)
 from sensor.presets import preset as read_preset
 from sensor.presets import preset_file
 from studies.commands.console import Out, require_ending, say
@@ -79,11 +87,19 @@ def preset(
     numbers = _numbers(noise, camera, iso, white_e)
     if anchor is not None:
         numbers = replace(numbers, efficiency=_anchor(anchor), source=f"{numbers.source}; anchor {anchor} as given")
+    shape = None if measured is None else measured_curves(measured)
     if lender is not None:
         numbers = completed(numbers, lender, str(name))
-    curves = curves_csv(numbers, measured)
+        if shape is None and numbers.efficiency is not None:
+            shape = lent_curves(lender, str(name), numbers.cfa)
+    if shape is None and anchor is not None and (noise is None or noise.suffix.lower() != ".toml"):
+        raise InputError(
+            f"anchor: {anchor} scales a response, and {str(noise)!r} has none; allowed with --camera, or with a preset "
+            "that lends its curves; add low_noise, or leave --anchor out"
+        )
+    curves = curves_csv(numbers, shape)
     title = f"{measured.maker} {measured.model}" if measured else camera or numbers.source.split(":")[0]
-    text = preset_text(f"{title}, as its sources tell it.", numbers, measured, curves_file.name if curves else "")
+    text = preset_text(f"{title}, as its sources tell it.", numbers, shape, curves_file.name if curves else "")
     check_place(out)
     files = {curves_file: curves, out: text} if curves else {out: text}
     with replacing(*files) as places:

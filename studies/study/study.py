@@ -14,6 +14,7 @@ from rodcone.errors import InputError, require_range, require_whole, unknown
 from sensor.exposure import AUTO, LONGEST_S
 from sensor.presets import preset
 from sensor.variations import vary
+from studies.study.equal_area import EqualArea
 from studies.study.exposures import parse_exposure
 from studies.study.levels import parse_level
 from studies.study.light_range import check_known, check_range
@@ -152,6 +153,8 @@ class Study:
     """Axes of a sweep, and how its pictures are made. Every combination of the nine axes is a cell.
 
     `trust_code` is the consent to run the user's own Python files among `processors`; no study file can give it.
+    `sensor_side_um` gives all sensors one longer side: pixels follow from each pitch, and pictures are averaged to the
+    pixels of the coarsest before they are measured. Left out, a pixel of the render is one of every sensor.
 
     Raises
     ------
@@ -170,6 +173,7 @@ class Study:
     frames: tuple[int, ...] = (1,)
     name: str = "study"
     longest_exposure_s: float = LONGEST_S
+    sensor_side_um: float | None = None
     render: RenderLimits = field(default_factory=RenderLimits)
     lens: LensTerms = field(default_factory=LensTerms)
     budget: BudgetShares = field(default_factory=BudgetShares)
@@ -182,6 +186,13 @@ class Study:
         _check_axes(self)
         _check_cameras(self)
         _check_numbers(self)
+
+    @property
+    def equal_area(self) -> EqualArea | None:
+        """Size that all sensors share; None where each has the render's pixels."""
+        if self.sensor_side_um is None:
+            return None
+        return EqualArea(self.sensor_side_um, max(preset(name).pixel.pitch_um for name in self.sensors))
 
 
 def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:
@@ -264,6 +275,10 @@ def _check_cameras(study: Study) -> None:
 def _check_numbers(study: Study) -> None:
     limits, lens, budget = study.render, study.lens, study.budget
     require_range("longest_exposure_s", study.longest_exposure_s, 1e-9, 1e6, "give seconds above 0")
+    if study.sensor_side_um is not None:
+        for name in study.sensors:
+            across = round(study.sensor_side_um / preset(name).pixel.pitch_um)
+            require_whole(f"sensor_side_um: pixels across {label(name)}", across, 16, 8192, "change it")
     if limits.size is not None:
         require_whole("render.size", limits.size, 16, 8192, "give the picture's longer side in pixels")
     require_range("render.band_nm", limits.band_nm, 1.0, 100.0, "give nanometres")

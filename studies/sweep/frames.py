@@ -5,7 +5,7 @@ cell reads one (h, w) array from its path, whatever the number of bands, and no 
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -28,9 +28,11 @@ from sensor.optics import form_image
 from sensor.response import expected_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
+from studies.study.equal_area import EqualArea
 from studies.study.exposures import parse_exposure
 from studies.study.lit_scene import OpenedScene, in_lux, lux_per_cd_m2
 from studies.study.model import unit_exposure_s
+from studies.study.study import Study
 from studies.sweep.provenance import versions
 from studies.sweep.stored import is_whole, keep
 
@@ -76,14 +78,15 @@ class UnitFrame:
 
 
 def frame_key(
-    render: str, opened: OpenedScene, spectrum: str, levels: Sequence[str], preset: SensorConfig, sensor: SensorConfig
+    render: str, opened: OpenedScene, spectrum: str, study: Study, preset: SensorConfig, sensor: SensorConfig
 ) -> str:
     """Key of a frame: the render's content, the scene's own lights, the spectrum, and what computes it.
 
     The preset sets the exposure; the sensor is as it is modelled. Of the levels it counts whether one is in lux.
     """
     light = illuminant(spectrum) if is_light_file(spectrum) else spectrum
-    return digest([render, opened.identity, light, in_lux(levels), versions(), preset, sensor])
+    area = [] if study.equal_area is None else [study.equal_area]
+    return digest([render, opened.identity, light, in_lux(study.levels), versions(), preset, sensor, *area])
 
 
 def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None:
@@ -107,7 +110,7 @@ def make_frames(
     transport: Transport,
     light: Light,
     wanted: Mapping[str, tuple[SensorConfig, SensorConfig]],
-    levels: Sequence[str],
+    study: Study,
 ) -> None:
     """Make and keep the frames of one lit scene.
 
@@ -119,26 +122,28 @@ def make_frames(
         That the cameras' colours are set to.
     wanted : mapping of str to (SensorConfig, SensorConfig)
         By key: the preset, whose auto exposure it is whatever mosaic and lens it gets, and the sensor as modelled.
-    levels : sequence of str
-        Of the study.
+    study : Study
+        Its levels, and the sensors' size.
     """
     if transport.denoised is None:
         views = (transport.relight(luminance_cd_m2=1.0), *transport.relight_halves(luminance_cd_m2=1.0))
     else:
         views = relight_denoised(transport, luminance_cd_m2=1.0)
-    white = shown_white_cd_m2(transport, 1.0)
+    white, area = shown_white_cd_m2(transport, 1.0), study.equal_area
+    shown = views[0] if area is None else area.view(views[0], area.coarsest_um)
     scene = {
         "light": {name: value.tolist() for name, value in vars(light).items()},
         "white_cd_m2": white,
-        "lux_per_cd_m2": lux_per_cd_m2(transport, levels),
-        "truth": keep(folder, _npy(true_srgb(views[0], light, white)), ".npy"),
+        "lux_per_cd_m2": lux_per_cd_m2(transport, study.levels),
+        "truth": keep(folder, _npy(true_srgb(shown, light, white)), ".npy"),
     }
     for key, (preset, sensor) in wanted.items():
-        whole, one, other = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in views)
+        own = views if area is None else tuple(area.view(view, sensor.pixel.pitch_um) for view in views)
+        whole, one, other = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in own)
         errors = [(one - other) / 2] if transport.denoised is None else [whole - one, whole - other]
         facts = scene | {
-            "auto_s": unit_exposure_s(views[0], preset),
-            "auto_w_s": unit_exposure_s(views[0], sensor, "W" if "W" in channels(sensor.cfa) else None),
+            "auto_s": unit_exposure_s(own[0], preset),
+            "auto_w_s": unit_exposure_s(own[0], sensor, "W" if "W" in channels(sensor.cfa) else None),
             "electrons": keep(folder, _npy(whole), ".npy"),
             "errors": keep(folder, _npy(np.stack(errors).astype(np.float32)), ".npy"),
         }

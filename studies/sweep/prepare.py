@@ -146,21 +146,21 @@ def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: 
     folder.mkdir(parents=True, exist_ok=True)
     for spectrum in job.study.spectra:
         keyed = {
-            frame_key(record.content, opened, spectrum, job.study.levels, *sensors): sensors
+            frame_key(record.content, opened, spectrum, job.study, *sensors): sensors
             for (under_spectrum, *_), sensors in _imaged(job, opened).items()
             if under_spectrum == spectrum
         }
         wanted = {key: sensors for key, sensors in keyed.items() if read_frame(folder, key, sensors[1]) is None}
         if wanted:
             light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
-            make_frames(folder, under(transport, spectrum), light, wanted, job.study.levels)
+            make_frames(folder, under(transport, spectrum), light, wanted, job.study)
 
 
 def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | None:
     """Cells of a scene whose files stand; None where one is missing."""
     frames, colours = dict[Imaged, UnitFrame](), dict[tuple[Imaged, str], ColourFit]()
     for imaged, sensors in _imaged(job, opened).items():
-        key = frame_key(record.content, opened, imaged[0], job.study.levels, *sensors)
+        key = frame_key(record.content, opened, imaged[0], job.study, *sensors)
         frame = read_frame(job.out / FRAMES, key, sensors[1])
         if frame is None:
             return None

@@ -28,6 +28,7 @@ from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import develop_to_scale, mean_electrons
 from studies.photograph.clock import timed
 from studies.photograph.png import to_png
+from studies.study.equal_area import area_average
 from studies.study.study import AS_SHOT, label
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text
 from studies.sweep.provenance import in_words, machine, provenance, threads
@@ -84,6 +85,8 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         lambda: develop_to_scale(raw, processor, cell.colours, sensor, cell.light, cell.white_cd_m2, **options),
         *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),
     )
+    if linear.shape != truth.linear.shape:  # of sensors of one size: compared at the coarsest's pixels
+        linear = area_average(linear, truth.linear.shape[:2])
     encoded = encode_srgb(linear)
     # Measure.
     figures, measure_s, first_measure_s = timed(

@@ -1,0 +1,61 @@
+"""Sensors of one size: pixels by pitch, and pictures averaged to the pixels of the coarsest sensor."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.radiance import SpectralRadiance
+
+
+@dataclass(frozen=True)
+class EqualArea:
+    """Size that all sensors of a study have.
+
+    Attributes
+    ----------
+    side_um : float
+        Longer side of every sensor.
+    coarsest_um : float
+        Greatest pitch among them: pictures are compared at such pixels, so that none is interpolated.
+    """
+
+    side_um: float
+    coarsest_um: float
+
+    def shape(self, picture: tuple[int, int], pitch_um: float) -> tuple[int, int]:
+        """Height and width in whole pixels of a pitch, in a picture's proportions."""
+        pixels = self.side_um / pitch_um / max(picture)
+        return max(1, round(picture[0] * pixels)), max(1, round(picture[1] * pixels))
+
+    def view(self, radiance: SpectralRadiance, pitch_um: float) -> SpectralRadiance:
+        """Radiance at the pixels of a pitch."""
+        return replace(radiance, values=area_average(radiance.values, self.shape(radiance.shape, pitch_um)))
+
+
+def area_average(values: NDArray[np.floating], shape: tuple[int, int]) -> NDArray[np.floating]:
+    """Mean of a picture over each pixel of another grid on the same area, pixels taken as even squares.
+
+    Parameters
+    ----------
+    values : (h, w, ...) floating
+    shape : (int, int)
+        Height and width of the other grid, finer or coarser.
+
+    Returns
+    -------
+    (shape[0], shape[1], ...) array of the same type
+        The picture's mean is kept.
+    """
+    rows, columns = (
+        _overlaps(own, other).astype(values.dtype) for own, other in zip(values.shape, shape, strict=False)
+    )
+    along = np.tensordot(rows, values, axes=1)
+    return np.ascontiguousarray(np.moveaxis(np.tensordot(columns, along, axes=(1, 1)), 0, 1))
+
+
+def _overlaps(own: int, other: int) -> NDArray[np.float64]:
+    """Share of each of `own` intervals in each of `other` on the same length, shape (other, own); rows sum to 1."""
+    ends, starts = np.arange(1, own + 1) / own, np.arange(own) / own
+    low, high = np.arange(other)[:, None] / other, np.arange(1, other + 1)[:, None] / other
+    return np.maximum(np.minimum(ends, high) - np.maximum(starts, low), 0.0) * other
