@@ -11,6 +11,8 @@ from sensor.cameras.library import MeasuredCamera
 from sensor.cfa import Tile, channels
 from sensor.config import PixelConfig, SensorConfig
 
+_STEP_NM = 4.0  # of lent curves
+_LEAST_SHARE = 0.05  # of the greatest response, at an anchor's wavelength
 NEEDED = ("pitch_um", "fill_factor", "full_well_e", "read_noise_e", "dsnu_e", "prnu")  # keys without a default
 _OFF = {  # what a term that a source says nothing of is, by key
     "dark_current_e_per_s": "no dark current",
@@ -57,16 +59,16 @@ class PixelNumbers:
 
 @dataclass(frozen=True)
 class Curves:
-    """Relative responses that a preset gets.
+    """Responses that a preset gets.
 
     Attributes
     ----------
     name, source : str
         Whose they are, and where they come from, on one line.
     curves : mapping of str to Spectrum
-        Per photon, by channel, on one grid of wavelengths; the greatest value is 1.
+        By channel, on one grid of wavelengths: relative per photon, the greatest 1; electrons per photon where lent.
     note : str
-        What is known of the channels' ratios; empty for nothing.
+        What is known of the channels' ratios, or what was assumed.
     lent_cfa : tuple of str
         Mosaic of the preset that lends the curves; empty for the camera's own curves.
     """
@@ -74,7 +76,7 @@ class Curves:
     name: str
     source: str
     curves: Mapping[str, Spectrum]
-    note: str = ""
+    note: str
     lent_cfa: Tile = ()
 
 
@@ -87,25 +89,54 @@ def measured_curves(camera: MeasuredCamera) -> Curves:
     return Curves(f"{camera.maker} {camera.model}", source, camera.responses.curves, note)
 
 
-def lent_curves(sensor: SensorConfig, name: str, cfa: Tile) -> Curves:
-    """Curves of another camera, those of the channels that a mosaic has; of all its channels where `cfa` is empty."""
-    curves = sensor.responses.curves
-    own = {channel: curves[channel] for channel in (channels(cfa) if cfa else curves)}
-    greatest = max(float(curve.values.max()) for curve in own.values())
-    shape = {channel: Spectrum(curve.wavelength_nm, curve.values / greatest) for channel, curve in own.items()}
-    return Curves(name, f"shape of {name}'s curves, not of this camera", shape, lent_cfa=cfa or sensor.cfa)
+def lent_curves(sensor: SensorConfig, name: str, numbers: PixelNumbers) -> Curves:
+    """Curves of another camera, scaled to a source's quantum efficiency at one wavelength; every `_STEP_NM` a value.
+
+    Those of the channels that the source's mosaic has, or of all. The channel that responds most at the wavelength is
+    taken for the one of which the source speaks: W for a monochrome chip. Where one electron a photon would be passed,
+    the scale ends there: the shape isn't the camera's.
+
+    Raises
+    ------
+    InputError
+        For a wavelength at which the curves hardly respond.
+    """
+    assert numbers.efficiency is not None  # the callers' choice
+    value, at_nm = numbers.efficiency
+    theirs = sensor.responses.curves
+    first_nm, last_nm = next(iter(theirs.values())).wavelength_nm[[0, -1]]
+    nm = np.arange(first_nm, last_nm + 1e-6, _STEP_NM)
+    shape = {
+        channel: np.interp(nm, theirs[channel].wavelength_nm, theirs[channel].values)
+        for channel in (channels(numbers.cfa) if numbers.cfa else theirs)
+    }
+    at = {channel: float(np.interp(at_nm, nm, values, left=0.0, right=0.0)) for channel, values in shape.items()}
+    spoken_of = max(at, key=lambda channel: at[channel])
+    if not at[spoken_of] > _LEAST_SHARE:
+        raise InputError(
+            f"anchor: {value:g} electrons a photon at {at_nm:g} nm, where {name} responds with {at[spoken_of]:.3g}, is "
+            "not allowed; give a quantum efficiency near a peak, such as 0.5@530"
+        )
+    factor = value / at[spoken_of]
+    most = 1.0 / max(float(values.max()) for values in shape.values())
+    note = f"scaled by {factor:.4g}, so that {spoken_of} has the quantum efficiency {_anchor(numbers)}"
+    if factor > most:
+        note = f"scaled by {most:.4g}, to 1 electron a photon at most; {spoken_of} would need {factor:.4g} to have "
+        note += f"the quantum efficiency {_anchor(numbers)}"
+    scaled = {channel: Spectrum(nm, values * min(factor, most)) for channel, values in shape.items()}
+    return Curves(name, f"shape of {name}'s curves, not of this camera", scaled, note, numbers.cfa or sensor.cfa)
 
 
 def bits_of(white_dn: float, black_dn: float, source: str) -> Sourced:
     """Bits of the converter whose top is a white level, or next above it.
 
-    White stays the same number of electrons, so K [DN/e-] rises by the range above black: (top - black) / (white -
+    White stays the same number of electrons, so K [DN/e-] rises as the range above black does: (top - black) / (white -
     black).
     """
     bits = int(white_dn).bit_length()
     top = 2**bits - 1
     factor = (top - black_dn) / (white_dn - black_dn)
-    finer = "" if top == white_dn else f"; the simulated converter ends at {top}, so its K is {factor:.3f} times as high"
+    finer = "" if top == white_dn else f"; the simulated converter ends at {top}, so its K is {factor:.3f} times that"
     return Sourced(bits, f"white level {white_dn:g} of {source}{finer}")
 
 
@@ -153,7 +184,7 @@ def preset_text(title: str, numbers: PixelNumbers, shape: Curves | None, curves:
 
 
 def curves_csv(numbers: PixelNumbers, shape: Curves | None) -> str:
-    """Responses as CSV: relative ones, the greatest 1, or a source's one wavelength; empty without either."""
+    """Responses as CSV: curves, or a source's one wavelength; empty without either."""
     if shape is not None:
         nm = next(iter(shape.curves.values())).wavelength_nm
         columns = {name: curve.values for name, curve in shape.curves.items()}
@@ -167,15 +198,14 @@ def curves_csv(numbers: PixelNumbers, shape: Curves | None) -> str:
 
 
 def greatest_response(numbers: PixelNumbers, shape: Curves) -> float | None:
-    """Electrons per photon of the greatest response, by a source's at one wavelength.
+    """Electrons per photon of relative curves' greatest response, by a source's at one wavelength.
 
-    The channel that responds most there is taken for the one of which the source speaks. None without a source. Lent
-    curves that would pass one electron a photon stop there: their shape isn't the camera's.
+    The channel that responds most there is taken for the one of which the source speaks. None without a source.
 
     Raises
     ------
     InputError
-        For a wavelength at which the curves hardly respond, or a product over one electron a photon that is measured.
+        For a wavelength at which the curves hardly respond, or a product over one electron a photon.
     """
     if numbers.efficiency is None:
         return None
@@ -184,7 +214,7 @@ def greatest_response(numbers: PixelNumbers, shape: Curves) -> float | None:
         float(np.interp(at_nm, curve.wavelength_nm, curve.values, left=0.0, right=0.0))
         for curve in shape.curves.values()
     )
-    if not share > 0.05 or (value / share > 1 and not shape.lent_cfa):
+    if not share > _LEAST_SHARE or value / share > 1:
         raise InputError(
             f"anchor: {value:g} electrons a photon at {at_nm:g} nm, where {shape.name} responds with "
             f"{share:.3g} of its greatest, is not allowed; give a quantum efficiency near a peak, such as 0.5@530"
@@ -194,19 +224,18 @@ def greatest_response(numbers: PixelNumbers, shape: Curves) -> float | None:
 
 def _responses(numbers: PixelNumbers, shape: Curves | None, curves: str) -> Sequence[str]:
     if shape is not None:
-        greatest = greatest_response(numbers, shape)
-        known = 'quantum_efficiency = "relative"  # no anchor: electrons hold up to one factor; a number here fixes it'
-        if greatest is not None:
-            least = min(greatest, 1.0)
-            over = f"; asks for {greatest:.4g} of these curves, and 1 is the most" if greatest > 1 else ""
-            known = f"quantum_efficiency = {least:.6g}  # of the greatest response: {_anchor(numbers)}{over}"
+        known = '"relative"  # no anchor: electrons hold up to one factor; a number here fixes it'
+        if shape.lent_cfa:
+            known = '"included"'
+        elif (greatest := greatest_response(numbers, shape)) is not None:
+            known = f"{greatest:.6g}  # of the greatest response: {_anchor(numbers)}"
         nm = next(iter(shape.curves.values())).wavelength_nm
         return [
             "[responses]",
             f'csv = "{curves}"  # {_plain(shape.source)}',
-            *([f"# {shape.note}"] if shape.note else []),
+            f"# {shape.note}",
             _range_line(*nm[[0, -1]]),
-            known,
+            f"quantum_efficiency = {known}",
         ]
     if numbers.efficiency is None:
         return ["# [responses] is left out: not told. The project's own curves stand in, not this camera's."]

@@ -91,11 +91,11 @@ def preset(
     if lender is not None:
         numbers = completed(numbers, lender, str(name))
         if shape is None and numbers.efficiency is not None:
-            shape = lent_curves(lender, str(name), numbers.cfa)
-    if shape is None and anchor is not None and (noise is None or noise.suffix.lower() != ".toml"):
+            shape = lent_curves(lender, str(name), numbers)
+    if shape is None and anchor and noise and noise.suffix.lower() != ".toml":  # a report is of a chip without filters
         raise InputError(
-            f"anchor: {anchor} scales a response, and {str(noise)!r} has none; allowed with --camera, or with a preset "
-            "that lends its curves; add low_noise, or leave --anchor out"
+            f"anchor: {anchor} scales a response, and {noise.name!r} tells none; allowed with "
+            "--camera, or with a preset that lends its curves; add low_noise, or leave --anchor out"
         )
     curves = curves_csv(numbers, shape)
     title = f"{measured.maker} {measured.model}" if measured else camera or numbers.source.split(":")[0]
@@ -138,8 +138,9 @@ def study(name: str = "light_levels", /, *, out: Out) -> None:
         light_levels (moonlight to daylight), spectra (one scene under several lights at equal lux), metamers (pairs
         that look alike under D65), infrared_cut (a filter in or out), responses (broad filters or narrow ones),
         exposures (exposure times and fixed patterns on Table 1's pixel), opponents (every processor, for rodcone
-        opponents), white_pixel (one method with and without W), white_pixel_lights (the same under four lights), demo
-        (what rodcone demo makes), or paper_1b and paper_6 (of the paper's figures).
+        opponents), white_pixel (one method with and without W), white_pixel_lights (the same under four lights),
+        real_cameras (five cameras that exist beside the paper's pixel), demo (what rodcone demo makes), or paper_1b
+        and paper_6 (of the paper's figures).
     out
         File to write, ending in .toml; one that exists is left alone. Sensors and their curves go into the folder
         sensors beside it, where files of the same content are kept.

@@ -33,7 +33,7 @@ from studies.pages.report_compare import (
 from studies.pages.report_data import ReportCell, ReportData, ReportLevel
 from studies.pages.report_pictures import ReportPictures
 from studies.pages.report_speed import speed_rows
-from studies.pages.snr_table import snr_over_light
+from studies.pages.snr_chart import snr_over_light
 
 # One script, in this order.
 SCRIPTS = ("report_numbers.js", "report_colour.js", "report_charts.js", "report_viewer.js", "report.js")

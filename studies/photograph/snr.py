@@ -1,19 +1,22 @@
 """An even neutral field before a camera in closed form: electrons, SNR, and the light that an SNR takes."""
 
 from dataclasses import dataclass, replace
-from math import pi
+from math import log10, pi
 
 import numpy as np
 
 from render.illuminants import illuminant
 from render.spectrum import VISIBLE_NM, Floats
 from sensor.binning import as_read
+from sensor.capture import expose
 from sensor.cfa import channels
 from sensor.config import SensorConfig
+from sensor.device import draw_device
 from sensor.readout import electrons_at_snr, noise_variance
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons
 
 GREY = 0.18  # reflectance of the card whose illuminance is told
+FIELD_SIDE = 512  # pixels of a simulated even field
 
 
 @dataclass(frozen=True)
@@ -79,3 +82,36 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
     electrons = dict(zip(channels(sensor.cfa), of[:, None] * luminance_cd_m2, strict=True))
     full_e = as_read(sensor).pixel.full_well_e
     return {name: np.where(e < full_e, snr(e, sensor, exposure_s), np.nan) for name, e in electrons.items()}
+
+
+@dataclass(frozen=True)
+class EvenField:
+    """An even neutral field on the pixels of one channel.
+
+    Attributes
+    ----------
+    electrons : float
+        Expected photo-electrons of a pixel.
+    snr_db : float
+        In closed form (`snr`).
+    simulated_db : float
+        Mean over standard deviation of `FIELD_SIDE` squared pixels of one simulated chip, from one frame; NaN where the
+        mean is not above the dark's.
+    """
+
+    electrons: float
+    snr_db: float
+    simulated_db: float
+
+
+def even_field(
+    sensor: SensorConfig, channel: str, light: Light, luminance_cd_m2: float, exposure_s: float
+) -> EvenField:
+    """Electrons and SNR of a channel's pixels in an even neutral field: closed form, and one simulated frame."""
+    alone = replace(sensor, cfa=(channel,))
+    electrons, shape = float(channel_e(alone, light, luminance_cd_m2, exposure_s)[0]), (FIELD_SIDE, FIELD_SIDE)
+    rng = np.random.default_rng(0)
+    read_e = expose(np.full(shape, electrons), alone, exposure_s, draw_device(alone, shape, rng), rng).electrons
+    mean_e = float(read_e.mean()) - alone.pixel.dark_current_e_per_s * exposure_s
+    simulated_db = 20 * log10(mean_e / float(read_e.std())) if mean_e > 0 else float("nan")
+    return EvenField(electrons, 20 * log10(float(snr(np.array(electrons), alone, exposure_s))), simulated_db)

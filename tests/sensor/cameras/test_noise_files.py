@@ -26,7 +26,7 @@ def test_a_noise_profile_gives_the_electrons_at_white_and_the_read_noise(tmp_pat
     assert numbers.pixel["read_noise_e"].value == pytest.approx(3.0)
     assert {key: each.value for key, each in numbers.settings.items()} == {"bits": 14, "black_level_dn": 100}
     assert numbers.cfa == BAYER
-    assert "ends at 16383, so its DN are 1.085 times as fine" in numbers.settings["bits"].source
+    assert "ends at 16383, so its K is 1.086 times that" in numbers.settings["bits"].source  # 16 283 over 15 000 DN
     assert "ISO 400" in numbers.pixel["full_well_e"].source
     assert {"dsnu_e", "prnu", "dark_current_e_per_s"} <= set(numbers.left_out)
 

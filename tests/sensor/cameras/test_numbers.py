@@ -7,7 +7,18 @@ import pytest
 
 from rodcone.errors import InputError
 from sensor.cameras.library import MeasuredCamera
-from sensor.cameras.numbers import PixelNumbers, Sourced, completed, curves_csv, greatest_response, preset_text
+from sensor.cameras.numbers import (
+    PixelNumbers,
+    Sourced,
+    bits_of,
+    completed,
+    curves_csv,
+    greatest_response,
+    lent_curves,
+    measured_curves,
+    preset_text,
+)
+from sensor.cfa import BAYER
 from sensor.config_file import read_sensor
 from sensor.curves import RelativeResponsesWarning
 from sensor.presets import low_noise
@@ -30,8 +41,8 @@ CAMERA = MeasuredCamera(
 
 def written(folder, numbers):
     path = folder / "one.toml"
-    path.write_text(preset_text("Maker One.", numbers, CAMERA, "one_curves.csv"), "utf-8")
-    (folder / "one_curves.csv").write_text(curves_csv(numbers, CAMERA), "utf-8")
+    path.write_text(preset_text("Maker One.", numbers, measured_curves(CAMERA), "one_curves.csv"), "utf-8")
+    (folder / "one_curves.csv").write_text(curves_csv(numbers, measured_curves(CAMERA)), "utf-8")
     return path
 
 
@@ -68,7 +79,7 @@ def test_an_anchor_turns_them_into_electrons_per_photon(tmp_path):
 def test_an_anchor_that_cannot_be_is_refused():
     for value, at_nm in ((0.5, 780.0), (0.5, 1000.0), (0.99, 490.0)):
         with pytest.raises(InputError, match=r"anchor: .* is not allowed; give a quantum efficiency near a peak"):
-            greatest_response(PixelNumbers("s", efficiency=(value, at_nm)), CAMERA)
+            greatest_response(PixelNumbers("s", efficiency=(value, at_nm)), measured_curves(CAMERA))
 
 
 def test_without_a_source_a_preset_names_every_key_that_is_missing(tmp_path):
@@ -79,3 +90,49 @@ def test_without_a_source_a_preset_names_every_key_that_is_missing(tmp_path):
     for key in ("pitch_um", "fill_factor", "full_well_e", "read_noise_e", "dsnu_e", "prnu"):
         assert f"# {key} =   # not told: needed" in text
     assert "bits = 12  # sheet" in text
+
+
+def test_lent_curves_have_a_monochrome_sources_quantum_efficiency_in_w(tmp_path):
+    numbers = PixelNumbers("sheet 7", lent().pixel, efficiency=(0.64, 528.0))
+    shape, theirs = lent_curves(low_noise(), "low_noise", numbers), low_noise().responses.curves
+    path = tmp_path / "one.toml"
+    path.write_text(preset_text("Mono.", numbers, shape, "one_curves.csv"), "utf-8")
+    (tmp_path / "one_curves.csv").write_text(curves_csv(numbers, shape), "utf-8")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sensor = read_sensor(path)
+    assert not sensor.responses.relative
+    assert sensor.cfa == low_noise().cfa
+    factor = 0.64 / np.interp(528.0, theirs["W"].wavelength_nm, theirs["W"].values)
+    for name, curve in sensor.responses.curves.items():
+        # every fourth nanometre, written with six decimals
+        assert np.abs(curve.values - factor * theirs[name].values[::4]).max() < 1e-5
+    text = path.read_text("utf-8")
+    assert "shape of low_noise's curves, not of this camera" in text
+    assert "so that W has the quantum efficiency 0.64 at 528 nm, sheet 7" in text
+
+
+def test_lent_curves_of_a_bayer_source_have_it_in_the_channel_that_responds_most():
+    numbers = PixelNumbers("own frames", efficiency=(0.5, 540.0), cfa=BAYER)
+    shape = lent_curves(low_noise(), "low_noise", numbers)
+    assert set(shape.curves) == set("RGB")
+    assert np.interp(540.0, shape.curves["G"].wavelength_nm, shape.curves["G"].values) == pytest.approx(0.5)
+
+
+def test_lent_curves_stop_at_one_electron_a_photon_and_say_so():
+    shape = lent_curves(low_noise(), "low_noise", PixelNumbers("s", efficiency=(0.9125, 536.0)))
+    assert max(curve.values.max() for curve in shape.curves.values()) == pytest.approx(1.0)
+    assert "scaled by 1, to 1 electron a photon at most; W would need 1.05" in shape.note
+
+
+def test_lent_curves_refuse_an_anchor_where_they_hardly_respond():
+    with pytest.raises(InputError, match=r"anchor: 0\.5 electrons a photon at 1068 nm, where low_noise responds with"):
+        lent_curves(low_noise(), "low_noise", PixelNumbers("s", efficiency=(0.5, 1068.0)))
+
+
+def test_the_converters_top_is_the_white_level_or_next_above_and_k_rises_with_the_range_above_black():
+    assert (bits_of(4095, 240, "x").value, bits_of(4095, 240, "x").source) == (12, "white level 4095 of x")
+    # 15 000 DN above black 100, and a converter of 14 bits with the same black: 16 283 DN for the same electrons
+    assert bits_of(15_100, 100, "x").source.endswith(f"ends at 16383, so its K is {16_283 / 15_000:.3f} times that")
+    # black counts: 1023 of 10 bits over black 512 is 511, where 800 is 288
+    assert f"{511 / 288:.3f} times that" in bits_of(800, 512, "x").source

@@ -5,10 +5,15 @@ import tomllib
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
+import numpy as np
 import pytest
+from builders import raw_image
 
+from sensor.calibration import ColourCalibration
 from sensor.cameras.library import VARIABLE
+from sensor.cfa import BAYER
 from sensor.config_file import read_sensor
+from sensor.raw_files.raw_file import write_raw
 from studies.commands.cli import main
 
 _PATH = Path(__file__).parents[2] / "sensor" / "cameras" / "test_library.py"
@@ -16,6 +21,7 @@ _SPEC = spec_from_file_location("library_sample", _PATH)
 sample = module_from_spec(_SPEC)
 _SPEC.loader.exec_module(sample)
 
+COLOUR = ColourCalibration(np.ones(3), np.eye(3), *[np.eye(3)] * 4)
 REPORT = Path(__file__).parents[3] / "sensor" / "cameras" / "reports" / "framos_imx900_lcg.toml"
 
 
@@ -96,6 +102,31 @@ def test_a_profile_of_darktable_tells_the_noise_of_its_camera(tmp_path, capsys):
     code, _, err = call(capsys, "new", "preset", "--camera", "A B", "--noise", profiles, "--white-e", "5e4", "-o", path)
     assert code == 0, err
     assert tomllib.loads(path.read_text("utf-8"))["pixel"]["full_well_e"] == 5e4
+
+
+def test_a_report_with_a_preset_that_lends_is_ready_for_any_scene(tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    assert call(capsys, "new", "preset", "low_noise", "--noise", REPORT, "-o", path) == (0, f"{path}\n", "")
+    sensor = read_sensor(path)
+    assert set(sensor.responses.curves) == set("RGBW")
+    assert sensor.pixel.read_noise_e == 5.56
+
+
+def test_an_anchor_beside_a_digital_negative_needs_curves_that_it_scales(tmp_path, capsys):
+    raw = raw_image(
+        np.full((16, 16), 500), BAYER, gain_e_per_dn=0.8, read_noise_e=3.0, dsnu_e=0.0, iso=400.0, colour=COLOUR
+    )
+    write_raw(raw, tmp_path / "shot.dng")
+    asked = ("--noise", tmp_path / "shot.dng", "--anchor", "0.5@540", "-o", tmp_path / "mine.toml")
+    code, out, err = call(capsys, "new", "preset", *asked)
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert "anchor: 0.5@540 scales a response, and 'shot.dng' tells none" in err
+    assert not (tmp_path / "mine.toml").exists()
+    assert call(capsys, "new", "preset", "low_noise", *asked)[0] == 0
+    sensor = read_sensor(tmp_path / "mine.toml")
+    assert sensor.cfa == BAYER
+    assert sensor.responses.band_average(("G",), [540.0], [0.1])[0, 0] == pytest.approx(0.5, rel=1e-4)
+    assert sensor.pixel.full_well_e == pytest.approx(12_000)
 
 
 @pytest.mark.usefixtures("cameras")

@@ -7,7 +7,7 @@ from report_sample import sample_pictures, sample_report
 from sensor.presets import preset
 from studies.pages.report import render_report
 from studies.pages.report_text import MISSING, significant
-from studies.pages.snr_table import snr_image, snr_rows
+from studies.pages.snr_chart import snr_image, snr_rows
 from studies.photograph.snr import light_for_snr
 
 SENSORS = {name: preset(name) for name in ("low_noise", "table1_output")}
@@ -21,7 +21,7 @@ def test_a_row_a_channel_with_the_numbers_of_the_command():
 
 
 def test_an_snr_that_no_light_gives_is_a_dash(monkeypatch):
-    monkeypatch.setattr("studies.pages.snr_table.SNR", 1000.0)
+    monkeypatch.setattr("studies.pages.snr_chart.SNR", 1000.0)
     assert {row[2:] for row in snr_rows(SENSORS)} == {(MISSING, MISSING, MISSING)}
 
 

@@ -1,0 +1,301 @@
+"""Cameras that exist beside the paper's pixel, on sensors of one size: `python -m studies.pages.five_cameras`."""
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import log10
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from rodcone.errors import InputError
+from rodcone.files import replacing
+from scenes.catalog import load
+from sensor.cameras.emva_report import read_report
+from sensor.cfa import channels
+from sensor.config import SensorConfig
+from sensor.presets import preset
+from sensor.variations import vary
+from studies.metrics.confidence import mean_with_confidence
+from studies.metrics.truth import Light, light_in_bands
+from studies.pages import report_text
+from studies.pages.duels import AHEAD, BEHIND, LEVEL, METRICS, Contest, contests_of, duels, opponents_of
+from studies.pages.duels_page import lead_table
+from studies.pages.plots import CHART, COLOURS, INK, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
+from studies.pages.real_cameras import REPORTS
+from studies.pages.report_text import (
+    DELTA_E,
+    MISSING,
+    ON_TARGETS,
+    PSNR,
+    Metric,
+    duration,
+    fixed,
+    level_text,
+    plain_name,
+    significant,
+    table,
+)
+from studies.pages.white_pixel import BAYER, RGBW, white_pixel_tables
+from studies.photograph.snr import FIELD_SIDE, even_field
+from studies.study.equal_area import EqualArea
+from studies.study.study import label
+from studies.sweep.database import LastRun, last_run
+from studies.sweep.row import Row
+
+SHOWN = tuple(metric for metric in report_text.METRICS if metric not in ON_TARGETS)
+LINES = dict(zip((*COLOURS, SOFT, "#9a7d0a", INK), ("-", "-", "-", "-", "-", "--", ":"), strict=True))  # a sensor each
+TEXT = """\
+# Five cameras and the paper's pixel, from moonlight to daylight
+
+    rodcone new study real_cameras -o real_cameras.toml
+    rodcone sweep real_cameras.toml -o {folder} --as-stated
+    python -m studies.pages.five_cameras {folder} docs/{page}
+
+A scene ({scene}) before sensors of one size behind one f-number. Each has the noise, well, pitch and quantum efficiency
+that its maker published ([cameras that exist](real_cameras.md)).
+
+## How far "equal" goes
+
+- **Equal:** the sensor ({side} µm on its longer side; pixels across follow from the pitch, to whole pixels), field of
+  view, f/{f_number}, scene, light, longest exposure ({longest}), white balance (of the known light), development
+  (one method, `ple`, on Bayer and on RGBW). So the same light falls on every sensor. The lens is ideal: no diffraction,
+  no glare.
+- **Compared at one size:** each picture is developed at its sensor's own pixels, then averaged in linear light to those
+  of the coarsest ({coarsest} µm) and measured there. A sensor of finer pixels thereby averages its noise, and samples
+  the scene more finely: in good light, where noise is small, this decides, not the noise.
+- **Each its own:** the exposure time, by the information that its samples get, up to the longest. A small well takes
+  less light in daylight.
+- **Measured:** pitch, read noise, saturation, conversion gain, DSNU and PRNU where a report has them, and the quantum
+  efficiency of the chip without filters at one wavelength.
+- **Assumed:** the shape of the response over wavelength and the colour filters, which are the project's RGBW curves for
+  all, scaled so that W has the published quantum efficiency at its wavelength. The reports are of monochrome chips;
+  their colour twins have filters of their own (Basler estimates its green at 93 % of the monochrome chip's at 545 nm,
+  for the infrared filter; here green's filter takes {green_share} of W). DSNU of 1 e⁻ and PRNU of 1 % where a report
+  lacks them. No real camera of these has a W pixel: its rows with RGBW say what its pixel would give with the paper's
+  mosaic.
+- **Not there:** column noise, hot pixels, crosstalk, angular response; no report tells them.
+"""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One sensor of the study with the mosaic that it has here, and the development that stands for it."""
+
+    name: str
+    sensor: SensorConfig
+    processor: str
+
+    @property
+    def words(self) -> str:
+        """Name in tables."""
+        return f"{self.name}, {'RGBW' if self.processor == RGBW else 'Bayer'}"
+
+
+def write_page(run: LastRun, folder: Path, out: Path) -> None:
+    """Write the page and its figure, both or neither.
+
+    Parameters
+    ----------
+    run : LastRun
+        Of a study of one scene, spectrum, exposure and white balance, with `BAYER` and `RGBW`.
+    folder : Path
+        For the page's own command.
+    out : Path
+        Ends in ``.md``; the figure goes beside it, ending in ``.svg``.
+
+    Raises
+    ------
+    InputError
+        For another study, or one that isn't whole.
+    """
+    contests = contests_of(run.rows)
+    if not {BAYER, RGBW} <= set(contests[0].rows) or not run.study.get("sensor_side_um"):
+        raise InputError(
+            f"study: {folder} is not of sensors of one size; allowed: one with sensor_side_um, {BAYER} and {RGBW}; "
+            "start from rodcone new study real_cameras"
+        )
+    entries = [_entry(given) for given in run.study["sensors"]]
+    figure, beside = out.with_suffix(".svg"), beside_each_other(contests, entries)
+    page = "\n\n".join(_parts(run.study, entries, contests, beside, folder, out.name)) + "\n"
+    with replacing(out, figure) as (to_page, to_figure):
+        to_page.write_text(page, "utf-8")
+        to_figure.write_text(svg_text(figure_of(beside)), "utf-8")
+
+
+def _entry(given: str) -> Entry:
+    """Sensor of a file with Bayer, as it exists, or a preset with RGBW."""
+    own, real = preset(given), given.endswith(".toml")
+    return Entry(plain_name(label(given)), vary(own, "bayer" if real else "rgbw"), BAYER if real else RGBW)
+
+
+def beside_each_other(contests: Sequence[Contest], entries: Sequence[Entry]) -> list[Contest]:
+    """Contests in which the study's sensors, each with its development, stand where processors do."""
+    found: dict[str, dict[str, tuple[Row, ...]]] = {}
+    for entry in entries:
+        for contest in contests:
+            if plain_name(contest.group.sensor) == entry.name:
+                found.setdefault(contest.level, {})[entry.words] = contest.rows[entry.processor]
+    group = replace(contests[0].group, sensor="sensors of one size")
+    return [Contest(group, level, next(iter(rows.values()))[0].luminance_cd_m2, rows) for level, rows in found.items()]
+
+
+def _light(scene: str) -> Light:
+    """Spectrum of the scene's first light, as the study has it."""
+    nm = np.arange(380.5, 780.0)
+    return light_in_bands(next(iter(load(scene).groups.values())).spectrum, nm, np.ones_like(nm))
+
+
+def _parts(
+    study: Mapping[str, Any],
+    entries: Sequence[Entry],
+    contests: Sequence[Contest],
+    beside: Sequence[Contest],
+    folder: Path,
+    page: str,
+) -> list[str]:
+    coarsest = max(entry.sensor.pixel.pitch_um for entry in entries)
+    area = EqualArea(study["sensor_side_um"], coarsest)
+    green, white = (entries[0].sensor.responses.curves[channel] for channel in "GW")
+    at_peak = np.interp(green.wavelength_nm[green.values.argmax()], white.wavelength_nm, white.values)
+    parts = [
+        TEXT.format(
+            folder=folder,
+            page=page,
+            scene=f"`{study['scenes'][0]['source']}`",
+            side=f"{area.side_um:g}",
+            f_number=f"{entries[0].sensor.lens.f_number:g}",
+            longest=duration(study["longest_exposure_s"]),
+            coarsest=f"{coarsest:g}",
+            green_share=f"{green.values.max() / at_peak:.0%}",
+        ),
+        sensors_table(entries, area),
+        f"![PSNR over light, and SNR of an even field over light, by sensor]({page.removesuffix('.md')}.svg)",
+        "## Light and noise",
+        "Of a pixel of green, and of W where the mosaic has it. Closed form: an even neutral field of the scene's mean "
+        "luminance, as `rodcone snr` has it; in the picture, the scene's colours under that channel. Simulated: mean "
+        f"over standard deviation of {FIELD_SIDE} x {FIELD_SIDE} pixels of one chip. Per area: as many such pixels "
+        f"as fill a square of {coarsest:g} µm.",
+        *light_tables(entries, beside, _light(study["scenes"][0]["source"]), coarsest),
+        "## Pictures",
+        "Means over seeds ± half the 95 % interval; the best of each column in bold. The real cameras with Bayer, the "
+        "paper's pixel with RGBW.",
+        *(metric_table(metric, beside) for metric in SHOWN),
+    ]
+    own = next((entry for entry in entries if entry.processor == RGBW), None)
+    if own is not None:
+        parts += [
+            f"## {own.name} beside the cameras that exist",
+            "Levels at which the paper's RGBW pixel is ahead / level / behind, by the 95 % interval of the difference "
+            "over seeds.",
+            outcome_table(beside, own.words),
+            "Its lead light by light: positive, it is better. **Bold**: it is behind, and the whole interval is below "
+            "0. In brackets: the interval holds 0.",
+            *(lead_table(metric, beside, own.words) for metric in METRICS),
+        ]
+    return [*parts, *white_pixel_tables(contests)]
+
+
+def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
+    """Return a table of the sensors' numbers; what no report tells stands in brackets."""
+    rows = []
+    for entry in entries:
+        path, pixel = REPORTS / f"{entry.name}.toml", entry.sensor.pixel
+        report = read_report(path) if path.is_file() else None
+        told = {} if report is None else report.figures
+        dsnu, prnu = f"{pixel.dsnu_e:g}", f"{100 * pixel.prnu:g}"
+        rows.append(
+            [
+                f"`{entry.name}`" + ("" if report is None else f": {report.camera}"),
+                f"{pixel.pitch_um:g}",
+                str(area.shape((1, 1), pixel.pitch_um)[0]),
+                f"{told['eta']:g} % at {told['lambda_nm']:g} nm" if "eta" in told else "(the project's curves)",
+                f"{pixel.read_noise_e:.3g}",
+                f"{pixel.full_well_e:.4g}",
+                f"{pixel.full_well_e / pixel.pitch_um**2:.3g}",
+                dsnu if report is None or "DSNU1288" in told else f"({dsnu})",
+                prnu if report is None or "PRNU1288" in told else f"({prnu})",
+            ]
+        )
+    head = ["sensor", "pitch [µm]", "pixels across", "quantum efficiency", "read noise [e⁻]", "clip [e⁻]"]
+    return table([*head, "clip [e⁻/µm²]", "DSNU [e⁻]", "PRNU [%]"], rows)
+
+
+def light_tables(entries: Sequence[Entry], beside: Sequence[Contest], light: Light, coarsest_um: float) -> list[str]:
+    """Return tables over light: exposure time, electrons, SNR of a pixel and per area."""
+    levels = [level_text(contest.level) for contest in beside]
+    rows: dict[str, list[list[str]]] = {"exposure": [], "electrons": [], "snr": [], "area": []}
+    for entry in entries:
+        shown = [each for each in channels(entry.sensor.cfa) if each in "GW"]
+        rows["exposure"].append([entry.words, *(duration(each.rows[entry.words][0].exposure_s) for each in beside)])
+        for channel in shown:
+            name = f"{entry.words}, {channel}"
+            cells: dict[str, list[str]] = {"electrons": [], "snr": [], "area": []}
+            for contest in beside:
+                row = contest.rows[entry.words][0]
+                field = even_field(entry.sensor, channel, light, row.luminance_cd_m2, row.exposure_s)
+                in_picture = json.loads(row.mean_electrons)[channel]
+                cells["electrons"].append(f"{significant(field.electrons)}, {significant(in_picture)}")
+                full = field.electrons >= entry.sensor.pixel.full_well_e
+                cells["snr"].append(MISSING if full else f"{fixed(field.snr_db, 1)}, {fixed(field.simulated_db, 1)}")
+                gain_db = 20 * log10(coarsest_um / entry.sensor.pixel.pitch_um)
+                cells["area"].append(MISSING if full else fixed(field.snr_db + gain_db, 1))
+            for key, values in cells.items():
+                rows[key].append([name, *values])
+    heads = {
+        "exposure": "exposure time",
+        "electrons": "electrons a pixel: even field, mean of the picture",
+        "snr": "SNR of a pixel [dB]: closed form, simulated",
+        "area": f"SNR of {coarsest_um:g} µm squared [dB]",
+    }
+    return [table([heads[key], *levels], of_key) for key, of_key in rows.items()]
+
+
+def metric_table(metric: Metric, beside: Sequence[Contest]) -> str:
+    """Return a table of one metric: sensors down, light across; the best of each column in bold."""
+    sign = 1 if metric.higher else -1
+    best = [sign * max(sign * contest.mean(name, metric) for name in contest.rows) for contest in beside]
+    rows = []
+    for name in beside[0].rows:
+        cells = []
+        for contest, most in zip(beside, best, strict=True):
+            found = mean_with_confidence([getattr(row, metric.key) for row in contest.rows[name]])
+            shown = fixed(found.mean, metric.digits)
+            shown = f"**{shown}**" if shown == fixed(most, metric.digits) else shown
+            cells.append(f"{shown} ± {fixed((found.high - found.low) / 2, metric.digits)}")
+        rows.append([name, *cells])
+    unit = f" [{metric.unit}]" if metric.unit else ""
+    return table([f"{metric.name}{unit}", *(level_text(contest.level) for contest in beside)], rows)
+
+
+def outcome_table(beside: Sequence[Contest], own: str) -> str:
+    """Return how often a sensor is ahead, level and behind each other one, by metric."""
+    rows = []
+    for other in opponents_of(beside, own):
+        found = [[duel.outcome for duel in duels(beside, own, other, metric)] for metric in SHOWN]
+        counts = [" / ".join(str(each.count(way)) for way in (AHEAD, LEVEL, BEHIND)) for each in found]
+        rows.append([other, *counts])
+    return table(["beside", *(metric.name for metric in SHOWN)], rows)
+
+
+@rc_context(STYLE)
+def figure_of(beside: Sequence[Contest]) -> Figure:
+    """Draw PSNR and median CIEDE2000 over light, a line a sensor."""
+    figure = blank(2.6 * CHART[0], 1.2 * CHART[1])
+    light = [contest.luminance_cd_m2 for contest in beside]
+    for axes, metric in zip(figure.subplots(1, 2), (PSNR, DELTA_E), strict=True):
+        values = {name: [contest.mean(name, metric) for contest in beside] for name in beside[0].rows}
+        for of_sensor, (colour, line) in zip(values.values(), LINES.items(), strict=False):
+            axes.semilogx(light, of_sensor, line, color=colour)
+        axes.set(title=f"{metric.name} {metric.unit}".strip(), xlabel="cd/m²", xlim=(light[0], light[-1]))
+        plain_ticks(axes)
+        name_at_ends(axes, [(name, of[-1], colour) for (name, of), colour in zip(values.items(), LINES, strict=False)])
+    return figure
+
+
+if __name__ == "__main__":
+    write_page(last_run(Path(sys.argv[1])), Path(sys.argv[1]), Path(sys.argv[2]))
