@@ -276,6 +276,7 @@ def _check_numbers(study: Study) -> None:
     limits, lens, budget = study.render, study.lens, study.budget
     require_range("longest_exposure_s", study.longest_exposure_s, 1e-9, 1e6, "give seconds above 0")
     if study.sensor_side_um is not None:
+        require_range("sensor_side_um", study.sensor_side_um, 1.0, 1e6, "give micrometres, or leave it out")
         for name in study.sensors:
             across = round(study.sensor_side_um / preset(name).pixel.pitch_um)
             require_whole(f"sensor_side_um: pixels across {label(name)}", across, 16, 8192, "change it")

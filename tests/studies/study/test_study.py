@@ -23,6 +23,14 @@ def test_conditions_are_the_product_of_five_axes_each_once() -> None:
     assert replace(second, sensor=first.sensor) == first
 
 
+def test_sensors_of_one_size_are_compared_at_the_coarsest_pitch() -> None:
+    study = replace(STUDY, sensors=("low_noise", "table1_output_6um"))
+    assert study.equal_area is None
+    area = replace(study, sensor_side_um=600.0).equal_area
+    assert area is not None
+    assert (area.side_um, area.coarsest_um) == (600.0, 6.0)
+
+
 def test_mosaics_are_those_of_the_processors_each_once() -> None:
     assert mosaics(replace(STUDY, processors=("bayer", "interleaved"))) == ("bayer", "rgbw")
 
@@ -64,6 +72,10 @@ def test_auto_exposure_goes_without_green(tmp_path: Path) -> None:
         ({"processors": ("bayers",)}, "did you mean 'bayer'"),
         ({"seeds": (-1,)}, "give whole numbers"),
         ({"longest_exposure_s": 0.0}, "longest_exposure_s"),
+        ({"sensor_side_um": float("nan")}, "sensor_side_um"),
+        ({"sensor_side_um": -5.0}, "sensor_side_um"),
+        ({"sensor_side_um": 20.0}, "pixels across low_noise"),  # 9 of 2.2 um
+        ({"sensor_side_um": 1e5}, "pixels across low_noise"),
         ({"render": replace(STUDY.render, spp=0)}, "render.spp"),
         ({"render": replace(STUDY.render, size=8)}, "render.size"),
         ({"render": replace(STUDY.render, noise_share=0.0)}, "render.noise_share"),

@@ -5,6 +5,7 @@ import json
 import os
 import random
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -26,7 +27,7 @@ from render.engine import render
 from rodcone.errors import InputError
 from scenes.catalog import load
 from sensor.optics import form_image
-from sensor.presets import preset
+from sensor.presets import preset, preset_file
 from sensor.response import expected_electrons
 from studies.budget.budget import charged_share, monte_carlo_share
 from studies.study.study import RenderLimits, SceneChoice, Study
@@ -67,6 +68,31 @@ def test_order_and_executor_change_nothing(tmp_path: Path) -> None:
     with ThreadPoolExecutor(2) as pool:
         swept(study, tmp_path / "threads", partial(run, executor=pool, at_once=3))
     assert content(tmp_path / "one") == content(tmp_path / "turned") == content(tmp_path / "threads")
+
+
+def test_sensors_of_one_size_get_the_same_light_and_are_compared_at_the_coarsest_pixels(tmp_path: Path) -> None:
+    SAMPLE.picture(tmp_path / "scene.exr", (48, 64))
+    coarse_file = tmp_path / "coarse.toml"
+    coarse_file.write_text(preset_file("low_noise").read_text("utf-8").replace("pitch_um = 2.2", "pitch_um = 4.4"))
+    names = (str(coarse_file), "low_noise")
+    study = small_study(tmp_path, sensors=names, sensor_side_um=140.8, seeds=(0,), exposures=("1ms",))
+    swept(study, tmp_path / "out")
+    with open_results(tmp_path / "out") as base:
+        made = list(rows(base))
+    coarse, fine = ([row for row in made if row.sensor == name] for name in ("coarse.toml", "low_noise"))
+    assert len(coarse) == len(fine) == 2
+    for one, other in zip(coarse, fine, strict=True):
+        # four pixels for one; green's sites sample the picture a little differently
+        light = [json.loads(row.mean_electrons)["G"] for row in (one, other)]
+        assert light[0] / light[1] == pytest.approx(4.0, rel=0.01)
+        assert one.truth == other.truth
+        sizes = {png_size(tmp_path / "out" / "pictures" / name) for name in (one.picture, other.picture, one.truth)}
+        assert sizes == {(32, 24)}
+
+
+def png_size(path: Path) -> tuple[int, int]:
+    """Width and height, from the header of a PNG."""
+    return struct.unpack(">II", path.read_bytes()[16:24])
 
 
 def test_a_wider_study_leaves_the_cells_it_shares_as_they_are(tmp_path: Path) -> None:

@@ -1,0 +1,47 @@
+"""Sensors of one size: means over pixels of another grid, by hand, and the pixels that a pitch makes."""
+
+import numpy as np
+import pytest
+
+from render.radiance import SpectralRadiance
+from studies.study.equal_area import EqualArea, area_average
+
+RNG = np.random.default_rng(3)
+NM = np.array([450.0, 550.0, 650.0])
+
+
+def test_whole_factors_are_means_of_blocks_and_a_finer_grid_repeats() -> None:
+    picture = RNG.random((6, 8, 3))
+    blocks = picture.reshape(3, 2, 4, 2, 3).mean(axis=(1, 3))
+    assert area_average(picture, (3, 4)) == pytest.approx(blocks, rel=1e-12)
+    assert area_average(blocks, (6, 8)) == pytest.approx(blocks.repeat(2, 0).repeat(2, 1), rel=1e-12)
+    assert area_average(picture, (6, 8)) == pytest.approx(picture, rel=1e-12)
+
+
+def test_three_pixels_on_two_share_the_middle_one() -> None:
+    # each of two takes one and a half: (a + b / 2) / 1.5, (b / 2 + c) / 1.5
+    assert area_average(np.array([[3.0, 6.0, 12.0]]), (1, 2)) == pytest.approx(np.array([[4.0, 10.0]]))
+
+
+@pytest.mark.parametrize("shape", [(5, 7), (13, 4), (40, 31)])
+def test_the_mean_and_the_type_are_kept(shape: tuple[int, int]) -> None:
+    picture = RNG.random((11, 9)).astype(np.float32)
+    found = area_average(picture, shape)
+    assert found.shape == shape
+    assert found.dtype == np.float32
+    assert found.mean() == pytest.approx(picture.mean(), rel=1e-5)
+
+
+def test_independent_noise_falls_as_the_root_of_the_pixels_averaged() -> None:
+    noise = RNG.standard_normal((400, 400))
+    # 40 000 means of four: the standard error of their deviation is 0.35 %
+    assert area_average(noise, (200, 200)).std() == pytest.approx(0.5, rel=0.02)
+
+
+def test_pixels_follow_from_the_pitch_in_the_pictures_proportions() -> None:
+    area = EqualArea(side_um=883.2, coarsest_um=6.9)
+    assert area.shape((300, 400), 6.9) == (96, 128)
+    assert area.shape((400, 300), 2.2) == (401, 301)
+    view = area.view(SpectralRadiance(RNG.random((30, 40, 3)), NM), 6.9)
+    assert view.shape == (96, 128)
+    assert view.wavelength_nm == pytest.approx(NM)
