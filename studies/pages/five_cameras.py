@@ -49,37 +49,8 @@ from studies.sweep.row import Row
 
 SHOWN = tuple(metric for metric in report_text.METRICS if metric not in ON_TARGETS)
 LINES = dict(zip((*COLOURS, SOFT, "#9a7d0a", INK), ("-", "-", "-", "-", "-", "--", ":"), strict=True))  # a sensor each
-TEXT = """\
-# Five cameras and the paper's pixel, from moonlight to daylight
-
-    rodcone new study real_cameras -o real_cameras.toml
-    rodcone sweep real_cameras.toml -o {folder} --as-stated
-    python -m studies.pages.five_cameras {folder} docs/{page}
-
-A scene ({scene}) before sensors of one size behind one f-number. Each has the noise, well, pitch and quantum efficiency
-that its maker published ([cameras that exist](real_cameras.md)).
-
-## How far "equal" goes
-
-- **Equal:** the sensor ({side} µm on its longer side; pixels across follow from the pitch, to whole pixels), field of
-  view, f/{f_number}, scene, light, longest exposure ({longest}), white balance (of the known light), development
-  (one method, `ple`, on Bayer and on RGBW). So the same light falls on every sensor. The lens is ideal: no diffraction,
-  no glare.
-- **Compared at one size:** each picture is developed at its sensor's own pixels, then averaged in linear light to those
-  of the coarsest ({coarsest} µm) and measured there. A sensor of finer pixels thereby averages its noise, and samples
-  the scene more finely: in good light, where noise is small, this decides, not the noise.
-- **Each its own:** the exposure time, by the information that its samples get, up to the longest. A small well takes
-  less light in daylight.
-- **Measured:** pitch, read noise, saturation, conversion gain, DSNU and PRNU where a report has them, and the quantum
-  efficiency of the chip without filters at one wavelength.
-- **Assumed:** the shape of the response over wavelength and the colour filters, which are the project's RGBW curves for
-  all, scaled so that W has the published quantum efficiency at its wavelength. The reports are of monochrome chips;
-  their colour twins have filters of their own (Basler estimates its green at 93 % of the monochrome chip's at 545 nm,
-  for the infrared filter; here green's filter takes {green_share} of W). DSNU of 1 e⁻ and PRNU of 1 % where a report
-  lacks them. No real camera of these has a W pixel: its rows with RGBW say what its pixel would give with the paper's
-  mosaic.
-- **Not there:** column noise, hot pixels, crosstalk, angular response; no report tells them.
-"""
+TEXT = Path(__file__).parent / "templates" / "five_cameras.md"
+AT_NM = 530.0  # where the quantum efficiency of a sensor without a report is told
 
 
 @dataclass(frozen=True)
@@ -120,6 +91,9 @@ def write_page(run: LastRun, folder: Path, out: Path) -> None:
             "start from rodcone new study real_cameras"
         )
     entries = [_entry(given) for given in run.study["sensors"]]
+    stops = {entry.name: entry.sensor.lens.f_number for entry in entries}
+    if len(set(stops.values())) > 1:
+        raise InputError(f"f_number: {stops} are not one; allowed: one aperture for all; correct the sensors' files")
     figure, beside = out.with_suffix(".svg"), beside_each_other(contests, entries)
     page = "\n\n".join(_parts(run.study, entries, contests, beside, folder, out.name)) + "\n"
     with replacing(out, figure) as (to_page, to_figure):
@@ -158,12 +132,13 @@ def _parts(
     folder: Path,
     page: str,
 ) -> list[str]:
+    own = next((entry for entry in entries if entry.processor == RGBW), None)
     coarsest = max(entry.sensor.pixel.pitch_um for entry in entries)
     area = EqualArea(study["sensor_side_um"], coarsest)
     green, white = (entries[0].sensor.responses.curves[channel] for channel in "GW")
     at_peak = np.interp(green.wavelength_nm[green.values.argmax()], white.wavelength_nm, white.values)
     parts = [
-        TEXT.format(
+        TEXT.read_text("utf-8").format(
             folder=folder,
             page=page,
             scene=f"`{study['scenes'][0]['source']}`",
@@ -174,7 +149,8 @@ def _parts(
             green_share=f"{green.values.max() / at_peak:.0%}",
         ),
         sensors_table(entries, area),
-        f"![PSNR over light, and SNR of an even field over light, by sensor]({page.removesuffix('.md')}.svg)",
+        f"![PSNR and CIEDE2000 over light, by sensor]({page.removesuffix('.md')}.svg)",
+        summary_table(beside, own.words if own else None),
         "## Light and noise",
         "Of a pixel of green, and of W where the mosaic has it. Closed form: an even neutral field of the scene's mean "
         "luminance, as `rodcone snr` has it; in the picture, the scene's colours under that channel. Simulated: mean "
@@ -186,7 +162,6 @@ def _parts(
         "paper's pixel with RGBW.",
         *(metric_table(metric, beside) for metric in SHOWN),
     ]
-    own = next((entry for entry in entries if entry.processor == RGBW), None)
     if own is not None:
         parts += [
             f"## {own.name} beside the cameras that exist",
@@ -213,7 +188,7 @@ def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
                 f"`{entry.name}`" + ("" if report is None else f": {report.camera}"),
                 f"{pixel.pitch_um:g}",
                 str(area.shape((1, 1), pixel.pitch_um)[0]),
-                f"{told['eta']:g} % at {told['lambda_nm']:g} nm" if "eta" in told else "(the project's curves)",
+                _efficiency(entry.sensor) if report is None else f"{told['eta']:g} % at {told['lambda_nm']:g} nm",
                 f"{pixel.read_noise_e:.3g}",
                 f"{pixel.full_well_e:.4g}",
                 f"{pixel.full_well_e / pixel.pitch_um**2:.3g}",
@@ -223,6 +198,12 @@ def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
         )
     head = ["sensor", "pitch [µm]", "pixels across", "quantum efficiency", "read noise [e⁻]", "clip [e⁻]"]
     return table([*head, "clip [e⁻/µm²]", "DSNU [e⁻]", "PRNU [%]"], rows)
+
+
+def _efficiency(sensor: SensorConfig) -> str:
+    white = sensor.responses.curves["W"]
+    value = sensor.pixel.fill_factor * np.interp(AT_NM, white.wavelength_nm, white.values)
+    return f"({100 * value:.3g} % at {AT_NM:g} nm: the paper's W, fill factor {sensor.pixel.fill_factor:g})"
 
 
 def light_tables(entries: Sequence[Entry], beside: Sequence[Contest], light: Light, coarsest_um: float) -> list[str]:
@@ -270,6 +251,18 @@ def metric_table(metric: Metric, beside: Sequence[Contest]) -> str:
         rows.append([name, *cells])
     unit = f" [{metric.unit}]" if metric.unit else ""
     return table([f"{metric.name}{unit}", *(level_text(contest.level) for contest in beside)], rows)
+
+
+def summary_table(beside: Sequence[Contest], own: str | None) -> str:
+    """Return the first two sensors by PSNR at each level, and the place of one."""
+    rows = []
+    for contest in beside:
+        psnr_db = {name: contest.mean(name, PSNR) for name in contest.rows}
+        order = sorted(psnr_db, key=lambda name: -psnr_db[name])
+        shown = [order[0], order[1], *([] if own is None else [own])]
+        cells = [f"{order.index(name) + 1}. {name}: {fixed(psnr_db[name], 1)} dB" for name in shown]
+        rows.append([level_text(contest.level), *cells])
+    return table(["by PSNR", "first", "second", *([] if own is None else ["the paper's pixel"])], rows)
 
 
 def outcome_table(beside: Sequence[Contest], own: str) -> str:

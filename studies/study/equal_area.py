@@ -1,11 +1,14 @@
 """Sensors of one size: pixels by pitch, and pictures averaged to the pixels of the coarsest sensor."""
 
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
+
+Real = TypeVar("Real", bound=np.floating)
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,7 @@ class EqualArea:
         return replace(radiance, values=area_average(radiance.values, self.shape(radiance.shape, pitch_um)))
 
 
-def area_average(values: NDArray[np.floating], shape: tuple[int, int]) -> NDArray[np.floating]:
+def area_average(values: NDArray[Real], shape: tuple[int, int]) -> NDArray[Real]:
     """Mean of a picture over each pixel of another grid on the same area, pixels taken as even squares.
 
     Parameters
@@ -58,4 +61,4 @@ def _overlaps(own: int, other: int) -> NDArray[np.float64]:
     """Share of each of `own` intervals in each of `other` on the same length, shape (other, own); rows sum to 1."""
     ends, starts = np.arange(1, own + 1) / own, np.arange(own) / own
     low, high = np.arange(other)[:, None] / other, np.arange(1, other + 1)[:, None] / other
-    return np.maximum(np.minimum(ends, high) - np.maximum(starts, low), 0.0) * other
+    return np.asarray(np.maximum(np.minimum(ends, high) - np.maximum(starts, low), 0.0) * other)
