@@ -36,6 +36,7 @@ from studies.pages.report_text import (
     duration,
     fixed,
     level_text,
+    percent,
     plain_name,
     significant,
     table,
@@ -133,12 +134,15 @@ def _parts(
     page: str,
 ) -> list[str]:
     own = next((entry for entry in entries if entry.processor == RGBW), None)
+    worst = max(row.mc_share for contest in contests for rows in contest.rows.values() for row in rows)
     coarsest = max(entry.sensor.pixel.pitch_um for entry in entries)
     area = EqualArea(study["sensor_side_um"], coarsest)
     green, white = (entries[0].sensor.responses.curves[channel] for channel in "GW")
     at_peak = np.interp(green.wavelength_nm[green.values.argmax()], white.wavelength_nm, white.values)
     parts = [
-        TEXT.read_text("utf-8").format(
+        TEXT.read_text("utf-8")
+        .rstrip()
+        .format(
             folder=folder,
             page=page,
             scene=f"`{study['scenes'][0]['source']}`",
@@ -146,7 +150,7 @@ def _parts(
             f_number=f"{entries[0].sensor.lens.f_number:g}",
             longest=duration(study["longest_exposure_s"]),
             coarsest=f"{coarsest:g}",
-            green_share=f"{green.values.max() / at_peak:.0%}",
+            green_share=percent(float(green.values.max() / at_peak)),
         ),
         sensors_table(entries, area),
         f"![PSNR and CIEDE2000 over light, by sensor]({page.removesuffix('.md')}.svg)",
@@ -158,8 +162,9 @@ def _parts(
         f"as fill a square of {coarsest:g} µm.",
         *light_tables(entries, beside, _light(study["scenes"][0]["source"]), coarsest),
         "## Pictures",
-        "Means over seeds ± half the 95 % interval; the best of each column in bold. The real cameras with Bayer, the "
-        "paper's pixel with RGBW.",
+        "Means over seeds ± half the 95 % interval; the best of each column in bold. Real cameras have Bayer, the "
+        "paper's pixel RGBW. The render's own noise, which counts as texture, has at most "
+        f"{percent(worst)} of the sensor's variance.",
         *(metric_table(metric, beside) for metric in SHOWN),
     ]
     if own is not None:
@@ -182,7 +187,7 @@ def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
         path, pixel = REPORTS / f"{entry.name}.toml", entry.sensor.pixel
         report = read_report(path) if path.is_file() else None
         told = {} if report is None else report.figures
-        dsnu, prnu = f"{pixel.dsnu_e:g}", f"{100 * pixel.prnu:g}"
+        dsnu, prnu = f"{pixel.dsnu_e:.3g}", f"{100 * pixel.prnu:.3g}"
         rows.append(
             [
                 f"`{entry.name}`" + ("" if report is None else f": {report.camera}"),
@@ -190,8 +195,8 @@ def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
                 str(area.shape((1, 1), pixel.pitch_um)[0]),
                 _efficiency(entry.sensor) if report is None else f"{told['eta']:g} % at {told['lambda_nm']:g} nm",
                 f"{pixel.read_noise_e:.3g}",
-                f"{pixel.full_well_e:.4g}",
-                f"{pixel.full_well_e / pixel.pitch_um**2:.3g}",
+                significant(pixel.full_well_e),
+                significant(pixel.full_well_e / pixel.pitch_um**2),
                 dsnu if report is None or "DSNU1288" in told else f"({dsnu})",
                 prnu if report is None or "PRNU1288" in told else f"({prnu})",
             ]
@@ -284,7 +289,11 @@ def figure_of(beside: Sequence[Contest]) -> Figure:
         values = {name: [contest.mean(name, metric) for contest in beside] for name in beside[0].rows}
         for of_sensor, (colour, line) in zip(values.values(), LINES.items(), strict=False):
             axes.semilogx(light, of_sensor, line, color=colour)
-        axes.set(title=f"{metric.name} {metric.unit}".strip(), xlabel="cd/m²", xlim=(light[0], light[-1]))
+        axes.set(
+            title=f"{metric.name}{f' [{metric.unit}]' if metric.unit else ''}",
+            xlabel="cd/m²",
+            xlim=(light[0], light[-1]),
+        )
         plain_ticks(axes)
         name_at_ends(axes, [(name, of[-1], colour) for (name, of), colour in zip(values.items(), LINES, strict=False)])
     return figure
