@@ -139,10 +139,9 @@ def _parts(
     area = EqualArea(study["sensor_side_um"], coarsest)
     green, white = (entries[0].sensor.responses.curves[channel] for channel in "GW")
     at_peak = np.interp(green.wavelength_nm[green.values.argmax()], white.wavelength_nm, white.values)
+    text = TEXT.read_text("utf-8").rstrip()
     parts = [
-        TEXT.read_text("utf-8")
-        .rstrip()
-        .format(
+        text.format(
             folder=folder,
             page=page,
             scene=f"`{study['scenes'][0]['source']}`",
@@ -254,8 +253,7 @@ def metric_table(metric: Metric, beside: Sequence[Contest]) -> str:
             shown = f"**{shown}**" if shown == fixed(most, metric.digits) else shown
             cells.append(f"{shown} ± {fixed((found.high - found.low) / 2, metric.digits)}")
         rows.append([name, *cells])
-    unit = f" [{metric.unit}]" if metric.unit else ""
-    return table([f"{metric.name}{unit}", *(level_text(contest.level) for contest in beside)], rows)
+    return table([_with_unit(metric), *(level_text(contest.level) for contest in beside)], rows)
 
 
 def summary_table(beside: Sequence[Contest], own: str | None) -> str:
@@ -268,6 +266,10 @@ def summary_table(beside: Sequence[Contest], own: str | None) -> str:
         cells = [f"{order.index(name) + 1}. {name}: {fixed(psnr_db[name], 1)} dB" for name in shown]
         rows.append([level_text(contest.level), *cells])
     return table(["by PSNR", "first", "second", *([] if own is None else ["the paper's pixel"])], rows)
+
+
+def _with_unit(metric: Metric) -> str:
+    return f"{metric.name} [{metric.unit}]" if metric.unit else metric.name
 
 
 def outcome_table(beside: Sequence[Contest], own: str) -> str:
@@ -289,11 +291,7 @@ def figure_of(beside: Sequence[Contest]) -> Figure:
         values = {name: [contest.mean(name, metric) for contest in beside] for name in beside[0].rows}
         for of_sensor, (colour, line) in zip(values.values(), LINES.items(), strict=False):
             axes.semilogx(light, of_sensor, line, color=colour)
-        axes.set(
-            title=f"{metric.name}{f' [{metric.unit}]' if metric.unit else ''}",
-            xlabel="cd/m²",
-            xlim=(light[0], light[-1]),
-        )
+        axes.set(title=_with_unit(metric), xlabel="cd/m²", xlim=(light[0], light[-1]))
         plain_ticks(axes)
         name_at_ends(axes, [(name, of[-1], colour) for (name, of), colour in zip(values.items(), LINES, strict=False)])
     return figure

@@ -39,11 +39,13 @@ the preset in closed form; recovered ones are measured in the chip's frames, whi
 
 **Where the numbers come from.** The makers' own files could not be opened when this page was made. Each number was
 read in a public copy or quotation of the maker's document, which its section names; what no copy holds is left out, and
-nothing is filled in from memory. One maker's own pages could be opened, MATRIX VISION's (Balluff), which print two EMVA
-figures a sensor: SNR_max 40.3 dB and DR 71.2 dB for an IMX250 (mvBlueFOX3-2051, 3.45 µm), 45.1 and 73 dB for an IMX249
-(mvBlueFOX3-2024a, 5.86 µm, read in a copy of the manual). The sensors of the same pitch below agree within 0.6 dB: IMX264
-of Teledyne FLIR (40.3 by its saturation, 71.8) and IMX174 of Basler (45.1, 73.4). Two figures make no preset. Where a report lacks DSNU1288 or PRNU1288 it is switched off, with no effect on the
+nothing is filled in from memory. Where a report lacks DSNU1288 or PRNU1288 it is switched off, with no effect on the
 other rows. Photo-electrons are set on the bench, so a quantum efficiency goes into the preset and is not tested here.
+
+**What a maker's own pages say.** MATRIX VISION (Balluff) prints two EMVA figures a sensor, which make no preset: SNR_max
+40.3 dB and DR 71.2 dB for an IMX250 (mvBlueFOX3-2051, 3.45 µm), 45.1 and 73 dB for an IMX249 (mvBlueFOX3-2024a, 5.86 µm,
+in a copy of its manual). The copies below of other makers' figures, for sensors of these pitches, agree within 0.7 dB:
+Teledyne FLIR's IMX264 (40.3 by its saturation, 71.8) and Basler's IMX174 (45.1, 73.4).
 
 **What is an input.** K with bits and black level gives the clip; then the saturation capacity, which is where the
 temporal variance is greatest, is recovered and no input. Where K or the black level isn't told, the clip is solved from
