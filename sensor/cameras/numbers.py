@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from render.spectrum import Spectrum
-from rodcone.errors import InputError
+from rodcone.errors import InputError, unknown
 from sensor.cameras.library import MeasuredCamera
 from sensor.cfa import Tile, channels
 from sensor.config import PixelConfig, SensorConfig
@@ -99,11 +99,14 @@ def lent_curves(sensor: SensorConfig, name: str, numbers: PixelNumbers) -> Curve
     Raises
     ------
     InputError
-        For a wavelength at which the curves hardly respond.
+        For a wavelength at which the curves hardly respond, or a mosaic's channel that the other camera hasn't.
     """
     assert numbers.efficiency is not None  # the callers' choice
     value, at_nm = numbers.efficiency
     theirs = sensor.responses.curves
+    for channel in channels(numbers.cfa) if numbers.cfa else ():
+        if channel not in theirs:
+            raise unknown(f"preset {name}: channel", channel, theirs)
     first_nm, last_nm = next(iter(theirs.values())).wavelength_nm[[0, -1]]
     nm = np.arange(first_nm, last_nm + 1e-6, _STEP_NM)
     shape = {

@@ -63,7 +63,8 @@ def preset(
         Where its noise stands: an EMVA 1288 report as .toml, a .dng with a NoiseProfile, or darktable's
         noiseprofiles.json with --camera and --iso. For raw frames of your own: rodcone characterise --from.
     anchor
-        Published quantum efficiency at a wavelength, such as 0.5@530, which turns a relative response into electrons.
+        Published quantum efficiency at a wavelength, such as 0.5@530, which turns a relative response, or the curves of
+        the preset that is named, into electrons.
     iso
         Exposure index of a profile in noiseprofiles.json; the lowest by default.
     white_e
@@ -83,10 +84,12 @@ def preset(
     curves_file = out.parent / f"{out.stem}_curves.csv"
     _require_new(curves_file, ".csv")
     lender = None if name is None else read_preset(name)
+    # what the sources tell
     measured = None if camera is None else measured_camera(camera) if _wants_curves(noise) else _if_measured(camera)
     numbers = _numbers(noise, camera, iso, white_e)
     if anchor is not None:
         numbers = replace(numbers, efficiency=_anchor(anchor), source=f"{numbers.source}; anchor {anchor} as given")
+    # what a preset lends
     shape = None if measured is None else measured_curves(measured)
     if lender is not None:
         numbers = completed(numbers, lender, str(name))
@@ -97,6 +100,7 @@ def preset(
             f"anchor: {anchor} scales a response, and {noise.name!r} tells none; allowed with "
             "--camera, or with a preset that lends its curves; add low_noise, or leave --anchor out"
         )
+    # the files
     curves = curves_csv(numbers, shape)
     title = f"{measured.maker} {measured.model}" if measured else camera or numbers.source.split(":")[0]
     text = preset_text(f"{title}, as its sources tell it.", numbers, shape, curves_file.name if curves else "")

@@ -86,20 +86,20 @@ def write_page(run: LastRun, folder: Path, out: Path) -> None:
         For another study, or one that isn't whole.
     """
     contests = contests_of(run.rows)
-    if not {BAYER, RGBW} <= set(contests[0].rows) or not run.study.get("sensor_side_um"):
-        raise InputError(
-            f"study: {folder} is not of sensors of one size; allowed: one with sensor_side_um, {BAYER} and {RGBW}; "
-            "start from rodcone new study real_cameras"
-        )
     entries = [_entry(given) for given in run.study["sensors"]]
+    kinds = {entry.processor for entry in entries}
+    if not kinds == {BAYER, RGBW} <= set(contests[0].rows) or not run.study.get("sensor_side_um"):
+        raise InputError(
+            f"study: {folder} is not of sensors of one size; allowed: one with sensor_side_um, {BAYER} and {RGBW}, "
+            "sensors of files and a preset; start from rodcone new study real_cameras"
+        )
     stops = {entry.name: entry.sensor.lens.f_number for entry in entries}
     if len(set(stops.values())) > 1:
         raise InputError(f"f_number: {stops} are not one; allowed: one aperture for all; correct the sensors' files")
-    figure, beside = out.with_suffix(".svg"), beside_each_other(contests, entries)
-    page = "\n\n".join(_parts(run.study, entries, contests, beside, folder, out.name)) + "\n"
-    with replacing(out, figure) as (to_page, to_figure):
+    page, figure = page_of(run.study, entries, contests, folder, out), figure_of(beside_each_other(contests, entries))
+    with replacing(out, out.with_suffix(".svg")) as (to_page, to_figure):
         to_page.write_text(page, "utf-8")
-        to_figure.write_text(svg_text(figure_of(beside)), "utf-8")
+        to_figure.write_text(svg_text(figure), "utf-8")
 
 
 def _entry(given: str) -> Entry:
@@ -125,58 +125,41 @@ def _light(scene: str) -> Light:
     return light_in_bands(next(iter(load(scene).groups.values())).spectrum, nm, np.ones_like(nm))
 
 
-def _parts(
-    study: Mapping[str, Any],
-    entries: Sequence[Entry],
-    contests: Sequence[Contest],
-    beside: Sequence[Contest],
-    folder: Path,
-    page: str,
-) -> list[str]:
-    own = next((entry for entry in entries if entry.processor == RGBW), None)
-    worst = max(row.mc_share for contest in contests for rows in contest.rows.values() for row in rows)
-    coarsest = max(entry.sensor.pixel.pitch_um for entry in entries)
-    area = EqualArea(study["sensor_side_um"], coarsest)
-    green, white = (entries[0].sensor.responses.curves[channel] for channel in "GW")
+def page_of(
+    study: Mapping[str, Any], entries: Sequence[Entry], contests: Sequence[Contest], folder: Path, out: Path
+) -> str:
+    """Return the page's Markdown; parameters as `write_page`."""
+    beside = beside_each_other(contests, entries)
+    own = next(entry for entry in entries if entry.processor == RGBW)
+    area = EqualArea(study["sensor_side_um"], max(entry.sensor.pixel.pitch_um for entry in entries))
+    green, white = (own.sensor.responses.curves[channel] for channel in "GW")
     at_peak = np.interp(green.wavelength_nm[green.values.argmax()], white.wavelength_nm, white.values)
-    text = TEXT.read_text("utf-8").rstrip()
-    parts = [
-        text.format(
-            folder=folder,
-            page=page,
-            scene=f"`{study['scenes'][0]['source']}`",
-            side=f"{area.side_um:g}",
-            f_number=f"{entries[0].sensor.lens.f_number:g}",
-            longest=duration(study["longest_exposure_s"]),
-            coarsest=f"{coarsest:g}",
-            green_share=percent(float(green.values.max() / at_peak)),
-        ),
-        sensors_table(entries, area),
-        f"![PSNR and CIEDE2000 over light, by sensor]({page.removesuffix('.md')}.svg)",
-        summary_table(beside, own.words if own else None),
-        "## Light and noise",
-        "Of a pixel of green, and of W where the mosaic has it. Closed form: an even neutral field of the scene's mean "
-        "luminance, as `rodcone snr` has it; in the picture, the scene's colours under that channel. Simulated: mean "
-        f"over standard deviation of {FIELD_SIDE} x {FIELD_SIDE} pixels of one chip. Per area: as many such pixels "
-        f"as fill a square of {coarsest:g} µm.",
-        *light_tables(entries, beside, _light(study["scenes"][0]["source"]), coarsest),
-        "## Pictures",
-        "Means over seeds ± half the 95 % interval; the best of each column in bold. Real cameras have Bayer, the "
-        "paper's pixel RGBW. The render's own noise, which counts as texture, has at most "
-        f"{percent(worst)} of the sensor's variance.",
-        *(metric_table(metric, beside) for metric in SHOWN),
-    ]
-    if own is not None:
-        parts += [
-            f"## {own.name} beside the cameras that exist",
-            "Levels at which the paper's RGBW pixel is ahead / level / behind, by the 95 % interval of the difference "
-            "over seeds.",
-            outcome_table(beside, own.words),
-            "Its lead light by light: positive, it is better. **Bold**: it is behind, and the whole interval is below "
-            "0. In brackets: the interval holds 0.",
-            *(lead_table(metric, beside, own.words) for metric in METRICS),
-        ]
-    return [*parts, *white_pixel_tables(contests)]
+    scene = study["scenes"][0]["source"]
+    worst = max(row.mc_share for contest in contests for rows in contest.rows.values() for row in rows)
+    tables = {
+        "sensors": [sensors_table(entries, area)],
+        "summary": [summary_table(beside, own.words)],
+        "light": light_tables(entries, beside, _light(scene), area.coarsest_um),
+        "metrics": [metric_table(metric, beside) for metric in SHOWN],
+        "outcomes": [outcome_table(beside, own.words)],
+        "leads": [lead_table(metric, beside, own.words) for metric in METRICS],
+        "white_pixel": white_pixel_tables(contests),
+    }
+    return TEXT.read_text("utf-8").format(
+        folder=folder,
+        page=out.name,
+        figure=out.with_suffix(".svg").name,
+        scene=f"`{scene}`",
+        side=f"{area.side_um:g}",
+        f_number=f"{own.sensor.lens.f_number:g}",
+        longest=duration(study["longest_exposure_s"]),
+        coarsest=f"{area.coarsest_um:g}",
+        green_share=percent(float(green.values.max() / at_peak)),
+        field=FIELD_SIDE,
+        worst=percent(worst),
+        own=own.name,
+        **{name: "\n\n".join(parts) for name, parts in tables.items()},
+    )
 
 
 def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
@@ -256,16 +239,16 @@ def metric_table(metric: Metric, beside: Sequence[Contest]) -> str:
     return table([_with_unit(metric), *(level_text(contest.level) for contest in beside)], rows)
 
 
-def summary_table(beside: Sequence[Contest], own: str | None) -> str:
+def summary_table(beside: Sequence[Contest], own: str) -> str:
     """Return the first two sensors by PSNR at each level, and the place of one."""
     rows = []
     for contest in beside:
         psnr_db = {name: contest.mean(name, PSNR) for name in contest.rows}
         order = sorted(psnr_db, key=lambda name: -psnr_db[name])
-        shown = [order[0], order[1], *([] if own is None else [own])]
+        shown = (order[0], order[1], own)
         cells = [f"{order.index(name) + 1}. {name}: {fixed(psnr_db[name], 1)} dB" for name in shown]
         rows.append([level_text(contest.level), *cells])
-    return table(["by PSNR", "first", "second", *([] if own is None else ["the paper's pixel"])], rows)
+    return table(["by PSNR", "first", "second", "the paper's pixel"], rows)
 
 
 def _with_unit(metric: Metric) -> str:

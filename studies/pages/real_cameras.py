@@ -42,10 +42,10 @@ read in a public copy or quotation of the maker's document, which its section na
 nothing is filled in from memory. Where a report lacks DSNU1288 or PRNU1288 it is switched off, with no effect on the
 other rows. Photo-electrons are set on the bench, so a quantum efficiency goes into the preset and is not tested here.
 
-**What a maker's own pages say.** MATRIX VISION (Balluff) prints two EMVA figures a sensor, which make no preset: SNR_max
-40.3 dB and DR 71.2 dB for an IMX250 (mvBlueFOX3-2051, 3.45 µm), 45.1 and 73 dB for an IMX249 (mvBlueFOX3-2024a, 5.86 µm,
-in a copy of its manual). The copies below of other makers' figures, for sensors of these pitches, agree within 0.7 dB:
-Teledyne FLIR's IMX264 (40.3 by its saturation, 71.8) and Basler's IMX174 (45.1, 73.4).
+**What a maker's own pages say.** MATRIX VISION (Balluff) prints two EMVA figures a sensor, which make no preset:
+SNR_max 40.3 dB and DR 71.2 dB for an IMX250 (mvBlueFOX3-2051, 3.45 µm), 45.1 and 73 dB for an IMX249 (mvBlueFOX3-2024a,
+5.86 µm, in a copy of its manual). The copies below of other makers' figures, for sensors of these pitches, agree within
+0.7 dB: Teledyne FLIR's IMX264 (40.3 by its saturation, 71.8) and Basler's IMX174 (45.1, 73.4).
 
 **What is an input.** K with bits and black level gives the clip; then the saturation capacity, which is where the
 temporal variance is greatest, is recovered and no input. Where K or the black level isn't told, the clip is solved from
