@@ -128,7 +128,7 @@ def test_lent_curves_stop_at_one_electron_a_photon_and_say_so():
 def test_lent_curves_refuse_an_anchor_where_they_hardly_respond_and_a_mosaic_of_other_channels():
     with pytest.raises(InputError, match=r"anchor: 0\.5 electrons a photon at 1068 nm, where low_noise responds with"):
         lent_curves(low_noise(), "low_noise", PixelNumbers("s", efficiency=(0.5, 1068.0)))
-    with pytest.raises(InputError, match="preset low_noise: channel 'M' is unknown; allowed: R, G, B, W"):
+    with pytest.raises(InputError, match="preset low_noise: channel: 'M' is unknown; allowed: B, G, R, W"):
         lent_curves(low_noise(), "low_noise", PixelNumbers("s", efficiency=(0.5, 530.0), cfa=("GM", "YC")))
 
 

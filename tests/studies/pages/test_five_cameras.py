@@ -112,9 +112,11 @@ def test_another_study_is_refused_and_nothing_is_written(tmp_path: Path) -> None
     slow.write_text(preset_file("low_noise").read_text("utf-8").replace("f_number = 2.8", "f_number = 4.0"), "utf-8")
     bayer = run()
     bayer.rows[:] = [row for row in bayer.rows if row.processor == "ple_bayer"]
-    other = run(sensors=[str(FILES[0]), str(slow)])
-    other.rows[:] = [replace(row, sensor="slow.toml") if row.sensor == "table1_output" else row for row in other.rows]
-    for wrong, words in ((run(sensor_side_um=None), "sensor_side_um"), (bayer, "ple_rgbw"), (other, "f_number")):
+    other = run(sensors=[str(slow), "table1_output"])
+    other.rows[:] = [replace(row, sensor="slow.toml") if row.sensor == FILES[0].name else row for row in other.rows]
+    alone = run(sensors=["table1_output"])
+    cases = {"sensor_side_um": run(sensor_side_um=None), "ple_rgbw": bayer, "f_number": other, "and a preset": alone}
+    for words, wrong in cases.items():
         with pytest.raises(InputError, match=words):
             write_page(wrong, tmp_path, tmp_path / "five.md")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["slow.toml"]
