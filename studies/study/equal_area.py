@@ -20,20 +20,21 @@ class EqualArea:
     side_um : float
         Longer side of every sensor.
     coarsest_um : float
-        Greatest pitch among them: pictures are compared at such pixels, so that none is interpolated.
+        Greatest pitch among them, of a sensor that bins that of its raw image: pictures are compared at such pixels, so
+        that none is interpolated.
     """
 
     side_um: float
     coarsest_um: float
 
-    def shape(self, picture: tuple[int, int], pitch_um: float) -> tuple[int, int]:
-        """Height and width in whole pixels of a pitch, in a picture's proportions."""
-        pixels = self.side_um / pitch_um / max(picture)
-        return max(1, round(picture[0] * pixels)), max(1, round(picture[1] * pixels))
+    def shape(self, picture: tuple[int, int], pitch_um: float, block: int = 1) -> tuple[int, int]:
+        """Height and width in whole blocks of pixels of a pitch, in a picture's proportions."""
+        blocks = self.side_um / (pitch_um * block * max(picture))
+        return block * max(1, round(picture[0] * blocks)), block * max(1, round(picture[1] * blocks))
 
-    def view(self, radiance: SpectralRadiance, pitch_um: float) -> SpectralRadiance:
-        """Radiance at the pixels of a pitch."""
-        return replace(radiance, values=area_average(radiance.values, self.shape(radiance.shape, pitch_um)))
+    def view(self, radiance: SpectralRadiance, pitch_um: float, block: int = 1) -> SpectralRadiance:
+        """Radiance at the pixels of a pitch, in whole blocks."""
+        return replace(radiance, values=area_average(radiance.values, self.shape(radiance.shape, pitch_um, block)))
 
 
 def area_average(values: NDArray[Real], shape: tuple[int, int]) -> NDArray[Real]:

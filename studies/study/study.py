@@ -1,6 +1,7 @@
 """A study: scenes, spectra, levels, exposures, sensors, ..., processors and seeds; every combination is a cell."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_
 from render.spectrum import VISIBLE_NM
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, require_whole, unknown
+from sensor.binning import as_read
 from sensor.exposure import AUTO, LONGEST_S
 from sensor.presets import preset
 from sensor.variations import vary
@@ -187,12 +189,13 @@ class Study:
         _check_cameras(self)
         _check_numbers(self)
 
-    @property
+    @cached_property
     def equal_area(self) -> EqualArea | None:
         """Size that all sensors share; None where each has the render's pixels."""
         if self.sensor_side_um is None:
             return None
-        return EqualArea(self.sensor_side_um, max(preset(name).pixel.pitch_um for name in self.sensors))
+        read = [as_read(vary(preset(name), mosaic)) for name in self.sensors for mosaic in mosaics(self)]
+        return EqualArea(self.sensor_side_um, max(sensor.pixel.pitch_um for sensor in read))
 
 
 def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:

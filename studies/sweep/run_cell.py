@@ -59,12 +59,13 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     _check_provenance(cell, processor)
     if most_threads is not None:
         limit_threads(most_threads)
-    truth, truth_png = _truth(cell.truth, bool(cell.sensor.binning))
     sensor, engine = cell.sensor, cell.made_by.readout_engine
     names = labels(cell.condition)
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
     light = cell.luminance_cd_m2 * cell.exposure_s
     expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
+    # of sensors of one size it has the coarsest's pixels already
+    truth, truth_png = _truth(cell.truth, bool(sensor.binning) and _array(cell.truth).shape[:2] == expected_e.shape)
     errors_e = of_read_pixels(_array(cell.errors), sensor) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))

@@ -42,6 +42,7 @@ def test_pixels_follow_from_the_pitch_in_the_pictures_proportions() -> None:
     area = EqualArea(side_um=883.2, coarsest_um=6.9)
     assert area.shape((300, 400), 6.9) == (96, 128)
     assert area.shape((400, 300), 2.2) == (401, 301)
+    assert area.shape((400, 300), 2.2, block=2) == (402, 302)
     view = area.view(SpectralRadiance(RNG.random((30, 40, 3)), NM), 6.9)
     assert view.shape == (96, 128)
     assert view.wavelength_nm == pytest.approx(NM)

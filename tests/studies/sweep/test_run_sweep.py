@@ -94,6 +94,29 @@ def test_sensors_of_one_size_get_the_same_light_and_are_compared_at_the_coarsest
     assert {shape for shape in frames if len(shape) == 2} == {(24, 32), (48, 64)}
 
 
+def test_a_sensor_that_bins_is_compared_at_the_pixels_that_it_reads(tmp_path: Path) -> None:
+    SAMPLE.picture(tmp_path / "scene.exr", (48, 64))
+    text = preset_file("low_noise").read_text("utf-8")
+    (tmp_path / "plain.toml").write_text(text.replace("pitch_um = 2.2", "pitch_um = 3.3"))
+    (tmp_path / "binned.toml").write_text(text.replace('cfa = "rgbw"', 'cfa = "quad_bayer"\nbinning = "charge"'))
+    study = small_study(
+        tmp_path,
+        sensors=(str(tmp_path / "plain.toml"), str(tmp_path / "binned.toml")),
+        sensor_side_um=140.8,
+        seeds=(0,),
+        levels=("25cd/m2",),
+    )
+    assert study.equal_area is not None
+    assert study.equal_area.coarsest_um == pytest.approx(4.4)
+    swept(study, tmp_path / "out")
+    with open_results(tmp_path / "out") as base:
+        made = list(rows(base))
+    assert len({row.truth for row in made}) == 1
+    sizes = {png_size(tmp_path / "out" / "pictures" / name) for row in made for name in (row.picture, row.truth)}
+    assert sizes == {(32, 24)}
+    assert min(row.psnr_db for row in made) > 20
+
+
 def png_size(path: Path) -> tuple[int, int]:
     """Width and height, from the header of a PNG."""
     return struct.unpack(">II", path.read_bytes()[16:24])
