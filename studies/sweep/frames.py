@@ -137,11 +137,9 @@ def make_frames(
         "truth": keep(folder, _npy(true_srgb(shown, light, white)), ".npy"),
     }
     for key, (preset, sensor) in wanted.items():
-        own = (
-            views
-            if area is None
-            else tuple(area.view(view, sensor.pixel.pitch_um, 2 if sensor.binning else 1) for view in views)
-        )
+        own, block = views, 2 if sensor.binning else 1
+        if area is not None:
+            own = tuple(area.view(view, sensor.pixel.pitch_um, block) for view in views)
         whole, one, other = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in own)
         errors = [(one - other) / 2] if transport.denoised is None else [whole - one, whole - other]
         facts = scene | {
