@@ -280,5 +280,16 @@ def figure_of(beside: Sequence[Contest]) -> Figure:
     return figure
 
 
+def main(arguments: Sequence[str]) -> None:
+    """Write the page of a sweep's folder, from where the sweep ran: its sensors' files are told as it was told them."""
+    try:
+        if len(arguments) != 2 or not arguments[1].endswith(".md"):
+            raise InputError(f"arguments: {list(arguments)} are not allowed; give the sweep's folder and a page.md")
+        folder, out = map(Path, arguments)
+        write_page(last_run(folder), folder, out)
+    except InputError as error:
+        raise SystemExit(f"five_cameras: {error}") from error
+
+
 if __name__ == "__main__":
-    write_page(last_run(Path(sys.argv[1])), Path(sys.argv[1]), Path(sys.argv[2]))
+    main(sys.argv[1:])

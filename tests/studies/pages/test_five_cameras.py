@@ -10,7 +10,7 @@ from rodcone.errors import InputError
 from sensor.cameras.emva_report import numbers_of, read_report
 from sensor.cameras.numbers import completed, curves_csv, lent_curves, missing, preset_text
 from sensor.presets import low_noise, preset_file
-from studies.pages.five_cameras import write_page
+from studies.pages.five_cameras import main, write_page
 from studies.pages.real_cameras import REPORTS
 from studies.study.study_file import read_study
 from studies.sweep.database import LastRun
@@ -120,6 +120,19 @@ def test_another_study_is_refused_and_nothing_is_written(tmp_path: Path) -> None
         with pytest.raises(InputError, match=words):
             write_page(wrong, tmp_path, tmp_path / "five.md")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["slow.toml"]
+
+
+def test_the_command_tells_faults_in_one_line(tmp_path: Path) -> None:
+    for arguments, words in (
+        ([], "give the sweep's folder and a page.md"),
+        ([str(tmp_path), str(tmp_path / "five.html")], "give the sweep's folder and a page.md"),
+        ([str(tmp_path), str(tmp_path / "five.md")], "it holds no ledger.sqlite"),
+    ):
+        with pytest.raises(SystemExit) as told:
+            main(arguments)
+        assert words in str(told.value)
+        assert "\n" not in str(told.value)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_page_in_docs_is_of_the_committed_study() -> None:
