@@ -80,6 +80,8 @@ def characterise(
         raise InputError(f"window: {window} for {preset!r}; allowed with --from and --dark; leave it out")
     sensor = sensor_preset(preset)
     if reading is not None:
+        if not sensor.readings:
+            raise InputError(f"reading: {reading} of {preset!r}, whose pixels are read once; leave it out")
         require_whole("reading", reading, 1, len(sensor.readings), f"{preset!r} has so many")
         sensor = of_reading(sensor, reading - 1)
     if out is not None:

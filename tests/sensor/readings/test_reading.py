@@ -2,10 +2,12 @@
 
 import warnings
 
+import numpy as np
 import pytest
 
 from rodcone.errors import InputError
 from sensor.config_file import read_sensor
+from sensor.exposure import exposure_of_electrons_s
 from sensor.presets import preset, preset_file
 from sensor.readings.reading import Reading
 
@@ -65,6 +67,7 @@ def test_switching_and_merging_are_a_word_of_the_file(tmp_path):
         ('readout = "both"\n' + PIXEL + ONE + OTHER + LENS, ("readout: 'both' is unknown", "merged, switched")),
         ('readout = "switched"\n' + PIXEL + LARGE + SMALL + LENS, ("readout: 'switched' between shares",)),
         ('readout = "switched"\n' + PIXEL + "read_noise_e = 1\ndsnu_e = 1\nfull_well_e = 9\n" + LENS, ("without",)),
+        ('binning = "charge"\ncfa = "quad_bayer"\n' + PIXEL + ONE + OTHER + LENS, ("binning: 'charge' with several",)),
         ("readout = [1]\n" + PIXEL + ONE + OTHER + LENS, ("readout: [1] is unknown",)),
     ],
 )
@@ -75,3 +78,9 @@ def test_readings_that_no_pixel_has_are_refused_in_one_line(tmp_path, text, part
     assert "\n" not in message
     for part in ("camera.toml", *parts):
         assert part in message, message
+
+
+def test_auto_exposure_aims_at_the_most_sensitive_photodiode():
+    per_second_e = np.full((8, 8, 4), 1e6)
+    for name, well_e in (("low_noise", 15_000.0), ("staggered", 15_000.0), ("split_pixel", 24_200.0)):
+        assert exposure_of_electrons_s("auto", per_second_e, preset(name), 1.0) == pytest.approx(0.8 * well_e / 1e6)
