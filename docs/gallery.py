@@ -139,6 +139,9 @@ were measured come by name from a collection that you copy once: [a camera that 
 |---|---|---|---|---|---|---|
 {table}
 
+Of a pixel that is [read more than once](../how_to/hdr.md): the deepest well and the least noise, over that reading's
+share of the light and of the time.
+
 {texts}
 
 ## Responses

@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sensor.raw import RawImage
+
 # Under it PRNU adds less than 1 % to shot noise up to a million electrons, and ln(1 + p) runs out of digits.
 LEAST_PRNU = 1e-4
 _LEAST = 2.0 * np.sqrt(0.375)  # what stands for 0 electrons: the Anscombe transform of 0
@@ -39,6 +41,25 @@ def stabilise(electrons: NDArray[Any], dark_noise_e: float, prnu: float) -> NDAr
     seen = np.maximum(electrons + 0.375, 0.0)
     variance = np.maximum(electrons + (0.375 + dark_noise_e**2), 0.0) + (prnu * seen) ** 2
     return np.asarray(np.log(1.0 + 2.0 * prnu * np.sqrt(variance) + 2.0 * prnu**2 * seen) / prnu)
+
+
+def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
+    """`stabilise` by the noise of a raw image, with its steps where readings of a pixel were merged.
+
+    From a step on the variance is k e + s^2 + (p e)^2 with another k, s and p, whose integral is the transform at k e
+    with PRNU p / k, over k. The pieces join where they meet.
+    """
+    stable, own, offset = stabilise(electrons, raw.dark_noise_e, raw.prnu), (1.0, raw.dark_noise_e, raw.prnu), 0.0
+    for step in raw.noise_steps:
+        before, own = own, (step.shot, float(np.hypot(step.read_noise_e, step.dsnu_e)), step.prnu)
+        seam_e = np.array(step.from_e)
+        offset += float(_piece(seam_e, *before) - _piece(seam_e, *own))
+        stable = np.where(electrons >= seam_e, _piece(electrons, *own) + offset, stable).astype(electrons.dtype)
+    return stable
+
+
+def _piece(electrons: NDArray[Any], shot: float, dark_noise_e: float, prnu: float) -> NDArray[Any]:
+    return stabilise(electrons * shot, dark_noise_e, prnu / shot) / shot
 
 
 def unstabilise(stable: NDArray[np.floating], dark_noise_e: float) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.anscombe import stabilise
+from isp.anscombe import stabilise_raw
 from isp.settings import Distance
 from sensor.cfa import Tile, channels
 from sensor.raw import RawImage
@@ -151,7 +151,7 @@ def _line_sums(values: NDArray[Any], count: int) -> NDArray[Any]:
 
 def guide_mosaic(electrons: NDArray[Any], raw: RawImage, distance: Distance) -> NDArray[Any]:
     """The mosaic of `raw` [e-] as patches are read from it: in units of noise, or as it is."""
-    return stabilise(electrons, raw.dark_noise_e, raw.prnu) if distance == "noise" else electrons
+    return stabilise_raw(electrons, raw) if distance == "noise" else electrons
 
 
 def planes(raw: RawImage, distance: Distance = "noise") -> Plane:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,20 +13,22 @@ from rodcone.brief import brief
 from rodcone.errors import InputError, require_range
 from sensor.binning import as_read
 from sensor.capture import capture
-from sensor.config import SensorConfig
+from sensor.config import PixelConfig, SensorConfig, pixel_of_readings
 from sensor.device import Device
 from sensor.raw import RawImage
+from sensor.readings.reading import Reading
 
 # A frame counts where the merged rate fills the well to no more than 6 standard deviations under its end: its own
 # noise then clips once in 1e9 pixels.
 CLEAR_SIGMAS = 6.0
 MERGED_WHITE_DN = 65_535.0  # of a merged raw image, whose samples are no whole numbers
+_Read = TypeVar("_Read", PixelConfig, Reading)
 _ROUNDS = 6  # of the weights: a further one changes less than a thousandth of the merged noise
 
 # Fields that all frames must share: what turns DN into electrons, and the noise that weighs them.
 _CALIBRATION = (
     *("cfa", "shape", "black_dn", "white_dn", "gain_e_per_dn"),
-    *("read_noise_e", "dsnu_e", "prnu", "column_gain_spread"),
+    *("read_noise_e", "dsnu_e", "prnu", "column_gain_spread", "noise_steps"),
 )
 
 
@@ -136,12 +139,17 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
     Raises
     ------
     InputError
-        As `merge`.
+        As `merge`; for frames of several readings each and different times.
     """
     if len(frames) == 1 and not dark_current_e_per_s:
         return frames[0]
     merged, first = merge(frames, dark_current_e_per_s), frames[0]
     times = np.array([frame.exposure_s for frame in frames])
+    if first.noise_steps and np.ptp(times) > 0:
+        raise InputError(
+            f"frames: exposures of {times.min():g} to {times.max():g} s, each of several readings; allowed: one time; "
+            "merge those of equal times"
+        )
     whole_s = float(times.sum())
     full_e = first.full_well_e * whole_s / float(times.min())
     gain_e = full_e / MERGED_WHITE_DN
@@ -159,6 +167,15 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
         read_noise_e=sqrt(max(temporal_e2 - gain_e**2 / 12, 0.0)),  # `RawImage.dark_noise_e` adds it
         dsnu_e=first.dsnu_e * whole_s * float(times.sum()) / squares,
         exposure_s=whole_s,
+        noise_steps=tuple(
+            replace(
+                step,
+                from_e=step.from_e * len(frames),
+                read_noise_e=step.read_noise_e * sqrt(len(frames)),
+                dsnu_e=step.dsnu_e * len(frames),
+            )
+            for step in first.noise_steps
+        ),
     )
 
 
@@ -168,15 +185,14 @@ def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
     Of a sensor that bins, the one `sensor.binning.as_read`.
     """
     sensor = as_read(sensor)
-    pixel = sensor.pixel
+    readings = tuple(_of_burst(reading, count) for reading in sensor.readings)
+    pixel = pixel_of_readings(sensor.pixel, readings) if readings else _of_burst(sensor.pixel, count)
+    return replace(sensor, pixel=pixel, readings=readings)
+
+
+def _of_burst(one: _Read, count: int) -> _Read:
     return replace(
-        sensor,
-        pixel=replace(
-            pixel,
-            read_noise_e=pixel.read_noise_e * sqrt(count),
-            dsnu_e=pixel.dsnu_e * count,
-            full_well_e=pixel.full_well_e * count,
-        ),
+        one, read_noise_e=one.read_noise_e * sqrt(count), dsnu_e=one.dsnu_e * count, full_well_e=one.full_well_e * count
     )
 
 

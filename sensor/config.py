@@ -1,7 +1,7 @@
 """What a camera is: pixel, lens, mosaic, responses, converter. Zero switches a term off."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import ceil, hypot
 from numbers import Real
 
@@ -12,6 +12,7 @@ from rodcone.notebook import html_of
 from rodcone.plots import png_of
 from sensor.cfa import RGBW, Tile, binned_tile, channels, check_tile
 from sensor.curves import Responses, rgbw
+from sensor.readings.reading import MERGED, Reading, check_readings
 
 SHOWN_EXPOSURE_S = 0.033  # of the noise that a notebook shows
 CHARGE, DIGITAL = BINNINGS = ("charge", "digital")
@@ -176,6 +177,10 @@ class SensorConfig:
     binning : {"", "charge", "digital"}
         How 2x2 pixels of one channel become one of the raw image: summed as charge on their floating diffusion and
         read once, or read one by one and summed in digital numbers. Empty: not at all. `sensor.binning` says more.
+    readings : tuple of Reading
+        Two or more; none for a pixel that is read once, as `pixel` says. The pixel is `pixel_of_readings` of them then.
+    readout : str
+        ``merged``: all are read, and become one linear raw image; ``switched``: the one whose gain suits the light.
     """
 
     pixel: PixelConfig
@@ -187,6 +192,8 @@ class SensorConfig:
     window_nm: tuple[float, float] = VISIBLE_NM
     white_level_dn: int | None = None
     binning: str = ""
+    readings: tuple[Reading, ...] = ()
+    readout: str = MERGED
 
     __repr__ = brief
 
@@ -194,7 +201,9 @@ class SensorConfig:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
         require_whole("bits", self.bits, 1, 16, "give the converter's resolution")
         if self.white_level_dn is not None:
-            require_whole("white_level_dn", self.white_level_dn, 1, 2**self.bits - 1, "give DN up to the converter's top")
+            require_whole(
+                "white_level_dn", self.white_level_dn, 1, 2**self.bits - 1, "give DN up to the converter's top"
+            )
         if self.black_level_dn is not None:
             require_whole("black_level_dn", self.black_level_dn, 0, self.white_dn - 1, "give DN under the white level")
         pair = self.window_nm if isinstance(self.window_nm, tuple | list) and len(self.window_nm) == 2 else (0, 0)
@@ -211,6 +220,14 @@ class SensorConfig:
                     f"bits: {self.bits} with binning {DIGITAL!r}: four readings sum to two bits more than a raw file's "
                     f"16; allowed: up to {MOST_BITS_SUMMED}; give fewer bits, or binning {CHARGE!r}"
                 )
+        check_readings(self.readings, self.readout)
+        if self.readings and self.binning:
+            raise InputError(f"binning: {self.binning!r} with several readings; allowed: one of the two; leave one out")
+        if self.readings and self.pixel != pixel_of_readings(self.pixel, self.readings):
+            raise InputError(
+                "pixel: its full_well_e, read_noise_e or dsnu_e is not that of its readings; allowed: "
+                "pixel_of_readings(pixel, readings); change the readings instead"
+            )
 
     def _repr_html_(self) -> str:
         from sensor.readout import noise_sources  # late: it imports this module
@@ -228,6 +245,15 @@ class SensorConfig:
         facts["all"] = [f"{hypot(*each.values()):.3g} e⁻" for each in sources]
         own = {name: self.responses.curves[name] for name in channels(self.cfa)}
         return html_of("SensorConfig", facts, png_of(Responses(own).plot))
+
+    @property
+    def metered_well_e(self) -> float:
+        """Photo-electrons of the whole pixel that fill its most sensitive photodiode: what an exposure aims at.
+
+        What shorter times and smaller photodiodes hold beyond it is room for lamps.
+        """
+        most = max((x.share for x in self.readings), default=1.0)
+        return max((x.full_well_e / most for x in self.readings if x.share == most), default=self.pixel.full_well_e)
 
     @property
     def white_dn(self) -> int:
@@ -248,3 +274,13 @@ class SensorConfig:
     def gain_e_per_dn(self) -> float:
         """Electrons per DN: the full well reads the converter's top."""
         return self.pixel.full_well_e / (self.white_dn - self.black_dn)
+
+
+def pixel_of_readings(pixel: PixelConfig, readings: Sequence[Reading]) -> PixelConfig:
+    """Pixel with the deepest well and the least dark noise that one of its readings has, over that one's share."""
+    return replace(
+        pixel,
+        full_well_e=max(x.full_well_e / x.share for x in readings),
+        read_noise_e=min(x.read_noise_e / x.share for x in readings),
+        dsnu_e=min(x.dsnu_e / x.share for x in readings),
+    )

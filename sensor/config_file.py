@@ -10,11 +10,13 @@ from render.spectrum import Spectrum
 from rodcone.errors import InputError, one_line, require_keys
 from rodcone.toml_file import read_toml
 from sensor.cfa import Tile, channels, tile_of
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.config import LensConfig, PixelConfig, SensorConfig, pixel_of_readings
 from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_csv, read_curve, rgbw
+from sensor.readings.reading import Reading
 
-_SETTINGS = ("bits", "black_level_dn", "white_level_dn", "window_nm", "binning")
-_KEYS = ("cfa", *_SETTINGS, "pixel", "lens", "responses")
+_SETTINGS = ("bits", "black_level_dn", "white_level_dn", "window_nm", "binning", "readout")
+_KEYS = ("cfa", *_SETTINGS, "pixel", "lens", "responses", "readings")
+_OF_READINGS = ("read_noise_e", "dsnu_e", "full_well_e")  # keys of each of several readings, in place of the pixel's
 _RESPONSE_KEYS = ("csv", "range_nm", "quantum_efficiency", "ir_cut")
 
 
@@ -72,13 +74,32 @@ def _sensor(content: Mapping[str, Any], folder: Path, cfa: Tile | None) -> Senso
     else:
         responses = rgbw() if set(channels(tile)) <= set("RGBW") else built_in()
     settings = {name: content[name] for name in _SETTINGS if name in content}
+    readings = _readings(content["readings"]) if "readings" in content else ()
     return SensorConfig(
-        PixelConfig(**_numbers("pixel", content, PixelConfig)),
+        _pixel(content, readings),
         LensConfig(**_numbers("lens", content, LensConfig)),
         cfa=tile,
         responses=responses,
+        readings=readings,
         **settings,
     )
+
+
+def _pixel(content: Mapping[str, Any], readings: Sequence[Reading]) -> PixelConfig:
+    """The table's pixel; what each of several readings has is theirs alone."""
+    if not readings:
+        return PixelConfig(**_numbers("pixel", content, PixelConfig))
+    table = _table("pixel", content)
+    if twice := [name for name in _OF_READINGS if name in table]:
+        raise InputError(f"pixel: {twice[0]} beside [[readings]]; allowed: in each of them; take it out of [pixel]")
+    filled = {**content, "pixel": table | {name: getattr(readings[0], name) for name in _OF_READINGS}}
+    return pixel_of_readings(PixelConfig(**_numbers("pixel", filled, PixelConfig)), readings)
+
+
+def _readings(tables: Any) -> tuple[Reading, ...]:
+    if not isinstance(tables, list) or not tables:
+        raise InputError(f"readings: {tables!r} is no list of tables; allowed: [[readings]], two or more; write so")
+    return tuple(Reading(**_numbers("readings", {"readings": each}, Reading)) for each in tables)
 
 
 def _table(name: str, content: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """One chip: its fixed patterns, which stay the same over exposures."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -32,12 +32,16 @@ class Device:
         Relative gain of each column's amplifier, mean 1; not negative. None where all are 1. (w / 2,) as above.
     hot : (h, w) bool, optional
         Where a pixel is hot: a defect map as a camera's calibration holds it. None where no pixel is.
+    readings : tuple of Device
+        The chip as each of the sensor's several readings shows it: PRNU and hot pixels of its photodiode, offsets of
+        its own, the column amplifiers of all.
     """
 
     photo_response: NDArray[np.float64]
     dark_offset_e: NDArray[np.float64]
     column_gain: NDArray[np.float64] | None = None
     hot: NDArray[np.bool_] | None = None
+    readings: tuple["Device", ...] = ()
 
     __repr__ = brief
 
@@ -62,22 +66,31 @@ def draw_device(sensor: SensorConfig | str, shape: tuple[int, int], rng: np.rand
     key, one_row = draw_key(rng), (1, shape[1] // 2 if in_charge else shape[1])
     pixel = sensor.pixel
     draws = _normals_kept if shape[0] * shape[1] <= _MOST_KEPT else normals
-    response = np.maximum(1.0 + pixel.prnu * draws(key, NoiseTerm.PRNU, shape), 0.0)
-    offset_e = pixel.dsnu_e * draws(key, NoiseTerm.DSNU, shape)
-    offset_e = block_sums(offset_e) if in_charge else offset_e
-    column_gain = hot = None
-    if pixel.column_offset_e:
-        offset_e += pixel.column_offset_e * normals(key, NoiseTerm.COLUMN_OFFSET, one_row)
-    if pixel.column_gain_spread:
-        column_gain = np.maximum(1.0 + pixel.column_gain_spread * normals(key, NoiseTerm.COLUMN_GAIN, one_row)[0], 0.0)
-    if pixel.hot_pixel_share:
-        hot = normals(key, NoiseTerm.HOT, shape) < ndtri(pixel.hot_pixel_share)
-    return Device(photo_response=response, dark_offset_e=offset_e, column_gain=column_gain, hot=hot)
+
+    def drawn(dsnu_e: float, photodiode: int, reading: int) -> Device:
+        response = np.maximum(1.0 + pixel.prnu * draws(key, NoiseTerm.PRNU, shape, photodiode), 0.0)
+        offset_e = dsnu_e * draws(key, NoiseTerm.DSNU, shape, reading)
+        offset_e = block_sums(offset_e) if in_charge else offset_e
+        column_gain = hot = None
+        if pixel.column_offset_e:
+            offset_e += pixel.column_offset_e * normals(key, NoiseTerm.COLUMN_OFFSET, one_row)
+        if pixel.column_gain_spread:
+            spread = pixel.column_gain_spread * normals(key, NoiseTerm.COLUMN_GAIN, one_row)[0]
+            column_gain = np.maximum(1.0 + spread, 0.0)
+        if pixel.hot_pixel_share:
+            hot = normals(key, NoiseTerm.HOT, shape, photodiode) < ndtri(pixel.hot_pixel_share)
+        return Device(photo_response=response, dark_offset_e=offset_e, column_gain=column_gain, hot=hot)
+
+    photodiodes = list(dict.fromkeys(x.photodiode for x in sensor.readings))
+    of_readings = tuple(
+        drawn(x.dsnu_e, photodiodes.index(x.photodiode), number) for number, x in enumerate(sensor.readings)
+    )
+    return replace(of_readings[0], readings=of_readings) if of_readings else drawn(pixel.dsnu_e, 0, 0)
 
 
 @lru_cache(maxsize=8)
-def _normals_kept(key: int, term: NoiseTerm, shape: tuple[int, int]) -> NDArray[np.float64]:
+def _normals_kept(key: int, term: NoiseTerm, shape: tuple[int, int], number: int) -> NDArray[np.float64]:
     """`normals` of a chip whose PRNU or DSNU alone may change next: they are most of a small chip's time."""
-    draws = normals(key, term, shape)
+    draws = normals(key, term, shape, number)
     draws.flags.writeable = False
     return draws

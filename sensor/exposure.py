@@ -37,7 +37,8 @@ def auto_exposure_s(
 ) -> float:
     """Exposure that puts a percentile of one channel's expected electrons at a share of the well [s].
 
-    Dark current and crosstalk are left out: the rule is about light.
+    Dark current and crosstalk are left out: the rule is about light. The well of several readings is
+    `SensorConfig.metered_well_e`.
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ def _share_of_well_s(
     well_share: float = 0.8,
 ) -> float:
     bright = float(np.percentile(of_read_pixels(per_second_e, sensor), percentile))
-    return min(longest_s, well_share * as_read(sensor).pixel.full_well_e / bright) if bright > 0 else longest_s
+    return min(longest_s, well_share * as_read(sensor).metered_well_e / bright) if bright > 0 else longest_s
 
 
 def exposure_by_rule_s(

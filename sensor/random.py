@@ -53,15 +53,18 @@ def philox(counter: tuple[NDArray[np.uint64], ...], key: int) -> tuple[NDArray[n
     return c0, c1, c2, c3
 
 
-def normals(key: int, term: NoiseTerm, shape: tuple[int, int]) -> NDArray[np.float64]:
-    """Standard normal draw for each pixel, shape `shape` (Box-Muller on two 53-bit uniforms)."""
+def normals(key: int, term: NoiseTerm, shape: tuple[int, int], number: int = 0) -> NDArray[np.float64]:
+    """Standard normal draw for each pixel, shape `shape` (Box-Muller on two 53-bit uniforms).
+
+    Draws of another `number` are independent: readings of one charge, patterns of one chip.
+    """
     draws = np.empty(shape)
     columns = np.arange(shape[1], dtype=np.uint64)[None, :]
-    terms, zeros = (np.full((1, 1), number, dtype=np.uint64) for number in (int(term), 0))
+    terms, numbers = (np.full((1, 1), word, dtype=np.uint64) for word in (int(term), number))
     rows_at_once = max(1, _PIXELS_AT_ONCE // max(1, shape[1]))
     for first in range(0, shape[0], rows_at_once):
         rows = np.arange(first, min(first + rows_at_once, shape[0]), dtype=np.uint64)[:, None]
-        words = philox((columns, rows, terms, zeros), key)
+        words = philox((columns, rows, terms, numbers), key)
         radius, turn = (
             (((a << np.uint64(32)) | b) >> np.uint64(11)).astype(np.float64) * 2.0**-53
             for a, b in (words[:2], words[2:])

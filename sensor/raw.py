@@ -16,6 +16,41 @@ from sensor.cfa import Tile, channels, check_covers, check_tile, mask
 
 # A saturated pixel reads white - 4 sigma_dark or more, give or take half a DN, with probability 1 - 3.2e-5.
 SATURATION_SIGMAS = 4.0
+LARGEST_DN = 2.0**24  # up to which single precision holds every whole number
+
+
+@dataclass(frozen=True)
+class NoiseStep:
+    """Noise of samples from a level on: shot e + read_noise_e^2 + dsnu_e^2 + (prnu e)^2 at e electrons [e-^2].
+
+    Attributes
+    ----------
+    from_e : float
+        Electrons above black from which it holds.
+    shot : float
+        Variance of a sample's shot noise over its electrons: over 1 where not all charges of a pixel count.
+    read_noise_e, dsnu_e, prnu : float
+        As `RawImage` has them.
+    """
+
+    from_e: float
+    shot: float
+    read_noise_e: float
+    dsnu_e: float
+    prnu: float
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        limits = {
+            "from_e": (0.0, 1e12, "give electrons"),
+            "shot": (1e-6, 1e12, "give a factor"),
+            "read_noise_e": (0.0, 1e12, "give electrons, 0 for none"),
+            "dsnu_e": (0.0, 1e12, "give electrons, 0 for none"),
+            "prnu": (0.0, 1.0, "give a fraction: 1.7 % is 0.017"),
+        }
+        for name, (low, high, fix) in limits.items():
+            require_range(f"noise_steps: {name}", getattr(self, name), low, high, fix)
 
 
 @dataclass(frozen=True)
@@ -51,6 +86,9 @@ class RawImage:
         Standard deviation of the columns' relative gain, in `prnu` too: full pixels of weak columns read less.
     defects : (n, 2) intp, optional
         Row and column of each defective pixel, as a camera's maker lists them; None where there is none.
+    noise_steps : tuple of NoiseStep
+        Where several readings of a pixel were merged, the noise from each level on at which one of them is full; up to
+        the first one read_noise_e, dsnu_e and prnu hold.
 
     Raises
     ------
@@ -75,6 +113,7 @@ class RawImage:
     engine: str = ""
     column_gain_spread: float = 0.0
     defects: NDArray[np.intp] | None = None
+    noise_steps: tuple[NoiseStep, ...] = ()
 
     __repr__ = brief
 
@@ -85,8 +124,8 @@ class RawImage:
         if self.defects is not None:
             object.__setattr__(self, "defects", _checked_defects(self.defects, self.shape))
         limits = {
-            "black_dn": (-65_535.0, 65_535.0, "give digital numbers of 16 bits"),
-            "white_dn": (-65_535.0, 65_535.0, "give digital numbers of 16 bits"),
+            "black_dn": (-LARGEST_DN, LARGEST_DN, "give digital numbers of 24 bits"),
+            "white_dn": (-LARGEST_DN, LARGEST_DN, "give digital numbers of 24 bits"),
             "gain_e_per_dn": (1e-12, 1e12, "give electrons per digital number"),
             "read_noise_e": (0.0, 1e9, "give electrons, 0 for none"),
             "dsnu_e": (0.0, 1e9, "give electrons, 0 for none"),
@@ -104,6 +143,10 @@ class RawImage:
             raise InputError(
                 f"black_dn: {self.black_dn!r} is not under white_dn {self.white_dn!r}; swap or correct them"
             )
+        object.__setattr__(self, "noise_steps", tuple(self.noise_steps))
+        levels = [step.from_e for step in self.noise_steps]
+        if levels != sorted(levels):
+            raise InputError(f"noise_steps: from_e {levels} doesn't rise; put the darkest step first")
         for name, text in (("camera", self.camera), ("engine", self.engine)):
             if not (isinstance(text, str) and text.isascii() and text.isprintable() and (text or name == "engine")):
                 raise InputError(f"{name}: {text!r} is not allowed; give a name in printable ASCII")
@@ -154,7 +197,10 @@ class RawImage:
     @property
     def saturation_e(self) -> float:
         """Level from which a pixel counts as saturated [e-]: noise comes after the well clips (design, section 4)."""
-        spread_e = hypot(self.dark_noise_e, self.column_gain_spread * self.full_well_e)
+        dark_e = self.dark_noise_e
+        if self.noise_steps:
+            dark_e = hypot(self.noise_steps[-1].read_noise_e, self.noise_steps[-1].dsnu_e)
+        spread_e = hypot(dark_e, self.column_gain_spread * self.full_well_e)
         return self.full_well_e - SATURATION_SIGMAS * spread_e - self.gain_e_per_dn / 2
 
     @property

@@ -12,9 +12,13 @@ from sensor.config import CHARGE, DIGITAL, SensorConfig
 from sensor.device import Device
 from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
+from sensor.readings.merge import merge_readings
+from sensor.readings.noise import merged_variance, merged_variances, of_reading, switched_to
+from sensor.readings.reading import MERGED, SWITCHED
 
-# Digital numbers of one exposure from expected electrons, camera, chip, exposure time [s] and key.
-DrawFrame: TypeAlias = Callable[[NDArray[np.floating], SensorConfig, Device, float, int], NDArray[np.uint16]]
+# Digital numbers of one exposure from expected electrons, camera, chip, exposure time [s], key, and the reading's
+# number among those of one charge.
+DrawFrame: TypeAlias = Callable[[NDArray[np.floating], SensorConfig, Device, float, int, int], NDArray[np.uint16]]
 
 
 def draw_frame(
@@ -23,12 +27,14 @@ def draw_frame(
     device: Device,
     exposure_s: float,
     key: int,
+    reading: int = 0,
     counts: Callable[[int, NoiseTerm, NDArray[np.float64]], NDArray[Any]] = poisson,
 ) -> NDArray[np.uint16]:
     """Digital numbers of one exposure, shape (h, w), with NumPy's exact Poisson sampler; binned, (h / 2, w / 2).
 
     In physical order: crosstalk and PRNU move the photo-electrons' means, dark current and hot pixels add to them, then
-    one Poisson draw; the well clips; pixels that bin in charge are summed; the rest is `convert`.
+    one Poisson draw; the well clips; pixels that bin in charge are summed; the rest is `convert`. Of one key, each
+    `reading` draws read noise of its own, and the same shot noise.
     """
     pixel, expected = sensor.pixel, np.asarray(expected_e, dtype=np.float64)
 
@@ -41,38 +47,43 @@ def draw_frame(
     # Poisson far above the well is the well with certainty; the bound keeps the draw inside 64-bit integers.
     collected_e = counts(key, NoiseTerm.SHOT, np.minimum(mean_e, 2 * pixel.full_well_e + 1e4)).astype(np.float64)
     np.minimum(collected_e, pixel.full_well_e, out=collected_e)
-    return convert(collected_e, sensor, device, key)
+    return convert(collected_e, sensor, device, key, reading)
 
 
 def convert(
-    collected_e: NDArray[np.float64], sensor: SensorConfig, device: Device, key: int
+    collected_e: NDArray[np.float64], sensor: SensorConfig, device: Device, key: int, reading: int = 0
 ) -> NDArray[np.uint16]:
     """Digital numbers of what the wells hold, shape (h, w); binned, (h / 2, w / 2).
 
     Pixels that bin in charge are summed, and their floating diffusion clips; the column's amplifier multiplies; fixed
     offsets and read noise are added; the converter rounds and clips; readings that bin in digital numbers are summed.
     """
-    reading = sensor
+    own = sensor
     if sensor.binning == CHARGE:
-        reading = as_read(sensor)
-        collected_e = np.minimum(block_sums(collected_e), reading.pixel.full_well_e)
+        own = as_read(sensor)
+        collected_e = np.minimum(block_sums(collected_e), own.pixel.full_well_e)
     read_e = collected_e if device.column_gain is None else collected_e * device.column_gain
     read_e = read_e + device.dark_offset_e
-    if reading.pixel.read_noise_e:
-        read_e += reading.pixel.read_noise_e * normals(key, NoiseTerm.READ, read_e.shape)
-    dn = np.rint(read_e / reading.gain_e_per_dn + reading.black_dn)
-    dn = np.clip(dn, 0, reading.white_dn).astype(np.uint16)
+    if own.pixel.read_noise_e:
+        read_e += own.pixel.read_noise_e * normals(key, NoiseTerm.READ, read_e.shape, reading)
+    dn = np.rint(read_e / own.gain_e_per_dn + own.black_dn)
+    dn = np.clip(dn, 0, own.white_dn).astype(np.uint16)
     return block_sums(dn) if sensor.binning == DIGITAL else dn
 
 
 def draw_mean_frame(
-    expected_e: NDArray[np.floating], sensor: SensorConfig, device: Device, exposure_s: float, key: int
+    expected_e: NDArray[np.floating],
+    sensor: SensorConfig,
+    device: Device,
+    exposure_s: float,
+    key: int,
+    reading: int = 0,
 ) -> NDArray[np.uint16]:
     """`draw_frame` without shot noise: a pixel collects the mean of its Poisson draw, fractions of electrons too.
 
     No camera does; it shows what the other terms do alone. Both draw the same read noise for a key.
     """
-    return draw_frame(expected_e, sensor, device, exposure_s, key, counts=lambda key, term, mean_e: mean_e)
+    return draw_frame(expected_e, sensor, device, exposure_s, key, reading, counts=lambda key, term, mean_e: mean_e)
 
 
 def read_out(
@@ -85,7 +96,7 @@ def read_out(
     draw: DrawFrame = draw_frame,
     engine: str = "numpy",
 ) -> RawImage:
-    """Expose and read the chip once.
+    """Expose and read the chip once; of a pixel with several readings all are drawn and merged, or one is chosen.
 
     Parameters
     ----------
@@ -121,7 +132,20 @@ def read_out(
             f"expected_e: {expected[row, column]} at row {row}, column {column}; "
             "allowed: finite numbers >= 0; repair the radiance"
         )
-    return as_raw(draw(expected, sensor, device, exposure_s, draw_key(rng)), sensor, exposure_s, engine, device.hot)
+    if not sensor.readings:
+        dn = draw(expected, sensor, device, exposure_s, draw_key(rng), 0)
+        return as_raw(dn, sensor, exposure_s, engine, device.hot)
+    if sensor.readout == SWITCHED:
+        index = switched_to(sensor, expected)
+        own, chip = of_reading(sensor, index), device.readings[index]
+        return as_raw(draw(expected, own, chip, exposure_s, draw_key(rng), 0), own, exposure_s, engine, chip.hot)
+    keys = {charge: draw_key(rng) for charge in dict.fromkeys(x.charge for x in sensor.readings)}
+    raws = []
+    for number, (reading, chip) in enumerate(zip(sensor.readings, device.readings, strict=True)):
+        own, light_e = of_reading(sensor, number), expected * reading.share
+        dn = draw(light_e, own, chip, exposure_s, keys[reading.charge], number)
+        raws.append(as_raw(dn, own, exposure_s * reading.time_share, engine, chip.hot))
+    return merge_readings(raws, sensor, exposure_s)
 
 
 def spread_charge(expected_e: NDArray[np.float64], crosstalk: float) -> NDArray[np.float64]:
@@ -152,7 +176,8 @@ def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposu
     """Variance of one pixel of one chip drawn at random [e-^2], shape of `expected_e`; clipping left out.
 
     Shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was collected, DSNU
-    and column offsets, read noise and quantisation (gain^2 / 12).
+    and column offsets, read noise and quantisation (gain^2 / 12). Of several readings, that of the merge over the share
+    of the pixel that all hold together; a camera that switches its gain looks at `expected_e` as one frame.
 
     Parameters
     ----------
@@ -166,6 +191,10 @@ def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposu
     sensor = as_read(sensor)
     pixel = sensor.pixel
     signal = spread_charge(np.asarray(expected_e, dtype=np.float64), pixel.crosstalk)
+    if sensor.readings and sensor.readout == MERGED:
+        return merged_variance(signal, sensor, exposure_s)
+    if sensor.readings:
+        return noise_variance(expected_e, of_reading(sensor, switched_to(sensor, signal)), exposure_s)
     hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
     collected = signal + pixel.dark_current_e_per_s * exposure_s + hot_share * hot_e
     variance = collected + (pixel.prnu * signal) ** 2 + hot_share * (1 - hot_share) * hot_e**2
@@ -181,6 +210,11 @@ def noise_sources(expected_e: float, sensor: SensorConfig, exposure_s: float) ->
     Their squares sum to `noise_variance`, which says what each of them is.
     """
     sensor = as_read(sensor)
+    if sensor.readings and sensor.readout == MERGED:
+        found = merged_variances(np.array([expected_e]), sensor, exposure_s)
+        return {name: float(value[0]) ** 0.5 for name, value in found.items()}
+    if sensor.readings:
+        sensor = of_reading(sensor, switched_to(sensor, np.array([expected_e])))
     pixel = sensor.pixel
     hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
     dark_e = pixel.dark_current_e_per_s * exposure_s
@@ -208,6 +242,8 @@ def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float) -> flo
     1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before.
     """
     sensor = as_read(sensor)
+    if sensor.readings:
+        return _electrons_at_snr_of_readings(snr, sensor, exposure_s)
     scale_e = sensor.pixel.full_well_e  # three points give the parabola; so far apart, no digits are lost
     a, half, full = (float(noise_variance(np.full((1, 1), x * scale_e), sensor, exposure_s)[0, 0]) for x in (0, 0.5, 1))
     c = (full - 2 * half + a) * 2 / scale_e**2
@@ -218,6 +254,20 @@ def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float) -> flo
     electrons = (snr**2 * b + np.sqrt((snr**2 * b) ** 2 + 4 * lead * snr**2 * a)) / (2 * lead)
     dark_e = sensor.pixel.dark_current_e_per_s * exposure_s
     return float(electrons) if electrons + dark_e < sensor.pixel.full_well_e else float("inf")
+
+
+def _electrons_at_snr_of_readings(snr: float, sensor: SensorConfig, exposure_s: float) -> float:
+    """The least light with this SNR; beyond a seam it may be less again for a while."""
+    if sensor.readout == SWITCHED:
+        each = [(electrons_at_snr(snr, of_reading(sensor, i), exposure_s), i) for i in range(len(sensor.readings))]
+        return min((e for e, i in each if np.isfinite(e) and switched_to(sensor, np.array([e])) == i), default=np.inf)
+    levels = np.geomspace(1e-3, sensor.pixel.full_well_e, 8000)[:-1]
+    ratio = levels / np.sqrt(merged_variance(levels, sensor, exposure_s))
+    above = np.flatnonzero(ratio >= snr)
+    if above.size == 0:
+        return float("inf")
+    part = slice(max(above[0] - 1, 0), above[0] + 1)
+    return float(np.interp(snr, ratio[part], levels[part]))
 
 
 def as_raw(

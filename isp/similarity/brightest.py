@@ -29,7 +29,7 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
         B = m + z sqrt(m + s^2 + (p m)^2) + 2.25 / (1 + s^2)^2.
 
     z is `SIGMAS` up to the default sigma_s and rises with it: who lets all patches count as similar gets no bound, nor
-    does who takes the paper's distance.
+    does who takes the paper's distance. Where readings of a pixel were merged, the noise is that of `raw.noise_steps`.
 
     Parameters
     ----------
@@ -55,6 +55,10 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
         bound *= bound
         bound += light
         bound += raw.dark_noise_e**2
+        for step in raw.noise_steps:
+            beyond = light >= step.from_e
+            some = light[beyond]
+            bound[beyond] = step.shot * some + step.read_noise_e**2 + step.dsnu_e**2 + (step.prnu * some) ** 2
         np.sqrt(bound, out=bound)
         bound *= z
         bound += FEWEST_E / (1.0 + raw.dark_noise_e**2) ** 2

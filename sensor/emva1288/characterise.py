@@ -8,7 +8,7 @@ import numpy as np
 
 from render.spectrum import Floats
 from rodcone.brief import brief
-from rodcone.errors import require_range, require_whole
+from rodcone.errors import InputError, require_range, require_whole
 from rodcone.jit import backend
 from rodcone.plots import BLUE, ORANGE, Axes, draw_curves
 from sensor.binning import as_read
@@ -115,6 +115,11 @@ def characterise(
     for name, side in zip(("height", "width"), shape, strict=True):
         require_whole(name, side, 16, 1 << 14, "give the frame's side in pixels")
     require_whole("seed", seed, 0, 2**31, "give a whole number")
+    if sensor.readings:
+        raise InputError(
+            f"sensor: {len(sensor.readings)} readings of a pixel; allowed: one, for the standard has no other; "
+            "give one of them (--reading 1, sensor.readings.noise.of_reading)"
+        )
     require_range("exposure_s", exposure_s, 0.0, 1e6, "give seconds, 0 or more")
     read = as_read(sensor)
     result = measure(bench(sensor, shape, seed, exact), plan_for(read, exposure_s), read)

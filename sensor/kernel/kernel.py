@@ -118,7 +118,12 @@ def _pieces(planes: NDArray[np.float32]) -> list[tuple[int, NDArray[np.float32]]
 
 
 def read_frame(
-    expected_e: NDArray[np.floating], sensor: SensorConfig, device: Device, exposure_s: float, key: int
+    expected_e: NDArray[np.floating],
+    sensor: SensorConfig,
+    device: Device,
+    exposure_s: float,
+    key: int,
+    reading: int = 0,
 ) -> NDArray[np.uint16]:
     """Digital numbers of one exposure: what `sensor.readout.draw_frame` does, with other draws.
 
@@ -132,6 +137,9 @@ def read_frame(
     halves = dr.opaque(jit.UInt, key & 0xFFFFFFFF), dr.opaque(jit.UInt, key >> 32)
     words = philox((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), jit.UInt(0)), halves)
     shot, read = normal_pair(words[0], words[1])
+    if reading:  # shot noise is the charge's, read noise the reading's own
+        others = philox((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), dr.opaque(jit.UInt, reading)), halves)
+        _, read = normal_pair(others[0], others[1])
 
     # The Poisson mean, PRNU on the light alone. Far above the well the draw is the well with certainty: the bound of
     # the mean, as in `draw_frame`. An infinite sum times a response of 0 would be NaN: the bound of the light.

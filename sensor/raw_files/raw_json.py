@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from rodcone.errors import InputError, require_keys
 from sensor.calibration import ColourCalibration
-from sensor.raw import RawImage
+from sensor.raw import NoiseStep, RawImage
 
 FORMAT = "rodcone raw image"
 VERSION = 1
 KEYS = tuple(field.name for field in fields(RawImage) if field.name != "dn")
+_OPTIONAL = ("defects", "noise_steps")  # left out where there are none
 _LONGEST_KEY = 400  # characters of an unknown key in a message: a damaged file may hold a mebibyte there
 MOST_BYTES = 1 << 20  # of the text: sixteen channels' calibration takes some 5 kB
 
@@ -21,8 +22,8 @@ MOST_BYTES = 1 << 20  # of the text: sixteen channels' calibration takes some 5 
 def to_json(raw: RawImage, **more: Any) -> str:
     """Everything of a raw image but its pixels, and the keys of `more`.
 
-    Python writes the shortest decimals that read back as the same float64. The key ``defects`` is left out where there
-    are none.
+    Python writes the shortest decimals that read back as the same float64. The keys ``defects`` and ``noise_steps`` are
+    left out where there are none.
 
     Raises
     ------
@@ -32,9 +33,11 @@ def to_json(raw: RawImage, **more: Any) -> str:
     calibration: dict[str, Any] = {key: getattr(raw, key) for key in KEYS}
     if raw.colour is not None:
         calibration["colour"] = {key: value.tolist() for key, value in asdict(raw.colour).items()}
-    defects = calibration.pop("defects")
+    defects, steps = (calibration.pop(key) for key in _OPTIONAL)
     if defects is not None:
         calibration["defects"] = defects.tolist()
+    if steps:
+        calibration["noise_steps"] = [asdict(step) for step in steps]
     content = {"format": FORMAT, "version": VERSION, **more, **calibration}
     text = json.dumps(content, allow_nan=False, default=float)
     if len(text) > MOST_BYTES:
@@ -64,7 +67,7 @@ def parse_json(text: bytes, name: str, more: tuple[str, ...] = ()) -> dict[str, 
             f"{name}: its calibration is not that of a raw image; allowed: {FORMAT!r}, version {VERSION}; write it anew"
         )
     require_keys(f"{name}: calibration", (key[:_LONGEST_KEY] for key in held), ("format", "version", *KEYS, *more))
-    missing = [key for key in (*KEYS, *more) if key not in held and key != "defects"]
+    missing = [key for key in (*KEYS, *more) if key not in held and key not in _OPTIONAL]
     if missing:
         raise InputError(f"{name}: its calibration lacks {', '.join(missing)}; write the file anew")
     return held
@@ -88,6 +91,19 @@ def raw_image(held: dict[str, Any], dn: NDArray[np.uint16], name: str) -> RawIma
             if not isinstance(colour, dict) or set(colour) != names:
                 raise InputError(f"colour: allowed is null, or an object of {', '.join(sorted(names))}; correct it")
             colour = ColourCalibration(**colour)
-        return RawImage(dn, **{key: held[key] for key in KEYS if key in held} | {"colour": colour})
+        steps = _noise_steps(held.get("noise_steps", []))
+        return RawImage(
+            dn, **{key: held[key] for key in KEYS if key in held} | {"colour": colour, "noise_steps": steps}
+        )
     except InputError as error:
         raise InputError(f"{name}: {error}") from None
+
+
+def _noise_steps(held: Any) -> tuple[NoiseStep, ...]:
+    names = {field.name for field in fields(NoiseStep)}
+    if not isinstance(held, list) or not all(isinstance(each, dict) and set(each) == names for each in held):
+        raise InputError(f"noise_steps: allowed is a list of objects of {', '.join(sorted(names))}; correct it")
+    for key, value in (pair for each in held for pair in each.items()):
+        if isinstance(value, bool):  # which Python takes for a number
+            raise InputError(f"noise_steps: {key}: {value!r} is not a number; correct it")
+    return tuple(NoiseStep(**each) for each in held)

@@ -1,7 +1,8 @@
-"""Any mosaic as a 16-bit TIFF, with a JSON sidecar that holds its tile and calibration exactly."""
+"""Any mosaic as a TIFF, with a JSON sidecar that holds its tile and calibration exactly."""
 
 import hashlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ def write_tiff(raw: RawImage, path: Path) -> tuple[Path, Path]:
     Raises
     ------
     InputError
-        Where the pixels are not uint16.
+        Where the pixels are neither uint16 nor float32.
     OSError
         Where the folder is missing or can't be written.
     """
@@ -57,5 +58,5 @@ def read_tiff(path: Path) -> RawImage:
     return raw_image(held, dn, str(sidecar))
 
 
-def _digest(dn: NDArray[np.uint16]) -> str:
-    return hashlib.sha256(np.ascontiguousarray(dn, dtype="<u2").data).hexdigest()
+def _digest(dn: NDArray[Any]) -> str:
+    return hashlib.sha256(np.ascontiguousarray(dn, dtype=dn.dtype.newbyteorder("<")).data).hexdigest()

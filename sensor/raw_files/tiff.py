@@ -1,4 +1,6 @@
-"""One 16-bit mosaic in a TIFF: written by `tifffile`, read here with every size compared with the file's own first.
+"""One mosaic of 16-bit whole numbers or single-precision floats in a TIFF.
+
+It is written by `tifffile`, and read here with every size compared with the file's own first.
 
 TIFF 6.0, section 2: a directory holds a count, entries of 12 bytes (tag, type, count, value or its offset), and the
 offset of the next directory.
@@ -18,11 +20,15 @@ Values = bytes | tuple[int, ...] | tuple[float, ...]
 Tags = Mapping[int, tuple[str, Values]]  # by code: format of one value (below), values; a rational is two numbers
 
 WIDTH, HEIGHT, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC = 256, 257, 258, 259, 262
-STRIP_OFFSETS, SAMPLES_PER_PIXEL, STRIP_BYTE_COUNTS = 273, 277, 279
+STRIP_OFFSETS, SAMPLES_PER_PIXEL, STRIP_BYTE_COUNTS, SAMPLE_FORMAT = 273, 277, 279, 339
 EXIF = 34665
 _EXIF_PLACE = 34664  # no tag's code: tifffile doesn't write EXIF, so this entry is written and then changed into it
 MIN_IS_BLACK, CFA = 1, 32803
 _LAYOUT = (WIDTH, HEIGHT, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC, STRIP_OFFSETS, SAMPLES_PER_PIXEL)
+_SAMPLES: dict[tuple[tuple[int, ...], tuple[int, ...]], np.dtype[Any]] = {
+    ((16,), (1,)): np.dtype("<u2"),
+    ((32,), (3,)): np.dtype("<f4"),
+}  # by BitsPerSample and SampleFormat
 _FORMATS = dict(enumerate(("B", "s", "H", "I", "2I", "b", "U", "h", "i", "2i", "f", "d", "I"), start=1))  # by type
 _BYTES = "BsU"  # formats whose values are bytes: numbers, ASCII, and those whose meaning is the tag's own
 _TYPES = {form: kind for kind, form in reversed(_FORMATS.items())}
@@ -30,18 +36,18 @@ _MOST_VALUE_BYTES = 1 << 20  # of one tag: a million pixel rows in strips of fou
 _LONGEST_SIDE = 1 << 17  # pixels; no single chip is larger
 
 
-def write_mosaic(path: Path, dn: NDArray[np.uint16], photometric: int, tags: Tags, exif: Tags | None = None) -> None:
-    """Write an uncompressed 16-bit TIFF with further tags, and an Exif directory with those of `exif`.
+def write_mosaic(path: Path, dn: NDArray[Any], photometric: int, tags: Tags, exif: Tags | None = None) -> None:
+    """Write an uncompressed TIFF with further tags, and an Exif directory with those of `exif`.
 
     Raises
     ------
     InputError
-        Where `dn` is not a (h, w) array of uint16.
+        Where `dn` is not a (h, w) array of uint16 or float32.
     """
     import tifffile
 
-    if dn.ndim != 2 or dn.dtype != np.uint16:
-        raise InputError(f"dn: {dn.dtype} of shape {dn.shape} is not allowed; give (h, w) of uint16")
+    if dn.ndim != 2 or dn.dtype not in _SAMPLES.values():
+        raise InputError(f"dn: {dn.dtype} of shape {dn.shape} is not allowed; give (h, w) of uint16 or float32")
     tags = {**tags, **({_EXIF_PLACE: ("I", (0,))} if exif else {})}
     extra: list[Any] = [
         (code, _TYPES[form], _count(form, values), values if form in _BYTES or len(values) > 1 else values[0], True)
@@ -83,21 +89,21 @@ def text(value: str) -> tuple[str, bytes]:
     return "s", value.encode("ascii") + b"\0"
 
 
-def read_mosaic(path: Path, photometric: int, codes: Collection[int] = ()) -> tuple[NDArray[np.uint16], Tags]:
+def read_mosaic(path: Path, photometric: int, codes: Collection[int] = ()) -> tuple[NDArray[Any], Tags]:
     """Pixels (h, w), and the tags of these codes, Exif's among them; one of more than a mebibyte is left out.
 
     Raises
     ------
     InputError
         For a file that is missing, cut off, no classic little-endian TIFF, or holds anything but one uncompressed
-        16-bit mosaic of this photometric interpretation.
+        mosaic of this photometric interpretation, of 16-bit whole numbers or single-precision floats.
     """
     name = str(path)
     if not path.is_file():
         raise InputError(f"{name}: there is no such file; give the path of a raw file")
     try:
         with path.open("rb") as file:
-            tags = read_tags(file, {*_LAYOUT, STRIP_BYTE_COUNTS, *codes}, name)
+            tags = read_tags(file, {*_LAYOUT, STRIP_BYTE_COUNTS, SAMPLE_FORMAT, *codes}, name)
             return _read_strips(file, tags, photometric, name), tags
     except OSError as error:
         raise InputError(f"{name}: can't be read ({error.strerror or error}); give the path of a raw file") from error
@@ -167,9 +173,15 @@ def whole(tags: Tags, code: int, name: str) -> tuple[int, ...]:
     return tuple(int(value) for value in values)
 
 
-def _read_strips(file: BinaryIO, tags: Tags, photometric: int, name: str) -> NDArray[np.uint16]:
+def _read_strips(file: BinaryIO, tags: Tags, photometric: int, name: str) -> NDArray[Any]:
     """Pixels (h, w); memory is taken for no more of them than the file has bytes."""
-    fixed = {BITS_PER_SAMPLE: 16, COMPRESSION: 1, PHOTOMETRIC: photometric, SAMPLES_PER_PIXEL: 1}
+    kind = whole(tags, BITS_PER_SAMPLE, name), whole(tags, SAMPLE_FORMAT, name) if SAMPLE_FORMAT in tags else (1,)
+    if (samples := _SAMPLES.get(kind)) is None:
+        raise InputError(
+            f"{name}: tag {BITS_PER_SAMPLE} is {kind[0][:4]}; allowed: 16, or 32 with {SAMPLE_FORMAT} of 3 (float); "
+            "use a rodcone file"
+        )
+    fixed = {COMPRESSION: 1, PHOTOMETRIC: photometric, SAMPLES_PER_PIXEL: 1}
     for code, allowed in fixed.items():
         if (found := whole(tags, code, name)) != (allowed,):
             raise InputError(f"{name}: tag {code} is {found[:4]}; allowed: {allowed}; use a rodcone file")
@@ -179,12 +191,13 @@ def _read_strips(file: BinaryIO, tags: Tags, photometric: int, name: str) -> NDA
         raise InputError(f"{name}: {width} x {height} pixels; allowed: 1 to {_LONGEST_SIDE} a side; it is damaged")
     size = file.seek(0, 2)
     fits = len(offsets) == len(counts) and all(a + n <= size for a, n in zip(offsets, counts, strict=True))
-    if not fits or sum(counts) != 2 * width * height or sum(counts) > size:
+    if not fits or sum(counts) != samples.itemsize * width * height or sum(counts) > size:
         raise InputError(
-            f"{name}: {width} x {height} pixels of 2 bytes don't fit its {size} bytes; cut off, copy it again"
+            f"{name}: {width} x {height} pixels of {samples.itemsize} bytes don't fit its {size} bytes; "
+            "cut off, copy it again"
         )
     pixels = bytearray()
     for offset, count in zip(offsets, counts, strict=True):
         file.seek(offset)
         pixels += file.read(count)
-    return np.frombuffer(pixels, dtype="<u2").astype(np.uint16).reshape(height, width)
+    return np.frombuffer(pixels, dtype=samples).astype(samples.newbyteorder("="), copy=False).reshape(height, width)

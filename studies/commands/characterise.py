@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from rodcone.errors import InputError
+from rodcone.errors import InputError, require_whole
 from rodcone.files import check_place, replacing
 from rodcone.json_values import finite
 from sensor.cameras.frames import frame_numbers, measure_files
@@ -15,6 +15,7 @@ from sensor.cameras.numbers import preset_text
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
+from sensor.readings.noise import of_reading
 from studies.commands.console import Flag, OutOrNone, Seconds, print_table, require_ending, say
 from studies.pages.transfer_chart import transfer_svg
 
@@ -29,6 +30,7 @@ def characterise(
     *,
     flats: Annotated[Files, Parameter(name="--from", consume_multiple=True, negative_iterable=())] = None,
     dark: Annotated[Files, Parameter(consume_multiple=True, negative_iterable=())] = None,
+    reading: int | None = None,
     window: int | None = None,
     out: OutOrNone = None,
     json: Flag = False,
@@ -47,6 +49,8 @@ def characterise(
         Raw files of a real camera instead: an evenly lit surface, two or more at each light.
     dark
         Raw files with the cap on, two or more, at the same exposure index and time.
+    reading
+        Of a sensor with several readings, which: 1 for the first; it is measured alone.
     window
         Width in pixels of the square in the middle of the frames to measure; the whole frame by default.
     out
@@ -66,6 +70,8 @@ def characterise(
     if flats or dark:
         if preset is not None:
             raise InputError(f"preset: {preset!r} beside raw files; allowed: a preset, or --from and --dark; give one")
+        if reading is not None:
+            raise InputError(f"reading: {reading} beside raw files; allowed with a preset; leave it out")
         _measure_files(flats or [], dark or [], window, out, json)
         return
     if preset is None:
@@ -73,6 +79,11 @@ def characterise(
     if window is not None:
         raise InputError(f"window: {window} for {preset!r}; allowed with --from and --dark; leave it out")
     sensor = sensor_preset(preset)
+    if reading is not None:
+        if not sensor.readings:
+            raise InputError(f"reading: {reading} of {preset!r}, whose pixels are read once; leave it out")
+        require_whole("reading", reading, 1, len(sensor.readings), f"{preset!r} has so many")
+        sensor = of_reading(sensor, reading - 1)
     if out is not None:
         require_ending(out, ".svg")
         check_place(out)

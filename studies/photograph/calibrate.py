@@ -10,8 +10,8 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
 from rodcone.colour_spaces import D50_XYZ, adapt_to_d65, xyz_to_srgb
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker
-from sensor.calibration import ColourCalibration
 from sensor.binning import as_read
+from sensor.calibration import ColourCalibration
 from sensor.cfa import channels, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation
@@ -65,7 +65,7 @@ def iso_speed(sensor: SensorConfig) -> float | None:
     if electrons_per_cd_m2 <= 0:
         return None
     per_lux_s = electrons_per_cd_m2 / camera_equation(sensor.lens)
-    return ISO_SATURATION_LUX_S * per_lux_s / as_read(sensor).pixel.full_well_e
+    return ISO_SATURATION_LUX_S * per_lux_s / as_read(sensor).metered_well_e
 
 
 def _in_bands(spectrum: Spectrum) -> Light:

@@ -18,8 +18,8 @@ from rodcone.errors import InputError, require_range, require_whole
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
-from sensor.burst import burst
 from sensor.binning import as_read, check_blocks
+from sensor.burst import burst
 from sensor.cfa import channels, check_covers, is_bayer
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -168,7 +168,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
         notes += [
-            f"{saturated:.0%} of the pixels are saturated at {raw.exposure_s:g} s; give a shorter --exposure, "
+            f"{saturated:.0%} of the pixels are saturated at {exposure_s:g} s; give a shorter --exposure, "
             "such as 20ms, or leave it out"
         ]
 
@@ -186,7 +186,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         "cfa": list(raw.cfa),
         "size": list(raw.shape),
         "seed": order.seed,
-        "exposure_s": raw.exposure_s,
+        "exposure_s": exposure_s,
         "iso": raw.iso,
         "engine": raw.engine,
         "luminance_cd_m2": float(radiance.luminance().mean()),

@@ -12,6 +12,7 @@ from sensor.capture import expose
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.device import draw_device
+from sensor.readings.reading import SWITCHED
 from sensor.readout import electrons_at_snr, noise_variance
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons
 
@@ -57,7 +58,10 @@ def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float) -> Floats:
     Crosstalk plays no part: neighbours exchange the same.
     """
     even = replace(sensor, pixel=replace(sensor.pixel, crosstalk=0.0))
-    return np.asarray(electrons / np.sqrt(noise_variance(electrons, even, exposure_s)))
+    # each is a frame of its own, for which a camera may switch its gain
+    fields = electrons.ravel()[:, None] if sensor.readout == SWITCHED else electrons[None]
+    variance = np.reshape([noise_variance(field, even, exposure_s) for field in fields], electrons.shape)
+    return np.asarray(electrons / np.sqrt(variance))
 
 
 def light_for_snr(ratio: float, sensor: SensorConfig, light: str, exposure_s: float) -> list[LightForSnr]:

@@ -5,7 +5,10 @@ import pytest
 from numpy.polynomial.hermite_e import hermegauss
 from scipy.stats import poisson
 
-from isp.anscombe import unstabilise
+from isp.anscombe import stabilise, stabilise_raw, unstabilise
+from sensor.capture import expose
+from sensor.device import draw_device
+from sensor.presets import preset
 
 NODES, WEIGHTS = hermegauss(60)
 WEIGHTS = WEIGHTS / WEIGHTS.sum()
@@ -36,3 +39,32 @@ def test_the_algebraic_inverse_would_be_a_quarter_of_an_electron_low() -> None:
 
 def test_the_transforms_least_value_is_no_light() -> None:
     assert unstabilise(np.array([2 * np.sqrt(0.375), 0.0]), 0.0) == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["dual_gain", "split_pixel", "staggered"])
+def test_merged_readings_have_a_noise_of_one_in_every_range_of_light(name: str) -> None:
+    sensor, shape = preset(name), (128, 128)
+    for light in np.geomspace(20.0, 0.8 * sensor.pixel.full_well_e, 12):
+        # a chip each: PRNU is in the unit
+        device = draw_device(sensor, shape, np.random.default_rng([1, int(light)]))
+        raw = expose(np.full(shape, light), sensor, 0.01, device, np.random.default_rng([2, int(light)]))
+        # 1.7 % is three standard errors; the steps of the noise are within a third of a decibel, 3.9 %
+        at_a_seam = min(abs(raw.electrons.mean() / step.from_e - 1) for step in raw.noise_steps) < 0.1
+        assert at_a_seam or abs(stabilise_raw(raw.electrons, raw).std() - 1) < 0.039 + 0.017
+
+
+def test_the_pieces_of_merged_readings_meet_and_rise() -> None:
+    sensor = preset("split_pixel")
+    device = draw_device(sensor, (4, 4), np.random.default_rng(1))
+    raw = expose(np.full((4, 4), 9.0), sensor, 0.01, device, np.random.default_rng(2))
+    light = np.geomspace(0.1, 0.9 * raw.full_well_e, 20_001)
+    stable = stabilise_raw(light, raw)
+    assert (np.diff(stable) > 0).all()
+    for step in raw.noise_steps:
+        below, above = stabilise_raw(step.from_e * np.array([1 - 1e-9, 1 + 1e-9]), raw)
+        assert above - below < 1e-5
+    single = stabilise_raw(light.astype(np.float32), raw)
+    assert single.dtype == np.float32
+    np.testing.assert_allclose(single, stable, atol=2e-3)
+    dark = light[light < raw.noise_steps[0].from_e]
+    np.testing.assert_array_equal(stable[: dark.size], stabilise(dark, raw.dark_noise_e, raw.prnu))

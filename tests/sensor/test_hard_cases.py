@@ -49,7 +49,7 @@ def shoot(sensor, value, shape, exact, exposure_s=0.01, seed=0):
     device = draw_device(sensor, shape, np.random.default_rng([seed, 0]))
     rng = np.random.default_rng([seed, 1])
     raw = capture(scene(value, shape), sensor, exposure_s, device, rng, exact=exact)
-    assert raw.dn.dtype == np.uint16
+    assert raw.dn.dtype == (np.float32 if sensor.readings else np.uint16)
     assert raw.dn.max() <= raw.white_dn
     assert np.isfinite(raw.electrons).all()
     return raw
@@ -60,7 +60,8 @@ def shoot(sensor, value, shape, exact, exposure_s=0.01, seed=0):
 def test_without_light_a_frame_reads_black_and_half_lies_on_either_side(name, exact):
     raw = shoot(preset(name), 0.0, (128, 128), exact)
     sigma = raw.dark_noise_e
-    assert abs(raw.electrons.mean()) < 4 * sigma / 128 + 1e-9  # six presets, two forms: 8e-4
+    dark_e = preset(name).pixel.dark_current_e_per_s * raw.exposure_s
+    assert abs(raw.electrons.mean() - dark_e) < 4 * sigma / 128 + 1e-9  # nine presets, two forms: 1e-3
     assert raw.dn.min() >= 0
     assert not raw.saturated.any()
 

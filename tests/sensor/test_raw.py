@@ -95,7 +95,7 @@ def test_whole_numbers_and_finite_floats_are_taken_as_they_are(dtype):
         ({"exposure_s": -1e-9}, r"exposure_s: -1e-09 is outside .*give seconds, 0 or more"),
         ({"f_number": 0.0}, r"f_number: 0\.0 is outside"),
         ({"iso": -100.0}, r"iso: -100\.0 is outside"),
-        ({"white_dn": 65_536.0}, r"white_dn: 65536\.0 is outside .*give digital numbers of 16 bits"),
+        ({"white_dn": 2.0**24 + 2}, r"white_dn: 16777218\.0 is outside .*give digital numbers of 24 bits"),
         ({"dn": np.full((2, 2), np.nan)}, r"dn: nan at \(0, 0\) is not allowed; give finite numbers"),
         ({"dn": np.array([[1.0, 2.0], [-np.inf, 0.0]])}, r"dn: -inf at \(1, 0\)"),
         ({"dn": np.ones((2, 2), complex)}, r"dn: samples of type complex128 are not allowed; give whole numbers or"),

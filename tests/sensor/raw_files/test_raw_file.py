@@ -3,6 +3,7 @@
 import json
 import os
 from dataclasses import fields, replace
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -129,6 +130,51 @@ def test_a_list_of_defects_that_cannot_be_is_refused(places: object, tmp_path: P
     (tmp_path / "shot.json").write_text(json.dumps(held))
     with pytest.raises(InputError, match=r"shot\.json: defects: .* is not allowed; give rows and columns"):
         read_raw(tmp_path / "shot.tif")
+
+
+STEP = {"from_e": 10.0, "shot": 2.0, "read_noise_e": 1.0, "dsnu_e": 0.0, "prnu": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("steps", "message"),
+    [
+        (3, "noise_steps: allowed is a list of objects"),
+        ([3], "noise_steps: allowed is a list"),
+        ([{"from_e": 1.0}], "noise_steps: allowed is a list"),
+        ([STEP | {"more": 1}], "noise_steps: allowed is a list"),
+        ([STEP | {"shot": 0.0}], "noise_steps: shot: 0.0 is outside"),
+        ([STEP | {"prnu": "1"}], "noise_steps: prnu: '1'"),
+        ([STEP | {"dsnu_e": None}], "noise_steps: dsnu_e: None"),
+        ([STEP | {"from_e": True}], "noise_steps: from_e: True"),
+        ([STEP, STEP | {"from_e": 5.0}], r"noise_steps: from_e \[10.0, 5.0\] doesn't rise"),
+        (None, "noise_steps: allowed is a list"),
+    ],
+)
+def test_noise_steps_that_cannot_be_are_refused_in_one_line(steps: object, message: str, tmp_path: Path) -> None:
+    write_raw(exposure(("RC", "CC")), tmp_path / "shot.tif")
+    sidecar = tmp_path / "shot.json"
+    sidecar.write_text(json.dumps(json.loads(sidecar.read_text()) | {"noise_steps": steps}))
+    with pytest.raises(InputError, match=message) as error:
+        read_raw(tmp_path / "shot.tif")
+    assert "\n" not in str(error.value)
+
+
+def test_samples_that_are_no_numbers_are_refused(tmp_path: Path) -> None:
+    dn = np.ones(exposure(("RC", "CC")).shape, np.float32)
+    dn[3, 4] = np.inf
+    write_raw(replace(exposure(("RC", "CC")), dn=np.ones_like(dn)), tmp_path / "shot.tif")
+    content = (tmp_path / "shot.tif").read_bytes()
+    ones, broken = np.ones_like(dn).tobytes(), dn.tobytes()
+    assert content.count(ones) == 1
+    (tmp_path / "shot.tif").write_bytes(content.replace(ones, broken))
+    with pytest.raises(InputError, match="describes other pixels"):
+        read_raw(tmp_path / "shot.tif")
+    sidecar = tmp_path / "shot.json"
+    digest = sha256(broken).hexdigest()
+    sidecar.write_text(json.dumps(json.loads(sidecar.read_text()) | {"pixels_sha256": digest}))
+    with pytest.raises(InputError, match=r"dn: inf at \(3, 4\)") as error:
+        read_raw(tmp_path / "shot.tif")
+    assert "\n" not in str(error.value)
 
 
 def test_a_sidecar_of_another_exposure_is_refused(tmp_path: Path) -> None:

@@ -144,3 +144,19 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, words, capsys, tmp_pat
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert words in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_of_several_readings_one_is_measured(capsys):
+    code, out, _ = call(["characterise", "dual_gain", "--reading", "2", *SMALL], capsys)
+    assert code == 0
+    assert re.search(r"^dark noise +e- +5\.56", out, re.MULTILINE)
+    for arguments, message in (
+        (["dual_gain"], "sensor: 2 readings of a pixel; allowed: one"),
+        (["dual_gain", "--reading", "3"], "reading: 3 is outside 1 to 2"),
+        (["low_noise", "--reading", "1"], "reading: 1 of 'low_noise', whose pixels are read once"),
+        (["--from", "a.dng", "b.dng", "--reading", "1"], "reading: 1 beside raw files"),
+    ):
+        code, out, err = call(["characterise", *arguments], capsys)
+        assert (code, out) == (2, "")
+        assert message in err
+        assert err.count("\n") == 1

@@ -1,0 +1,129 @@
+"""Several readings of one exposure merged into one linear raw image (docs/decisions/0047-several-readings.md)."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import ceil, hypot, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensor.config import BLACK_SIGMAS, SensorConfig
+from sensor.raw import NoiseStep, RawImage
+from sensor.readings.noise import Floats, best_weights, covariances, dark_electrons, seams, shares, whole_share
+
+MERGED_WHITE_DN = 2**24 - 1  # linear words of 24 bits, as chips that merge give them; single precision holds them all
+_ROUNDS = 6  # of the weights, as of `sensor.burst`
+_LEVELS = 512  # of light, between which weights are interpolated
+
+
+def merge_readings(raws: Sequence[RawImage], sensor: SensorConfig, exposure_s: float) -> RawImage:
+    """Merge all readings of one exposure.
+
+    The raw image's electrons are those of all charges together, so that shot noise is Poisson's as long as none is
+    full; beyond each seam `RawImage.noise_steps` says what the rest knows. Its exposure time is the one that would
+    collect as many: the whole pixel's times `whole_share`.
+
+    Parameters
+    ----------
+    raws : sequence of RawImage
+        In the order of `sensor.readings`.
+    sensor : SensorConfig
+    exposure_s : float
+        Of the longest [s].
+    """
+    whole, last = whole_share(sensor), seams(sensor, exposure_s).order[-1]
+    estimates_e = np.stack([raw.electrons / share for raw, share in zip(raws, shares(sensor), strict=True)])
+    electrons = merged_electrons(estimates_e, sensor, exposure_s) * whole
+    base, *steps = noise_of_merged(sensor, exposure_s)
+
+    full_e = sensor.pixel.full_well_e * whole
+    dark_e = BLACK_SIGMAS * hypot(base.read_noise_e, base.dsnu_e)
+    black_dn = ceil(MERGED_WHITE_DN * dark_e / (full_e + dark_e))
+    gain_e = full_e / (MERGED_WHITE_DN - black_dn)
+    electrons = np.where(raws[last].saturated, full_e, np.minimum(electrons, full_e))
+    hot = [raw.defects for raw in raws if raw.defects is not None]
+    return replace(
+        raws[0],
+        dn=(electrons / gain_e + black_dn).astype(np.float32),
+        black_dn=black_dn,
+        white_dn=MERGED_WHITE_DN,
+        gain_e_per_dn=gain_e,
+        read_noise_e=base.read_noise_e,
+        dsnu_e=base.dsnu_e,
+        prnu=base.prnu,
+        exposure_s=whole * exposure_s,
+        defects=np.concatenate(hot) if hot else None,
+        noise_steps=tuple(steps),
+    )
+
+
+def merged_electrons(estimates_e: Floats, sensor: SensorConfig, exposure_s: float) -> Floats:
+    """Electrons of the whole pixel from each reading's estimate of them.
+
+    Weights and the choice of readings follow the merged light, never one reading's own noisy value: the best linear
+    estimate is uncorrelated with what the readings differ by, so that what is decided from it favours none of them.
+
+    Parameters
+    ----------
+    estimates_e : (reading, h, w) float64
+        Each reading's electrons over its share.
+
+    Returns
+    -------
+    (h, w) float64
+    """
+    at, dark_e = seams(sensor, exposure_s), dark_electrons(sensor, exposure_s)
+    levels = np.concatenate([[0.0], np.geomspace(1e-2, sensor.pixel.full_well_e, _LEVELS - 1)])
+    total = np.asarray(sum(covariances(levels, sensor, exposure_s).values()))
+    flat = estimates_e.reshape(len(estimates_e), -1)
+    light, where = np.empty(flat.shape[1]), np.arange(flat.shape[1])
+    for number, above_e in enumerate(at.above_e):
+        weights = best_weights(total, at.order[number:])
+        light[where] = _weighted(flat[:, where], weights, levels + dark_e)
+        where = where[light[where] >= above_e]
+        if where.size == 0:
+            break
+    return light.reshape(estimates_e.shape[1:])
+
+
+def _weighted(estimates_e: Floats, weights: Floats, levels_e: Floats) -> Floats:
+    """Mean under the weights (level, reading) that belong to the mean itself, in a few rounds from the dark on."""
+    light = np.asarray(weights[0] @ estimates_e)
+    if np.ptp(weights, axis=0).max() < 1e-9:
+        return light
+    for _ in range(_ROUNDS):
+        light = np.asarray(
+            sum(np.interp(light, levels_e, own) * x for own, x in zip(weights.T, estimates_e, strict=True) if own.any())
+        )
+    return light
+
+
+def noise_of_merged(sensor: SensorConfig, exposure_s: float) -> list[NoiseStep]:
+    """Noise of merged electrons from the dark on, and from each seam on.
+
+    Read noise and offsets are told where a step begins, shot noise and PRNU where it ends: there each counts.
+    """
+    at, whole = seams(sensor, exposure_s), whole_share(sensor)
+    starts_e = np.concatenate([[0.0], at.above_e[:-1]])
+    steps = []
+    for number, (start_e, end_e) in enumerate(zip(starts_e, at.above_e, strict=True)):
+        dark, bright = (_variances_at(level_e, sensor, exposure_s, at.order[number:]) for level_e in (start_e, end_e))
+        steps.append(
+            NoiseStep(
+                from_e=whole * float(start_e),
+                shot=whole * bright["shot noise"] / float(end_e),
+                read_noise_e=whole * sqrt(dark["read noise"] + dark["quantisation"]),
+                dsnu_e=whole * sqrt(dark["DSNU"] + dark["column offsets"]),
+                prnu=hypot(sqrt(bright["PRNU"]) / float(end_e), sensor.pixel.column_gain_spread),
+            )
+        )
+    return steps
+
+
+def _variances_at(
+    expected_e: float, sensor: SensorConfig, exposure_s: float, kept: NDArray[np.intp]
+) -> dict[str, float]:
+    """Variance of the best estimate from the readings `kept`, by source."""
+    by_source = covariances(np.array([expected_e]), sensor, exposure_s)
+    weights = best_weights(np.asarray(sum(by_source.values())), kept)[0]
+    return {name: float(weights @ covariance[0] @ weights) for name, covariance in by_source.items()}

@@ -1,0 +1,173 @@
+"""Joint noise of several readings of one exposure, the best weights under it, and the merge's noise in closed form.
+
+A reading i holds the share s_i of the electrons E that the whole pixel would hold in the whole exposure, and estimates
+E by x_i / s_i. The covariance of these estimates says all: shot noise is common to readings of one charge, PRNU to
+those of one photodiode, a column's amplifier to all, read noise to none. The best linear estimate of E weighs them by
+
+    w = C^-1 1 / (1^T C^-1 1),    of variance w^T C w.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from sensor.config import SensorConfig
+from sensor.readings.reading import MERGED
+
+# A reading counts where the merged light fills it to no more than 6 standard deviations under its well: its own noise
+# then clips once in 1e9 pixels.
+CLEAR_SIGMAS = 6.0
+METERED_SHARE = 0.8  # of a gain's well, up to which it takes a frame's bright end (`sensor.exposure` aims there too)
+METERED_PERCENTILE = 99.0
+_LEVELS = 8192  # between which the variance of larger frames is interpolated: 0.3 % of light apart
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Seams:
+    """Readings in the order in which they fill, and the light from which each is left out.
+
+    Attributes
+    ----------
+    order : (reading,) intp
+    above_e : (reading,) float64
+        Electrons of the whole pixel, light and dark current; of the last the level from which it may clip.
+    """
+
+    order: NDArray[np.intp]
+    above_e: Floats
+
+
+def shares(sensor: SensorConfig) -> Floats:
+    """Share of the whole pixel's electrons of the whole exposure in each reading."""
+    return np.array([x.share for x in sensor.readings])
+
+
+def whole_share(sensor: SensorConfig) -> float:
+    """What all charges hold together, over the whole pixel's electrons: the unit of the merged electrons."""
+    return float(sum({x.charge: x.share for x in sensor.readings}.values()))
+
+
+def of_reading(sensor: SensorConfig, index: int) -> SensorConfig:
+    """Sensor of one reading alone, which takes its share of the light and of the dark current."""
+    reading, pixel = sensor.readings[index], sensor.pixel
+    own = replace(
+        pixel,
+        read_noise_e=reading.read_noise_e,
+        dsnu_e=reading.dsnu_e,
+        full_well_e=reading.full_well_e,
+        dark_current_e_per_s=pixel.dark_current_e_per_s * reading.share,
+        hot_pixel_dark_current_e_per_s=pixel.hot_pixel_dark_current_e_per_s * reading.share,
+    )
+    return replace(sensor, pixel=own, readings=(), readout=MERGED)
+
+
+def switched_to(sensor: SensorConfig, expected_e: Floats) -> int:
+    """Number of the reading that a camera which switches its gain takes: the quietest that holds the bright end."""
+    bright_e = float(np.percentile(expected_e, METERED_PERCENTILE))
+    quiet_first = sorted(range(len(sensor.readings)), key=lambda i: sensor.readings[i].read_noise_e)
+    holding = [i for i in quiet_first if bright_e <= METERED_SHARE * sensor.readings[i].full_well_e]
+    return holding[0] if holding else max(quiet_first, key=lambda i: sensor.readings[i].full_well_e)
+
+
+def dark_electrons(sensor: SensorConfig, exposure_s: float) -> float:
+    """Mean electrons of dark current and hot pixels in the whole pixel."""
+    pixel = sensor.pixel
+    return (pixel.dark_current_e_per_s + pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s) * exposure_s
+
+
+def covariances(expected_e: Floats, sensor: SensorConfig, exposure_s: float) -> dict[str, Floats]:
+    """Covariance of the readings' estimates of the whole pixel's electrons, by source of noise; without clipping.
+
+    Parameters
+    ----------
+    expected_e : (n,) float64
+        Photo-electrons of the whole pixel in the whole exposure.
+
+    Returns
+    -------
+    dict of str to (n, reading, reading) float64
+        By the names of `sensor.readout.noise_sources` [e-^2].
+    """
+    pixel, readings = sensor.pixel, sensor.readings
+    share = shares(sensor)
+    light = np.asarray(expected_e, dtype=np.float64)[:, None, None]
+    own = np.eye(len(readings))
+    charge = np.array([[a.charge == b.charge for b in readings] for a in readings]) / share
+    photodiode = np.array([[a.photodiode == b.photodiode for b in readings] for a in readings]) * 1.0
+    hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
+    spread_e2 = hot_share * (1 - hot_share) * hot_e**2
+    gain_e = np.array([of_reading(sensor, i).gain_e_per_dn for i in range(len(readings))])
+
+    found = {
+        "shot noise": light * charge,
+        "dark current": pixel.dark_current_e_per_s * exposure_s * charge,
+        "hot pixels": hot_share * hot_e * charge + spread_e2 * photodiode,
+        "PRNU": (pixel.prnu * light) ** 2 * photodiode,
+    }
+    collected = sum(found.values()) + (light + dark_electrons(sensor, exposure_s)) ** 2
+    found |= {
+        "column gains": pixel.column_gain_spread**2 * collected,
+        "DSNU": own * (np.array([x.dsnu_e for x in readings]) / share) ** 2,
+        "column offsets": pixel.column_offset_e**2 / np.outer(share, share),
+        "read noise": own * (np.array([x.read_noise_e for x in readings]) / share) ** 2,
+        "quantisation": own * (gain_e / share) ** 2 / 12,
+    }
+    shape = (len(light), len(readings), len(readings))
+    return {name: np.broadcast_to(value, shape) for name, value in found.items()}
+
+
+def best_weights(covariance: Floats, kept: NDArray[np.intp]) -> Floats:
+    """Weights of the best linear estimate from the readings `kept`, 0 for the others; shape (n, reading)."""
+    weights = np.zeros(covariance.shape[:2])
+    part = np.linalg.solve(covariance[:, kept[:, None], kept[None, :]], np.ones((len(covariance), kept.size, 1)))[
+        ..., 0
+    ]
+    weights[:, kept] = part / part.sum(axis=1, keepdims=True)
+    return weights
+
+
+def seams(sensor: SensorConfig, exposure_s: float) -> Seams:
+    """Where the merge leaves readings out: 6 standard deviations under the well, but not under half of it."""
+    full_e = np.array([x.full_well_e for x in sensor.readings]) / shares(sensor)
+    total = sum(covariances(full_e, sensor, exposure_s).values())
+    spread_e = np.sqrt(np.einsum("iii->i", total))
+    above_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
+    order = np.argsort(above_e, kind="stable")
+    return Seams(order, above_e[order])
+
+
+def merged_variances(expected_e: Floats, sensor: SensorConfig, exposure_s: float) -> Mapping[str, Floats]:
+    """Variance of the merge by source, over chips and exposures [e-^2 of the whole pixel], shape of `expected_e`.
+
+    Around a seam some pixels keep the reading that fills and some leave it out, by their merged light; that is not
+    correlated with what the readings differ by, so that the variances add by the shares of the pixels.
+    """
+    light = np.ravel(np.asarray(expected_e, dtype=np.float64))
+    by_source = covariances(light, sensor, exposure_s)
+    total = np.asarray(sum(by_source.values()))
+    found, left, at = dict.fromkeys(by_source, np.zeros_like(light)), np.ones_like(light), seams(sensor, exposure_s)
+    dark_e = dark_electrons(sensor, exposure_s)
+    for number, above_e in enumerate(at.above_e):
+        weights = best_weights(total, at.order[number:])
+        noise_e = np.sqrt(np.einsum("ni,nij,nj->n", weights, total, weights))
+        last = number == len(at.order) - 1
+        beyond = np.zeros_like(light) if last else ndtr((light + dark_e - above_e) / noise_e)
+        for name, covariance in by_source.items():
+            found[name] = found[name] + left * (1 - beyond) * np.einsum("ni,nij,nj->n", weights, covariance, weights)
+        left = left * beyond
+    return {name: value.reshape(np.shape(expected_e)) for name, value in found.items()}
+
+
+def merged_variance(expected_e: Floats, sensor: SensorConfig, exposure_s: float) -> Floats:
+    """Sum of `merged_variances`; for frames of many pixels interpolated between levels of light."""
+    light = np.asarray(expected_e, dtype=np.float64)
+    if light.size <= _LEVELS:
+        return np.asarray(sum(merged_variances(light, sensor, exposure_s).values()))
+    most_e = max(float(light.max()), 2 * sensor.pixel.full_well_e)
+    levels = np.concatenate([[0.0], np.geomspace(1e-3, most_e, _LEVELS - 1)])
+    return np.interp(light, levels, merged_variance(levels, sensor, exposure_s))

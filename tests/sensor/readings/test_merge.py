@@ -1,0 +1,173 @@
+"""Readings as they are drawn and merged: unbiased, at the noise of the closed form, without a step at a seam."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rodcone.errors import InputError
+from sensor.burst import merged_raw
+from sensor.capture import expose
+from sensor.device import draw_device
+from sensor.kernel.kernel import read_frame
+from sensor.presets import low_noise, preset
+from sensor.raw_files.raw_file import read_raw, write_raw
+from sensor.readings.noise import covariances, of_reading, seams, shares, whole_share
+from sensor.readout import draw_frame, noise_variance
+from studies.photograph.calibrate import calibrate
+
+HDR = ("dual_gain", "split_pixel", "staggered")
+SHAPE, TIME_S = (256, 256), 0.01
+EXACT = pytest.mark.parametrize("exact", [False, True], ids=["engine", "exact"])
+
+
+def levels_of(sensor):
+    """Light over six decades, and each seam in steps of a third of its noise."""
+    at = seams(sensor, TIME_S).above_e
+    fine = [
+        e + step * np.sqrt(noise_variance(np.array([e]), sensor, TIME_S)[0])
+        for e in at[:-1]
+        for step in np.arange(-8, 9) / 3
+    ]
+    return np.array([*np.geomspace(0.1, 0.9 * at[-1], 17), *fine])
+
+
+@EXACT
+@pytest.mark.parametrize("name", HDR)
+def test_the_merge_has_the_mean_of_the_light_and_the_noise_of_the_closed_form(name, exact):
+    sensor = preset(name)
+    whole, dark_e = whole_share(sensor), sensor.pixel.dark_current_e_per_s * TIME_S
+    chips, rng = np.random.default_rng(11), np.random.default_rng(12)
+    levels = levels_of(sensor)[:: 3 if exact else 1]
+    for light in levels:
+        device = draw_device(sensor, SHAPE, chips)  # a chip each: PRNU is drawn anew
+        merged = expose(np.full(SHAPE, light), sensor, TIME_S, device, rng, exact=exact).electrons / whole
+        variance = float(noise_variance(np.array([light]), sensor, TIME_S)[0])
+        # 4 standard errors at some 160 lights: a false alarm in 1 of 100 runs, and the seeds are fixed
+        assert abs(merged.mean() - light - dark_e) < 4 * np.sqrt(variance / merged.size), light
+        # 256 x 256 samples know a variance to 0.024 dB; 0.15 dB is six times that
+        assert abs(10 * np.log10(merged.var() / variance)) < 0.15, light
+
+
+@pytest.mark.parametrize("light", [3.0, 900.0])  # read noise that were shared would show in the dark
+@pytest.mark.parametrize("draw", [draw_frame, read_frame])
+@pytest.mark.parametrize("name", HDR)
+def test_readings_covary_as_their_charges_and_photodiodes_say(name, draw, light):
+    sensor = preset(name)
+    chips, rng = np.random.default_rng(3), np.random.default_rng(4)
+    device = draw_device(sensor, SHAPE, chips)
+    keys = {}
+    samples = []
+    for number, reading in enumerate(sensor.readings):
+        own = of_reading(sensor, number)
+        key = keys.setdefault(reading.charge, int(rng.integers(2**63)))
+        dn = draw(np.full(SHAPE, light * reading.share), own, device.readings[number], TIME_S, key, number)
+        samples.append((dn.astype(float) - own.black_dn).ravel() * own.gain_e_per_dn / reading.share)
+    found = np.cov(samples)
+    meant = sum(covariances(np.array([light]), sensor, TIME_S).values())[0]
+    # standard error of a covariance of Gaussians; 4 of them in at most 9 entries: 6e-4
+    error = np.sqrt((np.outer(np.diag(meant), np.diag(meant)) + meant**2) / samples[0].size)
+    assert (np.abs(found - meant) < 4 * error).all(), (found, meant)
+
+
+def test_a_frame_depends_on_its_key_alone_and_both_engines_agree_in_the_mean():
+    sensor = preset("split_pixel")
+    device = draw_device(sensor, SHAPE, np.random.default_rng(1))
+    light = np.linspace(0, 60_000, SHAPE[0] * SHAPE[1]).reshape(SHAPE)
+    for exact in (False, True):
+        one, other = (expose(light, sensor, TIME_S, device, np.random.default_rng(5), exact=exact) for _ in range(2))
+        np.testing.assert_array_equal(one.dn, other.dn)
+        assert one.dn.dtype == np.float32
+
+
+def test_whole_numbers_of_electrons_are_light_like_any_other():
+    sensor = preset("staggered")
+    device = draw_device(sensor, (32, 32), np.random.default_rng(1))
+    whole, same = (
+        expose(np.full((32, 32), light), sensor, TIME_S, device, np.random.default_rng(5)) for light in (700, 700.0)
+    )
+    np.testing.assert_array_equal(whole.dn, same.dn)
+
+
+def test_what_fills_the_last_reading_reads_the_top_and_counts_as_saturated():
+    sensor = preset("split_pixel")
+    device = draw_device(sensor, (64, 64), np.random.default_rng(1))
+    well_e = sensor.pixel.full_well_e
+    full = expose(np.full((64, 64), 1.5 * well_e), sensor, TIME_S, device, np.random.default_rng(2))
+    assert (full.dn == full.white_dn).all()
+    assert full.saturated.all()
+    assert full.full_well_e == pytest.approx(well_e)
+    under = expose(np.full((64, 64), 0.8 * well_e), sensor, TIME_S, device, np.random.default_rng(2))
+    assert not under.saturated.any()
+
+
+def test_the_first_reading_alone_is_what_a_chip_with_one_reading_gives():
+    sensor = preset("dual_gain")
+    device = draw_device(sensor, SHAPE, np.random.default_rng(1))
+    alone = draw_device(of_reading(sensor, 0), SHAPE, np.random.default_rng(1))
+    np.testing.assert_array_equal(device.readings[0].photo_response, alone.photo_response)
+    np.testing.assert_array_equal(device.readings[0].dark_offset_e, alone.dark_offset_e)
+    np.testing.assert_array_equal(device.readings[1].photo_response, alone.photo_response)
+    assert np.corrcoef(device.readings[1].dark_offset_e.ravel(), alone.dark_offset_e.ravel())[0, 1] < 4 / 256
+
+
+def test_a_camera_that_switches_gives_one_gain_s_frame():
+    sensor = replace(preset("dual_gain"), readout="switched")
+    device = draw_device(sensor, (32, 32), np.random.default_rng(1))
+    for light, index in ((100.0, 0), (5000.0, 1)):
+        own = of_reading(sensor, index)
+        raw = expose(np.full((32, 32), light), sensor, TIME_S, device, np.random.default_rng(2), exact=True)
+        assert (raw.read_noise_e, raw.gain_e_per_dn) == (own.pixel.read_noise_e, own.gain_e_per_dn)
+        assert raw.dn.dtype == np.uint16
+        assert raw.noise_steps == ()
+        assert raw.electrons.mean() == pytest.approx(light, rel=0.02)
+
+
+def test_a_burst_is_merged_as_frames_of_one_reading_are():
+    for name in HDR:
+        sensor = preset(name)
+        device, rng = draw_device(sensor, SHAPE, np.random.default_rng(1)), np.random.default_rng(2)
+        frames = [expose(np.full(SHAPE, 3000.0), sensor, TIME_S, device, rng) for _ in range(4)]
+        merged = merged_raw(frames)
+        assert merged.electrons.mean() == pytest.approx(sum(frame.electrons.mean() for frame in frames), rel=1e-6)
+        assert merged.exposure_s == pytest.approx(4 * whole_share(sensor) * TIME_S)
+        assert [step.from_e for step in merged.noise_steps] == [4 * step.from_e for step in frames[0].noise_steps]
+        with pytest.raises(InputError, match="each of several readings"):
+            merged_raw([frames[0], replace(frames[1], exposure_s=1.0)])
+
+
+@pytest.mark.parametrize("ending", [".dng", ".tif"])
+@pytest.mark.parametrize("name", HDR)
+def test_a_raw_file_holds_merged_samples_and_their_noise_bit_for_bit(name, ending, tmp_path):
+    sensor = preset(name, "bayer")
+    device = draw_device(sensor, (32, 40), np.random.default_rng(1))
+    light = np.geomspace(0.1, 2 * sensor.pixel.full_well_e, 32 * 40).reshape(32, 40)
+    raw = expose(light, sensor, TIME_S, device, np.random.default_rng(2))
+    raw = replace(raw, colour=calibrate(sensor, "D65"))
+    back = read_raw(write_raw(raw, tmp_path / f"shot{ending}")[0])
+    np.testing.assert_array_equal(back.dn, raw.dn)
+    assert back.dn.dtype == np.float32
+    assert back.noise_steps == raw.noise_steps
+    assert len(raw.noise_steps) == len(sensor.readings) - 1
+    np.testing.assert_array_equal(back.saturated, raw.saturated)
+
+
+def test_a_chip_of_other_patterns_has_shares_of_dark_current_and_hot_pixels():
+    own = preset("staggered")
+    sensor = replace(own, pixel=replace(own.pixel, hot_pixel_share=0.02, hot_pixel_dark_current_e_per_s=1e5))
+    device = draw_device(sensor, SHAPE, np.random.default_rng(1))
+    raw = expose(np.zeros(SHAPE), sensor, TIME_S, device, np.random.default_rng(2), exact=True)
+    hot = np.zeros(SHAPE, bool)
+    hot[tuple(raw.defects.T)] = True
+    np.testing.assert_array_equal(hot, device.hot)
+    assert raw.electrons[hot].mean() / whole_share(sensor) == pytest.approx(1000.0, rel=0.01)
+    assert shares(sensor).tolist() == [1.0, 0.0625]
+
+
+def test_a_sensor_that_is_read_once_draws_what_it_drew_before():
+    sensor = low_noise()
+    device = draw_device(sensor, (8, 8), np.random.default_rng(1))
+    raw = expose(np.full((8, 8), 100.0), sensor, TIME_S, device, np.random.default_rng(2), exact=True)
+    assert device.readings == ()
+    assert raw.noise_steps == ()
+    assert raw.dn[0, :4].tolist() == [130, 122, 122, 123]  # before there were readings

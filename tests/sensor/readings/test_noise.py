@@ -1,0 +1,154 @@
+"""Joint noise of several readings against closed forms worked out on paper."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sensor.burst import merged_sensor
+from sensor.config import pixel_of_readings
+from sensor.presets import low_noise, preset
+from sensor.readings.merge import noise_of_merged
+from sensor.readings.noise import (
+    best_weights,
+    covariances,
+    merged_variance,
+    of_reading,
+    seams,
+    switched_to,
+    whole_share,
+)
+from sensor.readings.reading import Reading
+from sensor.readout import electrons_at_snr, noise_sources, noise_variance
+from studies.photograph.snr import snr
+
+HDR = ("dual_gain", "split_pixel", "staggered")
+REAL = {
+    "dark_current_e_per_s": 100.0,
+    "column_gain_spread": 0.01,
+    "column_offset_e": 3.0,
+    "hot_pixel_share": 0.01,
+    "hot_pixel_dark_current_e_per_s": 1e4,
+}
+
+
+def sensor_of(*readings, **pixel):
+    own = low_noise()
+    return replace(own, pixel=pixel_of_readings(replace(own.pixel, **pixel), readings), readings=readings)
+
+
+def dual(high=2.0, low=6.0, **pixel):
+    """Two gains without PRNU, DSNU or coarse converters."""
+    return replace(
+        sensor_of(Reading(high, 0.0, 2000.0), Reading(low, 0.0, 16_000.0), **{"prnu": 0.0, **pixel}), bits=16
+    )
+
+
+@pytest.mark.parametrize("name", HDR)
+def test_each_reading_s_own_variance_is_that_of_a_chip_that_is_read_once(name):
+    sensor = preset(name)
+    sensor = replace(sensor, pixel=replace(sensor.pixel, **REAL))
+    light = np.array([0.0, 0.3, 40.0, 5000.0])
+    total = sum(covariances(light, sensor, 0.02).values())
+    for index, reading in enumerate(sensor.readings):
+        alone = noise_variance(light * reading.share, of_reading(sensor, index), 0.02)
+        np.testing.assert_allclose(total[:, index, index] * reading.share**2, alone, rtol=1e-12)
+
+
+def test_two_gains_of_one_charge_share_its_shot_noise_and_average_their_read_noise():
+    sensor = dual()
+    light = np.array([0.0, 1.0, 100.0, 1500.0])
+    read_e2 = 1.0 / (1.0 / 2.0**2 + 1.0 / 6.0**2)
+    # quantisation is 1e-3 of a variance of 4 or less
+    np.testing.assert_allclose(merged_variance(light, sensor, 0.01), light + read_e2, rtol=1e-3)
+    weights = best_weights(np.asarray(sum(covariances(light, sensor, 0.01).values())), np.array([0, 1]))
+    np.testing.assert_allclose(weights[:, 0], 36 / (36 + 4), rtol=1e-3)
+
+
+def test_two_charges_without_dark_noise_add_their_photons():
+    split = sensor_of(Reading(0.0, 0.0, 1e6, 0.5, 1.0, "a"), Reading(0.0, 0.0, 1e6, 0.3, 1.0, "b"), prnu=0.0)
+    apart = sensor_of(Reading(0.0, 0.0, 1e6), Reading(0.0, 0.0, 1e6, 1.0, 0.25), prnu=0.0)
+    light = np.array([1000.0, 1e5])
+    # the converter's step of 61 e- is all dark noise there is: 310 e-^2 of each over its share
+    for sensor, whole in ((split, 0.8), (apart, 1.25)):
+        fine = replace(sensor, bits=16)
+        assert whole_share(fine) == pytest.approx(whole)
+        assert merged_variance(light, fine, 0.01)[1] == pytest.approx(1e5 / whole, rel=1e-3)
+
+
+def test_prnu_of_two_photodiodes_averages_and_of_one_doesn_t():
+    noise = {"read_noise_e": 0.0, "dsnu_e": 0.0, "full_well_e": 1e9}
+    halves = sensor_of(
+        Reading(**noise, light_share=0.5, photodiode="a"), Reading(**noise, light_share=0.5, photodiode="b"), prnu=0.02
+    )
+    twice = sensor_of(Reading(**noise), Reading(**noise, time_share=0.5), prnu=0.02)
+    light = 1e8
+    assert noise_sources(light, halves, 0.01)["PRNU"] == pytest.approx(0.02 * light / np.sqrt(2), rel=1e-3)
+    assert noise_sources(light, twice, 0.01)["PRNU"] == pytest.approx(0.02 * light, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", HDR)
+def test_sources_sum_to_the_variance_and_frames_are_interpolated_within_a_thousandth(name):
+    sensor = preset(name)
+    for light in (0.1, 30.0, 5000.0, 40_000.0):
+        total = sum(value**2 for value in noise_sources(light, sensor, 0.01).values())
+        assert total == pytest.approx(float(noise_variance(np.array([light]), sensor, 0.01)[0]), rel=1e-12)
+    light = np.geomspace(0.01, sensor.pixel.full_well_e, 9000).reshape(90, 100)
+    few = noise_variance(light[:, ::50], sensor, 0.01)
+    np.testing.assert_allclose(noise_variance(light, sensor, 0.01)[:, ::50], few, rtol=1e-3)
+
+
+def test_at_a_seam_half_of_the_pixels_have_lost_the_reading():
+    sensor = dual()
+    seam = float(seams(sensor, 0.01).above_e[0])
+    assert seam == pytest.approx(2000.0 - 6.0 * np.sqrt(2000.0 + 4.0), rel=1e-5)
+    below, at, above = merged_variance(seam * np.array([0.8, 1.0, 1.2]), sensor, 0.01)
+    assert at == pytest.approx(seam + (below - 0.8 * seam + above - 1.2 * seam) / 2, rel=1e-6)
+    assert above == pytest.approx(1.2 * seam + 36.0, rel=1e-3)
+
+
+def test_a_camera_that_switches_takes_the_quietest_gain_that_holds_the_bright_end():
+    sensor = replace(preset("dual_gain"), readout="switched")
+    high, low = (of_reading(sensor, index) for index in (0, 1))
+    assert [switched_to(sensor, np.array([e])) for e in (10.0, 1746.0, 1747.0, 8e3, 1e5)] == [0, 0, 1, 1, 1]
+    frame = np.array([[5.0, 1000.0], [20.0, 3000.0]])
+    np.testing.assert_array_equal(noise_variance(frame, sensor, 0.01), noise_variance(frame, low, 0.01))
+    np.testing.assert_array_equal(noise_variance(frame / 10, sensor, 0.01), noise_variance(frame / 10, high, 0.01))
+    # each level of an even field is a frame of its own
+    levels = np.array([10.0, 3000.0])
+    expected = [float(snr(levels[i : i + 1], one, 0.01)[0]) for i, one in enumerate((high, low))]
+    np.testing.assert_allclose(snr(levels, sensor, 0.01), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("readout", ["merged", "switched"])
+@pytest.mark.parametrize("ratio", [1.0, 10.0, 40.0])
+def test_the_light_for_an_snr_gives_back_the_snr(ratio, readout):
+    sensor = replace(preset("dual_gain"), readout=readout)
+    electrons = electrons_at_snr(ratio, sensor, 0.01)
+    assert float(snr(np.array([electrons]), sensor, 0.01)[0]) == pytest.approx(ratio, rel=1e-4)
+    assert electrons_at_snr(1e4, sensor, 0.01) == np.inf
+
+
+@pytest.mark.parametrize("name", HDR)
+def test_noise_steps_are_within_a_third_of_a_decibel_of_the_closed_form(name):
+    sensor = preset(name)
+    whole, at = whole_share(sensor), seams(sensor, 0.02).above_e
+    dark_e = sensor.pixel.dark_current_e_per_s * 0.02  # its shot noise is in the samples' own electrons
+    for number, step in enumerate(noise_of_merged(sensor, 0.02)):
+        light = np.linspace(1.05 * at[number - 1] if number else 0.0, 0.97 * at[number], 200)
+        found = whole**2 * (merged_variance(light, sensor, 0.02) - dark_e)
+        electrons = whole * light
+        told = step.shot * electrons + step.read_noise_e**2 + step.dsnu_e**2 + (step.prnu * electrons) ** 2
+        assert np.abs(10 * np.log10(told / found)).max() < 1 / 3
+
+
+@pytest.mark.parametrize("name", HDR)
+def test_a_sensor_for_a_burst_holds_the_variance_of_its_merged_frames(name):
+    one, fixed = preset(name), ("PRNU", "DSNU", "column offsets", "column gains")
+    four = merged_sensor(one, 4)
+    assert four.pixel.full_well_e == 4 * one.pixel.full_well_e
+    for light in (50.0, 3000.0):
+        sources = noise_sources(light, one, 0.01)
+        expected = sum(value**2 * (16 if key in fixed else 4) for key, value in sources.items())
+        # its weights know PRNU and a converter's step of four frames, which those of a frame don't
+        assert float(noise_variance(np.array([4 * light]), four, 0.04)[0]) == pytest.approx(expected, rel=0.02)
