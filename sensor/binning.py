@@ -11,6 +11,7 @@ from dataclasses import replace
 from math import hypot, inf, sqrt
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError
@@ -77,7 +78,7 @@ def of_read_pixels(values: NDArray[Any], sensor: SensorConfig) -> NDArray[Any]:
 def block_sums(values: NDArray[Any]) -> NDArray[Any]:
     """Sums over 2x2, shape (..., h, w) to (..., h / 2, w / 2)."""
     rows = values[..., ::2, :] + values[..., 1::2, :]
-    return rows[..., ::2] + rows[..., 1::2]
+    return np.asarray(rows[..., ::2] + rows[..., 1::2])
 
 
 def check_blocks(sensor: SensorConfig, shape: tuple[int, ...]) -> None:

@@ -174,8 +174,8 @@ def take(order: Order, step: Step | None = None) -> Taken:
 
     # The files.
     places = [out] if order.frames == 1 else [out.with_stem(f"{out.stem}_{n}") for n in range(1, order.frames + 1)]
-    known = is_bayer(raw.cfa) or out.suffix.lower() != ".dng"  # to raw converters
-    bayer = remosaic(raw) if not known and order.frames == 1 else None
+    converted = is_bayer(raw.cfa) or out.suffix.lower() != ".dng"  # by raw converters
+    bayer = remosaic(raw) if not converted and order.frames == 1 else None
     paths = tuple(path for frame, place in zip(raws, places, strict=True) for path in write_raw(frame, place))
     if bayer is not None:
         paths += write_raw(bayer, out.with_stem(out.stem + "_bayer"))

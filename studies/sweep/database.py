@@ -95,8 +95,8 @@ def read_results(folder: Path) -> Iterator[sqlite3.Connection]:
     path = folder / FILE
     if not path.is_file():
         raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
-    # SQLite reads the write-ahead log too, and makes one, which only a connection that may write takes away again. Where
-    # the folder can't be written and has no log, nobody else writes, and the file alone is read.
+    # SQLite reads the write-ahead log too, and makes one, which only a connection that may write takes away again.
+    # Where the folder can't be written and has no log, nobody else writes, and the file alone is read.
     log = path.with_name(f"{FILE}-wal")
     options = "mode=rw" if os.access(folder, os.W_OK) else "mode=ro" if log.exists() else "mode=ro&immutable=1"
     with _connected(path, options) as base:

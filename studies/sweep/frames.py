@@ -17,6 +17,7 @@ from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
 from render.denoised.relight import relight_denoised
 from render.illuminants import illuminant, is_light_file
+from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
 from rodcone.digests import digest
@@ -137,8 +138,9 @@ def make_frames(
         "truth": keep(folder, _npy(true_srgb(shown, light, white)), ".npy"),
     }
     for key, (preset, sensor) in wanted.items():
-        own, block = views, 2 if sensor.binning else 1
+        own: tuple[SpectralRadiance, ...] = views
         if area is not None:
+            block = 2 if sensor.binning else 1
             own = tuple(area.view(view, sensor.pixel.pitch_um, block) for view in views)
         whole, one, other = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in own)
         errors = [(one - other) / 2] if transport.denoised is None else [whole - one, whole - other]

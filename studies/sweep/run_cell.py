@@ -113,8 +113,10 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         budget_share=cell.budget_share,
         **figures,
         mc_share=charged_share(
-            *(values * frames for values in (errors_e, of_read_pixels(expected_e, sensor))),
-            *(merged_sensor(sensor, frames), cell.exposure_s * frames),
+            errors_e * frames,
+            of_read_pixels(expected_e, sensor) * frames,
+            merged_sensor(sensor, frames),
+            cell.exposure_s * frames,
         ),
         snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),

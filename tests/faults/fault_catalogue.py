@@ -85,12 +85,12 @@ SENSOR = (
     _fault(
         "conversion gain inverted",
         "sensor/readout.py",
-        "collected_e / sensor.gain_e_per_dn",
-        "collected_e * sensor.gain_e_per_dn",
+        "read_e / own.gain_e_per_dn",
+        "read_e * own.gain_e_per_dn",
         *_READOUT,
     ),
-    _fault("black level missing", "sensor/readout.py", " + sensor.black_dn)", ")", *_READOUT),
-    _fault("converter rounds down", "sensor/readout.py", "np.rint(collected_e", "np.floor(collected_e", *_READOUT),
+    _fault("black level missing", "sensor/readout.py", " + own.black_dn)", ")", *_READOUT),
+    _fault("converter rounds down", "sensor/readout.py", "np.rint(read_e", "np.floor(read_e", *_READOUT),
     _fault(
         "well does not clip",
         "sensor/readout.py",
@@ -209,8 +209,8 @@ SENSOR = (
     _fault(
         "auto exposure forgets the share of the well",
         "sensor/exposure.py",
-        "min(longest_s, well_share * sensor",
-        "min(longest_s, sensor",
+        "min(longest_s, well_share * as_read(sensor)",
+        "min(longest_s, as_read(sensor)",
         "sensor/test_exposure",
     ),
     _fault(
@@ -501,8 +501,8 @@ ISP = (
     _fault(
         "inverse transform forgets dark noise",
         "isp/anscombe.py",
-        "np.asarray(series - dark_noise_e**2)",
-        "np.asarray(series)",
+        "(0.125 + dark_noise_e**2) + series",
+        "0.125 + series",
         "isp/test_anscombe",
     ),
 )

@@ -85,7 +85,9 @@ def test_calibration_goes_along_without_white() -> None:
 
 @pytest.mark.parametrize("cfa", [BAYER, MOSAICS["rgbw_4x4"]])
 def test_other_mosaics_are_refused(cfa: Tile) -> None:
-    with pytest.raises(InputError, match=r"cfa: .* can't become Bayer; allowed: 2x2 with R, G, B and W, quad_rgbw, quad_bayer"):
+    with pytest.raises(
+        InputError, match=r"cfa: .* can't become Bayer; allowed: 2x2 with R, G, B and W, quad_rgbw, quad_bayer"
+    ):
         remosaic(raw(cfa, flat()))
 
 

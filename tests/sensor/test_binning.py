@@ -59,7 +59,9 @@ def test_mono_of_one_pixel_bins_to_itself():
 
 @pytest.mark.parametrize("cfa", ["bayer", "rgbw", "rgbw_4x4", "rccb"])
 def test_a_mosaic_whose_2x2_pixels_differ_is_refused_in_one_line(cfa):
-    with pytest.raises(InputError, match=r"binning: 2x2 pixels of the mosaic .* aren't of one channel; allowed") as found:
+    with pytest.raises(
+        InputError, match=r"binning: 2x2 pixels of the mosaic .* aren't of one channel; allowed"
+    ) as found:
         SensorConfig(QUIET, LensConfig(2.8), cfa=tile_of(cfa), responses=built_in(), binning="charge")
     assert "\n" not in str(found.value)
 
@@ -263,7 +265,9 @@ def test_a_sensor_that_does_not_bin_is_read_as_it_is():
 @BOTH
 @pytest.mark.parametrize("shape", [(33, 40), (40, 33), (5, 5)])
 def test_an_odd_size_is_refused_in_one_line(binning, shape):
-    with pytest.raises(InputError, match=r"size: \d+ x \d+ pixels with binning .* even height and width; give ") as found:
+    with pytest.raises(
+        InputError, match=r"size: \d+ x \d+ pixels with binning .* even height and width; give "
+    ) as found:
         draw_device(camera(binning), shape, np.random.default_rng(0))
     assert "\n" not in str(found.value)
 

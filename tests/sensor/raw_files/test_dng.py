@@ -229,7 +229,10 @@ def test_tiles_are_told_apart(cfa: Tile, bayer: bool, rgbw: bool) -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"cfa": ("RC", "CC"), "colour": None}, r"cfa: .* is not written as DNG; allowed: Bayer, 2x2 RGBW, quads of both"),
+        (
+            {"cfa": ("RC", "CC"), "colour": None},
+            r"cfa: .* is not written as DNG; allowed: Bayer, 2x2 RGBW, quads of both",
+        ),
         ({"colour": None}, r"colour: the raw image holds no colour calibration"),
         ({"black_dn": -1.0}, r"levels: black -1\.0 .* don't fit a DNG"),
         ({"black_dn": 9.84}, r"black_dn: 9\.84 is no whole number, .* allowed: whole DN; write a \.tif instead"),
