@@ -5,15 +5,21 @@ weights had to be counted in units of the largest one, as they are where sigma i
 """
 
 from itertools import product
+from typing import Any
 
 from studies.explore.controls import TIME, Controls
 
-_TERMS = (
+_TERMS: tuple[dict[str, float], ...] = (
     {"crosstalk": 0.01},
     {"hot_pixel_share": 0.01, "hot_pixel_dark_current_e_per_s": 100.0},
     {"column_gain_spread": 0.01},
 )
-_FULL = {"level_cd_m2": 1e4, "exposure": TIME, "exposure_s": 0.01}  # of which many pixels are full, in any scene
+_LIT: dict[str, Any] = {}
+_FULL: dict[str, Any] = {
+    "level_cd_m2": 1e4,
+    "exposure": TIME,
+    "exposure_s": 0.01,
+}  # of which many pixels are full, in any scene
 _NARROW = {"sigma_s": 0.1, "sigma_d": 0.3}
 
 WARM = (
@@ -23,7 +29,7 @@ WARM = (
         for patch in (1.0, 3.0, 5.0, 7.0, 9.0)
         for mosaic in ("rgbw", "rgbw_4x4")
         for processor in ("interleaved", "interleaved_paper")
-        for light in ({}, _FULL)
+        for light in (_LIT, _FULL)
     ),
-    *(Controls(processor="bayer_nlm", mosaic="bayer", **light) for light in ({}, _FULL)),
+    *(Controls(processor="bayer_nlm", mosaic="bayer", **light) for light in (_LIT, _FULL)),
 )
