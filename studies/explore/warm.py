@@ -17,10 +17,6 @@ _TERMS: tuple[dict[str, float], ...] = (
 _LIT: dict[str, Any] = {}
 # Many pixels are full, in any scene.
 _FULL: dict[str, Any] = {"level_cd_m2": 1e4, "exposure": TIME, "exposure_s": 0.01}
-    "level_cd_m2": 1e4,
-    "exposure": TIME,
-    "exposure_s": 0.01,
-}  # of which many pixels are full, in any scene
 _NARROW = {"sigma_s": 0.1, "sigma_d": 0.3}
 
 WARM = (
