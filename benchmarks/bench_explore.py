@@ -123,6 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             for number in range(1, asked.memory + 1):
                 EXPLORE.move(page, rng)
                 EXPLORE.settle(page)
+                browser.events.clear()  # Chromium tells of each picture; this process is the program's too
                 if number in (500, asked.memory) or number % max(1, asked.memory // 10) == 0:
                     print(f"{number} changes: {resident_mib():.0f} MiB, {kernels.count - before} kernels", flush=True)
         finally:

@@ -86,7 +86,7 @@ def make_pattern(cfa: Tile) -> Pattern:
     )
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=4)  # of two cameras, by W and by channels
 def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Every offset of Omega, phase by phase.
 

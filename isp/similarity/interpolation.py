@@ -52,10 +52,8 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
     total, (height, width) = np.zeros_like(mosaic), mosaic.shape
     repeats = BLOCK_ROWS // len(tile) + 2, width // len(tile[0]) + 1
     for (row, column), weight in opposite_pairs(tile).items():
-        across, shares = (
-            abs(column),
-            np.tile((weight / 4.0).astype(mosaic.dtype), repeats),
-        )  # of half the change, squared
+        # of half the change, squared
+        across, shares = abs(column), np.tile((weight / 4.0).astype(mosaic.dtype), repeats)
         left, right = slice(None, max(width - 2 * across, 0)), slice(2 * across, None)
         before, behind = (left, right) if column >= 0 else (right, left)
         for first in range(row, height - row, BLOCK_ROWS):

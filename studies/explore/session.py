@@ -23,22 +23,12 @@ from studies.explore.messages import KINDS, Header, hello, read_message, read_vi
 from studies.explore.slow import begin, is_slow, stand_in
 from studies.explore.source import Rendered, Source
 from studies.explore.views import VIEWS, Bytes, facts, histogram, pixel
+from studies.explore.warm import WARM
 from studies.explore.written import python_of, study_of
 
 Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 Send: TypeAlias = Callable[[Header, Sequence[bytes]], None]
 
-# Terms and processors that have kernels of their own: these are compiled while nobody asks, not under a slider.
-_HOT = {"hot_pixel_share": 0.01, "hot_pixel_dark_current_e_per_s": 100.0}
-_COLUMNS = {"column_gain_spread": 0.01}
-WARM = (
-    *(Controls(pixel=terms) for terms in ({"crosstalk": 0.01}, _HOT, _COLUMNS, _HOT | _COLUMNS)),
-    *(Controls(settings={"neighbourhood": width}) for width in (3.0, 11.0, 41.0)),
-    *(Controls(settings={"patch": width}) for width in (3.0, 5.0)),
-    Controls(mosaic="rgbw_4x4"),
-    Controls(processor="interleaved_paper"),
-    Controls(processor="bayer_nlm", mosaic="bayer"),
-)
 REST_S = 0.4  # without a new setting, after which a slow processor begins
 
 

@@ -188,10 +188,12 @@ def test_a_picture_without_bytes_is_the_last_one_sent_even_where_that_came_too_l
           document.body.append(el);
           explorer.render({{ model: {{ send: each => asked.push(each), on: (_, listener) => tell = listener }}, el }});
           tell({json.dumps({**said, "kind": "hello"})}, []);
-          const level = el.querySelector("[data-key=level]"), grey = value => new DataView(new Uint8Array([value, value, value]).buffer);
-          const look = () => seen.push([...el.querySelectorAll("canvas")].map(each => each.getContext("2d").getImageData(0, 0, 1, 1).data[0]));
+          const level = el.querySelector("[data-key=level]"), none = new DataView(new ArrayBuffer(0));
+          const grey = value => new DataView(new Uint8Array([value, value, value]).buffer);
+          const red = each => each.getContext("2d").getImageData(0, 0, 1, 1).data[0];
+          const look = () => seen.push([...el.querySelectorAll("canvas")].map(red));
           level.dispatchEvent(new Event("input"));
-          const [old, young] = asked.filter(each => each.kind === "show").map(each => each.number), none = new DataView(new ArrayBuffer(0));
+          const [old, young] = asked.filter(each => each.kind === "show").map(each => each.number);
           tell({{ ...{json.dumps(answer)}, number: old }}, [grey(10), grey(20)]);
           look();
           tell({{ ...{json.dumps(answer)}, number: young }}, [grey(30), none]);
