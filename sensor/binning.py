@@ -25,7 +25,7 @@ def as_read(sensor: SensorConfig) -> SensorConfig:
     Its numbers are those of four pixels: mean and variance of an evenly lit pixel are exact below the well, but that
     column gains in digital numbers miss half of their spread's square of the shot noise. Its read noise there holds three
     of the four roundings, for the noise of a raw image counts one. Its share of hot pixels and their dark current give
-    the sum's mean and variance. Its crosstalk is what leaves the four.
+    the sum's mean and variance (a sum that holds a hot pixel is, of a share s, 1.5 s less hot than that). Its crosstalk is what leaves the four.
     """
     if not sensor.binning:
         return sensor
