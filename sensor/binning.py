@@ -23,9 +23,10 @@ def as_read(sensor: SensorConfig) -> SensorConfig:
     """Camera whose pixels are those of the raw image: for one that bins, of 2x2 pixels each; else the camera itself.
 
     Its numbers are those of four pixels: mean and variance of an evenly lit pixel are exact below the well, but that
-    column gains in digital numbers miss half of their spread's square of the shot noise. Its read noise there holds three
-    of the four roundings, for the noise of a raw image counts one. Its share of hot pixels and their dark current give
-    the sum's mean and variance (a sum that holds a hot pixel is, of a share s, 1.5 s less hot than that). Its crosstalk is what leaves the four.
+    column gains in digital numbers miss half of their spread's square of the shot noise. Its read noise there holds
+    three of the four roundings, for the noise of a raw image counts one. Its share s of hot pixels and their dark
+    current give the sum's mean and variance (a sum that holds a hot pixel is 1.5 s less hot than that). Its crosstalk
+    is what leaves the four.
     """
     if not sensor.binning:
         return sensor

@@ -40,9 +40,9 @@ MOSAICS: Mapping[str, Tile] = MappingProxyType(
         "rccb": ("RC", "CB"),
         "ryyb": ("RY", "YB"),  # telephones: yellow, which passes red and green, in green's place
         "mono": ("W",),
-        # Telephones with pixels of 1 um and less: 2x2 pixels under one filter, which bin to the plain mosaic. Bayer's is
-        # Sony's Quad Bayer (IMX586, 2018) and Samsung's Tetracell. RGBW of 2x2 cells of one colour, so that all four
-        # share a floating diffusion, is proposed by Singh, "Double binnable RGB, RGBW and LMS color filter arrays",
+        # Telephones with pixels of 1 um and less: 2x2 pixels under one filter, which bin to the plain mosaic. Bayer's
+        # is Sony's Quad Bayer and Samsung's Tetracell. RGBW of 2x2 cells of one colour, so that all four share a
+        # floating diffusion, is proposed by Singh, "Double binnable RGB, RGBW and LMS color filter arrays",
         # arXiv:2306.17078, with a tile of 8x8; here the cells are those of Parmar & Wandell's tile.
         "quad_bayer": quad(BAYER),
         "quad_rgbw": quad(RGBW),

@@ -20,7 +20,8 @@ Expose: TypeAlias = Callable[[float, float], NDArray[np.uint16]]
 def bench(sensor: SensorConfig, shape: tuple[int, int], seed: int, exact: bool = False) -> Expose:
     """Put one chip under uniform light that is set in electrons: the quantum efficiency is 1 by construction.
 
-    The electrons are those of a raw image's pixel: four that bin share them. Its frames are drawn as `sensor.capture.expose` draws them.
+    The electrons are those of a raw image's pixel: four that bin share them. Its frames are drawn as
+    `sensor.capture.expose` draws them.
     """
     device = draw_device(sensor, shape, np.random.default_rng([seed, 0]))
     rng = np.random.default_rng([seed, 1])

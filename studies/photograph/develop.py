@@ -43,10 +43,10 @@ class Developed:
 
 
 def mosaic_processor(raw: RawImage) -> str:
-    """Processor that the paper has for a raw image's mosaic; ``any_mosaic`` for others, ``kriging`` for a quad Bayer."""
+    """Processor that the paper has for a raw image's mosaic; ``any_mosaic`` for others, ``kriging`` for a quad one."""
     if is_bayer(raw.cfa):
         return "bayer"
-    if is_bayer(plain(raw.cfa)):
+    if plain(raw.cfa) != raw.cfa:
         return "kriging"
     return "interleaved" if channels(raw.cfa) == ("R", "G", "B", "W") else "any_mosaic"
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sweep_sample as SAMPLE
-from PIL import Image
 
 from rodcone.errors import InputError
 from sensor.presets import preset_file
+from studies.pages.report_pictures import opened
 from studies.study.lit_scene import open_all
 from studies.sweep.database import open_results
 from studies.sweep.prepare import Job, scene_cells
@@ -28,11 +28,11 @@ def test_a_binned_cell_is_measured_at_its_own_size(binning: str, tmp_path: Path)
     study = SAMPLE.small_study(tmp_path, sensors=(quad_file(tmp_path, binning),), processors=("bayer",))
     with open_results(tmp_path) as base:
         job = Job(study, SAMPLE.stated(study), tmp_path, base)
-        cells = [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
+        cells = [cell for scene in open_all(study).values() for cell in scene_cells(job, scene, lambda *_: None)]
     whole = np.load(cells[0].truth)
     row = run_cell(cells[0])
-    sizes = [Image.open(cells[0].pictures / name).size for name in (row.picture, row.truth)]
-    assert sizes == [(whole.shape[1] // 2, whole.shape[0] // 2)] * 2
+    sizes = [opened((cells[0].pictures / name).read_bytes()).shape[:2] for name in (row.picture, row.truth)]
+    assert sizes == [(whole.shape[0] // 2, whole.shape[1] // 2)] * 2
     assert row.psnr_db > 15.0  # one at a wrong scale, a factor of four, has under 10
 
 
