@@ -23,6 +23,7 @@ Plane = NDArray[np.float64]
 RADIUS = 6  # of the window that samples are taken from [pixels]: a corner shows every channel on three lines or more
 CORRELATION = 0.93  # of two channels' values at one pixel
 LENGTH = 6.0  # of the exponential covariance [pixels]
+BESIDE_FULL = 1e3  # what a channel shows beside a saturated pixel [standard deviations of noise]
 LEAST_DEVIATION = 0.1  # of what a channel shows [standard deviations of noise]: a flat field shows nothing
 
 
@@ -31,7 +32,7 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
 
     How much channels show beside noise is taken from the middle two thirds of their samples: a lamp is no measure of
     the dark around it. Where a saturated pixel lies in the window each channel is estimated from its own samples alone,
-    for a full W says nothing of G. An even field comes out within 0.1 e- of its mean, from the dark on.
+    for a full W says nothing of G, and interpolated without smoothing, or a lamp would glow over the whole window. An even field comes out within 0.1 e- of its mean, from the dark on.
     """
     values = stabilise(raw.electrons, raw.dark_noise_e, 0.0)
     samples = [values[mask(raw.cfa, name, raw.shape)] for name in channels(raw.cfa)]
@@ -40,7 +41,7 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
     estimate, noise_gain = krige(values, raw.cfa, deviation)
     full = maximum_filter(raw.saturated, size=2 * RADIUS + 1)[..., None]
     if full.any():
-        apart = krige(values, raw.cfa, deviation, 0.0)
+        apart = krige(values, raw.cfa, np.full_like(deviation, BESIDE_FULL), 0.0)
         estimate, noise_gain = np.where(full, apart[0], estimate), np.where(full, apart[1], noise_gain)
     # The inverse adds the 1/4 e- that a mean of roots has lost, and what the estimate keeps of the noise has not.
     electrons = unstabilise(estimate, raw.dark_noise_e) - noise_gain / 4
