@@ -23,7 +23,8 @@ Plane = NDArray[np.float64]
 RADIUS = 6  # of the window that samples are taken from [pixels]: a corner shows every channel on three lines or more
 CORRELATION = 0.93  # of two channels' values at one pixel
 LENGTH = 6.0  # of the exponential covariance [pixels]
-BESIDE_FULL = 1e3  # what a channel shows beside a saturated pixel [standard deviations of noise]
+BESIDE_LAMPS = 1e3  # what a channel shows beside a lamp [standard deviations of noise]
+OUTLYING = 8.0  # half widths of the middle two thirds, above which a sample is a lamp's
 LEAST_DEVIATION = 0.1  # of what a channel shows [standard deviations of noise]: a flat field shows nothing
 
 
@@ -31,18 +32,21 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
     """Estimate every channel at every pixel of a raw image of any mosaic.
 
     How much channels show beside noise is taken from the middle two thirds of their samples: a lamp is no measure of
-    the dark around it. Where a saturated pixel lies in the window each channel is estimated from its own samples alone,
-    for a full W says nothing of G, and interpolated without smoothing, or a lamp would glow over the whole window. An even field comes out within 0.1 e- of its mean, from the dark on.
+    the dark around it. Where a saturated or such an outlying sample lies in the window, each channel is estimated from
+    its own samples alone, for a full W says nothing of G, and interpolated without smoothing, or a lamp would glow over
+    the whole window. An even field comes out within 0.1 e- of its mean, from the dark on.
     """
-    values = stabilise(raw.electrons, raw.dark_noise_e, 0.0)
-    samples = [values[mask(raw.cfa, name, raw.shape)] for name in channels(raw.cfa)]
-    spread = np.array([np.diff(np.percentile(x, (15.9, 84.1)))[0] / 2 for x in samples])
+    values, names = stabilise(raw.electrons, raw.dark_noise_e, 0.0), channels(raw.cfa)
+    sampled = [mask(raw.cfa, name, raw.shape) for name in names]
+    low, high = np.array([np.percentile(values[at], (15.9, 84.1)) for at in sampled]).T
+    spread = (high - low) / 2
     deviation = np.sqrt(np.maximum(spread**2 - 1.0, LEAST_DEVIATION**2))
     estimate, noise_gain = krige(values, raw.cfa, deviation)
-    full = maximum_filter(raw.saturated, size=2 * RADIUS + 1)[..., None]
-    if full.any():
-        apart = krige(values, raw.cfa, np.full_like(deviation, BESIDE_FULL), 0.0)
-        estimate, noise_gain = np.where(full, apart[0], estimate), np.where(full, apart[1], noise_gain)
+    bright = raw.saturated | (values > np.select(sampled, list(high + OUTLYING * np.maximum(spread, 1.0))))
+    beside = maximum_filter(bright, size=2 * RADIUS + 1)[..., None]
+    if beside.any():
+        apart = krige(values, raw.cfa, np.full_like(deviation, BESIDE_LAMPS), 0.0)
+        estimate, noise_gain = np.where(beside, apart[0], estimate), np.where(beside, apart[1], noise_gain)
     # The inverse adds the 1/4 e- that a mean of roots has lost, and what the estimate keeps of the noise has not.
     electrons = unstabilise(estimate, raw.dark_noise_e) - noise_gain / 4
     return Reconstruction(electrons, noise_gain, engine="numpy")
