@@ -271,7 +271,8 @@ def _check_cameras(study: Study) -> None:
         processor_of(name)
     for name in study.sensors:
         own = preset(name)
-        if bool(own.binning) != bool(preset(study.sensors[0]).binning):
+        # sensors of one size are compared at the coarsest's pixels
+        if study.sensor_side_um is None and bool(own.binning) != bool(preset(study.sensors[0]).binning):
             raise InputError(
                 f"sensors: {name!r} and {study.sensors[0]!r}, of which one bins: its pictures are half as large, and "
                 "have another truth; allowed: all bin, or none; give each a study of its own"
