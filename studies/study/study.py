@@ -25,6 +25,7 @@ OWN = "own"  # the spectrum that the scene's lights have
 MOST_FRAMES = 64
 # Gray World from the picture, or the neutral of the scene's light, as a camera notes it in its raw files.
 WHITE_BALANCES = GRAY_WORLD, AS_SHOT = "gray-world", "as-shot"
+_LISTS = ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "frames", "seeds")
 FILES = (".xml", ".toml", ".csv", *ENDINGS)  # endings of values that name a file
 
 
@@ -221,17 +222,7 @@ def label(value: Any) -> str:
 
 def _check_axes(study: Study) -> None:
     """Check that each axis has values of its own, and that levels, times, seeds and lights are known."""
-    for name in (
-        "scenes",
-        "spectra",
-        "levels",
-        "exposures",
-        "sensors",
-        "white_balances",
-        "processors",
-        "frames",
-        "seeds",
-    ):
+    for name in _LISTS:
         values = getattr(study, name)
         labels = [value.label if isinstance(value, SceneChoice) else label(value) for value in values]
         if not labels or len(set(labels)) != len(labels):

@@ -122,8 +122,8 @@ SENSOR = (
     _fault(
         "DSNU drawn with PRNU's numbers",
         "sensor/device.py",
-        "draws(key, NoiseTerm.DSNU, shape)",
-        "draws(key, NoiseTerm.PRNU, shape)",
+        "draws(key, NoiseTerm.DSNU, shape, reading)",
+        "draws(key, NoiseTerm.PRNU, shape, reading)",
         "sensor/test_device",
         *_READOUT,
     ),
