@@ -2,8 +2,9 @@
 
 Channels are taken for random fields that vary together around a plane of their own, whose three numbers are unknown:
 so weights are found that give back every mosaic of planes, constant or linear, exactly, and among these the ones of
-least error. Samples are weighed in units of their noise (`isp.anscombe`). Nothing is decided pixel by pixel: where the
-interleaved reconstruction chooses among samples that look alike, this is one fixed filter for each pixel of the tile.
+least error. Samples are weighed in units of their noise (`isp.anscombe`). Where the interleaved reconstruction
+chooses among samples that look alike, this is one filter for each pixel of the tile and frame, and a second one,
+channel by channel, near lamps.
 """
 
 from functools import lru_cache

@@ -101,7 +101,7 @@ def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merg
     require_range("dark_current_e_per_s", dark_current_e_per_s, 0.0, 1e12, "give electrons per second, 0 for none")
     groups = _grouped(frames)
     first = frames[0]
-    temporal_e2 = first.read_noise_e**2 + first.gain_e_per_dn**2 / 12
+    temporal_e2 = first.read_noise_e**2 + first.rounding_e2
     full_e = first.full_well_e
     spread_e = (full_e + first.dark_noise_e**2 + (first.column_gain_spread * full_e) ** 2) ** 0.5
     clear_e = max(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)  # half, lest a well of a few electrons never count
@@ -155,7 +155,7 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
     gain_e = full_e / MERGED_WHITE_DN
     # In the dark a frame's weight goes with the square of its time.
     squares = float((times**2).sum())
-    temporal_e2 = (first.read_noise_e**2 + first.gain_e_per_dn**2 / 12) * whole_s**2 / squares
+    temporal_e2 = (first.read_noise_e**2 + first.rounding_e2) * whole_s**2 / squares
     full = np.all([frame.saturated for frame in frames if frame.exposure_s == times.min()], axis=0)
     electrons = np.where(full, full_e, np.minimum(merged.rate_e_per_s * whole_s, full_e))
     return replace(
@@ -164,7 +164,7 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
         black_dn=0.0,
         white_dn=MERGED_WHITE_DN,
         gain_e_per_dn=gain_e,
-        read_noise_e=sqrt(max(temporal_e2 - gain_e**2 / 12, 0.0)),  # `RawImage.dark_noise_e` adds it
+        read_noise_e=sqrt(temporal_e2),
         dsnu_e=first.dsnu_e * whole_s * float(times.sum()) / squares,
         exposure_s=whole_s,
         noise_steps=tuple(

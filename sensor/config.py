@@ -238,7 +238,9 @@ class SensorConfig:
             "mosaic": " / ".join(self.cfa),
             "pixel": f"{self.pixel.pitch_um:g} µm, full well {self.pixel.full_well_e:g} e⁻",
             "lens": f"f/{self.lens.f_number:g}",
-            "converter": f"{self.bits} bits, {self.gain_e_per_dn:.3g} e⁻/DN, black at {self.black_dn} DN",
+            "converter": f"{self.bits} bits, "
+            + (f"{len(self.readings)} readings" if self.readings else f"{self.gain_e_per_dn:.3g} e⁻/DN")
+            + f", black at {self.black_dn} DN",
             f"noise in {1e3 * SHOWN_EXPOSURE_S:g} ms": [f"of {signal_e:g} e⁻" for signal_e in signals_e],
         }
         facts |= {name: [f"{each[name]:.3g} e⁻" for each in sources] for name in sources[0]}

@@ -28,9 +28,10 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     path : str or Path
         TOML with the tables ``[pixel]`` and ``[lens]`` (fields of `PixelConfig` and `LensConfig`), optionally ``cfa``
         (a name of `sensor.cfa.MOSAICS`, or rows of channels), ``bits``, ``black_level_dn``, ``white_level_dn``,
-        ``window_nm``, ``binning`` ("charge" or "digital"), and ``[responses]``: ``csv``, its ``range_nm``, its
-        ``quantum_efficiency`` ("included", "relative", a number, or a CSV) and ``ir_cut`` (nm, or a CSV). Names of CSV
-        files are relative to the TOML's folder.
+        ``window_nm``, ``binning`` ("charge" or "digital"), ``readout`` ("merged" or "switched") with ``[[readings]]``
+        (fields of `Reading`), and ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency`` ("included",
+        "relative", a number, or a CSV) and ``ir_cut`` (nm, or a CSV). Names of CSV files are relative to the TOML's
+        folder.
     cfa : str or sequence of str, optional
         Mosaic to use in place of the file's.
 
@@ -105,8 +106,12 @@ def _readings(tables: Any) -> tuple[Reading, ...]:
 def _table(name: str, content: Mapping[str, Any]) -> dict[str, Any]:
     table = content.get(name)
     if not isinstance(table, dict):
-        raise InputError(f"{name}: {table!r} is not a table; allowed: [{name}] and its keys; add it")
+        raise InputError(f"{name}: {table!r} is not a table; allowed: {_header(name)} and its keys; add it")
     return table
+
+
+def _header(name: str) -> str:
+    return "[[readings]]" if name == "readings" else f"[{name}]"
 
 
 def _numbers(name: str, content: Mapping[str, Any], kind: type) -> dict[str, Any]:
@@ -115,7 +120,7 @@ def _numbers(name: str, content: Mapping[str, Any], kind: type) -> dict[str, Any
     require_keys(f"{name} key", table, [field.name for field in fields(kind)])
     for field in fields(kind):
         if field.default is MISSING and field.name not in table:
-            raise InputError(f"{name}: {field.name} is missing; allowed: a number; add it to [{name}]")
+            raise InputError(f"{name}: {field.name} is missing; allowed: a number; add it to {_header(name)}")
     for key, value in table.items():
         if isinstance(value, bool):  # a Real for Python
             raise InputError(f"{key}: {value!r} is not a number; allowed: a number, 0 to switch a term off; write one")

@@ -182,7 +182,12 @@ class RawImage:
     @property
     def dark_noise_e(self) -> float:
         """Standard deviation of a dark pixel [e-]: read noise, DSNU and quantisation (1/sqrt(12) DN)."""
-        return float(np.sqrt(self.read_noise_e**2 + self.dsnu_e**2 + self.gain_e_per_dn**2 / 12))
+        return float(np.sqrt(self.read_noise_e**2 + self.dsnu_e**2 + self.rounding_e2))
+
+    @property
+    def rounding_e2(self) -> float:
+        """Variance of quantisation [e-^2]: of whole numbers alone, for merged samples aren't rounded."""
+        return self.gain_e_per_dn**2 / 12 if self.dn.dtype.kind in "iu" else 0.0
 
     @property
     def electrons(self) -> NDArray[np.float64]:

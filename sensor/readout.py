@@ -194,7 +194,7 @@ def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposu
     if sensor.readings and sensor.readout == MERGED:
         return merged_variance(signal, sensor, exposure_s)
     if sensor.readings:
-        return noise_variance(expected_e, of_reading(sensor, switched_to(sensor, signal)), exposure_s)
+        return noise_variance(expected_e, of_reading(sensor, switched_to(sensor, np.asarray(expected_e))), exposure_s)
     hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
     collected = signal + pixel.dark_current_e_per_s * exposure_s + hot_share * hot_e
     variance = collected + (pixel.prnu * signal) ** 2 + hot_share * (1 - hot_share) * hot_e**2

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from render.engine import render
 from render.spectrum import Spectrum
 from render.transport import Transport
+from rodcone.errors import InputError
 from rodcone.progress import Step
 from sensor.binning import as_read
 from sensor.burst import merged_sensor
@@ -70,8 +71,13 @@ def plan(study: Study, *, cache: str | Path | None = None, step: Step | None = N
     Raises
     ------
     InputError
-        For a scene that can't be opened or rendered.
+        For a scene that can't be opened or rendered, or sensors of one size, whose pixels aren't the pilots'.
     """
+    if study.sensor_side_um is not None:
+        raise InputError(
+            f"sensor_side_um: {study.sensor_side_um:g} can't be planned; allowed: sweep --as-stated; add it, or leave "
+            "sensor_side_um out"
+        )
     renders, images, ledgers = {}, {}, []
     opened_scenes = open_all(study)
     for index, opened in enumerate(opened_scenes.values()):

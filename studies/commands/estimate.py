@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import prod
 
 from render.radiance_files.radiance_source import extent_of
 from rodcone.memory import memory
 from studies.budget.model_plan import Plan
+from studies.study.equal_area import sensor_shapes
 from studies.study.lit_scene import OpenedScene
 from studies.study.study import SceneChoice, Study, conditions
 
@@ -54,6 +56,8 @@ def estimate(study: Study, plan: Plan, scenes: Mapping[SceneChoice, OpenedScene]
             model, pixels, groups = plan.renders[choice], opened.size[0] * opened.size[1], len(opened.scene.groups)
             bands, denoised = len(model.wavelength_nm), model.denoise
             seconds += RENDER_S * pixels * bands * groups * model.spp
+            if study.equal_area is not None:
+                pixels = max(pixels, *map(prod, sensor_shapes(study.equal_area, study.sensors, opened.size).values()))
         seconds += per_scene * max(CELL_LEAST_S, CELL_S * pixels) / max(workers, 1)
         needs.append(memory(pixels, bands, groups, workers, denoised=denoised))
     renders = sum(opened.scene is not None for opened in scenes.values())

@@ -178,7 +178,19 @@ def camera_of(controls: Controls, own: SensorConfig | None = None) -> SensorConf
     """
     own = own or own_camera(controls.sensor, controls.mosaic)
     if own.binning:
-        raise InputError(f"sensor: {controls.sensor!r} bins, which is not explored; allowed: one without binning")
+        raise InputError(
+            f"sensor: {controls.sensor!r} bins, which is not explored; allowed: one without binning; take "
+            "binning out of its file"
+        )
+    if own.readings and (fixed := {"full_well_e", "read_noise_e", "dsnu_e"} & set(controls.pixel)):
+        raise InputError(
+            f"pixel: {', '.join(sorted(fixed))} with {controls.sensor!r}, whose readings have their own; allowed: the "
+            "preset's; reset it, or take another sensor"
+        )
+    if own.readings and not controls.shot_noise:
+        raise InputError(
+            f"shot_noise: False with {controls.sensor!r}, whose readings are merged by it; allowed: True; switch it on"
+        )
     return replace(
         own,
         lens=replace(own.lens, **controls.lens),

@@ -14,6 +14,8 @@ from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_whole
 from sensor.cfa import channel_map, channels, mask
 from sensor.raw import RawImage
+from sensor.readings.noise import of_reading, switched_to
+from sensor.readings.reading import SWITCHED
 from sensor.readout import noise_sources, noise_variance, spread_charge
 from sensor.response import electrons_per_irradiance
 from studies.explore.chain import Exposed, GroupFrame, Shot
@@ -45,10 +47,10 @@ def raw_picture(shot: Shot) -> Bytes:
 def noise_picture(shot: Shot) -> Bytes:
     """Raw image less the expected electrons: grey is none, black and white are four standard deviations."""
     exposed = shot.exposed
-    frames = round(exposed.raw.exposure_s / exposed.exposure_s)
+    light = exposed.raw.exposure_s / exposed.exposure_s  # a burst's frames, or what readings hold together
     dark_e = exposed.sensor.pixel.dark_current_e_per_s * exposed.exposure_s
-    noise_e = exposed.raw.electrons - frames * (_collected_e(exposed) + dark_e)
-    return _grey(0.5 + 0.5 * noise_e / (MOST_SIGMAS * frames**0.5 * noise_scale_e(exposed)))
+    noise_e = exposed.raw.electrons / light - (_collected_e(exposed) + dark_e)
+    return _grey(0.5 + 0.5 * noise_e * round(light) ** 0.5 / (MOST_SIGMAS * noise_scale_e(exposed)))
 
 
 def luminance_error_picture(shot: Shot) -> Bytes:
@@ -219,7 +221,10 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
 def noise_sources_e(exposed: Exposed, row: int, column: int) -> dict[str, float]:
     """Standard deviation of each noise source of one pixel of a chip drawn at random [e-], and of all together."""
     pixel, time_s, signal_e = exposed.sensor.pixel, exposed.exposure_s, float(_collected_e(exposed)[row, column])
-    sources = noise_sources(signal_e, exposed.sensor, time_s)
+    sensor = exposed.sensor
+    if sensor.readout == SWITCHED:
+        sensor = of_reading(sensor, switched_to(sensor, exposed.expected_e))
+    sources = noise_sources(signal_e, sensor, time_s)
     if not exposed.shot_noise:
         share, hot_e = pixel.hot_pixel_share, pixel.hot_pixel_dark_current_e_per_s * time_s
         counted_e = signal_e + pixel.dark_current_e_per_s * time_s + share * hot_e

@@ -1,4 +1,4 @@
-"""Settings whose kernels are compiled while nobody asks, so that none is compiled under a slider.
+"""Settings whose kernels are compiled while nobody asks, so that hardly any is compiled under a slider.
 
 Kernels differ by which noise terms there are, by the tile's size, the patch, what guides the similarity, and by whether
 weights had to be counted in units of the largest one, as they are where sigma is small.

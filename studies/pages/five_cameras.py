@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from rodcone.errors import InputError
 from rodcone.files import replacing
 from scenes.catalog import load
+from sensor.binning import as_read
 from sensor.cameras.emva_report import read_report
 from sensor.cfa import channels
 from sensor.config import SensorConfig
@@ -93,6 +94,8 @@ def write_page(run: LastRun, folder: Path, out: Path) -> None:
             f"study: {folder} is not of sensors of one size; allowed: one with sensor_side_um, {BAYER} and {RGBW}, "
             "sensors of files and a preset; start from rodcone new study real_cameras"
         )
+    if len(entries) > len(LINES):
+        raise InputError(f"sensors: {len(entries)} are too many for one figure; allowed: {len(LINES)}; leave some out")
     stops = {entry.name: entry.sensor.lens.f_number for entry in entries}
     if len(set(stops.values())) > 1:
         raise InputError(f"f_number: {stops} are not one; allowed: one aperture for all; correct the sensors' files")
@@ -131,7 +134,7 @@ def page_of(
     """Return the page's Markdown; parameters as `write_page`."""
     beside = beside_each_other(contests, entries)
     own = next(entry for entry in entries if entry.processor == RGBW)
-    area = EqualArea(study["sensor_side_um"], max(entry.sensor.pixel.pitch_um for entry in entries))
+    area = EqualArea(study["sensor_side_um"], max(as_read(entry.sensor).pixel.pitch_um for entry in entries))
     green, white = (own.sensor.responses.curves[channel] for channel in "GW")
     at_peak = np.interp(green.wavelength_nm[green.values.argmax()], white.wavelength_nm, white.values)
     scene = study["scenes"][0]["source"]

@@ -116,7 +116,7 @@ def even_field(
     electrons, shape = float(channel_e(alone, light, luminance_cd_m2, exposure_s)[0]), (FIELD_SIDE, FIELD_SIDE)
     rng = np.random.default_rng(0)
     photodiode_e = electrons / 4 if alone.binning else electrons
-    read_e = expose(np.full(shape, photodiode_e), alone, exposure_s, draw_device(alone, shape, rng), rng).electrons
-    mean_e = float(read_e.mean()) - as_read(alone).pixel.dark_current_e_per_s * exposure_s
-    simulated_db = 20 * log10(mean_e / float(read_e.std())) if mean_e > 0 else float("nan")
+    raw = expose(np.full(shape, photodiode_e), alone, exposure_s, draw_device(alone, shape, rng), rng)
+    mean_e = float(raw.electrons.mean()) - as_read(alone).pixel.dark_current_e_per_s * raw.exposure_s
+    simulated_db = 20 * log10(mean_e / float(raw.electrons.std())) if mean_e > 0 else float("nan")
     return EvenField(electrons, 20 * log10(float(snr(np.array(electrons), alone, exposure_s))), simulated_db)

@@ -1,5 +1,6 @@
 """Sensors of one size: pixels by pitch, and pictures averaged to the pixels of the coarsest sensor."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -7,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
+from rodcone.errors import InputError
+from sensor.presets import preset
 
 Real = TypeVar("Real", bound=np.floating)
 
@@ -35,6 +38,22 @@ class EqualArea:
     def view(self, radiance: SpectralRadiance, pitch_um: float, block: int = 1) -> SpectralRadiance:
         """Radiance at the pixels of a pitch, in whole blocks."""
         return replace(radiance, values=area_average(radiance.values, self.shape(radiance.shape, pitch_um, block)))
+
+
+def sensor_shapes(area: EqualArea, sensors: Sequence[str], picture: tuple[int, int]) -> dict[str, tuple[int, int]]:
+    """Height and width of each sensor in pixels, for a picture's proportions."""
+    own = {name: preset(name) for name in sensors}
+    return {name: area.shape(picture, each.pixel.pitch_um, 2 if each.binning else 1) for name, each in own.items()}
+
+
+def require_pixels(area: EqualArea, sensors: Sequence[str], picture: tuple[int, int]) -> None:
+    """Raise `InputError` for a render of fewer pixels than a sensor has: it would be enlarged."""
+    for name, shape in sensor_shapes(area, sensors, picture).items():
+        if max(shape) > max(picture):
+            raise InputError(
+                f"render.size: {max(picture)}, and {name} has {max(shape)} pixels on {area.side_um:g} um; allowed: "
+                f"{max(shape)} or more; raise it, or lower sensor_side_um"
+            )
 
 
 def area_average(values: NDArray[Real], shape: tuple[int, int]) -> NDArray[Real]:

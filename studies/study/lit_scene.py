@@ -23,6 +23,7 @@ from rodcone.digests import digest, digest_file
 from rodcone.errors import InputError, require_keys
 from sensor.binning import check_blocks
 from sensor.presets import preset
+from studies.study.equal_area import require_pixels
 from studies.study.levels import parse_level
 from studies.study.model import RenderModel
 from studies.study.quiet_render import render_quietly
@@ -289,7 +290,11 @@ def level_luminance(level: str, lux_per_cd_m2: float | None) -> float:
 
 def open_all(study: Study) -> dict[SceneChoice, OpenedScene]:
     """Open every scene of a study: done before the first render, so that a fault in the last scene stops it at once."""
-    return {choice: open_choice(choice, study) for choice in study.scenes}
+    opened = {choice: open_choice(choice, study) for choice in study.scenes}
+    for scene in opened.values():
+        if scene.scene is not None and study.equal_area is not None:
+            require_pixels(study.equal_area, study.sensors, scene.size)
+    return opened
 
 
 def digest_scene(scene: Scene) -> str:

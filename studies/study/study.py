@@ -278,8 +278,10 @@ def _check_numbers(study: Study) -> None:
     if study.sensor_side_um is not None:
         require_range("sensor_side_um", study.sensor_side_um, 1.0, 1e6, "give micrometres, or leave it out")
         for name in study.sensors:
-            across = round(study.sensor_side_um / preset(name).pixel.pitch_um)
-            require_whole(f"sensor_side_um: pixels across {label(name)}", across, 16, 8192, "change it")
+            pitch_um = preset(name).pixel.pitch_um
+            across, most = round(study.sensor_side_um / pitch_um), f"{16 * pitch_um:g} to {8192 * pitch_um:g}"
+            fix = f"{study.sensor_side_um:g} um is given; give {most}"
+            require_whole(f"sensor_side_um: pixels across {label(name)}", across, 16, 8192, fix)
     if limits.size is not None:
         require_whole("render.size", limits.size, 16, 8192, "give the picture's longer side in pixels")
     require_range("render.band_nm", limits.band_nm, 1.0, 100.0, "give nanometres")

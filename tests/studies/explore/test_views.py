@@ -91,6 +91,19 @@ def test_noise_is_grey_on_average_and_its_spread_is_the_models():
     assert noise_scale_e(shot.exposed) > 0
 
 
+@pytest.mark.parametrize("sensor", ["dual_gain", "staggered", "split_pixel"])
+def test_noise_of_several_readings_is_grey_on_average(sensor):
+    shot = photograph(small_transport(), Controls(sensor=sensor, level_cd_m2=1.0))
+    grey = VIEWS["noise"](shot)[..., 0].astype(float)
+    assert grey.mean() == pytest.approx(127.5, abs=3.0)
+
+
+def test_terms_that_belong_to_readings_are_refused_in_one_line():
+    for changed in ({"pixel": {"read_noise_e": 2.0}}, {"shot_noise": False}):
+        with pytest.raises(InputError, match="dual_gain"):
+            photograph(small_transport(), Controls(sensor="dual_gain", **changed))
+
+
 @pytest.mark.parametrize("crosstalk", [0.0, 0.2])
 def test_crosstalk_is_no_noise(crosstalk):
     """Where light alone is noisy, noise over the square root of what each pixel collects has a variance of 1."""

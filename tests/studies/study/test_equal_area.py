@@ -1,10 +1,18 @@
 """Sensors of one size: means over pixels of another grid, by hand, and the pixels that a pitch makes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from render.radiance import SpectralRadiance
+from rodcone.errors import InputError
+from studies.budget.model_plan import as_stated
+from studies.budget.plan import plan
+from studies.commands.estimate import estimate
 from studies.study.equal_area import EqualArea, area_average
+from studies.study.lit_scene import open_all
+from studies.study.study import RenderLimits, SceneChoice, Study
 
 RNG = np.random.default_rng(3)
 NM = np.array([450.0, 550.0, 650.0])
@@ -46,3 +54,26 @@ def test_pixels_follow_from_the_pitch_in_the_pictures_proportions() -> None:
     view = area.view(SpectralRadiance(RNG.random((30, 40, 3)), NM), 6.9)
     assert view.shape == (96, 128)
     assert view.wavelength_nm == pytest.approx(NM)
+
+
+def test_a_render_of_fewer_pixels_than_a_sensor_is_refused_and_memory_counts_the_sensors() -> None:
+    asked = Study(
+        scenes=(SceneChoice("flat_field"),),
+        levels=("1cd/m2",),
+        sensors=("low_noise",),
+        sensor_side_um=220.0,
+        render=RenderLimits(size=64),
+    )
+    with pytest.raises(InputError, match=r"render\.size: 64, and low_noise has 100 pixels on 220 um; allowed: 100"):
+        open_all(asked)
+    need = [
+        estimate(study, as_stated(study), open_all(study), 1, 0).largest_bytes
+        for study in (replace(asked, render=RenderLimits(size=size)) for size in (100, 400))
+    ]
+    assert need[1] > need[0]
+
+
+def test_a_plan_of_sensors_of_one_size_is_refused() -> None:
+    asked = Study(scenes=(SceneChoice("flat_field"),), levels=("1cd/m2",), sensors=("low_noise",), sensor_side_um=220.0)
+    with pytest.raises(InputError, match="sensor_side_um: 220 can't be planned"):
+        plan(asked)
