@@ -47,7 +47,8 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
     Returns
     -------
     (h, w) of the same type
-        V(x) [noise variances], 0 or more. Pairs that the border cuts count as noise; patches go on by reflection.
+        V(x) [noise variances], 0 or more. Pairs that the border cuts count as noise; patches go on by reflection. 0
+        in `quad_rgbw`, whose blocks of 2x2 have no such pairs (docs/decisions/0048).
     """
     total, (height, width) = np.zeros_like(mosaic), mosaic.shape
     repeats = BLOCK_ROWS // len(tile) + 2, width // len(tile[0]) + 1

@@ -12,10 +12,9 @@ from render.illuminants import illuminant, is_light_file
 from rodcone.errors import InputError, require_keys, require_range, require_whole, unknown
 from sensor.cfa import MOSAICS, channels
 from sensor.cfa import OWN as OWN_MOSAIC
-from sensor.config import SensorConfig
 from sensor.exposure import AUTO, LONGEST_S, RULES
-from sensor.presets import names, preset
-from sensor.variations import VARIATIONS, vary
+from sensor.presets import names
+from sensor.variations import VARIATIONS
 from studies.study.radiance_file import LIGHT
 from studies.study.study import GRAY_WORLD, MOST_FRAMES, OWN, WHITE_BALANCES
 
@@ -161,42 +160,6 @@ def options_of(controls: Controls) -> dict[str, Any]:
     require_range("settings.neighbourhood", settings.neighbourhood, 3, WIDEST, "give an odd width in pixels")
     require_range("settings.patch", settings.patch, 1, 9, "give an odd width in pixels")
     return {"settings": settings}
-
-
-def own_camera(sensor: str, mosaic: str) -> SensorConfig:
-    """Sensor of a preset's name or a file, with a mosaic."""
-    return vary(preset(sensor), mosaic)
-
-
-def camera_of(controls: Controls, own: SensorConfig | None = None) -> SensorConfig:
-    """Sensor with its lens as the controls have it; `own` is that of `own_camera`, where it has been read before.
-
-    Raises
-    ------
-    InputError
-        For a file that describes no camera, or a term out of range.
-    """
-    own = own or own_camera(controls.sensor, controls.mosaic)
-    if own.binning:
-        raise InputError(
-            f"sensor: {controls.sensor!r} bins, which is not explored; allowed: one without binning; take "
-            "binning out of its file"
-        )
-    if own.readings and (fixed := {"full_well_e", "read_noise_e", "dsnu_e"} & set(controls.pixel)):
-        raise InputError(
-            f"pixel: {', '.join(sorted(fixed))} with {controls.sensor!r}, whose readings have their own; allowed: the "
-            "preset's; reset it, or take another sensor"
-        )
-    if own.readings and not controls.shot_noise:
-        raise InputError(
-            f"shot_noise: False with {controls.sensor!r}, whose readings are merged by it; allowed: True; switch it on"
-        )
-    return replace(
-        own,
-        lens=replace(own.lens, **controls.lens),
-        pixel=replace(own.pixel, **controls.pixel),
-        bits=own.bits if controls.bits is None else controls.bits,
-    )
 
 
 # From and to JSON

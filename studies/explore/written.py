@@ -9,7 +9,8 @@ from render.radiance_files.radiance_source import is_radiance_file
 from rodcone.errors import InputError
 from sensor.config import LensConfig, PixelConfig, SensorConfig
 from sensor.presets import preset, preset_file
-from studies.explore.controls import TIME, Controls, Lamp, camera_of
+from studies.explore.camera import camera_of
+from studies.explore.controls import TIME, Controls, Lamp
 from studies.study.radiance_file import LIGHT
 from studies.study.study import FILES, OWN, RenderLimits, SceneChoice
 

@@ -64,7 +64,7 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
     ------
     InputError
         For a scene that is unknown or can't be read, a level in lux without a reference plane, another spectrum for
-        lights that have colours of their own, or an odd size for a sensor that bins.
+        lights that have colours of their own, or a size for a sensor that bins or has more.
     """
     if is_radiance_file(choice.source):
         if choice.extend:
@@ -93,6 +93,8 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
     size = film_size(opened.size, study.render.size)
     for name in study.sensors:
         check_blocks(preset(name), size)
+    if study.equal_area is not None:
+        require_pixels(study.equal_area, study.sensors, size)
     identity = digest([digest_scene(scene), size])
     return OpenedScene(choice=choice, scene=scene, size=size, identity=identity, notes=tuple(opened.notes))
 
@@ -290,11 +292,7 @@ def level_luminance(level: str, lux_per_cd_m2: float | None) -> float:
 
 def open_all(study: Study) -> dict[SceneChoice, OpenedScene]:
     """Open every scene of a study: done before the first render, so that a fault in the last scene stops it at once."""
-    opened = {choice: open_choice(choice, study) for choice in study.scenes}
-    for scene in opened.values():
-        if scene.scene is not None and study.equal_area is not None:
-            require_pixels(study.equal_area, study.sensors, scene.size)
-    return opened
+    return {choice: open_choice(choice, study) for choice in study.scenes}
 
 
 def digest_scene(scene: Scene) -> str:
