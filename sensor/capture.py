@@ -19,7 +19,7 @@ from sensor.response import electrons_per_irradiance, expected_electrons
 
 def capture(
     radiance: SpectralRadiance,
-    sensor: SensorConfig | str,
+    sensor: SensorConfig | str = "low_noise",
     exposure_s: float | None = None,
     device: Device | None = None,
     rng: np.random.Generator | None = None,
@@ -29,7 +29,7 @@ def capture(
 ) -> RawImage:
     """Take one exposure: optics, expected electrons, readout.
 
-    Radiance and sensor alone give the frame of `rodcone capture` with its defaults, the same at every call.
+    What is left out is as `rodcone capture` has it by default; the same frame at every call then.
 
     With Dr.Jit on LLVM or CUDA all of it runs there: signal in single precision, shot noise as
     `sensor.kernel.poisson` says (exact under 30 e-, distribution function within 5e-6 above). Otherwise, and with
@@ -40,7 +40,7 @@ def capture(
     ----------
     radiance : SpectralRadiance
         Quickest as float32 with band-planar memory, as renders are.
-    sensor : SensorConfig or str
+    sensor : SensorConfig or str, optional
         A sensor, or a preset by name or path.
     exposure_s : float, optional
         0 or more [s]; left out, by `sensor.exposure.auto_exposure_s`.
