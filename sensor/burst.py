@@ -16,12 +16,10 @@ from sensor.capture import capture
 from sensor.config import PixelConfig, SensorConfig, pixel_of_readings
 from sensor.device import Device
 from sensor.raw import RawImage
+from sensor.readings.noise import CLEAR_SIGMAS
 from sensor.readings.reading import Reading
 
-# A frame counts where the merged rate fills the well to no more than 6 standard deviations under its end: its own
-# noise then clips once in 1e9 pixels.
-CLEAR_SIGMAS = 6.0
-MERGED_WHITE_DN = 65_535.0  # of a merged raw image, whose samples are no whole numbers
+BURST_WHITE_DN = 65_535.0  # of a merged burst, whose samples are no whole numbers
 _Read = TypeVar("_Read", PixelConfig, Reading)
 _ROUNDS = 6  # of the weights: a further one changes less than a thousandth of the merged noise
 
@@ -152,7 +150,7 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
         )
     whole_s = float(times.sum())
     full_e = first.full_well_e * whole_s / float(times.min())
-    gain_e = full_e / MERGED_WHITE_DN
+    gain_e = full_e / BURST_WHITE_DN
     # In the dark a frame's weight goes with the square of its time.
     squares = float((times**2).sum())
     temporal_e2 = (first.read_noise_e**2 + first.rounding_e2) * whole_s**2 / squares
@@ -162,7 +160,7 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
         first,
         dn=electrons / gain_e,  # type: ignore[arg-type]  # finite floats are taken as they are
         black_dn=0.0,
-        white_dn=MERGED_WHITE_DN,
+        white_dn=BURST_WHITE_DN,
         gain_e_per_dn=gain_e,
         read_noise_e=sqrt(temporal_e2),
         dsnu_e=first.dsnu_e * whole_s * float(times.sum()) / squares,

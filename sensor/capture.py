@@ -68,8 +68,6 @@ def capture(
         sensor = preset(sensor)
     fix = "call its relight()" if hasattr(radiance, "relight") else "give SpectralRadiance(values, wavelength_nm)"
     require_kind("radiance", radiance, SpectralRadiance, fix)
-    if exposure_s is None:
-        exposure_s = auto_exposure_s(form_image(radiance, sensor, samples_per_pixel), sensor)
     if device is None:
         shape = radiance.shape[0] // samples_per_pixel, radiance.shape[1] // samples_per_pixel
         device = draw_device(sensor, shape, np.random.default_rng([0, 0]))
@@ -79,6 +77,9 @@ def capture(
     light: SpectralRadiance | SpectralIrradiance = radiance
     if numpy_runs or not scaled:
         light = form_image(radiance, sensor, samples_per_pixel)
+    if exposure_s is None:
+        image = light if isinstance(light, SpectralIrradiance) else form_image(radiance, sensor)
+        exposure_s = auto_exposure_s(image, sensor)
     if light.values.shape[:2] != device.shape:
         raise InputError(
             f"radiance: a frame of {light.values.shape[:2]} is not the device's {device.shape}; "

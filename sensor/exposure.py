@@ -11,6 +11,7 @@ from sensor.binning import as_read, of_read_pixels
 from sensor.cfa import channels, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
+from sensor.readings.noise import METERED_PERCENTILE, METERED_SHARE
 from sensor.readout import noise_variance
 from sensor.response import behind_filters, channel_electrons
 
@@ -32,8 +33,8 @@ def auto_exposure_s(
     longest_s: float = LONGEST_S,
     *,
     channel: str | None = None,
-    percentile: float = 99.0,
-    well_share: float = 0.8,
+    percentile: float = METERED_PERCENTILE,
+    well_share: float = METERED_SHARE,
 ) -> float:
     """Exposure that puts a percentile of one channel's expected electrons at a share of the well [s].
 
@@ -73,8 +74,8 @@ def _share_of_well_s(
     per_second_e: NDArray[np.float64],
     sensor: SensorConfig,
     longest_s: float,
-    percentile: float = 99.0,
-    well_share: float = 0.8,
+    percentile: float = METERED_PERCENTILE,
+    well_share: float = METERED_SHARE,
 ) -> float:
     bright = float(np.percentile(of_read_pixels(per_second_e, sensor), percentile))
     return min(longest_s, well_share * as_read(sensor).metered_well_e / bright) if bright > 0 else longest_s

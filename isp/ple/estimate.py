@@ -245,8 +245,9 @@ def _overlapped(found: Patches, shape: tuple[int, int], size: int) -> tuple[Sing
     each, inner = found.weight.reshape(ny, nx), (found.inner * found.weight[:, None]).reshape(ny, nx, 4)
     taper = window(size).reshape(size, across, STRIDE)
     # Some rows of patches at once, so that values are read once.
-    for first in range(0, ny, max(1, 8 * BLOCK // nx)):
-        some = slice(first, min(first + max(1, 8 * BLOCK // nx), ny))
+    together = max(1, 8 * BLOCK // nx)
+    for first in range(0, ny, together):
+        some = slice(first, min(first + together, ny))
         for i in range(size):
             rows = slice(first * STRIDE + i, (some.stop - 1) * STRIDE + i + 1, STRIDE)
             for j in range(across):

@@ -17,10 +17,10 @@ from scipy.special import ndtr
 from sensor.config import SensorConfig
 from sensor.readings.reading import MERGED
 
-# A reading counts where the merged light fills it to no more than 6 standard deviations under its well: its own noise
-# then clips once in 1e9 pixels.
+# A reading, or a frame of a burst, counts where the merged light fills it to no more than 6 standard deviations under
+# its well: its own noise then clips once in 1e9 pixels.
 CLEAR_SIGMAS = 6.0
-METERED_SHARE = 0.8  # of a gain's well, up to which it takes a frame's bright end (`sensor.exposure` aims there too)
+METERED_SHARE = 0.8  # of the well: where exposure puts a frame's bright end, and up to which a gain takes it
 METERED_PERCENTILE = 99.0
 _LEVELS = 8192  # between which the variance of larger frames is interpolated: 0.3 % of light apart
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
+from sensor.config import SensorConfig
 from sensor.presets import preset
 
 Real = TypeVar("Real", bound=np.floating)
@@ -43,7 +44,12 @@ class EqualArea:
 def sensor_shapes(area: EqualArea, sensors: Sequence[str], picture: tuple[int, int]) -> dict[str, tuple[int, int]]:
     """Height and width of each sensor in pixels, for a picture's proportions."""
     own = {name: preset(name) for name in sensors}
-    return {name: area.shape(picture, each.pixel.pitch_um, 2 if each.binning else 1) for name, each in own.items()}
+    return {name: area.shape(picture, *grid(each)) for name, each in own.items()}
+
+
+def grid(sensor: SensorConfig) -> tuple[float, int]:
+    """Pitch of a sensor's pixels [um], and along either side how many of them are a pixel of its raw image."""
+    return sensor.pixel.pitch_um, 2 if sensor.binning else 1
 
 
 def require_pixels(area: EqualArea, sensors: Sequence[str], picture: tuple[int, int]) -> None:

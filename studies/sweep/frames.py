@@ -29,6 +29,7 @@ from sensor.optics import form_image
 from sensor.response import expected_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
+from studies.study.equal_area import grid
 from studies.study.exposures import parse_exposure
 from studies.study.lit_scene import OpenedScene, in_lux, lux_per_cd_m2
 from studies.study.model import unit_exposure_s
@@ -140,8 +141,7 @@ def make_frames(
     for key, (preset, sensor) in wanted.items():
         own: tuple[SpectralRadiance, ...] = views
         if area is not None:
-            block = 2 if sensor.binning else 1
-            own = tuple(area.view(view, sensor.pixel.pitch_um, block) for view in views)
+            own = tuple(area.view(view, *grid(sensor)) for view in views)
         whole, one, other = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in own)
         errors = [(one - other) / 2] if transport.denoised is None else [whole - one, whole - other]
         facts = scene | {

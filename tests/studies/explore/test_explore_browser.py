@@ -110,37 +110,49 @@ def test_the_page_fits_and_is_readable(browser, address, width, dark):
     assert min(boxes) > 100
 
 
-def test_an_old_answer_is_never_shown(browser, address):
-    """The page's module with a program that answers the older of two questions last, and first."""
-    page = CHROME.Page(browser, address)
+def answered(page, views, script):
+    """Value of a script in a page whose program is the script: `asked` holds what the page sends, `tell` answers.
+
+    `level` is a slider, and an answer is ``{...answer, number}`` with its pictures.
+    """
     EXPLORE.settle(page)
     said = hello(open_source("still_life_outdoor", RenderOptions(size=48, spp=4)))
-    controls = said["controls"]
     answer = {
-        "kind": "show", "cameras": [{"controls": controls, "waiting_for": None}], "views": [[0, "picture"]],
+        "kind": "show", "cameras": [{"controls": said["controls"], "waiting_for": None}], "views": views,
         "facts": [{"exposure_s": 0.01, "saturated": 0.0, "snr_db": None}],
         "size": [1, 1], "spp": 4, "last": True, "notes": [],
     }  # fmt: skip
-    painted = page.value(
+    return page.value(
         f"""(async () => {{
           const {{ default: explorer }} = await import(new URL("explore.js", location.href));
-          const asked = [], el = document.createElement("div"), seen = [];
+          const asked = [], el = document.createElement("div"), seen = [], answer = {json.dumps(answer)};
           let tell;
           document.body.append(el);
           explorer.render({{ model: {{ send: each => asked.push(each), on: (_, listener) => tell = listener }}, el }});
           tell({json.dumps({**said, "kind": "hello"})}, []);
-          const root = el.firstChild, level = el.querySelector("[data-key=level]");
+          const level = el.querySelector("[data-key=level]");
+          {script}
+        }})()"""
+    )
+
+
+def test_an_old_answer_is_never_shown(browser, address):
+    """The page's module with a program that answers the older of two questions last, and first."""
+    old, young, seen = answered(
+        CHROME.Page(browser, address),
+        [[0, "picture"]],
+        """
+          const root = el.firstChild;
           level.value = 900;
           level.dispatchEvent(new Event("input"));
           const [old, young] = asked.filter(each => each.kind === "show").map(each => each.number);
-          for (const number of [old, young, old]) {{
-            tell({{ ...{json.dumps(answer)}, number }}, [new DataView(new ArrayBuffer(3))]);
+          for (const number of [old, young, old]) {
+            tell({ ...answer, number }, [new DataView(new ArrayBuffer(3))]);
             seen.push(root.dataset.painted ?? "none");
-          }}
+          }
           return [old, young, seen];
-        }})()"""
+        """,
     )
-    old, young, seen = painted
     assert old < young
     assert seen == ["none", str(young), str(young)]
 
@@ -172,34 +184,22 @@ def test_a_lamp_from_a_csv_file_is_in_the_copied_python(browser, address, one_re
 
 
 def test_a_picture_without_bytes_is_the_last_one_sent_even_where_that_came_too_late(browser, address):
-    page = CHROME.Page(browser, address)
-    EXPLORE.settle(page)
-    said = hello(open_source("still_life_outdoor", RenderOptions(size=48, spp=4)))
-    answer = {
-        "kind": "show", "cameras": [{"controls": said["controls"], "waiting_for": None}],
-        "views": [[0, "picture"], [0, "truth"]], "facts": [{"exposure_s": 0.01, "saturated": 0.0, "snr_db": None}],
-        "size": [1, 1], "spp": 4, "last": True, "notes": [],
-    }  # fmt: skip
-    seen = page.value(
-        f"""(async () => {{
-          const {{ default: explorer }} = await import(new URL("explore.js", location.href));
-          const asked = [], el = document.createElement("div"), seen = [];
-          let tell;
-          document.body.append(el);
-          explorer.render({{ model: {{ send: each => asked.push(each), on: (_, listener) => tell = listener }}, el }});
-          tell({json.dumps({**said, "kind": "hello"})}, []);
-          const level = el.querySelector("[data-key=level]"), none = new DataView(new ArrayBuffer(0));
+    seen = answered(
+        CHROME.Page(browser, address),
+        [[0, "picture"], [0, "truth"]],
+        """
+          const none = new DataView(new ArrayBuffer(0));
           const grey = value => new DataView(new Uint8Array([value, value, value]).buffer);
           const red = each => each.getContext("2d").getImageData(0, 0, 1, 1).data[0];
           const look = () => seen.push([...el.querySelectorAll("canvas")].map(red));
           level.dispatchEvent(new Event("input"));
           const [old, young] = asked.filter(each => each.kind === "show").map(each => each.number);
-          tell({{ ...{json.dumps(answer)}, number: old }}, [grey(10), grey(20)]);
+          tell({ ...answer, number: old }, [grey(10), grey(20)]);
           look();
-          tell({{ ...{json.dumps(answer)}, number: young }}, [grey(30), none]);
+          tell({ ...answer, number: young }, [grey(30), none]);
           look();
           return seen;
-        }})()"""
+        """,
     )
     assert seen == [[0, 0], [30, 20]]
 
