@@ -4,6 +4,7 @@ Of requests of one kind only the newest is answered: what a slider has left behi
 number of its request and the controls that it was made with; the page shows none that is older than its last question.
 """
 
+import ctypes
 import sys
 import threading
 import time
@@ -30,6 +31,7 @@ Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 Send: TypeAlias = Callable[[Header, Sequence[bytes]], None]
 
 REST_S = 0.4  # without a new setting, after which a slow processor begins
+TRIM_AFTER = 100  # turns of its thread
 
 
 class Session:
@@ -111,8 +113,11 @@ class Session:
 
     def _work(self) -> None:
         """Answer what is asked; where nothing is, do what is left to do."""
+        turns = 0
         while not self._closed:
             message, act = self._next()
+            if (turns := turns + 1) % TRIM_AFTER == 0:
+                _trim()
             with warnings.catch_warnings(record=True) as told:
                 warnings.simplefilter("always")
                 try:
@@ -287,3 +292,9 @@ def _whose(message: Header) -> Header:
 
 def _nothing() -> None:
     """Nothing to do."""
+
+
+def _trim() -> None:
+    """Give back what lies free between live arrays: without it 10 000 changes took a seventh more memory than 500."""
+    if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "malloc_trim"):  # glibc's
+        library.malloc_trim(0)
