@@ -317,7 +317,9 @@ def test_a_lens_that_undershoots_beside_a_lamp_leaves_every_term_a_number() -> N
     assert (some.full.mean(axis=0) < 0).any()
     row = weigh(CONDITION, "rgbw", sensor, some, 1e-3, 0.01, QUIET)
     kept = 1e-5 * np.maximum(some.full.mean(axis=0), 0.0)
-    assert row.noise_variance == pytest.approx(noise_variance(kept, sensor, 0.01)[kept < sensor.pixel.full_well_e].mean())
+    assert row.noise_variance == pytest.approx(
+        noise_variance(kept, sensor, 0.01)[kept < sensor.pixel.full_well_e].mean()
+    )
     assert np.isfinite([row.kernel, row.level, *row.jitter.values(), *row.lens.values()]).all()
     sharp = 1e-5 * (some.full + some.lens["diffraction"]).mean(axis=0)[12, 12]  # the lamp's electrons, all in one pixel
     relative = 1e-10 * some.sharp[0, 12, 12] ** 2 * 128 / sharp**2 + 1 / 16
