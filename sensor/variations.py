@@ -20,8 +20,8 @@ VARIATIONS: Mapping[str, tuple[Tile, Callable[[Responses], Responses]]] = Mappin
 def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     """Give a camera another mosaic: the same pixel, well, lens and converter.
 
-    A camera that bins has four pixels for each of that mosaic's, which is the one that its raw image shows: no quad, for
-    no camera has four pixels for each of a quad's.
+    A camera that bins has four pixels for each of that mosaic's, which is the one that its raw image shows. So it can't
+    be a quad, of whose pixels no camera has four for one.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
         tile = MOSAICS[mosaic]
         if sensor.binning and plain(tile) != tile:
             raise InputError(
-                f"cfa: {mosaic!r} for a sensor with binning {sensor.binning!r}, whose raw images hold no quad; allowed: "
-                f"what they hold, such as {mosaic.removeprefix('quad_')}; give that, or leave binning out"
+                f"cfa: {mosaic!r} for a sensor with binning {sensor.binning!r}, whose raw images hold no quad; "
+                f"allowed: what they hold, such as {mosaic.removeprefix('quad_')}; give that, or leave binning out"
             )
         responses = with_channels(sensor.responses, channels(tile))
     return replace(sensor, cfa=quad(tile) if sensor.binning else tile, responses=responses)
