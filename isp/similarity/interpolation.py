@@ -51,9 +51,9 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
 
     Notes
     -----
-    0 everywhere in `quad_rgbw`: the tent that fills a pixel reaches one block of 2x2 of each other channel, on one side of
-    the pixel, so no plane holds a value between two sides, which is what V is for. The plane is the near block's
-    value carried on by up to two pixels; how far that errs beside an edge, V doesn't tell. In `quad_bayer` green alone has
+    0 everywhere in `quad_rgbw`: the tent that fills a pixel reaches one block of 2x2 of each other channel, on one side
+    of the pixel, so no plane holds a value between two sides, which is what V is for. The plane is the near block's
+    value carried on by a pixel; how far that errs beside an edge, V doesn't tell. In `quad_bayer` green alone has
     pairs, across the corners of its blocks. Quads are developed by `isp.kriging` for that (docs/decisions/0048).
     """
     total, (height, width) = np.zeros_like(mosaic), mosaic.shape

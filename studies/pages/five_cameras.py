@@ -166,7 +166,7 @@ def page_of(
 
 
 def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
-    """Return a table of the sensors' numbers; what no report tells stands in brackets."""
+    """Return a table of the sensors' numbers as simulated; what no report tells stands in brackets."""
     rows = []
     for entry in entries:
         path, pixel = REPORTS / f"{entry.name}.toml", entry.sensor.pixel
@@ -178,7 +178,7 @@ def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
                 f"`{entry.name}`" + ("" if report is None else f": {report.camera}"),
                 f"{pixel.pitch_um:g}",
                 str(area.shape((1, 1), pixel.pitch_um)[0]),
-                _efficiency(entry.sensor) if report is None else f"{told['eta']:g} % at {told['lambda_nm']:g} nm",
+                _efficiency(entry.sensor, told),
                 f"{pixel.read_noise_e:.3g}",
                 significant(pixel.full_well_e),
                 significant(pixel.full_well_e / pixel.pitch_um**2),
@@ -190,10 +190,14 @@ def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
     return table([*head, "clip [e⁻/µm²]", "DSNU [e⁻]", "PRNU [%]"], rows)
 
 
-def _efficiency(sensor: SensorConfig) -> str:
-    white = sensor.responses.curves["W"]
-    value = sensor.pixel.fill_factor * np.interp(AT_NM, white.wavelength_nm, white.values)
-    return f"({100 * value:.3g} % at {AT_NM:g} nm: the paper's W, fill factor {sensor.pixel.fill_factor:g})"
+def _efficiency(sensor: SensorConfig, told: Mapping[str, float]) -> str:
+    """Simulated quantum efficiency of W, in brackets without a report; the report's beside it where it differs."""
+    at_nm, white = told.get("lambda_nm", AT_NM), sensor.responses.curves["W"]
+    value = 100 * sensor.pixel.fill_factor * float(np.interp(at_nm, white.wavelength_nm, white.values))
+    shown = f"{value:.1f} % at {at_nm:g} nm"
+    if not told:
+        return f"({shown}: the paper's W, fill factor {sensor.pixel.fill_factor:g})"
+    return shown if abs(value - told["eta"]) < 0.05 else f"{shown}; published: {told['eta']:g} %"  # half a last digit
 
 
 def light_tables(entries: Sequence[Entry], beside: Sequence[Contest], light: Light, coarsest_um: float) -> list[str]:
