@@ -71,6 +71,10 @@ def test_a_fresh_installation_has_a_measured_camera(tmp_path, capsys, monkeypatc
     assert "BSD-3-Clause" in path.read_text("utf-8")
     assert "their ratios aren't known" in path.read_text("utf-8")
     assert call(capsys, "snr", path)[0] == 0
+    code, _, err = call(capsys, "snr", "nikon d5100")  # it is listed beside the presets
+    assert code != 0
+    assert "a measured response without a pixel; allowed" in err
+    assert err.count("\n") == 1
 
 
 @pytest.mark.usefixtures("cameras")
