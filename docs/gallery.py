@@ -132,8 +132,9 @@ def sensors_page() -> str:
     return f"""# Sensors
 
 Presets by name: `--sensor low_noise`, `sensors = ["low_noise"]` in a study, `rodcone.low_noise()` in Python. `rodcone
-new preset low_noise -o mine.toml` copies one to change, [how to](../how_to/own_sensor.md). 52 cameras whose responses
-were measured come by name from a collection that you copy once: [a camera that exists](../how_to/real_camera.md).
+new preset low_noise -o mine.toml` copies one to change, [how to](../how_to/own_sensor.md). A camera whose
+response was measured comes by name, `Nikon D5100`, and 51 more from a collection that you copy once: [a camera that
+exists](../how_to/real_camera.md).
 
 | preset | pitch, µm | full well, e⁻ | read noise, e⁻ | DSNU, e⁻ | PRNU | lens |
 |---|---|---|---|---|---|---|
@@ -146,8 +147,8 @@ share of the light and of the time.
 
 ## Responses
 
-Electrons a photon over wavelength, the same in all presets; with measured cameras at hand the same command draws each
-of them.
+Electrons a photon over wavelength, the same in all presets, and the measured cameras at hand, relative to their
+greatest response; a * where each channel was divided by its own maximum.
 
 ![Responses of R, G, B and W](sensors.svg)
 

@@ -1,11 +1,12 @@
 """The generalised Anscombe transform, from electrons to units of noise, and its exact inverse, which has no bias."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sensor.raw import RawImage
+from sensor.raw import NoiseStep, RawImage
 
 # Under it PRNU adds less than 1 % to shot noise up to a million electrons, and ln(1 + p) runs out of digits.
 LEAST_PRNU = 1e-4
@@ -49,17 +50,46 @@ def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
     From a step on the variance is k e + s^2 + (p e)^2 with another k, s and p, whose integral is the transform at k e
     with PRNU p / k, over k. The pieces join where they meet.
     """
-    stable, own, offset = stabilise(electrons, raw.dark_noise_e, raw.prnu), (1.0, raw.dark_noise_e, raw.prnu), 0.0
-    for step in raw.noise_steps:
-        before, own = own, (step.shot, float(np.hypot(step.read_noise_e, step.dsnu_e)), step.prnu)
-        seam_e = np.array(step.from_e)
-        offset += float(_piece(seam_e, *before) - _piece(seam_e, *own))
-        stable = np.where(electrons >= seam_e, _piece(electrons, *own) + offset, stable).astype(electrons.dtype)
+    stable = stabilise(electrons, raw.dark_noise_e, raw.prnu)
+    for step, offset in _joined(raw):
+        stable = np.where(electrons >= step.from_e, _piece(electrons, step) + offset, stable).astype(electrons.dtype)
     return stable
 
 
-def _piece(electrons: NDArray[Any], shot: float, dark_noise_e: float, prnu: float) -> NDArray[Any]:
-    return stabilise(electrons * shot, dark_noise_e, prnu / shot) / shot
+def _joined(raw: RawImage) -> list[tuple[NoiseStep, float]]:
+    """Steps of a raw image's noise, each with what its piece of the transform is moved by to meet the one before."""
+    found: list[tuple[NoiseStep, float]] = []
+    before, offset = NoiseStep(0.0, 1.0, raw.dark_noise_e, 0.0, raw.prnu), 0.0
+    for step in raw.noise_steps:
+        seam_e = np.array(step.from_e)
+        offset += float(_piece(seam_e, before) - _piece(seam_e, step))
+        found.append((step, offset))
+        before = step
+    return found
+
+
+def _piece(electrons: NDArray[Any], step: NoiseStep) -> NDArray[Any]:
+    dark_e = float(np.hypot(step.read_noise_e, step.dsnu_e))
+    return stabilise(electrons * step.shot, dark_e, step.prnu / step.shot) / step.shot
+
+
+def without_prnu(raw: RawImage) -> RawImage:
+    """Raw image of which `unstabilise_raw` has the inverse: the same, its PRNU left out."""
+    return replace(raw, prnu=0.0, noise_steps=tuple(replace(step, prnu=0.0) for step in raw.noise_steps))
+
+
+def unstabilise_raw(stable: NDArray[np.floating], raw: RawImage) -> NDArray[np.float64]:
+    """Inverse of `stabilise_raw` of a raw image `without_prnu`.
+
+    Before the first step `unstabilise`. Beyond one, where noise is tens of electrons and more, its mean is k / 4
+    electrons off at most.
+    """
+    found = unstabilise(stable, raw.dark_noise_e)
+    for step, offset in _joined(raw):
+        dark_e = float(np.hypot(step.read_noise_e, step.dsnu_e))
+        bright = unstabilise(step.shot * (stable - offset), dark_e) / step.shot
+        found = np.where(stable >= _piece(np.array(step.from_e), step) + offset, bright, found)
+    return found
 
 
 def unstabilise(stable: NDArray[np.floating], dark_noise_e: float) -> NDArray[np.float64]:

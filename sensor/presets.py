@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from rodcone.errors import unknown
+from rodcone.errors import InputError, unknown
+from sensor.cameras.library import measured_cameras
 from sensor.config import SensorConfig
 from sensor.config_file import read_sensor
 
@@ -28,6 +29,11 @@ def preset_file(name: str) -> Path:
         For an unknown name.
     """
     if name not in _NAMES:
+        if " " in name and name.lower() in {each.lower() for each in measured_cameras()}:
+            raise InputError(
+                f"sensor preset: {name!r} is a measured response without a pixel; allowed: a preset or a .toml file; "
+                f"make one: rodcone new preset low_noise --camera {name!r} -o camera.toml"
+            )
         raise unknown("sensor preset", name, _NAMES)
     return _FOLDER / f"{name}.toml"
 

@@ -20,6 +20,10 @@ from sensor.readings.reading import MERGED, SWITCHED
 # number among those of one charge.
 DrawFrame: TypeAlias = Callable[[NDArray[np.floating], SensorConfig, Device, float, int, int], NDArray[np.uint16]]
 
+# Far above any well, and inside 64-bit integers. One bound for all: what a pixel takes from its row's stream depends on
+# its mean, so readings of one charge, whose wells differ, draw the same electrons only from the same means.
+_MOST_E = 1e15
+
 
 def draw_frame(
     expected_e: NDArray[np.floating],
@@ -44,8 +48,7 @@ def draw_frame(
     mean_e += pixel.dark_current_e_per_s * exposure_s  # PRNU is photo-response only
     if device.hot is not None:
         mean_e[device.hot] += pixel.hot_pixel_dark_current_e_per_s * exposure_s
-    # Poisson far above the well is the well with certainty; the bound keeps the draw inside 64-bit integers.
-    collected_e = counts(key, NoiseTerm.SHOT, np.minimum(mean_e, 2 * pixel.full_well_e + 1e4)).astype(np.float64)
+    collected_e = counts(key, NoiseTerm.SHOT, np.minimum(mean_e, _MOST_E)).astype(np.float64)
     np.minimum(collected_e, pixel.full_well_e, out=collected_e)
     return convert(collected_e, sensor, device, key, reading)
 

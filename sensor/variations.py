@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from rodcone.errors import unknown
-from sensor.cfa import MOSAICS, OWN, RGBW, Tile, channels, quad
+from rodcone.errors import InputError, unknown
+from sensor.cfa import MOSAICS, OWN, RGBW, Tile, channels, plain, quad
 from sensor.config import SensorConfig
 from sensor.curves import Responses, complementary, neutral_density, with_channels
 
@@ -20,7 +20,8 @@ VARIATIONS: Mapping[str, tuple[Tile, Callable[[Responses], Responses]]] = Mappin
 def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     """Give a camera another mosaic: the same pixel, well, lens and converter.
 
-    A camera that bins has four pixels for each of that mosaic's, which is the one that its raw image shows.
+    A camera that bins has four pixels for each of that mosaic's, which is the one that its raw image shows. So it can't
+    be a quad, of whose pixels no camera has four for one.
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     Raises
     ------
     InputError
-        For an unknown name, or curves that are missing.
+        For an unknown name, curves that are missing, or a quad for a camera that bins.
     """
     if mosaic == OWN:
         return sensor
@@ -45,5 +46,10 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
         responses = change(sensor.responses)
     else:
         tile = MOSAICS[mosaic]
+        if sensor.binning and plain(tile) != tile:
+            raise InputError(
+                f"cfa: {mosaic!r} for a sensor with binning {sensor.binning!r}, whose raw images hold no quad; "
+                f"allowed: what they hold, such as {mosaic.removeprefix('quad_')}; give that, or leave binning out"
+            )
         responses = with_channels(sensor.responses, channels(tile))
     return replace(sensor, cfa=quad(tile) if sensor.binning else tile, responses=responses)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.anscombe import stabilise, unstabilise
+from isp.anscombe import stabilise_raw, unstabilise_raw, without_prnu
 from isp.picture import Image
 from isp.planes import Plane
 from isp.processors.bm3d import bm3d
@@ -50,12 +50,13 @@ def bm3d_mosaic(raw: RawImage, mix: Mix) -> Plane:
     InputError
         Without the library `bm3d`.
     """
+    plain = without_prnu(raw)  # of merged readings, with the noise of each range of light
     odd = [(0, size % 2) for size in raw.shape]
-    stable = np.pad(stabilise(raw.electrons, raw.dark_noise_e, 0.0), odd, mode="reflect")
+    stable = np.pad(stabilise_raw(raw.electrons, plain), odd, mode="reflect")
     sites = np.stack([stable[row::2, column::2] for row in (0, 1) for column in (0, 1)], axis=-1)
     matrix = mix(sites)
     mixed = bm3d(sites @ matrix.T, [1.0] * len(matrix))
     quiet = np.empty_like(stable)
     for site, plane in enumerate(np.moveaxis(mixed @ matrix, -1, 0)):
         quiet[site // 2 :: 2, site % 2 :: 2] = plane
-    return unstabilise(quiet[: raw.shape[0], : raw.shape[1]], raw.dark_noise_e)
+    return unstabilise_raw(quiet[: raw.shape[0], : raw.shape[1]], plain)

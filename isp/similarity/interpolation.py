@@ -47,8 +47,14 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
     Returns
     -------
     (h, w) of the same type
-        V(x) [noise variances], 0 or more. Pairs that the border cuts count as noise; patches go on by reflection. 0
-        in `quad_rgbw`, whose blocks of 2x2 have no such pairs (docs/decisions/0048).
+        V(x) [noise variances], 0 or more. Pairs that the border cuts count as noise; patches go on by reflection.
+
+    Notes
+    -----
+    0 everywhere in `quad_rgbw`: the tent that fills a pixel reaches one block of 2x2 of each other channel, on one side
+    of the pixel, so no plane holds a value between two sides, which is what V is for. The plane is the near block's
+    value carried on by a pixel; how far that errs beside an edge, V doesn't tell. In `quad_bayer` green alone has
+    pairs, across the corners of its blocks. Quads are developed by `isp.kriging` for that (docs/decisions/0048).
     """
     total, (height, width) = np.zeros_like(mosaic), mosaic.shape
     repeats = BLOCK_ROWS // len(tile) + 2, width // len(tile[0]) + 1

@@ -1,4 +1,4 @@
-"""Measured responses of cameras by name, from a file that `sensor.cameras.convert` makes."""
+"""Measured responses of cameras by name: one of colour-science, and those of `sensor.cameras.convert`'s file."""
 
 import json
 import os
@@ -12,6 +12,7 @@ import numpy as np
 
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError, one_line, unknown
+from rodcone.optional import quietly_imported
 from sensor.curves import Responses
 
 FILE = "cameras.json"
@@ -19,6 +20,7 @@ VARIABLE = "RODCONE_CAMERAS"  # environment variable: folder of the file
 MOST_BYTES = 1 << 23  # 52 cameras take 68 kB
 STEPS = 100_000  # whole numbers in the file are this many to 1: half a step is under the sources' own last digits
 _SHIPPED = Path(__file__).parent / "measured"  # a distribution may ship what `convert` writes
+_NPL = "Nikon D5100"
 _TEXTS = ("maker", "model", "creator", "laboratory", "equipment", "date")
 
 
@@ -86,7 +88,7 @@ def library_file() -> Path | None:
 
 
 def measured_cameras() -> dict[str, MeasuredCamera]:
-    """Cameras by name, such as ``Nikon D850``; empty where no file of them is at hand.
+    """Cameras by name, such as ``Nikon D850``: those of the file, and one that every installation has.
 
     Raises
     ------
@@ -94,7 +96,8 @@ def measured_cameras() -> dict[str, MeasuredCamera]:
         For a file that is damaged.
     """
     path = library_file()
-    return {} if path is None else read_library(path, path.stat().st_mtime_ns)
+    found = {} if path is None else read_library(path, path.stat().st_mtime_ns)
+    return found if _NPL in found else {_NPL: _npl_camera(), **found}
 
 
 def measured_camera(name: str) -> MeasuredCamera:
@@ -103,19 +106,41 @@ def measured_camera(name: str) -> MeasuredCamera:
     Raises
     ------
     InputError
-        For an unknown name, or where no file of measured responses is at hand.
+        For an unknown name.
     """
     found = measured_cameras()
-    if not found:
-        raise InputError(
-            f"camera: {name!r} is unknown, for no measured responses are at hand; allowed: the names of a copy of "
-            f"rawtoaces-data: rodcone new cameras COPY -o FOLDER, then {VARIABLE}=FOLDER"
-        )
     names = {" ".join(each.lower().split()): each for each in found}
     key = " ".join(name.lower().split())
-    if key not in names:
-        raise unknown("camera", name, found)
-    return found[names[key]]
+    if key in names:
+        return found[names[key]]
+    if library_file() is None:
+        raise InputError(
+            f"camera: {name!r} is unknown; allowed: {', '.join(found)}, and the names of a copy of rawtoaces-data, "
+            f"which isn't at hand: rodcone new cameras COPY -o FOLDER, then {VARIABLE}=FOLDER"
+        )
+    raise unknown("camera", name, found)
+
+
+@cache
+def _npl_camera() -> MeasuredCamera:
+    """Camera that colour-science holds; importing that library takes 1 to 2 s.
+
+    The same measurement as rawtoaces-data's, equal to the last digit there. colour-science's other camera, a Sigma SD1
+    Merrill, has three layers in each pixel and no mosaic (decision 0052).
+    """
+    held = quietly_imported("colour").MSDS_CAMERA_SENSITIVITIES["Nikon 5100 (NPL)"]
+    return MeasuredCamera(
+        maker="Nikon",
+        model="D5100",
+        creator="Darrodi, Finlayson, Goodman and Mackiewicz",
+        laboratory="National Physical Laboratory",
+        equipment="monochromator",
+        date="2015",
+        source="colour-science, from J. Opt. Soc. Am. A 32, 381 (2015), doi:10.1364/JOSAA.32.000381",
+        licence="BSD-3-Clause",
+        wavelength_nm=np.array(held.wavelengths, np.float64),
+        per_power=dict(zip("RGB", np.array(held.values, np.float64).T, strict=True)),
+    )
 
 
 @cache

@@ -84,7 +84,10 @@ def measured_curves(camera: MeasuredCamera) -> Curves:
     """Curves of a measured camera."""
     note = "per photon, greatest 1: published per radiant power, divided by the wavelength"
     if not camera.balanced:
-        note += "; each channel was divided by its own maximum: their ratios aren't known"
+        note += (
+            "; each channel was divided by its own maximum: their ratios aren't known, so the electrons of each hold "
+        )
+        note += "up to a factor of its own"
     source = f"{camera.source} ({camera.licence}); {camera.text}"
     return Curves(f"{camera.maker} {camera.model}", source, camera.responses.curves, note)
 

@@ -131,14 +131,17 @@ def weigh(
     pilot : PilotNoise
     """
     scale = level_cd_m2 * exposure_s
-    expected_e = scale * found.full.mean(axis=0)
+    # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
+    expected_e = scale * np.maximum(found.full.mean(axis=0), 0.0)
     below = expected_e < sensor.pixel.full_well_e
     # Where every pixel is saturated no error reaches the raw image: each is 0, of a variance of 1.
     own = _mean(noise_variance(expected_e, sensor, exposure_s)[below]) or 1.0
     blurred, sharp = found.blurred**2 * pilot.spp, found.sharp**2 * pilot.spp
-    signal = np.maximum(found.full.mean(axis=0), np.finfo(np.float64).tiny)
-    # Wavelengths are stratified within a half; what light a path carries is independent of its wavelength.
-    spread = sharp.mean(axis=0) / signal**2 + 1 / pilot.half_spp
+    # Wavelengths are stratified within a half; what light a path carries is independent of its wavelength. Both are of
+    # light before diffraction, and a pixel without light has neither noise nor jitter.
+    signal = (found.full + found.lens.get(DIFFRACTION, 0.0)).mean(axis=0)
+    relative = np.divide(sharp.mean(axis=0), signal**2, out=np.zeros_like(signal), where=signal > 0)
+    spread = relative + 1 / pilot.half_spp
     return Weighed(
         condition=condition,
         mosaic=mosaic,

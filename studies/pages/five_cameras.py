@@ -166,7 +166,7 @@ def page_of(
 
 
 def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
-    """Return a table of the sensors' numbers; what no report tells stands in brackets."""
+    """Return a table of the sensors' numbers as simulated; what no report tells stands in brackets."""
     rows = []
     for entry in entries:
         path, pixel = REPORTS / f"{entry.name}.toml", entry.sensor.pixel
@@ -178,7 +178,7 @@ def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
                 f"`{entry.name}`" + ("" if report is None else f": {report.camera}"),
                 f"{pixel.pitch_um:g}",
                 str(area.shape((1, 1), pixel.pitch_um)[0]),
-                _efficiency(entry.sensor) if report is None else f"{told['eta']:g} % at {told['lambda_nm']:g} nm",
+                _efficiency(entry.sensor, told),
                 f"{pixel.read_noise_e:.3g}",
                 significant(pixel.full_well_e),
                 significant(pixel.full_well_e / pixel.pitch_um**2),
@@ -190,10 +190,14 @@ def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
     return table([*head, "clip [e⁻/µm²]", "DSNU [e⁻]", "PRNU [%]"], rows)
 
 
-def _efficiency(sensor: SensorConfig) -> str:
-    white = sensor.responses.curves["W"]
-    value = sensor.pixel.fill_factor * np.interp(AT_NM, white.wavelength_nm, white.values)
-    return f"({100 * value:.3g} % at {AT_NM:g} nm: the paper's W, fill factor {sensor.pixel.fill_factor:g})"
+def _efficiency(sensor: SensorConfig, told: Mapping[str, float]) -> str:
+    """Simulated quantum efficiency of W, in brackets without a report; the report's beside it where it differs."""
+    at_nm, white = told.get("lambda_nm", AT_NM), sensor.responses.curves["W"]
+    value = 100 * sensor.pixel.fill_factor * float(np.interp(at_nm, white.wavelength_nm, white.values))
+    if not told:
+        return f"({value:.1f} % at {at_nm:g} nm: the paper's W, fill factor {sensor.pixel.fill_factor:g})"
+    published = "" if abs(value - told["eta"]) < 0.05 else f"; published: {told['eta']:g} %"  # half of the last digit
+    return f"{value:.1f} % at {at_nm:g} nm{published}"
 
 
 def light_tables(entries: Sequence[Entry], beside: Sequence[Contest], light: Light, coarsest_um: float) -> list[str]:
@@ -204,7 +208,6 @@ def light_tables(entries: Sequence[Entry], beside: Sequence[Contest], light: Lig
         shown = [each for each in channels(entry.sensor.cfa) if each in "GW"]
         rows["exposure"].append([entry.words, *(duration(each.rows[entry.words][0].exposure_s) for each in beside)])
         for channel in shown:
-            name = f"{entry.words}, {channel}"
             cells: dict[str, list[str]] = {"electrons": [], "snr": [], "area": []}
             for contest in beside:
                 row = contest.rows[entry.words][0]
@@ -216,7 +219,7 @@ def light_tables(entries: Sequence[Entry], beside: Sequence[Contest], light: Lig
                 gain_db = 20 * log10(coarsest_um / entry.sensor.pixel.pitch_um)
                 cells["area"].append(MISSING if full else fixed(field.snr_db + gain_db, 1))
             for key, values in cells.items():
-                rows[key].append([name, *values])
+                rows[key].append([f"{entry.words}, {channel}", *values])
     heads = {
         "exposure": "exposure time",
         "electrons": "electrons a pixel: even field, mean of the picture",
@@ -248,8 +251,7 @@ def summary_table(beside: Sequence[Contest], own: str) -> str:
     for contest in beside:
         psnr_db = {name: contest.mean(name, PSNR) for name in contest.rows}
         order = sorted(psnr_db, key=lambda name: -psnr_db[name])
-        shown = (order[0], order[1], own)
-        cells = [f"{order.index(name) + 1}. {name}: {fixed(psnr_db[name], 1)} dB" for name in shown]
+        cells = [f"{order.index(name) + 1}. {name}: {fixed(psnr_db[name], 1)} dB" for name in (*order[:2], own)]
         rows.append([level_text(contest.level), *cells])
     return table(["by PSNR", "first", "second", "the paper's pixel"], rows)
 

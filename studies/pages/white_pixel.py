@@ -23,7 +23,8 @@ def white_pixel_tables(contests: Sequence[Contest]) -> list[str]:
         return []
     light = {contest.level: contest.luminance_cd_m2 for contest in contests}
     levels = sorted(light, key=lambda level: light[level])
-    parts = ["## What the W pixel brings", TEXT]
+    drawn = any(_group(contest)[-1] for contest in contests)
+    parts = ["## What the W pixel brings", f"{TEXT} {DRAWN_TEXT}" if drawn else TEXT]
     for metric in METRICS:
         unit = f" [{metric.unit}]" if metric.unit else ""
         head = [f"{metric.name}{unit}", "exposure", "white balance", "scenes", *map(level_text, levels)]
@@ -34,8 +35,9 @@ def white_pixel_tables(contests: Sequence[Contest]) -> list[str]:
 TEXT = (
     f"`{RGBW}` beside `{BAYER}`: one method, prior and colour rule on both mosaics, which differ in nothing else. "
     "Positive: RGBW is better. Means over scenes, with half the 95 % interval over seeds, in brackets where"
-    " it holds 0. *Drawn* scenes come from a number that nobody chose, after prior and settings were fixed."
+    " it holds 0."
 )
+DRAWN_TEXT = "*Drawn* scenes come from a number that nobody chose, after prior and settings were fixed."
 
 
 def _rows(contests: Sequence[Contest], levels: Sequence[str], metric: Metric) -> list[list[str]]:

@@ -61,8 +61,8 @@ SENSOR = (
                 "spread_charge(expected, pixel.crosstalk)",
             ),
             (
-                "2 * pixel.full_well_e + 1e4)).astype(np.float64)\n",
-                "2 * pixel.full_well_e + 1e4)).astype(np.float64) * device.photo_response\n",
+                "np.minimum(mean_e, _MOST_E)).astype(np.float64)\n",
+                "np.minimum(mean_e, _MOST_E)).astype(np.float64) * device.photo_response\n",
             ),
         ),
         tuple(f"tests/{name}.py" for name in _READOUT),

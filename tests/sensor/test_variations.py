@@ -1,5 +1,6 @@
 """Filters of other cameras: sums and densities of the own curves, and cameras that carry them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,19 @@ def test_variations_are_named_by_what_they_change() -> None:
     assert VARIATIONS["rgbw_nd"][0] == RGBW
     assert channels(VARIATIONS["cmyw"][0]) == ("W", "C", "M", "Y")
     assert vary(preset("low_noise"), "rccc").responses.curves["C"] is rgbw().curves["W"]
+
+
+@pytest.mark.parametrize("binning", ["charge", "digital"])
+def test_a_camera_that_bins_shows_no_quad(binning: str) -> None:
+    camera = replace(preset("low_noise"), cfa=MOSAICS["quad_bayer"], binning=binning)
+    assert vary(camera, "rgbw").cfa == MOSAICS["quad_rgbw"]
+    assert vary(camera, "mono").cfa == ("WW", "WW")
+    for name in ("quad_bayer", "quad_rgbw"):
+        with pytest.raises(
+            InputError, match=rf"cfa: '{name}' .*binning '{binning}'.* such as {name[5:]}; .*leave"
+        ) as error:
+            vary(camera, name)
+        assert "\n" not in str(error.value)
 
 
 def test_what_cannot_be_made_is_refused() -> None:

@@ -78,6 +78,11 @@ def test_noise_alone_makes_none_on_average(tile):
 
 def test_blocks_of_one_channel_have_no_samples_on_opposite_sides():
     assert not any(weight.any() for weight in opposite_pairs(MOSAICS["quad_rgbw"]).values())
+    for weights in tent_weights(MOSAICS["quad_rgbw"]):  # since each tent fills a pixel from one side of it
+        reach = weights.shape[2] // 2
+        for of_phase in weights.reshape(-1, *weights.shape[2:]):
+            sides = np.argwhere(of_phase) - reach
+            assert not {tuple(side) for side in sides if side.any()} & {tuple(-side) for side in sides if side.any()}
 
 
 @pytest.mark.parametrize("tile", [tile for name, tile in MOSAICS.items() if name != "quad_rgbw"])

@@ -10,7 +10,7 @@ from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from rodcone.errors import InputError
 from sensor.cameras.convert import convert
-from sensor.cameras.library import FILE, VARIABLE, measured_camera, measured_cameras
+from sensor.cameras.library import FILE, VARIABLE, _npl_camera, library_file, measured_camera, measured_cameras
 from sensor.raw_files.dng import rational
 from sensor.raw_files.tiff import CFA, Values, text, write_mosaic
 
@@ -64,7 +64,7 @@ def library(tmp_path, monkeypatch) -> Path:
 
 def test_a_camera_is_what_its_file_says_with_licence_and_notice_beside_it(library):
     found = measured_camera("maker  MODEL one")
-    assert list(measured_cameras()) == ["Maker Model One", "Maker Alone"]
+    assert list(measured_cameras()) == ["Nikon D5100", "Maker Model One", "Maker Alone"]
     assert (found.maker, found.date, found.licence) == ("Maker", "2025-11-09", "Apache-2.0")
     assert found.text == "lab, 2025-11-09, double monochromator"
     green = np.array([row[1] for row in camera_json()["spectral_data"]["data"]["main"].values()])
@@ -151,9 +151,35 @@ def test_an_unknown_name_and_a_library_that_is_not_there_say_what_to_do(tmp_path
         measured_cameras()
     monkeypatch.delenv(VARIABLE)
     monkeypatch.setattr("sensor.cameras.library._SHIPPED", tmp_path)
-    assert measured_cameras() == {}
-    with pytest.raises(InputError, match="rodcone new cameras COPY -o FOLDER"):
+    with pytest.raises(InputError, match=r"allowed: Nikon D5100, .* rodcone new cameras COPY -o FOLDER") as error:
         measured_camera("Maker Model One")
+    assert "\n" not in str(error.value)
+
+
+def test_every_installation_has_a_camera_by_name_with_its_source(tmp_path, monkeypatch):
+    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.setattr("sensor.cameras.library._SHIPPED", tmp_path)
+    found = measured_camera("nikon d5100")
+    assert list(measured_cameras()) == ["Nikon D5100"]
+    assert not found.balanced
+    assert found.licence == "BSD-3-Clause"
+    assert "10.1364/JOSAA.32.000381" in found.source
+    assert [found.wavelength_nm[0], found.wavelength_nm[-1], found.wavelength_nm.size] == [380.0, 780.0, 81]
+    # The paper's red, green and blue are greatest, 1, at these; per photon the shorter waves' peak is the greatest.
+    peaks = {name: found.wavelength_nm[curve.argmax()] for name, curve in found.per_power.items()}
+    assert peaks == {"R": 595.0, "G": 530.0, "B": 460.0}
+    greatest = {name: curve.values.max() for name, curve in found.responses.curves.items()}
+    assert greatest["B"] == 1.0
+    assert greatest["R"] == pytest.approx(460 / 595, rel=0.01)
+
+
+def test_the_copys_camera_of_that_name_is_the_same_measurement(monkeypatch):
+    if library_file() is None:
+        pytest.skip(f"no copy of rawtoaces-data here; rodcone new cameras COPY -o FOLDER, then {VARIABLE}=FOLDER")
+    copied, held = measured_camera("Nikon D5100"), _npl_camera()
+    assert copied.source != held.source
+    for name, curve in held.per_power.items():
+        assert np.abs(copied.per_power[name] - curve).max() <= 0.5e-5 + 1e-12  # half a step of the file
 
 
 # The real collection: where RODCONE_CAMERAS names it, or a distribution ships it.
@@ -189,7 +215,7 @@ def libraw_daylight(path: Path, maker: str, model: str) -> np.ndarray | None:
 
 def test_all_cameras_open_and_their_daylight_balance_is_that_of_libraw(tmp_path):
     cameras = measured_cameras()
-    if not cameras:
+    if library_file() is None:
         pytest.skip(f"no copy of rawtoaces-data here; rodcone new cameras COPY -o FOLDER, then {VARIABLE}=FOLDER")
     assert len(cameras) >= 51
     nm = np.arange(380.0, 781.0, 1.0)

@@ -11,6 +11,7 @@ from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.kernel.kernel import read_frame
 from sensor.presets import low_noise, preset
+from sensor.random import poisson
 from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.readings.noise import covariances, of_reading, seams, shares, whole_share
 from sensor.readout import draw_frame, noise_variance
@@ -78,6 +79,23 @@ def test_a_frame_depends_on_its_key_alone_and_both_engines_agree_in_the_mean():
         one, other = (expose(light, sensor, TIME_S, device, np.random.default_rng(5), exact=exact) for _ in range(2))
         np.testing.assert_array_equal(one.dn, other.dn)
         assert one.dn.dtype == np.float32
+
+
+def test_two_readings_of_one_charge_see_the_same_electrons_beside_a_lamp():
+    """A lamp over every well stands in each row: of one key, what both wells hold is the same number beyond it."""
+    sensor = preset("dual_gain")
+    sensor = replace(sensor, pixel=replace(sensor.pixel, prnu=0.0, dark_current_e_per_s=0.0))
+    light = np.full((64, 64), 300.0)
+    light[:, ::8] = np.geomspace(1e3, 1e9, 8)
+    chip, seen = draw_device(sensor, light.shape, np.random.default_rng(1)), []
+
+    def drawn(key, term, mean_e):
+        seen.append(poisson(key, term, mean_e))
+        return seen[-1]
+
+    for number in range(2):
+        draw_frame(light, of_reading(sensor, number), chip.readings[number], 0.01, 7, number, drawn)
+    assert np.array_equal(*seen)
 
 
 def test_whole_numbers_of_electrons_are_light_like_any_other():

@@ -308,6 +308,26 @@ def test_saturated_pixels_are_left_out() -> None:
     assert ledger(all_full, 40, 128, frozenset(LENS_TERMS)).share == 0.0
 
 
+def test_a_lens_that_undershoots_beside_a_lamp_leaves_every_term_a_number() -> None:
+    """A lamp in the dark: what diffraction takes below 0 has no light, no noise of it and no jitter."""
+    planes = np.zeros((40, *SIZE))
+    planes[::2, 12, 12], planes[1::2, 12, 12] = 0.5, 1.0
+    sensor = low_noise()
+    some = found(transport(planes, noise=0.02), counts=(20, 40), diffraction=1.0)
+    assert (some.full.mean(axis=0) < 0).any()
+    row = weigh(CONDITION, "rgbw", sensor, some, 1e-3, 0.01, QUIET)
+    kept = 1e-5 * np.maximum(some.full.mean(axis=0), 0.0)
+    assert row.noise_variance == pytest.approx(
+        noise_variance(kept, sensor, 0.01)[kept < sensor.pixel.full_well_e].mean()
+    )
+    assert np.isfinite([row.kernel, row.level, *row.jitter.values(), *row.lens.values()]).all()
+    sharp = 1e-5 * (some.full + some.lens["diffraction"]).mean(axis=0)[12, 12]  # the lamp's electrons, all in one pixel
+    relative = 1e-10 * some.sharp[0, 12, 12] ** 2 * 128 / sharp**2 + 1 / 16
+    values = np.zeros(planes[0].size)
+    values[0] = 1e-10 * some.bands[20].jitter[12, 12] * relative
+    assert row.jitter[20] == pytest.approx(values.mean() + NOISE_MARGIN * values.std() / values.size**0.5, rel=1e-3)
+
+
 def weighed(condition=CONDITION, mosaic="rgbw", noise_variance=100.0, paths=10.0, **lens) -> Weighed:
     """Errors in electrons beside 10 e- of noise; bands miss 4, 1.5, 0.5 and 0 e-."""
     bands = {4: (3.0, 1.0), 12: (1.0, 0.5), 20: (0.4, 0.1), 40: (0.0, 0.0)}

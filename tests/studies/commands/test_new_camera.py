@@ -60,6 +60,23 @@ def test_a_measured_camera_is_listed_and_becomes_a_preset(tmp_path, capsys):
     assert [rows[0]["relative"] for rows in found.values()] == [True, False]
 
 
+@pytest.mark.filterwarnings("default::sensor.curves.RelativeResponsesWarning")
+def test_a_fresh_installation_has_a_measured_camera(tmp_path, capsys, monkeypatch):
+    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.setattr("sensor.cameras.library._SHIPPED", tmp_path)
+    listed = json.loads(call(capsys, "list", "sensors", "--json")[1])["sensors"]
+    assert "each channel by itself: Darrodi" in listed["Nikon D5100"]
+    path = tmp_path / "mine.toml"
+    assert call(capsys, "new", "preset", "low_noise", "--camera", "Nikon D5100", "-o", path) == (0, f"{path}\n", "")
+    assert "BSD-3-Clause" in path.read_text("utf-8")
+    assert "their ratios aren't known" in path.read_text("utf-8")
+    assert call(capsys, "snr", path)[0] == 0
+    code, _, err = call(capsys, "snr", "nikon d5100")  # it is listed beside the presets
+    assert code != 0
+    assert "a measured response without a pixel; allowed" in err
+    assert err.count("\n") == 1
+
+
 @pytest.mark.usefixtures("cameras")
 def test_the_gallery_draws_each_measured_camera(tmp_path, capsys, monkeypatch):
     path = tmp_path / "cameras.svg"
@@ -69,6 +86,7 @@ def test_the_gallery_draws_each_measured_camera(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("sensor.cameras.library._SHIPPED", tmp_path)
     assert call(capsys, "list", "sensors", "-o", path)[0] == 0
     assert "Maker Model One" not in path.read_text("utf-8")
+    assert "Nikon D5100*" in path.read_text("utf-8")
 
 
 @pytest.mark.usefixtures("cameras")

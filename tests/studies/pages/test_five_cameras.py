@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import sweep_sample as SAMPLE
 
@@ -10,8 +11,9 @@ from rodcone.errors import InputError
 from sensor.cameras.emva_report import numbers_of, read_report
 from sensor.cameras.numbers import completed, curves_csv, lent_curves, missing, preset_text
 from sensor.presets import low_noise, preset_file
-from studies.pages.five_cameras import main, write_page
+from studies.pages.five_cameras import _entry, main, sensors_table, write_page
 from studies.pages.real_cameras import REPORTS
+from studies.study.equal_area import EqualArea
 from studies.study.study_file import read_study
 from studies.sweep.database import LastRun
 from studies.sweep.row import Row
@@ -54,7 +56,11 @@ def run(**changes: object) -> LastRun:
 
 def plain(path: Path) -> str:
     """Text of a page with plain spaces and signs."""
-    return path.read_text("utf-8").translate({0xA0: " ", 0x202F: " ", 0x2212: "-"})
+    return plain_text(path.read_text("utf-8"))
+
+
+def plain_text(text: str) -> str:
+    return text.translate({0xA0: " ", 0x202F: " ", 0x2212: "-"})
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -90,6 +96,20 @@ def test_sensors_stand_beside_each_other_each_with_its_own_mosaic(tmp_path: Path
     # 100 um at 6.9 and at 2.2 um
     assert f"`{REAL}`: {read_report(REPORTS / FILES[0].name).camera} | 6.9 | 14 |" in text
     assert "| `table1_output` | 2.2 | 45 | (76.2 % at 530 nm" in text
+    assert "*Drawn*" not in text  # the study has no drawn scene
+
+
+def test_the_quantum_efficiency_is_the_simulated_one_and_the_published_stands_beside_it_where_it_differs() -> None:
+    entries = [_entry(str(CONFIGS / path)) for path in FILES]
+    rows = plain_text(sensors_table(entries, EqualArea(883.2, 6.9))).splitlines()[2:]
+    for entry, row in zip(entries, rows, strict=True):
+        told = read_report(REPORTS / f"{entry.name}.toml").figures
+        white = entry.sensor.responses.curves["W"]
+        simulated = 100 * np.interp(told["lambda_nm"], white.wavelength_nm, white.values)
+        cell = row.split(" | ")[3]
+        assert cell.startswith(f"{simulated:.1f} % at {told['lambda_nm']:g} nm")
+        assert ("published" in cell) == entry.name.startswith("framos")  # whose curve ends at 1 electron a photon
+    assert "86.5 % at 536 nm; published: 91.25 %" in rows[-1]
 
 
 def test_the_closed_form_stands_beside_the_simulated_field(tmp_path: Path) -> None:

@@ -41,6 +41,8 @@ def test_scenes_that_were_drawn_stand_apart() -> None:
     drawn = [line for line in table if "1 drawn" in line]
     assert named[0].endswith("| +2.0 ± 0.3 | −1.0 ± 0.3 |")
     assert drawn[0].endswith("| +6.0 ± 0.3 | +3.0 ± 0.3 |")
+    assert "*Drawn* scenes" in parts[1]
+    assert "*Drawn* scenes" not in white_pixel_tables(contests_of(made(scenes=("still_life",))))[1]
 
 
 def test_lights_stand_apart() -> None:
