@@ -14,7 +14,7 @@ from threadpoolctl import ThreadpoolController
 
 from isp.ple.pick import BLOCK, blocks, pick
 from isp.ple.prior import PATCH, Prior
-from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, window
+from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, taper, window
 
 STRIDE = 2  # pixels from patch to patch: one tile
 STRIP = 100_000  # patches that are estimated together
@@ -238,23 +238,30 @@ def _overlapped(found: Patches, shape: tuple[int, int], size: int) -> tuple[Sing
     """Sums over overlapping patches: values and weights by pixel, variances and weights by cells of 2x2 pixels."""
     (ny, nx), across = shape, size // STRIDE
     total = np.zeros(((ny - 1) * STRIDE + size, nx - 1 + across, 4 * STRIDE), np.float32)
-    weight = np.zeros((len(total), nx - 1 + across, STRIDE), np.float32)
-    cells = np.zeros((ny - 1 + across, nx - 1 + across), np.float32)
-    variance = np.zeros((*cells.shape, 4), np.float32)
-    values = found.values.reshape(ny, nx, size, across, 4 * STRIDE)
-    each, inner = found.weight.reshape(ny, nx), (found.inner * found.weight[:, None]).reshape(ny, nx, 4)
-    taper = window(size).reshape(size, across, STRIDE)
-    # Some rows of patches at once, so that values are read once.
-    together = max(1, 8 * BLOCK // nx)
+    values = found.values.reshape(ny, nx, size, -1)
+    # Some rows of patches at once, so that values are read once. In a row patches that don't overlap, so that a sum
+    # runs over a patch's width.
+    together = max(1, 4 * BLOCK // nx)
     for first in range(0, ny, together):
         some = slice(first, min(first + together, ny))
         for i in range(size):
-            rows = slice(first * STRIDE + i, (some.stop - 1) * STRIDE + i + 1, STRIDE)
-            for j in range(across):
-                total[rows, j : j + nx] += values[some, :, i, j]
-                weight[rows, j : j + nx] += each[some, :, None] * taper[i, j]
+            rows = total[first * STRIDE + i : (some.stop - 1) * STRIDE + i + 1 : STRIDE]
+            for j in range(min(across, nx)):
+                part = values[some, j::across, i]
+                line = rows[:, j : j + part.shape[1] * across].reshape(part.shape)  # a view: `total` takes the sum
+                line += part
+    # Weights and variances are products of two lines: summed across, then down.
+    inner = np.concatenate([found.inner, np.ones((ny * nx, 1), np.float32)], axis=1)
+    inner = (inner * found.weight[:, None]).reshape(ny, nx, 5)
+    each, sides = inner[..., 4:], taper(size).reshape(across, STRIDE)
+    weight, cells = (np.zeros((ny, nx - 1 + across, width), np.float32) for width in (STRIDE, 5))
+    for j in range(across):
+        weight[:, j : j + nx] += each * sides[j]
+        cells[:, j : j + nx] += inner
+    weights = np.zeros((len(total), nx - 1 + across, STRIDE), np.float32)
+    sums = np.zeros((ny - 1 + across, nx - 1 + across, 5), np.float32)
     for i in range(across):
-        for j in range(across):
-            cells[i : i + ny, j : j + nx] += each
-            variance[i : i + ny, j : j + nx] += inner
-    return total.reshape(len(total), -1, 4), weight.reshape(len(total), -1), variance, cells
+        sums[i : i + ny] += cells
+        for side in range(STRIDE):
+            weights[STRIDE * i + side :: STRIDE][:ny] += weight * sides[i, side]
+    return total.reshape(len(total), -1, 4), weights.reshape(len(total), -1), sums[..., :4], sums[..., 4]

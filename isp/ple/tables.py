@@ -110,10 +110,14 @@ def unlift(stable: NDArray[Any], dark_e: float) -> Doubles:
     return np.asarray(plain + 0.25 * ratio + share * skew)
 
 
+def taper(size: int) -> Singles:
+    """How much each line of a patch's pixels counts where patches overlap: its edges are less sure."""
+    return np.asarray(np.sin(np.pi * (np.arange(size) + 0.5) / size) ** TAPER, dtype=np.float32)
+
+
 def window(size: int) -> Singles:
-    """How much each pixel of a patch counts where patches overlap, shape (size, size): its edges are less sure."""
-    line = np.sin(np.pi * (np.arange(size) + 0.5) / size) ** TAPER
-    return np.outer(line, line).astype(np.float32)
+    """How much each pixel of a patch counts where patches overlap, shape (size, size)."""
+    return np.outer(taper(size), taper(size))
 
 
 class Table:
