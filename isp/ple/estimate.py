@@ -210,27 +210,29 @@ def _solve_one_light(at: Table, y: Singles, pilot: PatchPilot | None, index: NDA
         noise = (INFLATE * pilot.variance + at.pilot_floor) / (PILOT_VARIANCE + at.pilot_floor)
         told.append(pilot.means)
     known = np.concatenate(told, axis=1)
-    chosen, misfit, innovation = pick(at, known, noise)
-    known[:, y.shape[1] + 1 :] = innovation
+    chosen, misfit = pick(at, known, noise)
     taken, values = (np.empty((BLOCK, width), np.float32) for width in (known.shape[1], found.values.shape[1]))
     order = np.argsort(chosen, kind="stable")
     bounds = np.flatnonzero(np.diff(chosen[order], prepend=-1, append=-1))
     for first, last in pairwise(bounds.tolist()):
-        by = at.estimator(int(chosen[order[first]]))
+        k = int(chosen[order[first]])
+        by = at.estimator(k)
         linear = by.linear[: known.shape[1]]
         for some in blocks(order[first:last]):
             variance, inner = by.variance, by.inner
+            own = np.take(known, some, axis=0, out=taken[: some.size], mode="clip")
             if noise is not None:
-                sure = 1.0 / (noise[some, None] + at.spread[chosen[some[0]]])
+                sure = 1.0 / (noise[some, None] + at.spread[k])
                 variance, inner = by.variance - sure @ by.pilot_variance, by.inner - sure @ by.pilot_inner
+                # The pilot's innovation over its variance stands for its means.
+                own[:, -4:] = own @ at.reads[k][:, -4:] * sure
             # A patch that no component explains knows its pixels by as much less.
             doubt = np.maximum(misfit[some], 1.0) ** DOUBT
             place, weight = index[some], 1.0 / (doubt * (variance.mean(axis=-1) + LEAST_VARIANCE))
             found.weight[place] = weight
             found.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
             found.noise[place] = variance * (by.noise / by.variance)
-            np.take(known, some, axis=0, out=taken[: some.size], mode="clip")
-            product = np.matmul(taken[: some.size], linear, out=values[: some.size])
+            product = np.matmul(own, linear, out=values[: some.size])
             found.values[place] = np.multiply(product, found.weight[place, None], out=product)
 
 

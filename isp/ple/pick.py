@@ -11,7 +11,7 @@ BLOCK = 1024  # patches whose numbers stay in a core's cache
 MOST = 24  # components that a patch is held against, of the likeliest in a few directions
 
 
-def pick(at: Table, known: Singles, noise: Singles | None) -> tuple[NDArray[np.int32], Singles, Singles]:
+def pick(at: Table, known: Singles, noise: Singles | None) -> tuple[NDArray[np.int32], Singles]:
     """Pick each patch's likeliest component.
 
     Parameters
@@ -28,32 +28,27 @@ def pick(at: Table, known: Singles, noise: Singles | None) -> tuple[NDArray[np.i
         The component.
     (patch,) float32
         Its misfit: squared whitened samples over their number, 1 in the mean of patches that it explains.
-    (patch, 0 or 4) float32
-        The pilot's innovation in its four directions, over its variance.
     """
     count, size = len(known), len(at.centre)
     best, chosen = np.full(count, -np.inf, np.float32), np.zeros(count, np.int32)
     misfit = np.empty(count, np.float32)
-    innovation = np.zeros((count, known.shape[1] - size - 1), np.float32)
+    width = size if noise is None else size + 4
     # Arrays are made once: fresh memory costs as much as the sums.
-    taken = np.empty((BLOCK, known.shape[1]), np.float32)
-    reads = np.empty((BLOCK, size + innovation.shape[1]), np.float32)
+    taken, reads = (np.empty((BLOCK, each), np.float32) for each in (known.shape[1], width))
     candidates = _candidates(at, known[:, :size])
     for k, some in ((k, some) for k, row in enumerate(candidates) for some in blocks(np.flatnonzero(row))):
         np.take(known, some, axis=0, out=taken[: some.size], mode="clip")
-        read = np.matmul(taken[: some.size], at.reads[k][: known.shape[1], : reads.shape[1]], out=reads[: some.size])
-        square = np.einsum("ij,ij->i", read[:, :size], read[:, :size])
+        read = np.matmul(taken[: some.size], at.reads[k][: known.shape[1], :width], out=reads[: some.size])
+        square = np.vecdot(read[:, :size], read[:, :size])
         likelihood = at.log_scale[k] - 0.5 * square
         if noise is not None:
-            news, spread = read[:, size:], noise[some, None] + at.spread[k].astype(np.float32)
-            over = news / spread
-            likelihood -= 0.5 * (np.log(spread.prod(axis=1)) + np.einsum("ij,ij->i", news, over))
+            # A row a direction, for sums along them.
+            news, spread = read[:, size:].T.copy(), noise[some] + at.spread[k, :, None].astype(np.float32)
+            likelihood -= 0.5 * (np.log(spread.prod(axis=0)) + (news * news / spread).sum(axis=0))
         better = likelihood > best[some]
         winners = some[better]
         best[winners], chosen[winners], misfit[winners] = likelihood[better], k, square[better] / size
-        if noise is not None:
-            innovation[winners] = over[better]
-    return chosen, misfit, innovation
+    return chosen, misfit
 
 
 def blocks(index: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
