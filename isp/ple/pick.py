@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from isp.ple.tables import Singles, Table
 
-BLOCK = 1024  # patches whose numbers stay in a core's cache
+BLOCK = 1000  # patches whose numbers stay in a core's cache; lines a power of two apart would share its places
 MOST = 24  # components that a patch is held against, of the likeliest in a few directions
 
 
@@ -64,7 +64,7 @@ def _candidates(at: Table, y: Singles) -> NDArray[np.bool_]:
     held = np.empty((at.quick.shape[1], BLOCK), np.float32)
     for first in range(0, len(y), BLOCK):
         off = y[first : first + BLOCK] - at.centre
-        told = (off @ at.few).T
+        told = np.ascontiguousarray((off @ at.few).T)
         features = held[:, : len(off)]
         for i, start in enumerate(starts[:-1]):
             np.multiply(told[i], told[i:], out=features[start : starts[i + 1]])
