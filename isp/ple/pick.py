@@ -73,7 +73,8 @@ def _candidates(at: Table, y: Singles) -> NDArray[np.bool_]:
         features[-1] = 1.0
         quick[:, first : first + BLOCK] = at.quick @ features
     candidates = np.asarray(quick > quick.max(axis=0) - at.margin)
-    crowded = np.flatnonzero(candidates.sum(axis=0) > MOST)
-    last = np.partition(quick[:, crowded], len(quick) - MOST, axis=0)[-MOST]
-    candidates[:, crowded] &= quick[:, crowded] >= last
+    crowded = np.flatnonzero(candidates.sum(axis=0, dtype=np.int8) > MOST)
+    least = np.full(len(y), -np.inf, np.float32)
+    least[crowded] = np.partition(quick[:, crowded], len(quick) - MOST, axis=0)[-MOST]
+    candidates &= quick >= least
     return candidates
