@@ -11,7 +11,7 @@ BLOCK = 1000  # patches whose numbers stay in a core's cache; lines a power of t
 MOST = 24  # components that a patch is held against, of the likeliest in a few directions
 
 
-def pick(at: Table, known: Singles, noise: Singles | None) -> tuple[NDArray[np.int32], Singles]:
+def pick(at: Table, known: Singles, noise: Singles | None) -> tuple[NDArray[np.int16], Singles]:
     """Pick each patch's likeliest component.
 
     Parameters
@@ -24,13 +24,13 @@ def pick(at: Table, known: Singles, noise: Singles | None) -> tuple[NDArray[np.i
 
     Returns
     -------
-    (patch,) int32
+    (patch,) int16
         The component.
     (patch,) float32
         Its misfit: squared whitened samples over their number, 1 in the mean of patches that it explains.
     """
     count, size = len(known), len(at.centre)
-    best, chosen = np.full(count, -np.inf, np.float32), np.zeros(count, np.int32)
+    best, chosen = np.full(count, -np.inf, np.float32), np.zeros(count, np.int16)
     misfit = np.empty(count, np.float32)
     width = size if noise is None else size + 4
     # Arrays are made once: fresh memory costs as much as the sums.
