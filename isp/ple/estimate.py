@@ -253,7 +253,7 @@ def _overlapped(found: Patches, shape: tuple[int, int], size: int) -> tuple[Sing
                 part = values[some, j::across, i]
                 line = rows[:, j : j + part.shape[1] * across].reshape(part.shape)  # a view: `total` takes the sum
                 line += part
-    # Weights and variances are products of two lines: summed across, then down.
+    # The window is a product of two lines: weights are summed across, then down, and so are the cells.
     inner = np.concatenate([found.inner, np.ones((ny * nx, 1), np.float32)], axis=1)
     inner = (inner * found.weight[:, None]).reshape(ny, nx, 5)
     each, sides = inner[..., 4:], taper(size).reshape(across, STRIDE)
