@@ -175,13 +175,14 @@ class Table:
         centre = weights @ at
         off = at - centre
         pooled = np.tensordot(weights, seen, 1) + (off.T * weights) @ off
-        few = np.linalg.eigh(pooled)[1][:, ::-1][:, :FEW]
+        count = min(FEW, seen.shape[1] - 1)
+        few = np.linalg.eigh(pooled)[1][:, ::-1][:, :count]
         mean, within = off @ few, few.T @ seen @ few
         inverse = np.linalg.inv(within)
-        others = seen.shape[1] - FEW
+        others = seen.shape[1] - count
         total = np.trace(seen, axis1=1, axis2=2) + (off**2).sum(axis=1)
-        outside = (total - np.trace(within, axis1=1, axis2=2) - (mean**2).sum(axis=1)) / max(others, 1)
-        pairs = np.triu_indices(FEW)
+        outside = (total - np.trace(within, axis1=1, axis2=2) - (mean**2).sum(axis=1)) / others
+        pairs = np.triu_indices(count)
         square = -0.5 * inverse[:, pairs[0], pairs[1]] * np.where(pairs[0] == pairs[1], 1.0, 2.0)
         straight = np.einsum("kij,kj->ki", inverse, mean)
         constant = self.mix.log_weights - 0.5 * (
