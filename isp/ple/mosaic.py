@@ -87,7 +87,7 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
     counts[list(index)], whole[list(index)] = least, 4 * found.mean(axis=(0, 1))
     finest = _cell_sampling(raw, white_e, counts, found > 0, index)
     levels = [Cells(sums[0], fulls[0], found > 0, finest, index)]
-    sums, fulls = (sums[0], fulls[0]) if len(sums) == 1 else (sums.sum(axis=0), fulls.any(axis=0))
+    sums, fulls = (sums[0], fulls[0]) if len(sums) == 1 else (sums.sum(axis=0), np.asarray(fulls.any(axis=0)))
     every = np.ones((1, 1, len(names)), bool)
     while len(levels) < SCALES and min(sums.shape[:2]) // 2 >= LEAST_CELLS:
         height, width = (length // 2 for length in sums.shape[:2])
