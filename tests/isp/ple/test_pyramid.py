@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from builders import raw_image
 
-from isp.ple import estimate, pyramid
-from isp.ple.prior import LETTERS, own_prior
+from isp.ple import estimate, mosaic, pyramid
+from isp.ple.prior import LETTERS, PATCH, own_prior
 from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map, channels
 from sensor.raw import RawImage
 
 FULL_E, NOISE_E = 15_000.0, 1.5
 RGBW_4X4, QUAD_BAYER, QUAD_RGBW = (MOSAICS[name] for name in ("rgbw_4x4", "quad_bayer", "quad_rgbw"))
 UNEVEN = ("WWWW", "WWWW", "WWWR", "WWGB")  # four Ws in one cell of 2x2, one in another
+TILES = [RGBW, BAYER, RGBW_4X4, QUAD_BAYER, QUAD_RGBW, UNEVEN, ("W",), ("RGBW", "WBGR")]
 
 
 def reconstruct(raw):
@@ -32,7 +33,7 @@ def grey(level_e, tile, shape=(96, 96)):
     return np.broadcast_to(level_e, shape) * share
 
 
-@pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4, QUAD_BAYER, QUAD_RGBW, UNEVEN, ("W",), ("RGBW", "WBGR")])
+@pytest.mark.parametrize("tile", TILES)
 @pytest.mark.parametrize("level_e", [0.01, 0.3, 10.0, 300.0, 10_000.0])
 def test_a_flat_field_keeps_its_mean(tile, level_e):
     # at 10 000 e- W is full, and nothing is asked of it
@@ -98,6 +99,28 @@ def test_any_size_of_frame_will_do(tile, shape):
     planes, _ = reconstruct(raw_image(np.full(shape, 600), tile))
     assert planes.shape == (*shape, 4)
     assert np.isfinite(planes).all()
+
+
+@pytest.mark.parametrize("tile", TILES)
+@pytest.mark.parametrize(("stride", "size"), [(1, PATCH), (2, mosaic.CELLS)])
+def test_a_patchs_own_light_is_the_frames_up_to_its_border_and_varies_as_stated(tile, stride, size):
+    level_e, shape, white_e = 50.0, (61, 54), own_prior().neutral_e
+    means = []
+    for raw in (
+        replace(exposure(np.ones(shape), tile, np.random.default_rng(1)), dn=200 + grey(level_e, tile, shape)),
+        *(exposure(grey(level_e, tile, shape), tile, np.random.default_rng(seed)) for seed in range(40)),
+    ):
+        cells = mosaic.pyramid(raw, white_e, raw.electrons.astype(np.float32), np.zeros(shape, bool))[0]
+        sides = pyramid._sides(shape, cells.full.shape, PATCH)
+        sides = sides if size == PATCH else [estimate.border(length, size) for length in cells.full.shape[:2]]
+        light = pyramid._own_light(cells, sides, stride)
+        means.append(light.mean)
+    assert means[0] == pytest.approx(np.full(means[0].shape, level_e), rel=1e-5)
+    inside = (slice(4, -4), slice(4, -4))
+    stated = (light.shot * level_e + light.floor)[inside].mean()
+    # patches overlap: one in sixteen is counted, in 40 frames
+    draws = 40 * means[0][inside].size / 16
+    assert np.var(means[1:], axis=0)[inside].mean() * 40 / 39 == pytest.approx(stated, rel=4.5 * np.sqrt(2 / draws))
 
 
 @pytest.mark.parametrize("tile", [RGBW, BAYER])

@@ -128,3 +128,9 @@ def test_other_curves_of_a_quad_mosaic_are_warned_of():
     raw = grey(MOSAICS["quad_rgbw"], np.full((16, 16), 1000.0))
     with pytest.warns(UserWarning, match=r"^curves: a neutral reads .* in RGBW, .*`rodcone train`$"):
         PROCESSORS["ple"].develop(raw, np.eye(3), neutral=neutral)
+
+
+def test_one_channel_tells_nothing_of_the_light():
+    raw = grey(("W",), np.geomspace(1, 2000, 30) * np.ones((25, 1)))
+    pictures = [PROCESSORS["ple"].develop(raw, np.eye(3), neutral=neutral).rgb for neutral in ([3.0], None)]
+    assert np.array_equal(*pictures)
