@@ -68,11 +68,12 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
     down, across = (lcm(side, 2) // 2 for side in (len(raw.cfa), len(raw.cfa[0])))
     letters = channel_map(raw.cfa, (2 * down, 2 * across)).reshape(down, 2, across, 2)
     found = np.stack([(letters == name).sum(axis=(1, 3)) for name in names], axis=-1)
-    # Where some cells hold more samples of a channel than others, the finest scale leaves those out.
+    # The finest cells. Where some hold more samples of a channel than others, those are left out here.
     least = np.where(found > 0, found, 4).min(axis=(0, 1))
     height, width = (length // 2 for length in raw.shape)
     shape = (1 + int(np.any(found > least)), height, width, len(names))
-    sums, fulls = np.zeros(shape, np.float32), np.zeros(shape, bool)
+    sums: Singles = np.zeros(shape, np.float32)
+    fulls: NDArray[np.bool_] = np.zeros(shape, bool)
     for (a, b), (c, name) in product(np.ndindex(down, across), enumerate(names)):
         sites = [
             (slice(2 * a + i, 2 * height, 2 * down), slice(2 * b + j, 2 * width, 2 * across))
@@ -88,11 +89,13 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
     finest = _cell_sampling(raw, white_e, counts, found > 0, index)
     levels = [Cells(sums[0], fulls[0], found > 0, finest, index)]
     sums, fulls = (sums[0], fulls[0]) if len(sums) == 1 else (sums.sum(axis=0), np.asarray(fulls.any(axis=0)))
+    # Larger cells hold every channel, and all of its samples.
     every = np.ones((1, 1, len(names)), bool)
     while len(levels) < SCALES and min(sums.shape[:2]) // 2 >= LEAST_CELLS:
         height, width = (length // 2 for length in sums.shape[:2])
-        sums, fulls = (a[: 2 * height, : 2 * width].reshape(height, 2, width, 2, -1) for a in (sums, fulls))
-        sums, fulls = sums.sum(axis=(1, 3)), np.asarray(fulls.any(axis=(1, 3)))
+        fours = (height, 2, width, 2, len(names))
+        sums = sums[: 2 * height, : 2 * width].reshape(fours).sum(axis=(1, 3))
+        fulls = np.asarray(fulls[: 2 * height, : 2 * width].reshape(fours).any(axis=(1, 3)))
         levels.append(Cells(sums, fulls, every, _cell_sampling(raw, white_e, whole, every, index), index))
         whole = np.where(np.isin(np.arange(4), index), 4 * whole, whole)
     return levels

@@ -32,8 +32,8 @@ LIFT = 2.0
 _LEAST_BASE = 1e-12
 FEW = 20  # directions in which components are told apart first
 MARGINS = (5.0, 15.0)  # of that log likelihood: where the other directions are noise, and where they are all signal
-# Tables that are kept, all of a 4x4 tile over six decades of light: 1.3 MB each, and 70 kB for each of its estimators of
-# 8x8 pixels that was asked for.
+# Tables that are kept, all of a 4x4 tile over six decades of light: 1.3 MB each, and 70 kB for each of its estimators
+# of 8x8 pixels that was asked for.
 _TABLES = 512
 
 
