@@ -59,7 +59,9 @@ def _coloured(raw: RawImage, result: Reconstruction, colours: ColourFit, balance
     planes = np.asarray(result.estimate, dtype=np.float64)
     gains, sources = balance.gains(raw, planes)
     balanced = clip_highlights(raw, planes * gains)
-    noise = relative_noise(raw, planes, result.noise_gain, gains, colours) * COLOUR_ERROR
+    noise = np.zeros(len(gains))
+    if colours.plain is None:
+        noise = relative_noise(raw, planes, result.noise_gain, gains, colours) * COLOUR_ERROR
     return Picture(rgb_of_channels(raw, balanced, colours, noise), sources, engine=result.engine)
 
 

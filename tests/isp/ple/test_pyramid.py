@@ -133,7 +133,7 @@ def test_a_tile_written_twice_is_the_same_mosaic(tile, times):
         assert np.array_equal(once, again)
 
 
-@pytest.mark.parametrize("shift", [(0, 1), (1, 0), (1, 1), (2, 3)])
+@pytest.mark.parametrize("shift", [(1, 0), (2, 3)])
 def test_a_4x4_mosaic_that_begins_elsewhere_gives_as_good_a_picture(shift):
     # the same samples, less the first rows and columns: patches and cells fall on other phases
     level_e = np.geomspace(20, 500, 67) * (1 + 0.5 * np.sin(np.arange(67)[:, None] / 3))
