@@ -16,13 +16,37 @@ from isp.ple.pick import BLOCK, blocks, pick
 from isp.ple.prior import PATCH, Prior
 from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, taper, window
 
-STRIDE = 2  # pixels from patch to patch: one tile
+STRIDE = 2  # pixels from patch to patch
 STRIP = 100_000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons
 COARSE_STEPS = 2  # of light from table to table where a scale only tells the finer one
 DOUBT = 2.0
 INFLATE = 2.0
 LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of noise^2]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Samples of one scale.
+
+    Attributes
+    ----------
+    shape : (h, w)
+    samples : (h + border, w + border) or (h + border, w + border, channel) float32
+        In units of noise, continued beyond the frame by `border`.
+    full : like `samples`, bool
+        W's saturated samples: only lower bounds.
+    samplings : tuple of tuple of Sampling
+        Of the first patches' rows and columns; those of the others repeat them.
+    columns : (sample,) intp or None
+        Which numbers of a patch are samples, in the order of the samplings' rows; None: all.
+    """
+
+    shape: tuple[int, int]
+    samples: Singles
+    full: NDArray[np.bool_]
+    samplings: tuple[tuple[Sampling, ...], ...]
+    columns: NDArray[np.intp] | None = None
 
 
 @dataclass(frozen=True)
@@ -81,44 +105,35 @@ def padded(samples: NDArray[Any], size: int) -> NDArray[Any]:
     return np.pad(samples, sides + [(0, 0)] * (samples.ndim - 2), mode="reflect")
 
 
-def estimate(
-    prior: Prior,
-    sampling: Sampling,
-    samples: Singles,
-    full: NDArray[np.bool_],
-    light: Singles,
-    pilot: PatchPilot | None,
-) -> ScaleEstimate:
+def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | None) -> ScaleEstimate:
     """Estimate every channel at every pixel of one scale.
 
     Parameters
     ----------
     prior : Prior
-    sampling : Sampling
-    samples : (h, w) or (h, w, channel) float32
-        In units of noise.
-    full : like `samples`, bool
-        W's saturated samples: only lower bounds.
+    scale : Scale
     light : (ny, nx) float32
         Of each patch [e- of white in G].
     pilot : PatchPilot or None
     """
-    size = sampling.size
-    shape, (ny, nx) = samples.shape[:2], light.shape
+    size = scale.samplings[0][0].size
+    shape, (ny, nx) = scale.shape, light.shape
     coarse = 1 if size == PATCH else COARSE_STEPS
     steps = np.round(np.log(np.maximum(light, LEAST_LIGHT)) / np.log(STEP) / coarse).astype(np.int16) * coarse
-    wide, wide_full = padded(samples, size), padded(full, size)
     rows = max(1, STRIP // nx)
 
     def strip(first: int) -> tuple[Singles, ...]:
         last = min(first + rows, ny)
         part = slice(first * STRIDE, (last - 1) * STRIDE + size)
-        y = _windows(wide[part], size)
-        hit = _windows(wide_full[part], size) if wide_full[part].any() else np.zeros((len(y), 1), bool)
+        y, full = _windows(scale.samples[part], size), scale.full[part]
+        hit = _windows(full, size) if full.any() else np.zeros((len(y), 1), bool)
+        if scale.columns is not None:
+            y, hit = y[:, scale.columns], hit[:, scale.columns] if full.any() else hit
         told = None
         if pilot is not None:
             told = PatchPilot(pilot.means[first:last].reshape(-1, 4), pilot.variance[first:last].ravel())
-        found = _solve(prior, sampling, y, hit, steps[first:last].ravel(), told)
+        groups = _by_sampling(scale.samplings, range(first, last), nx)
+        found = _solve(prior, groups, y, hit, steps[first:last].ravel(), told)
         return *_overlapped(found, (last - first, nx), size), found.noise
 
     # Sums run strip by strip, whatever the threads.
@@ -161,28 +176,41 @@ def _windows(values: NDArray[Any], size: int) -> NDArray[Any]:
     return view.reshape(view.shape[0] * view.shape[1], -1)
 
 
+def _by_sampling(
+    samplings: tuple[tuple[Sampling, ...], ...], rows: range, nx: int
+) -> list[tuple[Sampling, NDArray[np.intp]]]:
+    """Each sampling, and which patches of these rows have it."""
+    distinct = list(dict.fromkeys(sampling for line in samplings for sampling in line))
+    numbers = np.array([[distinct.index(sampling) for sampling in line] for line in samplings])
+    each = numbers[np.array(rows)[:, None] % len(samplings), np.arange(nx) % len(samplings[0])].ravel()
+    return [(sampling, np.flatnonzero(each == number)) for number, sampling in enumerate(distinct)]
+
+
 def _solve(
     prior: Prior,
-    sampling: Sampling,
+    groups: list[tuple[Sampling, NDArray[np.intp]]],
     y: Singles,
     full: NDArray[np.bool_],
     steps: NDArray[np.int16],
     pilot: PatchPilot | None,
 ) -> Patches:
     """Estimate patches by light; where Ws are full, first without any W, then with what that says of the full ones."""
-    count, values = len(y), 4 * sampling.size**2
+    count, values = len(y), 4 * groups[0][0].size ** 2
     found = Patches(*(np.empty((count, *shape), np.float32) for shape in ((values,), (), (4,), (4,))))
-    hit = full.any(axis=1)
+    hit = np.asarray(full.any(axis=1))
     if hit.any():
-        rows = np.array(sampling.rows)
-        kept = rows % 4 != 3
-        blind = Sampling(sampling.size, tuple(rows[kept].tolist()), sampling.gains, sampling.dark_e, sampling.prnu)
-        some = np.flatnonzero(hit)
-        _solve_by_light(prior, blind, y[:, kept], steps, pilot, some, found)
-        guess = found.values[np.ix_(some, rows)] / (window(sampling.size).ravel()[rows // 4] * found.weight[some, None])
         y = y.copy()
-        y[some] = np.where(full[some], np.maximum(y[some], guess), y[some])
-    _solve_by_light(prior, sampling, y, steps, pilot, np.arange(count), found)
+    for sampling, among in groups:
+        some = among[hit[among]]
+        if some.size:
+            rows = np.array(sampling.rows)
+            kept = rows % 4 != 3
+            blind = Sampling(sampling.size, tuple(rows[kept].tolist()), sampling.gains, sampling.dark_e, sampling.prnu)
+            _solve_by_light(prior, blind, y[:, kept], steps, pilot, some, found)
+            weight = window(sampling.size).ravel()[rows // 4] * found.weight[some, None]
+            guess = found.values[np.ix_(some, rows)] / weight
+            y[some] = np.where(full[some], np.maximum(y[some], guess), y[some])
+        _solve_by_light(prior, sampling, y, steps, pilot, among, found)
     return found
 
 

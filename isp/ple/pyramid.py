@@ -4,45 +4,20 @@ In the dark a patch of 8x8 pixels holds too little light to say what it shows. S
 means over larger patches; the finer scale takes them as further samples with a known error.
 """
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from isp.ple.estimate import STRIDE, PatchPilot, ScaleEstimate, border, estimate
-from isp.ple.prior import LETTERS, PATCH, Prior
-from isp.ple.tables import LIFT, PILOT_ERROR, Sampling, Singles, lift, lifted_root, unlift
-from sensor.cfa import channel_map, channels
+from isp.ple.mosaic import CELLS, Cells, full_white, pyramid, scale_of_cells, scale_of_pixels
+from isp.ple.prior import PATCH, Prior
+from isp.ple.tables import LIFT, PILOT_ERROR, Sampling, Singles, lifted_root, unlift
 from sensor.raw import RawImage
 
-SCALES = 4  # coarser ones
-CELLS = 4  # a side of a coarse patch
-LEAST_CELLS = 5  # a side of the coarsest scale
 TOGETHER = 32  # rows that stay in a core's cache while they are worked on
 COLOUR_SPREAD = 0.2  # relative standard deviation of the light that a patch's own sums show, by its colour
-
-
-@dataclass(frozen=True)
-class Cells:
-    """Sums of samples over square cells.
-
-    Attributes
-    ----------
-    electrons : (h, w, channel) float32
-        Of the mosaic's channels [e-].
-    full : (h, w, channel) bool
-        Where a saturated W is in the sum.
-    sampling : Sampling
-        Of patches of 4x4 cells.
-    index : tuple of int
-        Places of the mosaic's channels among R, G, B and W.
-    """
-
-    electrons: Singles
-    full: NDArray[np.bool_]
-    sampling: Sampling
-    index: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -60,7 +35,7 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     Parameters
     ----------
     raw : RawImage
-        Its tile is 2x2, of R, G, B and W.
+        Its tile is of R, G, B and W, and 1, 2 or 4 pixels high and wide.
     prior : Prior
         Of the camera's curves.
     white_e : (4,) array_like
@@ -73,75 +48,23 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     (channel,) float64
         Posterior variance of a pixel over a sample's noise, median over the patches.
     """
-    electrons = raw.electrons.astype(np.float32)
-    full = raw.saturated & (channel_map(raw.cfa, raw.shape) == "W")
-    pyramid = _pyramid(raw, white_e, electrons, full)
-    coarsest = pyramid[-1]
+    electrons, full = raw.electrons.astype(np.float32), full_white(raw)
+    levels = pyramid(raw, white_e, electrons, full)
+    coarsest = levels[-1]
     light = _own_light(coarsest, [border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
-    found = _estimate_cells(prior, coarsest, light, None)
-    for coarse, cells in zip(pyramid[:0:-1], pyramid[-2::-1], strict=True):
-        shape = cells.full.shape[:2]
-        own = _own_light(cells, [border(length, CELLS) for length in shape], STRIDE)
-        found = _estimate_cells(prior, cells, *_told(found, coarse.sampling, cells.sampling, own))
+    found = estimate(prior, scale_of_cells(coarsest), light, None)
+    for coarse, cells in zip(levels[:0:-1], levels[-2::-1], strict=True):
+        own = _own_light(cells, [border(length, CELLS) for length in cells.full.shape[:2]], STRIDE)
+        found = estimate(prior, scale_of_cells(cells), *_told(found, coarse.sampling, cells.sampling, own))
 
-    cells = pyramid[0]
+    cells = levels[0]
     own = _own_light(cells, _sides(raw.shape, cells.full.shape, PATCH), 1)
-    sites = [4 * (PATCH * y + x) + LETTERS.index(raw.cfa[y % 2][x % 2]) for y in range(PATCH) for x in range(PATCH)]
-    sampling = _sampling(raw, white_e, np.ones(4), PATCH, tuple(sites))
-    light, pilot = _told(found, cells.sampling, sampling, own)
-    found = estimate(prior, sampling, lift(electrons, raw.dark_noise_e), full, light, pilot)
+    scale = scale_of_pixels(raw, white_e, electrons, full)
+    found = estimate(prior, scale, *_told(found, cells.sampling, scale.samplings[0][0], own))
     planes = found.planes[..., cells.index]
     for first in range(0, len(planes), TOGETHER):
         planes[first : first + TOGETHER] = unlift(planes[first : first + TOGETHER], raw.dark_noise_e)
     return planes, found.noise[list(cells.index)]
-
-
-def _sampling(
-    raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]
-) -> Sampling:
-    # In six digits: exposures of other times differ in the last bits, and would each have tables of their own.
-    gains, dark_e = (
-        tuple(float(f"{value:.6g}") for value in values)
-        for values in (np.asarray(white_e) * counts, raw.dark_noise_e * np.sqrt(counts))
-    )
-    return Sampling(size=size, rows=rows, gains=gains, dark_e=dark_e, prnu=raw.prnu)
-
-
-def _pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray[np.bool_]) -> list[Cells]:
-    """Cells of 2x2, 4x4, ... pixels."""
-    names = channels(raw.cfa)
-    index = tuple(LETTERS.index(name) for name in names)
-    rows = tuple(4 * place + channel for place in range(CELLS**2) for channel in index)
-    height, width = (length // 2 for length in raw.shape)
-    quads, hit = (a[: 2 * height, : 2 * width].reshape(height, 2, width, 2) for a in (electrons, full))
-    sums, fulls, counts = [], [], np.ones(4)
-    for name, channel in zip(names, index, strict=True):
-        sites = [(i, j) for i in (0, 1) for j in (0, 1) if raw.cfa[i][j] == name]
-        sums.append(sum(quads[:, i, :, j] for i, j in sites))
-        fulls.append(np.any([hit[:, i, :, j] for i, j in sites], axis=0))
-        counts[channel] = len(sites)
-    last = Cells(np.stack(sums, -1), np.stack(fulls, -1), _sampling(raw, white_e, counts, CELLS, rows), index)
-    levels = [last]
-    while len(levels) < SCALES and min(last.full.shape[:2]) // 2 >= LEAST_CELLS:
-        height, width = (length // 2 for length in last.full.shape[:2])
-        four, hit = (a[: 2 * height, : 2 * width].reshape(height, 2, width, 2, -1) for a in (last.electrons, last.full))
-        counts[list(index)] *= 4
-        last = replace(
-            last,
-            electrons=four.sum(axis=(1, 3)),
-            full=np.asarray(hit.any(axis=(1, 3))),
-            sampling=_sampling(raw, white_e, counts, CELLS, rows),
-        )
-        levels.append(last)
-    return levels
-
-
-def _estimate_cells(prior: Prior, cells: Cells, light: Singles, pilot: PatchPilot | None) -> ScaleEstimate:
-    stable = [
-        lift(plane, cells.sampling.dark_e[channel])
-        for plane, channel in zip(np.moveaxis(cells.electrons, -1, 0), cells.index, strict=True)
-    ]
-    return estimate(prior, cells.sampling, np.stack(stable, axis=-1), cells.full, light, pilot)
 
 
 def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[tuple[int, int]]:
@@ -156,13 +79,26 @@ def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[t
 def _own_light(cells: Cells, sides: list[tuple[int, int]], stride: int) -> PatchLight:
     """Light of patches of 4x4 cells from their own sums, each channel as sure as its noise; full Ws left out."""
     gains, dark = (np.array(each)[list(cells.index)] for each in (cells.sampling.gains, cells.sampling.dark_e))
-    weights = gains / (np.maximum(np.median(cells.electrons, axis=(0, 1)), 0.1) + dark**2)
-    full, sums = (_sums(np.pad(a, [*sides, (0, 0)], mode="symmetric"), stride) for a in (cells.full, cells.electrons))
+    weights = gains / (np.maximum(_medians(cells), 0.1) + dark**2)
+    mode: Literal["reflect", "symmetric"] = "symmetric" if cells.held.all() else "reflect"  # which keeps the mosaic
+    full, sums = (_sums(np.pad(a, [*sides, (0, 0)], mode=mode), stride) for a in (cells.full, cells.electrons))
     weights = np.where(full > 0, 0.0, weights)
+    share = cells.held.mean(axis=(0, 1))  # of cells that hold a channel
+    gains, floors = gains * share, dark**2 * share
     whole = CELLS**2 * (weights @ gains)
     mean = (sums * weights).sum(axis=-1) / whole
-    shot, floor = (CELLS**2 * (weights**2 * each).sum(axis=-1) / whole**2 for each in (gains, dark**2))
+    shot, floor = (CELLS**2 * (weights**2 * each).sum(axis=-1) / whole**2 for each in (gains, floors))
     return PatchLight(*(each.astype(np.float32) for each in (mean, shot, floor)))
+
+
+def _medians(cells: Cells) -> NDArray[np.float64]:
+    """Median of each channel's electrons over the cells that hold it, shape (channel,)."""
+    down, across, _ = cells.held.shape
+    medians = np.empty(len(cells.index))
+    for c in range(len(cells.index)):
+        each = [cells.electrons[a::down, b::across, c].ravel() for a, b in np.argwhere(cells.held[..., c])]
+        medians[c] = np.median(np.concatenate(each))
+    return medians
 
 
 def _told(coarse: ScaleEstimate, before: Sampling, now: Sampling, own: PatchLight) -> tuple[Singles, PatchPilot]:

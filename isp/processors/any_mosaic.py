@@ -8,10 +8,11 @@ from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
-from isp.kriging import reconstruct_linear
+from isp.kriging import Plane, reconstruct_linear
 from isp.picture import Picture, require_letters
 from isp.settings import DEFAULTS, Reconstruction, Settings
 from isp.substitution import COLOUR_ERROR
+from render.spectrum import Floats
 from sensor.cfa import channels, tile_of, unit_channel
 from sensor.raw import RawImage
 
@@ -55,16 +56,24 @@ def picture_kriging(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance)
 
 def _coloured(raw: RawImage, result: Reconstruction, colours: ColourFit, balance: WhiteBalance) -> Picture:
     """Balance reconstructed planes, and take them to linear sRGB by a matrix that knows their noise."""
-    names = channels(raw.cfa)
     planes = np.asarray(result.estimate, dtype=np.float64)
     gains, sources = balance.gains(raw, planes)
     balanced = clip_highlights(raw, planes * gains)
-    if colours.plain is not None:  # knows three colours, and no noise
-        unit = names.index(unit_channel(raw.cfa))
-        three = balanced[..., :3] if len(names) >= 3 else np.repeat(balanced[..., unit : unit + 1], 3, axis=-1)
-        return Picture(three @ colours.plain.T, sources, engine=result.engine)
-    noise = relative_noise(raw, planes, result.noise_gain, gains, colours)
-    return Picture(balanced @ colours.matrix(names, noise * COLOUR_ERROR).T, sources, engine=result.engine)
+    noise = np.zeros(len(gains))
+    if colours.plain is None:
+        noise = relative_noise(raw, planes, result.noise_gain, gains, colours) * COLOUR_ERROR
+    return Picture(rgb_of_channels(raw, balanced, colours, noise), sources, engine=result.engine)
+
+
+def rgb_of_channels(raw: RawImage, balanced: Plane, colours: ColourFit, noise: Floats) -> Plane:
+    """Take balanced planes of a mosaic's channels to linear sRGB (h, w, 3), by a matrix that knows their noise."""
+    names = channels(raw.cfa)
+    if colours.plain is None:
+        return np.asarray(balanced @ colours.matrix(names, noise).T)
+    # It knows three colours, and no noise.
+    unit = names.index(unit_channel(raw.cfa))
+    three = balanced[..., :3] if len(names) >= 3 else np.repeat(balanced[..., unit : unit + 1], 3, axis=-1)
+    return np.asarray(three @ colours.plain.T)
 
 
 def _guided(raw: RawImage, settings: Settings) -> Reconstruction:

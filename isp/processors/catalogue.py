@@ -23,7 +23,7 @@ from isp.processors.demosaic import malvar, menon, picture_demosaicked
 from isp.processors.fusion import picture_complementary, picture_kijima, picture_sato, picture_yamagami
 from isp.processors.gindele import picture_gindele
 from isp.processors.park import picture_rgbw_park
-from isp.processors.piecewise import picture_ple_bayer, picture_ple_rgbw
+from isp.processors.piecewise import picture_ple, picture_ple_bayer, picture_ple_rgbw
 from isp.processors.residual import residual_interpolation
 from isp.processors.sub_images import hadamard, principal_components
 from rodcone.errors import InputError
@@ -141,6 +141,7 @@ _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
         "kriging": Processor(OWN, picture_kriging, _LINEAR, colours=(), unit=""),
         "ple_rgbw": Processor("rgbw", picture_ple_rgbw, _PIECEWISE),
         "ple_bayer": Processor("bayer", picture_ple_bayer, _PIECEWISE),
+        "ple": Processor(OWN, picture_ple, f"any mosaic of R, G, B, W, {_PIECEWISE}", colours=(), unit=""),
     }
 )
 FAIR = "_fair"  # ending of a processor's form whose colour matrix knows the noise; the others' does of itself

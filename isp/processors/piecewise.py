@@ -1,4 +1,4 @@
-"""Piecewise linear estimation for RGBW and for Bayer, by the prior of the project's own curves.
+"""Piecewise linear estimation for any mosaic of R, G, B and W, by the prior of the project's own curves.
 
 G. Yu, G. Sapiro, S. Mallat, "Solving inverse problems with piecewise linear estimators: from Gaussian mixture models to
 structured sparsity", IEEE Trans. Image Process. 21(5), 2012, with a prior that is fixed beforehand as in D. Zoran, Y.
@@ -16,12 +16,15 @@ from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
+from isp.ple.estimate import STRIDE
+from isp.ple.mosaic import SIDES
 from isp.ple.prior import LETTERS, Prior, own_prior
 from isp.ple.pyramid import reconstruct
+from isp.processors.any_mosaic import rgb_of_channels
 from isp.processors.demosaic import require_bayer
 from render.spectrum import Floats
 from rodcone.errors import InputError
-from sensor.cfa import RGBW, channels, is_rgbw
+from sensor.cfa import RGBW, channels, is_rgbw, unit_channel
 from sensor.raw import RawImage
 
 OTHER_CURVES = 0.1  # in the logarithm of a channel over green: how far a neutral may lie from those of known lights
@@ -64,31 +67,53 @@ def picture_ple_bayer(
     return _developed(raw, colours, balance, prior or own_prior())
 
 
+def picture_ple(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, prior: Prior | None = None) -> Picture:
+    """Develop a raw image of any tile of R, G, B and W that is 1, 2 or 4 pixels high and wide; as `picture_ple_rgbw`.
+
+    Without R, G and B the matrix takes all channels; of one or two it makes a grey picture.
+    """
+    sides = {len(raw.cfa), len(raw.cfa[0])}
+    if not sides <= set(SIDES) or not set(channels(raw.cfa)) <= set(LETTERS) or min(raw.shape) < STRIDE:
+        raise InputError(
+            f"raw: mosaic {raw.cfa} of {raw.shape} pixels; allowed here: R, G, B and W in a tile of 1, 2 or 4 pixels a "
+            "side, on 2x2 pixels or more; use kriging or any_mosaic"
+        )
+    return _developed(raw, colours, balance, prior or own_prior())
+
+
 def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: Prior) -> Picture:
-    index = [LETTERS.index(name) for name in channels(raw.cfa)]
+    names, unit = channels(raw.cfa), unit_channel(raw.cfa)
+    index = [LETTERS.index(name) for name in names]
     white_e = prior.neutral_e.copy()
     if balance.neutral is not None:
         if curves_differ(prior, balance.neutral, index):
             warnings.warn(
-                f"curves: a neutral reads {np.round(balance.neutral, 3).tolist()} in {''.join(channels(raw.cfa))}, as "
+                f"curves: a neutral reads {np.round(balance.neutral, 3).tolist()} in {''.join(names)}, as "
                 "under no light that this prior knows; its pictures may be poor; train one by `rodcone train`",
                 UserWarning,
                 stacklevel=2,
             )
-        white_e[index] = balance.neutral / balance.neutral[index.index(LETTERS.index("G"))]
+        white_e[index] = balance.neutral / balance.neutral[names.index(unit)] * prior.neutral_e[LETTERS.index(unit)]
     found, variance = reconstruct(raw, prior, white_e)
     planes = found.astype(np.float64)
     gains, sources = balance.gains(raw, planes)
     # The posterior variance is all of the error: no factor on it, as weighted means of samples need.
-    noise = relative_noise(raw, planes, np.broadcast_to(variance, planes.shape), gains, colours)[:3]
-    rgb = clip_highlights(raw, planes[..., :3] * gains[:3]) @ colours.matrix(noise=noise).T
+    noise = relative_noise(raw, planes, np.broadcast_to(variance, planes.shape), gains, colours)
+    if {"R", "G", "B"} <= set(names):
+        rgb = clip_highlights(raw, planes[..., :3] * gains[:3]) @ colours.matrix(noise=noise[:3]).T
+    else:
+        rgb = rgb_of_channels(raw, clip_highlights(raw, planes * gains), colours, noise)
     return Picture(rgb, sources)
 
 
 def curves_differ(prior: Prior, neutral: Floats, index: Sequence[int]) -> bool:
-    """Whether a calibrated neutral lies far from those of the prior's curves, under any mix of two known lights."""
-    known = np.log(prior.neutrals_e[:, index])
-    seen = np.log(neutral / neutral[index.index(LETTERS.index("G"))])
+    """Whether a calibrated neutral lies far from those of the prior's curves, under any mix of two known lights.
+
+    Of channels `index` among R, G, B and W; G counts as sure, or the last one where there is none.
+    """
+    sure = index.index(LETTERS.index("G")) if LETTERS.index("G") in index else -1
+    known = np.log(prior.neutrals_e[:, index] / prior.neutrals_e[:, index[sure], None])
+    seen = np.log(neutral / neutral[sure])
     along = known[:, None] - known
     share = ((seen - known) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), 1e-12)
     nearest = known + np.clip(share, 0.0, 1.0)[..., None] * along

@@ -12,10 +12,10 @@ from studies.training.train import train_prior
 
 
 def train(*, sensor: str, out: Out, seed: int = 1, json: Flag = False) -> None:
-    """Train the prior over patches of a sensor's curves, which ple_rgbw and ple_bayer develop with; prints its path.
+    """Train the prior over patches of a sensor's curves, which ple develops with; prints its path.
 
-    Takes some three minutes on two cores and 1.5 GB. The prior serves every noise, well, exposure and 2x2 mosaic of
-    these curves: isp.processors.catalogue.PROCESSORS["ple_rgbw"].develop(..., prior=load_prior(path)).
+    Takes some three minutes on two cores and 1.5 GB. The prior serves every noise, well, exposure and mosaic of
+    these curves: isp.processors.catalogue.PROCESSORS["ple"].develop(..., prior=load_prior(path)).
 
     Parameters
     ----------

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from builders import raw_image
 
-from isp.ple import estimate, pyramid
-from isp.ple.prior import LETTERS, own_prior
-from sensor.cfa import BAYER, RGBW, channel_map, channels
+from isp.ple import estimate, mosaic, pyramid
+from isp.ple.prior import LETTERS, PATCH, own_prior
+from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map, channels
 from sensor.raw import RawImage
 
 FULL_E, NOISE_E = 15_000.0, 1.5
+RGBW_4X4, QUAD_BAYER, QUAD_RGBW = (MOSAICS[name] for name in ("rgbw_4x4", "quad_bayer", "quad_rgbw"))
+UNEVEN = ("WWWW", "WWWW", "WWWR", "WWGB")  # four Ws in one cell of 2x2, one in another
+TILES = [RGBW, BAYER, RGBW_4X4, QUAD_BAYER, QUAD_RGBW, UNEVEN, ("W",), ("RGBW", "WBGR")]
 
 
 def reconstruct(raw):
@@ -30,7 +33,7 @@ def grey(level_e, tile, shape=(96, 96)):
     return np.broadcast_to(level_e, shape) * share
 
 
-@pytest.mark.parametrize("tile", [RGBW, BAYER])
+@pytest.mark.parametrize("tile", TILES)
 @pytest.mark.parametrize("level_e", [0.01, 0.3, 10.0, 300.0, 10_000.0])
 def test_a_flat_field_keeps_its_mean(tile, level_e):
     # at 10 000 e- W is full, and nothing is asked of it
@@ -38,19 +41,19 @@ def test_a_flat_field_keeps_its_mean(tile, level_e):
     for name, plane in zip(channels(tile), np.moveaxis(planes, -1, 0), strict=True):
         expected = own_prior().neutral_e[LETTERS.index(name)] * level_e
         if expected < FULL_E:
-            samples = plane.size * "".join(tile).count(name) / 4
+            samples = plane.size * "".join(tile).count(name) / len("".join(tile))
             error = np.sqrt((expected + NOISE_E**2 + 1 / 12) / samples)
             assert abs(plane.mean() - expected) < max(0.005 * expected, 4 * error), name
 
 
-@pytest.mark.parametrize("tile", [RGBW, BAYER])
+@pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4, QUAD_BAYER, QUAD_RGBW])
 @pytest.mark.parametrize("side", [1, 4])
 def test_a_lamp_in_the_dark_has_no_frame_around_it(tile, side):
-    # Frames alike but for the lamp, which lies on each site of the tile in turn. No coarse scale helps beside it, and a
-    # patch's own 16 Ws, or 32 greens, are what its estimate rests on.
+    # Frames alike but for the lamp, which lies on each site of a 2x2 tile in turn, and on four of a 4x4 one. No coarse
+    # scale helps beside it, and a patch's own 16 Ws, or 32 greens, are what its estimate rests on.
     moved = []
     for seed in range(4):
-        at = (32 + seed % 2, 32 + seed // 2)
+        at = (32 + seed % 2, 32 + seed // 2) if len(tile) == 2 else (32 + seed, 32 + 5 * seed % 4)
         rng = np.random.default_rng(seed)
         raw = exposure(np.full((64, 64), 0.1), tile, rng)
         lit = raw.dn.copy()
@@ -65,13 +68,14 @@ def test_a_lamp_in_the_dark_has_no_frame_around_it(tile, side):
     assert np.abs(mean.mean(axis=0)).max() < 0.05
 
 
-def test_a_full_sample_is_a_lower_bound():
+@pytest.mark.parametrize("tile", [RGBW, RGBW_4X4, QUAD_RGBW])
+def test_a_full_sample_is_a_lower_bound(tile):
     # W fills along a ramp, in the middle of patches; above, the colours say how far
-    tile, ramp = RGBW, np.linspace(1500, 6000, 96)
+    ramp = np.linspace(1500, 6000, 96)
     raw = exposure(grey(ramp, tile), tile, np.random.default_rng(5))
     planes, variance = reconstruct(raw)
     full = raw.saturated & (channel_map(tile, raw.shape) == "W")
-    assert 0.05 < full.mean() < 0.22
+    assert 0.2 < full.mean() * len("".join(tile)) / "".join(tile).count("W") < 0.88
     least = FULL_E - 4 * np.sqrt(variance[3] * FULL_E)
     assert (planes[full][:, 3] > least).mean() > 0.999
     above = planes[..., 3][:, ramp > 4500].mean(axis=0)
@@ -89,7 +93,56 @@ def test_threads_change_nothing(monkeypatch):
 
 
 @pytest.mark.parametrize("shape", [(2, 2), (3, 5), (9, 16), (16, 9), (31, 33)])
-def test_any_size_of_frame_will_do(shape):
-    planes, _ = reconstruct(raw_image(np.full(shape, 600)))
+@pytest.mark.parametrize("tile", [RGBW, RGBW_4X4, QUAD_RGBW])
+def test_any_size_of_frame_will_do(tile, shape):
+    shape = np.maximum(shape, len(tile))
+    planes, _ = reconstruct(raw_image(np.full(shape, 600), tile))
     assert planes.shape == (*shape, 4)
     assert np.isfinite(planes).all()
+
+
+@pytest.mark.parametrize("tile", TILES)
+@pytest.mark.parametrize(("stride", "size"), [(1, PATCH), (2, mosaic.CELLS)])
+def test_a_patchs_own_light_is_the_frames_up_to_its_border_and_varies_as_stated(tile, stride, size):
+    level_e, shape, white_e = 50.0, (61, 54), own_prior().neutral_e
+    means = []
+    for raw in (
+        replace(exposure(np.ones(shape), tile, np.random.default_rng(1)), dn=200 + grey(level_e, tile, shape)),
+        *(exposure(grey(level_e, tile, shape), tile, np.random.default_rng(seed)) for seed in range(40)),
+    ):
+        cells = mosaic.pyramid(raw, white_e, raw.electrons.astype(np.float32), np.zeros(shape, bool))[0]
+        sides = pyramid._sides(shape, cells.full.shape, PATCH)
+        sides = sides if size == PATCH else [estimate.border(length, size) for length in cells.full.shape[:2]]
+        light = pyramid._own_light(cells, sides, stride)
+        means.append(light.mean)
+    assert means[0] == pytest.approx(np.full(means[0].shape, level_e), rel=1e-5)
+    inside = (slice(4, -4), slice(4, -4))
+    stated = (light.shot * level_e + light.floor)[inside].mean()
+    # patches overlap: one in sixteen is counted, in 40 frames
+    draws = 40 * means[0][inside].size / 16
+    assert np.var(means[1:], axis=0)[inside].mean() * 40 / 39 == pytest.approx(stated, rel=4.5 * np.sqrt(2 / draws))
+
+
+@pytest.mark.parametrize("tile", [RGBW, BAYER])
+@pytest.mark.parametrize("times", [(2, 2), (2, 1), (1, 2)])
+def test_a_tile_written_twice_is_the_same_mosaic(tile, times):
+    level_e = np.geomspace(0.1, 5000, 61) * np.linspace(0.5, 1, 47)[:, None]
+    raw = exposure(grey(level_e, tile, (47, 61)), tile, np.random.default_rng(8))
+    twice = replace(raw, cfa=tuple(row * times[1] for row in tile) * times[0])
+    for once, again in zip(reconstruct(raw), reconstruct(twice), strict=True):
+        assert np.array_equal(once, again)
+
+
+@pytest.mark.parametrize("shift", [(1, 0), (2, 3)])
+def test_a_4x4_mosaic_that_begins_elsewhere_gives_as_good_a_picture(shift):
+    # the same samples, less the first rows and columns: patches and cells fall on other phases
+    level_e = np.geomspace(20, 500, 67) * (1 + 0.5 * np.sin(np.arange(67)[:, None] / 3))
+    expected_e = grey(level_e, QUAD_RGBW, (67, 67))
+    raw = exposure(expected_e, QUAD_RGBW, np.random.default_rng(9))
+    moved = tuple("".join(row) for row in np.roll([list(row) for row in QUAD_RGBW], (-shift[0], -shift[1]), (0, 1)))
+    later = replace(raw, dn=raw.dn[shift[0] :, shift[1] :], cfa=moved)
+    green = [planes[..., 1] for planes, _ in map(reconstruct, (raw, later))]
+    error = [
+        (each - level_e[-len(each) :, -each.shape[1] :]) / level_e[-len(each) :, -each.shape[1] :] for each in green
+    ]
+    assert error[1][8:-8, 8:-8].std() == pytest.approx(error[0][shift[0] :, shift[1] :][8:-8, 8:-8].std(), rel=0.1)

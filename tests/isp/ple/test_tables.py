@@ -3,16 +3,22 @@
 import numpy as np
 import pytest
 
+from isp.ple.pick import pick
 from isp.ple.prior import LETTERS, PATCH, Mixture, mixture, own_prior
 from isp.ple.tables import LIFT, PILOT_VARIANCE, Sampling, Table, window
-from sensor.cfa import BAYER, RGBW
+from sensor.cfa import BAYER, MOSAICS, RGBW
 
 GAINS = (0.5, 1.0, 0.45, 4.9)
 SIGMAS = 4.5  # of a normal deviate: 1 in 150 000
 
 
 def mosaic_rows(tile):
-    return tuple(4 * (PATCH * y + x) + LETTERS.index(tile[y % 2][x % 2]) for y in range(PATCH) for x in range(PATCH))
+    sides = len(tile), len(tile[0])
+    return tuple(
+        4 * (PATCH * y + x) + LETTERS.index(tile[y % sides[0]][x % sides[1]])
+        for y in range(PATCH)
+        for x in range(PATCH)
+    )
 
 
 def sampling(tile=RGBW, prnu=0.01):
@@ -34,7 +40,7 @@ def _with_1(y):
     return np.concatenate([y, np.ones((len(y), 1))], axis=1)
 
 
-@pytest.mark.parametrize("tile", [RGBW, BAYER])
+@pytest.mark.parametrize("tile", [RGBW, BAYER, *(MOSAICS[name] for name in ("rgbw_4x4", "quad_bayer", "quad_rgbw"))])
 @pytest.mark.parametrize("light_e", [0.5, 20.0, 2000.0])
 def test_over_signals_drawn_from_the_prior_the_error_is_0_in_the_mean_and_varies_as_the_closed_form(tile, light_e):
     rng, count = np.random.default_rng(1), 3000
@@ -95,3 +101,22 @@ def test_one_component_is_the_textbooks_linear_estimate():
     assert found == pytest.approx(expected, rel=2e-4)
     left = np.diag(whole) - np.einsum("ij,ji->i", gain, whole[at])
     assert by.variance == pytest.approx([left[channel::4].mean() for channel in range(4)], rel=1e-4)
+
+
+def test_of_cells_with_one_channel_each_the_likeliest_component_is_picked():
+    # 16 samples, fewer than the directions of other patches: all but one direction is held against each component
+    rng, light_e = np.random.default_rng(4), 50.0
+    rows = tuple(4 * (4 * y + x) + LETTERS.index(BAYER[y % 2][x % 2]) for y in range(4) for x in range(4))
+    table = Table(mixture(own_prior(), 4), Sampling(4, rows, GAINS, (1.8,) * 4, 0.01), light_e)
+    at = np.array(rows)
+    draws = [
+        rng.multivariate_normal(table.values[k, at], np.linalg.inv(factor.T @ factor), 20)
+        for k, factor in enumerate(table.reads[:, :16, :16].swapaxes(1, 2).astype(np.float64))
+    ]
+    known = _with_1(np.concatenate(draws)).astype(np.float32)
+    chosen, misfit, _ = pick(table, known, None)
+    read = np.einsum("ni,kij->nkj", known, table.reads[:, :17, :16])
+    likelihood = table.log_scale - 0.5 * (read**2).sum(axis=-1)
+    missed = likelihood.max(axis=1) - likelihood[np.arange(len(known)), chosen]
+    assert (missed > 0.01).mean() < 0.01
+    assert misfit.mean() == pytest.approx(1.0, abs=0.1)

@@ -26,7 +26,7 @@ SLOW = [name for name in PROCESSORS if PROCESSORS[name].extra == "bm3d"]  # that
 # Takes samples for noisy ones, whose mean root has lost 1/4 e-: that times the largest gain of a balance, 2.5.
 MISSES_E = {"kriging": 0.65}
 # ple leans on a prior, by up to 1 % where there is no noise: a file of its own
-QUICK = [name for name in PROCESSORS if name not in SLOW and not name.startswith("ple_")]
+QUICK = [name for name in PROCESSORS if name not in SLOW and not name.startswith("ple")]
 
 
 def neutral_of(name: str) -> Mapping[str, float]:
@@ -196,4 +196,5 @@ def test_each_processor_whose_colours_know_no_noise_has_a_form_whose_do() -> Non
         *("rccb", "rccc", "ryyb", "mono", "any_mosaic", "kriging"),
         "ple_rgbw",
         "ple_bayer",
+        "ple",
     }

@@ -4,17 +4,22 @@ import warnings
 
 import numpy as np
 import pytest
-from builders import BAYER_PHASES, RGBW_PHASES, raw_image
+from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, raw_image
 
+from isp.colour.colour_fit import ColourFit
 from isp.ple.prior import own_prior
 from isp.processors.catalogue import PROCESSORS
 from isp.processors.piecewise import curves_differ
-from sensor.cfa import channel_map, channels
+from rodcone.errors import InputError
+from sensor.cfa import MOSAICS, channel_map, channels
 from sensor.presets import preset
 from studies.training.pictures import neutral_electrons
 
 FULL_E, INDEX = 15_000.0, {"ple_rgbw": [0, 1, 2, 3], "ple_bayer": [0, 1, 2]}
 PHASES = [*(("ple_rgbw", tile) for tile in RGBW_PHASES), *(("ple_bayer", tile) for tile in BAYER_PHASES)]
+SITES = [(y, x) for y in range(4) for x in range(4)]  # of a 4x4 tile, where a frame may begin
+LARGE = [*((MOSAICS["rgbw_4x4"], at) for at in SITES), *((MOSAICS["quad_bayer"], at) for at in SITES)]
+LARGE += [(RGBW_4X4, (0, 0)), *((MOSAICS["quad_rgbw"], at) for at in [(0, 0), (1, 0), (1, 1), (2, 3)])]
 
 
 def grey(tile, level_e):
@@ -63,3 +68,69 @@ def test_own_curves_are_not_warned_of():
         warnings.simplefilter("error")
         picture = PROCESSORS["ple_bayer"].develop(raw, np.eye(3), neutral=own_prior().neutral_e[:3])
     assert set(picture.balance) == set(channels(raw.cfa))
+
+
+@pytest.mark.parametrize(("tile", "at"), LARGE)
+def test_a_flat_grey_field_stays_flat_and_grey_wherever_a_4x4_tile_begins(tile, at):
+    turned = tuple("".join(row) for row in np.roll([list(row) for row in tile], (-at[0], -at[1]), (0, 1)))
+    rgb = PROCESSORS["ple"].develop(grey(turned, np.full((17, 20), 1000.0)), np.eye(3)).rgb
+    assert rgb == pytest.approx(np.full(rgb.shape, 1000.0), rel=1.5e-3)
+
+
+@pytest.mark.parametrize("name", ["rgbw_4x4", "quad_bayer", "quad_rgbw"])
+def test_highlights_of_4x4_tiles_stay_grey_and_end_at_greens_full_well(name):
+    tile = MOSAICS[name]
+    balance = own_prior().neutral_e[: len(channels(tile))]
+    ramp = 5000.0 + 500.0 * np.indices((24, 80))[1]
+    rgb = PROCESSORS["ple"].develop(grey(tile, ramp), np.eye(3), balance=balance).rgb
+    # cells of a quad are four steps of the ramp apart
+    assert np.abs(rgb - rgb[..., 1:2]).max() < 1000.0
+    assert rgb[:, -20:] == pytest.approx(np.full((24, 20, 3), FULL_E), rel=2e-3)
+
+
+@pytest.mark.parametrize(("name", "tile"), PHASES)
+def test_on_a_2x2_tile_any_mosaics_processor_is_that_mosaics_own(name, tile):
+    raw = grey(tile, np.geomspace(1, 5000, 30) * np.ones((25, 1)))
+    neutral = own_prior().neutrals_e[3][INDEX[name]]
+    pictures = [PROCESSORS[each].develop(raw, np.eye(3), neutral=neutral).rgb for each in (name, "ple")]
+    assert np.array_equal(*pictures)
+
+
+@pytest.mark.parametrize("tile", [("W",), ("GW", "WG"), ("RW", "WW")])
+def test_one_or_two_channels_make_a_grey_picture(tile):
+    names = channels(tile)
+    fit = ColourFit(names, np.full(len(names), 0.3), np.full((len(names),) * 2, 0.1), np.full((len(names), 3), 0.1))
+    neutral = own_prior().neutral_e[["RGBW".index(name) for name in names]]
+    for matrix in (np.eye(3), fit):
+        rgb = PROCESSORS["ple"].develop(grey(tile, np.full((17, 20), 1000.0)), matrix, neutral=neutral).rgb
+        level = 1000.0 if "G" in names else neutral[-1] * 1000.0
+        assert rgb == pytest.approx(np.full(rgb.shape, level), rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("tile", "shape"),
+    [
+        (("RC", "CB"), (16, 16)),
+        (("RY", "YB"), (16, 16)),
+        (("RGB",) * 3, (16, 16)),
+        (("RG" * 4,) * 8, (16, 16)),
+        (("W",), (1, 9)),
+    ],
+)
+def test_what_the_prior_cant_develop_is_refused_in_one_line(tile, shape):
+    with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: R, G, B and W .*use kriging") as error:
+        PROCESSORS["ple"].develop(raw_image(np.full(shape, 500), tile), np.eye(3))
+    assert "\n" not in str(error.value)
+
+
+def test_other_curves_of_a_quad_mosaic_are_warned_of():
+    (neutral,) = neutral_electrons(preset("studies/configs/sensors/narrow.toml"), ["D65"])
+    raw = grey(MOSAICS["quad_rgbw"], np.full((16, 16), 1000.0))
+    with pytest.warns(UserWarning, match=r"^curves: a neutral reads .* in RGBW, .*`rodcone train`$"):
+        PROCESSORS["ple"].develop(raw, np.eye(3), neutral=neutral)
+
+
+def test_one_channel_tells_nothing_of_the_light():
+    raw = grey(("W",), np.geomspace(1, 2000, 30) * np.ones((25, 1)))
+    pictures = [PROCESSORS["ple"].develop(raw, np.eye(3), neutral=neutral).rgb for neutral in ([3.0], None)]
+    assert np.array_equal(*pictures)

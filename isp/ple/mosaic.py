@@ -1,0 +1,198 @@
+"""What of a mosaic lies where: sums of samples over cells, the samples of a patch, and the mosaic beyond its frame.
+
+Patches lie two pixels apart, so those of a tile of four pixels begin at its first or at its third one: each phase has
+samples of its own. Cells of 2x2 pixels are then a mosaic of cells, whose tile is two cells a side; larger cells
+hold every channel.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+from math import lcm
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from isp.ple.estimate import STRIDE, Scale, border, padded
+from isp.ple.prior import LETTERS, PATCH
+from isp.ple.tables import Sampling, Singles, lift
+from sensor.cfa import Tile, channel_map, channels, colour_channels
+from sensor.raw import RawImage
+
+SIDES = (1, 2, 4)  # of a tile [pixels]
+SCALES = 4  # coarser ones
+CELLS = 4  # a side of a coarse patch
+LEAST_CELLS = 5  # a side of the coarsest scale
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Sums of samples over square cells.
+
+    Attributes
+    ----------
+    electrons : (h, w, channel) float32
+        Of the mosaic's channels [e-]; 0 where a cell has no sample of a channel.
+    full : (h, w, channel) bool
+        Where a saturated W is in the sum.
+    held : (row, column, channel) bool
+        Which channels the first cells hold; the others repeat them.
+    sampling : Sampling
+        Of patches of 4x4 cells.
+    index : tuple of int
+        Places of the mosaic's channels among R, G, B and W.
+    """
+
+    electrons: Singles
+    full: NDArray[np.bool_]
+    held: NDArray[np.bool_]
+    sampling: Sampling
+    index: tuple[int, ...]
+
+
+def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray[np.bool_]) -> list[Cells]:
+    """Cells of 2x2, 4x4, ... pixels.
+
+    Parameters
+    ----------
+    raw : RawImage
+    white_e : (4,) array_like
+        Electrons of R, G, B and W from white, relative to G.
+    electrons : (h, w) float32
+        Of the raw image.
+    full : (h, w) bool
+        `full_white` of it.
+    """
+    names = channels(raw.cfa)
+    index = tuple(LETTERS.index(name) for name in names)
+    down, across = (lcm(side, 2) // 2 for side in (len(raw.cfa), len(raw.cfa[0])))
+    letters = channel_map(raw.cfa, (2 * down, 2 * across)).reshape(down, 2, across, 2)
+    found = np.stack([(letters == name).sum(axis=(1, 3)) for name in names], axis=-1)
+    # The finest cells. Where some hold more samples of a channel than others, those are left out here.
+    least = np.where(found > 0, found, 4).min(axis=(0, 1))
+    height, width = (length // 2 for length in raw.shape)
+    shape = (1 + int(np.any(found > least)), height, width, len(names))
+    sums: Singles = np.zeros(shape, np.float32)
+    fulls: NDArray[np.bool_] = np.zeros(shape, bool)
+    for (a, b), (c, name) in product(np.ndindex(down, across), enumerate(names)):
+        sites = [
+            (slice(2 * a + i, 2 * height, 2 * down), slice(2 * b + j, 2 * width, 2 * across))
+            for i, j in product((0, 1), (0, 1))
+            if letters[a, i, b, j] == name
+        ]
+        for number, site in enumerate(sites):
+            cells = (int(number >= least[c]), slice(a, None, down), slice(b, None, across), c)
+            sums[cells] += electrons[site]
+            fulls[cells] |= full[site]
+    counts, whole = np.ones(4), np.ones(4)
+    counts[list(index)], whole[list(index)] = least, 4 * found.mean(axis=(0, 1))
+    finest = _cell_sampling(raw, white_e, counts, found > 0, index)
+    levels = [Cells(sums[0], fulls[0], found > 0, finest, index)]
+    sums, fulls = (sums[0], fulls[0]) if len(sums) == 1 else (sums.sum(axis=0), np.asarray(fulls.any(axis=0)))
+    # Larger cells hold every channel, and all of its samples.
+    every = np.ones((1, 1, len(names)), bool)
+    while len(levels) < SCALES and min(sums.shape[:2]) // 2 >= LEAST_CELLS:
+        height, width = (length // 2 for length in sums.shape[:2])
+        fours = (height, 2, width, 2, len(names))
+        sums = sums[: 2 * height, : 2 * width].reshape(fours).sum(axis=(1, 3))
+        fulls = np.asarray(fulls[: 2 * height, : 2 * width].reshape(fours).any(axis=(1, 3)))
+        levels.append(Cells(sums, fulls, every, _cell_sampling(raw, white_e, whole, every, index), index))
+        whole = np.where(np.isin(np.arange(4), index), 4 * whole, whole)
+    return levels
+
+
+def _cell_sampling(
+    raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], held: NDArray[np.bool_], index: tuple[int, ...]
+) -> Sampling:
+    rows = [4 * place + channel for place, each in enumerate(_first_patch(held)) for channel in np.array(index)[each]]
+    return _sampling(raw, white_e, counts, CELLS, tuple(map(int, rows)))
+
+
+def _first_patch(held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which channels the cells of a patch hold, shape (cell, channel): patches begin at the tile's first one."""
+    down, across, count = held.shape
+    return np.tile(held, (CELLS // down, CELLS // across, 1)).reshape(-1, count)
+
+
+def _sampling(
+    raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]
+) -> Sampling:
+    # In six digits: exposures of other times differ in the last bits, and would each have tables of their own.
+    gains, dark_e = (
+        tuple(float(f"{value:.6g}") for value in values)
+        for values in (np.asarray(white_e) * counts, raw.dark_noise_e * np.sqrt(counts))
+    )
+    return Sampling(size=size, rows=rows, gains=gains, dark_e=dark_e, prnu=raw.prnu)
+
+
+def full_white(raw: RawImage) -> NDArray[np.bool_]:
+    """Saturated samples of W beside G, which is full long after."""
+    return np.asarray(raw.saturated & (channel_map(raw.cfa, raw.shape) == "W") & ("W" not in colour_channels(raw.cfa)))
+
+
+def scale_of_cells(cells: Cells) -> Scale:
+    """Sums in units of noise, as `isp.ple.estimate` takes them."""
+    stable = [
+        lift(plane, cells.sampling.dark_e[channel])
+        for plane, channel in zip(np.moveaxis(cells.electrons, -1, 0), cells.index, strict=True)
+    ]
+    held = _first_patch(cells.held).ravel()
+    return Scale(
+        shape=cells.full.shape[:2],
+        samples=padded(np.stack(stable, axis=-1), CELLS),
+        full=padded(cells.full, CELLS),
+        samplings=((cells.sampling,),),
+        columns=None if held.all() else np.flatnonzero(held),
+    )
+
+
+def scale_of_pixels(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray[np.bool_]) -> Scale:
+    """Samples in units of noise, and a sampling for each phase of the tile within patches; as `pyramid`."""
+    down, across = (len(raw.cfa), len(raw.cfa[0]))
+    beyond = PATCH - STRIDE  # pixels of the first patch that lie before the frame
+    samplings = tuple(
+        tuple(
+            _sampling(raw, white_e, np.ones(4), PATCH, _sites(raw.cfa, top - beyond, left - beyond))
+            for left in range(0, lcm(across, STRIDE), STRIDE)
+        )
+        for top in range(0, lcm(down, STRIDE), STRIDE)
+    )
+    samples, full = continued(raw.cfa, lift(electrons, raw.dark_noise_e), full)
+    return Scale(raw.shape, samples, full, samplings)
+
+
+def _sites(tile: Tile, top: int, left: int) -> tuple[int, ...]:
+    """Places of a patch's samples in its vector, whose first pixel lies at (top, left)."""
+    return tuple(
+        4 * (PATCH * y + x) + LETTERS.index(tile[(top + y) % len(tile)][(left + x) % len(tile[0])])
+        for y in range(PATCH)
+        for x in range(PATCH)
+    )
+
+
+def continued(tile: Tile, *samples: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+    """Samples (h, w) of a mosaic, continued beyond the frame by reflection, and the mosaic with them.
+
+    Where the reflected pixel is of another channel, the nearest pixel beside it of the right one stands for it.
+    """
+    wide = tuple(padded(each, PATCH) for each in samples)
+    if max(len(tile), len(tile[0])) <= 2:  # which reflection keeps
+        return wide
+    shape = samples[0].shape
+    sides = [border(length, PATCH) for length in shape]
+    letters = np.array([[LETTERS.index(name) for name in row] for row in tile], dtype=np.int8)
+    rows, columns = (np.arange(length) - side[0] for length, side in zip(wide[0].shape, sides, strict=True))
+    asked = letters[rows[:, None] % len(tile), columns % len(tile[0])]
+    own = asked[sides[0][0] :, sides[1][0] :][: shape[0], : shape[1]]
+    left = np.nonzero(padded(own, PATCH) != asked)
+    y, x = (
+        np.pad(np.arange(length), side, mode="reflect")[at] for length, side, at in zip(shape, sides, left, strict=True)
+    )
+    offsets = product(range(-SIDES[-1] + 1, SIDES[-1]), repeat=2)
+    for dy, dx in sorted(offsets, key=lambda offset: (offset[0] ** 2 + offset[1] ** 2, offset)):
+        inside = (y + dy >= 0) & (y + dy < shape[0]) & (x + dx >= 0) & (x + dx < shape[1])
+        right = inside & (own[np.where(inside, y + dy, 0), np.where(inside, x + dx, 0)] == asked[left])
+        for to, each in zip(wide, samples, strict=True):
+            to[left[0][right], left[1][right]] = each[y[right] + dy, x[right] + dx]
+        left, y, x = (left[0][~right], left[1][~right]), y[~right], x[~right]
+    return wide
