@@ -77,7 +77,7 @@ def picture_interleaved(
     weight = substitution_weight(snr, substitution_snr, octaves)
     alpha = saturated_fraction(raw, settings.window)
     if ours:
-        planes = even_rims(raw, planes, alpha)
+        planes = even_rims(raw, planes, gains, alpha)
     balanced = clip_highlights(raw, planes * gains)
     if ours:
         draw_unseen(everything, unseen, gains, balanced)

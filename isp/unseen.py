@@ -2,7 +2,7 @@
 
 W guides the similarity. Light that reaches no W site has dark W all around, and what is as dark gets a share of it: a
 block, in the colours that saw it. Yet a clear pixel collects whatever a colour does. So a sample far over all W around
-it tells of its own pixel alone, and of no colour (docs/decisions/0051-light-that-w-does-not-see.md).
+it tells of its own pixel alone, and of no colour (docs/decisions/0051-unseen-light.md).
 """
 
 from dataclasses import replace
@@ -75,7 +75,7 @@ def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np
 
 
 def _brightest_white(padded: NDArray[Any], raw: RawImage, phase: tuple[int, ...], reach: int) -> NDArray[Any]:
-    """Largest sample of W up to `reach` pixels away along either axis, at each pixel of a phase, from padded samples."""
+    """Largest sample of W up to `reach` pixels away along either axis, for the pixels at a phase."""
     (down, across), parts = (len(raw.cfa), len(raw.cfa[0])), []
     for row, column in product(range(phase[0], phase[0] + 2 * reach + 1), range(phase[1], phase[1] + 2 * reach + 1)):
         if raw.cfa[(row - reach) % down][(column - reach) % across] == "W":
