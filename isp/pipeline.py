@@ -70,14 +70,14 @@ def picture_interleaved(
     if ours:
         raw, unseen = without_unseen(raw, white_balance.response(raw))
     result = reconstruct_with_noise(raw, settings)
-    planes = np.asarray(result.estimate, dtype=np.float64)
+    planes = np.array(result.estimate, dtype=np.float64)
     gains, sources = white_balance.gains(raw, planes)
     noise = relative_noise(raw, planes, result.noise_gain, gains, colours)
     snr = green_snr(raw, planes)
     weight = substitution_weight(snr, substitution_snr, octaves)
     alpha = saturated_fraction(raw, settings.window)
     if ours:
-        planes = even_rims(raw, planes, gains, alpha)
+        even_rims(raw, planes, gains, alpha)
     balanced = clip_highlights(raw, planes * gains)
     if ours:
         draw_unseen(everything, unseen, gains, balanced)

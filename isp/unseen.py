@@ -53,7 +53,12 @@ def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np
     # Where W is 0: S = 4 sqrt(S + s^2), solved for S.
     least_e = (SIGMAS**2 + SIGMAS * np.sqrt(SIGMAS**2 + 4.0 * raw.dark_noise_e**2)) / 2.0
     least_dn = raw.black_dn + least_e / raw.gain_e_per_dn
-    padded = np.pad(raw.dn, reach, constant_values=raw.dn.min())
+    # Beyond the border, where a pixel's only W may lie, the samples a tile further in.
+    rows, columns = (np.arange(-reach, length + reach) for length in raw.shape)
+    for line, length, step in zip((rows, columns), raw.shape, size, strict=True):
+        line[:reach] += step
+        line[length + reach :] -= step
+    padded = raw.dn[rows[:, None], columns]
     for phase in np.ndindex(size):
         if raw.cfa[phase[0]][phase[1]] == "W":
             continue

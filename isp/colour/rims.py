@@ -5,6 +5,7 @@ pixel in each colour. A patch of a few pixels then shows the mosaic's tile (docs
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from isp.planes import BLOCK_ROWS, rows_at
 from render.spectrum import Floats
@@ -14,11 +15,13 @@ from sensor.raw import RawImage
 REACH = 2  # pixels; 1 and 3 leave more colour error
 FROM_SIGMAS, FULLY_SIGMAS = 10.0, 20.0  # contrast of the faintest colour, in noise of a sample
 FULL = 0.9  # of saturation, from which on there may be more light than was read
+Values = NDArray[np.float32]
+
 TINY_E = 1e-9  # where nothing differs
 
 
-def even_rims(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> Floats:
-    """Give all channels one share of light and dark where eq. (6) mixes.
+def even_rims(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> None:
+    """Give all channels one share of light and dark where eq. (6) mixes, in place.
 
     With l and h the least and the most of a channel f up to 2 pixels away along either axis, and c = (h - l) / (h + l),
 
@@ -38,39 +41,35 @@ def even_rims(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> Fl
         White balance.
     alpha : (h, w) float64
         Of `isp.similarity.guide.saturated_fraction`; a rim is where it is neither 0 nor 1.
-
-    Returns
-    -------
-    (h, w, channel) float64
-        `planes` itself where there is no rim.
     """
     rims = (alpha > 0.0) & (alpha < 1.0)
     if not rims.any():
-        return planes
-    names, result = channels(raw.cfa), planes.copy()
+        return
+    names, evened = channels(raw.cfa), []
     colours = [names.index(name) for name in colour_channels(raw.cfa)]
     for first in range(0, len(rims), BLOCK_ROWS):
-        rows = slice(first, first + BLOCK_ROWS)
-        columns = np.flatnonzero(rims[rows].any(axis=0))
+        columns = np.flatnonzero(rims[first : first + BLOCK_ROWS].any(axis=0))
         if columns.size == 0:
             continue
-        at = rows, slice(int(columns[0]), int(columns[-1]) + 1)
-        rim, around = rims[at], _with_surroundings(planes, at)
-        window = [rows_at(values, rim) for values in (planes[at], *_extremes(around))]
-        result[at][rim] = _evened(raw, *window, gains, colours)
-    return result
+        at = slice(first, first + BLOCK_ROWS), slice(int(columns[0]), int(columns[-1]) + 1)
+        window = _extremes(_with_surroundings(planes, at))
+        seen = rims[at] & (_least_contrast(raw, *window[:2], colours) > FROM_SIGMAS)
+        if seen.any():
+            evened.append((at, seen, _evened(raw, *(rows_at(x, seen) for x in (planes[at], *window)), gains, colours)))
+    for at, seen, values in evened:  # now that no window needs what was there
+        planes[at][seen] = values
 
 
-def _with_surroundings(planes: Floats, at: tuple[slice, slice]) -> Floats:
+def _with_surroundings(planes: Floats, at: tuple[slice, slice]) -> Values:
     """Rows and columns of the planes and `REACH` around, the border's pixels again beyond it."""
     rows, columns = (
         np.clip(np.arange(part.start - REACH, min(part.stop, size) + REACH), 0, size - 1)
         for part, size in zip(at, planes.shape, strict=False)
     )
-    return planes[rows[:, None], columns]
+    return planes[rows[0] : rows[-1] + 1].astype(np.float32)[(rows - rows[0])[:, None], columns]
 
 
-def _extremes(around: Floats) -> tuple[Floats, Floats, Floats]:
+def _extremes(around: Values) -> tuple[Values, Values, Values]:
     """Least, most, and the most that all pixels of some 2 x 2 hold, in windows of 2 `REACH` + 1 pixels a side."""
     size = 2 * REACH + 1
     squares = _moving(np.minimum, around, 2)
@@ -81,18 +80,34 @@ def _extremes(around: Floats) -> tuple[Floats, Floats, Floats]:
     )
 
 
-def _moving(extreme: np.ufunc, values: Floats, size: int) -> Floats:
-    """Least or most of the windows of `size` pixels a side that lie in the array."""
-    for _ in range(2):  # along the columns, then along the rows
-        count = len(values) - size + 1
-        values = extreme.reduce([values[i : i + count] for i in range(size)]).swapaxes(0, 1)
-    return values
+def _moving(extreme: np.ufunc, values: Values, size: int) -> Values:
+    """Least or most of the windows of `size` pixels a side that lie in an array (h, w, channel)."""
+    channel_count = values.shape[2]
+    lines = values.reshape(len(values), -1)  # a column further is `channel_count` values further
+    for axis, pace in ((0, 1), (1, channel_count)):
+        lines = np.moveaxis(lines, axis, 0)
+        reach = 1  # pixels of the window so far
+        while reach < size:
+            step = min(reach, size - reach)
+            lines, reach = extreme(lines[: len(lines) - step * pace], lines[step * pace :]), reach + step
+        lines = np.moveaxis(lines, 0, axis)
+    return lines.reshape(len(lines), -1, channel_count)
+
+
+def _least_contrast(raw: RawImage, least: Values, most: Values, colours: list[int]) -> Values:
+    """Contrast of the faintest colour, over the noise of a sample in the light."""
+    ratios = [
+        (most[..., i] - least[..., i]) / np.sqrt(np.maximum(most[..., i], 0.0) + np.float32(raw.dark_noise_e**2))
+        for i in colours
+    ]
+    return np.asarray(np.minimum.reduce(ratios))
 
 
 def _evened(
-    raw: RawImage, values: Floats, least: Floats, most: Floats, filled: Floats, gains: Floats, colours: list[int]
+    raw: RawImage, values: Floats, least: Values, most: Values, filled: Values, gains: Floats, colours: list[int]
 ) -> Floats:
     """Channels of `even_rims`, (pixel, channel), from those of the planes and of their windows."""
+    least, most, filled = (x.astype(np.float64) for x in (least, most, filled))
     step = np.maximum(most - least, TINY_E)
     # One share for all channels.
     contrast = np.square(step / np.maximum(most + least, TINY_E))[:, colours]
@@ -109,7 +124,6 @@ def _evened(
     grey = (evened * gains)[:, colours].mean(axis=1, keepdims=True) / gains
     evened += (1.0 - size) * np.square(np.clip(above, 0.0, 1.0)) * (grey - evened)
 
-    noise = np.sqrt(np.maximum(most, 0.0) + raw.dark_noise_e**2)
-    faintest = (step / noise)[:, colours].min(axis=1, keepdims=True)
-    much = np.clip((faintest - FROM_SIGMAS) / (FULLY_SIGMAS - FROM_SIGMAS), 0.0, 1.0)
+    faintest = _least_contrast(raw, least, most, colours)[:, None]
+    much = np.minimum((faintest - FROM_SIGMAS) / (FULLY_SIGMAS - FROM_SIGMAS), 1.0)
     return np.asarray(values + much * (evened - values))

@@ -72,7 +72,14 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
                 range((a - 1) % down, 2 * ends[0] + 1, down),
                 range((b - 1) % across, 2 * ends[1] + 1, across),
             )
-            lines = np.maximum.reduce([allowed[first + i : last + i] for i in rows])
-            target = result[a, b, first:last]
-            np.maximum.reduce([lines[:, j : j + shape[1]] for j in columns], out=target)
+            lines = _most([allowed[first + i : last + i] for i in rows], np.empty_like(allowed[first:last]))
+            _most([lines[:, j : j + shape[1]] for j in columns], result[a, b, first:last])
     return result
+
+
+def _most(parts: list[NDArray[Any]], out: NDArray[Any]) -> NDArray[Any]:
+    """Largest of some arrays, two or more; `np.maximum.reduce` would copy all of them first."""
+    np.maximum(parts[0], parts[1], out=out)
+    for part in parts[2:]:
+        np.maximum(out, part, out=out)
+    return out
