@@ -14,6 +14,7 @@ from sensor.raw import RawImage
 
 REACH = 2  # pixels; 1 and 3 leave more colour error
 FROM_SIGMAS, FULLY_SIGMAS = 10.0, 20.0  # contrast of the faintest colour, in noise of a sample
+FROM_SHARE, FULLY_SHARE = 0.5, 0.8  # contrast of the light over the colours' together: 1 where they rise together
 FULL = 0.9  # of saturation, from which on there may be more light than was read
 Values = NDArray[np.float32]
 
@@ -31,7 +32,9 @@ def even_rims(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> No
     fills 2 x 2 pixels as far as (q - l) / (h - l), the least of the colours', is 1. As far as it doesn't, and the pixel
     is over the dark around, its colour isn't known: it gets the mean of its balanced colours.
 
-    This counts where the faintest colour's h - l is over 20 times the noise of a sample, under 10 times not at all.
+    This counts where the faintest colour's h - l is over 20 times the noise of a sample, under 10 times not at all; and
+    where the colours rise together, as between red and green they don't: where h - l of the sum of balanced colours is
+    over 0.8 of the sum of theirs, under 0.5 not at all.
 
     Parameters
     ----------
@@ -52,10 +55,14 @@ def even_rims(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> No
         if columns.size == 0:
             continue
         at = slice(first, first + BLOCK_ROWS), slice(int(columns[0]), int(columns[-1]) + 1)
-        window = _extremes(_with_surroundings(planes, at))
+        around = _with_surroundings(planes, at)
+        window = _extremes(around)
         seen = rims[at] & (_least_contrast(raw, *window[:2], colours) > FROM_SIGMAS)
         if seen.any():
-            evened.append((at, seen, _evened(raw, *(rows_at(x, seen) for x in (planes[at], *window)), gains, colours)))
+            light = around[..., colours] @ gains[colours, None].astype(np.float32)
+            rise = _moving(np.maximum, light, 2 * REACH + 1) - _moving(np.minimum, light, 2 * REACH + 1)
+            values, *of_window = (rows_at(x, seen) for x in (planes[at], *window, rise))
+            evened.append((at, seen, _evened(raw, values, *of_window, gains, colours)))
     for at, seen, values in evened:  # now that no window needs what was there
         planes[at][seen] = values
 
@@ -104,7 +111,14 @@ def _least_contrast(raw: RawImage, least: Values, most: Values, colours: list[in
 
 
 def _evened(
-    raw: RawImage, values: Floats, least: Values, most: Values, filled: Values, gains: Floats, colours: list[int]
+    raw: RawImage,
+    values: Floats,
+    least: Values,
+    most: Values,
+    filled: Values,
+    rise: Values,
+    gains: Floats,
+    colours: list[int],
 ) -> Floats:
     """Channels of `even_rims`, (pixel, channel), from those of the planes and of their windows."""
     least, most, filled = (x.astype(np.float64) for x in (least, most, filled))
@@ -126,4 +140,6 @@ def _evened(
 
     faintest = _least_contrast(raw, least, most, colours)[:, None]
     much = np.minimum((faintest - FROM_SIGMAS) / (FULLY_SIGMAS - FROM_SIGMAS), 1.0)
+    together = rise / (step * gains)[:, colours].sum(axis=1, keepdims=True)
+    much *= np.clip((together - FROM_SHARE) / (FULLY_SHARE - FROM_SHARE), 0.0, 1.0)
     return np.asarray(values + much * (evened - values))

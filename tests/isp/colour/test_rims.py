@@ -71,6 +71,13 @@ def test_a_colour_that_is_full_nearby_is_not_lowered():
     assert (even[:, 6, [0, 2]] > planes[:, 6, [0, 2]]).all()
 
 
+def test_colours_that_do_not_rise_together_keep_their_own_edges():
+    """Orange beside green: red rises by 1400 e- where green and blue fall by 600, so the light does by 200 of 2600."""
+    planes = np.broadcast_to([500.0, 1500.0, 1000.0, 14_000.0], (12, 12, 4)).copy()
+    planes[:, 6:] = [1900.0, 900.0, 400.0, 15_000.0]
+    assert np.array_equal(even_rims(frame(), planes, np.ones(4), MIXED), planes)
+
+
 @pytest.mark.parametrize(("width", "grey"), [(1, True), (2, False)])
 def test_a_lamp_smaller_than_2_x_2_has_no_colour(width, grey):
     """Its colours, balanced, are their mean; over the dark by c^2, here 1."""
