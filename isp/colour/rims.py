@@ -4,6 +4,8 @@ Around a saturated place each colour guides itself (eq. (6)), and its edge falls
 pixel in each colour. A patch of a few pixels then shows the mosaic's tile (docs/decisions/0051-unseen-light.md).
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,8 +63,8 @@ def even_rims(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> No
         if seen.any():
             light = around[..., colours] @ gains[colours, None].astype(np.float32)
             rise = _moving(np.maximum, light, 2 * REACH + 1) - _moving(np.minimum, light, 2 * REACH + 1)
-            values, *of_window = (rows_at(x, seen) for x in (planes[at], *window, rise))
-            evened.append((at, seen, _evened(raw, values, *of_window, gains, colours)))
+            of_window = [rows_at(x, seen).astype(np.float64) for x in (*window, rise)]
+            evened.append((at, seen, _evened(raw, rows_at(planes[at], seen), of_window, gains, colours)))
     for at, seen, values in evened:  # now that no window needs what was there
         planes[at][seen] = values
 
@@ -73,7 +75,7 @@ def _with_surroundings(planes: Floats, at: tuple[slice, slice]) -> Values:
         np.clip(np.arange(part.start - REACH, min(part.stop, size) + REACH), 0, size - 1)
         for part, size in zip(at, planes.shape, strict=False)
     )
-    return planes[rows[0] : rows[-1] + 1].astype(np.float32)[(rows - rows[0])[:, None], columns]
+    return np.asarray(planes[rows[0] : rows[-1] + 1].astype(np.float32)[(rows - rows[0])[:, None], columns])
 
 
 def _extremes(around: Values) -> tuple[Values, Values, Values]:
@@ -101,7 +103,7 @@ def _moving(extreme: np.ufunc, values: Values, size: int) -> Values:
     return lines.reshape(len(lines), -1, channel_count)
 
 
-def _least_contrast(raw: RawImage, least: Values, most: Values, colours: list[int]) -> Values:
+def _least_contrast(raw: RawImage, least: NDArray[Any], most: NDArray[Any], colours: list[int]) -> NDArray[Any]:
     """Contrast of the faintest colour, over the noise of a sample in the light."""
     ratios = [
         (most[..., i] - least[..., i]) / np.sqrt(np.maximum(most[..., i], 0.0) + np.float32(raw.dark_noise_e**2))
@@ -110,18 +112,9 @@ def _least_contrast(raw: RawImage, least: Values, most: Values, colours: list[in
     return np.asarray(np.minimum.reduce(ratios))
 
 
-def _evened(
-    raw: RawImage,
-    values: Floats,
-    least: Values,
-    most: Values,
-    filled: Values,
-    rise: Values,
-    gains: Floats,
-    colours: list[int],
-) -> Floats:
-    """Channels of `even_rims`, (pixel, channel), from those of the planes and of their windows."""
-    least, most, filled = (x.astype(np.float64) for x in (least, most, filled))
+def _evened(raw: RawImage, values: Floats, window: list[Floats], gains: Floats, colours: list[int]) -> Floats:
+    """Channels of `even_rims`, (pixel, channel), from those of the planes; `window`: l, h, q, and the light's h - l."""
+    least, most, filled, rise = window
     step = np.maximum(most - least, TINY_E)
     # One share for all channels.
     contrast = np.square(step / np.maximum(most + least, TINY_E))[:, colours]
