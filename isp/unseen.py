@@ -92,7 +92,8 @@ def _brightest_white(padded: NDArray[Any], raw: RawImage, phase: tuple[int, ...]
 def draw_unseen(raw: RawImage, unseen: NDArray[np.bool_], gains: Floats, balanced: NDArray[np.float64]) -> None:
     """Draw, in place, what `without_unseen` took out of `raw`: at its own pixels, neutral, up to the full well.
 
-    The level is the mean of the balanced samples there and beside by a tent, for each colour saw a part.
+    The level is the mean of the balanced samples there and beside by a tent, for each colour saw a part. A line goes on
+    through a colour that has little of its light, between two pixels that were taken out.
 
     Parameters
     ----------
@@ -108,4 +109,8 @@ def draw_unseen(raw: RawImage, unseen: NDArray[np.bool_], gains: Floats, balance
     for gain, name in zip(gains, channels(raw.cfa), strict=True):
         light[mask(raw.cfa, name, raw.shape)] *= gain
     total, count = (convolve(values, weights, mode="constant") for values in (light, unseen.astype(np.float64)))
-    balanced[unseen] = np.minimum(total[unseen] / count[unseen], raw.full_well_e)[:, None]
+    drawn = unseen.copy()
+    drawn[1:-1] |= unseen[:-2] & unseen[2:]
+    drawn[:, 1:-1] |= unseen[:, :-2] & unseen[:, 2:]
+    drawn &= ~mask(raw.cfa, "W", raw.shape)
+    balanced[drawn] = np.minimum(total[drawn] / count[drawn], raw.full_well_e)[:, None]

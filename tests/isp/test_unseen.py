@@ -106,6 +106,15 @@ def test_a_row_of_colours_is_drawn_even():
     assert rgb[[9, 11]] == pytest.approx(np.zeros((2, 40, 3)), abs=3.0)
 
 
+def test_a_line_goes_on_through_a_colour_that_it_has_little_of():
+    """Sodium light on a column of R and B: B is within what W allows, and was dark between white dots."""
+    electrons = np.zeros((40, 20))
+    electrons[10:31:2, 10] = 4000.0
+    rgb = picture_interleaved(exposure(electrons), np.eye(3), balance=np.ones(4)).rgb
+    assert rgb[10:31, 10] == pytest.approx(np.full((21, 3), 4000.0), rel=1e-6)
+    assert np.abs(rgb[10:31, [9, 11]]).max() < 3.0
+
+
 def test_the_papers_own_method_keeps_its_lamps():
     electrons = np.zeros((24, 24))
     electrons[12, 12] = 15_000.0
