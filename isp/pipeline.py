@@ -6,12 +6,15 @@ from numpy.typing import ArrayLike
 from isp.bilinear import bilinear
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights
+from isp.colour.rims import even_rims
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish, require_letters
+from isp.planes import rows_at
 from isp.settings import DEFAULTS, PAPER, Settings
 from isp.similarity.guide import saturated_fraction
 from isp.substitution import COLOUR_ERROR, OCTAVES, SUBSTITUTION_SNR, green_snr, matrix_with_white, substitution_weight
+from isp.unseen import draw_unseen, without_unseen
 from sensor.raw import RawImage
 
 
@@ -62,18 +65,28 @@ def picture_interleaved(
     colours = ColourFit.of(matrix)
     white_balance = WhiteBalance.of(raw, neutral, balance)
 
+    # The paper's own method stays as it is.
+    ours, everything = settings.distance == "noise", raw
+    if ours:
+        raw, unseen = without_unseen(raw, white_balance.response(raw))
     result = reconstruct_with_noise(raw, settings)
-    planes = np.asarray(result.estimate, dtype=np.float64)
+    planes = np.array(result.estimate, dtype=np.float64)
     gains, sources = white_balance.gains(raw, planes)
     noise = relative_noise(raw, planes, result.noise_gain, gains, colours)
-    balanced = clip_highlights(raw, planes * gains)
-
     snr = green_snr(raw, planes)
     weight = substitution_weight(snr, substitution_snr, octaves)
+    alpha = saturated_fraction(raw, settings.window)
+    if ours:
+        even_rims(raw, planes, gains, alpha)
+    balanced = clip_highlights(raw, planes * gains)
+    if ours:
+        draw_unseen(everything, unseen, gains, balanced)
+
     # W leaves the colours as eq. (6) leaves it out of the similarity: by the share of saturated pixels around.
-    alpha = saturated_fraction(raw, settings.window)[..., None]
-    rgb = (1.0 - alpha) * (balanced @ matrix_with_white(colours, noise, weight).T)
-    rgb += alpha * (balanced[..., :3] @ colours.matrix("RGB", noise[:3] * COLOUR_ERROR).T)
+    rgb = balanced @ matrix_with_white(colours, noise, weight).T
+    mixed = alpha > 0.0
+    share, without_white = alpha[mixed, None], colours.matrix("RGB", noise[:3] * COLOUR_ERROR)
+    rgb[mixed] = (1.0 - share) * rows_at(rgb, mixed) + share * (rows_at(balanced, mixed)[:, :3] @ without_white.T)
     return Picture(rgb, sources, engine=result.engine, snr=snr, substitution=weight)
 
 

@@ -57,6 +57,10 @@ class WhiteBalance:
             return balance
         return cls(_response("neutral", neutral, raw), _response("balance", balance, raw))
 
+    def response(self, raw: RawImage) -> Floats:
+        """Calibrated response to a neutral, the project's own curves' where none was given, shape (channel,)."""
+        return neutral_response(channels(raw.cfa)) if self.neutral is None else self.neutral
+
     def gains(self, raw: RawImage, planes: NDArray[np.float64]) -> tuple[Floats, Mapping[str, BalanceSource]]:
         """Gains of a frame, and where they come from.
 
@@ -82,7 +86,7 @@ class WhiteBalance:
         names, unit, colours = channels(raw.cfa), unit_channel(raw.cfa), "".join(colour_channels(raw.cfa))
         if self.given is not None:
             return self.given[names.index(unit)] / self.given, dict.fromkeys(names, "given")
-        neutral = neutral_response(names) if self.neutral is None else self.neutral
+        neutral = self.response(raw)
         usable = ~saturated_nearby(raw, colours)
         groups = {colours: usable}
         if "W" not in colours and "W" in names:  # before the colours, which then say where green's gain comes from

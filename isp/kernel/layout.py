@@ -288,8 +288,8 @@ def _surroundings(
 
 def _window(values: Array, start: tuple[int, int], size: tuple[int, int], reflected: int, outside: float) -> Array:
     """Rows and columns from `start` on, which may be negative: beyond the border reflected, then `outside`."""
-    source, result = np.pad(values, reflected, mode="reflect"), np.full(size, outside, np.float32)
-    into, out_of = list[slice](), list[slice]()
+    source = np.pad(values, reflected, mode="reflect") if reflected else values
+    result, into, out_of = np.full(size, outside, np.float32), list[slice](), list[slice]()
     for first, count, length in zip(start, source.shape, size, strict=True):
         shift = first + reflected  # result[i] = source[i + shift]
         low = max(-shift, 0)

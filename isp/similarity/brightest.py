@@ -43,10 +43,9 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
     """
     tile, shape = (len(raw.cfa), len(raw.cfa[0])), electrons.shape
     z = max(SIGMAS, settings.sigma_s * (SIGMAS / SIGMA_S))
-    result = np.full((*tile, *shape), np.inf, electrons.dtype)
     if settings.distance == "raw" or z > MOST_SIGMAS:
-        return result
-    (down, across), ends = tile, (2 * tile[0] - 1, 2 * tile[1] - 1)
+        return np.full((*tile, *shape), np.inf, electrons.dtype)
+    ends = 2 * tile[0] - 1, 2 * tile[1] - 1
     allowed = np.full((shape[0] + 2 * ends[0], shape[1] + 2 * ends[1]), -np.inf, electrons.dtype)
     for first in range(0, shape[0], BLOCK_ROWS):
         part = electrons[first : first + BLOCK_ROWS]
@@ -64,15 +63,21 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
         bound += FEWEST_E / (1.0 + raw.dark_noise_e**2) ** 2
         # B rises with m: the largest m has the largest B.
         np.add(bound, part, out=allowed[ends[0] + first : ends[0] + first + len(part), ends[1] : ends[1] + shape[1]])
+    result = np.empty((*tile, *shape), electrons.dtype)
+    # Steps to the samples at each phase from x, from -(2 tiles - 1) on, counted from there.
+    rows, columns = ([range((p - 1) % n, 2 * end + 1, n) for p in range(n)] for n, end in zip(tile, ends, strict=True))
     for first in range(0, shape[0], BLOCK_ROWS):
         last = min(first + BLOCK_ROWS, shape[0])
-        for a, b in np.ndindex(tile):
-            # Steps to the samples at phase (a, b) from x, from -(2 tiles - 1) on, counted from there.
-            rows, columns = (
-                range((a - 1) % down, 2 * ends[0] + 1, down),
-                range((b - 1) % across, 2 * ends[1] + 1, across),
-            )
-            lines = np.maximum.reduce([allowed[first + i : last + i] for i in rows])
-            target = result[a, b, first:last]
-            np.maximum.reduce([lines[:, j : j + shape[1]] for j in columns], out=target)
+        for a, steps in enumerate(rows):
+            lines = _most([allowed[first + i : last + i] for i in steps], np.empty_like(allowed[first:last]))
+            for b, more in enumerate(columns):
+                _most([lines[:, j : j + shape[1]] for j in more], result[a, b, first:last])
     return result
+
+
+def _most(parts: list[NDArray[Any]], out: NDArray[Any]) -> NDArray[Any]:
+    """Largest of some arrays, two or more; `np.maximum.reduce` would copy all of them first."""
+    np.maximum(parts[0], parts[1], out=out)
+    for part in parts[2:]:
+        np.maximum(out, part, out=out)
+    return out

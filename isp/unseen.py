@@ -1,0 +1,116 @@
+"""Light that W doesn't see: a lamp of one pixel, or of one row of pixels, on sites of the colours alone.
+
+W guides the similarity. Light that reaches no W site has dark W all around, and what is as dark gets a share of it: a
+block, in the colours that saw it. Yet a clear pixel collects whatever a colour does. So a sample far over all W around
+it tells of its own pixel alone, and of no colour (docs/decisions/0051-unseen-light.md).
+"""
+
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import convolve
+
+from isp.planes import tent, tent_radius
+from render.spectrum import Floats
+from sensor.cfa import channels, mask
+from sensor.raw import RawImage
+
+SIGMAS = 4.0  # of the sample, over what W allows
+TIMES_NEUTRAL = 5.0  # a colour's share of W over a neutral's: behind a clear W never so much
+MOST_SHARE = 1.0  # of what a clear W collects, which a colour never exceeds whatever the light
+
+
+def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np.bool_]]:
+    """Take out samples that no W around can explain.
+
+    With n the channels' response to a neutral, s the dark noise and W the largest of W's samples as far as its tent
+    reaches, a sample S is taken out where
+
+        S > max(1, 5 n / n_W) W + 4 sqrt(S + s^2),
+
+    and W n / n_W stands in its place.
+
+    Parameters
+    ----------
+    raw : RawImage
+        Mosaic with W.
+    neutral : (channel,) float64
+        In the order of `sensor.cfa.channels`.
+
+    Returns
+    -------
+    raw : RawImage
+        The same one where nothing is taken out.
+    unseen : (h, w) bool
+        Pixels whose sample is.
+    """
+    names, size = channels(raw.cfa), (len(raw.cfa), len(raw.cfa[0]))
+    shares = neutral / neutral[names.index("W")]
+    unseen, filled, reach = np.zeros(raw.shape, np.bool_), raw.dn, tent_radius(raw.cfa, "W")
+    # Where W is 0: S = 4 sqrt(S + s^2), solved for S.
+    least_e = (SIGMAS**2 + SIGMAS * np.sqrt(SIGMAS**2 + 4.0 * raw.dark_noise_e**2)) / 2.0
+    least_dn = raw.black_dn + least_e / raw.gain_e_per_dn
+    # Beyond the border, where a pixel's only W may lie, the samples a tile further in.
+    rows, columns = (np.arange(-reach, length + reach) for length in raw.shape)
+    for line, length, step in zip((rows, columns), raw.shape, size, strict=True):
+        line[:reach] += step
+        line[length + reach :] -= step
+    padded = raw.dn[rows[:, None], columns]
+    for phase in np.ndindex(size):
+        if raw.cfa[phase[0]][phase[1]] == "W":
+            continue
+        at = slice(phase[0], None, size[0]), slice(phase[1], None, size[1])
+        samples, white = raw.dn[at], _brightest_white(padded, raw, phase, reach)
+        found = np.nonzero((samples > least_dn) & (samples > white))  # mostly few
+        light_e, white_e = (
+            np.maximum(values[found] - raw.black_dn, 0.0) * raw.gain_e_per_dn for values in (samples, white)
+        )
+        share = float(shares[names.index(raw.cfa[phase[0]][phase[1]])])
+        most_e = max(MOST_SHARE, TIMES_NEUTRAL * share) * white_e
+        over = light_e > most_e + SIGMAS * np.sqrt(light_e + raw.dark_noise_e**2)
+        if over.any():
+            filled, places = filled.copy() if filled is raw.dn else filled, tuple(index[over] for index in found)
+            explained = share * white_e[over] / raw.gain_e_per_dn + raw.black_dn
+            filled[at][places] = explained if filled.dtype.kind == "f" else np.rint(explained)
+            unseen[at][places] = True
+    return raw if filled is raw.dn else replace(raw, dn=filled), unseen
+
+
+def _brightest_white(padded: NDArray[Any], raw: RawImage, phase: tuple[int, ...], reach: int) -> NDArray[Any]:
+    """Largest sample of W up to `reach` pixels away along either axis, for the pixels at a phase."""
+    (down, across), parts = (len(raw.cfa), len(raw.cfa[0])), []
+    for row, column in product(range(phase[0], phase[0] + 2 * reach + 1), range(phase[1], phase[1] + 2 * reach + 1)):
+        if raw.cfa[(row - reach) % down][(column - reach) % across] == "W":
+            last = raw.shape[0] + row - phase[0], raw.shape[1] + column - phase[1]
+            parts.append(padded[row : last[0] : down, column : last[1] : across])
+    return np.asarray(np.maximum.reduce(parts))
+
+
+def draw_unseen(raw: RawImage, unseen: NDArray[np.bool_], gains: Floats, balanced: NDArray[np.float64]) -> None:
+    """Draw, in place, what `without_unseen` took out of `raw`: at its own pixels, neutral, up to the full well.
+
+    The level is the mean of the balanced samples there and beside by a tent, for each colour saw a part. A line goes on
+    through a colour that has little of its light, between two pixels that were taken out.
+
+    Parameters
+    ----------
+    raw : RawImage
+        With these samples.
+    gains : (channel,) float64
+        White balance.
+    balanced : (h, w, channel) float64
+    """
+    if not unseen.any():
+        return
+    light, weights = np.where(unseen, raw.electrons, 0.0), np.outer(tent(1), tent(1))
+    for gain, name in zip(gains, channels(raw.cfa), strict=True):
+        light[mask(raw.cfa, name, raw.shape)] *= gain
+    total, count = (convolve(values, weights, mode="constant") for values in (light, unseen.astype(np.float64)))
+    drawn = unseen.copy()
+    drawn[1:-1] |= unseen[:-2] & unseen[2:]
+    drawn[:, 1:-1] |= unseen[:, :-2] & unseen[:, 2:]
+    drawn &= ~mask(raw.cfa, "W", raw.shape)
+    balanced[drawn] = np.minimum(total[drawn] / count[drawn], raw.full_well_e)[:, None]
