@@ -1,9 +1,13 @@
 """Results that are kept between changes."""
 
+import ctypes
+import sys
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
+
+from rodcone.jit import backend, dr
 
 T = TypeVar("T")
 _KEPT = 8  # results a stage: four light groups before two cameras
@@ -29,3 +33,11 @@ class Memo:
     def kept(self, stage: str, key: Hashable) -> Any:
         """Return the result kept under a key; None where there is none."""
         return self.stages[stage].get(key) if stage in self.stages else None
+
+
+def give_memory_back() -> None:
+    """Give back free memory, Dr.Jit's and the C library's: without it 10 000 changes took a seventh more than 500."""
+    if backend() != "numpy":
+        dr.flush_malloc_cache()
+    if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "malloc_trim"):  # glibc's
+        library.malloc_trim(0)

@@ -114,7 +114,7 @@ def test_of_cells_with_one_channel_each_the_likeliest_component_is_picked():
         for k, factor in enumerate(table.reads[:, :16, :16].swapaxes(1, 2).astype(np.float64))
     ]
     known = _with_1(np.concatenate(draws)).astype(np.float32)
-    chosen, misfit, _ = pick(table, known, None)
+    chosen, misfit = pick(table, known, None)
     read = np.einsum("ni,kij->nkj", known, table.reads[:, :17, :16])
     likelihood = table.log_scale - 0.5 * (read**2).sum(axis=-1)
     missed = likelihood.max(axis=1) - likelihood[np.arange(len(known)), chosen]
