@@ -3,9 +3,7 @@
 Philox4x32-10 is the counter-based generator of Salmon et al., "Parallel random numbers: as easy as 1, 2, 3" (SC 2011).
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from enum import IntEnum
-from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,8 +62,7 @@ def normals(key: int, term: NoiseTerm, shape: tuple[int, int], number: int = 0) 
     columns = np.arange(shape[1], dtype=np.uint64)[None, :]
     terms, numbers = (np.full((1, 1), word, dtype=np.uint64) for word in (int(term), number))
     rows_at_once = max(1, _PIXELS_AT_ONCE // max(1, shape[1]))
-
-    def draw_rows(first: int) -> None:
+    for first in range(0, shape[0], rows_at_once):
         rows = np.arange(first, min(first + rows_at_once, shape[0]), dtype=np.uint64)[:, None]
         words = philox((columns, rows, terms, numbers), key)
         radius, turn = (
@@ -74,10 +71,6 @@ def normals(key: int, term: NoiseTerm, shape: tuple[int, int], number: int = 0) 
         )
         normal = np.sqrt(-2.0 * np.log1p(-radius)) * np.cos(2.0 * np.pi * turn)
         draws[first : first + rows_at_once] = normal
-
-    # NumPy lets go of Python's lock on arrays of this size; `list` raises what a thread did.
-    with ThreadPoolExecutor(cpu_count()) as threads:
-        list(threads.map(draw_rows, range(0, shape[0], rows_at_once)))
     return draws
 
 

@@ -9,9 +9,7 @@ with the least noise, W, and the paler the colours get.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from os import cpu_count
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -255,9 +253,7 @@ def relative_noise(
     rows = np.asarray(rows_at(estimate, kept), dtype=np.float64)
     mean = np.maximum(np.einsum("nc->c", rows) / len(rows), 0.0)
     noise_gains = np.ascontiguousarray(rows_at(noise_gain, kept).T)
-    with ThreadPoolExecutor(cpu_count()) as threads:  # the medians are most of the time
-        typical = np.array(list(threads.map(np.median, noise_gains)), dtype=np.float64)
-    variance = (mean + raw.dark_noise_e**2) * typical * gains**2
+    variance = (mean + raw.dark_noise_e**2) * np.median(noise_gains, axis=1, overwrite_input=True) * gains**2
     white = mean[green] * gains[green] / fit.mean[fit.channels.index(unit)]
     # A frame without any signal is all noise: there W alone decides, whatever the ratio.
     return np.asarray(variance / max(white**2, LEAST_SIGNAL**2 * float(variance.max())))

@@ -27,9 +27,7 @@ Planes are stored half a patch early: where a pixel stands, its patch begins. Be
 for half a patch and are OUTSIDE further on. Nothing in a strip depends on where the strip begins or ends.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from os import cpu_count
 from typing import Any
 
 import numpy as np
@@ -161,15 +159,13 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
     alpha = fraction_of_full(full, raw.cfa, settings.window) if pattern.white is not None and full.any() else None
     dn = dn.astype(np.float32)
     samples, electrons = dn - black, (dn - black) * gain
-    with ThreadPoolExecutor(1) as thread:
-        brightest = thread.submit(brightest_allowed, electrons, raw, settings)
-        guide = guide_mosaic(electrons, raw, settings.distance)
-        inverse_variance = np.full(dn.shape, np.float32(np.log2(np.e) / (2.0 * settings.sigma_s**2)))
-        if settings.distance == "noise":
-            light_e = ((dn if pattern.white is None else fill(dn, raw.cfa, "W")) - black) * gain
-            inverse_variance *= reliability(light_e, raw.dark_noise_e, WINDOW)
-            inverse_variance *= certainty(guide, raw.cfa, settings.patch)
-        np.maximum(inverse_variance, np.float32(LEAST_INVERSE_VARIANCE), out=inverse_variance)
+    guide = guide_mosaic(electrons, raw, settings.distance)
+    inverse_variance = np.full(dn.shape, np.float32(np.log2(np.e) / (2.0 * settings.sigma_s**2)))
+    if settings.distance == "noise":
+        light_e = ((dn if pattern.white is None else fill(dn, raw.cfa, "W")) - black) * gain
+        inverse_variance *= reliability(light_e, raw.dark_noise_e, WINDOW)
+        inverse_variance *= certainty(guide, raw.cfa, settings.patch)
+    np.maximum(inverse_variance, np.float32(LEAST_INVERSE_VARIANCE), out=inverse_variance)
     return Strip(
         shape=(shape[0], shape[1]),
         origin=(part[0].start, part[1].start),
@@ -177,7 +173,7 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
         guide=guide,
         inverse_variance=inverse_variance,
         alpha=alpha,
-        brightest=brightest.result() / gain,
+        brightest=brightest_allowed(electrons, raw, settings) / gain,
     )
 
 
@@ -214,8 +210,7 @@ def lay_out(
     row_packets, under = size[1] // across, block + settings.patch - 1
     planes = aligned((len(channels), *size), np.float32)
     packets = aligned((len(channels), size[0] // down, row_packets, packet_width(down * (under + block))), np.float32)
-
-    def put_plane(number: int, plane: Array, target: Array) -> None:
+    for number, plane, target in zip(channels, planes, packets, strict=True):
         filled = fill(strip.guide[own], pattern.cfa, pattern.channels[number])
         wide = _window(filled, (start[0] - half, start[1] - half), (size[0], size[1] + under), half, OUTSIDE)
         plane[:] = wide[:, : size[1]]
@@ -223,9 +218,6 @@ def lay_out(
             _put_packets(target[..., k * under : (k + 1) * under], wide[k::down], across)
             first = down * under + k * block
             _put_packets(target[..., first : first + block], samples[k::down], across)
-
-    with ThreadPoolExecutor(cpu_count()) as threads:
-        list(threads.map(put_plane, channels, planes, packets))  # a list, to raise what a thread did
     alpha = None
     if guide != "W" and strip.alpha is not None:
         alpha = aligned((size[0], row_packets, packet_width(block)), np.float32)
