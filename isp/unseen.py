@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import convolve
 
 from isp.planes import tent, tent_radius
 from render.spectrum import Floats
@@ -105,12 +104,18 @@ def draw_unseen(raw: RawImage, unseen: NDArray[np.bool_], gains: Floats, balance
     """
     if not unseen.any():
         return
-    light, weights = np.where(unseen, raw.electrons, 0.0), np.outer(tent(1), tent(1))
-    for gain, name in zip(gains, channels(raw.cfa), strict=True):
-        light[mask(raw.cfa, name, raw.shape)] *= gain
-    total, count = (convolve(values, weights, mode="constant") for values in (light, unseen.astype(np.float64)))
+    names, row, column = channels(raw.cfa), *np.nonzero(unseen)
+    cells = np.array([[names.index(name) for name in line] for line in raw.cfa])
+    gain = raw.gain_e_per_dn * gains[cells[row % len(cells), column % len(cells[0])]]
+    height, width = raw.shape
+    light, count = np.zeros((2, height + 2, width + 2))  # one pixel of border
+    light[row + 1, column + 1], count[row + 1, column + 1] = gain * (raw.dn[row, column] - raw.black_dn), 1.0
     drawn = unseen.copy()
     drawn[1:-1] |= unseen[:-2] & unseen[2:]
     drawn[:, 1:-1] |= unseen[:, :-2] & unseen[:, 2:]
     drawn &= ~mask(raw.cfa, "W", raw.shape)
-    balanced[drawn] = np.minimum(total[drawn] / count[drawn], raw.full_well_e)[:, None]
+    row, column = np.nonzero(drawn)
+    sums = np.zeros((2, row.size))
+    for (i, j), weight in np.ndenumerate(np.outer(tent(1), tent(1))):
+        sums += weight * np.stack([light[row + i, column + j], count[row + i, column + j]])
+    balanced[row, column] = np.minimum(sums[0] / sums[1], raw.full_well_e)[:, None]
