@@ -166,6 +166,7 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
         inverse_variance *= reliability(light_e, raw.dark_noise_e, WINDOW)
         inverse_variance *= certainty(guide, raw.cfa, settings.patch)
     np.maximum(inverse_variance, np.float32(LEAST_INVERSE_VARIANCE), out=inverse_variance)
+    bounds = brightest_allowed(electrons, raw, settings)
     return Strip(
         shape=(shape[0], shape[1]),
         origin=(part[0].start, part[1].start),
@@ -173,7 +174,7 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
         guide=guide,
         inverse_variance=inverse_variance,
         alpha=alpha,
-        brightest=brightest_allowed(electrons, raw, settings) / gain,
+        brightest=np.divide(bounds, gain, out=bounds),
     )
 
 
@@ -230,9 +231,9 @@ def lay_out(
     entries[..., 1 : offsets.shape[2] - 1] = offsets[..., 2:]
     brightest = aligned((len(pattern.cells), *size), np.float32)
     for phase, target in zip(np.ndindex(pattern.tile), brightest, strict=True):
-        target[:] = _window(strip.brightest[phase][own], start, size, 0, 0.0)
+        _window(strip.brightest[phase][own], start, size, 0, 0.0, target)
     read = {"planes": planes, "packets": packets, "brightest": brightest, "entries": entries, "counts": counts}
-    read["inverse_variance"] = _window(strip.inverse_variance[own], start, size, 0, 0.0)
+    read |= {"inverse_variance": _window(strip.inverse_variance[own], start, size, 0, 0.0)}
     read |= {} if alpha is None else {"alpha": alpha}
     numbers = {
         "length": entries.shape[1],
@@ -241,14 +242,11 @@ def lay_out(
         "plane_size": size[0] * size[1],
         "plane_packets": packets.shape[1] * row_packets,
         "white": channels.index(pattern.white) if pattern.white is not None else 0,
-        "height": strip.shape[0],
-        "width": strip.shape[1],
-    }
+    } | dict(zip(("height", "width"), strip.shape, strict=True))
     return Inputs(
         **{"alpha": None} | {name: upload(values) for name, values in read.items()},
         **{name: dr.opaque(jit.UInt, number) for name, number in numbers.items()},
-        top=dr.opaque(jit.Int, top),
-        left=dr.opaque(jit.Int, left),
+        **{name: dr.opaque(jit.Int, number) for name, number in (("top", top), ("left", left))},
         packet_rows=down,
         packet_columns=across,
         packet_values=packets.shape[3],
@@ -278,16 +276,18 @@ def _surroundings(
     return rows, columns
 
 
-def _window(values: Array, start: tuple[int, int], size: tuple[int, int], reflected: int, outside: float) -> Array:
+def _window(values: Array, start: Span, size: Span, reflected: int, outside: float, to: Array | None = None) -> Array:
     """Rows and columns from `start` on, which may be negative: beyond the border reflected, then `outside`."""
     source = np.pad(values, reflected, mode="reflect") if reflected else values
-    result, into, out_of = np.full(size, outside, np.float32), list[slice](), list[slice]()
+    result, into, out_of = np.empty(size, np.float32) if to is None else to, list[slice](), list[slice]()
     for first, count, length in zip(start, source.shape, size, strict=True):
         shift = first + reflected  # result[i] = source[i + shift]
         low = max(-shift, 0)
         high = max(min(count - shift, length), low)
         into.append(slice(low, high))
         out_of.append(slice(low + shift, high + shift))
+    result[: into[0].start], result[into[0].stop :] = outside, outside
+    result[into[0], : into[1].start], result[into[0], into[1].stop :] = outside, outside
     result[into[0], into[1]] = source[out_of[0], out_of[1]]
     return result
 
