@@ -14,6 +14,7 @@ from render.illuminants import illuminant
 from render.photometry import tristimulus
 from scenes import catalog
 from sensor import cfa, presets
+from sensor.cameras.library import measured_cameras
 from studies.commands.cli import main
 from studies.commands.list import LIGHTS
 
@@ -29,7 +30,7 @@ def test_every_name_of_every_catalogue_is_listed(capsys: pytest.CaptureFixture[s
     found = json.loads(printed(capsys, "--json"))
     assert tuple(found["scenes"]) == catalog.names()
     assert set(illuminants.names()) < set(found["lights"])
-    assert tuple(found["sensors"]) == presets.names()
+    assert tuple(found["sensors"]) == (*presets.names(), *measured_cameras())
     assert tuple(found["mosaics"]) == cfa.mosaics()
     assert tuple(found["processors"]) == tuple(PROCESSORS)
     assert "flip_mean" in found["metrics"]
