@@ -20,17 +20,19 @@ from sensor.raw import RawImage
 SIGMAS = 4.0  # of the sample, over what W allows
 TIMES_NEUTRAL = 5.0  # a colour's share of W over a neutral's: behind a clear W never so much
 MOST_SHARE = 1.0  # of what a clear W collects, which a colour never exceeds whatever the light
+TIMES_LEAST = 2.0  # of its channel around, over which a sample is alone
 
 
 def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np.bool_]]:
     """Take out samples that no W around can explain.
 
-    With n the channels' response to a neutral, s the dark noise and W the largest of W's samples as far as its tent
-    reaches, a sample S is taken out where
+    With n the channels' response to a neutral, s the dark noise, W the largest of W's samples as far as its tent
+    reaches, and L the least of the eight of its own channel a tile away, a sample S is taken out where
 
-        S > max(1, 5 n / n_W) W + 4 sqrt(S + s^2),
+        S > max(W, 5 W n / n_W, 2 L) + 4 sqrt(S + s^2),
 
-    and W n / n_W stands in its place.
+    and W n / n_W stands in its place. L, for light that no W sees is one pixel wide: where it isn't, W tells too
+    little, as where most charge leaves its pixel.
 
     Parameters
     ----------
@@ -50,8 +52,8 @@ def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np
     shares = neutral / neutral[names.index("W")]
     unseen, filled, reach = np.zeros(raw.shape, np.bool_), raw.dn, tent_radius(raw.cfa, "W")
     # Where W is 0: S = 4 sqrt(S + s^2), solved for S.
-    least_e = (SIGMAS**2 + SIGMAS * np.sqrt(SIGMAS**2 + 4.0 * raw.dark_noise_e**2)) / 2.0
-    least_dn = raw.black_dn + least_e / raw.gain_e_per_dn
+    first_e = (SIGMAS**2 + SIGMAS * np.sqrt(SIGMAS**2 + 4.0 * raw.dark_noise_e**2)) / 2.0
+    first_dn = raw.black_dn + first_e / raw.gain_e_per_dn
     # Beyond the border, where a pixel's only W may lie, the samples a tile further in.
     rows, columns = (np.arange(-reach, length + reach) for length in raw.shape)
     for line, length, step in zip((rows, columns), raw.shape, size, strict=True):
@@ -63,12 +65,13 @@ def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np
             continue
         at = slice(phase[0], None, size[0]), slice(phase[1], None, size[1])
         samples, white = raw.dn[at], _brightest_white(padded, raw, phase, reach)
-        found = np.nonzero((samples > least_dn) & (samples > white))  # mostly few
-        light_e, white_e = (
-            np.maximum(values[found] - raw.black_dn, 0.0) * raw.gain_e_per_dn for values in (samples, white)
+        found = np.nonzero((samples > first_dn) & (samples > white))  # mostly few
+        light_e, white_e, least_e = (  # an integer under black would wrap around
+            np.maximum(values - float(raw.black_dn), 0.0) * raw.gain_e_per_dn
+            for values in (samples[found], white[found], _least_around(samples, found))
         )
         share = float(shares[names.index(raw.cfa[phase[0]][phase[1]])])
-        most_e = max(MOST_SHARE, TIMES_NEUTRAL * share) * white_e
+        most_e = np.maximum(max(MOST_SHARE, TIMES_NEUTRAL * share) * white_e, TIMES_LEAST * least_e)
         over = light_e > most_e + SIGMAS * np.sqrt(light_e + raw.dark_noise_e**2)
         if over.any():
             filled, places = filled.copy() if filled is raw.dn else filled, tuple(index[over] for index in found)
@@ -86,6 +89,15 @@ def _brightest_white(padded: NDArray[Any], raw: RawImage, phase: tuple[int, ...]
             last = raw.shape[0] + row - phase[0], raw.shape[1] + column - phase[1]
             parts.append(padded[row : last[0] : down, column : last[1] : across])
     return np.asarray(np.maximum.reduce(parts))
+
+
+def _least_around(samples: NDArray[Any], places: tuple[NDArray[np.intp], ...]) -> NDArray[Any]:
+    """Least of the eight samples around each place among those of a phase."""
+    last, around = np.array(samples.shape)[:, None] - 1, []
+    for step in product((-1, 0, 1), repeat=2):
+        if any(step):  # beyond the border stand those a tile further in
+            around.append(samples[tuple(last - np.abs(last - np.abs(np.stack(places) + np.array(step)[:, None])))])
+    return np.asarray(np.minimum.reduce(around))
 
 
 def draw_unseen(raw: RawImage, unseen: NDArray[np.bool_], gains: Floats, balanced: NDArray[np.float64]) -> None:

@@ -53,6 +53,12 @@ def test_what_w_explains_stands_in_place_and_the_rest_stays():
     assert raw.electrons[4, 6] == 9000.0
 
 
+def test_what_reads_under_black_explains_nothing():
+    raw = exposure(np.where(mask(RGBW, "R", (12, 14)), 0.0, -5.0), black_dn=100)  # integers, as a camera writes them
+    raw.dn[4, 6] = 9000
+    assert np.argwhere(without_unseen(raw, NEUTRAL)[1]).tolist() == [[4, 6]]
+
+
 def test_a_lamp_that_w_sees_and_one_beside_full_w_are_seen():
     electrons = np.zeros((12, 14))
     electrons[4:6, 6:8] = 15_000.0  # full, W as well
@@ -60,6 +66,17 @@ def test_a_lamp_that_w_sees_and_one_beside_full_w_are_seen():
     kept, unseen = without_unseen(raw, NEUTRAL)
     assert not unseen.any()
     assert kept is raw
+
+
+@pytest.mark.parametrize("tile", [*RGBW_PHASES, RGBW_4X4, quad(RGBW)])
+def test_what_is_even_is_seen_whatever_w_tells_and_a_line_isnt(tile):
+    """A field in the colours alone, as where charge leaves its pixel, up to the border; a line has two of the eight."""
+    shape = 4 * len(tile), 4 * len(tile[0])
+    field = np.where(mask(tile, "W", shape), 0.0, 1000.0)
+    assert not without_unseen(exposure(field, tile), NEUTRAL)[1].any()
+    for row in range(shape[0]):
+        line = np.where(np.arange(shape[0])[:, None] == row, field, 0.0)
+        assert np.array_equal(without_unseen(exposure(line, tile), NEUTRAL)[1], line > 0)
 
 
 def test_a_w_of_less_light_explains_as_much_as_a_neutral_asks():
