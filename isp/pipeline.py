@@ -5,8 +5,8 @@ from numpy.typing import ArrayLike
 
 from isp.bilinear import bilinear
 from isp.colour.colour_fit import ColourFit, relative_noise
+from isp.colour.edges import even_edges
 from isp.colour.highlights import clip_highlights
-from isp.colour.rims import even_rims
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish, require_letters
@@ -77,7 +77,7 @@ def picture_interleaved(
     weight = substitution_weight(snr, substitution_snr, octaves)
     alpha = saturated_fraction(raw, settings.window)
     if ours:
-        even_rims(raw, planes, gains, alpha)
+        even_edges(raw, planes, gains, alpha)
     balanced = clip_highlights(raw, planes * gains)
     if ours:
         draw_unseen(everything, unseen, gains, balanced)
