@@ -23,7 +23,7 @@ FIGURES = ("*", "demo/*", "paper/*", "tutorial/*/*", "how_to/*/*")  # what docs/
 SHOWN = (".html", ".png", ".svg")
 # How much a word of a page counts in the search, by the page's folder; elsewhere 1. Who searches wants to do something:
 # how-tos come first, then what can be named; why it is so and the functions within come last.
-BOOSTS = {"how_to": 4.0, "tutorial": 4.0, "gallery": 2.0, "decisions": 0.25, "api": 0.25}
+BOOSTS = {"how_to": 4.0, "tutorial": 4.0, "gallery": 2.0, "decisions": 0.25, "api": 0.5}
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 NAME = re.compile(rf"(<a\b[^>]*>)?<code>((?:{'|'.join(PACKAGES)})(?:\.\w+)+)</code>")  # a link in front: left alone
 
