@@ -92,12 +92,10 @@ def _brightest_white(padded: NDArray[Any], raw: RawImage, phase: tuple[int, ...]
 
 
 def _least_around(samples: NDArray[Any], places: tuple[NDArray[np.intp], ...]) -> NDArray[Any]:
-    """Least of the eight samples around each place among those of a phase."""
-    last, around = np.array(samples.shape)[:, None] - 1, []
-    for step in product((-1, 0, 1), repeat=2):
-        if any(step):  # beyond the border stand those a tile further in
-            around.append(samples[tuple(last - np.abs(last - np.abs(np.stack(places) + np.array(step)[:, None])))])
-    return np.asarray(np.minimum.reduce(around))
+    """Least of the eight samples around each place among those of a phase, mirrored at the border."""
+    rows, columns = (np.pad(np.arange(length), 1, mode="reflect") for length in samples.shape)
+    steps = [step for step in product(range(3), repeat=2) if step != (1, 1)]  # from the one before on
+    return np.asarray(np.minimum.reduce([samples[rows[places[0] + i], columns[places[1] + j]] for i, j in steps]))
 
 
 def draw_unseen(raw: RawImage, unseen: NDArray[np.bool_], gains: Floats, balanced: NDArray[np.float64]) -> None:

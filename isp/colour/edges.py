@@ -72,12 +72,12 @@ def even_edges(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> N
     height, width = raw.shape
     names, gains = channels(raw.cfa), gains.astype(np.float32)  # W comes last
     cells = np.array([[names.index(name) for name in line] for line in raw.cfa])
-    columns, count = _mirrored(np.arange(-HALO, width + HALO), width), max(BLOCK_PIXELS // width, LEAST_ROWS)
-    beyond = np.r_[:HALO, width + HALO : width + 2 * HALO]
+    mirrored, columns = (np.pad(np.arange(length), HALO, mode="reflect") for length in raw.shape)
+    count, beyond = max(BLOCK_PIXELS // width, LEAST_ROWS), np.r_[:HALO, width + HALO : width + 2 * HALO]
     before = np.zeros((len(names), 0, width), np.float32)
     for first in range(0, height, count):
         # The planes as they were, mirrored at the borders.
-        rows = _mirrored(np.arange(first - HALO, min(first + count, height) + HALO), height)
+        rows = mirrored[first : first + count + 2 * HALO]
         lowest = int(rows.min())
         lines = np.moveaxis(planes[lowest : rows.max() + 1], 2, 0).astype(np.float32, order="C")
         lines[:, : before.shape[1]] = before
@@ -112,12 +112,6 @@ def even_edges(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> N
         evened *= _ramp(window.sigmas, SIGMAS)
         evened *= weight
         planes[first : first + count] += np.moveaxis(evened, 0, 2)
-
-
-def _mirrored(indices: NDArray[np.int_], size: int) -> NDArray[np.int_]:
-    """Indices beyond a border, mirrored at its pixel."""
-    last = size - 1
-    return np.asarray(last - np.abs(last - np.abs(indices) % max(2 * last, 1)))
 
 
 def _ramp(values: NDArray[Any], limits: tuple[float, float]) -> NDArray[Any]:
