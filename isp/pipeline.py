@@ -1,6 +1,5 @@
 """The two cameras' pipelines: raw image in, scene-linear RGB out."""
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from isp.bilinear import bilinear
@@ -70,14 +69,12 @@ def picture_interleaved(
     if ours:
         raw, unseen = without_unseen(raw, white_balance.response(raw))
     result = reconstruct_with_noise(raw, settings)
-    planes = np.array(result.estimate, dtype=np.float64)
-    gains, sources = white_balance.gains(raw, planes)
-    noise = relative_noise(raw, planes, result.noise_gain, gains, colours)
-    snr = green_snr(raw, planes)
+    gains, sources = white_balance.gains(raw, result.estimate)
+    noise = relative_noise(raw, result.estimate, result.noise_gain, gains, colours)
+    snr = green_snr(raw, result.estimate)
     weight = substitution_weight(snr, substitution_snr, octaves)
     alpha = saturated_fraction(raw, settings.window)
-    if ours:
-        even_edges(raw, planes, gains, alpha)
+    planes = even_edges(raw, result.estimate, gains, alpha) if ours else result.estimate
     balanced = clip_highlights(raw, planes * gains)
     if ours:
         draw_unseen(everything, unseen, gains, balanced)

@@ -6,44 +6,35 @@ around tells how far all channels do (docs/decisions/0053-strong-edges.md). Arou
 the tile has no colour (docs/decisions/0051-unseen-light.md).
 """
 
+from collections.abc import Callable
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter, minimum_filter
 
-from isp.planes import box_sums
+from isp.kernel.edges import EVEN, FULL, NOISE, OFF, REACH, RELATIVE, SIGMAS, TINY_E, TOGETHER, even_strips
 from render.spectrum import Floats
-from sensor.cfa import channels
+from rodcone.jit import backend
+from sensor.cfa import channels, mask
 from sensor.raw import RawImage
 
-REACH = 2  # pixels of a window to either side; 1 and 3 leave more error
-HALO = REACH + 1  # whose neighbours have windows too
-BLOCK_PIXELS, LEAST_ROWS = 2**15, 32  # that are computed together
-# From the first number on something counts, from the second on fully.
-SIGMAS = 3.0, 10.0  # a channel's contrast, in noise of a sample
-TOGETHER = 0.5, 0.8  # rise of the light over the colours' together: 1 where they rise alike
-RELATIVE = 0.4, 0.7  # contrast of a pixel's own channel, over the largest
-NOISE = 2.0, 4.0  # distance of a sample from its plane, in its noise
-OFF = 0.05, 0.15  # distance of the samples around from their planes, over the channel's contrast
-FULL = 0.9  # of saturation, from which on there may be more light than was read
-EVEN = 1e-3  # squared difference of shares that is none
-TINY_E = 1e-9  # where nothing differs
-Values = NDArray[np.float32]
+Flags = NDArray[np.bool_]
 
 
 class Window(NamedTuple):
-    """Around each pixel of a block; float32 but for `full`, channels first."""
+    """Around each pixel, (h, w, channel)."""
 
-    values: NDArray[Any]  # the planes themselves
-    least: NDArray[Any]
-    step: NDArray[Any]  # most - least
-    contrast: NDArray[Any]  # step / (most + least)
-    sigmas: NDArray[Any]  # step over the noise of a sample in the light
-    full: NDArray[Any]
+    least: Floats
+    step: Floats  # the most less the least
+    contrast: Floats  # step over the sum of both
+    sigmas: Floats  # step over the noise of a sample in the light
+    full: Flags
 
 
-def even_edges(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> None:
-    """Give all channels one share of light and dark at strong edges, in place.
+def even_edges(raw: RawImage, planes: NDArray[np.floating], gains: Floats, alpha: Floats) -> NDArray[np.float32]:
+    """Give all channels one share of light and dark at strong edges.
 
     With l and h the least and the most of a channel f up to 2 pixels away along either axis, its contrast
     c = (h - l) / (h + l), and e the pixel's own sample, of channel o,
@@ -62,170 +53,121 @@ def even_edges(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> N
 
     Parameters
     ----------
-    planes : (h, w, channel) float64
-        Of `isp.interleaved.reconstruct` [e-].
-    gains : (channel,) float64
+    planes : (h, w, 4) float
+        R, G, B and W of `isp.interleaved.reconstruct` [e-].
+    gains : (4,) float64
         White balance.
     alpha : (h, w) float64
         Of `isp.similarity.guide.saturated_fraction`.
+
+    Returns
+    -------
+    (h, w, 4) float32
     """
-    height, width = raw.shape
-    names, gains = channels(raw.cfa), gains.astype(np.float32)  # W comes last
-    cells = np.array([[names.index(name) for name in line] for line in raw.cfa])
-    mirrored, columns = (np.pad(np.arange(length), HALO, mode="reflect") for length in raw.shape)
-    count, beyond = max(BLOCK_PIXELS // width, LEAST_ROWS), np.r_[:HALO, width + HALO : width + 2 * HALO]
-    before = np.zeros((len(names), 0, width), np.float32)
-    for first in range(0, height, count):
-        # The planes as they were, mirrored at the borders.
-        rows = mirrored[first : first + count + 2 * HALO]
-        lowest = int(rows.min())
-        lines = np.moveaxis(planes[lowest : rows.max() + 1], 2, 0).astype(np.float32, order="C")
-        lines[:, : before.shape[1]] = before
-        before = lines[:, count + first - HALO - lowest :][:, :HALO].copy()
-        around = np.empty((len(names), rows.size, columns.size), np.float32)
-        around[:, :, HALO:-HALO] = lines[:, rows - lowest]
-        around[:, :, beyond] = around[:, :, columns[beyond] + HALO]
-        window = _window(raw, around)
-        if not (window.sigmas[:-1] > SIGMAS[0]).any():
-            continue
-
-        # One share for every pixel, from its own sample or the neighbours'.
-        inner = slice(REACH, -REACH)
-        site = cells[(rows[inner] % len(cells))[:, None], columns[inner] % len(cells[0])]
-        samples = raw.dn[rows[inner][:, None], columns[inner]].astype(np.float32)
-        samples = (samples - np.float32(raw.black_dn)) * np.float32(raw.gain_e_per_dn)
-        share, known = _shares(window, samples, site, raw.dark_noise_e)
-
-        # Each channel as far as it counts.
-        window, colours = Window(*(part[:, 1:-1, 1:-1] for part in window)), around[:-1, 1:-1, 1:-1]
-        mixed = alpha[first : first + count]
-        rims = (mixed > 0.0) & (mixed < 1.0)
-        weight = np.where(rims, np.float32(1.0), known) * _together(colours, window.step[:-1], gains[:-1])
-        evened = share * window.step
-        evened += window.least
-        _hold(evened, window)
-        if rims.any():
-            filled = _moving(np.maximum, _moving(np.minimum, colours, 2), 2 * REACH)[:, rims]
-            of_rims = Window(*(part[:, rims] for part in window))
-            evened[:, rims] = _evened_rims(of_rims, filled, share[rims], known[rims], gains)
-        evened -= window.values
-        evened *= _ramp(window.sigmas, SIGMAS)
-        evened *= weight
-        planes[first : first + count] += np.moveaxis(evened, 0, 2)
+    if backend() != "numpy":
+        return even_strips(raw, np.ascontiguousarray(planes, dtype=np.float32), gains, alpha)
+    return _even_edges(raw, planes.astype(np.float64), gains, alpha).astype(np.float32)
 
 
-def _ramp(values: NDArray[Any], limits: tuple[float, float]) -> NDArray[Any]:
+def _even_edges(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> Floats:
+    """In double precision; `isp.kernel.edges` is the same in single."""
+    window = _window(raw, planes)
+    share, known = _shares(raw, planes, window)
+
+    # Each channel as far as it counts.
+    light, colours = planes[..., :3] @ gains[:3], window.step[..., :3] @ gains[:3]
+    together = _ramp((_around(maximum_filter, light) - _around(minimum_filter, light)) / colours, TOGETHER)
+    rims = (alpha > 0.0) & (alpha < 1.0)
+    evened = window.least + share[..., None] * window.step
+    _hold(evened, planes, window)
+    evened[rims] = _evened_rims(planes, window, share, known, gains)[rims]
+    weight = np.where(rims, 1.0, known) * together
+    return np.asarray(planes + weight[..., None] * _ramp(window.sigmas, SIGMAS) * (evened - planes))
+
+
+def _ramp(values: Floats, limits: tuple[float, float]) -> Floats:
     """0 up to the first limit, 1 from the second on."""
-    result = values - np.float32(limits[0])
-    result *= np.float32(1.0 / (limits[1] - limits[0]))
-    return np.asarray(np.clip(result, 0.0, 1.0, out=result))
+    return np.clip((values - limits[0]) / (limits[1] - limits[0]), 0.0, 1.0)
 
 
-def _moving(extreme: np.ufunc, values: Values, size: int) -> Values:
-    """Least or most of the windows of `size` pixels a side that lie in an array (channel, h, w)."""
-    reach = 1  # pixels of the window so far
-    while reach < size:
-        step = min(reach, size - reach)
-        values = extreme(values[:, :-step], values[:, step:])
-        values, reach = extreme(values[:, :, :-step], values[:, :, step:]), reach + step
-    return values
+def _around(extreme: Callable[..., Any], values: Floats) -> Floats:
+    """Least or most of the window around each pixel, which goes on by reflection beyond the border."""
+    return np.asarray(extreme(values, size=2 * REACH + 1, axes=(0, 1), mode="mirror"))
 
 
-def _window(raw: RawImage, around: Values) -> Window:
-    """Of every pixel whose window lies in an array (channel, h, w) of the planes."""
-    least, most = (_moving(extreme, around, 2 * REACH + 1) for extreme in (np.minimum, np.maximum))
-    step = most - least
-    np.maximum(step, np.float32(TINY_E), out=step)
-    contrast, noise_e = most + least, np.maximum(most, np.float32(0.0))
-    np.maximum(contrast, np.float32(TINY_E), out=contrast)
-    noise_e += np.float32(raw.dark_noise_e**2)
-    np.sqrt(noise_e, out=noise_e)
+def _window(raw: RawImage, planes: Floats) -> Window:
+    least, most = (_around(extreme, planes) for extreme in (minimum_filter, maximum_filter))
+    step = np.maximum(most - least, TINY_E)
     return Window(
-        values=np.ascontiguousarray(around[:, REACH:-REACH, REACH:-REACH]),
         least=least,
         step=step,
-        contrast=np.divide(step, contrast, out=contrast),
-        sigmas=np.divide(step, noise_e, out=noise_e),
-        full=most >= np.float32(FULL * raw.saturation_e),
+        contrast=step / np.maximum(most + least, TINY_E),
+        sigmas=step / np.sqrt(np.maximum(most, 0.0) + raw.dark_noise_e**2),
+        full=most >= FULL * raw.saturation_e,
     )
 
 
-def _shares(window: Window, samples: Values, site: NDArray[np.int_], dark_noise_e: float) -> tuple[Values, Values]:
-    """Share t of each pixel but the border's, and how far it is known and needed.
-
-    Parameters
-    ----------
-    samples : (h, w) float32
-        [e-].
-    site : (h, w) int
-        Their channels.
-    """
+def _shares(raw: RawImage, planes: Floats, window: Window) -> tuple[Floats, Floats]:
+    """Share t of each pixel, and how far it is known and needed, (h, w)."""
     # By the pixel's own channel; its step is 0 where it is full.
-    steps, contrast = window.step, window.contrast
-    if window.full.any():
-        steps, contrast = (np.where(window.full, np.float32(0.0), part) for part in (steps, contrast))
-    places = site * site.size + np.arange(site.size).reshape(site.shape)
-    value, least, step = (np.take(part, places) for part in (window.values, window.least, steps))
-    noise_e = np.sqrt(np.maximum(value, np.float32(0.0)) + np.float32(dark_noise_e**2))
-    samples = value + (samples - value) * _ramp(np.abs(samples - value) / noise_e, NOISE)
-    trust = _ramp(step / np.sqrt(np.maximum(least + step, np.float32(0.0)) + np.float32(dark_noise_e**2)), SIGMAS)
-    relative = (
-        step
-        / np.maximum(least + least + step, np.float32(TINY_E))
-        / np.maximum(contrast.max(axis=0), np.float32(TINY_E))
-    )
-    trust *= _ramp(relative, RELATIVE)
-    divisor = np.maximum(step, np.float32(TINY_E))
-    share = np.clip((samples - least) / divisor, np.float32(0.0), np.float32(1.0))
-    off = np.where(step > 0.0, np.minimum(np.abs(samples - value) / divisor, np.float32(1.0)), np.float32(0.0))
+    site = np.argmax([mask(raw.cfa, name, raw.shape) for name in channels(raw.cfa)], axis=0)[..., None]
+    steps, contrast = (np.where(window.full, 0.0, part) for part in (window.step, window.contrast))
+    value, least, step = (np.take_along_axis(part, site, 2)[..., 0] for part in (planes, window.least, steps))
+    away = raw.electrons - value
+    away = away * _ramp(np.abs(away) / np.sqrt(np.maximum(value, 0.0) + raw.dark_noise_e**2), NOISE)
+    trust = _ramp(step / np.sqrt(np.maximum(least + step, 0.0) + raw.dark_noise_e**2), SIGMAS)
+    own_contrast = step / np.maximum(2.0 * least + step, TINY_E)
+    trust *= _ramp(own_contrast / np.maximum(contrast.max(axis=2), TINY_E), RELATIVE)
+    share = np.clip((value + away - least) / np.maximum(step, TINY_E), 0.0, 1.0)
+    off = np.where(step > 0.0, np.minimum(np.abs(away) / np.maximum(step, TINY_E), 1.0), 0.0)
 
     # By the neighbours: each axis counts by the other's difference.
+    shares, trusts, offs = (np.pad(part, 1, mode="reflect") for part in (share, trust, off))
     at = slice(1, -1)
-    left, right, above, below = (at, slice(0, -2)), (at, slice(2, None)), (slice(0, -2), at), (slice(2, None), at)
-    sums, count, trusted = np.zeros((3, *share[at, at].shape), np.float32)
-    for axis, other in (((left, right), (above, below)), ((above, below), (left, right))):
-        even = np.square(share[other[0]] - share[other[1]]) + np.float32(EVEN)
+    across, along = ((at, slice(0, -2)), (at, slice(2, None))), ((slice(0, -2), at), (slice(2, None), at))
+    sums, count, trusted = np.zeros((3, *share.shape))
+    for axis, other in ((across, along), (along, across)):
+        even = (shares[other[0]] - shares[other[1]]) ** 2 + EVEN
         for side in axis:
-            sums += even * trust[side] * share[side]
-            count += even * trust[side]
-            trusted += trust[side]
-    own = trust[at, at]
-    filled = sums / np.maximum(count, np.float32(TINY_E))
-    known = own + (1.0 - own) * np.minimum(trusted, np.float32(1.0))
+            sums += even * trusts[side] * shares[side]
+            count += even * trusts[side]
+            trusted += trusts[side]
+    known = trust + (1.0 - trust) * np.minimum(trusted, 1.0)
 
     # Where no sample around lies off its plane no edge was missed.
-    missed = _ramp(np.sqrt(box_sums(np.square(off), (3, 3)) / np.float32(9.0)), OFF)
-    return own * share[at, at] + (1.0 - own) * filled, known * missed
+    missed = _ramp(np.sqrt(_moved(np.add, offs**2, 3) / 9.0), OFF)
+    return trust * share + (1.0 - trust) * sums / np.maximum(count, TINY_E), known * missed
 
 
-def _together(colours: Values, step: Values, gains: NDArray[Any]) -> Values:
-    """How far the colours rise together in a window, 0 to 1, shape (h, w)."""
-    light = np.tensordot(gains, colours, 1)[None]
-    rise = _moving(np.maximum, light, 2 * REACH + 1)[0] - _moving(np.minimum, light, 2 * REACH + 1)[0]
-    return np.asarray(_ramp(rise / np.tensordot(gains, step, 1), TOGETHER))
+def _moved(combine: np.ufunc, values: Floats, size: int) -> Floats:
+    """Sum, least or most of each square of `size` pixels a side that lies in an array."""
+    height, width = (length - size + 1 for length in values.shape[:2])
+    return np.asarray(
+        combine.reduce([values[i : i + height, j : j + width] for i, j in product(range(size), repeat=2)])
+    )
 
 
-def _hold(evened: Values, window: Window) -> None:
-    """Lower no colour, in place, that is full nearby."""
-    if window.full[:-1].any():
-        np.maximum(evened[:-1], window.values[:-1], out=evened[:-1], where=window.full[:-1])
-
-
-def _evened_rims(window: Window, filled: Values, share: Values, known: Values, gains: NDArray[Any]) -> Values:
-    """Channels of `even_edges` in rims, (channel, pixel); `filled` is q of the colours."""
-    least, step, balance = window.least[:-1], window.step[:-1], gains[:, None]
-    fills = ((filled - least) / step).min(axis=0)
+def _evened_rims(planes: Floats, window: Window, share: Floats, known: Floats, gains: Floats) -> Floats:
+    """Channels of `even_edges` in rims, (h, w, channel), computed everywhere."""
+    least, step, colours, full = window.least[..., :3], window.step[..., :3], planes[..., :3], window.full[..., :3]
+    padded = np.pad(colours, ((REACH, REACH), (REACH, REACH), (0, 0)), mode="reflect")
+    filled = _moved(np.maximum, _moved(np.minimum, padded, 2), 2 * REACH)
+    fills = ((filled - least) / step).min(axis=2)
 
     # Its own share where the lamp is large, else the colours' mean.
-    contrast = np.square(window.contrast[:-1])
-    mean = np.sum(contrast * (window.values[:-1] - least) / step, axis=0)
-    mean /= np.maximum(contrast.sum(axis=0), np.float32(TINY_E))
-    large = np.where(window.full[:-1].any(axis=0), np.float32(0.0), fills * known)
-    evened = window.least + (large * share + (1.0 - large) * mean) * window.step
-    _hold(evened, window)
+    contrast = window.contrast[..., :3] ** 2
+    mean = (contrast * (colours - least) / step).sum(axis=2) / np.maximum(contrast.sum(axis=2), TINY_E)
+    large = np.where(full.any(axis=2), 0.0, fills * known)
+    evened = window.least + (large * share + (1.0 - large) * mean)[..., None] * window.step
+    _hold(evened, planes, window)
 
     # No colour where it is smaller than 2 x 2 pixels.
-    light = evened[:-1]
-    over = ((light - least) / np.maximum(light + least, np.float32(TINY_E))).max(axis=0)
-    grey = (light * balance[:-1]).mean(axis=0) / balance
-    return np.asarray(evened + (1.0 - fills) * np.square(np.clip(over, 0.0, 1.0)) * (grey - evened))
+    light = evened[..., :3]
+    over = ((light - least) / np.maximum(light + least, TINY_E)).max(axis=2)
+    grey = (light @ gains[:3] / 3.0)[..., None] / gains
+    return np.asarray(evened + ((1.0 - fills) * np.clip(over, 0.0, 1.0) ** 2)[..., None] * (grey - evened))
+
+
+def _hold(evened: Floats, planes: Floats, window: Window) -> None:
+    """Lower no colour, in place, that is full nearby."""
+    np.maximum(evened[..., :3], planes[..., :3], out=evened[..., :3], where=window.full[..., :3])

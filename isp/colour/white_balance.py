@@ -61,12 +61,12 @@ class WhiteBalance:
         """Calibrated response to a neutral, the project's own curves' where none was given, shape (channel,)."""
         return neutral_response(channels(raw.cfa)) if self.neutral is None else self.neutral
 
-    def gains(self, raw: RawImage, planes: NDArray[np.float64]) -> tuple[Floats, Mapping[str, BalanceSource]]:
+    def gains(self, raw: RawImage, planes: NDArray[np.floating]) -> tuple[Floats, Mapping[str, BalanceSource]]:
         """Gains of a frame, and where they come from.
 
         Parameters
         ----------
-        planes : (h, w, channel) float64
+        planes : (h, w, channel) float
             The pipeline's own linear planes [e-], channels in the order of `sensor.cfa.channels`.
 
         Returns
@@ -96,7 +96,7 @@ class WhiteBalance:
         for group, pixels in groups.items():
             index = [names.index(channel) for channel in group]
             samples = np.maximum([np.sum(pixels & mask(raw.cfa, channel, raw.shape)) for channel in group], 1)
-            rows = rows_at(planes, pixels)
+            rows = np.asarray(rows_at(planes, pixels), dtype=np.float64)
             means = np.einsum("nc->c", rows)[index] / max(len(rows), 1)
             errors = np.sqrt((np.maximum(means, 0.0) + raw.dark_noise_e**2) / samples)
             factors[index], certain = gray_world(means, errors, neutral[index], green=group.index(unit))

@@ -7,12 +7,25 @@ import pytest
 from builders import RGBW_4X4, RGBW_PHASES, raw_image
 
 from isp.colour import edges
+from isp.colour.edges import even_edges
+from isp.kernel import edges as kernel
 from isp.pipeline import picture_interleaved
+from rodcone.jit import backend
 from sensor.cfa import RGBW, channels, mask, quad
 
 DARK_E, LIGHT_E = np.array([10.0, 30.0, 8.0, 100.0]), np.array([1510.0, 3030.0, 1408.0, 10_100.0])
 OPEN, MIXED = np.zeros((16, 16)), np.full((16, 16), 0.5)
 MISPLACED = np.array([0.0, 0.9, 0.1, 1.0])
+
+
+@pytest.fixture(autouse=True, params=["kernel", "numpy"])
+def engine(request, monkeypatch):
+    """Everything holds for both engines."""
+    if request.param == "numpy":
+        monkeypatch.setattr(edges, "backend", lambda: "numpy")
+    elif backend() == "numpy":
+        pytest.skip("needs LLVM or CUDA")
+    return request.param
 
 
 def frame(planes, tile=RGBW):
@@ -21,12 +34,6 @@ def frame(planes, tile=RGBW):
     for index, name in enumerate(channels(tile)):
         electrons += np.where(mask(tile, name, electrons.shape), planes[..., index], 0.0)
     return raw_image(np.rint(electrons) + 100, tile)
-
-
-def even_edges(raw, planes, gains, alpha):
-    result = planes.copy()
-    edges.even_edges(raw, result, gains, alpha)
-    return result
 
 
 def edge(shares, light_e=LIGHT_E):
@@ -88,7 +95,7 @@ def test_contrast_within_the_noise_changes_nothing():
     noise = np.random.default_rng(0).normal(0.0, 0.2 * np.sqrt(1000.0), (16, 16, 4))  # 3 sigmas apart: once in 10^20
     planes = 1000.0 + noise
     raw = frame(planes + np.random.default_rng(1).normal(0.0, np.sqrt(1000.0), (16, 16, 4)))
-    assert np.array_equal(even_edges(raw, planes, np.ones(4), OPEN), planes)
+    assert np.array_equal(even_edges(raw, planes, np.ones(4), OPEN), planes.astype(np.float32))
 
 
 def test_a_sample_s_own_noise_beside_a_lamp_is_not_drawn():
@@ -137,19 +144,27 @@ def test_a_lamp_smaller_than_2_x_2_has_no_colour_in_rims(width, grey):
     assert balanced == pytest.approx(expected, rel=1e-5)
 
 
-def test_blocks_of_rows_make_no_difference(monkeypatch):
-    rng = np.random.default_rng(1)
-    planes, alpha = rng.uniform(0.0, 5000.0, (129, 9, 4)), rng.choice([0.0, 0.5, 1.0], (129, 9))
-    raw = frame(rng.uniform(0.0, 5000.0, (129, 9, 4)))
-    whole = even_edges(raw, planes, np.ones(4), alpha)
-    assert not np.array_equal(whole, planes)
-    monkeypatch.setattr(edges, "BLOCK_PIXELS", 0)
-    for rows in (3, 32, 64):
-        monkeypatch.setattr(edges, "LEAST_ROWS", rows)
-        assert np.array_equal(even_edges(raw, planes, np.ones(4), alpha), whole), rows
+SHAPES = [(129, 9), (2, 2), (2, 7), (5, 2), (4, 3)]
 
 
-@pytest.mark.parametrize("shape", [(2, 2), (2, 7), (5, 2), (4, 3)])
+@pytest.mark.parametrize("engine", ["kernel"], indirect=True)
+@pytest.mark.parametrize(("tile", "shape"), [*product([RGBW], SHAPES), (RGBW_4X4, (129, 9)), (RGBW_4X4, (4, 5))])
+def test_both_engines_agree(monkeypatch, tile, shape):
+    """Noise and rims everywhere, in strips of several sizes; single precision beside double."""
+    rng = np.random.default_rng(2)
+    planes, alpha = rng.uniform(0.0, 5000.0, (*shape, 4)), rng.choice([0.0, 0.5, 1.0], shape)
+    planes[:, shape[1] // 2 :] += [0.0, 10_000.0, 0.0, 12_000.0]
+    raw, gains = frame(rng.uniform(0.0, 5000.0, (*shape, 4)), tile), np.array([1.5, 1.0, 2.0, 0.3])
+    with monkeypatch.context() as patch:
+        patch.setattr(edges, "backend", lambda: "numpy")
+        expected = even_edges(raw, planes, gains, alpha)
+    assert shape in SHAPES[1:] or (np.abs(expected / planes - 1.0) > 0.01).mean() > 0.1
+    for pixels in (2**21, 1, 30):
+        monkeypatch.setattr(kernel, "STRIP_PIXELS", pixels)
+        assert even_edges(raw, planes, gains, alpha) == pytest.approx(expected, rel=1e-5, abs=1e-3), pixels
+
+
+@pytest.mark.parametrize("shape", SHAPES[1:])
 def test_tiny_frames(shape):
     rng = np.random.default_rng(2)
     planes, raw = rng.uniform(0.0, 5000.0, (*shape, 4)), frame(rng.uniform(0.0, 5000.0, (*shape, 4)))
@@ -157,6 +172,20 @@ def test_tiny_frames(shape):
         even = even_edges(raw, planes, np.ones(4), np.full(shape, alpha))
         assert np.isfinite(even).all()
         assert (even >= 0.0).all()
+
+
+def test_a_frame_of_no_contrast_in_its_colours_moves_w_alone():
+    """By each pixel: what lies elsewhere in the frame, as an edge of all colours far away, has no say."""
+    dark_e, light_e = np.array([5.0, 5.0, 5.0, 100.0]), np.array([10.0, 10.0, 10.0, 1000.0])
+    planes = np.where(np.arange(40)[:, None] < 9, dark_e, light_e)[None].repeat(40, axis=0)
+    planes[:, 9] = 7.0, 7.0, 7.0, 557.0  # a column that has samples of W
+    truth = planes.copy()
+    truth[:, 9, 3] = 120.0
+    alone = even_edges(frame(truth), planes, np.ones(4), np.zeros((40, 40)))
+    assert np.array_equal(alone[..., :3], planes[..., :3].astype(np.float32))
+    assert (alone[3:-3:2, 9, 3]) == pytest.approx(120.0, rel=1e-5)
+    truth[:, 30:], planes[:, 30:] = 5000.0, 5000.0
+    assert np.array_equal(even_edges(frame(truth), planes, np.ones(4), np.zeros((40, 40)))[:, :20], alone[:, :20])
 
 
 @pytest.mark.parametrize(("size", "row", "column"), list(product((3, 4, 5), (0, 1), (0, 1))))
