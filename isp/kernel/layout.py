@@ -44,7 +44,7 @@ from rodcone.device_arrays import aligned, upload
 from rodcone.jit import dr
 from sensor.raw import RawImage
 
-STRIP_BYTES = 600_000_000  # of all that a strip takes: one and a half megapixels of RGBW
+STRIP_BYTES = 300_000_000  # of all that a strip takes, 0.75 megapixels of RGBW; larger arrays are new memory each time
 
 Array = NDArray[Any]
 Span = tuple[int, int]  # the first of some rows or columns, and past the last

@@ -74,7 +74,7 @@ def test_strips_are_whole_blocks_and_fewer_rows_the_wider_the_frame():
     assert all(count % block == 0 for count in rows)
     assert rows == sorted(rows, reverse=True)
     assert rows[-1] == block
-    assert 1.2e6 < rows[1] * 4000 < 2.4e6
+    assert 0.6e6 < rows[1] * 4000 < 1.2e6
 
 
 def test_strips_of_a_frame_are_even():
