@@ -26,6 +26,7 @@ from sensor.raw import RawImage
 # Noise variance that is always there, far under any camera's. Under a light of one wavelength balanced channels are all
 # the same, and without noise any matrix fits; with the same noise in each they count alike.
 LEAST_NOISE = 1e-13
+MEDIAN_STEP = 7  # every so many pixels tell a median; odd, so that all cells of the tile do
 LEAST_SIGNAL = 1e-3  # of the noise: keeps the fit's equations solvable in a frame of pure noise
 
 
@@ -252,7 +253,7 @@ def relative_noise(
     kept = ~saturated if not saturated.all() else np.ones(raw.shape, dtype=bool)
     rows = np.asarray(rows_at(estimate, kept), dtype=np.float64)
     mean = np.maximum(np.einsum("nc->c", rows) / len(rows), 0.0)
-    noise_gains = np.ascontiguousarray(rows_at(noise_gain, kept).T)
+    noise_gains = np.ascontiguousarray(rows_at(noise_gain, kept)[::MEDIAN_STEP].T)
     variance = (mean + raw.dark_noise_e**2) * np.median(noise_gains, axis=1, overwrite_input=True) * gains**2
     white = mean[green] * gains[green] / fit.mean[fit.channels.index(unit)]
     # A frame without any signal is all noise: there W alone decides, whatever the ratio.

@@ -2,9 +2,8 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
 
-from isp.planes import rows_at
+from isp.planes import box_sums, rows_at
 from sensor.cfa import colour_channels, mask
 from sensor.raw import RawImage
 
@@ -17,17 +16,20 @@ def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> 
     hit = raw.saturated & mask(raw.cfa, channels, raw.shape)
     if not hit.any():
         return hit
-    tile = max(len(raw.cfa), len(raw.cfa[0]))
-    return np.asarray(maximum_filter(hit, size=2 * (tile - 1 if reach is None else reach) + 1))
+    reach = max(len(raw.cfa), len(raw.cfa[0])) - 1 if reach is None else reach
+    return box_sums(np.pad(hit, reach).astype(np.uint16), (2 * reach + 1, 2 * reach + 1)) > 0
 
 
 def clip_highlights(raw: RawImage, balanced: NDArray[np.float64], reach: int | None = None) -> NDArray[np.float64]:
     """Hold every balanced colour at green's full well near a saturated colour sample: highlights stay neutral.
 
     Without green it is the full well of `sensor.cfa.unit_channel`.
-    `reach` as in `saturated_nearby`: that of the filter which made the planes.
+    `reach` as in `saturated_nearby`: that of the filter which made the planes. Where nothing is held the array itself
+    is returned.
     """
     clipped = saturated_nearby(raw, "".join(colour_channels(raw.cfa)), reach)
+    if not clipped.any():
+        return balanced
     held = balanced.copy()
     held[clipped] = np.minimum(rows_at(balanced, clipped), raw.full_well_e)
     return held
