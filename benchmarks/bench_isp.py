@@ -3,7 +3,8 @@
 Run ``python benchmarks/bench_isp.py`` (five to ten minutes; ``--large`` adds 24 megapixels). It prints the environment,
 the first call in a fresh process with an empty kernel cache, then
 
-- one megapixel, 21x21 and 5x5, on frames for which the kernel does different work, preparation included;
+- one megapixel, 21x21 and 5x5, on frames for which the kernel does different work, preparation included, and three of
+  them developed by `interleaved` with its default, one pixel a patch;
 - the time of other programs: OpenCV's ``fastNlMeansDenoising`` on one 8-bit plane with the same windows (the yardstick
   of the ratios) and ``fastNlMeansDenoisingColored``, where `cv2` is installed, and scikit-image's ``denoise_nl_means``
   on four planes;
@@ -112,6 +113,8 @@ def ways(yardstick: Call) -> None:
     for name, (raw, settings) in frames.items():
         compare(name, partial(reconstruct, raw, settings), yardstick)
     compare("nothing saturated, with the noise", partial(reconstruct_with_noise, frame(300.0), PATCHES), yardstick)
+    for name in ("one pixel a patch, the default", "3 % saturated", "at the edge of saturation (both guide)"):
+        compare(f"developed: {name}", partial(PROCESSORS["interleaved"].develop, frames[name][0], np.eye(3)), yardstick)
 
 
 def sizes(yardstick: Call, large: bool) -> None:
