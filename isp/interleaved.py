@@ -44,7 +44,7 @@ def reconstruct(raw: RawImage, settings: Settings = DEFAULTS) -> NDArray[np.floa
     Notes
     -----
     Other sizes, sigmas and neighbourhoods run the kernels compiled already; another patch or size of tile compiles its
-    own. Besides the result a call takes some 1.2 GB at most.
+    own. Besides the result a call takes some 0.6 GB at most.
     """
     settings.check_reaches(raw.cfa)
     if backend() == "numpy":
