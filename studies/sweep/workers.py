@@ -4,18 +4,18 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from functools import partial
-from itertools import islice
 from multiprocessing import active_children
 from multiprocessing.connection import wait as wait_for
 from multiprocessing.process import BaseProcess
 from typing import Any
 
 from rodcone.errors import InputError
+from studies.study.study import Condition
 from studies.sweep.cells import Cell
 from studies.sweep.row import Row
 from studies.sweep.run_cell import run_cell
@@ -24,6 +24,9 @@ LEAVE_S = 10.0  # time for an idle worker to end, while libraries release thread
 MOST_DEATHS = 3  # a cell is given up after it was held by so many workers that died; the last two ran it alone
 # What BLAS libraries and OpenMP read at their import: set before a worker starts.
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
+
+
+Kind = tuple[Condition, str]
 
 
 class WorkerLostError(RuntimeError):
@@ -65,7 +68,8 @@ def run(
     executor : concurrent.futures.Executor
         Any whose calls may travel as pickles: a pool, `InThisProcess`, `dask.distributed.Client.get_executor()`.
     at_once : int
-        Cells in the executor's hands; twice its workers keep these busy.
+        Cells in the executor's hands: as many as it has workers, for each to make the cells of a condition one after
+        the other; twice as many where a worker would wait long for the next.
     threads : int, optional
         For Dr.Jit in each worker.
 
@@ -76,11 +80,14 @@ def run(
     WorkerLostError
         Where the executor broke; rows that were ready have been given.
     """
-    call, waiting = partial(run_cell, most_threads=threads), iter(cells)
+    call, waiting = partial(run_cell, most_threads=threads), dict[Kind, deque[Cell]]()
+    for cell in cells:
+        waiting.setdefault(_kind(cell), deque()).append(cell)
     running: dict[Future[Row], Cell] = {}
     try:
         while True:
-            for cell in islice(waiting, at_once - len(running)):
+            while waiting and len(running) < at_once:
+                cell = _take(waiting, running.values())
                 try:
                     running[executor.submit(call, cell)] = cell
                 except BrokenExecutor as error:
@@ -97,6 +104,21 @@ def run(
     finally:
         for future in running:
             future.cancel()
+
+
+def _kind(cell: Cell) -> Kind:
+    """Cells of one kind differ by their seeds, and share what a processor prepares."""
+    return cell.condition, cell.processor
+
+
+def _take(waiting: dict[Kind, deque[Cell]], running: Iterable[Cell]) -> Cell:
+    """Take the next cell: of a kind that none runs of, so that the worker which has just made one makes its others."""
+    busy = {_kind(cell) for cell in running}
+    kind = next((kind for kind in waiting if kind not in busy), next(iter(waiting)))
+    cell = waiting[kind].popleft()
+    if not waiting[kind]:
+        del waiting[kind]
+    return cell
 
 
 def _finished(running: dict[Future[Row], Cell]) -> Iterator[Row]:
@@ -129,7 +151,7 @@ def run_in_processes(cells: Sequence[Cell], workers: int) -> Generator[Row, None
     given_up: list[Cell] = []
     while waiting:
         untried = [cell for cell in waiting.values() if not deaths[cell.key]]
-        batch, at_once = (untried, 2 * workers) if untried else (list(waiting.values()), 1)
+        batch, at_once = (untried, workers) if untried else (list(waiting.values()), 1)
         with _pool(workers, threads) as pool:
             try:
                 for row in run(batch, pool, at_once=at_once, threads=threads):

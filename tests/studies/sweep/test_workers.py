@@ -43,6 +43,24 @@ class Breaking(Executor):
         return future
 
 
+class Alternating(Executor):
+    """Executor of two workers that take turns: each call ends as the next one is asked for."""
+
+    def __init__(self) -> None:
+        self.cells: list[Cell] = []
+        self.open: list[tuple[Future[Any], Any]] = []
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        self.cells.append(args[0])
+        self.open.append((Future(), lambda: fn(*args, **kwargs)))
+        future = self.open[-1][0]
+        if len(self.open) == 2 or len(self.cells) == 4:
+            for ended, call in self.open[: 1 if len(self.cells) < 4 else 2]:
+                ended.set_result(call())
+            del self.open[:1]
+        return future
+
+
 @pytest.fixture
 def cells(tmp_path: Path) -> list[Cell]:
     study = SAMPLE.small_study(tmp_path)
@@ -60,9 +78,19 @@ def test_every_cell_comes_back_once(at_once: int, cells: list[Cell]) -> None:
     assert list(run([], InThisProcess())) == []
 
 
+def test_a_worker_makes_all_seeds_of_a_condition(cells: list[Cell]) -> None:
+    """What it prepares for the first serves the others; the other worker is at another condition."""
+    executor = Alternating()
+    assert len(list(run(cells, executor, at_once=2))) == 4
+    assert [(cell.condition.level, cell.seed) for cell in executor.cells] == [
+        *(("1cd/m2", 0), ("25cd/m2", 0)),
+        *(("1cd/m2", 1), ("25cd/m2", 1)),
+    ]
+
+
 def test_what_was_ready_comes_before_the_error(cells: list[Cell], tmp_path: Path) -> None:
-    bad = replace(cells[1], truth=tmp_path / "absent.npy")
-    running = run([cells[0], bad, cells[2]], InThisProcess(), at_once=2)
+    bad = replace(cells[2], truth=tmp_path / "absent.npy")
+    running = run([cells[0], bad, cells[1]], InThisProcess(), at_once=2)
     assert next(running).key == cells[0].key
     with pytest.raises(InputError, match="can't be read"):
         list(running)
