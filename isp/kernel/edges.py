@@ -33,6 +33,28 @@ TINY_E = 1e-9  # where nothing differs
 
 
 @dataclass(frozen=True)
+class Pixels:
+    """Some pixels, numbered by `target` in the frame: their window's lines in it, planes, window, and share.
+
+    `together` is how far the colours rise together, `known` how far the share is known and needed.
+    """
+
+    target: Any
+    lines: tuple[list[Any], list[Any]]
+    plane: Any
+    least: Any
+    most: Any
+    share: Any
+    known: Any
+    together: Any
+
+    @property
+    def step(self) -> Any:
+        """Of each channel, least to most."""
+        return _most(self.most - self.least, TINY_E)
+
+
+@dataclass(frozen=True)
 class Frame:
     """What the passes read, Dr.Jit arrays.
 
@@ -46,8 +68,12 @@ class Frame:
         Of the frame, mirrored at its borders: row r stands at HALO + r.
     cells : UInt
         Channel of each of the tile's cells.
+    tile, width : Divisor
+        Rows and columns of the tile; of the frame.
     gains : Array4f
         White balance; W's is 0, for it is no colour.
+    white_gain, dark_variance, full_e : Float
+        W's white balance; variance of the dark noise [e-^2]; from where a channel counts as full [e-].
     """
 
     planes: Any
@@ -78,6 +104,7 @@ def even_strips(
         cells=upload(np.array([[names.index(name) for name in line] for line in raw.cfa], np.uint32)),
         tile=(divisor(len(raw.cfa)), divisor(len(raw.cfa[0]))),
         width=divisor(width),
+        # Opaque, W's 0 too: a literal takes the width of what it is multiplied with (Dr.Jit 1.5).
         gains=jit.Array4f([dr.opaque(jit.Float, float(gain)) for gain in (*gains[:3], 0.0)]),
         white_gain=dr.opaque(jit.Float, float(gains[3])),
         dark_variance=dr.opaque(jit.Float, raw.dark_noise_e**2),
@@ -87,11 +114,13 @@ def even_strips(
     for start in range(0, height, step):
         count, first = min(step, height - start), dr.opaque(jit.UInt, start)
         windows = _windows(jit, frame, first, (count + 2) * width)
-        _even(jit, frame, windows, first, dr.arange(jit.UInt, count * width), result, rims=False)
+        pixels = _pixels(jit, frame, windows, first, dr.arange(jit.UInt, count * width))
+        _store(frame, pixels, _evened(frame, pixels), pixels.known * pixels.together, result)
         mixed = alpha[start : start + count]
         rims = np.flatnonzero((mixed > 0.0) & (mixed < 1.0)).astype(np.uint32)
         if rims.size:
-            _even(jit, frame, windows, first, upload(rims), result, rims=True)
+            pixels = _pixels(jit, frame, windows, first, upload(rims))
+            _store(frame, pixels, _evened_rims(jit, frame, pixels), pixels.together, result)
     return np.asarray(result.numpy().reshape(planes.shape))
 
 
@@ -132,19 +161,14 @@ def _windows(jit: Any, frame: Frame, first: Any, count: int) -> tuple[Any, Any, 
     return windows
 
 
-def _even(
-    jit: Any, frame: Frame, windows: tuple[Any, Any, Any], first: Any, pixel: Any, result: Any, *, rims: bool
-) -> None:
-    """Store the channels of some pixels, numbered from row `first` on."""
+def _pixels(jit: Any, frame: Frame, windows: tuple[Any, Any, Any], first: Any, pixel: Any) -> Pixels:
+    """Pixels by their numbers from row `first` on."""
     # Share, trust, squared distance and rise together, here and beside; the windows begin a row early.
     line, column = divide(pixel, frame.width)
     beside = [dr.gather(jit.UInt, frame.columns, column + k) for k in (HALO - 1, HALO, HALO + 1)]
     told = [
         [dr.gather(jit.Array4f, windows[2], (line + k) * frame.width.number + at) for at in beside] for k in range(3)
     ]
-    at, target = pixel + frame.width.number, pixel + first * frame.width.number
-    least, most = (dr.gather(jit.Array4f, part, at) for part in windows[:2])
-    plane = dr.gather(jit.Array4f, frame.planes, target)
 
     # By the neighbours: each axis counts by the other's difference.
     sums, count, trusted = jit.Float(0.0), jit.Float(0.0), jit.Float(0.0)
@@ -156,30 +180,33 @@ def _even(
             count += even * trust
             trusted += trust
     share, own, _, together = told[1][1]
-    share = own * share + (1.0 - own) * sums / _most(count, TINY_E)
     missed = _ramp(dr.sqrt(sum((part[2] for beside in told for part in beside), jit.Float(0.0)) / 9.0), OFF)
-    known = (own + (1.0 - own) * _least(trusted, 1.0)) * missed
+    at, target = pixel + frame.width.number, pixel + first * frame.width.number
+    return Pixels(
+        target=target,
+        lines=(
+            _window_lines(frame.rows, first + line + (HALO - REACH), frame.width.number),
+            _window_lines(frame.columns, column + (HALO - REACH), 1),
+        ),
+        plane=dr.gather(jit.Array4f, frame.planes, target),
+        least=dr.gather(jit.Array4f, windows[0], at),
+        most=dr.gather(jit.Array4f, windows[1], at),
+        share=own * share + (1.0 - own) * sums / _most(count, TINY_E),
+        known=(own + (1.0 - own) * _least(trusted, 1.0)) * missed,
+        together=together,
+    )
 
-    # Each channel as far as it counts.
-    step, full = _most(most - least, TINY_E), (most >= frame.full_e) & jit.Array4b(True, True, True, False)
-    if rims:
-        rows = _window_lines(frame.rows, first + line + (HALO - REACH), frame.width.number)
-        columns = _window_lines(frame.columns, column + (HALO - REACH), 1)
-        evened = _evened_rims(jit, frame, (rows, columns), plane, (least, most, step, full), share, known)
-    else:
-        evened = dr.select(full, _most(least + share * step, plane), least + share * step)
-        together *= known
-    moved = _ramp(step / dr.sqrt(_most(most, 0.0) + frame.dark_variance), SIGMAS) * together
-    dr.scatter(result, plane + moved * (evened - plane), target, mode=dr.ReduceMode.NoConflicts)
-    dr.eval(result)
+
+def _evened(frame: Frame, pixels: Pixels) -> Any:
+    """Channels by the pixel's share; no colour is lowered that is full nearby."""
+    return _held(frame, pixels, pixels.least + pixels.share * pixels.step)
 
 
-def _evened_rims(
-    jit: Any, frame: Frame, lines: tuple[list[Any], list[Any]], plane: Any, window: Any, share: Any, known: Any
-) -> Any:
-    """Channels in rims; `lines` are the window's rows, in packets, and columns; it is least, most, step and full."""
-    least, most, step, full = window
-    values = [[dr.gather(jit.Array4f, frame.planes, row + column) for column in lines[1]] for row in lines[0]]
+def _evened_rims(jit: Any, frame: Frame, pixels: Pixels) -> Any:
+    """Channels in rims."""
+    plane, least, most, step = pixels.plane, pixels.least, pixels.most, pixels.step
+    rows, columns = pixels.lines
+    values = [[dr.gather(jit.Array4f, frame.planes, row + column) for column in columns] for row in rows]
     pairs = [[_least(a, b) for a, b in pairwise(line)] for line in values]
     squares = [_least(a, b) for both in pairwise(pairs) for a, b in zip(*both, strict=True)]
     fills = reduce(_least, [*((reduce(_most, squares) - least) / step)][:3])
@@ -188,14 +215,31 @@ def _evened_rims(
     colours = jit.Array4f(1.0, 1.0, 1.0, 0.0)
     contrast = colours * dr.square(step / _most(most + least, TINY_E))
     mean = dr.sum(contrast * (plane - least) / step) / _most(dr.sum(contrast), TINY_E)
-    large = dr.select(dr.any(full), 0.0, fills * known)
-    evened = least + (large * share + (1.0 - large) * mean) * step
-    evened = dr.select(full, _most(evened, plane), evened)
+    large = dr.select(dr.any(_full_colours(frame, pixels)), 0.0, fills * pixels.known)
+    evened = _held(frame, pixels, least + (large * pixels.share + (1.0 - large) * mean) * step)
 
     # No colour where it is smaller than 2 x 2 pixels.
     over = reduce(_most, [*((evened - least) / _most(evened + least, TINY_E))][:3])
     grey = dr.sum(frame.gains * evened) / 3.0 / (frame.gains + (1.0 - colours) * frame.white_gain)
     return evened + (1.0 - fills) * dr.square(_least(_most(over, 0.0), 1.0)) * (grey - evened)
+
+
+def _full_colours(frame: Frame, pixels: Pixels) -> Any:
+    full = pixels.most >= frame.full_e
+    return full & type(full)(True, True, True, False)
+
+
+def _held(frame: Frame, pixels: Pixels, evened: Any) -> Any:
+    """Lower no colour that is full nearby."""
+    return dr.select(_full_colours(frame, pixels), _most(evened, pixels.plane), evened)
+
+
+def _store(frame: Frame, pixels: Pixels, evened: Any, weight: Any, result: Any) -> None:
+    """Store the channels, moved as far as their step is over the noise of a sample."""
+    sigmas = pixels.step / dr.sqrt(_most(pixels.most, 0.0) + frame.dark_variance)
+    values = pixels.plane + _ramp(sigmas, SIGMAS) * weight * (evened - pixels.plane)
+    dr.scatter(result, values, pixels.target, mode=dr.ReduceMode.NoConflicts)
+    dr.eval(result)
 
 
 def _window_lines(mirrored: Any, first: Any, step: Any) -> list[Any]:
