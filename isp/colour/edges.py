@@ -20,8 +20,6 @@ from rodcone.jit import backend
 from sensor.cfa import channels, mask
 from sensor.raw import RawImage
 
-Flags = NDArray[np.bool_]
-
 
 class Window(NamedTuple):
     """Around each pixel, (h, w, channel)."""
@@ -30,7 +28,7 @@ class Window(NamedTuple):
     step: Floats  # the most less the least
     contrast: Floats  # step over the sum of both
     sigmas: Floats  # step over the noise of a sample in the light
-    full: Flags
+    full: NDArray[np.bool_]
 
 
 def even_edges(raw: RawImage, planes: NDArray[np.floating], gains: Floats, alpha: Floats) -> NDArray[np.float32]:

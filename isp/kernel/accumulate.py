@@ -73,7 +73,7 @@ def squared_distances(
     columns = sorted({c for _, c in pixels})
     lines = {c: {i: _sum(line, c, patch) for i, line in squares.items()} for c in columns}
     totals = [_sum(lines[c], r, patch) for r, c in pixels]
-    return [_at_least(total - share, 0.0) for total, share in zip(totals, noise, strict=True)] if noise else totals
+    return [larger(total - share, 0.0) for total, share in zip(totals, noise, strict=True)] if noise else totals
 
 
 def mixed_squares(own: list[Any], white: list[Any], alpha: list[Any]) -> list[Any]:
@@ -97,14 +97,14 @@ def _sum(values: Any, first: int, count: int) -> Any:
     return _sum(values, first, power) + _sum(values, first + power, count - power)
 
 
-def _at_least(value: Any, least: float) -> Any:
+def larger(a: Any, b: Any) -> Any:
     """The larger one; `dr.maximum` takes three instructions, for the sake of NaN."""
-    return dr.select(value > least, value, least)
+    return dr.select(a > b, a, b)
 
 
 def _add_at_fixed_scale(sums: Sums, log_weight: Any, sample: Any, brightest: Any) -> Sums:
     weight, value, *square = sums
-    new = dr.select(sample <= brightest, _exp2(_at_least(log_weight, LOWEST_EXPONENT)), 0.0)
+    new = dr.select(sample <= brightest, _exp2(larger(log_weight, LOWEST_EXPONENT)), 0.0)
     return weight + new, dr.fma(new, sample, value), *(dr.fma(new, new, total) for total in square)
 
 
@@ -112,7 +112,7 @@ def _add_to_running_maximum(sums: Sums, log_weight: Any, sample: Any, brightest:
     weight, value, *square, largest = sums
     bounded = dr.select((log_weight > LOWEST_LOG_WEIGHT) & (sample <= brightest), log_weight, LOWEST_LOG_WEIGHT)
     ahead = bounded - largest
-    smaller = _exp2(_at_least(-dr.abs(ahead), LOWEST_EXPONENT))  # one exponential: of the two weights the larger is 1
+    smaller = _exp2(larger(-dr.abs(ahead), LOWEST_EXPONENT))  # one exponential: of the two weights the larger is 1
     is_larger = ahead > 0.0
     old = dr.select(is_larger, smaller, 1.0)
     new = dr.select(is_larger, 1.0, smaller)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from isp.kernel.accumulate import larger
 from rodcone.device_arrays import Divisor, divide, divisor, tile_cell, upload
 from rodcone.jit import arrays, dr
 from sensor.cfa import channels
@@ -34,13 +35,12 @@ TINY_E = 1e-9  # where nothing differs
 
 @dataclass(frozen=True)
 class Pixels:
-    """Some pixels, numbered by `target` in the frame: their window's lines in it, planes, window, and share.
+    """Some pixels, numbered by `target` in the frame: their planes, window and share.
 
     `together` is how far the colours rise together, `known` how far the share is known and needed.
     """
 
     target: Any
-    lines: tuple[list[Any], list[Any]]
     plane: Any
     least: Any
     most: Any
@@ -51,7 +51,7 @@ class Pixels:
     @property
     def step(self) -> Any:
         """Of each channel, least to most."""
-        return _most(self.most - self.least, TINY_E)
+        return larger(self.most - self.least, TINY_E)
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,8 @@ def even_strips(
         count, first = min(step, height - start), dr.opaque(jit.UInt, start)
         windows = _windows(jit, frame, first, (count + 2) * width)
         pixels = _pixels(jit, frame, windows, first, dr.arange(jit.UInt, count * width))
-        _store(frame, pixels, _evened(frame, pixels), pixels.known * pixels.together, result)
+        evened = _held(frame, pixels, pixels.least + pixels.share * pixels.step)
+        _store(frame, pixels, evened, pixels.known * pixels.together, result)
         mixed = alpha[start : start + count]
         rims = np.flatnonzero((mixed > 0.0) & (mixed < 1.0)).astype(np.uint32)
         if rims.size:
@@ -134,23 +135,23 @@ def _windows(jit: Any, frame: Frame, first: Any, count: int) -> tuple[Any, Any, 
     rows = _window_lines(frame.rows, first + line + (HALO - REACH - 1), frame.width.number)
     columns = _window_lines(frame.columns, column + (HALO - REACH), 1)
     values = [[dr.gather(jit.Array4f, frame.planes, row + column) for column in columns] for row in rows]
-    least, most = (reduce(pick, [reduce(pick, line) for line in values]) for pick in (_least, _most))
+    least, most = (reduce(pick, [reduce(pick, line) for line in values]) for pick in (_smaller, larger))
     light = [dr.sum(frame.gains * value) for line in values for value in line]
-    rise = reduce(_most, light) - reduce(_least, light)
+    rise = reduce(larger, light) - reduce(_smaller, light)
 
     # By the pixel's own channel; its step is 0 where it is full.
-    step, full = _most(most - least, TINY_E), most >= frame.full_e
-    largest = reduce(_most, dr.select(full, 0.0, step / _most(most + least, TINY_E)))
+    step, full = larger(most - least, TINY_E), most >= frame.full_e
+    largest = reduce(larger, dr.select(full, 0.0, step / larger(most + least, TINY_E)))
     pixel = rows[REACH] + columns[REACH]
     site = dr.gather(jit.UInt, frame.cells, tile_cell(pixel, frame.width, frame.tile))
     value, low, own = (_own(part, site) for part in (values[REACH][REACH], least, dr.select(full, 0.0, step)))
     sample = dr.gather(jit.Float, frame.samples, pixel)
     away = sample - value
-    away *= _ramp(dr.abs(away) / dr.sqrt(_most(value, 0.0) + frame.dark_variance), NOISE)
-    trust = _ramp(own / dr.sqrt(_most(low + own, 0.0) + frame.dark_variance), SIGMAS)
-    trust *= _ramp(own / _most(low + low + own, TINY_E) / _most(largest, TINY_E), RELATIVE)
-    share = _least(_most((value + away - low) / _most(own, TINY_E), 0.0), 1.0)
-    off = dr.select(own > 0.0, _least(dr.abs(away) / _most(own, TINY_E), 1.0), 0.0)
+    away *= _ramp(dr.abs(away) / dr.sqrt(larger(value, 0.0) + frame.dark_variance), NOISE)
+    trust = _ramp(own / dr.sqrt(larger(low + own, 0.0) + frame.dark_variance), SIGMAS)
+    trust *= _ramp(own / larger(low + low + own, TINY_E) / larger(largest, TINY_E), RELATIVE)
+    share = _smaller(larger((value + away - low) / larger(own, TINY_E), 0.0), 1.0)
+    off = dr.select(own > 0.0, _smaller(dr.abs(away) / larger(own, TINY_E), 1.0), 0.0)
     together = _ramp(rise / dr.sum(frame.gains * step), TOGETHER)
 
     told = jit.Array4f(share, trust, dr.square(off), together)
@@ -184,44 +185,37 @@ def _pixels(jit: Any, frame: Frame, windows: tuple[Any, Any, Any], first: Any, p
     at, target = pixel + frame.width.number, pixel + first * frame.width.number
     return Pixels(
         target=target,
-        lines=(
-            _window_lines(frame.rows, first + line + (HALO - REACH), frame.width.number),
-            _window_lines(frame.columns, column + (HALO - REACH), 1),
-        ),
         plane=dr.gather(jit.Array4f, frame.planes, target),
         least=dr.gather(jit.Array4f, windows[0], at),
         most=dr.gather(jit.Array4f, windows[1], at),
-        share=own * share + (1.0 - own) * sums / _most(count, TINY_E),
-        known=(own + (1.0 - own) * _least(trusted, 1.0)) * missed,
+        share=own * share + (1.0 - own) * sums / larger(count, TINY_E),
+        known=(own + (1.0 - own) * _smaller(trusted, 1.0)) * missed,
         together=together,
     )
-
-
-def _evened(frame: Frame, pixels: Pixels) -> Any:
-    """Channels by the pixel's share; no colour is lowered that is full nearby."""
-    return _held(frame, pixels, pixels.least + pixels.share * pixels.step)
 
 
 def _evened_rims(jit: Any, frame: Frame, pixels: Pixels) -> Any:
     """Channels in rims."""
     plane, least, most, step = pixels.plane, pixels.least, pixels.most, pixels.step
-    rows, columns = pixels.lines
+    row, column = divide(pixels.target, frame.width)
+    rows = _window_lines(frame.rows, row + (HALO - REACH), frame.width.number)
+    columns = _window_lines(frame.columns, column + (HALO - REACH), 1)
     values = [[dr.gather(jit.Array4f, frame.planes, row + column) for column in columns] for row in rows]
-    pairs = [[_least(a, b) for a, b in pairwise(line)] for line in values]
-    squares = [_least(a, b) for both in pairwise(pairs) for a, b in zip(*both, strict=True)]
-    fills = reduce(_least, [*((reduce(_most, squares) - least) / step)][:3])
+    pairs = [[_smaller(a, b) for a, b in pairwise(line)] for line in values]
+    squares = [_smaller(a, b) for both in pairwise(pairs) for a, b in zip(*both, strict=True)]
+    fills = reduce(_smaller, [*((reduce(larger, squares) - least) / step)][:3])
 
     # Its own share where the lamp is large, else the colours' mean.
     colours = jit.Array4f(1.0, 1.0, 1.0, 0.0)
-    contrast = colours * dr.square(step / _most(most + least, TINY_E))
-    mean = dr.sum(contrast * (plane - least) / step) / _most(dr.sum(contrast), TINY_E)
+    contrast = colours * dr.square(step / larger(most + least, TINY_E))
+    mean = dr.sum(contrast * (plane - least) / step) / larger(dr.sum(contrast), TINY_E)
     large = dr.select(dr.any(_full_colours(frame, pixels)), 0.0, fills * pixels.known)
     evened = _held(frame, pixels, least + (large * pixels.share + (1.0 - large) * mean) * step)
 
     # No colour where it is smaller than 2 x 2 pixels.
-    over = reduce(_most, [*((evened - least) / _most(evened + least, TINY_E))][:3])
+    over = reduce(larger, [*((evened - least) / larger(evened + least, TINY_E))][:3])
     grey = dr.sum(frame.gains * evened) / 3.0 / (frame.gains + (1.0 - colours) * frame.white_gain)
-    return evened + (1.0 - fills) * dr.square(_least(_most(over, 0.0), 1.0)) * (grey - evened)
+    return evened + (1.0 - fills) * dr.square(_smaller(larger(over, 0.0), 1.0)) * (grey - evened)
 
 
 def _full_colours(frame: Frame, pixels: Pixels) -> Any:
@@ -231,12 +225,12 @@ def _full_colours(frame: Frame, pixels: Pixels) -> Any:
 
 def _held(frame: Frame, pixels: Pixels, evened: Any) -> Any:
     """Lower no colour that is full nearby."""
-    return dr.select(_full_colours(frame, pixels), _most(evened, pixels.plane), evened)
+    return dr.select(_full_colours(frame, pixels), larger(evened, pixels.plane), evened)
 
 
 def _store(frame: Frame, pixels: Pixels, evened: Any, weight: Any, result: Any) -> None:
     """Store the channels, moved as far as their step is over the noise of a sample."""
-    sigmas = pixels.step / dr.sqrt(_most(pixels.most, 0.0) + frame.dark_variance)
+    sigmas = pixels.step / dr.sqrt(larger(pixels.most, 0.0) + frame.dark_variance)
     values = pixels.plane + _ramp(sigmas, SIGMAS) * weight * (evened - pixels.plane)
     dr.scatter(result, values, pixels.target, mode=dr.ReduceMode.NoConflicts)
     dr.eval(result)
@@ -255,15 +249,11 @@ def _own(values: Any, site: Any) -> Any:
     return result
 
 
-def _least(a: Any, b: Any) -> Any:
-    """The smaller one; `dr.minimum` takes three instructions, for the sake of NaN."""
+def _smaller(a: Any, b: Any) -> Any:
+    """The smaller one, as `isp.kernel.accumulate.larger`."""
     return dr.select(a < b, a, b)
-
-
-def _most(a: Any, b: Any) -> Any:
-    return dr.select(a > b, a, b)
 
 
 def _ramp(value: Any, limits: tuple[float, float]) -> Any:
     """0 up to the first limit, 1 from the second on."""
-    return _least(_most((value - limits[0]) * (1.0 / (limits[1] - limits[0])), 0.0), 1.0)
+    return _smaller(larger((value - limits[0]) * (1.0 / (limits[1] - limits[0])), 0.0), 1.0)

@@ -527,8 +527,8 @@ KERNEL = (
     _fault(
         "kernel forgets what noise alone makes",
         "isp/kernel/accumulate.py",
-        "_at_least(total - share, 0.0)",
-        "_at_least(total, 0.0)",
+        "larger(total - share, 0.0)",
+        "larger(total, 0.0)",
         *_KERNEL,
     ),
     _fault(

@@ -54,10 +54,9 @@ class Alternating(Executor):
         self.cells.append(args[0])
         self.open.append((Future(), lambda: fn(*args, **kwargs)))
         future = self.open[-1][0]
-        if len(self.open) == 2 or len(self.cells) == 4:
-            for ended, call in self.open[: 1 if len(self.cells) < 4 else 2]:
-                ended.set_result(call())
-            del self.open[:1]
+        while len(self.open) > (len(self.cells) < 4):  # the last of four ends too
+            ended, call = self.open.pop(0)
+            ended.set_result(call())
         return future
 
 
