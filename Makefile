@@ -11,12 +11,13 @@ DEMO_OUT ?= out/demo
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-plain-cpu verify hard-cases faults docs fuzz lint clean FORCE
+.PHONY: help demo test test-all test-any-cpu verify hard-cases faults docs fuzz lint clean FORCE
 
 help:
 	@echo "make demo    set up $(VENV), render the still life from moonlight to daylight, write $(DEMO_OUT)/report.html"
-	@echo "make test    set up $(VENV), lint, types, import contracts and every test that is not slow"
-	@echo "make test-plain-cpu  the same tests with every instruction set beyond NumPy's baseline off"
+	@echo "make test    set up $(VENV), lint, types, import contracts, and the tests of two minutes on two cores"
+	@echo "make test-all  every test that is not slow: ten minutes on two cores"
+	@echo "make test-any-cpu  the same as other processors add up; CPU=NAME one of them, CPU=by-date today's"
 	@echo "make verify  slow tests, hard cases, planted faults, damaged files, soak: hours; goes on where it was ended"
 	@echo "make hard-cases  a hundred hard cases with the margin by which each invariant is kept, as docs/hard_cases.md"
 	@echo "make faults  plant the faults of tests/faults one by one and show that a test notices each (resumable)"
@@ -30,11 +31,20 @@ demo: $(VENV)/installed
 	@$(BIN)/rodcone demo -o "$(DEMO_OUT)"
 	@echo "Report: $(abspath $(DEMO_OUT))/report.html (open it in a browser)"
 
-test: lint
-	@$(BIN)/python -m pytest -m "not slow"
+# A worker a core, with one thread of BLAS and (tests/conftest.py) of Dr.Jit in each.
+PARALLEL := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --maxprocesses 8 --dist worksteal
 
-test-plain-cpu: $(VENV)/installed-dev
-	@$(BIN)/python tests/plain_cpu.py -m "not slow"
+test: lint
+	@$(PARALLEL) -m "not thorough and not slow"
+
+test-all: $(VENV)/installed-dev
+	@$(PARALLEL) -m "not slow"
+
+# As test-all; in CI TESTS="not thorough and not slow" has it run what `make test` does.
+CPU := all
+TESTS := not slow
+test-any-cpu: $(VENV)/installed-dev
+	@$(BIN)/python tests/any_cpu/any_cpu.py --cpu "$(CPU)" -q -n auto --maxprocesses 8 --dist worksteal -m "$(TESTS)"
 
 verify: $(VENV)/installed-dev
 	@$(BIN)/python tests/verification/verify.py
@@ -55,7 +65,7 @@ docs: $(VENV)/installed-docs
 fuzz: $(VENV)/installed-dev
 	@nice -n 10 $(BIN)/python tests/fuzz/run.py --seconds 60
 
-lint: $(VENV)/installed-dev
+lint: $(VENV)/installed-test
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
@@ -93,8 +103,11 @@ endif
 $(VENV)/installed: pyproject.toml Makefile $(UNUSABLE)
 	$(call set-up,.,$@)
 
+$(VENV)/installed-test: pyproject.toml Makefile $(UNUSABLE)
+	$(call set-up,.[test],$@ $(VENV)/installed)
+
 $(VENV)/installed-dev: pyproject.toml Makefile $(UNUSABLE)
-	$(call set-up,.[dev],$@ $(VENV)/installed $(VENV)/installed-docs)
+	$(call set-up,.[dev],$@ $(VENV)/installed $(VENV)/installed-test $(VENV)/installed-docs)
 
 $(VENV)/installed-docs: pyproject.toml Makefile $(UNUSABLE)
 	$(call set-up,.[docs],$@ $(VENV)/installed)

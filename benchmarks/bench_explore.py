@@ -1,10 +1,12 @@
-"""Latency of the explorer: milliseconds from a slider's event to the full picture of its settings, painted by Chromium.
+"""The explorer under a slider, in Chromium: latency of a jump, pictures painted a second and their age during a drag.
 
-Run ``python benchmarks/bench_explore.py`` on an idle machine that has ``chromium``; ``--scene``, ``--size``, ``--spp``
-and ``--changes`` narrow it down. Picture (`interleaved`) and truth are in view, 20 bands, kernels are compiled: 20
-random changes go before. Each slider is moved to ``--changes`` random places, one after the other has been painted and
-its figures drawn; time runs in the page, from the event to the task after the frame that shows the picture. It prints
-the environment, then for each slider median and 95th percentile beside the target, and how many kernels were compiled.
+Run ``python benchmarks/bench_explore.py`` on an idle machine that has ``chromium``; ``--scene``, ``--size``, ``--spp``,
+``--changes`` and ``--drag-s`` narrow it down. Picture (`interleaved`) and truth are in view, 20 bands, kernels are
+compiled: 20 random changes go before. Each slider is moved to ``--changes`` random places, one after the other has been
+painted and its figures drawn; time runs in the page, from the event to the task after the frame that shows the picture.
+Then it is dragged for ``--drag-s`` seconds, an event each 16 ms. It prints the environment, then for each slider median
+and 95th percentile of a jump beside the target, pictures painted a second of the drag, and the age of what is seen (the
+time since its values were set), in the mean over the drag; and how many kernels were compiled.
 
 ``--memory N`` makes N random changes more and prints the resident memory after 500 and after each tenth of N.
 """
@@ -13,6 +15,7 @@ import argparse
 import os
 import sys
 import threading
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from random import Random
@@ -47,8 +50,8 @@ SLIDERS = {
 MOVED = """new Promise(done => {
   const root = document.querySelector(".explore"), control = document.querySelector(`.explore [data-key="%s"]`);
   control.value = control.type === "range" ? Math.round(%r * control.max) : Math.round(%r * 1e6);
-  root.addEventListener("painted", function painted({ detail }) {
-    if (String(detail.number) !== root.dataset.asked) return;
+  root.addEventListener("painted", function painted() {
+    if (root.dataset.painted !== root.dataset.asked) return;
     root.removeEventListener("painted", painted);
     requestAnimationFrame(() => { const after = new MessageChannel();
       after.port1.onmessage = () => done(performance.now() - start); after.port2.postMessage(0); });
@@ -89,13 +92,25 @@ def latencies_ms(page: CHROME.Page, key: str, low: float, high: float, changes: 
     return found
 
 
+def drag(page: CHROME.Page, key: str, low: float, high: float, seconds: float) -> tuple[float, float]:
+    """Pictures painted a second while a slider is dragged, and mean age of what is seen after the first [ms]."""
+    painted = np.array(page.value(EXPLORE.DRAG % (key, low, high, 1000 * seconds)), dtype=float).reshape(-1, 2)
+    EXPLORE.settle(page, figures=True)
+    if len(painted) < 2:
+        return len(painted) / seconds, np.nan
+    shown_ms, middle_ms = np.diff(painted[:, 0]), (painted[1:, 0] + painted[:-1, 0]) / 2
+    return len(painted) / seconds, float(np.average(middle_ms - painted[:-1, 1], weights=shown_ms))
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scene", default="still_life_outdoor")
+    parser.add_argument("--scene", default="still_life")
     parser.add_argument("--size", type=int, default=256)
     parser.add_argument("--spp", type=int, default=16)
     parser.add_argument("--changes", type=int, default=100)
+    parser.add_argument("--drag-s", type=float, default=4.0)
+    parser.add_argument("--rest-s", type=float, default=60.0, help="for kernels to be compiled")
     parser.add_argument("--memory", type=int, default=0)
     asked = parser.parse_args(arguments)
     print_environment()
@@ -110,15 +125,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 EXPLORE.move(page, rng)
                 EXPLORE.settle(page)
             page = CHROME.Page(browser, address)  # the controls as they were
+            time.sleep(asked.rest_s)
             EXPLORE.settle(page, figures=True)
             before = kernels.count
             print(f"{asked.scene}, {asked.size} x {asked.size} pixels, {asked.changes} changes each")
-            print("| slider | median | 95 % | target: median | 95 % |\n|---|---|---|---|---|")
+            print("| slider | median | 95 % | target: median | 95 % | painted a second, dragged | age |")
+            print("|---|---|---|---|---|---|---|")
             for key, (low, high, median, most) in SLIDERS.items():
                 if key.startswith("power") and len(source.groups) < 2:
                     continue
                 middle, late = np.percentile(latencies_ms(page, key, low, high, asked.changes), [50, 95])
-                print(f"| {key} | {middle:.0f} ms | {late:.0f} ms | {median:.0f} ms | {most:.0f} ms |", flush=True)
+                rate, age_ms = drag(page, key, low, high, asked.drag_s)
+                jump = f"{middle:.0f} ms | {late:.0f} ms | {median:.0f} ms | {most:.0f} ms"
+                print(f"| {key} | {jump} | {rate:.1f} | {age_ms:.0f} ms |", flush=True)
             print(f"kernels compiled meanwhile: {kernels.count - before}")
             for number in range(1, asked.memory + 1):
                 EXPLORE.move(page, rng)

@@ -35,7 +35,7 @@ from environment import print_environment
 from matplotlib import rc_context
 from references import SEEDS, Film, both, make
 
-from render.denoised.measured_error import measured_error
+from render.denoised.relight import measured_error
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from scenes.catalog import load

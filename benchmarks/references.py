@@ -104,7 +104,7 @@ def make(folder: Path, scene: Scene, film: Film, samples: int) -> None:
                 file,
                 radiance=np.moveaxis(made.relight().values, -1, 0),
                 variance=made.relight_variance(luminance_cd_m2=level_cd_m2),
-                coverage=made.coverage,
+                coverage=made.coverage.mean,
                 facts=np.array(json.dumps(facts)),
             )
         print(path)

@@ -1,9 +1,12 @@
 # The documentation's figures, made by rodcone itself: `make docs` runs this, and so does tests/test_docs_site.py.
 # A figure is made anew where the code, or the page that holds its commands, is newer.
-# Variables: BIN, the folder of python and rodcone; FIGURES, where the figures go; the commands' options.
+# Pictures that a page shows are kept in docs/pictures, so that they show where the sources are hosted too.
+# Variables: BIN, the folder of python and rodcone; FIGURES, where the figures go; PICTURES, where the kept ones go; the
+# commands' options.
 
 BIN ?= .venv/bin
 FIGURES ?= out/figures
+PICTURES ?= docs/pictures
 DEMO ?=
 PAPER ?=
 CODE := $(shell find rodcone render scenes sensor isp studies -type f -not -path '*/__pycache__/*')
@@ -29,4 +32,5 @@ $(FIGURES)/photon_transfer.svg: $(CODE)
 $(RAN): $(FIGURES)/%/ran: docs/%.md docs/run_page.py $(CODE)
 	rm -rf $(@D)
 	$(BIN)/python docs/run_page.py $< $(@D)
+	$(BIN)/python docs/pictures.py $< $(@D) $(PICTURES)/$(notdir $*)
 	@touch $@

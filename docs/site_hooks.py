@@ -1,9 +1,10 @@
-"""Hooks of the documentation's build (mkdocs.yml): a page for every module, formulas as MathML, names as links."""
+"""Hooks of the documentation's build (mkdocs.yml): pages of modules and results, formulas as MathML, names as links."""
 
 import ast
+import csv
 import json
 import re
-from html import unescape
+from html import escape, unescape
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -19,19 +20,23 @@ from studies.commands.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("rodcone", "render", "scenes", "sensor", "isp", "studies")
+RESULTS = sorted((ROOT / "docs" / "results").glob("*.csv"))
 FIGURES = ("*", "demo/*", "paper/*", "tutorial/*/*", "how_to/*/*")  # what docs/figures.mk makes
 SHOWN = (".html", ".png", ".svg")
 # How much a word of a page counts in the search, by the page's folder; elsewhere 1. Who searches wants to do something:
 # how-tos come first, then what can be named; why it is so and the functions within come last.
-BOOSTS = {"how_to": 4.0, "tutorial": 4.0, "gallery": 2.0, "decisions": 0.25, "api": 0.5}
+BOOSTS = {"how_to": 4.0, "tutorial": 4.0, "gallery": 2.0, "decisions": 0.25, "results": 0.25, "api": 0.5}
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
+CSV_LINK = re.compile(r"\(results/(\w+)\.csv\)")  # a file in the repository, a page of the site
 NAME = re.compile(rf"(<a\b[^>]*>)?<code>((?:{'|'.join(PACKAGES)})(?:\.\w+)+)</code>")  # a link in front: left alone
 
 
 def on_config(config: Any) -> Any:
     """Add to the navigation what its list lacks: pages about one part, decisions, the API."""
-    (depth,) = (entry["In depth"] for entry in config.nav if isinstance(entry, dict) and "In depth" in entry)
-    depth += sorted({path.name for path in (ROOT / "docs").glob("*.md")} - {*depth, *map(str, config.nav)})
+    sections = {name: pages for entry in config.nav if isinstance(entry, dict) for name, pages in entry.items()}
+    listed = {*map(str, config.nav), *(page for pages in sections.values() for page in pages)}
+    sections["In depth"] += sorted({path.name for path in (ROOT / "docs").glob("*.md")} - listed)
+    sections["Results"].append({"Tables": [f"results/{path.stem}.md" for path in RESULTS]})
     decisions = sorted(path.name for path in (ROOT / "docs" / "decisions").glob("*.md"))
     packages = [
         {name: [f"api/{name}/index.md", *({module: f"api/{name}/{module}.md"} for module in modules(name))]}
@@ -47,6 +52,8 @@ def on_config(config: Any) -> Any:
 def on_files(files: Files, config: Any) -> Files:
     """Add the generated pages: decisions, commands, packages and modules."""
     pages = {"decisions/index.md": decisions_page(), "api/index.md": api_page(), "api/commands.md": commands_page()}
+    for path in RESULTS:
+        pages[f"results/{path.stem}.md"] = results_page(path)
     for package in PACKAGES:
         pages[f"api/{package}/index.md"] = package_page(package)
         for module in modules(package):
@@ -63,6 +70,8 @@ def on_files(files: Files, config: Any) -> Files:
 def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> str:
     """Show beneath each block that docs/run_page.py ran what it printed; weigh the page for the search."""
     page.meta["search"] = {"boost": BOOSTS.get(page.file.src_uri.partition("/")[0], 1.0)}
+    if not page.file.src_uri.startswith("results/"):
+        markdown = CSV_LINK.sub(r"(results/\1.md)", markdown)
     outputs = ROOT / config.extra["figures"] / page.file.src_uri.removesuffix(".md") / "output.json"
     if not outputs.is_file():
         return markdown
@@ -99,6 +108,15 @@ def decisions_page() -> str:
     lines = [f"- [{path.read_text('utf-8').partition(chr(10))[0].lstrip('# ')}]({path.name})" for path in paths]
     told = "Why things are as they are: each record states the question, what was found, and what was decided."
     return f"# Decisions\n\n{told}\n\n" + "\n".join(lines)
+
+
+def results_page(path: Path) -> str:
+    """Table of a results file, with a link to the file."""
+    head, *rows = csv.reader(path.read_text("utf-8").splitlines())
+    lines = [f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows]
+    top = f"<table><thead><tr>{''.join(f'<th>{escape(cell)}</th>' for cell in head)}</tr></thead><tbody>"
+    title = f"# Table: {path.stem.replace('_', ' ')}\n\nThe same as a file: [{path.name}]({path.name}).\n\n"
+    return title + "\n".join([top, *lines, "</tbody></table>\n"])
 
 
 def api_page() -> str:

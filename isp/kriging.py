@@ -10,8 +10,8 @@ channel by channel, near lamps.
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
 
 from isp.anscombe import stabilise, unstabilise
 from isp.settings import Reconstruction
@@ -44,7 +44,7 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
     deviation = np.sqrt(np.maximum(spread**2 - 1.0, LEAST_DEVIATION**2))
     estimate, noise_gain = krige(values, raw.cfa, deviation)
     bright = raw.saturated | (values > np.select(sampled, list(high + OUTLYING * np.maximum(spread, 1.0))))
-    beside = maximum_filter(bright, size=2 * RADIUS + 1)[..., None]
+    beside = scipy.ndimage.maximum_filter(bright, size=2 * RADIUS + 1)[..., None]
     if beside.any():
         apart = krige(values, raw.cfa, np.full_like(deviation, BESIDE_LAMPS), 0.0)
         estimate, noise_gain = np.where(beside, apart[0], estimate), np.where(beside, apart[1], noise_gain)

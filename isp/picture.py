@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from isp.colour.colour_fit import ColourFit, relative_noise
+from isp.colour.encoding import encode
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.substitution import COLOUR_ERROR
 from rodcone.brief import brief
-from rodcone.errors import InputError
+from rodcone.colour_spaces import white_of
+from rodcone.errors import InputError, require_range
 from rodcone.jit import Backend
 from rodcone.notebook import html_of, preview_png
 from rodcone.plots import Axes, draw_line
@@ -68,6 +70,21 @@ class Picture:
     def __truediv__(self, scale: ArrayLike) -> Image:
         return np.asarray(self.rgb / np.asarray(scale))
 
+    def encode(self, white: float | None = None, encoding: str = "srgb") -> Image:
+        """Encode the picture for a display: shape (h, w, 3), 0 to 1.
+
+        Parameters
+        ----------
+        white : float, optional
+            Level of `rgb` that is shown as white [e-]; left out, the 99th percentile of its luminance comes to 90 % of
+            white.
+        encoding : str
+            Of `isp.colour.encoding.ENCODINGS`.
+        """
+        level = (white_of(self.rgb) or 1.0) if white is None else white
+        require_range("white", level, 1e-12, 1e12, "give electrons of green")
+        return encode(self.rgb / level, encoding)
+
     def plot_line(self, row: int | None = None, column: int | None = None, axes: Axes | None = None) -> Axes:
         """Draw R, G and B along a row (the middle one by default) or a column into Matplotlib's axes."""
         planes = dict(zip("RGB", np.moveaxis(self.rgb, -1, 0), strict=True))
@@ -108,6 +125,11 @@ def finish(
     noise_gain : (h, w, 3) array, optional
         Of `isp.interleaved.reconstruct_with_noise`: with a `ColourFit` as `matrix`, colours that know this noise.
     """
+    shape = *raw.shape, len(channels(raw.cfa))
+    if planes.shape != shape or (noise_gain is not None and np.shape(noise_gain) != shape):
+        raise InputError(
+            f"planes: shape {planes.shape} is not allowed; give one a channel, {shape}, noise_gain likewise"
+        )
     colours = ColourFit.of(matrix)
     gains, sources = WhiteBalance.of(raw, neutral, balance).gains(raw, planes)
     noise = np.zeros(3)

@@ -2,14 +2,13 @@
 
 from numpy.typing import ArrayLike
 
-from isp.bilinear import bilinear
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.edges import even_edges
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish, require_letters
-from isp.planes import rows_at
+from isp.planes import bilinear, rows_at
 from isp.settings import DEFAULTS, PAPER, Settings
 from isp.similarity.guide import saturated_fraction
 from isp.substitution import COLOUR_ERROR, OCTAVES, SUBSTITUTION_SNR, green_snr, matrix_with_white, substitution_weight

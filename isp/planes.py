@@ -4,6 +4,7 @@ Planes are filled by normalised convolution (Knutsson & Westin 1993) of the samp
 flat up to the border. They serve only to guide the similarity: what is averaged are the samples themselves.
 """
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -158,3 +159,17 @@ def planes(raw: RawImage, distance: Distance = "noise") -> Plane:
     """Planes h_i, shape (channel, h, w), in the order of `sensor.cfa.channels`."""
     mosaic = guide_mosaic(raw.electrons, raw, distance)
     return np.stack([fill(mosaic, raw.cfa, channel) for channel in channels(raw.cfa)])
+
+
+def bilinear(raw: RawImage) -> NDArray[np.float64]:
+    """Every channel at every pixel by bilinear interpolation, shape (h, w, channel) [e-].
+
+    A sampled pixel keeps its sample; the frame's border is normalised by the samples that exist, so a flat field stays
+    flat up to it.
+    """
+    return fill_channels(raw.electrons, raw.cfa, channels(raw.cfa))
+
+
+def fill_channels(mosaic: Plane, tile: Tile, names: Sequence[str]) -> NDArray[np.float64]:
+    """As `bilinear`, of a mosaic's channels `names`."""
+    return np.stack([fill(mosaic, tile, name) for name in names], axis=-1)

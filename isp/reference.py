@@ -7,8 +7,8 @@ against, and what runs where Dr.Jit can't.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d
 
 from isp.planes import Plane, fill, guide_mosaic
 from isp.settings import DEFAULTS, WINDOW, Reconstruction, Settings
@@ -136,7 +136,7 @@ def _distance(
     h = inputs.h[channel]
     squares = (h[np.ix_(*grown)] - h[np.ix_(grown[0] + offset[0], grown[1] + offset[1])]) ** 2
     for axis in (0, 1):
-        squares = convolve1d(squares, np.ones(settings.patch), axis, mode="constant")
+        squares = scipy.ndimage.convolve1d(squares, np.ones(settings.patch), axis, mode="constant")
     total = squares[half : half + len(x[0]), half : half + len(x[1])]
     noise = inputs.noise[channel][:, :, offset[0] + settings.reach, offset[1] + settings.reach]
     return np.asarray(np.maximum(total - noise[np.ix_(x[0] % noise.shape[0], x[1] % noise.shape[1])], 0.0))

@@ -16,18 +16,18 @@ import numpy as np
 
 from render.combine import emission
 from render.denoised.denoise import Denoised
-from render.error_estimates import SharedPaths, relative_error
+from render.error_estimates import Halves, SharedPaths, relative_error
 from render.level import Irradiance, SceneMeans
 from render.loader import Film, integrator_name, variant
 from render.scene import Node, Scene, walk
 from render.transport import Transport
-from rodcone.digests import digest, digest_file
+from rodcone.digests import digest_file, digest_inputs
 from rodcone.files import replacing
 from rodcone.jit import compiler_version
 
-ENGINE_VERSION = 8  # raise it with any change that moves a rendered value: older entries are then not used
+ENGINE_VERSION = 9  # raise it where a value or an array's name changes: older entries are then not used
 _DIGEST_BYTES = hashlib.sha256().digest_size
-_ARRAYS = ("radiance", "half_difference", "variance", "coverage", "coverage_difference", "counts")
+_ARRAYS = ("variance", "counts")
 _MEANS = tuple(field.name for field in fields(SceneMeans))
 _VALUES = ("stopped_by", "seconds", "integrator", "variant")
 _NOT_IN_NAMES = re.compile(r"[^\w.-]+")  # above all path separators: entries stay in their folder
@@ -47,13 +47,14 @@ def load_transport(folder: Path, scene: Scene, film: Film, seed: int, *, denoise
     return Transport(
         **{name: arrays[name] for name in _ARRAYS},
         **{name: values[name] for name in _VALUES},
-        seen=tuple(arrays[f"seen_{index}"] for index in range(len(scene.groups))),
-        seen_difference=tuple(arrays[f"seen_difference_{index}"] for index in range(len(scene.groups))),
+        light=_halves(arrays, "light"),
+        coverage=_halves(arrays, "coverage"),
+        seen=tuple(_halves(arrays, f"seen_{index}") for index in range(len(scene.groups))),
         scene_means=SceneMeans(**{name: arrays[f"mean_{name}"] for name in _MEANS}),
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,
         width_nm=film.width_nm,
-        relative_mc_error=relative_error(lights, arrays["radiance"], arrays["variance"], shared),
+        relative_mc_error=relative_error(lights, arrays["light_mean"], arrays["variance"], shared),
         shared=shared,
         denoised=_denoised(arrays, values) if denoised else None,
     )
@@ -63,14 +64,16 @@ def save_transport(folder: Path, scene: Scene, film: Film, seed: int, transport:
     """Store a transport; readers see the whole file or none."""
     shared = transport.shared
     arrays: dict[str, Any] = {name: np.ascontiguousarray(getattr(transport, name)) for name in _ARRAYS}
-    arrays |= {f"seen_{index}": planes for index, planes in enumerate(transport.seen)}
-    arrays |= {f"seen_difference_{index}": planes for index, planes in enumerate(transport.seen_difference)}
+    halves = {"light": transport.light, "coverage": transport.coverage}
+    halves |= {f"seen_{index}": of_group for index, of_group in enumerate(transport.seen)}
     arrays |= {f"mean_{name}": x for name, x in vars(transport.scene_means).items()}
     arrays |= {"correlation": shared.correlation} if shared else {}
     values = {name: getattr(transport, name) for name in _VALUES} | {"shared": shared.groups if shared else None}
-    if transport.denoised:
-        arrays |= {f"denoised_{name}": x for name, x in vars(transport.denoised).items() if name != "fold_points"}
-        values |= {"fold_points": transport.denoised.fold_points}
+    if denoised := transport.denoised:
+        arrays |= {"denoised": denoised.radiance}
+        halves |= {"indirect": denoised.indirect, "folds": denoised.folds}
+        values |= {"fold_points": denoised.fold_points}
+    arrays |= {f"{name}_{part}": x for name, both in halves.items() for part, x in vars(both).items()}
     path = _path(folder, scene, film, seed, _kind(transport.denoised is not None))
     _write(path, arrays | {"values": np.array(json.dumps(values))})
 
@@ -80,8 +83,12 @@ def _kind(denoised: bool) -> str:
 
 
 def _denoised(arrays: Mapping[str, Any], values: Mapping[str, Any]) -> Denoised:
-    names = [field.name for field in fields(Denoised) if field.name != "fold_points"]
-    return Denoised(**{name: arrays[f"denoised_{name}"] for name in names}, fold_points=values["fold_points"])
+    indirect, folds = _halves(arrays, "indirect"), _halves(arrays, "folds")
+    return Denoised(arrays["denoised"], indirect, folds, fold_points=values["fold_points"])
+
+
+def _halves(arrays: Mapping[str, Any], name: str) -> Halves:
+    return Halves(arrays[f"{name}_mean"], arrays[f"{name}_difference"])
 
 
 def load_irradiance(folder: Path, scene: Scene, film: Film, seed: int) -> Irradiance | None:
@@ -122,7 +129,7 @@ def _write(path: Path, arrays: Mapping[str, Any]) -> None:
 
 
 def _path(folder: Path, scene: Scene, film: Film, seed: int, kind: str = "render") -> Path:
-    key = digest(
+    key = digest_inputs(
         [
             *(ENGINE_VERSION, kind, integrator_name(), variant(), compiler_version()),
             *map(metadata.version, ("mitsuba", "drjit")),

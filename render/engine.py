@@ -18,22 +18,23 @@ from render.denoised.denoise import denoiser
 from render.denoised.folds import FOLD_SHARE, denoise_means
 from render.level import Irradiance
 from render.limits import LEAST_POINTS, PILOT_FROM, Limits
-from render.loader import Film, integrator_name, load_groups, variant
+from render.loader import Film, as_guest, integrator_name, load_groups, variant
 from render.meter import Meter
 from render.runs import add_run, errors_of, let_go, means_of, no_means, pilot_rates, scene_means_of
 from render.scene import Scene
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from render.transport import Transport
-from rodcone.errors import InputError, require_kind, require_whole
+from rodcone.errors import InputError, require_whole
 from rodcone.jit import backend
 from rodcone.progress import Step, render_words, told
 
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
 
 
+@as_guest()
 def render(
-    scene: Scene | str,
+    scene: Scene,
     size: tuple[int, int],
     *,
     wavelength_nm: ArrayLike | None = None,
@@ -42,7 +43,7 @@ def render(
     max_spp: int | None = None,
     noise: float | None = None,
     max_seconds: float | None = None,
-    max_depth: int = 8,
+    max_depth: int | None = None,
     seed: int = 0,
     cache: str | Path | None = None,
     resume: Transport | None = None,
@@ -56,8 +57,7 @@ def render(
 
     Parameters
     ----------
-    scene : Scene or str
-        A scene, or the name of one in the catalogue.
+    scene : Scene
     size : (int, int)
         Height and width in pixels.
     wavelength_nm, width_nm : (band,) array_like, optional
@@ -74,8 +74,8 @@ def render(
         to reach, looked at from 16 samples on at powers of two and half-way between.
     max_seconds : float, optional
         Time to keep, earlier calls' included; at least one run is made.
-    max_depth : int
-        Longest path in segments; 2 is direct light.
+    max_depth : int, optional
+        Longest path in segments; 2 is direct light. The scene's own by default.
     seed : int
         The same seed gives the same bits on one machine, variant and LLVM, whatever the number of threads.
     cache : path, optional
@@ -107,12 +107,7 @@ def render(
         Where data of a coloured light end within the bands: it gives no light beyond.
     """
     # What is asked for
-    if isinstance(scene, str):
-        from rodcone import load  # late: the catalogue stands above this package
-
-        scene = load(scene)
-    require_kind("scene", scene, Scene, "give rodcone.load(name), or the name alone")
-    film = _checked_film(scene, size, wavelength_nm, width_nm, max_depth)
+    film = _checked_film(scene, size, wavelength_nm, width_nm, scene.max_depth if max_depth is None else max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
     if denoise:
         _require_denoiser()
@@ -226,12 +221,9 @@ def _render(
     if "variance" not in errors:  # fewer points than an error is told of
         errors = errors_of(lights, means)
     return Transport(
-        radiance=means.radiance,
-        half_difference=means.difference,
+        light=means.light,
         coverage=means.coverage,
-        coverage_difference=means.coverage_difference,
         seen=tuple(means.seen),
-        seen_difference=tuple(means.seen_difference),
         **errors,
         scene_means=scene_means_of(means),
         groups=dict(scene.groups),

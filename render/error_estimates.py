@@ -19,6 +19,44 @@ SUB_BANDS = 64  # of a band, over which a light's moments are summed: 0.16 nm in
 
 
 @dataclass(frozen=True)
+class Halves:
+    """What two halves of the samples give, whose paths are independent of each other.
+
+    Attributes
+    ----------
+    mean : (..., h, w) float32
+    difference : (..., h, w) float32
+        Half the difference between the even and the odd half: one draw of the error of `mean`, all correlations kept.
+    """
+
+    mean: Planes
+    difference: Planes
+
+    __repr__ = brief
+
+    @classmethod
+    def zeros(cls, *shape: int) -> "Halves":
+        """Halves before the first sample."""
+        return cls(np.zeros(shape, np.float32), np.zeros(shape, np.float32))
+
+    def copy(self) -> "Halves":
+        """Halves that can be added to."""
+        return Halves(self.mean.copy(), self.difference.copy())
+
+    def __getitem__(self, index: int) -> "Halves":
+        """View of one along the first axis."""
+        return Halves(self.mean[index], self.difference[index])
+
+    def add(self, even: Planes, odd: Planes, weight: np.float32) -> None:
+        """Add a chunk's two means, in place: m += ((a + b) / 2 - m) w, d += ((a - b) / 2 - d) w."""
+        for planes, twice in ((self.mean, even + odd), (self.difference, even - odd)):
+            step = np.multiply(twice, np.float32(0.5), out=twice)
+            np.subtract(step, planes, out=step)
+            np.multiply(step, weight, out=step)
+            np.add(planes, step, out=planes)
+
+
+@dataclass(frozen=True)
 class SharedPaths:
     """Two light groups that were rendered along the same paths, so that their errors aren't independent.
 

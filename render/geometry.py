@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from rodcone.errors import InputError
 from rodcone.jit import Matrix4
 from rodcone.types import Floats
 
@@ -32,11 +33,21 @@ def rotate(axis: Sequence[float], degrees: float) -> Floats:
 
 
 def look_at(origin: Sequence[float], target: Sequence[float], up: Sequence[float] = (0.0, 1.0, 0.0)) -> Floats:
-    """Place a camera (or anything that faces +z) at `origin`, turned towards `target`."""
+    """Place a camera (or anything that faces +z) at `origin`, turned towards `target`.
+
+    Raises
+    ------
+    InputError
+        Where the two are one place, or `up` points from one to the other.
+    """
     start = np.asarray(origin, dtype=np.float64)
     forward = np.asarray(target, dtype=np.float64) - start
-    forward /= np.linalg.norm(forward)
     left = np.cross(up, forward)
+    if not left.any():
+        raise InputError(
+            f"target: {target} lies at {origin}, or straight {up} of it; give another target, or another up"
+        )
+    forward /= np.linalg.norm(forward)
     left /= np.linalg.norm(left)
     matrix = np.eye(4)
     matrix[:3] = np.stack([left, np.cross(forward, left), forward, start], axis=1)

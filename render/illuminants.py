@@ -27,6 +27,7 @@ _LINES = {"sodium_low": ((588.995, 589.592), (2.0, 1.0))}
 # Rise of the full moon's reflectance per nm, over its value at 550 nm: straight line through the 16 bands of 405 to
 # 775 nm of the ROLO model at a phase of 7 degrees (Kieffer & Stone 2005, equation 10 and table 4; libration left out).
 MOON_SLOPE_PER_NM = 1.48e-3
+_NUMBER = re.compile(r"\d{4,5}")  # too large for a name's
 _TEMPERATURE = re.compile(r"(D?)(\d+(?:\.\d+)?) ?K")
 
 
@@ -77,7 +78,7 @@ def illuminant(name: str) -> Spectrum:
 
 
 def _measured(path: str) -> Spectrum:
-    columns = read_columns(path, "illuminant", "wavelength_nm")
+    columns = read_columns(path, "illuminant")
     if len(columns) != 2:
         raise InputError(
             f"illuminant: {path!r} has {len(columns) - 1} columns beside wavelength_nm; allowed: 1; keep one lamp"
@@ -99,6 +100,10 @@ def _named(name: str) -> Spectrum:
             return daylight(kelvin)
         require_range("illuminant: black body [K]", kelvin, 800.0, 1e6, "cooler ones hardly glow")
         return unit_luminance(black_body(kelvin))
+    if _NUMBER.fullmatch(name):
+        raise InputError(
+            f"illuminant: {name!r} has no unit; allowed: kelvin; write {name}K for a black body, D{name}K for daylight"
+        )
     if name not in names():
         others = quietly_imported("colour").SDS_ILLUMINANTS
         if name not in list(others):  # colour-science takes any case

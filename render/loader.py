@@ -1,6 +1,8 @@
 """From a `Scene` to Mitsuba objects: variant, film, and the scene at unit emission."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache, reduce
 from operator import getitem
@@ -14,7 +16,7 @@ from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uni
 from render.spectrum import Spectrum
 from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError, one_line
-from rodcone.jit import backend
+from rodcone.jit import at_least_two_threads, backend
 from rodcone.types import Floats
 
 METER_PIXELS = 64  # film of the irradiance meter, each side
@@ -25,6 +27,7 @@ METER_PIXELS = 64  # film of the irradiance meter, each side
 PART_BANDS = 40
 # Without Dr.Jit, whose paths have points of their own: the samples of a pass are drawn independently, as many as asked.
 _SAMPLER = {"type": "independent"}
+_search_path: list[Any] = []  # this program's file resolver, between two of its calls
 _VARIANTS = {"cuda": "cuda_ad_spectral", "llvm": "llvm_ad_spectral", "numpy": "scalar_spectral"}
 
 
@@ -47,6 +50,28 @@ def mitsuba_module() -> Any:
     else:
         mi.register_bsdf("matte", matte_surface(mi))
     return mi
+
+
+@contextmanager
+def as_guest() -> Iterator[None]:
+    """Work in this program's Mitsuba variant and search path, and leave a user's own as they were.
+
+    One who has chosen no variant gets this program's: Mitsuba can't go back to none.
+    """
+    import mitsuba
+
+    mi: Any = mitsuba
+    variant_before, resolver_before = mi.variant(), mi.file_resolver()
+    mitsuba_module()
+    mi.set_variant(variant())
+    mi.set_file_resolver(_search_path.pop() if _search_path else search_path(mi))
+    try:
+        yield
+    finally:
+        _search_path[:] = [mi.file_resolver()]  # a trusted scene may have added folders
+        mi.set_file_resolver(resolver_before)
+        if variant_before:
+            mi.set_variant(variant_before)
 
 
 def mitsuba_words(error: BaseException) -> str:
@@ -198,6 +223,8 @@ def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ..
     # Merging meshes orders a scene's shapes anew at each load, and its lights with them. A path chooses a light by its
     # number, so several keep their order only without.
     mi_scene = _load(scene, description, merge_meshes=len(scene.groups[group].emitters) == 1)
+    if not mi_scene.shapes():
+        raise InputError(f"scene {scene.name}: it has no shape, so nothing is lit; add one")
     # A constant environment is met in every direction: directions sampled for the surface alone leave less noise than a
     # mixture with ones sampled for the light, and half of the rays are saved.
     environment = [light.class_name() for light in mi_scene.emitters()] == ["ConstantBackgroundEmitter"]
@@ -230,7 +257,8 @@ def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> Any
     try:
         state = mi.parser.parse_dict(config, description)
         mi.parser.transform_all(config, state)
-        return mi.parser.instantiate(config, state)
+        with at_least_two_threads():
+            return mi.parser.instantiate(config, state)
     except RuntimeError as error:
         words = mitsuba_words(error)
         raise InputError(f"scene {scene.name}: Mitsuba can't load it: {words}; correct the description") from error

@@ -10,7 +10,7 @@ from render.cache import load_irradiance, save_irradiance
 from render.integrator.dense import Tracer
 from render.integrator.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
 from render.level import Irradiance
-from render.loader import METER_PIXELS, Film, Loaded, load_groups, mitsuba_module, stock_integrator
+from render.loader import METER_PIXELS, Film, Loaded, as_guest, load_groups, mitsuba_module, stock_integrator
 from render.runs import let_go
 from render.scene import Scene
 from rodcone.errors import InputError
@@ -61,6 +61,7 @@ class Meter:
         return made
 
 
+@as_guest()
 def _measured(scene: Scene, film: Film, seed: int) -> Irradiance:
     """Trace two halves with seeds of their own; summed in float64, so that threads don't change it."""
     shape = (2, len(scene.groups), film.wavelength_nm.size, *film.size)

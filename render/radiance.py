@@ -9,10 +9,10 @@ from render.photometry import luminance, tristimulus
 from render.spectrum import band_widths
 from rodcone.brief import brief
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
-from rodcone.errors import InputError, require_range
+from rodcone.errors import InputError, require_fields, require_range
 from rodcone.notebook import html_of, preview_png
 from rodcone.plots import Axes, draw_line
-from rodcone.types import Floats
+from rodcone.types import Floats, real_array
 
 
 @dataclass(frozen=True)
@@ -52,10 +52,11 @@ class SpectralRadiance:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        values = np.asarray(self.values)
+        require_fields(self)
+        values = real_array("radiance", self.values)
         if not np.issubdtype(values.dtype, np.floating):
             values = values.astype(np.float64)
-        centres = np.array(self.wavelength_nm, dtype=np.float64)
+        centres = np.array(real_array("wavelength_nm", self.wavelength_nm), dtype=np.float64)
         widths = band_widths(centres, self.width_nm)
         if values.ndim != 3 or values.shape[2] != centres.size or 0 in values.shape:
             raise InputError(f"radiance: shape {values.shape} is not (h, w, {centres.size}); give one value a band")

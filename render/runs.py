@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.error_estimates import relative_error, shared_paths, variance_of
+from render.error_estimates import Halves, relative_error, shared_paths, variance_of
 from render.integrator.allocation import rates_of
 from render.integrator.dense import Tracer
 from render.integrator.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
@@ -30,7 +30,7 @@ MOST_FLOATS = 1 << 24  # of all channels of a launch, 64 MiB: as many threads as
 PILOT = Span(0, 8, 2)  # of each half: 32 samples a pixel, in four sets
 BLOCK = 1 << 16  # pixels whose errors are summed in double precision at once
 
-Halves = tuple[Planes, Planes]  # the even and the odd one
+EvenAndOdd = tuple[Planes, Planes]
 
 
 @dataclass
@@ -43,29 +43,24 @@ class Means:
         Points of each half in a pixel of rate 1.
     rates : (h, w) uint32
         By how many times more points a pixel has: powers of two.
-    radiance, difference : (group, band, h, w) float32
-        All light, and half the difference of the halves.
-    seen, seen_difference : list of (1 or band, h, w) float32
+    light : Halves of (group, band, h, w)
+    seen : list of Halves of (1 or band, h, w)
         Light that is seen directly, of each group.
-    coverage, coverage_difference : (h, w) float32
+    coverage : Halves of (h, w)
         Share of the paths that meet a light first.
     shared : (int, int) or None
         Groups that are rendered along the same paths.
-    indirect, indirect_difference : (group, band, h, w) float32 or None
-        Indirect light in `radiance` and in `difference`, where it is kept by itself.
+    indirect : Halves of (group, band, h, w) or None
+        Indirect light in `light`, where it is kept by itself.
     """
 
     count: int
     rates: NDArray[np.uint32]
-    radiance: Planes
-    difference: Planes
-    seen: list[Planes]
-    seen_difference: list[Planes]
-    coverage: Planes
-    coverage_difference: Planes
+    light: Halves
+    seen: list[Halves]
+    coverage: Halves
     shared: tuple[int, int] | None = None
-    indirect: Planes | None = None
-    indirect_difference: Planes | None = None
+    indirect: Halves | None = None
 
 
 @dataclass(frozen=True)
@@ -82,25 +77,23 @@ class Drawn:
         No groups where it isn't asked for.
     """
 
-    radiance: Halves
-    seen: tuple[Halves, ...]
-    coverage: Halves
-    indirect: Halves
+    radiance: EvenAndOdd
+    seen: tuple[EvenAndOdd, ...]
+    coverage: EvenAndOdd
+    indirect: EvenAndOdd
 
 
 def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, apart: bool = False) -> Means:
     """Means before the first run; with `apart` indirect light is kept by itself."""
-    bands = film.wavelength_nm.size
-    radiance, difference = (np.zeros((len(scene.groups), bands, *film.size), np.float32) for _ in range(2))
-    seen, seen_difference = (
-        [np.zeros((bands if x.coloured else 1, *film.size), np.float32) for x in scene.groups.values()]
-        for _ in range(2)
+    bands, groups = film.wavelength_nm.size, scene.groups.values()
+    return Means(
+        count=0,
+        rates=rates,
+        light=Halves.zeros(len(groups), bands, *film.size),
+        seen=[Halves.zeros(bands if group.coloured else 1, *film.size) for group in groups],
+        coverage=Halves.zeros(*film.size),
+        indirect=Halves.zeros(len(groups), bands, *film.size) if apart else None,
     )
-    coverage, coverage_difference = (np.zeros(film.size, np.float32) for _ in range(2))
-    means = Means(0, rates, radiance, difference, seen, seen_difference, coverage, coverage_difference)
-    if apart:
-        means.indirect, means.indirect_difference = np.zeros_like(radiance), np.zeros_like(radiance)
-    return means
 
 
 def means_of(transport: Transport, *, apart: bool = False) -> Means:
@@ -109,40 +102,36 @@ def means_of(transport: Transport, *, apart: bool = False) -> Means:
     return Means(
         count=int(transport.counts.min()) // 2,
         rates=transport.counts // transport.counts.min(),
-        radiance=transport.radiance.copy(),
-        difference=transport.half_difference.copy(),
-        seen=[planes.copy() for planes in transport.seen],
-        seen_difference=[planes.copy() for planes in transport.seen_difference],
+        light=transport.light.copy(),
+        seen=[halves.copy() for halves in transport.seen],
         coverage=transport.coverage.copy(),
-        coverage_difference=transport.coverage_difference.copy(),
         shared=transport.shared.groups if transport.shared else None,
         indirect=denoised.indirect.copy() if denoised else None,
-        indirect_difference=denoised.indirect_difference.copy() if denoised else None,
     )
 
 
 def errors_of(lights: Floats, means: Means) -> dict[str, Any]:
     """What a `Transport` tells of its Monte Carlo error under lights (group, band), from the means: fields by name."""
-    variance = variance_of(means.difference, means.rates)
-    shared = shared_paths(means.shared, means.difference, variance, means.rates) if means.shared else None
-    error = relative_error(lights, means.radiance, variance, shared)
+    variance = variance_of(means.light.difference, means.rates)
+    shared = shared_paths(means.shared, means.light.difference, variance, means.rates) if means.shared else None
+    error = relative_error(lights, means.light.mean, variance, shared)
     return {"variance": variance, "shared": shared, "relative_mc_error": error}
 
 
 def scene_means_of(means: Means) -> SceneMeans:
     """Means over the picture of what is no light; pixels are independent of each other."""
-    groups, bands, *size = means.radiance.shape
+    groups, bands, *size = means.light.mean.shape
     scattered, errors = np.empty((groups, bands)), []
     for group in range(groups):
-        light = means.radiance[group] - means.seen[group]
-        scattered[group] = light.mean(axis=(1, 2), dtype=np.float64)
-        errors.append((means.difference[group] - means.seen_difference[group]).reshape(bands, -1))
-    error = np.concatenate([*errors, -means.coverage_difference.reshape(1, -1)])
+        light, seen = means.light[group], means.seen[group]
+        scattered[group] = (light.mean - seen.mean).mean(axis=(1, 2), dtype=np.float64)
+        errors.append((light.difference - seen.difference).reshape(bands, -1))
+    error = np.concatenate([*errors, -means.coverage.difference.reshape(1, -1)])
     covariance = np.zeros((len(error),) * 2)
     for first in range(0, error.shape[1], BLOCK):
         part = error[:, first : first + BLOCK].astype(np.float64)
         covariance += part @ part.T
-    uncovered = 1 - float(means.coverage.mean(dtype=np.float64))
+    uncovered = 1 - float(means.coverage.mean.mean(dtype=np.float64))
     return SceneMeans(scattered, uncovered, covariance / (size[0] * size[1]) ** 2)
 
 
@@ -164,16 +153,16 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
         weight = np.float32(chunk / (means.count + chunk))
         # Each light group is found by paths of its own: together they cover the sum of what each does.
         even, odd = (sum(of_group.coverage[half][index] for of_group in drawn) for half in range(2))
-        _add(means.coverage, means.coverage_difference, np.asarray(even), np.asarray(odd), weight)
+        means.coverage.add(np.asarray(even), np.asarray(odd), weight)
         for loaded, of_group in zip(light_groups, drawn, strict=True):
             for slot, group in enumerate(loaded.groups):
-                even, odd = (half[index, slot] for half in of_group.radiance)
-                _add(means.radiance[group], means.difference[group], even, odd, weight)
-                even, odd = (half[index] for half in of_group.seen[slot])
-                _add(means.seen[group], means.seen_difference[group], even, odd, weight)
-                if means.indirect is not None and means.indirect_difference is not None:
-                    even, odd = (half[index, slot] for half in of_group.indirect)
-                    _add(means.indirect[group], means.indirect_difference[group], even, odd, weight)
+                even, odd = of_group.radiance
+                means.light[group].add(even[index, slot], odd[index, slot], weight)
+                even, odd = of_group.seen[slot]
+                means.seen[group].add(even[index], odd[index], weight)
+                if means.indirect is not None:
+                    even, odd = of_group.indirect
+                    means.indirect[group].add(even[index, slot], odd[index, slot], weight)
         means.count += chunk
 
 
@@ -204,15 +193,6 @@ def pilot_rates(light_groups: list[Loaded], film: Film, lights: Floats, seed: in
 def launch_threads(light_groups: list[Loaded], film: Film, *, apart: bool = False) -> int:
     """Threads of a launch, by the memory that their channels need."""
     return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, apart=apart) for loaded in light_groups)
-
-
-def _add(mean: Planes, difference: Planes, even: Planes, odd: Planes, weight: np.float32) -> None:
-    """Add both halves' means over a chunk, in place: m += ((a + b) / 2 - m) w, d += ((a - b) / 2 - d) w."""
-    for planes, twice in ((mean, even + odd), (difference, even - odd)):
-        step = np.multiply(twice, np.float32(0.5), out=twice)
-        np.subtract(step, planes, out=step)
-        np.multiply(step, weight, out=step)
-        np.add(planes, step, out=planes)
 
 
 def _drawn(

@@ -1,6 +1,5 @@
 """A scene as plain data: what `mitsuba.load_dict` takes, its light groups, and where illuminance is measured."""
 
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import reduce
@@ -9,11 +8,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from render.optical_constants import optical_constant
-from render.spectrum import VISIBLE_NM, Spectrum
+from render.published_spectra import optical_constant
+from render.spectrum import Spectrum
 from rodcone.brief import brief
-from rodcone.errors import InputError, one_line, unknown
+from rodcone.errors import InputError, one_line, require_fields, unknown
 from rodcone.notebook import html_of
+from rodcone.plots import draw_curves, png_of
 from rodcone.types import Floats
 
 Node: TypeAlias = dict[str, Any]
@@ -29,7 +29,6 @@ EMISSION_PARAMETER = {
 }
 # Emitter plug-ins whose colour differs over directions: a spectrum can only filter them.
 COLOURED_EMITTERS = ("envmap", "sunsky")
-THUMBNAIL_SIDE, THUMBNAIL_SPP, THUMBNAIL_NM = 128, 16, 40.0
 OWN_SIDE = 256  # pixels, of a scene that states no size
 HELD_NM = (100.0, 20_000.0)  # as far as held ends go
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
@@ -60,6 +59,9 @@ class LightGroup:
 
     __repr__ = brief
 
+    def __post_init__(self) -> None:
+        require_fields(self)
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -77,6 +79,8 @@ class Scene:
     extend : "hold" or None
         What surfaces do outside their tables (reflectance, transmittance, refractive index): ``"hold"`` continues the
         end values, None refuses bands beyond them.
+    max_depth : int
+        Longest path in segments, 2 being direct light, where a render isn't asked for another.
 
     Raises
     ------
@@ -91,10 +95,12 @@ class Scene:
     groups: Mapping[str, LightGroup]
     reference_plane: str | None = None
     extend: str | None = None
+    max_depth: int = 8
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
+        require_fields(self)
         grouped = [path for group in self.groups.values() for path in group.emitters]
         present = emitter_paths(self.geometry)
         for path in grouped:
@@ -143,7 +149,12 @@ class Scene:
             "shapes": str(sum(isinstance(part, dict) and key not in others for key, part in self.geometry.items())),
             "lux are measured on": self.reference_plane or "nothing: give levels in cd/m²",
         }
-        return html_of(f"Scene {self.name}", facts, _thumbnail(self))
+        curves = {
+            name: (group.spectrum.wavelength_nm, group.power * group.spectrum.values)
+            for name, group in self.groups.items()
+        }
+        lights = png_of(lambda axes: draw_curves(curves, axes, x="wavelength, nm", y="emission, per nm"))
+        return html_of(f"Scene {self.name}", facts, lights)
 
     def check_meter(self) -> None:
         """Raise `InputError` where Mitsuba's own irradiance meter, whose rays have to meet a light, would read 0."""
@@ -180,21 +191,6 @@ def film_size(own: tuple[int, int], longest: int | None) -> tuple[int, int]:
     """Height and width, or their proportions with the longer side that was asked for."""
     scale = 1.0 if longest is None else longest / max(own)
     return max(1, round(own[0] * scale)), max(1, round(own[1] * scale))
-
-
-def _thumbnail(scene: Scene) -> bytes | None:
-    """Small, noisy picture of a scene under its own lights; None for one that can't be rendered."""
-    from render.engine import render  # late: it imports this module
-
-    nm = np.arange(VISIBLE_NM[0] + THUMBNAIL_NM / 2, VISIBLE_NM[1], THUMBNAIL_NM)
-    size = film_size(scene.size, THUMBNAIL_SIDE)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of lights that are dark in some bands: told when the scene is rendered
-        try:
-            made = render(scene, size, wavelength_nm=nm, spp=THUMBNAIL_SPP, max_depth=4)
-        except InputError:
-            return None
-        return made._repr_png_()
 
 
 def spectrum_node(spectrum: Spectrum) -> Node:

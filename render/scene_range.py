@@ -7,7 +7,7 @@ from operator import getitem
 
 import numpy as np
 
-from render.optical_constants import optical_constant
+from render.published_spectra import optical_constant
 from render.scene import Node, Scene, emitter_paths, table_of, walk
 from render.spectrum import Spectrum
 from rodcone.errors import InputError

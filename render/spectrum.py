@@ -10,6 +10,7 @@ from rodcone.errors import InputError
 from rodcone.notebook import html_of
 from rodcone.plots import Axes, draw_curves, png_of
 from rodcone.types import Floats as Floats  # noqa: PLC0414  (other packages import it from here)
+from rodcone.types import real_array
 
 VISIBLE_NM = (380.0, 780.0)
 SHORTEST_NM, LONGEST_NM = 100.0, 20_000.0  # what is taken for a wavelength in nm: from the far ultraviolet to heat
@@ -42,8 +43,8 @@ class Spectrum:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        nm = np.array(self.wavelength_nm, dtype=np.float64)
-        values = np.array(self.values, dtype=np.float64)
+        nm = np.array(real_array("wavelength_nm", self.wavelength_nm), dtype=np.float64)
+        values = np.array(real_array("spectrum values", self.values), dtype=np.float64)
         if nm.ndim != 1 or nm.size < 2 or not np.all(np.isfinite(nm)) or not np.all(np.diff(nm) > 0):
             raise InputError(
                 f"wavelength_nm: {nm.tolist()!r} is not allowed; give two or more strictly increasing [nm]"
@@ -142,11 +143,14 @@ def band_widths(wavelength_nm: ArrayLike, width_nm: ArrayLike | None = None) -> 
         Where centres don't increase, widths aren't positive, or the spacing isn't even and no widths are given; where
         bands reach beyond 100 to 20 000 nm, or overlap by more than 1 % of a width.
     """
-    nm = np.asarray(wavelength_nm, dtype=np.float64)
+    nm = real_array("wavelength_nm", wavelength_nm).astype(np.float64)
     if nm.ndim != 1 or nm.size == 0 or not np.all(np.isfinite(nm)) or np.any(np.diff(nm) <= 0) or nm[0] <= 0:
         raise InputError(f"wavelength_nm: {nm.tolist()!r} is not allowed; give increasing band centres in nm")
     if width_nm is not None:
-        widths = np.broadcast_to(np.asarray(width_nm, dtype=np.float64), nm.shape).copy()
+        widths = real_array("width_nm", width_nm)
+        if widths.shape not in ((), nm.shape):
+            raise InputError(f"width_nm: {widths.shape} widths for {nm.size} bands; give one each, or one for all")
+        widths = np.broadcast_to(widths.astype(np.float64), nm.shape).copy()
         if not np.all(np.isfinite(widths) & (widths > 0)):
             raise InputError(f"width_nm: {widths.tolist()!r} is not allowed; give positive band widths in nm")
     else:

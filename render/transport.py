@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from render.combine import combine, emission
 from render.denoised.denoise import Denoised
-from render.error_estimates import SharedPaths, relative_error, within_band_error
+from render.error_estimates import Halves, SharedPaths, relative_error, within_band_error
 from render.illuminants import illuminant
 from render.level import Irradiance, Level, SceneMeans
 from render.photometry import luminance
@@ -31,18 +31,15 @@ class Transport:
 
     Attributes
     ----------
-    radiance : (group, band, h, w) float32
-        Mean of two halves, whose paths are independent; times a spectral emission it is radiance.
-    half_difference : (group, band, h, w) float32
-        Half the difference between the even and the odd half: one draw of the error of `radiance`, all correlations
-        kept.
+    light : Halves of (group, band, h, w)
+        Times a spectral emission it is radiance.
     variance : (group, band, h, w) float32
-        Variance of `radiance`, from the difference of the halves, pooled over 3x3 pixels.
-    coverage, coverage_difference : (h, w) float32
-        Share of each pixel's samples in which a light is seen directly, and half the difference of the halves.
-    seen, seen_difference : tuple of (1 or band, h, w) float32
-        The light in `radiance` that is seen directly, of each group: one plane for all bands, or by band where the
-        group has a colour of its own; and half the difference of the halves.
+        Variance of the light, from the difference of the halves, pooled over 3x3 pixels.
+    coverage : Halves of (h, w)
+        Share of each pixel's samples in which a light is seen directly.
+    seen : tuple of Halves of (1 or band, h, w)
+        The part of `light` that is seen directly, of each group: one plane for all bands, or by band where the group
+        has a colour of its own.
     scene_means : SceneMeans
         What levels are computed from.
     groups : mapping of str to LightGroup
@@ -64,13 +61,10 @@ class Transport:
         Denoised light beside the unbiased, where it was asked for (`render.denoised.relight`).
     """
 
-    radiance: Planes
-    half_difference: Planes
+    light: Halves
     variance: Planes
-    coverage: Planes
-    coverage_difference: Planes
-    seen: tuple[Planes, ...]
-    seen_difference: tuple[Planes, ...]
+    coverage: Halves
+    seen: tuple[Halves, ...]
     scene_means: SceneMeans
     groups: Mapping[str, LightGroup]
     wavelength_nm: Floats
@@ -86,6 +80,11 @@ class Transport:
     denoised: Denoised | None = None
 
     __repr__ = brief
+
+    @property
+    def radiance(self) -> Planes:
+        """Mean of both halves, (group, band, h, w) float32: times a spectral emission it is radiance."""
+        return self.light.mean
 
     @property
     def spp(self) -> float:
@@ -164,7 +163,7 @@ class Transport:
         """
         emitted = self._emission(spectra, powers)
         coefficients, _ = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
-        values, difference = combine(coefficients, self.radiance), combine(coefficients, self.half_difference)
+        values, difference = combine(coefficients, self.radiance), combine(coefficients, self.light.difference)
         even, odd = (
             SpectralRadiance(np.moveaxis(half, 0, -1), self.wavelength_nm, width_nm=self.width_nm, signed=True)
             for half in (values + difference, values - difference)
@@ -221,11 +220,11 @@ class Transport:
         """
         emitted = self._emission()
         weights = self._luminance_weights(self._at_level(emitted, luminance_cd_m2, None)[0])
-        total = np.zeros(self.coverage.shape)
+        total = np.zeros(self.coverage.mean.shape)
         for of_group, radiance, seen in zip(weights, self.radiance, self.seen, strict=True):
             for weight, plane in zip(of_group, radiance, strict=True):  # no copy of all planes in double precision
                 total += weight * plane
-            for weight, plane in zip(of_group if len(seen) > 1 else [of_group.sum()], seen, strict=True):
+            for weight, plane in zip(of_group if len(seen.mean) > 1 else [of_group.sum()], seen.mean, strict=True):
                 total -= weight * plane
         return np.maximum(total, 0.0)
 

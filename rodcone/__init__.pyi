@@ -1,6 +1,22 @@
+"""Public names with their types; `rodcone.doors` takes a name in place of some values."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from isp.picture import Picture as Picture
+from isp.picture import finish as finish
+from isp.processors.catalogue import Processor as Processor
 from isp.processors.catalogue import names as processors
-from render.engine import render as render
+from render.denoised.relight import measured_error as measured_error
+from render.denoised.relight import relight_denoised as relight_denoised
+from render.geometry import look_at as look_at
+from render.geometry import to_world as to_world
 from render.illuminants import illuminant as illuminant
+from render.illuminants import lines_nm as lines_nm
 from render.illuminants import names as illuminants
 from render.radiance import SpectralRadiance as SpectralRadiance
 from render.radiance_files.exr import write_exr as write_exr
@@ -8,72 +24,203 @@ from render.radiance_files.radiance_source import load_radiance as load_radiance
 from render.scene import LightGroup as LightGroup
 from render.scene import Scene as Scene
 from render.spectrum import Spectrum as Spectrum
+from render.spectrum import line_bands as line_bands
+from render.transport import Transport
 from render.user_scene.scene_file import load_scene_file as load_scene_file
 from rodcone.colour_spaces import encode_srgb as encode_srgb
 from rodcone.errors import InputError as InputError
+from rodcone.progress import Step
 from scenes.catalog import load as load
 from scenes.catalog import names as scenes
-from sensor.capture import capture as capture
-from sensor.capture import expose as expose
+from scenes.materials import matte as matte
+from scenes.materials import panel as panel
+from scenes.reflectances import grey as grey
+from sensor.burst import merged_raw as merged_raw
+from sensor.calibration import ColourCalibration
+from sensor.cfa import mask as mask
 from sensor.cfa import mosaics as mosaics
-from sensor.device import draw_device as draw_device
-from sensor.exposure import auto_exposure_s as auto_exposure_s
+from sensor.chip import PixelConfig as PixelConfig
+from sensor.chip import Reading as Reading
+from sensor.config import SensorConfig
+from sensor.device import Device
+from sensor.emva1288.characterise import Characterisation
+from sensor.optics import SpectralIrradiance
 from sensor.presets import low_noise as low_noise
 from sensor.presets import names as sensors
 from sensor.presets import preset as preset
 from sensor.presets import table1_output as table1_output
 from sensor.presets import table1_pixel as table1_pixel
+from sensor.raw import RawImage as RawImage
 from sensor.raw_files.raw_file import read_raw as read_raw
 from sensor.raw_files.raw_file import write_raw as write_raw
-from studies.budget.plan import plan as plan
+from studies.budget.model_plan import Plan
 from studies.commands.report import write_report as report
 from studies.explore.widget import explore as explore
-from studies.photograph.calibrate import calibrate as calibrate
+from studies.photograph.clock import Clock
 from studies.photograph.develop import develop as develop
+from studies.photograph.develop import develop_file as develop_file
 from studies.photograph.picture_file import write_picture as write_picture
+from studies.photograph.shot import Order as Order
+from studies.photograph.shot import take as take
+from studies.photograph.snr import LightForSnr
+from studies.study.study import RenderLimits as RenderLimits
+from studies.study.study import SceneChoice as SceneChoice
 from studies.study.study import Study as Study
 from studies.study.study_file import read_study as read_study
 from studies.sweep.export import read_rows as read_rows
-from studies.sweep.run_sweep import sweep as sweep
+from studies.sweep.export import to_pandas as to_pandas
+from studies.sweep.run_sweep import Runner, Swept
 from studies.sweep.workers import run as run
+from studies.sweep.workers import run_in_processes as run_in_processes
 
 __all__ = [
     "InputError",
     "LightGroup",
+    "Order",
+    "Picture",
+    "PixelConfig",
+    "Processor",
+    "RawImage",
+    "Reading",
+    "RenderLimits",
     "Scene",
+    "SceneChoice",
     "SpectralRadiance",
     "Spectrum",
     "Study",
     "auto_exposure_s",
+    "binned",
     "calibrate",
     "capture",
+    "channel_electrons",
+    "characterise",
     "develop",
+    "develop_file",
     "draw_device",
     "encode_srgb",
+    "expected_electrons",
     "explore",
     "expose",
+    "finish",
+    "form_image",
+    "grey",
     "illuminant",
     "illuminants",
+    "light_for_snr",
+    "line_bands",
+    "lines_nm",
     "load",
     "load_radiance",
     "load_scene_file",
+    "look_at",
     "low_noise",
+    "mask",
+    "matte",
+    "measured_error",
+    "merged_raw",
     "mosaics",
+    "panel",
     "plan",
     "preset",
     "processors",
     "read_raw",
     "read_rows",
     "read_study",
+    "reference_plan",
+    "relight_denoised",
     "render",
     "report",
     "run",
+    "run_in_processes",
     "scenes",
     "sensors",
+    "snr",
     "sweep",
     "table1_output",
     "table1_pixel",
+    "take",
+    "to_pandas",
+    "to_world",
+    "with_readings",
     "write_exr",
     "write_picture",
     "write_raw",
 ]
+
+_Sensor: TypeAlias = SensorConfig | str | Path
+_Seconds: TypeAlias = float | str
+_Light: TypeAlias = Spectrum | str
+_Study: TypeAlias = Study | str | Path
+
+def auto_exposure_s(
+    irradiance: SpectralIrradiance,
+    sensor: _Sensor,
+    longest_s: float = ...,
+    *,
+    channel: str | None = None,
+    percentile: float = ...,
+    well_share: float = ...,
+) -> float: ...
+def binned(sensor: _Sensor, way: str) -> SensorConfig: ...
+def calibrate(sensor: _Sensor, light: _Light) -> ColourCalibration: ...
+def capture(
+    radiance: SpectralRadiance,
+    sensor: _Sensor | None = None,
+    exposure_s: _Seconds | None = None,
+    device: Device | None = None,
+    rng: np.random.Generator | None = None,
+    *,
+    light: _Light | None = None,
+    exact: bool = False,
+    samples_per_pixel: int = 1,
+) -> RawImage: ...
+def channel_electrons(irradiance: SpectralIrradiance, sensor: _Sensor, exposure_s: _Seconds) -> NDArray[np.float64]: ...
+def characterise(
+    sensor: _Sensor, shape: tuple[int, int] = ..., seed: int = 0, exposure_s: _Seconds = ..., exact: bool = False
+) -> Characterisation: ...
+def draw_device(sensor: _Sensor, shape: tuple[int, int], rng: np.random.Generator) -> Device: ...
+def expected_electrons(
+    irradiance: SpectralIrradiance, sensor: _Sensor, exposure_s: _Seconds
+) -> NDArray[np.float64]: ...
+def expose(
+    expected_e: ArrayLike,
+    sensor: _Sensor,
+    exposure_s: _Seconds,
+    device: Device,
+    rng: np.random.Generator,
+    *,
+    exact: bool = False,
+) -> RawImage: ...
+def form_image(radiance: SpectralRadiance, sensor: _Sensor, samples_per_pixel: int = 1) -> SpectralIrradiance: ...
+def light_for_snr(ratio: float, sensor: _Sensor, light: str, exposure_s: _Seconds) -> list[LightForSnr]: ...
+def plan(study: _Study, *, cache: str | Path | None = None, step: Step | None = None) -> Plan: ...
+def reference_plan(study: _Study) -> Plan: ...
+def render(
+    scene: Scene | str,
+    size: tuple[int, int],
+    *,
+    wavelength_nm: ArrayLike | None = None,
+    width_nm: ArrayLike | None = None,
+    spp: int | None = None,
+    max_spp: int | None = None,
+    noise: float | None = None,
+    max_seconds: float | None = None,
+    max_depth: int | None = None,
+    seed: int = 0,
+    cache: str | Path | None = None,
+    resume: Transport | None = None,
+    progress: Callable[[float, float], None] | None = None,
+    denoise: bool = False,
+) -> Transport: ...
+def snr(electrons: ArrayLike, sensor: _Sensor, exposure_s: _Seconds) -> NDArray[np.float64]: ...
+def sweep(
+    study: _Study,
+    out: str | Path,
+    plan: Plan | None = None,
+    runner: Runner | None = None,
+    step: Step | None = None,
+    *,
+    keep_old: bool = False,
+    clock: Clock | None = None,
+) -> Swept: ...
+def with_readings(sensor: _Sensor, readings: Sequence[Reading], readout: str = ...) -> SensorConfig: ...

@@ -15,6 +15,7 @@ A_XY = np.array([0.44758, 0.40745])
 D50_XYZ = np.array([0.9642, 1.0, 0.8249])
 
 # Bradford cone responses (Lam 1985), as ICC.1:2010 Annex E gives them.
+WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # this percentile of a picture's luminance is shown at 90 % of white
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 
 
@@ -42,6 +43,12 @@ def xyz_to_srgb(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
 def luminance_of_srgb(rgb: NDArray[np.floating]) -> NDArray[np.float64]:
     """Y of linear sRGB over the last axis."""
     return np.asarray(rgb @ SRGB_TO_XYZ[1])
+
+
+def white_of(linear: NDArray[np.floating]) -> float:
+    """Level of linear sRGB (h, w, 3), or of grey (h, w), that is shown as white; 0 or less where there is no light."""
+    luminance = linear if linear.ndim == 2 else luminance_of_srgb(linear)
+    return float(np.percentile(luminance, WHITE_PERCENTILE)) / WHITE_AT
 
 
 def adapt_to_d65(xyz: NDArray[np.float64], white_xyz: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,48 +1,53 @@
 """Tables of numbers from CSV files."""
 
 import csv
+import re
 from io import StringIO
 from pathlib import Path
 
 import numpy as np
 
 from rodcone.errors import InputError
+from rodcone.files import read_bounded
 from rodcone.types import Floats
 
+NM = "wavelength_nm"
+_WAVELENGTH = {"wavelengthnm", "wavelength", "wavelengths", "lambda", "lambdanm", "λ", "λnm", "nm", "wl"}
+_NOT_LETTERS = re.compile(r"[^a-zλ]")  # lambda [nm], Wavelength (nm)
+LEAST_NM = 50.0  # below it the column is in micrometres
 MOST_BYTES = 1 << 23  # 100 columns at 0.1 nm over 300-1100 nm take 6 MB
 
 
-def read_columns(path: str | Path, what: str, first: str) -> dict[str, Floats]:
-    """Columns of a CSV by the names in its header.
+def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
+    """Columns of a CSV by the names in its header; the first holds wavelengths in nm, and is called ``wavelength_nm``.
 
     Parameters
     ----------
     path : str or Path
     what : str
         That the file holds, for the message.
-    first : str
-        Name that the first column has to have; one more is needed.
 
     Raises
     ------
     InputError
-        For a file that can't be read, a cell that is no number, or another header.
+        For a file that can't be read, a cell that is no number, another header, or wavelengths that aren't nm.
     """
     try:
-        if Path(path).exists() and not Path(path).is_file():  # a pipe or a device may never end
-            raise ValueError("it is a folder or a device")
-        with Path(path).open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
-        if len(content) > MOST_BYTES:
-            raise ValueError(f"it is over {MOST_BYTES} bytes")
+        content = read_bounded(Path(path), MOST_BYTES)
         header, *rows = [row for row in csv.reader(StringIO(content.decode("utf-8-sig"), newline="")) if row]
         table = np.array([[float(cell) for cell in row] for row in rows], dtype=np.float64)
     except (OSError, ValueError, csv.Error) as error:
         told = f"{str(path)!r} can't be read ({error})"
         raise InputError(f"{what}: {told}; give a CSV of numbers with a header") from error
     names = [name.strip() for name in header]
+    if _NOT_LETTERS.sub("", names[0].lower()) in _WAVELENGTH:
+        names[0] = NM
     fits = table.ndim == 2 and table.shape[1] == len(names) == len(set(names))
-    if not fits or names[0] != first or len(names) < 2:
+    if not fits or names[0] != NM or len(names) < 2:
         told = f"{str(path)!r} has header {names}"
-        raise InputError(f"{what}: {told}; allowed: {first} and one channel a column; add it")
+        raise InputError(f"{what}: {told}; allowed: {NM} (or wavelength, lambda, nm) and one channel a column; add it")
+    if table[:, 0].max() < LEAST_NM:
+        raise InputError(
+            f"{what}: {str(path)!r} has wavelengths up to {table[:, 0].max():g}; allowed: nm; convert them"
+        )
     return dict(zip(names, table.T, strict=True))

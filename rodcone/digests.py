@@ -3,18 +3,30 @@
 import hashlib
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+_BITS = 30  # of a float: what processors differ by is a millionth of the last, single precision has 24
 _LENGTH = 32  # hexadecimal digits, 128 bits: two of a million cells collide with a chance of 1e-27
 
 
 def digest(value: Any) -> str:
     """Hash of plain data: numbers, texts, arrays, dataclasses, mappings and sequences of them."""
     return digest_bytes(json.dumps(value, sort_keys=True, default=_plain).encode())
+
+
+def digest_inputs(value: Any) -> str:
+    """Hash of what a result is made from, as `digest`, with floats rounded to 2^-30 of the largest of their array.
+
+    NumPy and BLAS pick their loops by the processor, so that a spectrum read from a table and resampled has other last
+    bits on another one. The same inputs have the same hash on all; only a float that happens to lie on the edge
+    between two roundings (one in a million of those that differ) makes a result be made again.
+    """
+    return digest(_rounded(value))
 
 
 def digest_bytes(*parts: bytes | memoryview) -> str:
@@ -38,3 +50,21 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return dict(value)
     return np.asarray(value).tolist()  # arrays, NumPy's scalars and Dr.Jit's matrices
+
+
+def _rounded(value: Any) -> Any:
+    """Plain data with its floats rounded."""
+    if isinstance(value, str) and "," in value:  # a spectrum as Mitsuba takes it is text: 0.25,0.5,...
+        with suppress(ValueError):
+            return _rounded(np.array(value.split(","), dtype=np.float64))
+    if value is None or isinstance(value, str | int):
+        return value
+    if is_dataclass(value) or isinstance(value, Mapping):
+        return {name: _rounded(part) for name, part in _plain(value).items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(part) for part in value]
+    array = np.asarray(value)
+    if array.dtype.kind != "f":
+        return array.tolist()
+    _, exponent = np.frexp(np.abs(array[np.isfinite(array)]).max(initial=0.0))
+    return (np.ldexp(np.rint(np.ldexp(array, _BITS - exponent)), exponent - _BITS) + 0.0).tolist()  # + 0.0: no -0.0

@@ -2,9 +2,11 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from functools import cache
 from math import isfinite, nan
-from numbers import Real
-from typing import Any
+from numbers import Integral, Real
+from types import UnionType
+from typing import Any, get_args, get_origin, get_type_hints
 
 MOST_TOLD = 2000  # characters; a quoted file may fill megabytes
 
@@ -38,7 +40,7 @@ def unknown(what: str, value: object, allowed: Iterable[str]) -> InputError:
 def require_range(name: str, value: Any, low: float, high: float, fix: str) -> None:
     """Raise `InputError` unless `value` is a finite number and ``low <= value <= high``."""
     try:
-        number = float(value) if isinstance(value, Real) else nan
+        number = float(value) if not isinstance(value, bool) and isinstance(value, Real) else nan
     except OverflowError:  # whole numbers of Python go on beyond float's
         number = nan
     if not (isfinite(number) and low <= number <= high):
@@ -65,3 +67,33 @@ def require_keys(what: str, given: Iterable[str], allowed: Iterable[str]) -> Non
     for key in given:
         if key not in allowed:
             raise unknown(what, key, allowed)
+
+
+def require_fields(value: object) -> None:
+    """Raise `InputError` where a field of a dataclass is of another kind than its annotation says.
+
+    Numbers, text, flags, classes and tuples of these; arrays and mappings say more than an annotation, and are left.
+    """
+    owner: Any = type(value)
+    for name, kind in _kinds(owner).items():
+        if not _fits(getattr(value, name), kind):
+            words = kind.__name__ if isinstance(kind, type) else str(kind)
+            raise InputError(f"{name}: {str(getattr(value, name))[:80]!r} is not allowed; give {words}")
+
+
+@cache
+def _kinds(owner: Any) -> dict[str, Any]:
+    return get_type_hints(owner)
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    parts = get_args(kind)
+    if isinstance(kind, UnionType):
+        return any(_fits(value, part) for part in parts)
+    if kind in (float, int):
+        return not isinstance(value, bool) and isinstance(value, Real if kind is float else Integral)
+    if get_origin(kind) is tuple:
+        kinds = parts[:1] * len(value) if parts[-1] is ... and isinstance(value, tuple) else parts
+        return isinstance(value, tuple) and len(value) == len(kinds) and all(map(_fits, value, kinds))
+    origin = get_origin(kind) or kind
+    return not isinstance(origin, type) or hasattr(origin, "__array__") or isinstance(value, origin)

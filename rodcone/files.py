@@ -1,13 +1,18 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, and reading with a bound."""
 
 import errno
 import os
-import tempfile
-from collections.abc import Iterator
+import re
+import secrets
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from math import isfinite
 from pathlib import Path
+from typing import Any
 
 from rodcone.errors import InputError
+
+_HALF_WRITTEN = re.compile(r"\.rodcone-[0-9a-f]{16}(\.\w+)?")
 
 
 @contextmanager
@@ -17,13 +22,40 @@ def replacing(*paths: Path) -> Iterator[tuple[Path, ...]]:
     Raises
     ------
     OSError
-        Where the folder, which has to be the same for all, is missing or can't be written; it names the first path.
+        Where a folder is missing or can't be written; it names the path.
     """
-    with _folder_beside(paths[0]) as parts:
-        places = tuple(Path(parts) / path.name for path in paths)
+    places = tuple(_place_beside(path) for path in paths)
+    try:
         yield places
         for place, path in zip(places, paths, strict=True):
             os.replace(place, path)
+    finally:
+        for place in places:
+            place.unlink(missing_ok=True)
+
+
+def is_half_written(path: Path) -> bool:
+    """Whether a path is a file that `replacing` had begun to write; of a killed program it stays behind."""
+    return bool(_HALF_WRITTEN.fullmatch(path.name)) and path.is_file() and not path.is_symlink()
+
+
+def read_bounded(path: Path, most_bytes: int) -> bytes:
+    """Content of a file.
+
+    Raises
+    ------
+    ValueError
+        For a folder, a pipe or a device, which may never end, and for more bytes than allowed.
+    OSError
+        Where there is no file, or it can't be read.
+    """
+    if path.exists() and not path.is_file():
+        raise ValueError("it is a folder or a device; allowed: a file")
+    with path.open("rb") as file:
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise ValueError(f"it is over {most_bytes} bytes")
+    return content
 
 
 def check_place(path: Path) -> None:
@@ -31,8 +63,7 @@ def check_place(path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.is_dir():
         raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    with _folder_beside(path):
-        pass
+    _place_beside(path)
 
 
 def inside(folder: Path, name: str) -> Path:
@@ -49,8 +80,21 @@ def inside(folder: Path, name: str) -> Path:
     return path
 
 
-def _folder_beside(path: Path) -> "tempfile.TemporaryDirectory[str]":
+def _place_beside(path: Path) -> Path:
+    """New path beside a path, in a folder that can be written, with its ending, by which writers choose a format."""
+    place = path.with_name(f".rodcone-{secrets.token_hex(8)}{path.suffix}")
     try:
-        return tempfile.TemporaryDirectory(dir=path.parent, prefix=".part-")
-    except OSError as error:  # it names the temporary folder, which the user did not ask for
+        place.open("xb").close()
+        place.unlink()
+    except OSError as error:  # it names the temporary file, which the user did not ask for
         raise OSError(error.errno, error.strerror, str(path)) from error
+    return place
+
+
+def finite(value: Any) -> Any:
+    """A value as a JSON file holds it: None in place of every NaN and infinity, lists in place of tuples."""
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {name: finite(each) for name, each in value.items()}
+    return [finite(each) for each in value] if isinstance(value, (list, tuple)) else value

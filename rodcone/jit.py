@@ -1,5 +1,7 @@
 """Dr.Jit, with the LLVM library of `rodcone.llvm`. The only module that imports Dr.Jit."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any, Literal
 
@@ -10,7 +12,7 @@ from rodcone.llvm import LIBLLVM
 
 Backend = Literal["cuda", "llvm", "numpy"]
 
-__all__ = ["Backend", "Matrix4", "arrays", "backend", "compiler_version", "dr"]
+__all__ = ["Backend", "Matrix4", "arrays", "at_least_two_threads", "backend", "compiler_version", "dr"]
 
 Matrix4 = dr.scalar.Matrix4f64  # a 4x4 transform as `mitsuba.load_dict` takes it in every variant
 
@@ -38,3 +40,17 @@ def arrays() -> Any:
     import drjit.llvm
 
     return drjit.cuda if name == "cuda" else drjit.llvm
+
+
+@contextmanager
+def at_least_two_threads() -> Iterator[None]:
+    """Give Dr.Jit a second thread for a while: Mitsuba reads OpenEXR files in its threads.
+
+    The thread that asks waits without helping, so with one thread (a machine of one core) it would wait for ever.
+    """
+    count = dr.thread_count()
+    dr.set_thread_count(max(2, count))
+    try:
+        yield
+    finally:
+        dr.set_thread_count(count)

@@ -8,9 +8,8 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.colour_spaces import encode_srgb
+from rodcone.colour_spaces import encode_srgb, white_of
 
-WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # this percentile of a picture is shown at 90 % of white
 LEAST_SHOWN = 384  # pixels of the screen that a small picture is as wide as, about: each of its own is several there
 SIDE = 512  # most pixels of a shown picture's longer side
 
@@ -24,8 +23,7 @@ def preview_png(linear: NDArray[np.floating]) -> bytes:
 
     step = max(1, -(-max(linear.shape[:2]) // SIDE))
     small = np.nan_to_num(np.asarray(linear[::step, ::step], dtype=np.float64))
-    luminance = small if small.ndim == 2 else small @ [0.2126, 0.7152, 0.0722]
-    white = np.percentile(luminance, WHITE_PERCENTILE) / WHITE_AT
+    white = white_of(small)
     shown = np.clip(small / white, 0.0, 1.0) if white > 0 else np.zeros_like(small)
     file = BytesIO()
     Image.fromarray(np.rint(encode_srgb(shown) * 255).astype(np.uint8)).save(file, "PNG")

@@ -23,8 +23,9 @@ def progress(file: TextIO) -> Iterator[Step]:
     """Give a function to call with what is being done and the share of the whole that is done (0..1).
 
     On a terminal it moves a bar, which vanishes at the end; elsewhere, as in the log of a batch system, a line is
-    printed every five seconds. Both show the time left, by the pace since the first share above 0: what comes before,
-    such as compilation, isn't repeated. Until then the bar swings to and fro.
+    printed every five seconds where there is something new. The share only grows. Both show the time left, by the pace
+    since the first share above 0: what comes before, such as compilation, isn't repeated. Until then the bar swings to
+    and fro.
     """
     console = Console(file=file)
     columns = (
@@ -39,11 +40,13 @@ def progress(file: TextIO) -> Iterator[Step]:
         *columns, console=console, transient=True, disable=not console.is_terminal, speed_estimate_period=math.inf
     )
     number = bar.add_task("start", total=None)
-    ended = Event()
+    ended, most = Event(), 0.0
     printer = Thread(target=_print_lines, args=(bar.tasks[number], file, ended), daemon=True)
 
     def step(what: str, share: float) -> None:
-        bar.update(number, description=what, completed=share, total=1.0 if share else None)
+        nonlocal most
+        most = max(most, share)  # what is left may turn out to be more than was thought; what is done stays done
+        bar.update(number, description=what, completed=most, total=1.0 if most else None)
 
     with bar:
         if not console.is_terminal:
@@ -94,10 +97,15 @@ def _notebook_display() -> Callable[..., Any] | None:
 
 
 def _print_lines(task: Task, file: TextIO, ended: Event) -> None:
-    """Print a line now and then; by a thread of its own, since a call of Mitsuba may take long."""
+    """Print a line now and then where it says something new; by a thread, since a call of Mitsuba may take long."""
+    printed = None
     while not ended.wait(LINE_EVERY_S):
+        state = f"{task.completed:.0%}, {task.description}"
+        if state == printed:
+            continue
+        printed = state
         left = "" if task.time_remaining is None else f", {duration(task.time_remaining)} left"
-        print(f"rodcone: {task.completed:.0%}, {task.description}{left}", file=file, flush=True)
+        print(f"rodcone: {state}{left}", file=file, flush=True)
 
 
 def render_words(error: float) -> str:

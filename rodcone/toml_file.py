@@ -1,13 +1,28 @@
-"""Reading TOML with limits on size, nesting and whole numbers, which Python's parser lacks."""
+"""TOML with limits on size, nesting and whole numbers, which Python's parser lacks, and its tables as dataclasses.
+
+They are read strictly: unknown keys and values of another kind are errors by name.
+"""
 
 import re
 import tomllib
+from collections.abc import Callable
+from dataclasses import fields
+from functools import partial
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import Any, TypeVar, get_args, get_origin
+
+from cattrs import AttributeValidationNote, ClassValidationError, Converter, ForbiddenExtraKeysError
+
+from rodcone.errors import InputError, unknown
+from rodcone.files import read_bounded
 
 MOST_BYTES = 1 << 18  # cameras and studies take some 2 kB
 # Over 32 parts of a key: the parser's time grows with the square of their number, to 13 s for a file of 40 kB.
 _LONG_KEY = re.compile(r"""(?:\.[ \t]*(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*){32}""")
+Kind = TypeVar("Kind")
+_WORDS = {bool: "true or false", str: "a text in quotes", int: "a whole number", float: "a number"}
+_TYPES = {bool: (bool,), str: (str,), int: (int,), float: (int, float)}  # what TOML gives for each
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -21,13 +36,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     OSError
         Where there is no file, or it can't be read.
     """
-    if path.exists() and not path.is_file():  # a pipe or a device may never end
-        raise ValueError("it is a folder or a device; allowed: a file")
-    with path.open("rb") as file:
-        content = file.read(MOST_BYTES + 1)
-    if len(content) > MOST_BYTES:
-        raise ValueError(f"it is over {MOST_BYTES} bytes")
-    return parse_toml(content.decode())
+    return parse_toml(read_bounded(path, MOST_BYTES).decode())
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -48,3 +57,93 @@ def _check_numbers(value: Any) -> None:
             _check_numbers(item)
     elif isinstance(value, int) and not -(1 << 63) <= value < 1 << 63:  # TOML 1.0, "Integer"
         raise ValueError("it holds a whole number of more than 64 bits")
+
+
+def strict_converter() -> Converter:
+    """Converter that takes a whole number for a number, and converts nothing else.
+
+    Python would take a text that reads as a number for one, and true for 1.
+    """
+    converter = Converter(forbid_extra_keys=True)
+    for kind in _WORDS:
+        converter.register_structure_hook(kind, _one_of(kind))
+    converter.register_structure_hook_factory(is_tuple, partial(_tuple_of, converter))
+    converter.register_structure_hook_factory(_is_plain_union, lambda kind: _one_of(*get_args(kind)))
+    return converter
+
+
+def structured(content: Any, kind: type[Kind], converter: Converter, fix: str) -> Kind:
+    """Dataclass of a table's keys.
+
+    Parameters
+    ----------
+    content : dict
+        As `rodcone.toml_file.read_toml` gives it.
+    fix : str
+        Where to look for what is allowed, such as ``see rodcone new study``.
+
+    Raises
+    ------
+    InputError
+        For the first fault, named by its keys; for an unknown key with the one that was likely meant.
+    """
+    try:
+        return converter.structure(content, kind)
+    except ClassValidationError as error:
+        raise InputError(_first_fault(error, fix)) from error
+
+
+def is_tuple(kind: Any) -> bool:
+    """Whether a type is a tuple of others."""
+    origin: Any = get_origin(kind)
+    return origin is tuple
+
+
+def _is_plain_union(kind: Any) -> bool:
+    return get_origin(kind) is UnionType and set(get_args(kind)) <= {*_WORDS, type(None)}
+
+
+def _one_of(*kinds: type) -> Callable[[Any, Any], Any]:
+    """Hook that takes a value of these kinds alone; the first that fits is what it becomes."""
+    plain = [kind for kind in kinds if kind in _WORDS]
+
+    def take(value: Any, _: Any) -> Any:
+        if value is None and len(plain) < len(kinds):
+            return None
+        for kind in plain:
+            if isinstance(value, bool) == (kind is bool) and isinstance(value, _TYPES[kind]):
+                return kind(value)
+        raise InputError(f"{value!r} is not {' or '.join(_WORDS[kind] for kind in plain)}")
+
+    return take
+
+
+def _tuple_of(converter: Converter, kind: Any) -> Callable[[Any, Any], Any]:
+    """Hook for a tuple of as many values as its type says, which a list stands for."""
+    items = get_args(kind)
+
+    def take(value: Any, _: Any) -> Any:
+        if not isinstance(value, list):
+            raise InputError(f"{value!r} is not a list; write it in brackets")
+        kinds = items[:1] * len(value) if items[-1] is Ellipsis else items
+        if len(kinds) != len(value):
+            raise InputError(f"{value!r} has {len(value)} values; allowed: {len(kinds)}")
+        return tuple(converter.structure(each, item) for each, item in zip(value, kinds, strict=True))
+
+    return take
+
+
+def _first_fault(error: ClassValidationError, fix: str) -> str:
+    fault = min(error.exceptions, key=lambda each: not isinstance(each, ForbiddenExtraKeysError))
+    if isinstance(fault, ForbiddenExtraKeysError):
+        return str(unknown("key", sorted(fault.extra_fields)[0], [field.name for field in fields(fault.cl)]))
+    if isinstance(fault, KeyError):
+        return f"{fault.args[0]} is missing; add it, or {fix}"
+    if isinstance(fault, ClassValidationError):
+        words = _first_fault(fault, fix)
+    elif isinstance(fault, InputError):
+        words = str(fault)
+    else:
+        words = f"the value is not a table; allowed: a table of keys; {fix}"
+    where = [note.name for note in getattr(fault, "__notes__", []) if isinstance(note, AttributeValidationNote)]
+    return f"{where[0]}{'' if words.startswith('key: ') else ':'} {words}" if where else words

@@ -1,10 +1,24 @@
-"""Names of arrays that every package uses."""
+"""Arrays that every package uses: their names, and what stands in one."""
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rodcone.errors import InputError
+
 Floats: TypeAlias = NDArray[np.float64]
 Image: TypeAlias = NDArray[np.float64]  # (h, w) or (h, w, channel)
 Planes: TypeAlias = NDArray[np.float32]  # (band, h, w), or (group, band, h, w)
+
+
+def real_array(name: str, value: Any) -> NDArray[Any]:
+    """Array of whole or floating numbers; raises `InputError` for complex ones, text, truth values and the like."""
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError, OverflowError):  # rows of unequal length, among others
+        array = np.asarray(None)
+    if array.dtype.kind not in "iuf":
+        kind = f"an array of {array.dtype}" if array.ndim else f"a {type(value).__name__}"
+        raise InputError(f"{name}: {kind} is not allowed; give an array of real numbers")
+    return array

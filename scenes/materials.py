@@ -3,7 +3,7 @@
 from math import radians, tan
 
 from render.geometry import look_at, rotate, scale, to_world, translate
-from render.optical_constants import optical_constant
+from render.published_spectra import optical_constant
 from render.scene import Node, spectrum_node
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError

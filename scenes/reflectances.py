@@ -29,7 +29,7 @@ def read_reflectances(path: str | Path) -> tuple[tuple[str, Spectrum], ...]:
     InputError
         For a file that is none such, or values outside 0 to 1.
     """
-    columns = read_columns(path, "chart", "wavelength_nm")
+    columns = read_columns(path, "chart")
     nm = columns.pop("wavelength_nm")
     for name, values in columns.items():
         if not ((values >= 0) & (values <= 1)).all():

@@ -1,4 +1,4 @@
-"""Binning: 2x2 pixels of one channel become one pixel of the raw image.
+"""Binning: 2x2 photodiodes of one channel become one pixel of the raw image.
 
 In charge the four photodiodes empty into the floating diffusion that they share, which clips at its own well; column
 amplifier, read noise and converter come once, and the converter spans the well of the sum. Dark offsets are those of
@@ -8,29 +8,45 @@ times the black and the white level, four read noises and four roundings.
 """
 
 from dataclasses import replace
-from math import hypot, inf, sqrt
+from math import hypot, inf, lcm, sqrt
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import InputError
-from sensor.cfa import binned_tile
-from sensor.config import CHARGE, SensorConfig
+from rodcone.errors import InputError, unknown
+from sensor.cfa import Tile, channel_map, check_covers, quad
+from sensor.chip import BINNINGS, CHARGE, DIGITAL, Binning, Chip
+from sensor.config import SensorConfig
+
+MOST_BITS_SUMMED = 14  # of a converter whose readings are summed by four: a raw image holds 16
 
 
-def as_read(sensor: SensorConfig) -> SensorConfig:
-    """Camera whose pixels are those of the raw image: for one that bins, of 2x2 pixels each; else the camera itself.
+def binned(sensor: SensorConfig, way: str) -> SensorConfig:
+    """Camera of which 2x2 photodiodes make a pixel: `sensor` is what they would be alone.
 
-    Its numbers are those of four pixels: mean and variance of an evenly lit pixel are exact below the well, but that
-    column gains in digital numbers miss half of their spread's square of the shot noise. Its read noise there holds
-    three of the four roundings, for the noise of a raw image counts one. Its share s of hot pixels and their dark
+    Its numbers are those of four photodiodes: mean and variance of an evenly lit pixel are exact below the well, but
+    that column gains in digital numbers miss half of their spread's square of the shot noise. Its read noise there
+    holds three of the four roundings, for the noise of a raw image counts one. Its share s of hot pixels and their dark
     current give the sum's mean and variance (a sum that holds a hot pixel is 1.5 s less hot than that). Its crosstalk
     is what leaves the four.
+
+    Raises
+    ------
+    InputError
+        For another way than "charge" and "digital", a mosaic whose 2x2 pixels aren't of one channel, several readings,
+        or a sum of more bits than a raw image holds.
     """
-    if not sensor.binning:
-        return sensor
+    if way not in BINNINGS:
+        raise unknown("binning", way, BINNINGS)
     pixel, share = sensor.pixel, sensor.pixel.hot_pixel_share
+    tile = binned_tile(sensor.cfa)
+    if way == DIGITAL and sensor.bits > MOST_BITS_SUMMED:
+        raise InputError(
+            f"bits: {sensor.bits} with binning {DIGITAL!r}: four readings sum to two bits more than a raw file's "
+            f"16; allowed: up to {MOST_BITS_SUMMED}; give fewer bits, or binning {CHARGE!r}"
+        )
+    chip = replace(sensor.chip, binning=Binning(way, pixel, sensor.bits, sensor.black_level_dn, sensor.white_level_dn))
     four = replace(
         pixel,
         pitch_um=2 * pixel.pitch_um,
@@ -43,10 +59,9 @@ def as_read(sensor: SensorConfig) -> SensorConfig:
         crosstalk=pixel.crosstalk / 2,
         binned_well_e=0.0,
     )
-    tile = binned_tile(sensor.cfa)
-    if sensor.binning == CHARGE:
+    if way == CHARGE:
         four = replace(four, full_well_e=min(4 * pixel.full_well_e, pixel.binned_well_e or inf))
-        return replace(sensor, pixel=four, cfa=tile, binning="")
+        return replace(sensor, pixel=four, cfa=tile, chip=chip)
     four = replace(
         four,
         read_noise_e=hypot(2 * pixel.read_noise_e, sensor.gain_e_per_dn / 2),  # 3 of 4 roundings: 3/12 of a DN^2
@@ -57,23 +72,57 @@ def as_read(sensor: SensorConfig) -> SensorConfig:
         sensor,
         pixel=four,
         cfa=tile,
-        binning="",
         bits=sensor.bits + 2,
         black_level_dn=4 * sensor.black_dn,
         white_level_dn=4 * sensor.white_dn,
+        chip=chip,
     )
 
 
-def of_read_pixels(values: NDArray[Any], sensor: SensorConfig) -> NDArray[Any]:
-    """What the raw image's pixels hold together, shape (..., h, w): sums over 2x2 where the sensor bins.
+def photosites(sensor: SensorConfig) -> SensorConfig:
+    """Camera of the photodiodes by themselves, `binned` undone; one that doesn't bin as it is."""
+    one = sensor.chip.binning
+    if one is None:
+        return sensor
+    return replace(
+        sensor,
+        pixel=one.photodiode,
+        cfa=quad(sensor.cfa),
+        bits=one.bits,
+        black_level_dn=one.black_level_dn,
+        white_level_dn=one.white_level_dn,
+        chip=Chip(),
+    )
+
+
+def binned_tile(tile: Tile) -> Tile:
+    """Tile of half the height and width whose pixels are 2x2 of `tile`: `quad` undone.
 
     Raises
     ------
     InputError
-        As `check_blocks`: a picture from a file may have any size.
+        Where 2x2 pixels, counted from the first, aren't of one channel.
     """
-    check_blocks(sensor, values.shape[-2:])
-    return block_sums(values) if sensor.binning else values
+    cells = channel_map(tile, (lcm(len(tile), 2), lcm(len(tile[0]), 2)))
+    first = cells[::2, ::2]
+    if np.any(cells != first.repeat(2, 0).repeat(2, 1)):
+        raise InputError(
+            f"binning: 2x2 pixels of the mosaic {tile} aren't of one channel; allowed: mosaics such as quad_bayer, "
+            "quad_rgbw and mono; give one, or leave binning out"
+        )
+    return tuple("".join(row) for row in first)
+
+
+def pixel_sums(values: NDArray[Any], sensor: SensorConfig) -> NDArray[Any]:
+    """What the raw image's pixels hold of values of photodiodes, shape (..., h, w).
+
+    Raises
+    ------
+    InputError
+        For an odd height or width of a camera that bins: a picture from a file may have any size.
+    """
+    _check_even(sensor, values.shape[-2:])
+    return values if sensor.chip.binning is None else block_sums(values)
 
 
 def block_sums(values: NDArray[Any]) -> NDArray[Any]:
@@ -82,11 +131,30 @@ def block_sums(values: NDArray[Any]) -> NDArray[Any]:
     return np.asarray(rows[..., ::2] + rows[..., 1::2])
 
 
-def check_blocks(sensor: SensorConfig, shape: tuple[int, ...]) -> None:
-    """Raise `InputError` for a sensor that bins whose height or width is odd."""
-    if sensor.binning and any(side % 2 for side in shape):
+def check_frame(sensor: SensorConfig, shape: tuple[int, ...]) -> None:
+    """Raise `InputError` for a frame of photodiodes that holds no tile of the mosaic, or no whole pixels."""
+    check_covers(sensor.cfa, shape)
+    _check_even(sensor, shape)
+
+
+def _check_even(sensor: SensorConfig, shape: tuple[int, ...]) -> None:
+    if sensor.chip.binning and any(side % 2 for side in shape):
         even = " x ".join(str(side + side % 2) for side in shape)
         raise InputError(
-            f"size: {' x '.join(map(str, shape))} pixels with binning {sensor.binning!r}; allowed: even height and "
-            f"width; give {even}"
+            f"size: {' x '.join(map(str, shape))} pixels with binning {sensor.chip.binning.way!r}; allowed: even "
+            f"height and width; give {even}"
         )
+
+
+def check_chip(sensor: SensorConfig) -> None:
+    """Raise `InputError` for a camera whose pixel or converter was changed without its photodiodes."""
+    one = sensor.chip.binning
+    if one and _converted(binned(photosites(sensor), one.way)) != _converted(sensor):
+        raise InputError(
+            "pixel: it isn't four of the chip's photodiodes; allowed: as `sensor.binning.binned` makes it; change the "
+            "photodiodes instead"
+        )
+
+
+def _converted(sensor: SensorConfig) -> tuple[object, ...]:
+    return sensor.pixel, sensor.bits, sensor.black_dn, sensor.white_dn

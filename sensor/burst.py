@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from render.radiance import SpectralRadiance
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_range
-from sensor.binning import as_read
 from sensor.capture import capture
-from sensor.config import PixelConfig, SensorConfig, pixel_of_readings
+from sensor.chip import Chip, PixelConfig, Reading, pixel_of_readings
+from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.raw import RawImage
 from sensor.readings.noise import CLEAR_SIGMAS
-from sensor.readings.reading import Reading
 
 BURST_WHITE_DN = 65_535.0  # of a merged burst, whose samples are no whole numbers
 _Read = TypeVar("_Read", PixelConfig, Reading)
@@ -180,12 +179,11 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
 def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
     """Sensor whose one exposure of `count` times the time holds the noise that a merged burst of `count` does.
 
-    Of a sensor that bins, the one `sensor.binning.as_read`.
+    Its pixels are undivided: four photodiodes of a burst are no binning of four bursts.
     """
-    sensor = as_read(sensor)
-    readings = tuple(_of_burst(reading, count) for reading in sensor.readings)
+    readings = tuple(_of_burst(reading, count) for reading in sensor.chip.readings)
     pixel = pixel_of_readings(sensor.pixel, readings) if readings else _of_burst(sensor.pixel, count)
-    return replace(sensor, pixel=pixel, readings=readings)
+    return replace(sensor, pixel=pixel, chip=Chip(readings=readings, readout=sensor.chip.readout))
 
 
 def _of_burst(one: _Read, count: int) -> _Read:

@@ -4,14 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
-from rodcone.errors import InputError, require_kind
+from rodcone.errors import InputError
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
 from sensor.exposure import auto_exposure_s
 from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
-from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.readout import read_out
 from sensor.response import electrons_per_irradiance, expected_electrons
@@ -19,7 +18,7 @@ from sensor.response import electrons_per_irradiance, expected_electrons
 
 def capture(
     radiance: SpectralRadiance,
-    sensor: SensorConfig | str = "low_noise",
+    sensor: SensorConfig,
     exposure_s: float | None = None,
     device: Device | None = None,
     rng: np.random.Generator | None = None,
@@ -40,8 +39,7 @@ def capture(
     ----------
     radiance : SpectralRadiance
         Quickest as float32 with band-planar memory, as renders are.
-    sensor : SensorConfig or str, optional
-        A sensor, or a preset by name or path.
+    sensor : SensorConfig
     exposure_s : float, optional
         0 or more [s]; left out, by `sensor.exposure.auto_exposure_s`.
     device : Device, optional
@@ -64,15 +62,10 @@ def capture(
     UserWarning
         Where the bands don't fill the camera's window: what each channel loses.
     """
-    if isinstance(sensor, str):
-        sensor = preset(sensor)
-    fix = "call its relight()" if hasattr(radiance, "relight") else "give SpectralRadiance(values, wavelength_nm)"
-    require_kind("radiance", radiance, SpectralRadiance, fix)
     if device is None:
         shape = radiance.shape[0] // samples_per_pixel, radiance.shape[1] // samples_per_pixel
         device = draw_device(sensor, shape, np.random.default_rng([0, 0]))
     rng = np.random.default_rng([0, 1]) if rng is None else rng
-    require_kind("device", device, Device, "give draw_device(sensor, radiance.shape, rng)")
     numpy_runs, scaled = exact or backend() == "numpy", samples_per_pixel == 1 and not spreads(sensor.lens)
     light: SpectralRadiance | SpectralIrradiance = radiance
     if numpy_runs or not scaled:

@@ -1,7 +1,6 @@
 """Colour filter arrays: a tile of channels, one letter each, that repeats over the sensor."""
 
 from collections.abc import Mapping, Sequence
-from math import lcm
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -81,25 +80,6 @@ def check_tile(tile: Sequence[str]) -> Tile:
     if len({len(row) for row in rows}) != 1:
         raise InputError(f"cfa: rows of {rows!r} differ in length; allowed: a rectangle; pad or cut the rows")
     return rows
-
-
-def binned_tile(tile: Tile) -> Tile:
-    """Tile of half the height and width whose pixels are 2x2 of `tile`: `quad` undone.
-
-    Raises
-    ------
-    InputError
-        Where 2x2 pixels, counted from the first, aren't of one channel.
-    """
-    size = (lcm(len(tile), 2), lcm(len(tile[0]), 2))
-    cells = channel_map(tile, size)
-    first = cells[::2, ::2]
-    if np.any(cells != first.repeat(2, 0).repeat(2, 1)):
-        raise InputError(
-            f"binning: 2x2 pixels of the mosaic {tile} aren't of one channel; allowed: mosaics such as quad_bayer, "
-            "quad_rgbw and mono; give one, or leave binning out"
-        )
-    return tuple("".join(row) for row in first)
 
 
 def channels(tile: Tile) -> tuple[str, ...]:

@@ -1,23 +1,22 @@
 """A camera from a TOML file: what a preset is, and what users copy and change."""
 
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from render.spectrum import Spectrum
-from rodcone.errors import InputError, one_line, require_keys
-from rodcone.toml_file import read_toml
+from rodcone.errors import InputError, one_line
+from rodcone.toml_file import read_toml, strict_converter, structured
+from sensor.binning import binned
 from sensor.cfa import Tile, channels, tile_of
-from sensor.config import LensConfig, PixelConfig, SensorConfig, pixel_of_readings
+from sensor.chip import MERGED, Chip, PixelConfig, Reading, pixel_of_readings
+from sensor.config import LensConfig, SensorConfig
 from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_csv, read_curve, rgbw
-from sensor.readings.reading import Reading
 
-_SETTINGS = ("bits", "black_level_dn", "white_level_dn", "window_nm", "binning", "readout")
-_KEYS = ("cfa", *_SETTINGS, "pixel", "lens", "responses", "readings")
+_SETTINGS = ("bits", "black_level_dn", "white_level_dn", "window_nm")
 _OF_READINGS = ("read_noise_e", "dsnu_e", "full_well_e")  # keys of each of several readings, in place of the pixel's
-_RESPONSE_KEYS = ("csv", "range_nm", "quantum_efficiency", "ir_cut")
 
 
 def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> SensorConfig:
@@ -67,94 +66,81 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     return sensor
 
 
-def _sensor(content: Mapping[str, Any], folder: Path, cfa: Tile | None) -> SensorConfig:
-    require_keys("key", content, _KEYS)
-    tile = tile_of(content.get("cfa", "rgbw")) if cfa is None else cfa
-    if "responses" in content:
-        responses = _responses(_table("responses", content), folder)
+@dataclass(frozen=True)
+class _ResponsesTable:
+    """Keys of ``[responses]``; what the file doesn't say about them is refused, not guessed."""
+
+    csv: str
+    range_nm: tuple[float, float]
+    quantum_efficiency: str | float
+    ir_cut: str | float | None = None
+
+
+@dataclass(frozen=True)
+class _SensorTable:
+    """Keys of a sensor file; `SensorConfig` and `tile_of` check the values of those that are Any."""
+
+    pixel: PixelConfig
+    lens: LensConfig
+    cfa: Any = "rgbw"
+    bits: Any = None
+    black_level_dn: Any = None
+    white_level_dn: Any = None
+    window_nm: Any = None
+    binning: str = ""
+    readout: str = MERGED
+    readings: tuple[Reading, ...] = ()
+    responses: _ResponsesTable | None = None
+
+
+_CONVERTER = strict_converter()
+_FIX = (
+    'see rodcone new preset; [responses] has csv, range_nm = [shortest, longest] and quantum_efficiency = "included", '
+    '"relative", a number or a CSV'
+)
+
+
+def _sensor(content: dict[str, Any], folder: Path, cfa: Tile | None) -> SensorConfig:
+    table = structured(_with_a_whole_pixel(content), _SensorTable, _CONVERTER, _FIX)
+    tile = tile_of(table.cfa) if cfa is None else cfa
+    if table.responses is not None:
+        responses = _responses(table.responses, folder)
     else:
         responses = rgbw() if set(channels(tile)) <= set("RGBW") else built_in()
-    settings = {name: content[name] for name in _SETTINGS if name in content}
-    readings = _readings(content["readings"]) if "readings" in content else ()
-    return SensorConfig(
-        _pixel(content, readings),
-        LensConfig(**_numbers("lens", content, LensConfig)),
+    sensor = SensorConfig(
+        pixel_of_readings(table.pixel, table.readings) if table.readings else table.pixel,
+        table.lens,
         cfa=tile,
         responses=responses,
-        readings=readings,
-        **settings,
+        chip=Chip(readings=table.readings, readout=table.readout),
+        **{name: value for name in _SETTINGS if (value := getattr(table, name)) is not None},
     )
+    return binned(sensor, table.binning) if table.binning else sensor
 
 
-def _pixel(content: Mapping[str, Any], readings: Sequence[Reading]) -> PixelConfig:
-    """The table's pixel; what each of several readings has is theirs alone."""
-    if not readings:
-        return PixelConfig(**_numbers("pixel", content, PixelConfig))
-    table = _table("pixel", content)
-    if twice := [name for name in _OF_READINGS if name in table]:
+def _with_a_whole_pixel(content: dict[str, Any]) -> dict[str, Any]:
+    """Content whose pixel has what each of several readings has for itself: the first one's."""
+    pixel, readings = content.get("pixel"), content.get("readings")
+    if "readings" not in content or not isinstance(pixel, dict):
+        return content
+    if not isinstance(readings, list) or not readings or not isinstance(readings[0], dict):
+        raise InputError(f"readings: {readings!r} is no list of tables; allowed: [[readings]], two or more; write so")
+    if twice := [name for name in _OF_READINGS if name in pixel]:
         raise InputError(f"pixel: {twice[0]} beside [[readings]]; allowed: in each of them; take it out of [pixel]")
-    filled = {**content, "pixel": table | {name: getattr(readings[0], name) for name in _OF_READINGS}}
-    return pixel_of_readings(PixelConfig(**_numbers("pixel", filled, PixelConfig)), readings)
+    return content | {"pixel": pixel | {name: readings[0].get(name, 1.0) for name in _OF_READINGS}}
 
 
-def _readings(tables: Any) -> tuple[Reading, ...]:
-    if not isinstance(tables, list) or not tables:
-        raise InputError(f"readings: {tables!r} is no list of tables; allowed: [[readings]], two or more; write so")
-    return tuple(Reading(**_numbers("readings", {"readings": each}, Reading)) for each in tables)
-
-
-def _table(name: str, content: Mapping[str, Any]) -> dict[str, Any]:
-    table = content.get(name)
-    if not isinstance(table, dict):
-        raise InputError(f"{name}: {table!r} is not a table; allowed: {_header(name)} and its keys; add it")
-    return table
-
-
-def _header(name: str) -> str:
-    return "[[readings]]" if name == "readings" else f"[{name}]"
-
-
-def _numbers(name: str, content: Mapping[str, Any], kind: type) -> dict[str, Any]:
-    """Keys of a table, checked against the fields of the dataclass that they go into."""
-    table = _table(name, content)
-    require_keys(f"{name} key", table, [field.name for field in fields(kind)])
-    for field in fields(kind):
-        if field.default is MISSING and field.name not in table:
-            raise InputError(f"{name}: {field.name} is missing; allowed: a number; add it to {_header(name)}")
-    for key, value in table.items():
-        if isinstance(value, bool):  # a Real for Python
-            raise InputError(f"{key}: {value!r} is not a number; allowed: a number, 0 to switch a term off; write one")
-    return table
-
-
-def _responses(table: Mapping[str, Any], folder: Path) -> Responses:
-    """Responses of a CSV; what the file doesn't say about them is refused, not guessed."""
-    require_keys("responses key", table, _RESPONSE_KEYS)
-    for key in ("csv", "range_nm", "quantum_efficiency"):
-        if key not in table:
-            raise InputError(
-                f"responses: {key} is missing; allowed: csv, range_nm = [shortest, longest], "
-                'quantum_efficiency = "included", "relative", a number or a CSV; add it to [responses]'
-            )
-    if not isinstance(table["csv"], str):
-        raise InputError(f"csv: {table['csv']!r} is not a file's name; allowed: a name in quotes; write so")
-    pair = table["range_nm"]
-    if not (isinstance(pair, list) and len(pair) == 2 and all(isinstance(nm, int | float) for nm in pair)):
-        raise InputError(f"range_nm: {pair!r} is not a pair of numbers; allowed: [shortest, longest] in nm; write so")
-    said = table["quantum_efficiency"]
+def _responses(table: _ResponsesTable, folder: Path) -> Responses:
+    said = table.quantum_efficiency
     efficiency = None if said in ("included", "relative") else said
     found = read_csv(
-        folder / table["csv"],
-        range_nm=(float(pair[0]), float(pair[1])),
-        ir_cut=_number_or_curve("ir_cut", table.get("ir_cut"), folder),
-        quantum_efficiency=_number_or_curve("quantum_efficiency", efficiency, folder),
+        folder / table.csv,
+        range_nm=table.range_nm,
+        ir_cut=_number_or_curve(table.ir_cut, folder),
+        quantum_efficiency=_number_or_curve(efficiency, folder),
     )
     return Responses(found.curves, relative=said == "relative")
 
 
-def _number_or_curve(name: str, value: Any, folder: Path) -> float | Spectrum | None:
-    if isinstance(value, str):
-        return read_curve(folder / value)
-    if isinstance(value, bool) or not isinstance(value, int | float | None):
-        raise InputError(f"{name}: {value!r} is not allowed; give a number, or the name of a CSV in quotes")
-    return None if value is None else float(value)
+def _number_or_curve(value: str | float | None, folder: Path) -> float | Spectrum | None:
+    return read_curve(folder / value) if isinstance(value, str) else value

@@ -245,7 +245,7 @@ def read_curve(path: str | Path) -> Spectrum:
 
 def _table(path: str | Path) -> dict[str, Spectrum]:
     """Columns of a CSV by their names."""
-    columns = read_columns(path, "responses", "wavelength_nm")
+    columns = read_columns(path, "responses")
     nm = columns.pop("wavelength_nm")
     return {name: Spectrum(nm, column) for name, column in columns.items()}
 

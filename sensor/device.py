@@ -4,14 +4,12 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from rodcone.brief import brief
-from sensor.binning import block_sums, check_blocks
-from sensor.cfa import check_covers
-from sensor.config import CHARGE, SensorConfig
-from sensor.presets import preset
+from sensor.binning import block_sums, check_chip, check_frame, photosites
+from sensor.config import SensorConfig
 from sensor.random import NoiseTerm, draw_key, normals
 
 _MOST_KEPT = 1 << 18  # pixels of a chip whose draws are kept: 2 MB each
@@ -51,20 +49,19 @@ class Device:
         return self.photo_response.shape[0], self.photo_response.shape[1]
 
 
-def draw_device(sensor: SensorConfig | str, shape: tuple[int, int], rng: np.random.Generator) -> Device:
-    """Make a chip of `shape` pixels; one key from `rng` decides all of it. A sensor may be a preset's name.
+def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Generator) -> Device:
+    """Make a chip of `shape` pixels; one key from `rng` decides all of it.
 
     Raises
     ------
     InputError
         Where the shape doesn't hold a tile of the mosaic, is odd for a sensor that bins, or `rng` isn't a Generator.
     """
-    sensor = preset(sensor) if isinstance(sensor, str) else sensor
-    check_covers(sensor.cfa, tuple(shape))
-    check_blocks(sensor, tuple(shape))
-    in_charge = sensor.binning == CHARGE
+    check_frame(sensor, tuple(shape))
+    check_chip(sensor)
+    in_charge = sensor.chip.in_charge
     key, one_row = draw_key(rng), (1, shape[1] // 2 if in_charge else shape[1])
-    pixel = sensor.pixel
+    pixel, readings = photosites(sensor).pixel, sensor.chip.readings
     draws = _normals_kept if shape[0] * shape[1] <= _MOST_KEPT else normals
 
     def drawn(dsnu_e: float, photodiode: int, reading: int) -> Device:
@@ -78,13 +75,11 @@ def draw_device(sensor: SensorConfig | str, shape: tuple[int, int], rng: np.rand
             spread = pixel.column_gain_spread * normals(key, NoiseTerm.COLUMN_GAIN, one_row)[0]
             column_gain = np.maximum(1.0 + spread, 0.0)
         if pixel.hot_pixel_share:
-            hot = normals(key, NoiseTerm.HOT, shape, photodiode) < ndtri(pixel.hot_pixel_share)
+            hot = normals(key, NoiseTerm.HOT, shape, photodiode) < scipy.special.ndtri(pixel.hot_pixel_share)
         return Device(photo_response=response, dark_offset_e=offset_e, column_gain=column_gain, hot=hot)
 
-    photodiodes = list(dict.fromkeys(x.photodiode for x in sensor.readings))
-    of_readings = tuple(
-        drawn(x.dsnu_e, photodiodes.index(x.photodiode), number) for number, x in enumerate(sensor.readings)
-    )
+    photodiodes = list(dict.fromkeys(x.photodiode for x in readings))
+    of_readings = tuple(drawn(x.dsnu_e, photodiodes.index(x.photodiode), number) for number, x in enumerate(readings))
     return replace(of_readings[0], readings=of_readings) if of_readings else drawn(pixel.dsnu_e, 0, 0)
 
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from math import inf
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import j1
 
 from render.spectrum import Floats
 from sensor.config import LensConfig
@@ -33,7 +33,7 @@ def defocus_otf(frequency_per_um: Floats, diameter_um: float) -> Floats:
     good where the disc is wider than the Airy disc, from two wavelengths of path or more at the aperture's rim.
     """
     x = np.pi * diameter_um * frequency_per_um
-    return np.asarray(np.divide(2 * j1(x), x, out=np.ones_like(x), where=x > 1e-9))
+    return np.asarray(np.divide(2 * scipy.special.j1(x), x, out=np.ones_like(x), where=x > 1e-9))
 
 
 def sampled_otf(

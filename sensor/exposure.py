@@ -1,20 +1,24 @@
 """Exposure times: auto exposure from the expected signal, and brackets around a given time."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import InputError, require_kind, require_range, unknown
-from sensor.binning import as_read, of_read_pixels
+from rodcone.errors import InputError, require_range, unknown
+from sensor.binning import pixel_sums
 from sensor.cfa import channels, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
+from sensor.raw import RawImage
 from sensor.readings.noise import METERED_PERCENTILE, METERED_SHARE
 from sensor.readout import noise_variance
 from sensor.response import behind_filters, channel_electrons
 
+MOST_FULL = 0.5  # share of the pixels above which an exposure is hardly meant
+DARK_SIGMAS, LEAST_LIT = 4.0, 1e-3  # noise alone takes 3e-5 of the dark pixels so far above their mean
 LONGEST_S = 0.066  # Parmar & Wandell 2009, Figure 5: 66 ms
 AUTO, AUTO_W, AUTO_INFORMATION = "auto", "auto:W", "auto:information"
 # What a camera exposes for, by the rule's name; in a mosaic without G `sensor.cfa.unit_channel` is in its place.
@@ -59,7 +63,6 @@ def auto_exposure_s(
     InputError
         For a number out of range, or a channel that the mosaic doesn't have.
     """
-    require_kind("irradiance", irradiance, SpectralIrradiance, "give sensor.optics.form_image(radiance, sensor)")
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     require_range("percentile", percentile, 0.0, 100.0, "give per cent of the pixels")
     require_range("well_share", well_share, 1e-6, 1.0, "give a fraction of the well")
@@ -77,8 +80,8 @@ def _share_of_well_s(
     percentile: float = METERED_PERCENTILE,
     well_share: float = METERED_SHARE,
 ) -> float:
-    bright = float(np.percentile(of_read_pixels(per_second_e, sensor), percentile))
-    return min(longest_s, well_share * as_read(sensor).metered_well_e / bright) if bright > 0 else longest_s
+    bright = float(np.percentile(pixel_sums(per_second_e, sensor), percentile))
+    return min(longest_s, well_share * sensor.metered_well_e / bright) if bright > 0 else longest_s
 
 
 def exposure_by_rule_s(
@@ -118,7 +121,7 @@ def exposure_of_electrons_s(
 
 
 def most_informative_s(per_second_e: NDArray[np.float64], sensor: SensorConfig, times_s: Sequence[float]) -> float:
-    """Time of several whose samples hold the most information on the light; of equal ones the first.
+    """Time of several whose samples hold the most information on the light; of equally good ones the first.
 
     Parameters
     ----------
@@ -128,7 +131,10 @@ def most_informative_s(per_second_e: NDArray[np.float64], sensor: SensorConfig, 
     times_s : sequence of float
         Each above 0.
     """
-    per_second_e, sensor = of_read_pixels(per_second_e, sensor), as_read(sensor)
+    times_s = list(dict.fromkeys(times_s))
+    if len(times_s) == 1:
+        return times_s[0]
+    per_second_e = pixel_sums(per_second_e, sensor)
     return max(times_s, key=lambda time_s: information_bits(per_second_e * time_s, sensor, time_s))
 
 
@@ -163,3 +169,24 @@ def bracket_s(middle_s: float, stops: Sequence[float] = (-2.0, 0.0, 2.0)) -> tup
     for stop in stops:
         require_range("stops", stop, -20.0, 20.0, "give powers of two of the time")
     return tuple(middle_s * 2.0**stop for stop in stops)
+
+
+def warn_if_full(raw: RawImage) -> None:
+    """Warn of a frame most of whose pixels are saturated, as one of 10 s is that was meant as 10 ms."""
+    if (full := float(raw.saturated.mean())) > MOST_FULL:
+        warnings.warn(
+            f"exposure_s: {full:.0%} of the pixels are saturated at {raw.exposure_s:g} s; give less, such as 0.01 or "
+            "'10ms' for ten milliseconds, or leave it out",
+            stacklevel=4,
+        )
+
+
+def warn_if_dark(raw: RawImage) -> None:
+    """Warn of a frame that shows nothing but its dark noise; one of no time at all is meant so."""
+    lit = float(np.mean(raw.electrons > DARK_SIGMAS * raw.dark_noise_e))
+    if raw.exposure_s > 0 and lit < LEAST_LIT:
+        warnings.warn(
+            f"exposure_s: {1 - lit:.1%} of the pixels read no more than dark noise ({raw.dark_noise_e:.2g} e-) at "
+            f"{raw.exposure_s:g} s; give a longer time, or more light",
+            stacklevel=4,
+        )

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from math import pi, radians, tan
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import dctn, idctn
 
 from render.photometry import luminance, photons_per_joule
 from render.radiance import SpectralRadiance, check_values
@@ -135,7 +135,7 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     return SpectralIrradiance(
         values=values,
         wavelength_nm=radiance.wavelength_nm,
-        pitch_um=sensor.pixel.pitch_um,
+        pitch_um=sensor.site_pitch_um,
         width_nm=radiance.widths_nm,
         signed=radiance.signed,
     )
@@ -148,14 +148,14 @@ def spread_light(radiance: SpectralRadiance, sensor: SensorConfig, samples: int)
     height, width = (size // samples for size in radiance.shape)
     planes = np.empty((radiance.wavelength_nm.size, height, width), dtype=radiance.values.dtype)
     blurs = bool(lens.diffraction or lens.defocus_um)
-    otf = sampled_otf(radiance.shape, sensor.pixel.pitch_um / samples, lens, folded=samples > 1) if blurs else None
+    otf = sampled_otf(radiance.shape, sensor.site_pitch_um / samples, lens, folded=samples > 1) if blurs else None
 
     def one_band(band: int) -> None:
         light = radiance.values[..., band] * per_radiance
         if otf is not None:
-            spectrum = dctn(light, type=2)
+            spectrum = scipy.fft.dctn(light, type=2)
             spectrum *= otf(float(radiance.wavelength_nm[band]))
-            light = idctn(spectrum, type=2, overwrite_x=True)
+            light = scipy.fft.idctn(spectrum, type=2, overwrite_x=True)
             if light.min() < 0 and not radiance.signed:  # undershoot becomes 0, the sum of the light stays
                 total, kept = light.sum(), np.maximum(light, 0.0)
                 light = kept * (total / kept.sum() if total > 0 else 0.0)
@@ -173,7 +173,7 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
 
     MTFs are those of lens and pixel aperture together, at 550 nm, for the camera's own pixel and f-number.
     """
-    lens, nyquist = sensor.lens, np.array(0.5 / sensor.pixel.pitch_um)
+    lens, nyquist = sensor.lens, np.array(0.5 / sensor.site_pitch_um)
     lines = []
     if not lens.diffraction:
         ideal = LensConfig(lens.f_number, magnification=lens.magnification, diffraction=1.0)
@@ -185,7 +185,7 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
         )
     if samples_per_pixel > 1 and lens.diffraction:
         # What the nearest copy adds at the pixels' Nyquist frequency (`sensor.diffraction.sampled_otf`).
-        copy_per_um = np.array((samples_per_pixel - 0.5) / sensor.pixel.pitch_um)
+        copy_per_um = np.array((samples_per_pixel - 0.5) / sensor.site_pitch_um)
         excess = float(diffraction_otf(copy_per_um, WAVELENGTH_NM, lens))
         if excess > 0:
             lines.append(
@@ -200,7 +200,7 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
     if not lens.veiling_glare:
         lines.append("veiling glare: each per cent would add 1 % of the picture's mean irradiance to every pixel")
     if not lens.defocus_um:
-        disc = float(defocus_otf(nyquist, sensor.pixel.pitch_um))
+        disc = float(defocus_otf(nyquist, sensor.site_pitch_um))
         lines.append(f"defocus: a disc as wide as a pixel: {_at_nyquist(disc)}")
     elif lens.diffraction and lens.defocus_um < AIRY_DIAMETER / limit_per_um(WAVELENGTH_NM, lens):
         lines.append("defocus: its disc is within the Airy disc, where the product of both transfers is a rough guess")
@@ -211,8 +211,8 @@ def negative_lobe_share(sensor: SensorConfig) -> float:
     """Share of a point's light in the negative lobes of its image, at one sample a pixel and within 32 pixels."""
     point = np.zeros((64, 64))
     point[32, 32] = 1.0
-    otf = sampled_otf((64, 64), sensor.pixel.pitch_um, sensor.lens, folded=False)
-    image = idctn(dctn(point) * otf(WAVELENGTH_NM))
+    otf = sampled_otf((64, 64), sensor.site_pitch_um, sensor.lens, folded=False)
+    image = scipy.fft.idctn(scipy.fft.dctn(point) * otf(WAVELENGTH_NM))
     return float(-image[image < 0].sum())
 
 

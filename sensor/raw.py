@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rodcone.brief import brief
-from rodcone.errors import InputError, require_range
+from rodcone.errors import InputError, require_fields, require_range
 from rodcone.notebook import html_of, preview_png
 from rodcone.plots import Axes, draw_line
 from sensor.calibration import ColourCalibration
@@ -121,6 +121,7 @@ class RawImage:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
         object.__setattr__(self, "dn", _checked_dn(self.dn))
         check_covers(self.cfa, self.dn.shape)
+        require_fields(self)
         if self.defects is not None:
             object.__setattr__(self, "defects", _checked_defects(self.defects, self.shape))
         limits = {

@@ -7,14 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError, require_range
-from sensor.binning import as_read, block_sums
-from sensor.config import CHARGE, DIGITAL, SensorConfig
+from sensor.binning import block_sums, photosites, pixel_sums
+from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
 from sensor.readings.merge import merge_readings
 from sensor.readings.noise import merged_variance, merged_variances, of_reading, switched_to
-from sensor.readings.reading import MERGED, SWITCHED
 
 # Digital numbers of one exposure from expected electrons, camera, chip, exposure time [s], key, and the reading's
 # number among those of one charge.
@@ -40,7 +39,7 @@ def draw_frame(
     one Poisson draw; the well clips; pixels that bin in charge are summed; the rest is `convert`. Of one key, each
     `reading` draws read noise of its own, and the same shot noise.
     """
-    pixel, expected = sensor.pixel, np.asarray(expected_e, dtype=np.float64)
+    pixel, expected = photosites(sensor).pixel, np.asarray(expected_e, dtype=np.float64)
 
     # PRNU scales the mean: after the draw the variance would be wrong. It is the spread of the whole pixel's response,
     # as a flat field shows it, so crosstalk, which leaves a flat field alone, comes first and doesn't smooth it.
@@ -61,17 +60,18 @@ def convert(
     Pixels that bin in charge are summed, and their floating diffusion clips; the column's amplifier multiplies; fixed
     offsets and read noise are added; the converter rounds and clips; readings that bin in digital numbers are summed.
     """
-    own = sensor
-    if sensor.binning == CHARGE:
-        own = as_read(sensor)
-        collected_e = np.minimum(block_sums(collected_e), own.pixel.full_well_e)
+    converter = sensor
+    if sensor.chip.in_charge:
+        collected_e = np.minimum(block_sums(collected_e), sensor.pixel.full_well_e)
+    else:
+        converter = photosites(sensor)
     read_e = collected_e if device.column_gain is None else collected_e * device.column_gain
     read_e = read_e + device.dark_offset_e
-    if own.pixel.read_noise_e:
-        read_e += own.pixel.read_noise_e * normals(key, NoiseTerm.READ, read_e.shape, reading)
-    dn = np.rint(read_e / own.gain_e_per_dn + own.black_dn)
-    dn = np.clip(dn, 0, own.white_dn).astype(np.uint16)
-    return block_sums(dn) if sensor.binning == DIGITAL else dn
+    if converter.pixel.read_noise_e:
+        read_e += converter.pixel.read_noise_e * normals(key, NoiseTerm.READ, read_e.shape, reading)
+    dn = np.rint(read_e / converter.gain_e_per_dn + converter.black_dn)
+    dn = np.clip(dn, 0, converter.white_dn).astype(np.uint16)
+    return dn if sensor.chip.in_charge else pixel_sums(dn, sensor)
 
 
 def draw_mean_frame(
@@ -135,19 +135,21 @@ def read_out(
             f"expected_e: {expected[row, column]} at row {row}, column {column}; "
             "allowed: finite numbers >= 0; repair the radiance"
         )
-    if not sensor.readings:
+    if not sensor.chip.readings:
         dn = draw(expected, sensor, device, exposure_s, draw_key(rng), 0)
         return as_raw(dn, sensor, exposure_s, engine, device.hot)
-    if sensor.readout == SWITCHED:
+    if sensor.chip.switched:
         index = switched_to(sensor, expected)
-        own, chip = of_reading(sensor, index), device.readings[index]
-        return as_raw(draw(expected, own, chip, exposure_s, draw_key(rng), 0), own, exposure_s, engine, chip.hot)
-    keys = {charge: draw_key(rng) for charge in dict.fromkeys(x.charge for x in sensor.readings)}
+        alone, patterns = of_reading(sensor, index), device.readings[index]
+        dn = draw(expected, alone, patterns, exposure_s, draw_key(rng), 0)
+        return as_raw(dn, alone, exposure_s, engine, patterns.hot)
+    readings = sensor.chip.readings
+    keys = {charge: draw_key(rng) for charge in dict.fromkeys(x.charge for x in readings)}
     raws = []
-    for number, (reading, chip) in enumerate(zip(sensor.readings, device.readings, strict=True)):
-        own, light_e = of_reading(sensor, number), expected * reading.share
-        dn = draw(light_e, own, chip, exposure_s, keys[reading.charge], number)
-        raws.append(as_raw(dn, own, exposure_s * reading.time_share, engine, chip.hot))
+    for number, (reading, patterns) in enumerate(zip(readings, device.readings, strict=True)):
+        alone = of_reading(sensor, number)
+        dn = draw(expected * reading.share, alone, patterns, exposure_s, keys[reading.charge], number)
+        raws.append(as_raw(dn, alone, exposure_s * reading.time_share, engine, patterns.hot))
     return merge_readings(raws, sensor, exposure_s)
 
 
@@ -185,19 +187,17 @@ def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposu
     Parameters
     ----------
     expected_e : (h, w) float64
-        Expected photo-electrons as `read_out` takes them: before crosstalk. Of a sensor that bins, those of a raw
-        image's pixel (`sensor.binning.of_read_pixels`).
+        Expected photo-electrons of the raw image's pixels, before crosstalk; of photodiodes that bin,
+        `sensor.binning.pixel_sums`.
     sensor : SensorConfig
     exposure_s : float
         For the dark current [s].
     """
-    sensor = as_read(sensor)
+    sensor = as_switched(sensor, np.asarray(expected_e))
     pixel = sensor.pixel
     signal = spread_charge(np.asarray(expected_e, dtype=np.float64), pixel.crosstalk)
-    if sensor.readings and sensor.readout == MERGED:
+    if sensor.chip.readings:
         return merged_variance(signal, sensor, exposure_s)
-    if sensor.readings:
-        return noise_variance(expected_e, of_reading(sensor, switched_to(sensor, np.asarray(expected_e))), exposure_s)
     hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
     collected = signal + pixel.dark_current_e_per_s * exposure_s + hot_share * hot_e
     variance = collected + (pixel.prnu * signal) ** 2 + hot_share * (1 - hot_share) * hot_e**2
@@ -212,12 +212,10 @@ def noise_sources(expected_e: float, sensor: SensorConfig, exposure_s: float) ->
 
     Their squares sum to `noise_variance`, which says what each of them is.
     """
-    sensor = as_read(sensor)
-    if sensor.readings and sensor.readout == MERGED:
-        found = merged_variances(np.array([expected_e]), sensor, exposure_s)
-        return {name: float(value[0]) ** 0.5 for name, value in found.items()}
-    if sensor.readings:
-        sensor = of_reading(sensor, switched_to(sensor, np.array([expected_e])))
+    sensor = as_switched(sensor, np.array([expected_e]))
+    if sensor.chip.readings:
+        merged_e2 = merged_variances(np.array([expected_e]), sensor, exposure_s)
+        return {name: float(value[0]) ** 0.5 for name, value in merged_e2.items()}
     pixel = sensor.pixel
     hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
     dark_e = pixel.dark_current_e_per_s * exposure_s
@@ -238,14 +236,18 @@ def noise_sources(expected_e: float, sensor: SensorConfig, exposure_s: float) ->
     return {name: value**0.5 for name, value in variance_e2.items()}
 
 
+def as_switched(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> SensorConfig:
+    """Camera with the gain that it takes for a frame; one that doesn't switch as it is."""
+    return of_reading(sensor, switched_to(sensor, expected_e)) if sensor.chip.switched else sensor
+
+
 def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float) -> float:
     """Photo-electrons of an even field at which signal over `noise_variance`'s root is `snr`; inf where it never is.
 
     The variance is a + b e + c e^2, so that e solves (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. Beyond an SNR of
     1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before.
     """
-    sensor = as_read(sensor)
-    if sensor.readings:
+    if sensor.chip.readings:
         return _electrons_at_snr_of_readings(snr, sensor, exposure_s)
     scale_e = sensor.pixel.full_well_e  # three points give the parabola; so far apart, no digits are lost
     a, half, full = (float(noise_variance(np.full((1, 1), x * scale_e), sensor, exposure_s)[0, 0]) for x in (0, 0.5, 1))
@@ -261,9 +263,11 @@ def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float) -> flo
 
 def _electrons_at_snr_of_readings(snr: float, sensor: SensorConfig, exposure_s: float) -> float:
     """The least light with this SNR; beyond a seam it may be less again for a while."""
-    if sensor.readout == SWITCHED:
-        each = [(electrons_at_snr(snr, of_reading(sensor, i), exposure_s), i) for i in range(len(sensor.readings))]
-        return min((e for e, i in each if np.isfinite(e) and switched_to(sensor, np.array([e])) == i), default=np.inf)
+    if sensor.chip.switched:
+        count = len(sensor.chip.readings)
+        light_e = [electrons_at_snr(snr, of_reading(sensor, number), exposure_s) for number in range(count)]
+        fits = (np.isfinite(e) and switched_to(sensor, np.array([e])) == number for number, e in enumerate(light_e))
+        return min((e for e, fit in zip(light_e, fits, strict=True) if fit), default=np.inf)
     levels = np.geomspace(1e-3, sensor.pixel.full_well_e, 8000)[:-1]
     ratio = levels / np.sqrt(merged_variance(levels, sensor, exposure_s))
     above = np.flatnonzero(ratio >= snr)
@@ -277,9 +281,7 @@ def as_raw(
     dn: NDArray[np.uint16], sensor: SensorConfig, exposure_s: float, engine: str, hot: NDArray[np.bool_] | None = None
 ) -> RawImage:
     """Raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels."""
-    if hot is not None and sensor.binning:
-        hot = block_sums(hot)
-    sensor = as_read(sensor)
+    hot = None if hot is None else pixel_sums(hot, sensor)
     pixel = sensor.pixel
     return RawImage(
         dn=dn,

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from render.photometry import photons_per_joule
 from render.spectrum import VISIBLE_NM, Floats
 from rodcone.errors import InputError, require_range
+from sensor.binning import photosites
 from sensor.cfa import channels, check_covers, mask
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
@@ -20,7 +21,7 @@ _STEP_NM = 1.0  # of the wavelength grid on which shares are summed
 def electrons_per_irradiance(
     sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats, exposure_s: float
 ) -> Floats:
-    """Electrons of each channel per unit irradiance in each band, shape (channel, band).
+    """Electrons of each channel's photodiode per unit irradiance in each band, shape (channel, band).
 
     Response x photons per joule x band width (its part inside the camera's window) x collecting area x time.
 
@@ -40,12 +41,12 @@ def electrons_per_irradiance(
     _check_covered(sensor, wavelength_nm, width_nm)
     seen_nm = _inside_nm(sensor.window_nm, wavelength_nm, width_nm)
     response = sensor.responses.band_average(channels(sensor.cfa), wavelength_nm, width_nm)
-    area_m2 = (sensor.pixel.pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
+    area_m2 = (sensor.site_pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
     return np.asarray(response * photons_per_joule(wavelength_nm) * seen_nm * area_m2 * exposure_s)
 
 
 def channel_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
-    """Expected photo-electrons that each pixel would collect behind every filter, shape (h, w, channel)."""
+    """Expected photo-electrons that each photodiode would collect behind every filter, shape (h, w, channel)."""
     weights = electrons_per_irradiance(sensor, irradiance.wavelength_nm, irradiance.widths_nm, exposure_s)
     planes = np.moveaxis(irradiance.values, -1, 0)
     flat = planes.reshape(planes.shape[0], -1)  # a view where the memory is band-planar
@@ -54,7 +55,7 @@ def channel_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, expo
 
 
 def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
-    """Expected photo-electrons behind each pixel's own filter, shape (h, w); dark current comes with `read_out`.
+    """Expected photo-electrons behind each photodiode's own filter, shape (h, w); dark current comes with `read_out`.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exp
 
 
 def behind_filters(electrons: NDArray[np.float64], sensor: SensorConfig) -> NDArray[np.float64]:
-    """Electrons behind each pixel's own filter, shape (h, w), of those of every channel, shape (h, w, channel).
+    """Electrons behind each photodiode's own filter, shape (h, w), of those of every channel, shape (h, w, channel).
 
     Raises
     ------
@@ -81,10 +82,11 @@ def behind_filters(electrons: NDArray[np.float64], sensor: SensorConfig) -> NDAr
         For a frame smaller than the mosaic's tile.
     """
     shape = (electrons.shape[0], electrons.shape[1])
-    check_covers(sensor.cfa, shape)
+    mosaic = photosites(sensor).cfa
+    check_covers(mosaic, shape)
     result = np.empty(shape)
-    for index, channel in enumerate(channels(sensor.cfa)):
-        np.copyto(result, electrons[..., index], where=mask(sensor.cfa, channel, shape))
+    for index, channel in enumerate(channels(mosaic)):
+        np.copyto(result, electrons[..., index], where=mask(mosaic, channel, shape))
     return result
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from rodcone.errors import InputError, unknown
-from sensor.cfa import MOSAICS, OWN, RGBW, Tile, channels, plain, quad
+from sensor.cfa import MOSAICS, OWN, RGBW, Tile, channels, plain
 from sensor.config import SensorConfig
 from sensor.curves import Responses, complementary, neutral_density, with_channels
 
@@ -20,8 +20,8 @@ VARIATIONS: Mapping[str, tuple[Tile, Callable[[Responses], Responses]]] = Mappin
 def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     """Give a camera another mosaic: the same pixel, well, lens and converter.
 
-    A camera that bins has four pixels for each of that mosaic's, which is the one that its raw image shows. So it can't
-    be a quad, of whose pixels no camera has four for one.
+    The mosaic is the one that the raw image shows: for a camera that bins it can't be a quad, of whose pixels no camera
+    has four for one.
 
     Parameters
     ----------
@@ -46,10 +46,11 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
         responses = change(sensor.responses)
     else:
         tile = MOSAICS[mosaic]
-        if sensor.binning and plain(tile) != tile:
+        if sensor.chip.binning and plain(tile) != tile:
             raise InputError(
-                f"cfa: {mosaic!r} for a sensor with binning {sensor.binning!r}, whose raw images hold no quad; "
-                f"allowed: what they hold, such as {mosaic.removeprefix('quad_')}; give that, or leave binning out"
+                f"cfa: {mosaic!r} for a sensor with binning {sensor.chip.binning.way!r}, whose raw images hold no "
+                f"quad; allowed: what they hold, such as {mosaic.removeprefix('quad_')}; give that, or leave binning "
+                "out"
             )
         responses = with_channels(sensor.responses, channels(tile))
-    return replace(sensor, cfa=quad(tile) if sensor.binning else tile, responses=responses)
+    return replace(sensor, cfa=tile, responses=responses)

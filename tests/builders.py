@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from render.error_estimates import Halves
 from render.level import Irradiance, SceneMeans
 from render.scene import LightGroup
 from render.transport import Transport
@@ -15,6 +16,14 @@ from sensor.raw import RawImage
 BAYER_PHASES: list[Tile] = [BAYER, ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
 RGBW_PHASES: list[Tile] = [RGBW, ("GR", "WB"), ("BW", "RG"), ("WB", "GR")]
 RGBW_4X4: Tile = ("RWGW", "WBWG", "GWBW", "WGWR")  # W on a checkerboard, each colour on diagonals
+
+
+def any_order(terms: int) -> float:
+    """Most that two sums of the same positive terms differ by, relative, whatever order a processor adds them in.
+
+    Each addition rounds once, by up to half an eps (Higham 2002, section 4.2). A quotient of two such sums counts both.
+    """
+    return terms * float(np.finfo(float).eps)
 
 
 def raw_image(dn: ArrayLike, cfa: Tile = RGBW, **changes: Any) -> RawImage:
@@ -56,21 +65,18 @@ def transport_of(
     )
     measured = None if irradiance is None else Irradiance(irradiance, np.zeros((irradiance.size,) * 2))
     facts = {"stopped_by": "samples", "seconds": 1.0, "integrator": "none", "variant": "none"}
-    errors = {name: np.zeros((given, bands, *size), np.float32) for name in ("half_difference", "variance")}
     return Transport(
         **{
-            "radiance": radiance,
-            "coverage": seen.sum(axis=0),
-            "seen": tuple(seen[:, None]),
-            "seen_difference": tuple(np.zeros_like(seen[:, None])),
-            "coverage_difference": np.zeros(size, np.float32),
+            "light": Halves(radiance, np.zeros_like(radiance)),
+            "variance": np.zeros((given, bands, *size), np.float32),
+            "coverage": Halves(seen.sum(axis=0), np.zeros(size, np.float32)),
+            "seen": tuple(Halves(planes, np.zeros_like(planes)) for planes in seen[:, None]),
             "scene_means": means,
             "counts": np.full(size, spp, np.uint32),
             "groups": dict(groups),
             "wavelength_nm": np.asarray(wavelength_nm, np.float64),
             "width_nm": np.asarray(width_nm, np.float64),
             "meter": None if measured is None else lambda: measured,
-            **errors,
             **facts,
             **changes,
         }

@@ -3,9 +3,10 @@
 import threading
 import time
 from base64 import b64decode
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from random import Random
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,25 @@ MOVE = """((pick, share) => {
   }
   return `${control.dataset.key} ${control.type === "checkbox" ? control.checked : control.value}`;
 })(%r, %r)"""
+# Drags a slider between two places of its range and back, an event each 16 ms, for some ms; gives for each picture
+# painted meanwhile when that was, and when its values were set [ms].
+DRAG = """((key, low, high, ms) => new Promise(done => {
+  const root = document.querySelector(".explore"), start = performance.now(), changed = {}, painted = [];
+  const paint = () => painted.push([performance.now() - start, changed[root.dataset.painted]]);
+  root.addEventListener("painted", paint);
+  (function move() {
+    const now = performance.now() - start, control = root.querySelector(`[data-key="${key}"]`);
+    if (now > ms) {
+      root.removeEventListener("painted", paint);
+      return done(painted.filter(each => each[1] !== undefined));
+    }
+    const share = low + (high - low) * (0.5 - 0.5 * Math.cos(now / 300)), box = control.type === "number";
+    control.value = Math.round(share * (box ? 1e6 : control.max));
+    control.dispatchEvent(new Event("input"));
+    changed[root.dataset.asked] = now;
+    setTimeout(move, 16 - (performance.now() - start) %% 16);
+  })();
+}))(%r, %r, %r, %r)"""
 PIXELS = """((canvas) => { const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
   let text = ""; for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));
   return [canvas.width, canvas.height, btoa(text)]; })(document.querySelectorAll(".explore canvas")[%d])"""
@@ -49,9 +69,9 @@ COPY = """new Promise(done => { const root = document.querySelector(".explore");
 
 
 @contextmanager
-def served(source: Source) -> Iterator[str]:
+def served(source: Source, scenes: Mapping[str, Callable[[], Source]] = MappingProxyType({})) -> Iterator[str]:
     """Address of an explorer that runs in this process."""
-    session = Session(source)
+    session = Session(source, scenes)
     with listen(0) as listener:
         server, address = make_server(session, listener)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})

@@ -32,6 +32,7 @@ LEVELS = (
 SENSORS = (ReportSensor("table1_output", preset("table1_output")), ReportSensor("low_noise", preset("low_noise")))
 CAMERAS = ("interleaved", "bayer")
 RENDER = ReportRender("", 256, 40, 41.2, "llvm_ad_spectral", "path + specfilm", "seconds", 0.031, 0.42)
+AXES = ("scenes", "spectra", "sensors", "exposures", "balances", "cameras", "seeds")
 Change = Callable[[Row], Row | None]
 
 
@@ -77,27 +78,37 @@ def sample_report(change: Change = lambda made: made, levels: int = len(LEVELS),
 
     `values` take the place of the report's own; of its axes (scenes, spectra, sensors, exposures, cameras, seeds) too.
     """
+    given = {name: values.pop(name) for name in AXES if name in values}
     axes = {
         "scenes": (ReportScene("still_life", 256, 256),),
         "spectra": ("own",),
         "sensors": SENSORS,
         "exposures": ("auto",),
+        "balances": ("as-shot",),
         "cameras": CAMERAS,
         "seeds": (0,),
-    } | {name: values.pop(name) for name in ("scenes", "spectra", "sensors", "exposures", "cameras", "seeds")
-         if name in values}  # fmt: skip
+    } | given
     names = [scene.name for scene in axes["scenes"]], [sensor.name for sensor in axes["sensors"]]
     views = view_names(names[0], axes["spectra"])
     titles = [
-        name + (f", {view}" if view else "") for view in views for name in group_names(names[1], axes["exposures"])
+        name + (f", {view}" if view else "")
+        for view in views
+        for name in group_names(names[1], axes["exposures"], axes["balances"])
     ]
-    groups = product(names[0], axes["spectra"], axes["sensors"], axes["exposures"])
+    groups = product(names[0], axes["spectra"], axes["sensors"], axes["exposures"], axes["balances"])
     cells = []
-    for title, (scene, spectrum, sensor, exposure) in zip(titles, groups, strict=True):
+    for title, (scene, spectrum, sensor, exposure, balance) in zip(titles, groups, strict=True):
         for level, camera in product(range(levels), axes["cameras"]):
             made = [
                 sample_row(
-                    level, SENSORS.index(sensor), camera, seed, scene=scene, spectrum=spectrum, exposure=exposure
+                    level,
+                    SENSORS.index(sensor),
+                    camera,
+                    seed,
+                    scene=scene,
+                    spectrum=spectrum,
+                    exposure=exposure,
+                    white_balance=balance,
                 )
                 for seed in axes["seeds"]
             ]
@@ -106,6 +117,7 @@ def sample_report(change: Change = lambda made: made, levels: int = len(LEVELS),
     report = ReportData(
         rodcone="0.1.0",
         name="sample",
+        title="What is seen?",
         levels=tuple(ReportLevel(name, source) for name, _, _, source in LEVELS[:levels]),
         cells=tuple(cells),
         truths=("truth",),

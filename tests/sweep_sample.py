@@ -16,6 +16,7 @@ from studies.budget.model_plan import Plan, as_stated
 from studies.study.study import SceneChoice, Study
 from studies.sweep.cells import Cell
 from studies.sweep.database import COLUMNS, FILE
+from studies.sweep.folder import MARKER
 from studies.sweep.row import Row
 from studies.sweep.run_sweep import Runner, Swept, sweep
 from studies.sweep.workers import InThisProcess, run
@@ -93,7 +94,7 @@ def picture(path: Path, size: tuple[int, int] = SIZE) -> Path:
     rows, columns = np.mgrid[0 : size[0], 0 : size[1]] / np.array(size)[:, None, None]
     colour = 1 + 0.8 * np.sin(2 * np.pi * (NM[None, None] / 300.0 + rows[..., None]))
     values = colour * (0.05 + 0.95 * columns[..., None]) * 1e-3
-    write_exr(path, SpectralRadiance(values.astype(np.float32), NM))
+    write_exr(SpectralRadiance(values.astype(np.float32), NM), path)
     return path
 
 
@@ -130,14 +131,14 @@ def content(out: Path) -> list[tuple[Any, ...]]:
 
 
 def half_pictures(out: Path) -> list[Path]:
-    """Pictures whose content isn't what they are named after; one in a `.part-` folder hasn't got its name yet."""
-    found = [path for path in (out / "pictures").rglob("*.png") if not path.parent.name.startswith(".part-")]
+    """Pictures whose content isn't what they are named after; `.rodcone-...` has no name yet."""
+    found = [path for path in (out / "pictures").rglob("*.png") if not path.name.startswith(".rodcone-")]
     return [path for path in found if not hashlib.sha256(path.read_bytes()).hexdigest().startswith(path.stem)]
 
 
 def parts_left(out: Path) -> list[str]:
     """Temporary files that an end left behind among the pictures and frames."""
-    return [name for folder, folders, files in os.walk(out) for name in (*folders, *files) if name.startswith(".part")]
+    return [name for _, _, files in os.walk(out) for name in files if name.startswith(".rodcone-") and name != MARKER]
 
 
 def row(processor: str, seed: int, **values: Any) -> Row:

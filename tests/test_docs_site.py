@@ -120,7 +120,15 @@ def figures(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def make(figures: Path, *targets: str) -> None:
     """Make figures as `make docs` does, the large ones small."""
-    command = ["make", "-f", "docs/figures.mk", f"BIN={Path(sys.executable).parent}", f"FIGURES={figures}", *SMALL]
+    command = [
+        "make",
+        "-f",
+        "docs/figures.mk",
+        f"BIN={Path(sys.executable).parent}",
+        f"FIGURES={figures}",
+        f"PICTURES={figures}/kept",
+        *SMALL,
+    ]
     done = subprocess.run([*command, *targets], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 

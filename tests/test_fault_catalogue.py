@@ -54,6 +54,7 @@ def _project(folder: Path, test: str) -> Fault:
 READS = "from pathlib import Path\nTEXT = (Path(__file__).parent / 'sensor' / 'part.py').read_text()\n"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("test", "caught"),
     [

@@ -39,7 +39,9 @@ def walked() -> dict[str, dict[str, list[Stay]]]:
     return {"llvm": walks_of(), "numpy": walks_of(DRJIT_LIBLLVM_PATH="/nonexistent/libLLVM.so")}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("engine", ["llvm", "numpy"])
+@pytest.mark.thorough
 def test_the_walks_begin_where_they_say(walked, engine):
     assert walked[engine]["raw"][0][1:] == ("isp.interleaved", "reconstruct")
     assert walked[engine]["radiance"][0][1:] == ("sensor.capture", "capture")
@@ -47,22 +49,26 @@ def test_the_walks_begin_where_they_say(walked, engine):
     assert len(walked[engine]["radiance"]) > 5
 
 
+@pytest.mark.thorough
 def test_raw_makes_few_stays_on_its_way_through_reconstruct(walked):
     stays = list(dict.fromkeys(walked["llvm"]["raw"] + walked["numpy"]["raw"]))
     assert len(stays) <= MOST_OF_RAW, "\n".join(map(str, stays))
 
 
 @pytest.mark.parametrize("engine", ["llvm", "numpy"])
+@pytest.mark.thorough
 def test_raw_enters_no_module_often(walked, engine):
     counts = visits(walked[engine]["raw"])
     assert max(counts.values()) <= MOST_VISITS, counts
 
 
+@pytest.mark.thorough
 def test_radiance_makes_few_stays_on_its_way_through_capture(walked):
     stays = walked["llvm"]["radiance"]
     assert len(stays) <= MOST_OF_RADIANCE, "\n".join(map(str, stays))
 
 
+@pytest.mark.thorough
 def test_a_stay_is_a_call_with_the_value_into_another_module():
     """Three functions are given the mosaic, one of them in a loop; the fourth isn't."""
     from sensor import cfa

@@ -72,7 +72,7 @@ def test_a_term_has_one_row_with_a_meaning(term):
 
 
 @pytest.mark.parametrize(
-    "name", ["sensor.readout.no_such_function", "sensor.no_such_module.read_out", "sensor.config.PixelConfig.pitch_nm"]
+    "name", ["sensor.readout.no_such_function", "sensor.no_such_module.read_out", "sensor.chip.PixelConfig.pitch_nm"]
 )
 def test_a_name_that_is_gone_is_seen(name):
     with pytest.raises(AttributeError):

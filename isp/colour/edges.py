@@ -11,8 +11,8 @@ from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter, minimum_filter
 
 from isp.kernel.edges import EVEN, FULL, NOISE, OFF, REACH, RELATIVE, SIGMAS, TINY_E, TOGETHER, even_strips
 from render.spectrum import Floats
@@ -74,7 +74,8 @@ def _even_edges(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> 
 
     # Each channel as far as it counts.
     light, colours = planes[..., :3] @ gains[:3], window.step[..., :3] @ gains[:3]
-    together = _ramp((_around(maximum_filter, light) - _around(minimum_filter, light)) / colours, TOGETHER)
+    brightest, darkest = _around(scipy.ndimage.maximum_filter, light), _around(scipy.ndimage.minimum_filter, light)
+    together = _ramp((brightest - darkest) / colours, TOGETHER)
     rims = (alpha > 0.0) & (alpha < 1.0)
     evened = window.least + share[..., None] * window.step
     _hold(evened, planes, window)
@@ -94,7 +95,7 @@ def _around(extreme: Callable[..., Any], values: Floats) -> Floats:
 
 
 def _window(raw: RawImage, planes: Floats) -> Window:
-    least, most = (_around(extreme, planes) for extreme in (minimum_filter, maximum_filter))
+    least, most = (_around(extreme, planes) for extreme in (scipy.ndimage.minimum_filter, scipy.ndimage.maximum_filter))
     step = np.maximum(most - least, TINY_E)
     return Window(
         least=least,

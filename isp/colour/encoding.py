@@ -1,14 +1,15 @@
 """Pictures encoded for a display: sRGB, or Display P3, whose primaries hold more of the colours that cameras see."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rodcone.colour_spaces import DISPLAY_P3_PRIMARIES_XY, SRGB_PRIMARIES_XY, SRGB_TO_XYZ, encode_srgb, rgb_to_xyz
-from rodcone.errors import unknown
+from rodcone.errors import InputError, unknown
 
 
 @dataclass(frozen=True)
@@ -46,3 +47,35 @@ def encode(linear_srgb: NDArray[np.floating], encoding: str) -> NDArray[np.float
         return encode_srgb(linear_srgb)
     from_srgb = np.linalg.inv(rgb_to_xyz(ENCODINGS[encoding].primaries_xy)) @ SRGB_TO_XYZ
     return encode_srgb(linear_srgb @ from_srgb.T)
+
+
+def quantise(encoded: ArrayLike, bits: int = 8) -> NDArray[np.unsignedinteger]:
+    """Samples of 8 or 16 bits, (h, w, 3), of an encoded picture (h, w, 3), or of a grey one (h, w), in [0, 1].
+
+    Raises
+    ------
+    InputError
+        For another shape, values that are no real fractions, NaN and infinity.
+
+    Warns
+    -----
+    UserWarning
+        Where values are clipped: how many.
+    """
+    given = np.asarray(encoded)
+    if given.dtype.kind != "f":
+        raise InputError(f"picture: values of {given.dtype} are not allowed; give fractions, such as values / 255")
+    if given.ndim not in (2, 3) or given.size == 0 or given.shape[2:] not in ((), (3,)):
+        raise InputError(f"picture: shape {given.shape} is not allowed; give (h, w, 3), or (h, w) for grey")
+    if wrong := given.size - int(np.isfinite(given).sum()):
+        raise InputError(f"picture: {wrong} of {given.size} values are NaN or infinite; allowed: 0 to 1; mend them")
+    most = 2**bits - 1
+    samples = np.rint(np.multiply(given, most, dtype=np.float64))
+    if outside := int(((samples < 0) | (samples > most)).sum()):
+        warnings.warn(
+            f"picture: {outside} of {given.size} values lie outside 0 to 1 and are clipped; linear light is encoded "
+            "first: give the Picture itself, or encode_srgb(linear / white)",
+            stacklevel=3,
+        )
+    samples = np.clip(samples, 0, most).astype(f"u{bits // 8}")
+    return samples if given.ndim == 3 else np.repeat(samples[..., None], 3, axis=2)

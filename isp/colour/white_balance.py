@@ -1,4 +1,7 @@
-"""White balance of a developed frame: Gray World, the calibrated neutral where it is too dark for that, or as given."""
+"""White balance of a developed frame: by Gray World, as calibrated, or as given.
+
+Gray World (Buchsbaum 1980) makes the channels' means alike; where it is too dark for that the calibrated neutral holds.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.colour.gray_world import gray_world
 from isp.colour.highlights import saturated_nearby
 from isp.planes import rows_at
 from render.illuminants import illuminant
@@ -121,3 +123,32 @@ def _response(name: str, values: ArrayLike | None, raw: RawImage) -> Floats | No
     if response.shape != (len(names),) or not np.all((response > 0) & np.isfinite(response)):
         raise InputError(f"{name}: {response.tolist()!r} is not allowed; give a positive response for each of {names}")
     return response
+
+
+LEAST_STANDARD_ERRORS = 5.0  # a channel whose mean is less certain than this can't set its own gain
+
+
+def gray_world(
+    means: NDArray[np.float64], standard_errors: NDArray[np.float64], neutral: NDArray[np.float64], green: int
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Gains that make the mean of each channel equal to green's.
+
+    Parameters
+    ----------
+    means : (channel,) float64
+        Of the pipeline's own linear planes over the pixels that count, the unsaturated ones [e-].
+    standard_errors : (channel,) float64
+        Of each mean [e-].
+    neutral : (channel,) float64
+        Calibrated response to a neutral, in any unit: serves where a mean is under five standard errors.
+    green : int
+        Index of the green channel; where it is too dark all gains are the calibrated ones.
+
+    Returns
+    -------
+    (channel,) float64, (channel,) bool
+        Factor on each channel, and whether Gray World set it; `neutral` did where not.
+    """
+    certain = (means >= LEAST_STANDARD_ERRORS * standard_errors) & (means > 0)
+    certain &= bool(certain[green])
+    return np.where(certain, means[green] / np.where(certain, means, 1.0), neutral[green] / neutral), certain

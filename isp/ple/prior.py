@@ -8,17 +8,19 @@ is, its noise, well, exposure and mosaic don't.
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from zipfile import BadZipFile
+from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import InputError
+from rodcone.errors import InputError, one_line
 from rodcone.files import replacing
 
 PATCH = 8  # pixels a side
 LETTERS = ("R", "G", "B", "W")
 OWN = Path(__file__).with_name("prior.npz")  # of the project's own curves, `sensor.curves.rgbw`
+MOST_BYTES = 1 << 26  # of the arrays, before memory is taken for them: the project's own have 0.7 MB
+MOST_COMPONENTS = 4096
 _FIELDS = ("neutrals_e", "mean", "basis", "weights", "centres", "factors", "rest")
 
 
@@ -108,20 +110,43 @@ def load_prior(path: Path) -> Prior:
     Raises
     ------
     InputError
-        For a file that isn't one.
+        For a file that isn't one, holds over 64 MiB, other shapes, or values that are no finite numbers.
     """
     try:
+        if not path.is_file():
+            raise ValueError("it is a folder or a device, or isn't there")
+        with ZipFile(path) as archive:
+            needed = sum(entry.file_size for entry in archive.infolist())
+        if needed > MOST_BYTES:
+            raise ValueError(f"its arrays take {needed} bytes; allowed: {MOST_BYTES}")
         with path.open("rb") as place, np.load(place, allow_pickle=False) as file:
             held = {name: np.asarray(file[name]) for name in _FIELDS}
             source = str(file["source"])
-    except (OSError, EOFError, ValueError, KeyError, BadZipFile) as error:
-        raise InputError(f"prior: {str(path)!r} can't be read: {error}; give a file of `rodcone train`") from error
-    size = held["mean"].size // 4
-    components, directions = held["centres"].shape
+        if not all(np.issubdtype(array.dtype, np.floating) and np.all(np.isfinite(array)) for array in held.values()):
+            raise ValueError("it holds values that are no finite numbers")
+    except Exception as error:  # NumPy parses headers as Python's literals, which fail in many ways
+        raise InputError(
+            f"prior: {str(path)!r} can't be read: {one_line(error)}; give a file of `rodcone train`"
+        ) from error
+    rows, (components, directions) = 4 * PATCH**2, (*held["centres"].shape, 0, 0)[:2]
+    lower = directions * (directions + 1) // 2
+    shapes = {
+        "neutrals_e": (*held["neutrals_e"].shape[:1], 4),
+        "mean": (rows,),
+        "basis": (rows, directions),
+        "weights": (components,),
+        "centres": (components, directions),
+        "factors": (components, lower),
+        "rest": (components,),
+    }
+    wrong = [name for name, shape in shapes.items() if held[name].shape != shape]
+    if wrong or directions > rows or not 0 < components <= MOST_COMPONENTS:
+        raise InputError(
+            f"prior: {str(path)!r} holds {', '.join(wrong) or 'Gaussians'} of other patches than {PATCH}x{PATCH}; "
+            "train one anew"
+        )
     factors = np.zeros((components, directions, directions), np.float32)
     factors[:, *np.tril_indices(directions)] = held["factors"]
-    if size != PATCH**2 or held["basis"].shape != (4 * size, directions):
-        raise InputError(f"prior: {str(path)!r} is of other patches than {PATCH}x{PATCH}; train one anew")
     single = {name: held[name].astype(np.float32) for name in _FIELDS[1:] if name != "factors"}
     return Prior(neutrals_e=held["neutrals_e"], factors=factors, source=source, **single)
 

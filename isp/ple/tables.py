@@ -12,8 +12,8 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dtrtri
 
 from isp.anscombe import stabilise, unstabilise
 from isp.ple.prior import Mixture, Prior, mixture
@@ -144,7 +144,7 @@ class Table:
         noise = shot[:, at] / (electrons[:, at] + (LIFT * dark[at]) ** 2)
         self.unit = (electrons + (LIFT * dark) ** 2) / (electrons + dark**2)
         seen[:, np.arange(count), np.arange(count)] += noise
-        factors = np.stack([dtrtri(lower, lower=1)[0] for lower in np.linalg.cholesky(seen)])
+        factors = np.stack([scipy.linalg.lapack.dtrtri(lower, lower=1)[0] for lower in np.linalg.cholesky(seen)])
         self.log_scale = mix.log_weights + np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
         # The pilot: the patch's means p by channel, turned so that its directions are independent given the samples.
         self.average = np.tile(np.eye(4), pixels) / pixels

@@ -10,16 +10,14 @@ from collections.abc import Callable
 import numpy as np
 
 from isp.anscombe import stabilise, unstabilise
-from isp.bilinear import bilinear
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Image, Picture, finish
-from isp.planes import Plane
-from isp.processors.bm3d import bm3d
+from isp.planes import Plane, bilinear
 from isp.processors.demosaic import MALVAR_REACH, picture_demosaicked, require_bayer
 from isp.processors.mosaic import balance_mosaic, to_rgb
-from isp.processors.sub_images import Mix, bm3d_mosaic
+from isp.processors.sub_images import Mix, bm3d, bm3d_mosaic
 from sensor.cfa import Tile, channel_map, channels
 from sensor.raw import RawImage
 

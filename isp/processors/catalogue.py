@@ -17,14 +17,13 @@ from isp.picture import Picture
 from isp.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
 from isp.processors.any_mosaic import picture_any_mosaic, picture_kriging
 from isp.processors.bayer_denoised import picture_bayer_nlm, picture_demosaicked_first, picture_denoised_first
-from isp.processors.bm3d import EXTRA as BM3D
 from isp.processors.demosaic import EXTRA as DEMOSAICKING
 from isp.processors.demosaic import malvar, menon, picture_demosaicked
 from isp.processors.fusion import picture_complementary, picture_kijima, picture_sato, picture_yamagami
-from isp.processors.gindele import picture_gindele
-from isp.processors.park import picture_rgbw_park
+from isp.processors.gindele import picture_gindele, picture_rgbw_park
 from isp.processors.piecewise import picture_ple, picture_ple_bayer, picture_ple_rgbw
 from isp.processors.residual import residual_interpolation
+from isp.processors.sub_images import EXTRA as BM3D
 from isp.processors.sub_images import hadamard, principal_components
 from rodcone.errors import InputError
 from sensor.cfa import OWN, channels

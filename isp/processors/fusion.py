@@ -19,15 +19,14 @@ what happens to highlights. None of the three handles a saturated W: its luminan
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d
 
-from isp.bilinear import fill_channels
 from isp.colour.colour_fit import ColourFit
 from isp.colour.highlights import saturated_nearby
 from isp.colour.white_balance import WhiteBalance, neutral_response
 from isp.picture import Image, Picture, require_letters
-from isp.planes import Plane, fill, tent
+from isp.planes import Plane, fill, fill_channels, tent
 from isp.processors.mosaic import balance_mosaic, to_rgb
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
@@ -106,8 +105,8 @@ def combine(values: Plane, cfa: Tile, channel: str, radius: int = MATCHED_RADIUS
     total: NDArray[np.float64] = np.where(sampled, values, 0.0)
     weight = sampled.astype(np.float64)
     for axis in (0, 1):
-        total = convolve1d(total, tent(radius), axis, mode="constant")
-        weight = convolve1d(weight, tent(radius), axis, mode="constant")
+        total = scipy.ndimage.convolve1d(total, tent(radius), axis, mode="constant")
+        weight = scipy.ndimage.convolve1d(weight, tent(radius), axis, mode="constant")
     return np.asarray(total / weight)
 
 

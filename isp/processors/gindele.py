@@ -9,18 +9,22 @@ The first interpolation follows J. E. Adams and J. F. Hamilton (US patent 5 629 
 smaller gradient, with a Laplacian of the site's own colour; then differences of each colour from luminance. Ours: the
 balance before, the two steps in which W's quarter of the sites is filled (diagonals first), ties averaged, and bilinear
 interpolation by normalised convolution as the second.
+
+S. H. Park, H. S. Kim, S. Lansel, M. Parmar, B. A. Wandell, "A case for denoising before demosaicking color filter array
+data", Asilomar 2009, is about Bayer; `isp.processors.sub_images` takes any 2x2 tile. Ours: W's sub-image as the fourth,
+and Adams' interpolation after it. Where W is full its sub-image is flat, and the others keep what they differ by.
 """
 
 import numpy as np
 
-from isp.bilinear import fill_channels
 from isp.colour.colour_fit import ColourFit
 from isp.colour.highlights import saturated_nearby
 from isp.colour.white_balance import WhiteBalance
 from isp.picture import Image, Picture, require_letters
-from isp.planes import Plane
+from isp.planes import Plane, fill_channels
 from isp.processors.fusion import CHANNELS
 from isp.processors.mosaic import balance_mosaic, to_rgb
+from isp.processors.sub_images import bm3d_mosaic, principal_components
 from rodcone.errors import InputError
 from sensor.cfa import Tile, is_rgbw, mask
 from sensor.raw import RawImage
@@ -86,3 +90,10 @@ def _along_smaller_gradient(white: Plane, own: Plane, directions: tuple[tuple[in
     first, second = estimates
     smaller = np.where(classifiers[0] < classifiers[1], first, second)
     return np.where(classifiers[0] == classifiers[1], (first + second) / 2, smaller)
+
+
+def picture_rgbw_park(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
+    """Develop a 2x2 RGBW raw image whose mosaic is denoised by principal components (Park et al. 2009)."""
+    require_letters(raw, CHANNELS)
+    require_rgbw(raw.cfa)
+    return picture_gindele(raw, colours, balance=balance, electrons=bm3d_mosaic(raw, principal_components))

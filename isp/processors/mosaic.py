@@ -4,12 +4,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from isp.bilinear import bilinear
 from isp.colour.colour_fit import ColourFit
 from isp.colour.highlights import clip_highlights, saturated_nearby
 from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.picture import Image
-from isp.planes import Plane
+from isp.planes import Plane, bilinear
 from sensor.cfa import channel_map, channels
 from sensor.raw import RawImage
 

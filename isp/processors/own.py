@@ -20,6 +20,7 @@ from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS, Processor
 from rodcone.digests import digest_bytes
 from rodcone.errors import InputError, one_line, unknown
+from rodcone.files import read_bounded
 from sensor.cfa import OWN
 from sensor.raw import RawImage
 
@@ -100,17 +101,11 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
 
 def _read(path: Path) -> bytes:
     try:
-        if path.exists() and not path.is_file():  # a pipe or a device may never end
-            raise ValueError("it is a folder or a device")
-        with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
-        if len(content) > MOST_BYTES:
-            raise ValueError(f"it is over {MOST_BYTES} bytes")
+        return read_bounded(path, MOST_BYTES)
     except (OSError, ValueError) as error:
         raise InputError(
             f"processors: {str(path)!r} can't be read ({one_line(error)}); allowed: FILE.py:FUNCTION; correct the path"
         ) from error
-    return content
 
 
 @cache

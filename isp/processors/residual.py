@@ -12,12 +12,11 @@ After the papers' method, not their authors' program. Ours: reflection about the
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d
 
-from isp.bilinear import fill_channels
 from isp.picture import Image
-from isp.planes import Plane
+from isp.planes import Plane, fill_channels
 from isp.processors.demosaic import require_bayer
 from sensor.cfa import Tile, mask
 
@@ -48,20 +47,20 @@ def _green(mosaic: Plane, green: NDArray[np.bool_]) -> Plane:
     """Green everywhere: at another colour's site its sample and the difference that the four sides tell."""
     total, weights = np.zeros_like(mosaic), np.zeros_like(mosaic)
     for axis, difference in ((1, _differences(mosaic, green)), (0, _differences(mosaic.T, green.T).T)):
-        gradient = np.abs(convolve1d(difference, [1.0, 0.0, -1.0], axis))
-        around = convolve1d(gradient, np.ones(5), 1 - axis)
+        gradient = np.abs(scipy.ndimage.convolve1d(difference, [1.0, 0.0, -1.0], axis))
+        around = scipy.ndimage.convolve1d(gradient, np.ones(5), 1 - axis)
         for side in (1, -1):
             reached = np.concatenate([np.zeros(4), np.ones(5)])[::side]
             average = np.concatenate([np.zeros(4), _GAUSSIAN / _GAUSSIAN.sum()])[::side]
-            weight = 1.0 / (convolve1d(around, reached, axis) ** 2 + _LEAST)
-            total += weight * convolve1d(difference, average, axis)
+            weight = 1.0 / (scipy.ndimage.convolve1d(around, reached, axis) ** 2 + _LEAST)
+            total += weight * scipy.ndimage.convolve1d(difference, average, axis)
             weights += weight
     return np.where(green, mosaic, mosaic + total / weights)
 
 
 def _differences(mosaic: Plane, green: NDArray[np.bool_]) -> Plane:
     """Green less the other colour of the same row, at every pixel, by residual interpolation along the rows."""
-    between = convolve1d(mosaic, [0.5, 0.0, 0.5], axis=1)
+    between = scipy.ndimage.convolve1d(mosaic, [0.5, 0.0, 0.5], axis=1)
     as_green, as_colour = np.where(green, mosaic, between), np.where(green, between, mosaic)
     result = np.empty_like(mosaic)
     for parity in (0, 1):  # rows with red, rows with blue
@@ -71,14 +70,14 @@ def _differences(mosaic: Plane, green: NDArray[np.bool_]) -> Plane:
         for guide, sampled in ((as_colour, rows & green), (as_green, rows & ~green)):
             predicted = _predict(mosaic, guide, sampled, (1,), _GREEN_WINDOW)
             residual = np.where(sampled, mosaic - predicted, 0.0)
-            planes.append(predicted + convolve1d(residual, _BETWEEN, axis=1))
+            planes.append(predicted + scipy.ndimage.convolve1d(residual, _BETWEEN, axis=1))
         result[parity::2] = (planes[0] - planes[1])[parity::2]
     return result
 
 
 def _predict(samples: Plane, guide: Plane, sampled: NDArray[np.bool_], axes: tuple[int, ...], window: int) -> Plane:
     """A colour that is linear in the guide within each window, the Laplacian of its residual being the least."""
-    slopes = [sum(convolve1d(plane, _SECOND, axis) for axis in axes) for plane in (guide, samples)]
+    slopes = [sum(scipy.ndimage.convolve1d(plane, _SECOND, axis) for axis in axes) for plane in (guide, samples)]
     own, other = np.where(sampled, slopes[0], 0.0), slopes[1]
     gain = _sums(own * other, window) / (_sums(own**2, window) + _LEAST)
     count = _sums(sampled.astype(np.float64), window)
@@ -96,4 +95,4 @@ def _predict(samples: Plane, guide: Plane, sampled: NDArray[np.bool_], axes: tup
 def _sums(values: Plane, window: int) -> Plane:
     """Sum of the window around each pixel, each summed anew: a running sum leaves rounding behind what was bright."""
     ones = np.ones(window)
-    return np.asarray(convolve1d(convolve1d(values, ones, 0), ones, 1))
+    return np.asarray(scipy.ndimage.convolve1d(scipy.ndimage.convolve1d(values, ones, 0), ones, 1))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from render.error_estimates import Halves
 from render.integrator.dense import Tracer
 from render.integrator.wavefront import Span, bands_apart, seed_of, traced
 from render.loader import PART_BANDS, Film, Loaded, mitsuba_module
@@ -35,19 +36,17 @@ class Denoised:
     ----------
     radiance : (group, band, h, w) float32
         The unbiased light with its indirect part denoised, each group by itself.
-    indirect, indirect_difference : (group, band, h, w) float32
-        That part of the unbiased light, with its noise, and half the difference of its halves.
-    fold_mean, fold_difference : (group, band, h, w) float32
-        Mean and half the difference of two folds: renders with paths of their own, no part of which is in `radiance`.
+    indirect : Halves of (group, band, h, w)
+        That part of the unbiased light, with its noise.
+    folds : Halves of (group, band, h, w)
+        Two renders with paths of their own, no part of which is in `radiance`.
     fold_points : int
         Samples of each fold in a pixel of rate 1.
     """
 
     radiance: Planes
-    indirect: Planes
-    indirect_difference: Planes
-    fold_mean: Planes
-    fold_difference: Planes
+    indirect: Halves
+    folds: Halves
     fold_points: int
 
     __repr__ = brief

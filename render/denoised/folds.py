@@ -23,24 +23,20 @@ def denoise_means(
         Where the denoiser isn't installed.
     """
     assert means.indirect is not None
-    assert means.indirect_difference is not None
     folds = no_means(
         scene, film, means.rates, apart=True
     )  # by the kernel of the render's own light: no other is compiled
     if earlier is not None:
-        folds.count = earlier.fold_points
-        folds.radiance, folds.difference = earlier.fold_mean.copy(), earlier.fold_difference.copy()
+        folds.count, folds.light = earlier.fold_points, earlier.folds.copy()
     stop = max(1, round(2 * means.count * FOLD_SHARE))
     while folds.count < stop:
         add_run(loaded, folds, film, stop, seed_of(seed, _FOLDS))
     albedo, normal = first_surfaces(loaded[0], film, seed_of(seed, _SURFACES))
-    halves = zip(means.indirect, means.indirect_difference, strict=True)
+    halves = zip(means.indirect.mean, means.indirect.difference, strict=True)
     smooth = np.stack([denoised(light, difference, albedo, normal) for light, difference in halves])
     return Denoised(
-        radiance=np.maximum(means.radiance - means.indirect, 0) + smooth,  # the difference rounds
+        radiance=np.maximum(means.light.mean - means.indirect.mean, 0) + smooth,  # the difference rounds
         indirect=means.indirect,
-        indirect_difference=means.indirect_difference,
-        fold_mean=folds.radiance,
-        fold_difference=folds.difference,
+        folds=folds.light,
         fold_points=folds.count,
     )

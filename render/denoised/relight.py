@@ -1,16 +1,19 @@
 """Denoised light under given lights, and what its error is measured by."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
-from render.denoised.measured_error import measured_error
+from render.error_estimates import Halves
 from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.errors import InputError
+from rodcone.types import Floats
 
 
 def relight_denoised(
@@ -25,7 +28,7 @@ def relight_denoised(
 
     The folds are independent of the picture and of each other, and without bias: the mean over the frame of
     (picture - one)(picture - other) in any linear measure estimates the picture's whole squared error there, bias and
-    noise, by `render.denoised.measured_error`. Nothing is known of single pixels. The picture's `relative_mc_error` is
+    noise, by `render.denoised.relight`. Nothing is known of single pixels. The picture's `relative_mc_error` is
     the root of that limit for its luminance, over its mean.
 
     Raises
@@ -36,8 +39,8 @@ def relight_denoised(
     made = transport.denoised
     if made is None:
         raise InputError("denoised: the render has none; allowed: a render with denoise=True; render it so")
-    folded = replace(transport, radiance=made.fold_mean, half_difference=made.fold_difference)
-    denoised = replace(transport, radiance=made.radiance)
+    folded = replace(transport, light=made.folds)
+    denoised = replace(transport, light=Halves(made.radiance, transport.light.difference))
     asked: dict[str, Any] = {"powers": powers, "luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
     picture = denoised.relight(spectra, **asked)
     one, other = folded.relight_halves(spectra, **asked)
@@ -45,3 +48,64 @@ def relight_denoised(
     upper = measured_error(luminance - one.luminance(), luminance - other.luminance(), np.ones(picture.shape)).upper
     mean = float(luminance.mean())
     return replace(picture, relative_mc_error=upper**0.5 / mean if mean > 0 else 0.0), one, other
+
+
+BLOCK = 16  # pixels on a side: errors of a denoiser are alike in neighbours
+LEAST_BLOCKS = 4  # along the shorter side, smaller where they must be
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class MeasuredError:
+    """Mean squared error over a frame, its standard error, and the limit that it lies under with `LEVEL`, 0 or more."""
+
+    mean: float
+    standard_error: float
+    upper: float
+
+
+def measured_error(
+    one: NDArray[np.floating], other: NDArray[np.floating], weight: NDArray[np.floating]
+) -> MeasuredError:
+    """Weighted mean square of a picture's error over the frame, bias and noise together.
+
+    The mean product of its differences from two pictures is the mean of its squared error, whatever the noise of the
+    two: that is independent of the picture's and of each other's, and has no mean. Its standard error is that of blocks
+    of pixels, the limit Student's.
+
+    Parameters
+    ----------
+    one, other : (..., h, w) array
+        The picture less each of the two, in a measure that is linear in light.
+    weight : (..., h, w) array
+        Of each pixel's squared error, 0 where it doesn't count; the mean is over all pixels.
+
+    Returns
+    -------
+    MeasuredError
+        The mean may be negative, since it is an estimate; the limit isn't.
+
+    Raises
+    ------
+    InputError
+        For arrays of other shapes.
+    """
+    if not (one.shape == other.shape == weight.shape and one.ndim > 1 and one.size):
+        raise InputError(f"weight: shapes {one.shape}, {other.shape}, {weight.shape}; allowed: one of (..., h, w)")
+    product = one.astype(np.float64) * other * weight
+    planes = product.reshape(-1, *product.shape[-2:]).mean(axis=0)
+    side = max(1, min(BLOCK, min(planes.shape) // LEAST_BLOCKS))
+    sums, pixels = _block_sums(planes, side).ravel(), _block_sums(np.ones(planes.shape), side).ravel()
+    mean = float(sums.sum() / planes.size)
+    if sums.size == 1:
+        return MeasuredError(mean, np.inf, np.inf)
+    # Blocks at the edge are smaller: deviations from the mean of as many pixels.
+    spread = float(np.square(sums - mean * pixels).sum())
+    error = (spread * sums.size / (sums.size - 1)) ** 0.5 / planes.size
+    return MeasuredError(mean, error, max(0.0, mean + float(scipy.special.stdtrit(sums.size - 1, LEVEL)) * error))
+
+
+def _block_sums(planes: Floats, side: int) -> Floats:
+    """Sums over blocks of so many pixels on a side."""
+    rows, columns = (np.arange(0, length, side) for length in planes.shape)
+    return np.asarray(np.add.reduceat(np.add.reduceat(planes, rows, axis=0), columns, axis=1))

@@ -2,7 +2,6 @@
 they hold.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,14 +13,13 @@ from render.radiance import SpectralRadiance
 from render.radiance_files.envi import open_envi
 from render.radiance_files.file_checks import bands_between, require_extent, require_file
 from render.radiance_files.mat_file import read_numbers
-from rodcone.errors import InputError, one_line, require_keys, require_range, unknown
-from rodcone.toml_file import read_toml
+from rodcone.errors import InputError, one_line, require_range, unknown
+from rodcone.toml_file import read_toml, strict_converter, structured
 from rodcone.types import Floats
 
 KINDS = RADIANCE, REFLECTANCE = "radiance", "reflectance"
 AXES = ("height", "width", "wavelength")
 MOST_OVER_ONE = 0.01  # of a reflectance's values: highlights and noise; more is another unit
-_KEYS = ("holds", "wavelength_nm", "axes", "variable", "scale")
 
 
 @dataclass(frozen=True)
@@ -32,6 +30,26 @@ class Stored:
     axes: tuple[str, ...]
     wavelength_nm: Floats | None = None
     scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Description:
+    """Keys of the TOML beside a cube; see `read_cube`."""
+
+    holds: str
+    wavelength_nm: Any = None
+    axes: tuple[str, ...] = ()
+    variable: str | None = None
+    scale: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.holds not in KINDS:
+            raise unknown("holds", self.holds, KINDS)
+        if self.scale is not None:
+            require_range("scale", self.scale, 1e-30, 1e30, "give what a stored 1 is worth")
+
+
+_CONVERTER = strict_converter()
 
 
 def description(path: str | Path) -> Path:
@@ -47,7 +65,7 @@ def cube_holds(path: str | Path) -> str:
     InputError
         For a missing or wrong description.
     """
-    return str(_described(Path(path))["holds"])
+    return _described(Path(path)).holds
 
 
 def read_cube(path: str | Path) -> SpectralRadiance:
@@ -65,9 +83,9 @@ def read_cube(path: str | Path) -> SpectralRadiance:
         reflectances of which over 1 % exceed 1.
     """
     path = Path(path)
-    asked = _described(path)
+    described = _described(path)
     try:
-        stored = _READERS[path.suffix.lower()](path, asked)
+        stored = _READERS[path.suffix.lower()](path, described)
         if sorted(stored.axes) != sorted(AXES):
             raise InputError(f"axes: {list(stored.axes)!r} are not allowed; give {list(AXES)} in the array's own order")
         if stored.values.ndim != 3 or stored.values.dtype.kind not in "fiu":
@@ -77,12 +95,12 @@ def read_cube(path: str | Path) -> SpectralRadiance:
             )
         values = np.moveaxis(stored.values, [stored.axes.index(name) for name in AXES], (0, 1, 2))
         require_extent(*values.shape)
-        centres, widths = bands_between(_wavelengths(stored, asked, values.shape[2]))
+        centres, widths = bands_between(_wavelengths(stored, described, values.shape[2]))
         with np.errstate(all="ignore"):  # SpectralRadiance tells where a value isn't finite
-            scaled = np.asarray(values, dtype=np.float32) * np.float32(asked.get("scale", stored.scale))
+            scaled = np.asarray(values, dtype=np.float32) * np.float32(described.scale or stored.scale)
         cube = SpectralRadiance(scaled, centres, width_nm=widths)
         over = float((scaled > 1).mean())
-        if asked["holds"] == REFLECTANCE and over > MOST_OVER_ONE:
+        if described.holds == REFLECTANCE and over > MOST_OVER_ONE:
             raise InputError(
                 f"{over:.0%} of its reflectances exceed 1; allowed: {MOST_OVER_ONE:.0%}, of highlights; give scale, "
                 "such as 0.01 for per cent"
@@ -92,7 +110,7 @@ def read_cube(path: str | Path) -> SpectralRadiance:
     return cube
 
 
-def _described(path: Path) -> Mapping[str, Any]:
+def _described(path: Path) -> Description:
     """Content of the TOML beside a cube, checked but for what depends on the array."""
     require_file(path)
     beside = description(path)
@@ -102,26 +120,15 @@ def _described(path: Path) -> Mapping[str, Any]:
             '(or "radiance"), and wavelength_nm = [400, 700], the first and the last band'
         )
     try:
-        asked = read_toml(beside)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{beside}: can't be read ({one_line(error)}); give holds and wavelength_nm") from None
-    try:
-        require_keys("key", asked, _KEYS)
-        if asked.get("holds") not in KINDS:
-            raise unknown("holds", asked.get("holds"), KINDS)
-        if isinstance(asked.get("scale", 1.0), bool):
-            raise InputError("scale: true is not a number; give what a stored 1 is worth")
-        require_range("scale", asked.get("scale", 1.0), 1e-30, 1e30, "give what a stored 1 is worth")
-        axes = asked.get("axes", list(AXES))
-        if not (isinstance(axes, list) and all(isinstance(name, str) for name in axes)):
-            raise InputError(f"axes: {axes!r} is not a list of names; give {list(AXES)} in the array's own order")
+        return structured(read_toml(beside), Description, _CONVERTER, "give holds and wavelength_nm")
     except InputError as refused:
         raise InputError(f"{beside}: {refused}") from None
-    return asked
+    except (OSError, ValueError) as error:
+        raise InputError(f"{beside}: can't be read ({one_line(error)}); give holds and wavelength_nm") from None
 
 
-def _wavelengths(stored: Stored, asked: Mapping[str, Any], bands: int) -> Floats:
-    given = asked.get("wavelength_nm", stored.wavelength_nm)
+def _wavelengths(stored: Stored, described: Description, bands: int) -> Floats:
+    given = stored.wavelength_nm if described.wavelength_nm is None else described.wavelength_nm
     if given is None:
         raise InputError("wavelength_nm: nothing states it; give one number a band, or the first and the last")
     try:
@@ -138,24 +145,24 @@ def _wavelengths(stored: Stored, asked: Mapping[str, Any], bands: int) -> Floats
     return nm
 
 
-def _read_npy(path: Path, asked: Mapping[str, Any]) -> Stored:
+def _read_npy(path: Path, described: Description) -> Stored:
     try:
         values = np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as error:  # its header is parsed as Python's literals, which fail in many ways
         raise InputError(f"NumPy can't read it ({one_line(error)}); give an array saved by numpy.save") from None
     if not isinstance(values, np.ndarray):
         raise InputError("it is no array; give one saved by numpy.save")
-    return Stored(values, tuple(asked.get("axes", AXES)))
+    return Stored(values, described.axes or AXES)
 
 
-def _read_envi(path: Path, asked: Mapping[str, Any]) -> Stored:
+def _read_envi(path: Path, described: Description) -> Stored:
     envi = open_envi(path)
     return Stored(envi.values, AXES, envi.wavelength_nm, envi.scale)
 
 
-def _read_mat(path: Path, asked: Mapping[str, Any]) -> Stored:
-    name, nm = asked.get("variable"), asked.get("wavelength_nm")
-    if not isinstance(name, str) or "axes" not in asked:
+def _read_mat(path: Path, described: Description) -> Stored:
+    name, nm = described.variable, described.wavelength_nm
+    if name is None or not described.axes:
         raise InputError(
             "variable and axes are missing; a .mat doesn't tell which of its arrays is the cube; give "
             f'variable = "NAME" and axes = {list(AXES)} in the array\'s own order'
@@ -164,7 +171,7 @@ def _read_mat(path: Path, asked: Mapping[str, Any]) -> Stored:
     for key in (name, nm):
         if isinstance(key, str) and key not in found:
             raise InputError(f"it has no numbers {key!r}; give the name of a variable of the file")
-    return Stored(found[name], tuple(asked["axes"]), found[nm] if isinstance(nm, str) else None)
+    return Stored(found[name], described.axes, found[nm] if isinstance(nm, str) else None)
 
 
 _READERS = {".npy": _read_npy, ".hdr": _read_envi, ".mat": _read_mat}

@@ -27,7 +27,7 @@ from render.radiance_files.exr_layout import (
 )
 from render.radiance_files.file_checks import MOST_EXPANSION, require_extent, require_file
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
-from rodcone.errors import InputError, one_line, require_kind
+from rodcone.errors import InputError, one_line
 from rodcone.files import replacing
 
 ERROR, SCENE, PREVIEW = "rodconeRelativeMcError", "rodconeScene", "rodconePreview"
@@ -41,7 +41,7 @@ _HALF_MAX, _FLOAT = 65504.0, np.finfo(np.float32)
 MOST_TILE_BYTES = 64 << 20  # of one tile, however small the file: 1024 x 1024 pixels in 16 channels
 
 
-def write_exr(path: str | Path, radiance: SpectralRadiance, *, scene: str = "") -> None:
+def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") -> None:
     """Write radiance as a spectral OpenEXR file; it appears whole or not at all.
 
     Channels are float32 with lossless PIZ compression; there are no half floats, since absolute radiance at night is
@@ -49,9 +49,9 @@ def write_exr(path: str | Path, radiance: SpectralRadiance, *, scene: str = "") 
 
     Parameters
     ----------
-    path : path
     radiance : SpectralRadiance
         Values of float64 are rounded to float32: those under 1e-45 become 0.
+    path : path
     scene : str
         Name to keep with the picture.
 
@@ -63,8 +63,6 @@ def write_exr(path: str | Path, radiance: SpectralRadiance, *, scene: str = "") 
         Where the file can't be written.
     """
     path = Path(path)
-    fix = "call its relight()" if hasattr(radiance, "relight") else "give write_exr(path, radiance)"
-    require_kind("radiance", radiance, SpectralRadiance, fix)
     if radiance.values.max() > _FLOAT.max:
         raise InputError(f"{path}: radiance {radiance.values.max():g} is over float32's {_FLOAT.max:g}; scale it down")
     names = [channel_name(nm) for nm in radiance.wavelength_nm]

@@ -5,7 +5,6 @@ changes), and a scene may come from anywhere. So `mat_reader` runs it in a child
 bounded by the file's size; the child's end is an error of one line here.
 """
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from render.radiance_files import mat_reader
 from render.radiance_files.file_checks import MOST_BYTES, MOST_EXPANSION, SMALL_BYTES, require_file
+from rodcone.child_process import safe_environment
 from rodcone.errors import InputError
 
 _HEADER_BYTES = 128
@@ -56,8 +56,8 @@ def read_numbers(path: Path, keys: Collection[str]) -> Mapping[str, NDArray[Any]
 
 
 def _run_reader(path: Path, found: Path, most_bytes: int, keys: Collection[str], seconds: float) -> None:
-    command = [sys.executable, "-P", mat_reader.__file__, os.path.realpath(path), str(found), str(most_bytes), *keys]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OPENBLAS_NUM_THREADS": "1"}
+    command = [sys.executable, mat_reader.__file__, str(path.resolve()), str(found), str(most_bytes), *keys]
+    environment = safe_environment(OPENBLAS_NUM_THREADS="1")
     try:
         done = subprocess.run(command, env=environment, capture_output=True, timeout=seconds, check=False)
     except subprocess.TimeoutExpired:

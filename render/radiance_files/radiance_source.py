@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from render.error_estimates import Halves
 from render.illuminants import illuminant
 from render.level import SceneMeans
 from render.radiance import SpectralRadiance
@@ -109,8 +110,8 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
     """Transport whose one light group gives the radiance as it is at a spectrum of 1.
 
     It has no reference plane, and no light counts as seen directly. The variance is what the radiance's
-    relative Monte Carlo error says, the same share in every pixel; `half_difference` is 0, since one picture holds no
-    two halves.
+    relative Monte Carlo error says, the same share in every pixel; the halves' difference is 0, for one picture holds
+    no halves.
 
     Parameters
     ----------
@@ -122,24 +123,21 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
     nm, width = radiance.wavelength_nm, radiance.widths_nm
     ends = np.clip([(nm - width).min(), (nm + width).max()], SHORTEST_NM, LONGEST_NM)
     whole = Spectrum(ends, np.ones(2))
-    none, dark = np.broadcast_to(np.float32(0), planes.shape), np.zeros((1, *radiance.shape), np.float32)
+    none = np.broadcast_to(np.float32(0), planes.shape)
     means = planes.mean(axis=(2, 3), dtype=np.float64)
     error = radiance.relative_mc_error
     variance = np.minimum((error * planes.astype(np.float64)) ** 2, np.finfo(np.float32).max).astype(np.float32)
     return Transport(
-        radiance=planes,
-        half_difference=none,
+        light=Halves(planes, none),
         variance=variance if error else none,
         relative_mc_error=error,
-        coverage=dark[0],
-        coverage_difference=dark[0],
-        seen=(dark,),
-        seen_difference=(dark,),
+        coverage=Halves.zeros(*radiance.shape),
+        seen=(Halves.zeros(1, *radiance.shape),),
         scene_means=SceneMeans(means, 1.0, np.zeros((means.size + 1,) * 2)),
         groups={name: LightGroup((), whole)},
         wavelength_nm=nm,
         width_nm=width,
-        counts=np.zeros(dark.shape[1:], np.uint32),
+        counts=np.zeros(radiance.shape, np.uint32),
         stopped_by="samples",
         seconds=0.0,
         integrator="file",

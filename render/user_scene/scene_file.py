@@ -4,23 +4,40 @@ import os
 import re
 from collections import Counter
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from render.geometry import to_world
-from render.loader import mitsuba_module, mitsuba_words
+from render.loader import as_guest, mitsuba_module, mitsuba_words
 from render.scene import Node, spectrum_node, uniform_node
 from render.spectrum import Spectrum
 from render.user_scene.allowed_plugins import require_allowed
+from render.user_scene.mesh_files import check_mesh_file
 from render.user_scene.scene_parts import SceneFile, assemble
 from render.user_scene.scene_paths import find_file, screen, search_path
 from rodcone.errors import InputError, unknown
 
+# Numbers that may be below 0: angles, offsets in a picture, the depth of bumps, paths without a limit (-1). Points and
+# directions are vectors.
+_SIGNED = {
+    "latitude",
+    "longitude",
+    "max_depth",
+    "principal_point_offset_x",
+    "principal_point_offset_y",
+    "scale_tilt",
+    "timezone",
+}
+_SIGNED_OF = {("bumpmap", "scale")}
+_LISTS = {"wavelengths", "values"}  # of regular and irregular spectra, as texts
+_NUMBER = re.compile(r"[-+]?(?:[\d.]+(?:[eE][-+]?\d+)?|nan|inf)", re.IGNORECASE)
 _RESERVED = re.compile(r"[./\s]")  # Mitsuba's and our own separators in paths of a scene's dict
 
 
+@as_guest()
 def load_scene_file(path: str | Path, *, trust: bool = False, extend: str | None = None) -> SceneFile:
     """Read a Mitsuba XML scene.
 
@@ -124,8 +141,12 @@ def _xml_part(
             target = nodes[index_of[value.id()]]  # an <alias> has no node of its own
             result[key] = {"type": "ref", "id": target.props.id()}
         elif kind == "String" and key == "filename":
-            result[key] = str(find_file(value, searched, folder))
+            file = find_file(value, searched, folder)
+            check_mesh_file(result["type"], file)
+            result[key] = str(file)
         elif kind != "ResolvedReference":
+            signed = key in _SIGNED or (properties.plugin_name(), key) in _SIGNED_OF
+            _check_numbers(key, kind, value, signed=signed)
             result[key] = _xml_value(kind, value)
     return result
 
@@ -140,13 +161,31 @@ def _key(taken: Node, ids: Mapping[str, int], numbers: Counter[str], wanted: str
     return name
 
 
+def _check_numbers(key: str, kind: str, value: Any, *, signed: bool) -> None:
+    """Raise `InputError` for numbers that Mitsuba would take, and render as black, NaN or nonsense."""
+    if kind in ("Float", "Integer"):
+        numbers = [value]
+    elif kind == "Spectrum":
+        numbers = [*value.wavelengths, *value.values]
+    elif kind in ("Color", "Vector"):
+        numbers = list(value)
+    elif kind == "Transform":
+        numbers = np.ravel(value.matrix).tolist()
+    elif kind == "String" and key in _LISTS:
+        numbers = _NUMBER.findall(value)  # Mitsuba refuses what is none
+    else:
+        return
+    signed = signed or kind in ("Vector", "Transform")
+    wrong = [x for x in map(float, numbers) if not isfinite(x) or (x < 0 and not signed)]
+    if wrong:
+        allowed = "finite numbers" if signed else "finite numbers of 0 or more"
+        raise InputError(f"{key}: {wrong[0]:g} is not allowed; allowed: {allowed}; correct it")
+
+
 def _xml_value(kind: str, value: Any) -> Any:
     """Value of a property as `mitsuba.load_dict` takes it in every variant."""
     if kind == "Transform":
-        matrix = np.array(value.matrix, dtype=np.float64)
-        if not np.all(np.isfinite(matrix)):
-            raise InputError("a transform is not finite; allowed: finite numbers, a scale other than 0; correct it")
-        return to_world(matrix)
+        return to_world(np.array(value.matrix, dtype=np.float64))
     if kind == "Color":
         return {"type": "rgb", "value": [float(x) for x in value]}
     if kind == "Vector":

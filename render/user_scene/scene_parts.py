@@ -11,8 +11,10 @@ from rodcone.brief import brief
 from rodcone.errors import InputError, require_whole, unknown
 
 FILM_SIZE = 576, 768  # height and width of Mitsuba's films where a scene states none
+DEEPEST = 1 << 16  # paths of integrators without a limit; Russian roulette ends them long before
 LONGEST_CHAIN = 100  # of nested and referenced parts: Mitsuba follows them by recursion
 _UNSEEN_BY_METER = ("directional", "point", "spot")  # it sends rays out, which meet none of these: it would read 0
+_PATHS = ("path", "volpath", "volpathmis", "prb", "prb_basic", "prbvolpath", "ptracer")  # with a max_depth
 _LEFT_OUT = ("film", "sampler", "rfilter", "reconstructionfilter", "integrator")
 
 
@@ -58,11 +60,11 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
         For a scene without camera or light, a broken reference, or a light that can't be relit.
     """
     kinds = {key: _kind(mi, child) for key, child in description.items()}
-    notes = [
-        f"{kinds[key]} {description[key]['type']!r} is left out: the engine brings its own"
-        for key in kinds
-        if kinds[key] == "integrator"
-    ]
+    integrators = [description[key] for key, kind in kinds.items() if kind == "integrator"]
+    depth, notes = _deepest(integrators), []
+    for integrator in integrators:
+        limit = "of any length" if depth == DEEPEST else f"up to {depth} segments"
+        notes.append(f"integrator {integrator['type']!r}: the engine brings its own, with paths {limit}")
     camera, size = _camera(mi, name, description, notes)
     geometry: Node = {"type": "scene", "sensor": camera}
     planes = []
@@ -86,8 +88,17 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
     if not groups:
         raise InputError(f"scene {name}: it has no light; allowed: one emitter or more; add one")
     plane = planes[0] if planes else None
-    scene = Scene(name=name, geometry=geometry, groups=groups, reference_plane=plane, extend=extend)
+    scene = Scene(name=name, geometry=geometry, groups=groups, reference_plane=plane, extend=extend, max_depth=depth)
     return SceneFile(scene, size, tuple(notes))
+
+
+def _deepest(integrators: list[Node]) -> int:
+    """Longest path of the first integrator that states one, alone or inside another; without any the engine's."""
+    stated = [node for integrator in integrators for _, node in walk({"": integrator}) if node["type"] in _PATHS]
+    if not stated:
+        return 2 if any(node["type"] == "direct" for node in integrators) else Scene.max_depth
+    depth = int(stated[0].get("max_depth", -1))
+    return DEEPEST if depth < 0 else max(2, depth)
 
 
 def _kind(mi: Any, part: Any) -> str:

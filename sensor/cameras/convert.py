@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rodcone.errors import InputError, one_line
-from rodcone.files import replacing
+from rodcone.files import read_bounded, replacing
 from sensor.cameras.library import FILE, STEPS
 
 SOURCE = "rawtoaces-data, Academy Software Foundation, https://github.com/AcademySoftwareFoundation/rawtoaces-data"
@@ -39,7 +39,7 @@ def convert(copy: Path, folder: Path) -> Path:
     ------
     InputError
         For a folder that isn't a copy, a file in it that is damaged or under another licence, or a folder to write
-        that holds cameras already.
+        that holds one of the three files already.
     """
     camera_files = sorted((copy / "data" / "camera").glob("*.json"))[: _MOST_CAMERAS + 1]
     licence = copy / "LICENSE"
@@ -48,18 +48,23 @@ def convert(copy: Path, folder: Path) -> Path:
             f"copy: {str(copy)!r} holds no data/camera/*.json with a LICENSE; allowed: a copy of rawtoaces-data; "
             "give its folder"
         )
-    if (folder / FILE).exists():
-        raise InputError(f"out: {str(folder / FILE)!r} exists; allowed: a folder without it; choose another folder")
+    places = (folder / "LICENSE", folder / "NOTICE", folder / FILE)
+    for place in places:
+        if place.exists():
+            raise InputError(f"out: {str(place)!r} exists; allowed: a folder without it; choose another folder")
     content = {
         "source": SOURCE,
         "licence": LICENCE,
         "range_nm": RANGE_NM,
         "cameras": [_camera(path) for path in camera_files],
     }
+    try:
+        licence_text = read_bounded(licence, _MOST_BYTES)
+    except ValueError as error:
+        raise InputError(f"copy: {str(licence)!r}: {error}; give a copy of rawtoaces-data") from error
     folder.mkdir(parents=True, exist_ok=True)
-    places = (folder / "LICENSE", folder / "NOTICE", folder / FILE)
     with replacing(*places) as (to_licence, to_notice, to_cameras):
-        to_licence.write_bytes(licence.read_bytes()[:_MOST_BYTES])
+        to_licence.write_bytes(licence_text)
         to_notice.write_text(NOTICE, "utf-8")
         to_cameras.write_text(_compact(content), "utf-8")
     return folder / FILE
@@ -68,11 +73,7 @@ def convert(copy: Path, folder: Path) -> Path:
 def _camera(path: Path) -> dict[str, Any]:
     """One camera, its curves as whole numbers."""
     try:
-        with path.open("rb") as file:
-            text = file.read(_MOST_BYTES + 1)
-        if len(text) > _MOST_BYTES:
-            raise ValueError(f"it is over {_MOST_BYTES} bytes")
-        held = json.loads(text.decode("utf-8"))
+        held = json.loads(read_bounded(path, _MOST_BYTES).decode("utf-8"))
         header, data = held["header"], held["spectral_data"]
         channels, rows = list(data["index"]["main"]), data["data"]["main"]
         nm = np.array(sorted(float(key) for key in rows))

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtr
+import scipy
 
 from rodcone.errors import InputError, one_line, require_keys, require_range, require_whole
 from rodcone.toml_file import read_toml
@@ -121,6 +121,12 @@ def numbers_of(report: EmvaReport) -> PixelNumbers:
         clip_e = clip_over_saturation(value, figures.get("sigma_d", 0.0), figures.get("PRNU1288", 0.0) / 100)
         words = f"the clip whose variance is greatest at the saturation capacity, mu_e.sat = {value:g} e-"
         pixel["full_well_e"] = Sourced(clip_e, f"{words}; {told}")
+    if "K" in figures and "K =" not in str(pixel.get("full_well_e")):
+        lacking = [name for name in _WHOLE if name not in settings]
+        left_out["K"] = (
+            f"{figures['K']:g} DN/e- is set aside: without {' and '.join(lacking)} it doesn't tell where the converter "
+            "ends"
+        )
     if "sigma_d" in figures:
         pixel["read_noise_e"], note = _read_noise(figures, told)
         left_out |= note
@@ -150,7 +156,7 @@ def clip_over_saturation(saturation_e: float, sigma_d: float, prnu: float) -> fl
     clip_e = saturation_e
     for _ in range(8):  # the correction is a few per cent at first, and then what the last one missed
         z = (clip_e - mean_e) / np.sqrt(own)
-        above, density = ndtr(-z), np.exp(-(z**2) / 2) / sqrt(2 * pi)
+        above, density = scipy.special.ndtr(-z), np.exp(-(z**2) / 2) / sqrt(2 * pi)
         first, second = z * above - density, 1 - above - z * density + z**2 * above
         variance = (own * (second - first**2)) @ weights
         clip_e += saturation_e - light_e[np.argmax(variance)]

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from render.published_spectra import published_spectra
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError, one_line, unknown
-from rodcone.optional import quietly_imported
+from rodcone.files import read_bounded
 from sensor.curves import Responses
 
 FILE = "cameras.json"
@@ -123,12 +124,12 @@ def measured_camera(name: str) -> MeasuredCamera:
 
 @cache
 def _npl_camera() -> MeasuredCamera:
-    """Camera that colour-science holds; importing that library takes 1 to 2 s.
+    """Camera that every installation has.
 
     The same measurement as rawtoaces-data's, equal to the last digit there. colour-science's other camera, a Sigma SD1
     Merrill, has three layers in each pixel and no mosaic (decision 0052).
     """
-    held = quietly_imported("colour").MSDS_CAMERA_SENSITIVITIES["Nikon 5100 (NPL)"]
+    curves = published_spectra("nikon_d5100")
     return MeasuredCamera(
         maker="Nikon",
         model="D5100",
@@ -138,8 +139,8 @@ def _npl_camera() -> MeasuredCamera:
         date="2015",
         source="colour-science, from J. Opt. Soc. Am. A 32, 381 (2015), doi:10.1364/JOSAA.32.000381",
         licence="BSD-3-Clause",
-        wavelength_nm=np.array(held.wavelengths, np.float64),
-        per_power=dict(zip("RGB", np.array(held.values, np.float64).T, strict=True)),
+        wavelength_nm=curves["G"][0],
+        per_power={channel: values for channel, (_, values) in curves.items()},
     )
 
 
@@ -153,11 +154,7 @@ def read_library(path: Path, _changed: int) -> dict[str, MeasuredCamera]:
         For a file that is damaged.
     """
     try:
-        with path.open("rb") as file:
-            text = file.read(MOST_BYTES + 1)
-        if len(text) > MOST_BYTES:
-            raise ValueError(f"it is over {MOST_BYTES} bytes")
-        return _cameras(json.loads(text.decode("utf-8")))
+        return _cameras(json.loads(read_bounded(path, MOST_BYTES).decode("utf-8")))
     except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError) as error:
         raise InputError(
             f"measured responses: {str(path)!r} can't be read ({type(error).__name__}: {one_line(error)}); "

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rodcone.errors import InputError, one_line, require_range, unknown
+from rodcone.files import read_bounded
 from sensor.cameras.numbers import PixelNumbers, Sourced, bits_of
 from sensor.raw_files.noise_profile import read_noise_profile
 from sensor.raw_files.raw_file import open_raw
@@ -105,13 +106,7 @@ def darktable_numbers(path: Path, camera: str, iso: float | None, white_e: float
 def _darktable(path: Path) -> dict[str, dict[float, tuple[float, float]]]:
     """Green's a and b by exposure index, by camera."""
     try:
-        if path.exists() and not path.is_file():
-            raise ValueError("it is a folder or a device")
-        with path.open("rb") as file:
-            text = file.read(MOST_BYTES + 1)
-        if len(text) > MOST_BYTES:
-            raise ValueError(f"it is over {MOST_BYTES} bytes")
-        held = json.loads(text.decode("utf-8"))
+        held = json.loads(read_bounded(path, MOST_BYTES).decode("utf-8"))
         return {name: profiles for name, profiles in _each_camera(held) if profiles}
     except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError) as error:
         raise InputError(

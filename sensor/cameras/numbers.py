@@ -9,7 +9,8 @@ from render.spectrum import Spectrum
 from rodcone.errors import InputError, unknown
 from sensor.cameras.library import MeasuredCamera
 from sensor.cfa import Tile, channels
-from sensor.config import PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import SensorConfig
 
 _STEP_NM = 4.0  # of lent curves
 _LEAST_SHARE = 0.05  # of the greatest response, at an anchor's wavelength
@@ -186,7 +187,8 @@ def preset_text(title: str, numbers: PixelNumbers, shape: Curves | None, curves:
     words = dict.fromkeys(missing(numbers), "not told: needed, so give a number")
     words |= {key: f"not told: {off}" for key, off in _OFF.items()} | dict(numbers.left_out)
     lines += [f"# {key} =   # {_plain(why)}" for key, why in words.items() if key not in numbers.pixel]
-    return "\n".join([*lines, "", "[lens]", "f_number = 2.8  # a choice: no source of a sensor tells a lens", ""])
+    lines += ["", "[lens]", "f_number = 2.8  # a choice: no source of a sensor tells a lens"]
+    return "\n".join([*lines, "diffraction = 1.0  # a choice: an ideal aperture", ""])
 
 
 def curves_csv(numbers: PixelNumbers, shape: Curves | None) -> str:

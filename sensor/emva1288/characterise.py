@@ -11,7 +11,6 @@ from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, require_whole
 from rodcone.jit import backend
 from rodcone.plots import BLUE, ORANGE, Axes, draw_curves
-from sensor.binning import as_read
 from sensor.config import SensorConfig
 from sensor.emva1288 import estimators as emva
 from sensor.emva1288.photon_transfer import Expose, Transfer, bench, dark_slopes, take_stack, take_transfer
@@ -115,16 +114,16 @@ def characterise(
     for name, side in zip(("height", "width"), shape, strict=True):
         require_whole(name, side, 16, 1 << 14, "give the frame's side in pixels")
     require_whole("seed", seed, 0, 2**31, "give a whole number")
-    if sensor.readings:
+    if sensor.chip.readings:
         raise InputError(
-            f"sensor: {len(sensor.readings)} readings of a pixel; allowed: one, for the standard has no other; "
+            f"sensor: {len(sensor.chip.readings)} readings of a pixel; allowed: one, for the standard has no other; "
             "give one of them (--reading 1, sensor.readings.noise.of_reading)"
         )
     require_range("exposure_s", exposure_s, 0.0, 1e6, "give seconds, 0 or more")
-    read = as_read(sensor)
-    result = measure(bench(sensor, shape, seed, exact), plan_for(read, exposure_s), read)
+    result = measure(bench(sensor, shape, seed, exact), plan_for(sensor, exposure_s), sensor)
     engine = "numpy" if exact else backend()
-    binned = (f"figures are of 2x2 pixels, binned: {sensor.binning}",) if sensor.binning else ()
+    binning = sensor.chip.binning
+    binned = (f"figures are of 2x2 pixels, binned: {binning.way}",) if binning else ()
     return replace(result, notes=(*result.notes, *binned, f"frames were drawn by {engine}"))
 
 

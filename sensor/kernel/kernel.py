@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from rodcone.device_arrays import ALIGNMENT, aligned, divide, divisor, tile_cell, upload
 from rodcone.jit import arrays, dr
-from sensor.binning import of_read_pixels
+from sensor.binning import photosites, pixel_sums
 from sensor.cfa import channel_map, channels, check_covers
-from sensor.config import CHARGE, SensorConfig
+from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.kernel.poisson import alias_table, poisson
 from sensor.random import MULTIPLIERS, ROUNDS, WEYL, NoiseTerm
@@ -55,11 +55,12 @@ def expected_electrons_single(
     """
     jit = arrays()
     height, width, bands = values.shape
-    check_covers(sensor.cfa, (height, width))
+    mosaic = photosites(sensor).cfa
+    check_covers(mosaic, (height, width))
     planes = _single(np.moveaxis(values, -1, 0).reshape(bands, -1))
     scalars = [[dr.opaque(jit.Float, float(weight)) for weight in row] for row in weights]
-    tile = channel_map(sensor.cfa, (len(sensor.cfa), len(sensor.cfa[0])))
-    tile_channels = upload(np.vectorize(channels(sensor.cfa).index)(tile).astype(np.uint32))
+    tile = channel_map(mosaic, (len(mosaic), len(mosaic[0])))
+    tile_channels = upload(np.vectorize(channels(mosaic).index)(tile).astype(np.uint32))
     tile_size = divisor(tile.shape[0]), divisor(tile.shape[1])
     result = np.empty(planes.shape[1], dtype=np.float32)
     for start, piece in _pieces(planes):
@@ -130,7 +131,8 @@ def read_frame(
     Binned in charge, the wells are filled here and a quarter as many pixels converted in NumPy.
     """
     expected_e = np.asarray(expected_e, dtype=np.float32)
-    jit, pixel = arrays(), sensor.pixel
+    jit, one = arrays(), photosites(sensor)
+    pixel = one.pixel
     if pixel.crosstalk:
         expected_e = _single(spread_charge(np.minimum(expected_e, np.float64(LARGEST)), pixel.crosstalk))
     row, column = divide(dr.arange(jit.UInt, expected_e.size), divisor(expected_e.shape[1]))
@@ -153,7 +155,7 @@ def read_frame(
     collected_e = poisson(dr.minimum(mean_e, most_e), shot, words[2:], upload(alias_table()))
 
     collected_e = dr.minimum(collected_e, dr.opaque(jit.Float, pixel.full_well_e))
-    if sensor.binning == CHARGE:
+    if sensor.chip.in_charge:
         return convert(collected_e.numpy().astype(np.float64).reshape(expected_e.shape), sensor, device, key)
 
     # Double precision behind the well: whole electrons lie on the same DN as in the NumPy form.
@@ -162,9 +164,9 @@ def read_frame(
         read_e *= dr.gather(jit.Float64, upload(device.column_gain), column)
     read_noise_e = dr.opaque(jit.Float64, pixel.read_noise_e) * jit.Float64(read)
     read_e += upload(device.dark_offset_e, copy_under=COPY_UNDER) + read_noise_e
-    dn = read_e / dr.opaque(jit.Float64, sensor.gain_e_per_dn) + dr.opaque(jit.Float64, sensor.black_dn)
-    dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(sensor.white_dn))))
-    return of_read_pixels(dn.numpy().astype(np.uint16).reshape(expected_e.shape), sensor)
+    dn = read_e / dr.opaque(jit.Float64, one.gain_e_per_dn) + dr.opaque(jit.Float64, one.black_dn)
+    dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(one.white_dn))))
+    return pixel_sums(dn.numpy().astype(np.uint16).reshape(expected_e.shape), sensor)
 
 
 def philox(counter: tuple[Any, ...], key: tuple[Any, Any]) -> tuple[Any, ...]:

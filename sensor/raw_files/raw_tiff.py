@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import InputError
-from rodcone.files import replacing
+from rodcone.errors import InputError, one_line
+from rodcone.files import read_bounded, replacing
 from sensor.raw import RawImage
 from sensor.raw_files.raw_json import MOST_BYTES, parse_json, raw_image, to_json
 from sensor.raw_files.tiff import MIN_IS_BLACK, read_mosaic, write_mosaic
@@ -22,11 +22,16 @@ def write_tiff(raw: RawImage, path: Path) -> tuple[Path, Path]:
     Raises
     ------
     InputError
-        Where the pixels are neither uint16 nor float32.
+        Where the pixels are neither uint16 nor float32, or another program's file has the sidecar's name.
     OSError
         Where the folder is missing or can't be written.
     """
     sidecar = path.with_suffix(".json")
+    if sidecar.exists() and DIGEST.encode() not in _text(sidecar, path):
+        raise InputError(
+            f"{path}: {sidecar.name} beside it is another program's; allowed: none, or a sidecar that rodcone wrote; "
+            "choose another name"
+        )
     with replacing(sidecar, path) as (note, picture):
         write_mosaic(picture, raw.dn, MIN_IS_BLACK, {})
         note.write_text(to_json(raw, **{DIGEST: _digest(raw.dn)}) + "\n", encoding="utf-8")
@@ -43,19 +48,19 @@ def read_tiff(path: Path) -> RawImage:
     """
     dn, _ = read_mosaic(path, MIN_IS_BLACK)
     sidecar = path.with_suffix(".json")
-    try:
-        if sidecar.exists() and not sidecar.is_file():  # a pipe or a device may never end
-            raise InputError(f"{sidecar}: a folder or a device; allowed: the sidecar that rodcone wrote")
-        with sidecar.open("rb") as file:
-            text = file.read(MOST_BYTES + 1)  # one more is refused
-    except OSError as error:
-        raise InputError(
-            f"{sidecar}: can't be read ({error.strerror or error}); keep the sidecar beside {path.name}"
-        ) from error
-    held = parse_json(text, str(sidecar), (DIGEST,))
+    held = parse_json(_text(sidecar, path), str(sidecar), (DIGEST,))
     if held[DIGEST] != _digest(dn):
         raise InputError(f"{sidecar}: it describes other pixels than {path.name}; keep the two files of one exposure")
     return raw_image(held, dn, str(sidecar))
+
+
+def _text(sidecar: Path, picture: Path) -> bytes:
+    try:
+        return read_bounded(sidecar, MOST_BYTES)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{sidecar}: can't be read ({one_line(error)}); keep the sidecar beside {picture.name}"
+        ) from error
 
 
 def _digest(dn: NDArray[Any]) -> str:

@@ -26,7 +26,7 @@ def merge_readings(raws: Sequence[RawImage], sensor: SensorConfig, exposure_s: f
     Parameters
     ----------
     raws : sequence of RawImage
-        In the order of `sensor.readings`.
+        In the order of the chip's readings.
     sensor : SensorConfig
     exposure_s : float
         Of the longest [s].

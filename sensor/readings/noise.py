@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
+from sensor.chip import Chip
 from sensor.config import SensorConfig
-from sensor.readings.reading import MERGED
 
 # A reading, or a frame of a burst, counts where the merged light fills it to no more than 6 standard deviations under
 # its well: its own noise then clips once in 1e9 pixels.
@@ -44,17 +44,17 @@ class Seams:
 
 def shares(sensor: SensorConfig) -> Floats:
     """Share of the whole pixel's electrons of the whole exposure in each reading."""
-    return np.array([x.share for x in sensor.readings])
+    return np.array([x.share for x in sensor.chip.readings])
 
 
 def whole_share(sensor: SensorConfig) -> float:
     """What all charges hold together, over the whole pixel's electrons: the unit of the merged electrons."""
-    return float(sum({x.charge: x.share for x in sensor.readings}.values()))
+    return float(sum({x.charge: x.share for x in sensor.chip.readings}.values()))
 
 
 def of_reading(sensor: SensorConfig, index: int) -> SensorConfig:
     """Sensor of one reading alone, which takes its share of the light and of the dark current."""
-    reading, pixel = sensor.readings[index], sensor.pixel
+    reading, pixel = sensor.chip.readings[index], sensor.pixel
     own = replace(
         pixel,
         read_noise_e=reading.read_noise_e,
@@ -63,15 +63,15 @@ def of_reading(sensor: SensorConfig, index: int) -> SensorConfig:
         dark_current_e_per_s=pixel.dark_current_e_per_s * reading.share,
         hot_pixel_dark_current_e_per_s=pixel.hot_pixel_dark_current_e_per_s * reading.share,
     )
-    return replace(sensor, pixel=own, readings=(), readout=MERGED)
+    return replace(sensor, pixel=own, chip=Chip())
 
 
 def switched_to(sensor: SensorConfig, expected_e: Floats) -> int:
     """Number of the reading that a camera which switches its gain takes: the quietest that holds the bright end."""
     bright_e = float(np.percentile(expected_e, METERED_PERCENTILE))
-    quiet_first = sorted(range(len(sensor.readings)), key=lambda i: sensor.readings[i].read_noise_e)
-    holding = [i for i in quiet_first if bright_e <= METERED_SHARE * sensor.readings[i].full_well_e]
-    return holding[0] if holding else max(quiet_first, key=lambda i: sensor.readings[i].full_well_e)
+    quiet_first = sorted(range(len(sensor.chip.readings)), key=lambda i: sensor.chip.readings[i].read_noise_e)
+    holding = [i for i in quiet_first if bright_e <= METERED_SHARE * sensor.chip.readings[i].full_well_e]
+    return holding[0] if holding else max(quiet_first, key=lambda i: sensor.chip.readings[i].full_well_e)
 
 
 def dark_electrons(sensor: SensorConfig, exposure_s: float) -> float:
@@ -93,7 +93,7 @@ def covariances(expected_e: Floats, sensor: SensorConfig, exposure_s: float) -> 
     dict of str to (n, reading, reading) float64
         By the names of `sensor.readout.noise_sources` [e-^2].
     """
-    pixel, readings = sensor.pixel, sensor.readings
+    pixel, readings = sensor.pixel, sensor.chip.readings
     share = shares(sensor)
     light = np.asarray(expected_e, dtype=np.float64)[:, None, None]
     own = np.eye(len(readings))
@@ -133,7 +133,7 @@ def best_weights(covariance: Floats, kept: NDArray[np.intp]) -> Floats:
 
 def seams(sensor: SensorConfig, exposure_s: float) -> Seams:
     """Where the merge leaves readings out: 6 standard deviations under the well, but not under half of it."""
-    full_e = np.array([x.full_well_e for x in sensor.readings]) / shares(sensor)
+    full_e = np.array([x.full_well_e for x in sensor.chip.readings]) / shares(sensor)
     total = sum(covariances(full_e, sensor, exposure_s).values())
     spread_e = np.sqrt(np.einsum("iii->i", total))
     above_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
@@ -156,7 +156,7 @@ def merged_variances(expected_e: Floats, sensor: SensorConfig, exposure_s: float
         weights = best_weights(total, at.order[number:])
         noise_e = np.sqrt(np.einsum("ni,nij,nj->n", weights, total, weights))
         last = number == len(at.order) - 1
-        beyond = np.zeros_like(light) if last else ndtr((light + dark_e - above_e) / noise_e)
+        beyond = np.zeros_like(light) if last else scipy.special.ndtr((light + dark_e - above_e) / noise_e)
         for name, covariance in by_source.items():
             found[name] = found[name] + left * (1 - beyond) * np.einsum("ni,nij,nj->n", weights, covariance, weights)
         left = left * beyond

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from render.error_estimates import Halves
 from render.radiance import SpectralRadiance
 from render.spectrum import LINE_BASE_NM, VISIBLE_NM, Floats, Spectrum, line_bands
 from render.transport import Transport
@@ -67,17 +68,17 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
     matrix, means = _means(transport.width_nm, groups), transport.scene_means
     # Of all light groups' bands, and of the uncovered part that stands behind them.
     every = block_diag(*[matrix] * len(transport.groups), 1.0)
-    seen, seen_difference = (
-        tuple(planes if len(planes) == 1 else _merge(matrix, planes[None])[0] for planes in of_groups)
-        for of_groups in (transport.seen, transport.seen_difference)
-    )
+
+    def merged(halves: Halves) -> Halves:
+        return Halves(_merge(matrix, halves.mean), _merge(matrix, halves.difference))
+
     return replace(
         transport,
-        radiance=_merge(matrix, transport.radiance),
-        half_difference=_merge(matrix, transport.half_difference),
+        light=merged(transport.light),
         variance=_merge(matrix, np.sqrt(np.maximum(transport.variance, 0.0))) ** 2,
-        seen=seen,
-        seen_difference=seen_difference,
+        seen=tuple(
+            x if len(x.mean) == 1 else merged(Halves(x.mean[None], x.difference[None]))[0] for x in transport.seen
+        ),
         scene_means=replace(means, radiance=means.radiance @ matrix.T, covariance=every @ means.covariance @ every.T),
         meter=None,
         wavelength_nm=nm,

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from render.denoised.measured_error import measured_error
+from render.denoised.relight import measured_error
 from render.transport import Transport
 from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
@@ -60,7 +60,7 @@ def charged_share(
     ----------
     errors_e : (1 or 2, h, w) array
         One draw of the unbiased light's error [e-]; or what denoised light differs by from two folds: the mean of their
-        product is its whole squared error, and its upper limit is charged (`render.denoised.measured_error`).
+        product is its whole squared error, and its upper limit is charged (`render.denoised.relight`).
     expected_e : (h, w) float64
     sensor, exposure_s
         As of `monte_carlo_share`.

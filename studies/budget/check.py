@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.transport import Transport
-from sensor.binning import as_read
 from sensor.kernel.kernel import expected_electrons_single
 from sensor.optics import form_image
 from sensor.presets import preset
@@ -94,7 +93,7 @@ def check_plan(
             if row.condition.scene == choice:
                 expected = model_electrons(made["planned"], row, planned.images[row.condition])
                 true = model_electrons(made["reference"], row, reference.images[row.condition])
-                below = true < as_read(preset(row.condition.sensor)).pixel.full_well_e * row.condition.frames
+                below = true < preset(row.condition.sensor).pixel.full_well_e * row.condition.frames
                 measured = float(np.sqrt(np.mean((expected - true)[below] ** 2))) if below.any() else 0.0
                 # The reference has noise of its own, of its samples and of its level.
                 rms_e = {term.name: term.rms_e for term in row.terms}
@@ -108,7 +107,7 @@ def model_electrons(transport: Transport, row: Ledger, model: ImageModel) -> NDA
     condition = row.condition
     lit = under(transport, condition.spectrum)
     level = level_luminance(condition.level, lux_per_cd_m2(lit, [condition.level]))
-    sensor = replace(as_read(vary(preset(condition.sensor), row.mosaic)), lens=model.lens)
+    sensor = replace(vary(preset(condition.sensor), row.mosaic).undivided, lens=model.lens)
     image = form_image(photographed(lit, level), sensor)
     if model.exact:
         return expected_electrons(image, sensor, row.exposure_s)

@@ -1,7 +1,8 @@
 """The error budget's ledger: each approximation in electrons, and as a share of the sensor's own noise variance."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from sensor.config import SensorConfig
 from sensor.readout import noise_variance
 from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
-from studies.study.study import Condition
+from studies.study.study import Condition, label
 
 # Standard errors added to a mean over the pilot's pixels. Of noise a few pixels may hold most, here and in what is
 # predicted: whatever its distribution, at most 5 % exceed the mean by root 19 standard deviations (Cantelli).
@@ -17,6 +18,7 @@ EFFECT_MARGIN, NOISE_MARGIN = 2.0, 19.0**0.5
 MONTE_CARLO, LEVEL = "Monte Carlo", "level"
 RESPONSE, LIGHT = "bands", "light within bands"
 KERNEL = "kernel"
+LEAST_SHOWN = 1e-3  # share of the noise variance, of what a text shows
 
 
 @dataclass(frozen=True)
@@ -193,3 +195,33 @@ def _upper(values: NDArray[np.float64], margin: float) -> float:
 
 def _mean(values: NDArray[np.float64]) -> float:
     return float(values.mean()) if values.size else 0.0
+
+
+def ledger_html(ledgers: Sequence[Ledger]) -> str:
+    """Table for a notebook: a row a condition and mosaic, a column a term."""
+    names = ["condition", "noise, e-", "off, e-", "together", *(term.name for term in ledgers[0].terms)]
+    head = "".join(f"<th>{escape(name)}</th>" for name in names)
+    cells = ([" ".join(condition_words(row)), *figures(row)] for row in ledgers)
+    rows = ("".join(f"<td>{escape(text)}</td>" for text in line) for line in cells)
+    return f"<table>{''.join(f'<tr>{row}</tr>' for row in (head, *rows))}</table>"
+
+
+def condition_words(row: Ledger) -> tuple[str, ...]:
+    """Scene, spectrum, level, exposure, sensor and mosaic of a row."""
+    of = row.condition
+    return of.scene.label, label(of.spectrum), of.level, of.exposure, of.sensor, row.mosaic
+
+
+def figures(row: Ledger) -> list[str]:
+    """Noise and error [e-], the error's share, and the share of each term, in brackets where it is modelled."""
+    terms = [f"({percent(term.share)})" if term.modelled else percent(term.share) for term in row.terms]
+    return [f"{row.noise_e:.3g}", f"{row.rms_e:.3g}", percent(row.share), *terms]
+
+
+def percent(share: float) -> str:
+    """Share as per cent, from twice on as a factor."""
+    if share >= 2:
+        return f"{share:.1f}x" if share < 10 else f"{share:.0f}x"
+    if share >= 0.1:
+        return f"{100 * share:.0f}%"
+    return f"{100 * share:.2g}%" if share >= LEAST_SHOWN else "0%" if share == 0 else f"<{100 * LEAST_SHOWN:g}%"

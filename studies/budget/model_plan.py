@@ -7,7 +7,7 @@ import numpy as np
 
 from rodcone.brief import brief
 from sensor.presets import preset
-from studies.budget.ledger import Ledger
+from studies.budget.ledger import Ledger, ledger_html
 from studies.study.model import ImageModel, RenderModel
 from studies.study.study import Condition, SceneChoice, Study, conditions
 
@@ -27,17 +27,17 @@ class Plan:
     __repr__ = brief
 
     def _repr_html_(self) -> str:
-        from studies.budget.plan_text import plan_html  # late: it reads this type
-
-        return plan_html(self)
+        if not self.ledgers:
+            return f"<p>Plan without a budget: renders {len(self.renders)}, images {len(self.images)}</p>"
+        return ledger_html(self.ledgers)
 
 
 def as_stated(study: Study) -> Plan:
-    """Plan without a budget: bands and samples as the study states, lenses as the sensors state."""
+    """Plan without a budget: bands and samples as the study states, lenses as the study and its sensors state."""
     low, high = study.render.range_nm
     edges = np.linspace(low, high, max(1, round((high - low) / study.render.band_nm)) + 1)
     centres, widths = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
     render = RenderModel(tuple(centres.tolist()), tuple(widths.tolist()), study.render.spp, study.render.denoise)
-    lenses = {name: preset(name).lens for name in study.sensors}
+    lenses = {name: study.lens.on(preset(name).lens) for name in study.sensors}
     images = {condition: ImageModel(lenses[condition.sensor]) for condition in conditions(study)}
     return Plan(renders=dict.fromkeys(study.scenes, render), images=images)

@@ -12,7 +12,6 @@ from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.errors import InputError
 from rodcone.progress import Step
-from sensor.binning import as_read
 from sensor.burst import merged_sensor
 from sensor.config import LensConfig
 from sensor.presets import preset
@@ -22,7 +21,7 @@ from studies.budget.choice import choose
 from studies.budget.ledger import KERNEL, PilotNoise, Weighed, ledger, weigh
 from studies.budget.model_plan import Plan
 from studies.budget.terms import LENS_TERMS, effects, horizontal_view_deg
-from studies.study.exposures import parse_exposure
+from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, level_luminance, lux_per_cd_m2, open_all, under, white_spectrum
 from studies.study.model import ImageModel, RenderModel, unit_exposure_s
 from studies.study.radiance_file import open_radiance_file
@@ -142,16 +141,15 @@ def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> 
 
 
 def full_lens(study: Study, lens: LensConfig, opened: OpenedScene) -> LensConfig:
-    """Lens of the reference: what the sensor's own states, and what it leaves out as study and scene state it."""
-    asked, view = study.lens, study.lens.horizontal_view_deg
-    if view is None:
-        view = 0.0 if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
-    return replace(
+    """Lens of the reference: what the study states, then what the sensor's own has, then a good lens in the scene."""
+    view = 0.0 if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
+    whole = replace(
         lens,
-        diffraction=lens.diffraction or asked.diffraction,
-        veiling_glare=lens.veiling_glare or asked.veiling_glare,
+        diffraction=lens.diffraction or 1.0,  # an ideal aperture
+        veiling_glare=lens.veiling_glare or 0.01,  # a good photographic lens by the index of ISO 9358
         horizontal_view_deg=lens.horizontal_view_deg or view,
     )
+    return study.lens.on(whole)
 
 
 def _spectra(opened: OpenedScene, study: Study) -> list[Spectrum]:
@@ -168,9 +166,9 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
         lux = lux_per_cd_m2(lit, study.levels)
         noise = _pilot_noise(pilot, lit)
         for name in study.sensors:
-            auto_s = unit_exposure_s(lit.relight(luminance_cd_m2=1.0), as_read(preset(name)))
+            auto_s = unit_exposure_s(lit.relight(luminance_cd_m2=1.0), preset(name).undivided)
             for mosaic in mosaics(study):
-                sensor = as_read(vary(preset(name), mosaic))  # a pilot is coarser anyway
+                sensor = vary(preset(name), mosaic).undivided  # a pilot is coarser anyway
                 found = effects(lit, sensor, full_lens(study, sensor.lens, pilot.opened), pilot.groups, rng)
                 for condition in conditions(study, pilot.opened.choice):
                     if (condition.spectrum, condition.sensor) == (spectrum, name):
@@ -186,6 +184,6 @@ def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:
     """Monte Carlo noise of the pilot; a picture file states none."""
     if not pilot.rendered:
         return PilotNoise(spp=0, half_spp=1, level=0.0)
-    fewer = lit.coverage.size / (pilot.opened.size[0] * pilot.opened.size[1])
+    fewer = lit.coverage.mean.size / (pilot.opened.size[0] * pilot.opened.size[1])
     error = lit.level().relative_error or 0.0
     return PilotNoise(spp=lit.spp, half_spp=lit.spp / 2, level=error**2 * lit.spp * fewer)

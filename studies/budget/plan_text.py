@@ -2,18 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict
-from html import escape
 from typing import Any
 
 from rich.table import Table
 
 from studies.budget.choice import image_ns, render_ns
-from studies.budget.ledger import KERNEL, MONTE_CARLO, Ledger, Term
+from studies.budget.ledger import KERNEL, LEAST_SHOWN, MONTE_CARLO, Term, condition_words, figures, percent
 from studies.budget.model_plan import Plan
 from studies.budget.terms import LENS_TERMS
-from studies.study.study import SceneChoice, Study, label
+from studies.study.study import SceneChoice, Study
 
-LEAST_SHOWN = 1e-3  # share of the noise variance, of a column of the table
 LEVEL = 2  # place of the level in a condition's words
 
 
@@ -46,7 +44,7 @@ def plan_table(plan: Plan) -> Table:
     are under `LEAST_SHOWN` everywhere are named below.
     """
     worse = [max((x for x in plan.ledgers if x.condition == of), key=lambda row: row.share) for of in plan.images]
-    words = [_condition(row) for row in worse]
+    words = [condition_words(row) for row in worse]
     varies = [len({line[i] for line in words}) > 1 for i in range(len(words[0]))]
     small = [all(row.terms[i].share < LEAST_SHOWN for row in worse) for i in range(len(worse[0].terms))]
     names = [term.name for term in worse[0].terms]
@@ -63,50 +61,23 @@ def plan_table(plan: Plan) -> Table:
         table.add_column(name.replace(" ", "\n"), justify="right", no_wrap=True)
     lines: dict[tuple[str, ...], list[str]] = {}
     for row, line in zip(worse, words, strict=True):
-        figures = [cell for cell, is_small in zip(_figures(row), (*[False] * 3, *small), strict=True) if not is_small]
+        cells = [cell for cell, is_small in zip(figures(row), (*[False] * 3, *small), strict=True) if not is_small]
         rest = " ".join(word for i, word in enumerate(line) if varies[i] and i != LEVEL)
-        lines.setdefault((rest, *figures), []).append(row.condition.level)
+        lines.setdefault((rest, *cells), []).append(row.condition.level)
     above = ""
-    for (rest, *figures), levels in lines.items():
+    for (rest, *cells), levels in lines.items():
         if rest != above:
             table.add_row(f"[bold]{rest}")
         above = rest
-        table.add_row(", ".join(dict.fromkeys(levels)), *figures)
+        table.add_row(", ".join(dict.fromkeys(levels)), *cells)
     return table
-
-
-def plan_html(plan: Plan) -> str:
-    """The ledger as a table for a notebook: a row a condition and mosaic, a column a term."""
-    if not plan.ledgers:
-        return f"<p>Plan without a budget: renders {len(plan.renders)}, images {len(plan.images)}</p>"
-    head = "".join(f"<th>{escape(name)}</th>" for name in _head(plan))
-    rows = ("".join(f"<td>{escape(text)}</td>" for text in _cells(row)) for row in plan.ledgers)
-    return f"<table>{''.join(f'<tr>{row}</tr>' for row in (head, *rows))}</table>"
-
-
-def _head(plan: Plan) -> list[str]:
-    return ["condition", "noise, e-", "off, e-", "together", *(term.name for term in plan.ledgers[0].terms)]
-
-
-def _cells(row: Ledger) -> list[str]:
-    return [" ".join(_condition(row)), *_figures(row)]
-
-
-def _condition(row: Ledger) -> tuple[str, ...]:
-    of = row.condition
-    return of.scene.label, label(of.spectrum), of.level, of.exposure, of.sensor, row.mosaic
-
-
-def _figures(row: Ledger) -> list[str]:
-    terms = [f"({_percent(term.share)})" if term.modelled else _percent(term.share) for term in row.terms]
-    return [f"{row.noise_e:.3g}", f"{row.rms_e:.3g}", _percent(row.share), *terms]
 
 
 def reasons(study: Study, plan: Plan, reference: Plan) -> Iterator[str]:
     """One line for each thing that was chosen, with why."""
     budget = study.budget
     yield (
-        f"Budget: {_percent(budget.total)} of the sensor's own noise variance, {_percent(budget.monte_carlo)} of it "
+        f"Budget: {percent(budget.total)} of the sensor's own noise variance, {percent(budget.monte_carlo)} of it "
         "for Monte Carlo noise. Shares are upper estimates from a pilot render; in brackets, what is modelled would "
         "cost if it were left out."
     )
@@ -121,7 +92,7 @@ def reasons(study: Study, plan: Plan, reference: Plan) -> Iterator[str]:
         if noise.share > budget.monte_carlo:
             wanted = model.spp * noise.share / budget.monte_carlo
             yield (
-                f"{scene.label}: Monte Carlo noise reaches {_percent(noise.share)} in the worst condition; "
+                f"{scene.label}: Monte Carlo noise reaches {percent(noise.share)} in the worst condition; "
                 f"{wanted:.2g} samples would keep the aim, and render.spp allows {study.render.spp}"
             )
 
@@ -146,12 +117,3 @@ def cost_over_reference(plan: Plan, reference: Plan, scene: SceneChoice) -> floa
                 cost += image_ns(bands, [*kept, KERNEL] if image.exact else kept)
         costs.append(cost)
     return costs[0] / costs[1]
-
-
-def _percent(share: float) -> str:
-    """Share as per cent, from twice on as a factor."""
-    if share >= 2:
-        return f"{share:.1f}x" if share < 10 else f"{share:.0f}x"
-    if share >= 0.1:
-        return f"{100 * share:.0f}%"
-    return f"{100 * share:.2g}%" if share >= LEAST_SHOWN else "0%" if share == 0 else f"<{100 * LEAST_SHOWN:g}%"

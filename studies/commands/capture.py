@@ -4,8 +4,8 @@ import sys
 from pathlib import Path
 
 from rodcone.progress import progress
-from sensor.exposure import AUTO
-from studies.commands.console import Flag, Out, Seconds, Several, print_result, say
+from sensor.exposure import AUTO_INFORMATION
+from studies.commands.console import Flag, Out, Several, print_result, say
 from studies.photograph.shot import Order, take
 from studies.study.study import AS_SHOT
 
@@ -17,8 +17,7 @@ def capture(
     out: Out = Path("shot.dng"),
     sensor: str = "low_noise",
     cfa: str | None = None,
-    exposure: str = AUTO,
-    exposure_s: Seconds | None = None,
+    exposure: str = AUTO_INFORMATION,
     level: str | None = None,
     light: Several = None,
     chart: str | None = None,
@@ -49,10 +48,8 @@ def capture(
     cfa
         Mosaic, such as rgbw or bayer; the preset's own by default.
     exposure
-        Time such as 20ms, or a rule: auto for the brightest green, auto:W for the brightest W, auto:information for the
-        one of the two whose samples hold more.
-    exposure_s
-        Time in seconds or with its unit, in place of --exposure; 0 for a dark frame.
+        Time such as 20ms or 1/50, 0s for a dark frame, or a rule: auto for the brightest green, auto:W for the
+        brightest W, auto:information, the default, for the one of the two whose samples hold more.
     level
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
         by default.
@@ -92,7 +89,6 @@ def capture(
         out=out,
         sensor=sensor,
         cfa=cfa,
-        exposure_s=exposure_s,
         exposure=exposure,
         level=level,
         lights=tuple(light or ()),

@@ -8,15 +8,14 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from rodcone.errors import InputError, require_whole
-from rodcone.files import check_place, replacing
-from rodcone.json_values import finite
+from rodcone.files import check_place, finite, replacing
 from sensor.cameras.frames import frame_numbers, measure_files
 from sensor.cameras.numbers import preset_text
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
 from sensor.readings.noise import of_reading
-from studies.commands.console import Flag, OutOrNone, Seconds, print_table, require_ending, say
+from studies.commands.console import Flag, OutOrNone, Time, print_table, require_ending, say
 from studies.pages.transfer_chart import transfer_svg
 
 HEAD = ("figure", "unit", "configured", "measured", "std. error", "in std. errors")
@@ -36,7 +35,7 @@ def characterise(
     json: Flag = False,
     height: int = 256,
     width: int = 320,
-    exposure_s: Seconds = 0.01,
+    exposure: Time = 0.01,
     seed: int = 0,
 ) -> None:
     """Measure a simulated chip as an EMVA 1288 laboratory does, or a camera of your own from its raw files.
@@ -62,8 +61,8 @@ def characterise(
         Height of the chip in pixels; a larger chip has smaller standard errors.
     width
         Width of the chip in pixels; more columns measure the column noise better.
-    exposure_s
-        Exposure time of the photon-transfer series, in seconds or such as 10ms.
+    exposure
+        Exposure time of the photon-transfer series, such as 10ms, the default.
     seed
         Seed of the chip and of its frames.
     """
@@ -80,14 +79,14 @@ def characterise(
         raise InputError(f"window: {window} for {preset!r}; allowed with --from and --dark; leave it out")
     sensor = sensor_preset(preset)
     if reading is not None:
-        if not sensor.readings:
+        if not sensor.chip.readings:
             raise InputError(f"reading: {reading} of {preset!r}, whose pixels are read once; leave it out")
-        require_whole("reading", reading, 1, len(sensor.readings), f"{preset!r} has so many")
+        require_whole("reading", reading, 1, len(sensor.chip.readings), f"{preset!r} has so many")
         sensor = of_reading(sensor, reading - 1)
     if out is not None:
         require_ending(out, ".svg")
         check_place(out)
-    found = measure(sensor, (height, width), seed, exposure_s)
+    found = measure(sensor, (height, width), seed, exposure)
     if out is not None:
         with replacing(out) as (place,):
             place.write_text(transfer_svg(found, f"{preset}, characterised after EMVA 1288"), "utf-8")

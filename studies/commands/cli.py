@@ -1,7 +1,9 @@
 """The command `rodcone`. Results on stdout, progress and errors on stderr; bad input exits with code 2."""
 
+import re
 import sys
 import warnings
+from collections.abc import Sequence
 from functools import cache
 from importlib import metadata
 from typing import Any
@@ -14,6 +16,9 @@ from studies.commands.console import INTERRUPTED, say
 # Commands are imported when they run: other distributions have packages named render, sensor, ..., and `doctor`, which
 # says which ones Python finds, has to start all the same.
 BAD_INPUT = 2
+_BELOW_ZERO = re.compile(r"-[\d.]")
+_NUMBER = re.compile(r"^-?[\d.]+$")
+_UNITS = {"us", "ms", "s", "lux", "cd/m2", "cd/m²", "K"}
 
 app = App(
     name="rodcone",
@@ -31,7 +36,6 @@ app.command("studies.commands.doctor:doctor", name="doctor", help="Print version
 app.command("studies.commands.explore:explore", name="explore", help="Play with a camera on a page of this machine.")
 app.command("studies.commands.list:list_names", name="list", help="Print what the commands know by name.")
 app.command("studies.commands.new:app", name="new", help="Write files to start from: preset, study, cluster.")
-app.command("studies.commands.opponents:opponents", name="opponents", help="Rank a sweep's cameras on one page.")
 app.command("studies.commands.paper:paper", name="paper", help="Compute the paper's figures and check its claims.")
 app.command("studies.commands.plan:plan", name="plan", help="Compute a study's error budget and the cheapest model.")
 app.command("studies.commands.render:render", name="render", help="Render a scene into a spectral OpenEXR file.")
@@ -44,6 +48,20 @@ app.command("studies.commands.train:train", name="train", help="Train the prior 
 app.register_install_completion_command(help="Let this shell complete rodcone's commands and options.")
 
 
+def joined(arguments: Sequence[str]) -> list[str]:
+    """Arguments with a number below 0 and a unit put to what stands before: ``--level -5lux``, ``--exposure 20 ms``."""
+    result: list[str] = []
+    for text in arguments:
+        before = result[-1] if result else ""
+        if before.startswith("--") and "=" not in before and _BELOW_ZERO.match(text):
+            result[-1] += f"={text}"
+        elif text in _UNITS and _NUMBER.search(before) and len(result) > 1 and result[-2].startswith("-"):
+            result[-1] += f" {text}"
+        else:
+            result.append(text)
+    return result
+
+
 def main(arguments: list[str] | None = None) -> Any:
     """Run the command; one line on stderr and exit code 2 for bad input, 1 for a file that can't be written."""
     try:
@@ -51,7 +69,12 @@ def main(arguments: list[str] | None = None) -> Any:
             # Warnings look like errors, without the place in the code; each is printed once.
             once = cache(say)
             warnings.showwarning = lambda message, *_: once(str(message))
-            code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
+            code = app(
+                joined(sys.argv[1:] if arguments is None else arguments),
+                exit_on_error=False,
+                print_error=False,
+                result_action="return_value",
+            )
     except CycloptsError as error:
         fail(" ".join(str(error).split()), BAD_INPUT)
     except InputError as error:

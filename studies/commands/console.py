@@ -29,7 +29,13 @@ def _seconds(_: Any, tokens: Sequence[Any]) -> float:
         return parse_time(text)
 
 
-Seconds = Annotated[float, Parameter(converter=_seconds)]  # 0.02 or 20ms
+def _time(_: Any, tokens: Sequence[Any]) -> float:
+    """Seconds of a time with its unit."""
+    return parse_time(tokens[0].value)
+
+
+Seconds = Annotated[float, Parameter(converter=_seconds)]  # a duration: 65 or 65s
+Time = Annotated[float, Parameter(converter=_time)]  # an exposure: 20ms or 1/50
 
 INTERRUPTED = 130  # exit code after Ctrl-C: 128 + SIGINT
 

@@ -5,11 +5,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from studies.budget.model_plan import Plan, as_stated
-from studies.commands.console import Flag, Out, Seconds, Several
+from studies.budget.model_plan import as_stated
+from studies.commands.console import Flag, Out, Seconds, Several, Time
 from studies.commands.sweep import check_memory, make_all
 from studies.photograph.clock import Clock
-from studies.study.study import SceneChoice, Study
+from studies.study.study import SceneChoice
 from studies.study.study_file import read_study
 from studies.sweep.workers import cores, run_in_processes
 
@@ -24,7 +24,7 @@ def demo(
     sensor: Several = None,
     level: Several = None,
     processor: Several = None,
-    longest_exposure_s: Seconds | None = None,
+    longest_exposure: Time | None = None,
     spp: int | None = None,
     max_seconds: Seconds | None = None,
     seed: int = 0,
@@ -53,8 +53,8 @@ def demo(
     processor
         Processor such as bayer_menon; may be given several times. By default interleaved and bayer, the paper's method
         and its reference, and ple_rgbw and ple_bayer, one method on both mosaics, with which the page leads.
-    longest_exposure_s
-        Longest exposure time in seconds or with its unit; 66ms by default.
+    longest_exposure
+        Longest exposure time, such as 66ms, the default, or 1/15.
     spp
         Samples a pixel of the render, at most; 288 by default.
     max_seconds
@@ -76,20 +76,12 @@ def demo(
         scenes=(SceneChoice(scene or study.scenes[0].source, light),),
         sensors=study.sensors if sensor is None else tuple(sensor),
         levels=study.levels if level is None else tuple(level),
-        longest_exposure_s=study.longest_exposure_s if longest_exposure_s is None else longest_exposure_s,
+        longest_exposure_s=study.longest_exposure_s if longest_exposure is None else longest_exposure,
         processors=study.processors if processor is None else tuple(processor),
         seeds=tuple(seed + number for number in study.seeds),
         render=replace(study.render, **{name: value for name, value in changed.items() if value is not None}),
     )
     check_memory(study, out, reference=False, workers=cores(), force=force)
     runner = partial(run_in_processes, workers=cores())
-    _, report = make_all(study, out, lambda step: with_diffraction(as_stated(study), study), runner, clock=clock)
+    _, report = make_all(study, out, lambda step: as_stated(study), runner, clock=clock)
     print(report)
-
-
-def with_diffraction(plan: Plan, study: Study) -> Plan:
-    """Return a plan whose lenses have the study's diffraction, which a sensor's own leaves out."""
-    models = {}
-    for condition, model in plan.images.items():
-        models[condition] = replace(model, lens=replace(model.lens, diffraction=study.lens.diffraction))
-    return replace(plan, images=models)

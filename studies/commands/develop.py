@@ -7,7 +7,6 @@ from rodcone.files import check_place
 from studies.commands.console import Flag, OutOrNone, print_result
 from studies.photograph.develop import develop_file
 from studies.photograph.picture_file import check_picture_file, write_picture
-from studies.study.study import AS_SHOT
 
 
 def develop(
@@ -18,7 +17,7 @@ def develop(
     isp: str | None = None,
     bits: int = 8,
     ev: float | None = None,
-    white_balance: str = AS_SHOT,
+    white_balance: str | None = None,
     height: int | None = None,
     width: int | None = None,
     encoding: str = "srgb",
@@ -46,7 +45,8 @@ def develop(
         shown at 90 % of white.
     white_balance
         Illuminant, such as D65, under which grey is shown as grey; as-shot for the one that capture or the camera set,
-        as raw converters do; or gray-world, found in the picture as in the paper.
+        as raw converters do; or gray-world, found in the picture as in the paper. By default as-shot, and gray-world
+        for interleaved_paper.
     height
         Pixels of the picture, at most the raw file's; with one of height and width the other keeps the proportions.
     width

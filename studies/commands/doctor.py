@@ -16,7 +16,19 @@ from studies.commands.console import print_table
 
 PACKAGES = ("scenes", "render", "sensor", "isp", "studies")
 NEEDED = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR", "scikit-image", "flip-evaluator")
+# What pip install 'rodcone[...]' brings for a user, and what for.
+EXTRAS = {
+    "explore": ("the explorer", ("starlette", "uvicorn", "websockets", "anywidget")),
+    "opponents": ("Malvar's and Menon's demosaicking", ("colour-demosaicing",)),
+    "bm3d": ("processors by BM3D, for non-commercial use", ("bm3d", "colour-demosaicing")),
+    "denoise": ("denoised light", ("mitsuba-oidn",)),
+    "photographs": ("raw files of real cameras", ("rawpy",)),
+    "cluster": ("sweeps on several machines", ("dask", "distributed")),
+    "pandas": ("results as a table", ("pandas",)),
+    "parquet": ("results as Parquet", ("pyarrow",)),
+}
 LLVM_WHEEL = "karellen-llvm-core"
+_ABSENT = "not installed"
 FALLBACK = (
     "numpy: neither CUDA nor LLVM answers, so stock path + specfilm renders in scalar_spectral, "
     "and capture and reconstruction run their NumPy forms"
@@ -33,10 +45,16 @@ class Finding:
 
 
 def doctor() -> int:
-    """Print versions, the LLVM library, the engine, and whether rodcone's packages are its own; exit 1 if not."""
+    """Print versions, the LLVM library, the engine, the extras, whether rodcone's packages are its own, and a verdict.
+
+    Exit code 1 where something is wrong.
+    """
     found = findings()
-    print_table(("", ""), [(each.name, Text(each.value, style="" if each.ok else "red")) for each in found], words=2)
-    return 0 if all(each.ok for each in found) else 1
+    wrong = [each.name for each in found if not each.ok]
+    verdict = f"wrong: {', '.join(wrong)}; mend what stands beside" if wrong else "all is well"
+    rows = [*found, Finding("verdict", verdict, not wrong)]
+    print_table(("", ""), [(each.name, Text(each.value, style="" if each.ok else "red")) for each in rows], words=2)
+    return 1 if wrong else 0
 
 
 def findings() -> tuple[Finding, ...]:
@@ -45,16 +63,19 @@ def findings() -> tuple[Finding, ...]:
     home = Path(__file__).resolve().parents[2]
     others = intruders(home)
     packages = [package_finding(name, home, others.get(name)) for name in PACKAGES]
+    wrong = [each for each in packages if not each.ok]
+    places = wrong or [Finding("packages", f"{', '.join(PACKAGES)}: rodcone's own, in {home}")]
     unknown = Finding("engine", "not imported: a package named below is not rodcone's own", False)
     return (
         distribution_finding("rodcone", needed=False),
         Finding("Python", platform.python_version()),
         Finding("platform", platform.platform()),
         Finding("CPU threads", f"{usable} of {os.cpu_count()}"),
-        *(engine_findings() if all(each.ok for each in packages) else [unknown]),
+        *([unknown] if wrong else engine_findings()),
         *map(distribution_finding, NEEDED),
         distribution_finding(LLVM_WHEEL, needed=False),
-        *packages,
+        *map(extra_finding, EXTRAS),
+        *places,
     )
 
 
@@ -63,7 +84,15 @@ def distribution_finding(name: str, *, needed: bool = True) -> Finding:
     try:
         return Finding(name, metadata.version(name))
     except metadata.PackageNotFoundError:
-        return Finding(name, "not installed", not needed)
+        return Finding(name, _ABSENT, not needed)
+
+
+def extra_finding(name: str) -> Finding:
+    """Whether an extra is installed, and what it is for; its absence is no fault."""
+    purpose, distributions = EXTRAS[name]
+    installed = all(distribution_finding(each, needed=False).value != _ABSENT for each in distributions)
+    state = "installed" if installed else f"not installed; pip install 'rodcone[{name}]'"
+    return Finding(f"extra {name}", f"{purpose}: {state}")
 
 
 def intruders(home: Path) -> dict[str, str]:

@@ -1,7 +1,9 @@
 """The command `rodcone explore`."""
 
 import webbrowser
+from functools import partial
 
+from scenes.catalog import names
 from studies.commands.console import Flag, say
 from studies.explore.server import listen, make_server
 from studies.explore.session import Session
@@ -47,12 +49,12 @@ def explore(
     force
         Run even where more memory is needed than is free.
     """
-    opened = open_source(
-        source, RenderOptions(size=size, spp=spp, band_nm=band_nm, seed=seed, trust=trust_scene, force=force)
-    )
+    options = RenderOptions(size=size, spp=spp, band_nm=band_nm, seed=seed, trust=trust_scene, force=force)
+    opened = open_source(source, options)
+    scenes = {name: partial(open_source, name, options) for name in names()} | {opened.title: lambda: opened}
     say(*opened.notes)
     with listen(port) as listener:
-        session = Session(opened)
+        session = Session(opened, scenes)
         server, address = make_server(session, listener)
         print(address, flush=True)
         if not no_browser:

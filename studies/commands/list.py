@@ -5,16 +5,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
-from isp.processors.catalogue import PROCESSORS
-from render import illuminants
 from rodcone.errors import InputError
 from rodcone.files import check_place, replacing
-from scenes import catalog
-from sensor import cfa, presets
-from sensor.cameras.library import measured_cameras
 from studies.commands.console import Flag, OutOrNone, print_table, require_ending
-from studies.pages.curve_gallery import lights_svg, responses_svg
-from studies.pages.report_text import METRICS
+
+# Each list imports its own catalogue: all of them together take a second to load.
 
 # CIE 015:2018, with the correlated colour temperatures that it states.
 LIGHTS = {
@@ -66,6 +61,11 @@ def list_names(kind: Kind | None = None, /, *, out: OutOrNone = None, json: Flag
 
 def _write_gallery(kind: Kind | None, out: Path) -> None:
     """Draw the spectra of the lights, or the responses of the sensors."""
+    from render import illuminants
+    from sensor.cameras.library import measured_cameras
+    from sensor.presets import low_noise
+    from studies.pages.curve_gallery import lights_svg, responses_svg
+
     require_ending(out, ".svg")
     if kind not in ("lights", "sensors"):
         raise InputError(f"out: {str(out)!r} has no curves to show; allowed: with lights or sensors; leave it out")
@@ -76,13 +76,15 @@ def _write_gallery(kind: Kind | None, out: Path) -> None:
         measured = {
             f"{name}{'' if each.balanced else '*'}": each.responses for name, each in measured_cameras().items()
         }
-        text = responses_svg({"the presets": presets.low_noise().responses, **measured})
+        text = responses_svg({"the presets": low_noise().responses, **measured})
     with replacing(out) as (place,):
         place.write_text(text, "utf-8")
 
 
 def scenes() -> dict[str, str]:
     """Scenes of the catalogue, each by its module's first line, and its light groups."""
+    from scenes import catalog
+
     lines = {}
     for name in catalog.names():
         text = first_line(import_module(f"scenes.{name}").__doc__)
@@ -92,11 +94,16 @@ def scenes() -> dict[str, str]:
 
 def lights() -> dict[str, str]:
     """Illuminants."""
+    from render import illuminants
+
     return {name: LIGHTS[name] for name in (*illuminants.names(), *TEMPERATURES)}
 
 
 def sensors() -> dict[str, str]:
     """Presets, each by the remark that its file begins with, and cameras whose response was measured."""
+    from sensor import presets
+    from sensor.cameras.library import measured_cameras
+
     found = {}
     for name in presets.names():
         remark, _ = presets.preset_file(name).read_text("utf-8").split("\n\n", 1)
@@ -109,11 +116,15 @@ def sensors() -> dict[str, str]:
 
 def mosaics() -> dict[str, str]:
     """Mosaics by their tile's rows."""
+    from sensor import cfa
+
     return {name: "/".join(cfa.tile_of(name)) for name in cfa.mosaics()}
 
 
 def processors() -> dict[str, str]:
     """Processors with mosaic, source, and the extra that they need."""
+    from isp.processors.catalogue import PROCESSORS
+
     return {
         name: f"{each.mosaic}: {each.source}{f'; pip install rodcone[{each.extra}]' if each.extra else ''}"
         for name, each in PROCESSORS.items()
@@ -122,6 +133,8 @@ def processors() -> dict[str, str]:
 
 def metrics() -> dict[str, str]:
     """Columns of a sweep that tell cameras apart."""
+    from studies.pages.report_text import METRICS
+
     units = {x.key: f" [{x.unit}]" if x.unit else "" for x in METRICS}
     return {x.key: f"{x.name}{units[x.key]}, {'higher' if x.higher else 'lower'} is better" for x in METRICS}
 

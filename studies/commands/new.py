@@ -25,7 +25,7 @@ from sensor.cameras.numbers import (
 )
 from sensor.presets import preset as read_preset
 from sensor.presets import preset_file
-from studies.commands.console import Out, require_ending, say
+from studies.commands.console import Out, OutOrNone, require_ending, say
 
 app = App(name="new", help="Write files to start from.")
 _STUDIES = Path(__file__).parent.parent / "configs"
@@ -109,6 +109,8 @@ def preset(
     with replacing(*files) as places:
         for place, content in zip(places, files.values(), strict=True):
             place.write_text(content, "utf-8")
+    if "K" in numbers.left_out:
+        say(f"{out}: K = {numbers.left_out['K']}")
     if missing(numbers):
         say(
             f"{out}: needed, and told by no source: {', '.join(missing(numbers))}; add them, or name a preset, "
@@ -133,7 +135,7 @@ def cameras(copy: Path, /, *, out: Out) -> None:
 
 
 @app.command
-def study(name: str = "light_levels", /, *, out: Out) -> None:
+def study(name: str = "light_levels", /, *, out: OutOrNone = None) -> None:
     """Copy an example of a study to a TOML file to change, for `rodcone sweep`; sensors that it names come with it.
 
     Parameters
@@ -141,14 +143,18 @@ def study(name: str = "light_levels", /, *, out: Out) -> None:
     name
         light_levels (moonlight to daylight), spectra (one scene under several lights at equal lux), metamers (pairs
         that look alike under D65), infrared_cut (a filter in or out), responses (broad filters or narrow ones),
-        exposures (exposure times and fixed patterns on Table 1's pixel), opponents (every processor, for rodcone
-        opponents), white_pixel (one method with and without W), white_pixel_lights (the same under four lights),
-        real_cameras (five cameras that exist beside the paper's pixel), demo (what rodcone demo makes), or paper_1b
-        and paper_6 (of the paper's figures).
+        exposures (exposure times and fixed patterns on Table 1's pixel), opponents (every processor), white_pixel
+        (one method with and without W), white_pixel_lights (the same under four lights), real_cameras (five cameras
+        that exist beside the paper's pixel), demo (what rodcone demo makes), or paper_1b and paper_6 (of the paper's
+        figures).
     out
         File to write, ending in .toml; one that exists is left alone. Sensors and their curves go into the folder
         sensors beside it, where files of the same content are kept.
     """
+    if out is None:
+        file = name if name.endswith(".toml") else "mine.toml"
+        example = "" if name.endswith(".toml") else f" {name}"
+        raise InputError(f"out: none is given; allowed: a new .toml file; write rodcone new study{example} -o {file}")
     examples = {path.stem: path for path in sorted(_STUDIES.glob("*.toml"))}
     require_keys("study", [name], examples)
     beside = {out.parent / each: _STUDIES / each for each in _named(examples[name])}

@@ -38,7 +38,7 @@ def render(
     spp: int | None = None,
     noise: float | None = None,
     max_seconds: Seconds | None = None,
-    max_depth: int = 8,
+    max_depth: int | None = None,
     seed: int = 0,
     cache: Path | None = None,
     trust_scene: Flag = False,
@@ -81,7 +81,7 @@ def render(
     max_seconds
         Time for the render in seconds, at most.
     max_depth
-        Longest path in segments; 2 is direct light.
+        Longest path in segments; 2 is direct light. By default what the scene's file states, 8 where it states none.
     seed
         Seed of the render.
     cache
@@ -127,7 +127,7 @@ def render(
         )
     asked: dict[str, Any] = {"luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
     radiance = relight_denoised(transport, spectra, **asked)[0] if denoise else transport.relight(spectra, **asked)
-    write_exr(out, radiance, scene=scene.name)
+    write_exr(radiance, out, scene=scene.name)
     # Say what was done
     say(*opened.notes)
     interrupted = transport.stopped_by == "interrupt"

@@ -2,31 +2,58 @@
 
 from pathlib import Path
 
-from rodcone.errors import require_whole
+from rodcone.errors import InputError, require_whole, unknown
 from rodcone.files import replacing
 from studies.commands.console import OutOrNone
 from studies.pages.report import render_report
+from studies.pages.report_compare import CAMERA, first_comparison
+from studies.pages.report_markdown import markdown
 from studies.pages.report_sweep import sweep_report
 from studies.sweep.results import overview, results_json
 
 FILE, RESULTS, OVERVIEW = "report.html", "results.json", "overview.png"
 
 
-def report(folder: Path, /, *, out: OutOrNone = None, pictures: int | None = None) -> None:
+def report(folder: Path, /, *, out: OutOrNone = None, pictures: int | None = None, camera: str | None = None) -> None:
     """Write the report of a sweep as one self-contained HTML file; prints its path.
+
+    With an --out that ends in .md: its answer and its leads as Markdown tables.
 
     Parameters
     ----------
     folder
         Folder of the sweep.
     out
-        File to write; report.html in the sweep's folder by default.
+        File to write, .html or .md; report.html in the sweep's folder by default.
     pictures
-        Pictures to put into the page, at most; by default as many as fit into 8 MB. Numbers are given for all of them.
+        Pictures to put into the page, at most; by default as many as keep the page under 10 MB. Numbers are given
+        for all of them.
+    camera
+        For Markdown: the processor that is set beside the others; by default the one that the page leads with.
     """
     if pictures is not None:
         require_whole("pictures", pictures, 1, 100_000, "give a number of pictures")
-    print(write_report(folder, out or folder / FILE, pictures))
+    path = out or folder / FILE
+    if path.suffix.lower() == ".md":
+        with replacing(path) as (place,):
+            place.write_text(_markdown(folder, path, camera), "utf-8")
+    elif camera is not None:
+        raise InputError(f"camera: {camera!r} is for Markdown; the page has a menu; allowed: an --out that ends in .md")
+    else:
+        write_report(folder, path, pictures)
+    print(path)
+
+
+def _markdown(folder: Path, out: Path, camera: str | None) -> str:
+    """Return the report as Markdown, with the command that makes it."""
+    data, _ = sweep_report(folder, 0)
+    if camera is not None and camera not in data.cameras:
+        raise unknown("camera", camera, data.cameras)
+    of = first_comparison(data)
+    if of.a == of.b or (camera is not None and of.compared != CAMERA):
+        raise InputError("study: there is nothing to compare; allowed: two cameras or more, or two sensors")
+    command = f"rodcone report {folder} -o {out.name}" + (f" --camera {camera}" if camera else "")
+    return markdown(data, command, of.a if camera is None else data.cameras.index(camera))
 
 
 def write_results(folder: Path) -> Path:

@@ -7,15 +7,14 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from rodcone.errors import InputError, require_range
+from rodcone.errors import require_range
 from rodcone.files import check_place, replacing
 from sensor.config import SensorConfig
 from sensor.presets import preset
-from studies.commands.console import Flag, OutOrNone, print_table, require_ending
+from studies.commands.console import Flag, OutOrNone, Time, print_table, require_ending
 from studies.pages.report_text import MISSING
 from studies.pages.snr_chart import snr_svg
 from studies.photograph.snr import GREY, light_for_snr
-from studies.study.exposures import parse_exposure
 
 RELATIVE = "*"  # behind the name of a sensor whose responses are relative
 HEAD = ("sensor", "channel", "electrons", "cd/m2", f"lux on {GREY:.0%} grey")
@@ -27,7 +26,7 @@ def snr(
     *,
     at: float = 10.0,
     light: str = "D65",
-    exposure: str = "33ms",
+    exposure: Time = 0.033,
     f_number: float | None = None,
     out: OutOrNone = None,
     json: Flag = False,
@@ -46,7 +45,7 @@ def snr(
     light
         Illuminant.
     exposure
-        Exposure time, such as 33ms.
+        Exposure time, such as 33ms, the default, or 1/30.
     f_number
         Of the lens; the preset's own by default.
     out
@@ -55,18 +54,16 @@ def snr(
         Print one JSON object: a list for each sensor.
     """
     require_range("at", at, 1e-3, 1e4, "give signal over noise, such as 10")
-    exposure_s = parse_exposure(exposure, "exposure")
-    if exposure_s is None:
-        raise InputError(f"exposure: {exposure!r} has no time here; allowed: a time such as 33ms; give one")
+    require_range("exposure", exposure, 1e-9, 1e6, "give a time such as 33ms")
     if out is not None:
         require_ending(out, ".svg")
         check_place(out)
     opened = {name: _opened(name, f_number) for name in sensors}
-    found = {name: light_for_snr(at, sensor, light, exposure_s) for name, sensor in opened.items()}
+    found = {name: light_for_snr(at, sensor, light, exposure) for name, sensor in opened.items()}
     if out is not None:
         with replacing(out) as (place,):
             shown = {f"{name}{RELATIVE * each.responses.relative}": each for name, each in opened.items()}
-            place.write_text(snr_svg(shown, light, exposure_s, at), "utf-8")
+            place.write_text(snr_svg(shown, light, exposure, at), "utf-8")
     if json:
         rows = {
             name: [{k: None if v == float("inf") else v for k, v in asdict(x).items()}

@@ -29,12 +29,13 @@ from studies.study.study_file import read_study
 from studies.sweep.cluster import on_cluster
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows, write_table
+from studies.sweep.folder import claim
+from studies.sweep.prepare import PILOTS
 from studies.sweep.run_sweep import Runner, Swept
 from studies.sweep.run_sweep import sweep as run_sweep
 from studies.sweep.workers import InThisProcess, cores, run, run_in_processes
 
 MOST_WORKERS = 1024
-PILOTS = "pilots"  # folder of a plan's renders beside the ledger
 
 
 def sweep(
@@ -131,7 +132,7 @@ def make_all(
     Swept, Path
         What was made, and the report.
     """
-    out.mkdir(parents=True, exist_ok=True)  # a folder that can't be written fails before anything is rendered
+    claim(out)  # a folder that can't be written fails before anything is rendered
     with _saying_what_is_kept(out), progress(sys.stderr) as step:
         with clock.stage("plan"):
             plan = planned(step)

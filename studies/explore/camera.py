@@ -23,17 +23,17 @@ def camera_of(controls: Controls, own: SensorConfig | None = None) -> SensorConf
         For a file that describes no camera, or a term out of range.
     """
     own = own or own_camera(controls.sensor, controls.mosaic)
-    if own.binning:
+    if own.chip.binning:
         raise InputError(
             f"sensor: {controls.sensor!r} bins, which is not explored; allowed: one without binning; take "
             "binning out of its file"
         )
-    if own.readings and (fixed := {"full_well_e", "read_noise_e", "dsnu_e"} & set(controls.pixel)):
+    if own.chip.readings and (fixed := {"full_well_e", "read_noise_e", "dsnu_e"} & set(controls.pixel)):
         raise InputError(
             f"pixel: {', '.join(sorted(fixed))} with {controls.sensor!r}, whose readings have their own; allowed: the "
             "preset's; reset it, or take another sensor"
         )
-    if own.readings and not controls.shot_noise:
+    if own.chip.readings and not controls.shot_noise:
         raise InputError(
             f"shot_noise: False with {controls.sensor!r}, whose readings are merged by it; allowed: True; switch it on"
         )

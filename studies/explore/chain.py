@@ -22,7 +22,7 @@ from sensor.burst import merged_raw
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
-from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
+from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s, most_informative_s
 from sensor.optics import SpectralIrradiance, form_image
 from sensor.raw import RawImage
 from sensor.readout import draw_mean_frame, read_out
@@ -196,12 +196,14 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
 
     # Exposure
     exposure_s = controls.exposure_s
-    if controls.exposure == AUTO_INFORMATION:
-        exposure_s = exposure_of_electrons_s(controls.exposure, per_second_e * scale, sensor, exposure_s)
-    elif controls.exposure != TIME:  # these two look at a percentile, which goes with the level
-        rule = (lit_so, controls.exposure, sensor.pixel.full_well_e)
-        unit_s = memo.of("rule", rule, exposure_of_electrons_s, controls.exposure, per_second_e, sensor, _LONGEST_S)
-        exposure_s = min(exposure_s, unit_s / scale)
+    if controls.exposure != TIME:
+        rules = (AUTO, AUTO_W) if controls.exposure == AUTO_INFORMATION else (controls.exposure,)
+        times_s = []
+        for rule in rules:  # both look at a percentile, which goes with the level
+            metered = (lit_so, rule, sensor.pixel.full_well_e)
+            unit_s = memo.of("rule", metered, exposure_of_electrons_s, rule, per_second_e, sensor, _LONGEST_S)
+            times_s.append(min(exposure_s, unit_s / scale))
+        exposure_s = most_informative_s(mosaicked_e * scale, sensor, times_s)
     expected_e = mosaicked_e * (scale * exposure_s)
     shape = (expected_e.shape[0], expected_e.shape[1])
     chip = (controls.sensor, controls.mosaic, _items(controls.pixel), controls.seed)
@@ -263,7 +265,7 @@ def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDA
 def _white(lit: Transport, spectra: tuple[tuple[str, Any, Any], ...], memo: Memo) -> float:
     shining = [spectrum for spectrum in spectra if lit.groups[spectrum[0]].power > 0]
     planes = [memo.of("scattered", each, _scattered_luminance, lit, each[0]) for each in shining]
-    return white_of(_weighted([lit.groups[each[0]].power for each in shining], planes), lit.coverage)
+    return white_of(_weighted([lit.groups[each[0]].power for each in shining], planes), lit.coverage.mean)
 
 
 def _scattered_luminance(lit: Transport, name: str) -> Image:

@@ -1,7 +1,7 @@
 """What the explorer's controls are set to, as one value, and how it is read from a message."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any
@@ -12,11 +12,11 @@ from render.illuminants import illuminant, is_light_file
 from rodcone.errors import InputError, require_keys, require_range, require_whole, unknown
 from sensor.cfa import MOSAICS, channels
 from sensor.cfa import OWN as OWN_MOSAIC
-from sensor.exposure import AUTO, LONGEST_S, RULES
+from sensor.exposure import AUTO_INFORMATION, LONGEST_S, RULES
 from sensor.presets import names
 from sensor.variations import VARIATIONS
 from studies.study.radiance_file import LIGHT
-from studies.study.study import GRAY_WORLD, MOST_FRAMES, OWN, WHITE_BALANCES
+from studies.study.study import AS_SHOT, MOST_FRAMES, OWN, WHITE_BALANCES
 
 TIME = "time"  # as an exposure: the time that `exposure_s` states
 LENS = ("f_number", "defocus_um", "diffraction", "veiling_glare")
@@ -98,7 +98,7 @@ class Controls:
     lamps: Mapping[str, Lamp] = field(default_factory=dict)
     level_cd_m2: float = 25.0
     reference_light: str = LIGHT
-    exposure: str = AUTO
+    exposure: str = AUTO_INFORMATION
     exposure_s: float = LONGEST_S
     sensor: str = "low_noise"
     mosaic: str = "rgbw"
@@ -108,7 +108,7 @@ class Controls:
     shot_noise: bool = True
     processor: str = "interleaved"
     settings: Mapping[str, float] = field(default_factory=dict)
-    white_balance: str = GRAY_WORLD
+    white_balance: str = AS_SHOT
     seed: int = 0
     exposure_number: int = 0
     frames: int = 1
@@ -165,7 +165,7 @@ def options_of(controls: Controls) -> dict[str, Any]:
 # From and to JSON
 
 
-def controls_from(content: Any, own: Controls = Controls()) -> Controls:
+def controls_from(content: Any, own: Controls = Controls(), dropped: Iterable[str] = ()) -> Controls:
     """Check and read the controls of a message.
 
     Parameters
@@ -175,6 +175,8 @@ def controls_from(content: Any, own: Controls = Controls()) -> Controls:
     own : Controls
         What the page began with. The files that it names may be named again: a message may not make the program read
         others.
+    dropped : iterable of str
+        Files of sensors that were dropped on the page.
 
     Raises
     ------
@@ -185,8 +187,8 @@ def controls_from(content: Any, own: Controls = Controls()) -> Controls:
     readers = _readers()
     require_keys("controls", given, readers)
     values = {name: readers[name](name, value) for name, value in given.items()}
-    if values.get("sensor", own.sensor) not in (*names(), own.sensor):
-        raise unknown("sensor", values["sensor"], {*names(), own.sensor})
+    if values.get("sensor", own.sensor) not in (known := {*names(), own.sensor, *dropped}):
+        raise unknown("sensor", values["sensor"], known)
     lamps = {f"lamps[{group!r}].spectrum": lamp.spectrum for group, lamp in values.get("lamps", {}).items()}
     for name, light in {"reference_light": values.get("reference_light", LIGHT), **lamps}.items():
         if is_light_file(light) and light not in light_files(own):

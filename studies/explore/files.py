@@ -1,11 +1,8 @@
-"""A shot as files: raw negative and picture."""
+"""A shot as a file: its raw negative."""
 
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-import numpy as np
-from numpy.typing import NDArray
 
 from render.illuminants import illuminant
 from rodcone.errors import InputError
@@ -13,7 +10,6 @@ from sensor.raw_files.raw_file import write_raw
 from studies.explore.chain import Exposed
 from studies.explore.controls import Controls
 from studies.photograph.calibrate import calibrate, iso_speed
-from studies.photograph.png import to_png
 
 
 def dng_of(exposed: Exposed, controls: Controls) -> bytes:
@@ -38,8 +34,3 @@ def dng_of(exposed: Exposed, controls: Controls) -> bytes:
     with TemporaryDirectory() as folder:
         (path,) = write_raw(raw, Path(folder) / "explored.dng")
         return path.read_bytes()
-
-
-def png_of(picture: NDArray[np.uint8]) -> bytes:
-    """PNG of a view."""
-    return to_png(picture / 255.0)

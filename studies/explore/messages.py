@@ -1,7 +1,7 @@
 """Messages of the page: what the program says of itself first, and what is checked of each question."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any, TypeAlias
@@ -11,6 +11,8 @@ import numpy as np
 from isp.processors.catalogue import PROCESSORS, libraries
 from render.illuminants import names as illuminants
 from rodcone.errors import InputError, require_keys, require_whole, unknown
+from scenes.levels import DEMO_LEVELS
+from sensor.config import SensorConfig
 from sensor.exposure import RULES
 from sensor.presets import names as sensors
 from sensor.presets import preset
@@ -30,21 +32,20 @@ KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "hello": (),
         "cancel": (),
+        "scene": ("name",),
+        "sensor": ("files",),
         "show": ("cameras", "views"),
         "pixel": ("cameras", "row", "column"),
         "histogram": ("cameras",),
-        "python": ("cameras", "view"),
         "study": ("cameras",),
         "dng": ("cameras",),
-        "png": ("cameras", "view"),
     }
 )
 
 
-def hello(source: Source) -> Header:
-    """What the page builds its controls from."""
-    named = tuple(dict.fromkeys((*sensors(), source.controls.sensor)))
-    own = {name: preset(name) for name in named}
+def hello(source: Source, scenes: Iterable[str] = (), dropped: Iterable[str] = ()) -> Header:
+    """What the page builds its controls from; `scenes` that it may choose, `dropped` files of sensors."""
+    named = dict.fromkeys((*sensors(), source.controls.sensor, *dropped))
     return {
         "title": source.title,
         "controls": to_json(source.controls),
@@ -53,14 +54,9 @@ def hello(source: Source) -> Header:
         "illuminants": list(dict.fromkeys((*illuminants(), *light_files(source.controls)))),
         "rules": [*RULES, TIME],
         "white_balances": list(WHITE_BALANCES),
-        "sensors": {
-            name: {
-                "lens": {term: getattr(each.lens, term) for term in LENS},
-                "pixel": {term: getattr(each.pixel, term) for term in PIXEL},
-                "bits": each.bits,
-            }
-            for name, each in own.items()
-        },
+        "levels": {level.name: float(f"{level.luminance_cd_m2:.4g}") for level in DEMO_LEVELS},
+        "scenes": list(scenes),
+        "sensors": {name: sensor_terms(preset(name)) for name in named},
         "processors": {
             name: {
                 "mosaics": list(mosaics_of(each)),
@@ -74,6 +70,15 @@ def hello(source: Source) -> Header:
         "views": list(VIEWS),
         "assumed": list(source.notes),
         "saves": {"study": source.scene is not None},
+    }
+
+
+def sensor_terms(sensor: SensorConfig) -> Header:
+    """Terms of a sensor that the page's sliders begin with."""
+    return {
+        "lens": {term: getattr(sensor.lens, term) for term in LENS},
+        "pixel": {term: getattr(sensor.pixel, term) for term in PIXEL},
+        "bits": sensor.bits,
     }
 
 
@@ -117,16 +122,6 @@ def read_message(text: str) -> Header:
 
 def _refuse(constant: str) -> None:
     raise ValueError(constant)
-
-
-def read_view(value: Any) -> str:
-    """Name of a view, or of a figure that Python can make."""
-    if isinstance(value, str) and value in VIEWS:
-        return value
-    words = value.split(" ") if isinstance(value, str) else []
-    if words == ["histogram"] or (len(words) == 3 and words[0] == "pixel" and all(x.isdecimal() for x in words[1:])):
-        return " ".join(words)
-    raise unknown("view", value, (*VIEWS, "histogram", "pixel ROW COLUMN"))
 
 
 def read_views(value: Any, cameras: int) -> list[tuple[int, str]]:

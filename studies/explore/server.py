@@ -32,6 +32,9 @@ HEADERS = {
     "Cache-Control": "no-store",
 }
 EXTRA = "explore"
+# What one connection is read of. A page that has one request of each kind under way stays far below; a hostile one
+# leaves the others their turn.
+MOST_A_SECOND, MOST_CHARACTERS_A_SECOND, BURST_S = 400, 20 * MOST_CHARACTERS, 1.0
 
 Scope = MutableMapping[str, Any]
 App = Callable[[Scope, Any, Any], Awaitable[None]]
@@ -69,10 +72,13 @@ def make_app(session: Session, port: int, token: str) -> App:
                 await socket.send_bytes(await outgoing.get())
 
         session.connect(send)
-        sending = asyncio.create_task(forward())
+        sending, due_s = asyncio.create_task(forward()), 0.0
         try:
             while (message := await socket.receive())["type"] == "websocket.receive":
-                session.take(message.get("text") or "", send)
+                text = message.get("text") or ""
+                due_s = max(due_s, loop.time() - BURST_S) + 1 / MOST_A_SECOND + len(text) / MOST_CHARACTERS_A_SECOND
+                await asyncio.sleep(max(0.0, due_s - loop.time()))  # what a page sends meanwhile stays unread
+                session.take(text, send)
         finally:
             sending.cancel()
 

@@ -1,7 +1,7 @@
 """What the page asks and what it is answered: messages in, pictures and figures out, on one thread of its own.
 
-Of requests of one kind only the newest is answered: what a slider has left behind is not computed. Every answer has the
-number of its request and the controls that it was made with; the page shows none that is older than its last question.
+A page has one request of a kind under way; of several that wait, only the newest is answered. Every answer has the
+number of its request, the controls that it was made with, and the Python that makes it again.
 """
 
 import sys
@@ -9,26 +9,26 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from tempfile import TemporaryDirectory
+from types import MappingProxyType
+from typing import Any, TypeAlias
 
 from isp.picture import Picture
-from rodcone.errors import InputError, one_line
+from rodcone.errors import InputError, one_line, unknown
+from studies.explore.answers import Answer, python_text, take_sensor, written
 from studies.explore.chain import Exposed, Image, Shot, development_of, expose_scene, photograph, true_picture_of
-from studies.explore.controls import Controls, Lamp, controls_from, to_json
-from studies.explore.files import dng_of, png_of
+from studies.explore.controls import Controls, controls_from, to_json
 from studies.explore.memo import Memo, give_memory_back
-from studies.explore.messages import KINDS, Header, hello, read_message, read_view, read_views, unsent
-from studies.explore.slow import begin, is_slow, stand_in
+from studies.explore.messages import KINDS, Header, hello, read_message, read_views, unsent
+from studies.explore.slow import begin, stand_in
 from studies.explore.source import Rendered, Source
-from studies.explore.views import VIEWS, Bytes, facts, histogram, pixel
+from studies.explore.views import VIEWS, Bytes, facts
 from studies.explore.warm import WARM
-from studies.explore.written import python_of, study_of
 
-Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 Send: TypeAlias = Callable[[Header, Sequence[bytes]], None]
 
+SOON = ("hello", "scene", "sensor")  # kinds of message that wait for no render
 REST_S = 0.4  # without a new setting, after which a slow processor begins
 TRIM_AFTER = 100  # turns of its thread
 
@@ -39,21 +39,18 @@ class Session:
     Parameters
     ----------
     source : Source
+    scenes : mapping of str to callable
+        What the page may choose in its place.
     """
 
-    def __init__(self, source: Source) -> None:
-        self._source, self._states = source, source.states()
-        self._rendered: Rendered | None = None
-        self._rendering, self._failure = True, ""  # whether a finer state follows, and why none does
-        self._memo = Memo()
-        self._cold = list(WARM)
+    def __init__(self, source: Source, scenes: Mapping[str, Callable[[], Source]] = MappingProxyType({})) -> None:
+        self._scenes, self._cold = scenes, list(WARM)
+        self._dropped: dict[str, TemporaryDirectory[str]] = {}  # folders of sensors' files, by the file
         self._pending: dict[str, Header] = {}
-        self._shown: Header | None = None
-        self._page = ""  # that asks
-        self._sent: list[Bytes] = []  # pictures that it has
         self._slow: dict[str, Callable[[], None]] = {}  # what ends each job at work, by its camera
+        self._begin_page("")
+        self._begin_source(source)
         self._send: Send = lambda header, buffers: None
-        self._slow_wanted = False
         self._asked_s = -REST_S  # when the last picture was asked for
         self._closed = False
         self._changed = threading.Condition()
@@ -97,10 +94,19 @@ class Session:
             self._end_slow()
             self._changed.notify()
         self._thread.join()
+        for folder in self._dropped.values():
+            folder.cleanup()
+
+    def _begin_source(self, source: Source) -> None:
+        self._source, self._states, self._memo = source, source.states(), Memo()
+        self._rendered: Rendered | None = None
+        self._rendering, self._failure = True, ""  # whether a finer state follows, and why none does
 
     def _begin_page(self, page: str) -> None:
         """Forget what another page asked."""
-        self._page, self._shown, self._sent = page, None, []
+        self._page = page  # that asks
+        self._shown: Header | None = None
+        self._sent: list[Bytes] = []  # pictures that it has
         self._pending.clear()
         self._end_slow()
 
@@ -130,14 +136,15 @@ class Session:
                     self._fail(message, str(error))
                 except Exception as error:  # the page goes on; the terminal has the place
                     traceback.print_exc(file=sys.stderr)
-                    self._fail(message, f"the program failed: {type(error).__name__}: {error}; see its terminal")
+                    words = InputError(f"the program failed: {type(error).__name__}: {error}; see its terminal")
+                    self._fail(message, str(words))
 
     def _next(self) -> tuple[Header | None, Callable[[], None]]:
         """Take the message to answer, or what to do while nothing is asked; waits for one of them."""
         with self._changed:
             while not self._closed:
                 kind = next((kind for kind in KINDS if kind in self._pending), None)
-                if kind is not None and (self._rendered is not None or not self._rendering or kind == "hello"):
+                if kind is not None and (self._rendered is not None or not self._rendering or kind in SOON):
                     return self._pending.pop(kind), _nothing
                 act, left_s = self._left_to_do(), self._asked_s + REST_S - time.monotonic()
                 if act is not None and (left_s <= 0 or self._rendered is None):
@@ -154,7 +161,7 @@ class Session:
         return self._warm_up if self._cold and self._rendered is not None else None
 
     def _fail(self, message: Header | None, words: str) -> None:
-        whose = {"number": None} if message is None else _whose(message)
+        whose = {"number": None} if message is None else _whose(message) | {"of": message["kind"]}
         self._send(whose | {"kind": "error", "message": words}, ())
 
     def _render_on(self) -> None:
@@ -178,36 +185,32 @@ class Session:
 
     def _answer(self, message: Header) -> Answer:
         kind = message["kind"]
-        if kind in ("hello", "cancel"):
-            return (hello(self._source) if kind == "hello" else {}), ()
+        if kind == "scene":
+            self._choose_scene(message["name"])
+        if kind in ("hello", "scene"):
+            return hello(self._source, self._scenes, self._dropped), ()
+        if kind == "sensor":
+            return take_sensor(message["files"], self._dropped), ()
+        if kind == "cancel":
+            return {}, ()
         rendered = self._rendered
         if rendered is None:
             raise InputError(f"scene: {self._failure}; nothing can be shown; mend the scene and start again")
-        cameras = [controls_from(each, self._source.controls) for each in message["cameras"]]
+        cameras = self._cameras(message)
         if kind == "show":
             return self._show(message, cameras, rendered)
-        header, buffers = self._written(message, cameras[0], rendered)
-        return header | {"cameras": [{"controls": to_json(cameras[0])}]}, buffers
+        return written(message, cameras[0], rendered, self._source, self._memo, self._dropped)
 
-    def _written(self, message: Header, controls: Controls, rendered: Rendered) -> Answer:
-        """Figures, text and files of one camera."""
-        kind = message["kind"]
-        answer: Answer = {}, ()
-        if kind == "python":
-            return {"text": python_of(rendered.code, controls, read_view(message["view"]))}, ()
-        if kind == "study":
-            return {"files": self._study(controls, rendered)}, ()
-        exposed = expose_scene(rendered.transport, controls, self._memo)
-        if kind == "pixel":
-            answer = {"pixel": pixel(exposed, message["row"], message["column"])}, ()
-        elif kind == "histogram":
-            answer = {"histogram": histogram(exposed.raw)}, ()
-        elif kind == "dng":
-            answer = {"name": "explored.dng"}, (dng_of(exposed, controls),)
-        elif kind == "png":
-            shot = self._shot(controls, exposed) or photograph(rendered.transport, controls, self._memo)
-            answer = {"name": "explored.png"}, (png_of(VIEWS[read_view(message["view"])](shot)),)
-        return answer
+    def _cameras(self, message: Header) -> list[Controls]:
+        return [controls_from(each, self._source.controls, self._dropped) for each in message["cameras"]]
+
+    def _choose_scene(self, name: Any) -> None:
+        if name not in tuple(self._scenes):
+            raise unknown("scene", name, self._scenes)
+        source = self._scenes[name]()
+        with self._changed:
+            self._begin_page(self._page)
+            self._begin_source(source)
 
     def _show(self, message: Header, cameras: Sequence[Controls], rendered: Rendered) -> Answer:
         """Pictures of each view that is asked for; slow processors are left for later."""
@@ -216,33 +219,36 @@ class Session:
             sent: list[Bytes] = []
             if message.get("page", "") == self._page:
                 self._shown, sent = message, self._sent
-        shots, told = [], []
+        shots, used = [], []
         for controls in cameras:
             exposed = expose_scene(rendered.transport, controls, self._memo)
             shot, shown = self._shot(controls, exposed), controls
             if shot is None:
-                quick = stand_in(controls.processor)
-                assert quick is not None  # every mosaic of a slow processor has a quick one
-                shown = replace(controls, processor=quick, settings={})
+                shown = stand_in(controls, exposed.raw.dn.size)
                 shot = photograph(rendered.transport, shown, self._memo)
                 self._slow_wanted = True
             shots.append(shot)
-            told.append({"controls": to_json(shown), "waiting_for": controls.processor if shown != controls else None})
+            used.append(shown)
         pictures = [VIEWS[view](shots[camera]) for camera, view in views]
         height, width = pictures[0].shape[:2]
         header = {
-            "cameras": told,
+            "cameras": [
+                {"controls": to_json(shown), "waiting_for": None if shown == controls else controls.processor}
+                for shown, controls in zip(used, cameras, strict=True)
+            ],
             "views": [list(view) for view in views],
+            "python": [python_text(rendered, used[camera], view, self._dropped) for camera, view in views],
             "facts": [facts(shot) for shot in shots],
             "size": [height, width],
             "spp": rendered.transport.spp,
+            "render_error": rendered.transport.relative_mc_error,
             "last": not self._rendering,
         }
         return header, unsent(pictures, sent)
 
     def _shot(self, controls: Controls, exposed: Exposed) -> Shot | None:
         """Shot of an exposure; None where its processor is slow and hasn't been at work."""
-        if not is_slow(controls.processor):
+        if stand_in(controls, exposed.raw.dn.size) == controls:
             development = development_of(exposed, controls, self._memo)
             linear, picture = development.develop()
         else:
@@ -259,9 +265,10 @@ class Session:
         self._slow_wanted, shown, rendered = False, self._shown, self._rendered
         if shown is None or rendered is None:
             return
-        for controls in [controls_from(each, self._source.controls) for each in shown["cameras"]]:
+        for controls in self._cameras(shown):
             key, memo = repr(controls), self._memo
-            if is_slow(controls.processor) and memo.kept("slow", key) is None and key not in self._slow:
+            quick = stand_in(controls, rendered.transport.coverage.mean.size) == controls
+            if not quick and memo.kept("slow", key) is None and key not in self._slow:
 
                 def done(result: tuple[Image, Picture] | InputError, key: str = key, memo: Memo = memo) -> None:
                     with self._changed:
@@ -274,14 +281,6 @@ class Session:
                 end = begin(development_of(expose_scene(rendered.transport, controls, memo), controls, memo), done)
                 with self._changed:
                     self._slow[key] = end
-
-    def _study(self, controls: Controls, rendered: Rendered) -> dict[str, str]:
-        source = self._source
-        if source.scene is None:
-            raise InputError("study: a transport has no name that a study could say; allowed: rodcone explore SCENE")
-        judged = next(iter(rendered.transport.groups.values())).coloured
-        lamps = {name: controls.lamps.get(name, Lamp()) for name in rendered.transport.groups}
-        return study_of(source.scene, source.render, replace(controls, lamps=lamps), judged)
 
 
 def _whose(message: Header) -> Header:

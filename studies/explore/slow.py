@@ -5,13 +5,17 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 
 from isp.picture import Picture
-from isp.processors.bm3d import EXTRA as BM3D
 from isp.processors.catalogue import PROCESSORS
+from isp.processors.sub_images import EXTRA as BM3D
+from rodcone.child_process import safe_environment
 from rodcone.errors import InputError
 from studies.explore.chain import Development, Image
+from studies.explore.controls import Controls, options_of
 
+MOST_SUMS = 65_536 * 4_000  # pixels x neighbourhood^2 x patch that aren't slow: half a second of processor time
 _RUN = "from studies.explore.slow import work; work()"
 
 
@@ -20,10 +24,19 @@ def is_slow(processor: str) -> bool:
     return PROCESSORS[processor].extra == BM3D or processor.startswith("ple")
 
 
-def stand_in(processor: str) -> str | None:
-    """Quick processor of the same mosaic, which the page shows, under its own name, until a slow one is done."""
-    mosaic = PROCESSORS[processor].mosaic
-    return next((name for name, each in PROCESSORS.items() if each.mosaic == mosaic and not is_slow(name)), None)
+def stand_in(controls: Controls, pixels: int) -> Controls:
+    """What the page shows, under its own name, until a slow processor is done; the controls themselves if it is quick.
+
+    Of a slow processor a quick one of the same mosaic, of wide settings the processor's own.
+    """
+    if is_slow(controls.processor):
+        mosaic = PROCESSORS[controls.processor].mosaic
+        quick = next(name for name, each in PROCESSORS.items() if each.mosaic == mosaic and not is_slow(name))
+        return replace(controls, processor=quick, settings={})
+    settings = options_of(controls).get("settings")
+    if settings and pixels * settings.neighbourhood**2 * settings.patch > MOST_SUMS:
+        return replace(controls, settings={})
+    return controls
 
 
 def begin(development: Development, done: Callable[[tuple[Image, Picture] | InputError], None]) -> Callable[[], None]:
@@ -35,7 +48,9 @@ def begin(development: Development, done: Callable[[tuple[Image, Picture] | Inpu
     done : callable
         Called in a thread of its own with what came of it; not where it was ended.
     """
-    process = subprocess.Popen([sys.executable, "-c", _RUN], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    process = subprocess.Popen(
+        [sys.executable, "-c", _RUN], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=safe_environment()
+    )
     ended = threading.Event()
 
     def wait() -> None:

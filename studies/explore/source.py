@@ -17,10 +17,9 @@ from rodcone.errors import InputError, require_range, require_whole
 from rodcone.memory import memory, require_memory
 from sensor.exposure import RULES
 from sensor.presets import preset
-from studies.explore.controls import TIME, Controls, Lamp
+from studies.explore.controls import LENS, TIME, Controls, Lamp
 from studies.explore.written import GIVEN
-from studies.study.exposures import parse_exposure
-from studies.study.levels import parse_level
+from studies.study.levels import parse_exposure, parse_level
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.study.scene_source import open_scene
 from studies.study.study import OWN, RenderLimits, SceneChoice, Study
@@ -132,10 +131,10 @@ def _of_study(study: Study, limits: RenderOptions, source: str) -> Source:
     if level is None:
         level = Controls().level_cd_m2
         notes.append(f"{source}: its levels are in lux, the explorer's in cd/m2; it begins at {level:g} cd/m2")
-    exposure, lens = study.exposures[0], study.lens
+    exposure = study.exposures[0]
     time_s = parse_exposure(exposure)
-    terms = {"diffraction": lens.diffraction, "veiling_glare": lens.veiling_glare}
-    own = preset(study.sensors[0])
+    own = preset(study.sensors[0]).lens
+    lens = study.lens.on(own)
     lamps = {}
     if study.spectra[0] != OWN and opened.scene is not None:
         lamps = {name: Lamp(study.spectra[0]) for name in opened.groups}
@@ -147,7 +146,7 @@ def _of_study(study: Study, limits: RenderOptions, source: str) -> Source:
         exposure_s=study.longest_exposure_s if time_s is None else time_s,
         sensor=study.sensors[0],
         mosaic=PROCESSORS[study.processors[0]].mosaic,
-        lens={name: value for name, value in terms.items() if value != getattr(own.lens, name)},
+        lens={name: value for name in LENS if (value := getattr(lens, name)) != getattr(own, name)},
         processor=study.processors[0],
         white_balance=study.white_balances[0],
         seed=study.seeds[0],
@@ -172,7 +171,7 @@ def _of_choice(choice: SceneChoice, limits: RenderOptions) -> Source:
             _coloured(transport.groups),
             Controls(reference_light=choice.light or LIGHT),
             scene=choice,
-            render=RenderLimits(size=max(transport.coverage.shape)),
+            render=RenderLimits(size=max(transport.coverage.mean.shape)),
             notes=notes,
         )
     opened = open_scene(choice.source, limits.trust, choice.extend, choice.light, choice.chart)

@@ -14,9 +14,7 @@ from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_whole
 from sensor.cfa import channel_map, channels, mask
 from sensor.raw import RawImage
-from sensor.readings.noise import of_reading, switched_to
-from sensor.readings.reading import SWITCHED
-from sensor.readout import noise_sources, noise_variance, spread_charge
+from sensor.readout import as_switched, noise_sources, noise_variance, spread_charge
 from sensor.response import electrons_per_irradiance
 from studies.explore.chain import Exposed, GroupFrame, Shot
 from studies.metrics.flip import flip
@@ -221,9 +219,7 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
 def noise_sources_e(exposed: Exposed, row: int, column: int) -> dict[str, float]:
     """Standard deviation of each noise source of one pixel of a chip drawn at random [e-], and of all together."""
     pixel, time_s, signal_e = exposed.sensor.pixel, exposed.exposure_s, float(_collected_e(exposed)[row, column])
-    sensor = exposed.sensor
-    if sensor.readout == SWITCHED:
-        sensor = of_reading(sensor, switched_to(sensor, exposed.expected_e))
+    sensor = as_switched(exposed.sensor, exposed.expected_e)
     sources = noise_sources(signal_e, sensor, time_s)
     if not exposed.shot_noise:
         share, hot_e = pixel.hot_pixel_share, pixel.hot_pixel_dark_current_e_per_s * time_s

@@ -5,7 +5,6 @@ import json
 from typing import Any
 
 from render.transport import Transport
-from rodcone.errors import InputError
 from rodcone.optional import optional_library
 from studies.explore.messages import Header
 from studies.explore.session import Session
@@ -28,11 +27,8 @@ def explore(transport: Transport) -> Any:
     Raises
     ------
     InputError
-        For anything but a transport, or where the extra isn't installed.
+        Where the extra isn't installed.
     """
-    given: object = transport
-    if not isinstance(given, Transport):
-        raise InputError(f"transport: a {type(given).__name__} is none; allowed: a Transport; give rodcone.render(...)")
     anywidget = optional_library("anywidget", "explore")
     kind = type(
         "Explorer", (anywidget.AnyWidget,), {"_esm": str(own_file("explore.js")), "_css": str(own_file("explore.css"))}

@@ -1,5 +1,6 @@
 """What a shot is written as: Python that makes it again to the bit, and a study that asks the same question."""
 
+import json
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -7,7 +8,8 @@ from typing import Any
 from isp.processors.catalogue import PROCESSORS
 from render.radiance_files.radiance_source import is_radiance_file
 from rodcone.errors import InputError
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.presets import preset, preset_file
 from studies.explore.camera import camera_of
 from studies.explore.controls import TIME, Controls, Lamp
@@ -170,6 +172,5 @@ def _file(value: str) -> str:
 
 
 def _text(value: str) -> str:
-    """A text as TOML quotes it."""
-    escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-    return f'"{escaped}"'
+    """A text as TOML quotes it: as JSON does, and DEL escaped too."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

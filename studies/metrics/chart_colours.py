@@ -10,11 +10,10 @@ from skimage.color import deltaE_ciede2000, xyz2lab
 from render.illuminants import illuminant
 from render.photometry import tristimulus
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths
-from rodcone.colour_spaces import SRGB_TO_XYZ, adapt_to_d65, luminance_of_srgb, xyz_to_srgb
+from rodcone.colour_spaces import SRGB_TO_XYZ, WHITE_AT, adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from scenes.metamers import pairs
 from scenes.reflectances import color_checker
 from studies.metrics.patches import Masks, patch_labs
-from studies.metrics.truth import WHITE_AT
 
 WHITE_PATCH = 18  # of the ColorChecker's 24: its 99th percentile of luminance, which pictures show at `WHITE_AT`
 
@@ -46,7 +45,7 @@ def true_pair_delta_e(light: str) -> NDArray[np.float64]:
 def daylight_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
     """CIEDE2000 between each patch of a ColorChecker and its colour under D65, shape (patch,); parameters as above.
 
-    Both show the white patch's luminance, under its own light, at `truth.WHITE_AT`: nothing is fitted to the
+    Both show the white patch's luminance, under its own light, at `WHITE_AT`: nothing is fitted to the
     picture.
     """
     return np.asarray(deltaE_ciede2000(patch_labs(linear, masks), xyz2lab(daylight_srgb() @ SRGB_TO_XYZ.T)))

@@ -10,14 +10,11 @@ from render.radiance import SpectralRadiance
 from render.spectrum import Floats, Spectrum
 from render.transport import Transport
 from rodcone.brief import brief
-from rodcone.colour_spaces import adapt_to_d65, xyz_to_srgb
-from sensor.binning import as_read
+from rodcone.colour_spaces import WHITE_AT, WHITE_PERCENTILE, adapt_to_d65, xyz_to_srgb
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation
 from sensor.response import electrons_per_irradiance
-
-WHITE_PERCENTILE, WHITE_AT = 99.0, 0.9  # the scene's 99th percentile of luminance is shown at 90 % of white
 
 
 @dataclass(frozen=True)
@@ -47,7 +44,7 @@ def shown_white_cd_m2(transport: Transport, luminance_cd_m2: float | None) -> fl
 
     Light that is seen directly doesn't count, nor the part of a pixel that it covers.
     """
-    return white_of(transport.scattered_luminance(luminance_cd_m2=luminance_cd_m2), transport.coverage)
+    return white_of(transport.scattered_luminance(luminance_cd_m2=luminance_cd_m2), transport.coverage.mean)
 
 
 def white_of(luminance: NDArray[np.float64], coverage: NDArray[np.floating]) -> float:
@@ -75,8 +72,8 @@ def neutral_electrons(sensor: SensorConfig, light: Light, exposure_s: float) -> 
 
     Green's is the known scale: a developed picture over it is in cd/m^2, with nothing taken from the noisy picture.
     """
-    sensor = as_read(sensor)
-    weights = electrons_per_irradiance(sensor, light.wavelength_nm, light.width_nm, exposure_s)
+    whole = sensor.undivided
+    weights = electrons_per_irradiance(whole, light.wavelength_nm, light.width_nm, exposure_s)
     return np.asarray(weights @ light.spectrum * camera_equation(sensor.lens))
 
 

@@ -4,7 +4,8 @@ from typing import Any
 
 from render.loader import variant
 from rodcone.jit import backend
-from studies.sweep.provenance import machine, threads, versions
+from studies.photograph.machine import machine
+from studies.sweep.provenance import threads, versions
 
 
 def environment() -> dict[str, Any]:

@@ -9,7 +9,7 @@ import json
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from hashlib import sha256
-from math import isfinite
+from math import ceil, floor, isfinite, log10
 from typing import Any
 
 from markupsafe import Markup
@@ -18,19 +18,17 @@ from studies.budget.budget import MOST_SHARE
 from studies.pages import report_text as text
 from studies.pages.page import address, own_file, write_out
 from studies.pages.report_compare import (
-    CAMERA,
-    OUTCOMES,
-    UNKNOWN,
-    WHITE_PIXEL,
+    RIVALS,
     Comparison,
     axes_of,
     best,
-    counts,
+    comparisons,
     first_comparison,
-    student_t,
+    group_titles,
+    shown_metrics,
     verdicts,
 )
-from studies.pages.report_data import ReportCell, ReportData, ReportLevel
+from studies.pages.report_data import ReportCell, ReportData, ReportLevel, ReportRender
 from studies.pages.report_pictures import ReportPictures
 from studies.pages.report_speed import speed_rows
 from studies.pages.snr_chart import snr_over_light
@@ -55,10 +53,14 @@ def cell_view(cell: ReportCell, level: ReportLevel) -> dict[str, Any]:
     electrons = json.loads(row.mean_electrons) if row else {}
     return {
         "x": cell.luminance_cd_m2,
-        "values": {metric.key: cell.by_seed[metric.key] for metric in text.METRICS if metric.key in cell.by_seed},
+        "figures": {
+            metric.key: [float(f"{mean:.7g}"), half_of(cell, metric.key)]
+            for metric in text.METRICS
+            if (mean := cell.figures[metric.key]) is not None and isfinite(mean)
+        },
         "exposure": text.duration(row.exposure_s if row else None),
         "saturated": text.percent(cell.figures["saturated"]),
-        "substitution": text.substitution_text(cell.substitution),
+        "substitution": "" if cell.substitution is None else text.substitution_text(cell.substitution),
         "balance": balance_text(cell.balance),
         "mc_share": text.percent(share),
         "over": share is not None and share > MOST_SHARE,
@@ -68,6 +70,12 @@ def cell_view(cell: ReportCell, level: ReportLevel) -> dict[str, Any]:
         "file": f"pictures/{row.picture}" if row else "",
         "alt": f"{text.camera_name(cell.camera)} picture, {level.name}, {cell.group}",
     }
+
+
+def half_of(cell: ReportCell, key: str) -> float | None:
+    """Half the width of a figure's 95 % interval; None for one seed."""
+    low, high = cell.intervals.get(key, (None, None))
+    return None if low is None or high is None else float(f"{(high - low) / 2:.4g}")
 
 
 def level_view(level: ReportLevel, cell: ReportCell) -> dict[str, str]:
@@ -94,12 +102,27 @@ def viewer_data(report: ReportData) -> dict[str, Any]:
     return {
         "axes": [vars(axis) for axis in axes_of(report)],
         "first": vars(of) | {"level": seen_level(report), "look": report.looked_at},
+        "alone": alone(report),
+        "references": [reference_name(render) for render in report.renders],
+        "groups": [group_titles(report, axis) for axis in range(len(axes_of(report)))],
+        "comparisons": comparisons(report),
         "sizes": [[scene.height, scene.width] for scene in report.scenes],
         "metrics": [vars(metric) for metric in shown_metrics(report.cells)],
-        "t": student_t(len(report.seeds)),
         "levels": levels,
         "cells": [cell_view(cell, report.levels[cell.level]) for cell in report.cells],
     }
+
+
+def alone(report: ReportData) -> str:
+    """Say how a study does in which nothing competes: its PSNR from the first level to the last; else empty."""
+    if any(len(axes_of(report)[axis].values) > 1 for axis in RIVALS):
+        return ""
+    cells = [cell for cell in report.by_group[0] if cell.figures["psnr_db"] is not None]
+    ends = [
+        f"{text.metric_text(text.PSNR, cell)} at {report.levels[cell.level].name}"
+        for cell in ([cells[0], cells[-1]] if len(cells) > 1 else cells)
+    ]
+    return f"Nothing to compare: one camera, sensor and exposure. PSNR {' to '.join(ends) or 'unknown'}."
 
 
 def seen_level(report: ReportData) -> int:
@@ -110,28 +133,46 @@ def seen_level(report: ReportData) -> int:
     return len(report.levels) - 1
 
 
-def shown_metrics(cells: Sequence[ReportCell]) -> list[text.Metric]:
-    """Return the metrics that are known for some cell: those of targets are so on their own scene alone."""
-    return [metric for metric in text.METRICS if any(cell.figures[metric.key] is not None for cell in cells)]
+def reference_name(render: ReportRender) -> str:
+    """Name of the picture that all are measured against: it is rendered, and so has noise of its own."""
+    return "Reference" + (f", {text.significant(render.spp)} samples" if render.spp else "")
 
 
-def summary(report: ReportData, of: Comparison) -> dict[str, Any]:
-    """Return what the page says first: verdicts by metric and light, one table a row, and counts over everything."""
-    axes, metrics = axes_of(report), shown_metrics(report.cells)
-    counted = [counts(report, of, metric) for metric in metrics]
-    values = axes[of.compared].values
-    return {
-        "a": values[of.a],
-        "b": values[of.b],
-        "rows": [
-            (name, [(metric, verdicts(report, of, metric, row)) for metric in metrics])
-            for row, name in enumerate(axes[of.rows].values)
-        ],
-        "head": axes[of.along].values,
-        "conditions": len(report.cells) // len(values),
-        "counts": list(zip(metrics, counted, strict=True)),
-        "total": {outcome: sum(found[outcome] for found in counted) for outcome in (*OUTCOMES, UNKNOWN)},
-    }
+def samples_text(samples: float) -> str:
+    """Write a number of samples with two digits, rounded up."""
+    step = 10 ** max(floor(log10(samples)) - 1, 0)
+    return text.significant(float(ceil(samples / step) * step))
+
+
+def render_warning(report: ReportData) -> str:
+    """Say where the render's noise exceeds the sensor's, and with how many samples it wouldn't; empty where nowhere."""
+    over = [(share, cell) for share, cell in known_shares(report.cells) if share > 1]
+    if not over:
+        return ""
+    share, cell = over[0]
+    place = f"{report.levels[cell.level].name}, {cell.group}, {text.camera_name(cell.camera)}"
+    wanted = [share * cell.first.spp for share, cell in over if cell.first and cell.first.spp]
+    remedy = f" With {samples_text(max(wanted))} samples a pixel it would be below." if wanted else ""
+    return (
+        f"The render's own noise exceeds the sensor's in {len(over)} of {len(report.cells)} pictures, in variance up "
+        f"to {text.significant(share, digits=2)} times ({place}).{remedy}"
+    )
+
+
+def summary(report: ReportData, of: Comparison) -> list[tuple[str, list[tuple[text.Metric, list[tuple[str, float]]]]]]:
+    """Return the tables of verdicts: for each row its name and, by metric, outcome and lead along the axis."""
+    metrics = shown_metrics(report.cells)
+    found = [verdicts(report, of, metric) for metric in metrics]
+    return [
+        (
+            name,
+            [
+                (metric, list(zip(lead.outcome[row].tolist(), lead.mean[row].tolist(), strict=True)))
+                for metric, lead in zip(metrics, found, strict=True)
+            ],
+        )
+        for row, name in enumerate(axes_of(report)[of.rows].values)
+    ]
 
 
 def known_shares(cells: Sequence[ReportCell]) -> list[tuple[float, ReportCell]]:
@@ -195,7 +236,10 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
         of=of,
         varying=sum(len(axis.values) > 1 for axis in axes_of(report)),
         summary=summary(report, of),
-        white_pixel=of.compared == CAMERA and (report.cameras[of.a], report.cameras[of.b]) == WHITE_PIXEL,
+        metrics=metrics,
+        answer=data["comparisons"][of.compared]["answers"].get(f"{of.a} {of.b}", [None])[0],
+        over=data["comparisons"][of.compared]["over"].get(f"{of.a} {of.b}", ""),
+        warning=render_warning(report),
         cells=list(zip(report.cells, data["cells"], strict=True)),
         leading=leading,
         sources=[addresses[cell.picture] if cell.picture else "" for cell in report.cells],
@@ -212,7 +256,7 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
                 "name": name,
                 "groups": list(range(index * per_view, (index + 1) * per_view)),
                 "titles": text.group_names(
-                    [text.plain_name(sensor.name) for sensor in report.sensors], report.exposures
+                    [text.plain_name(sensor.name) for sensor in report.sensors], report.exposures, report.balances
                 ),
                 "metrics": shown_metrics(report.cells[index * per_cells : (index + 1) * per_cells]),
                 "scene": report.scenes[index // len(report.spectra)],

@@ -1,30 +1,28 @@
-"""Which two pictures a report sets against each other, and in which metrics the first is ahead, level or behind.
+"""Which two of a report's pictures are compared, and every comparison's figures and words, as the script reads them."""
 
-The page's script (templates/report_numbers.js) does the same sums for whatever else the reader chooses.
-"""
-
-from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
-from studies.metrics.confidence import mean_with_confidence
 from studies.pages import report_text as text
+from studies.pages.headline import Pair, answer, in_light
 from studies.pages.report_data import ReportCell, ReportData
+from studies.pages.verdict import AHEAD, BEHIND, OUTCOMES, Leads, counts, leads
 
-AHEAD, LEVEL, BEHIND, UNKNOWN = "ahead", "level", "behind", "unknown"
-OUTCOMES = (AHEAD, LEVEL, BEHIND)
 # The same method on both mosaics, the one with a white pixel first; and what the paper compares.
 WHITE_PIXEL = ("ple_rgbw", "ple_bayer")
-CONFIDENCE = 0.95
 # Axes by their place in `ReportData.cells`, and in which order one is taken to compare or to part the charts by.
-SCENE, LIGHT, SENSOR, EXPOSURE, BRIGHTNESS, CAMERA = range(6)
-COMPARED_FIRST = (CAMERA, SENSOR, EXPOSURE, LIGHT, SCENE, BRIGHTNESS)
-ALONG_FIRST = (BRIGHTNESS, EXPOSURE, SENSOR, LIGHT, SCENE, CAMERA)
-ROWS_FIRST = (SENSOR, EXPOSURE, SCENE, LIGHT, CAMERA, BRIGHTNESS)
+SCENE, LIGHT, SENSOR, EXPOSURE, BALANCE, BRIGHTNESS, CAMERA = range(7)
+COMPARED_FIRST = (CAMERA, SENSOR, EXPOSURE, BALANCE, LIGHT, SCENE, BRIGHTNESS)
+ALONG_FIRST = (BRIGHTNESS, EXPOSURE, SENSOR, LIGHT, SCENE, BALANCE, CAMERA)
+ROWS_FIRST = (SENSOR, EXPOSURE, SCENE, LIGHT, BALANCE, CAMERA, BRIGHTNESS)
+RIVALS = (SENSOR, EXPOSURE, BALANCE, CAMERA)  # what a person chooses; scenes and lights are what it is chosen for
+DRAWN = "generated"  # how the names of scenes begin that are drawn from a number
+SAME_TIME = 1.01  # exposure times whose ratio is below count as one
 
 
 @dataclass(frozen=True)
@@ -54,26 +52,6 @@ class Comparison:
     b: int
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """How one picture does beside another in a metric.
-
-    Attributes
-    ----------
-    outcome : str
-        `AHEAD` or `BEHIND` where the 95 % interval of the lead is clear of 0, else `LEVEL`; `UNKNOWN` where there is
-        no interval.
-    lead : float or None
-        Mean over seeds of each seed's difference, positive where the first is better.
-    half : float or None
-        Half the width of its interval.
-    """
-
-    outcome: str
-    lead: float | None
-    half: float | None
-
-
 def axes_of(report: ReportData) -> tuple[Axis, ...]:
     """Return what varies, in the order of `ReportData.cells`."""
     return (
@@ -81,6 +59,7 @@ def axes_of(report: ReportData) -> tuple[Axis, ...]:
         Axis("Light", tuple(text.spectrum_name(spectrum) for spectrum in report.spectra)),
         Axis("Sensor", tuple(text.plain_name(sensor.name) for sensor in report.sensors)),
         Axis("Exposure", tuple(text.exposure_name(exposure) for exposure in report.exposures)),
+        Axis("White balance", tuple(text.BALANCE_NAMES.get(balance, balance) for balance in report.balances)),
         Axis("Light level", tuple(level.name for level in report.levels)),
         Axis("Camera", tuple(text.camera_name(camera) for camera in report.cameras)),
     )
@@ -105,19 +84,6 @@ def first_comparison(report: ReportData) -> Comparison:
     return Comparison(compared, along, chosen(ROWS_FIRST, compared, along), a, b)
 
 
-def verdict(metric: text.Metric, cell: ReportCell, other: ReportCell) -> Verdict:
-    """Say how a picture does beside another of the same seeds."""
-    pairs = [one.by_seed.get(metric.key, ()) for one in (cell, other)]
-    if not all(pairs):
-        return Verdict(UNKNOWN, None, None)
-    leads = (1 if metric.higher else -1) * (np.array(pairs[0]) - np.array(pairs[1]))
-    if leads.size == 1:
-        return Verdict(UNKNOWN, float(leads[0]), None)
-    lead = mean_with_confidence(leads, CONFIDENCE)
-    outcome = AHEAD if lead.low > 0 else BEHIND if lead.high < 0 else LEVEL
-    return Verdict(outcome, lead.mean, (lead.high - lead.low) / 2)
-
-
 def grid(report: ReportData) -> NDArray[np.object_]:
     """Return the cells as an array with a dimension for each axis."""
     cells = np.empty(len(report.cells), dtype=object)
@@ -125,44 +91,186 @@ def grid(report: ReportData) -> NDArray[np.object_]:
     return cells.reshape([len(axis.values) for axis in axes_of(report)])
 
 
-def pairs(report: ReportData, of: Comparison) -> Iterator[tuple[ReportCell, ReportCell]]:
-    """Go through all conditions: the two cells that are compared in each."""
-    cells = np.moveaxis(grid(report), of.compared, -1)
-    for place in product(*map(range, cells.shape[:-1])):
-        yield cells[(*place, of.a)], cells[(*place, of.b)]
+@dataclass(frozen=True)
+class Group:
+    """A pair in one place of the study: scene, light, sensor, ... but for what is compared and the light level.
+
+    `title` names what varies besides.
+    """
+
+    title: str
+    pair: Pair
+    ours: tuple[ReportCell, ...] = ()
+    theirs: tuple[ReportCell, ...] = ()
 
 
-def counts(report: ReportData, of: Comparison, metric: text.Metric) -> dict[str, int]:
-    """Count the conditions by `Verdict.outcome`."""
-    found = [verdict(metric, *pair).outcome for pair in pairs(report, of)]
-    return {outcome: found.count(outcome) for outcome in (*OUTCOMES, UNKNOWN)}
-
-
-def verdicts(report: ReportData, of: Comparison, metric: text.Metric, row: int) -> list[Verdict]:
-    """Return the verdicts of a metric along the axis, in one row, of the first value of every other axis."""
-    cells = grid(report)
-    place = [0] * cells.ndim
-    place[of.rows] = row
+def groups_of(report: ReportData, axis: int, a: int, b: int) -> list[Group]:
+    """Return the groups in which two values of an axis other than the light level are compared."""
+    axes, levels = axes_of(report), [level.name for level in report.levels]
+    cells = np.moveaxis(grid(report), (axis, BRIGHTNESS), (0, -1)).reshape(len(axes[axis].values), -1, len(levels))
     found = []
-    for position in range(cells.shape[of.along]):
-        place[of.along] = position
-        two = [cells[(*place[: of.compared], value, *place[of.compared + 1 :])] for value in (of.a, of.b)]
-        found.append(verdict(metric, *two))
+    for title, *both in zip(group_titles(report, axis), cells[a], cells[b], strict=True):
+        sides = tuple(both[0]), tuple(both[1])
+        pair = Pair(
+            names=(axes[axis].values[a], axes[axis].values[b]),
+            ours=_figures(sides[0], len(report.seeds)),
+            theirs=_figures(sides[1], len(report.seeds)),
+            levels=levels,
+            light_cd_m2=[cell.luminance_cd_m2 for cell in sides[0]],
+        )
+        found.append(Group(title, pair, *sides))
     return found
 
 
-def student_t(seeds: int) -> float | None:
-    """Quantile by which a mean's deviation becomes half its interval; None for one seed."""
-    return float(student.isf((1 - CONFIDENCE) / 2, seeds - 1)) if seeds > 1 else None
+def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group]:
+    """Return groups whose figures are means over scenes, those that were drawn apart; without cells of their own."""
+    drawn = [scene.name.startswith(DRAWN) for scene in report.scenes]
+    rest, found = len(groups) // len(drawn), []
+    for words, kind in (("named", False), ("drawn", True)):
+        chosen = [scene for scene, is_drawn in enumerate(drawn) if is_drawn == kind]
+        for place in range(rest) if len(chosen) > 1 else ():
+            pairs = [groups[scene * rest + place].pair for scene in chosen]
+            ours, theirs = (
+                {key: np.mean([getattr(pair, side)[key] for pair in pairs], axis=0) for key in pairs[0].ours}
+                for side in ("ours", "theirs")
+            )
+            after = groups[place].title.removeprefix(report.scenes[0].name)
+            found.append(
+                Group(f"mean of {len(chosen)} {words} scenes{after}", replace(pairs[0], ours=ours, theirs=theirs))
+            )
+    return found
+
+
+def _figures(cells: Sequence[ReportCell], seeds: int) -> dict[str, NDArray[np.float64]]:
+    """Return (level, seed) by metric, NaN where a figure is unknown."""
+    unknown = (np.nan,) * seeds
+    return {
+        metric.key: np.array([cell.by_seed.get(metric.key) or unknown for cell in cells], dtype=np.float64)
+        for metric in text.METRICS
+    }
+
+
+def group_titles(report: ReportData, axis: int) -> list[str]:
+    """Return what varies beside an axis and the light level, for each place of the others, in the groups' order."""
+    others = [other.values for at, other in enumerate(axes_of(report)) if at not in (axis, BRIGHTNESS)]
+    return [
+        ", ".join(value for value, values in zip(place, others, strict=True) if len(values) > 1)
+        for place in product(*others)
+    ]
+
+
+def verdicts(report: ReportData, of: Comparison, metric: text.Metric) -> Leads:
+    """Return the leads of A over B (row, along), of the first value of every other axis."""
+    cells = np.moveaxis(grid(report), (of.compared, of.rows, of.along), (0, 1, 2))
+    figures = [
+        np.array([_figures(tuple(row), len(report.seeds))[metric.key] for row in side])
+        for side in (cells[value].reshape((*cells.shape[1:3], -1))[..., 0] for value in (of.a, of.b))
+    ]
+    return leads(metric, *figures)
+
+
+def exposure_words(group: Group) -> str:
+    """Say at which levels the two have other exposure times, or that both have the same ones."""
+    differ = []
+    for ours, theirs in zip(group.ours, group.theirs, strict=True):
+        times = [cell.first.exposure_s for cell in (ours, theirs) if cell.first]
+        if len(times) == 2 and max(times) > SAME_TIME * min(times):
+            differ.append(
+                f"{group.pair.levels[ours.level]} {text.duration(times[0])} against {text.duration(times[1])}"
+            )
+    white_pixel = tuple(cells[0].camera for cells in (group.ours, group.theirs)) == WHITE_PIXEL
+    one_method = "One method, prior and colour rule on both mosaics" if white_pixel else ""
+    if differ:
+        return f"{one_method and one_method + '. '}Exposure times differ: {'; '.join(differ)}."
+    return f"{one_method}, and the same exposure times: they differ by the mosaic alone." if white_pixel else ""
+
+
+def over_groups(groups: Sequence[Group]) -> str:
+    """Say of several groups in how many one is better and worse somewhere, with the largest of each; else empty."""
+    if len(groups) < 2:
+        return ""
+    parts = []
+    for outcome, word in ((AHEAD, "better"), (BEHIND, "worse")):
+        sizes = []
+        for group in groups:
+            cases = [
+                (abs(lead.mean[level]) / metric.seen, metric, float(lead.mean[level]), group.pair.levels[level])
+                for metric in text.METRICS
+                for lead in [group.pair.leads[metric.key]]
+                for level in np.flatnonzero(lead.outcome == outcome).tolist()
+            ]
+            if cases:
+                sizes.append((*max(cases, key=lambda case: case[0]), group.title))
+        if sizes:
+            _, metric, lead, level, title = max(sizes, key=lambda case: case[0])
+            size = text.lead_text(metric, lead) + (f"{text.NBSP}{metric.unit}" if metric.unit else "")
+            parts.append(f"{word} somewhere in {len(sizes)} (most: {metric.name} {size}, {title}, {level})")
+    return f"Of {len(groups)} places: {'; '.join(parts) or 'in none a difference that is seen'}."
+
+
+def comparisons(report: ReportData) -> list[dict[str, Any]]:
+    """Return for each axis what the page's script shows of any two of its values, i and j.
+
+    Returns
+    -------
+    list of dict
+        By "i j", i < j: ``leads``, by metric outcomes (their first letters), leads and half widths in all places but
+        for this axis. Of axes in `RIVALS`, by "i j": ``counts``, by metric ahead, level and behind over the groups,
+        equal light once; ``means``, for each mean over scenes its title and by metric what ``leads`` has, by light. And
+        by "a b": ``answers``, for each group the words; ``over``, those over all groups.
+    """
+    cells, metrics = grid(report), shown_metrics(report.cells)
+    found = []
+    for axis, length in enumerate(cells.shape):
+        across: dict[str, Any] = {"leads": {}, "counts": {}, "means": {}, "answers": {}, "over": {}}
+        sides = [_figures(tuple(part.ravel()), len(report.seeds)) for part in np.moveaxis(cells, axis, 0)]
+        for i, j in combinations(range(length), 2):
+            across["leads"][f"{i} {j}"] = {
+                metric.key: _flat(leads(metric, sides[i][metric.key], sides[j][metric.key])) for metric in metrics
+            }
+        for a, b in permutations(range(length), 2) if axis in RIVALS else ():
+            groups = groups_of(report, axis, a, b)
+            key = f"{a} {b}"
+            across["answers"][key] = [
+                {"said": answer(x.pair), "light": in_light(x.pair), "times": exposure_words(x)} for x in groups
+            ]
+            across["over"][key] = over_groups(groups)
+            if a < b:
+                counted = [counts(x.pair.ours, x.pair.theirs) for x in groups]
+                across["counts"][key] = {
+                    metric.key: [sum(one[metric.key][outcome] for one in counted) for outcome in OUTCOMES]
+                    for metric in metrics
+                }
+                across["means"][key] = [
+                    {"title": mean.title} | {metric.key: _flat(mean.pair.leads[metric.key]) for metric in metrics}
+                    for mean in means_over_scenes(report, groups)
+                ]
+        found.append(across)
+    return found
+
+
+def _flat(lead: Leads) -> list[Any]:
+    """Return outcomes as letters, leads and half widths with seven digits, more than a page writes."""
+    numbers = (
+        [float(f"{x:.7g}") if np.isfinite(x) else None for x in part.tolist()] for part in (lead.mean, lead.half)
+    )
+    return ["".join(outcome[0] for outcome in lead.outcome.tolist()), *numbers]
+
+
+def shown_metrics(cells: Sequence[ReportCell]) -> list[text.Metric]:
+    """Return the metrics that are known for some cell: those of targets are so on their own scene alone."""
+    return [metric for metric in text.METRICS if any(cell.figures[metric.key] is not None for cell in cells)]
 
 
 def best(report: ReportData, metric: text.Metric) -> set[int]:
     """Return the cells, by place, that are ahead of every other camera in their condition."""
-    count, found = len(report.cameras), set()
-    for start in range(0, len(report.cells), count):
-        cells = report.cells[start : start + count]
-        for index, cell in enumerate(cells):
-            others = [verdict(metric, cell, other).outcome for other in cells if other is not cell]
-            if others and set(others) == {AHEAD}:
-                found.add(start + index)
+    seeds, found = len(report.seeds), set()
+    for start, cells in zip(range(0, len(report.cells), len(report.cameras)), report.conditions, strict=True):
+        values = _figures(cells, seeds)[metric.key]
+        outcome = leads(metric, values[:, None], values[None]).outcome == AHEAD
+        found |= (
+            {start + int(at) for at in np.flatnonzero(outcome.sum(axis=1) == len(cells) - 1)}
+            if len(cells) > 1
+            else set()
+        )
     return found

@@ -104,12 +104,12 @@ class ReportData:
 
     Attributes
     ----------
-    rodcone, name : str
-        Version of rodcone, and the study's name.
+    rodcone, name, title : str
+        Version of rodcone, the study's name, and the report's title.
     scenes ... seeds
         Axes of the study.
     cells : tuple of ReportCell
-        One for each scene, spectrum, sensor, exposure, level and camera, in this order.
+        One for each scene, spectrum, sensor, exposure, white balance, level and camera, in this order.
     truths : tuple of str or None
         The noise-free picture of each scene under each spectrum; None where it isn't made yet.
     stages : mapping of str to float
@@ -124,14 +124,18 @@ class ReportData:
         Which pictures aren't in the page; empty where all are.
     looked_at : (int, int)
         Column and row of the first picture that the loupe shows at first.
+    denoised : bool
+        Whether the light is.
     """
 
     rodcone: str
     name: str
+    title: str
     scenes: tuple[ReportScene, ...]
     spectra: tuple[str, ...]
     sensors: tuple[ReportSensor, ...]
     exposures: tuple[str, ...]
+    balances: tuple[str, ...]
     levels: tuple[ReportLevel, ...]
     cameras: tuple[str, ...]
     seeds: tuple[int, ...]
@@ -146,6 +150,7 @@ class ReportData:
     notes: tuple[str, ...] = ()
     pictures_left_out: str = ""
     looked_at: tuple[int, int] = (0, 0)
+    denoised: bool = False
 
     @property
     def conditions(self) -> list[tuple[ReportCell, ...]]:
@@ -154,7 +159,7 @@ class ReportData:
 
     @property
     def by_group(self) -> list[tuple[ReportCell, ...]]:
-        """The cells by group: all levels and cameras of one scene, spectrum, sensor and exposure."""
+        """The cells by group: all levels and cameras of one scene, spectrum, sensor, exposure and balance."""
         return _parted(self.cells, len(self.cameras) * len(self.levels))
 
     @property

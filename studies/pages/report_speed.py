@@ -31,7 +31,7 @@ def speed_rows(report: ReportData) -> list[SpeedRow]:
     the same ones. Conditions that other variants or engines rendered or captured have rows of their own, whose sensor's
     name says so.
     """
-    per_sensor = len(report.exposures) * len(report.levels)
+    per_sensor = len(report.exposures) * len(report.balances) * len(report.levels)
     rows = []
     for slot, sensor in enumerate(report.sensors):
         parts: dict[str, list[Sequence[ReportCell]]] = {}

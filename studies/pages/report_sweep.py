@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensor.exposure import AUTO, RULES
+from sensor.exposure import AUTO_INFORMATION, RULES
 from studies.metrics.confidence import mean_with_confidence
 from studies.pages.report_compare import axes_of, first_comparison
 from studies.pages.report_data import ReportCell, ReportData, ReportScene
@@ -69,10 +69,12 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
     data = ReportData(
         rodcone=metadata.version("rodcone"),
         name=study["name"],
+        title=study.get("title") or study["name"],
         scenes=tuple(ReportScene(name, *size) for name, size in zip(names, sizes, strict=True)),
         spectra=tuple(study["spectra"]),
         sensors=tuple(sensor_of(name) for name in study["sensors"]),
         exposures=tuple(way_name(*way) for way in _ways(study)),
+        balances=tuple(study["white_balances"]),
         levels=tuple(level_of(level) for level in study["levels"]),
         cameras=tuple(study["processors"]),
         seeds=tuple(study["seeds"]),
@@ -85,6 +87,7 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         exposure_rule=_exposure_rules(study),
         left_out=lenses_left_out(made, study["sensors"]),
         notes=(*render_notes(made), *unmade),
+        denoised=study["render"]["denoise"],
         looked_at=next((busiest(truth) for truth in true.values()), (0, 0)),
     )
     order = view_order([len(axis.values) for axis in axes_of(data)], first_comparison(data))
@@ -99,17 +102,16 @@ def _cells(study: Mapping[str, Any], made: Sequence[Row], names: Sequence[str]) 
     """Return a cell for each combination that was asked for; one that isn't made yet has no figure."""
     sensors = [label(name) for name in study["sensors"]]
     found = {
-        (r.scene, r.spectrum, r.sensor, r.exposure, r.white_balance, r.frames, r.level, r.processor, r.seed): r
+        (r.scene, r.spectrum, r.sensor, (r.exposure, r.frames), r.white_balance, r.level, r.processor, r.seed): r
         for r in made
     }
     light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in made}
     views = view_names(names, study["spectra"])
-    in_view = group_names(sensors, [way_name(*way) for way in _ways(study)])
+    in_view = group_names(sensors, [way_name(*way) for way in _ways(study)], study["white_balances"])
     titles = [name + (f", {view}" if view else "") for view in views for name in in_view]
-    groups = product(names, study["spectra"], sensors, _ways(study))
+    groups = product(names, study["spectra"], sensors, _ways(study), study["white_balances"])
     cells = []
-    for title, (*place, way) in zip(titles, groups, strict=True):
-        group = (*place, *way)
+    for title, group in zip(titles, groups, strict=True):
         for level, camera in product(study["levels"], study["processors"]):
             of_seeds = [found.get((*group, level, camera, seed)) for seed in study["seeds"]]
             in_both_units = light.get((*group[:2], level), (None, None))
@@ -117,13 +119,13 @@ def _cells(study: Mapping[str, Any], made: Sequence[Row], names: Sequence[str]) 
     return cells
 
 
-def _ways(study: Mapping[str, Any]) -> list[tuple[str, str, int]]:
-    """Return each exposure with each white balance and number of frames; the report's exposures are these."""
-    return list(product(study["exposures"], study["white_balances"], study["frames"]))
+def _ways(study: Mapping[str, Any]) -> list[tuple[str, int]]:
+    """Return each exposure with each number of frames; the report's exposures are these."""
+    return list(product(study["exposures"], study["frames"]))
 
 
 def _exposure_rules(study: Mapping[str, Any]) -> str:
-    rules = [rule for rule in study["exposures"] if rule in RULES] or [AUTO]
+    rules = [rule for rule in study["exposures"] if rule in RULES] or [AUTO_INFORMATION]
     words = "; ".join((f"{exposure_name(rule)}: " if len(rules) > 1 else "") + RULES[rule] for rule in rules)
     return f"{words}, never longer than {study['longest_exposure_s'] * 1e3:g} ms"
 

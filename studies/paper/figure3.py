@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from isp.bilinear import bilinear
+from isp.planes import bilinear
 from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import channels

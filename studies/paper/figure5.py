@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.bilinear import bilinear
 from isp.colour.highlights import saturated_nearby
+from isp.planes import bilinear
 from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from sensor.cfa import channels, mask

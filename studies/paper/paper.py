@@ -7,8 +7,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from rodcone.files import replacing
-from rodcone.json_values import finite
+from rodcone.files import finite, replacing
 from studies.pages.environment import environment
 from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import png_bytes, svg_text

@@ -30,7 +30,7 @@ from studies.budget.model_plan import as_stated
 from studies.metrics.quality import psnr_db
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
-from studies.study.exposures import parse_exposure
+from studies.study.levels import parse_exposure
 from studies.study.lit_scene import make_transport, open_choice
 from studies.study.study import OWN, Condition, RenderLimits, SceneChoice, Study
 from studies.study.study_file import read_study

@@ -10,27 +10,25 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
 from rodcone.colour_spaces import D50_XYZ, adapt_to_d65, xyz_to_srgb
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker
-from sensor.binning import as_read
 from sensor.calibration import ColourCalibration
 from sensor.cfa import channels, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation
-from sensor.presets import preset
 from sensor.response import electrons_per_irradiance
 from studies.metrics.truth import Light, green_scale, light_in_bands
 
 ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is 78 / exposure that saturates [lux s]
 
 
-def calibrate(sensor: SensorConfig | str, light: Spectrum | str) -> ColourCalibration:
+def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
     """Fit a camera's colours under the light of an exposure, illuminant A and D65.
 
     Parameters
     ----------
-    sensor : SensorConfig or str
+    sensor : SensorConfig
         The first three channels of its mosaic, R, G and B where it has them, tell colours. Channels beyond these get a
         fitted column from XYZ, and carry no colour back. One or two channels give grey.
-    light : Spectrum or str
+    light : Spectrum
         What the camera's white balance is set to.
 
     Raises
@@ -38,8 +36,6 @@ def calibrate(sensor: SensorConfig | str, light: Spectrum | str) -> ColourCalibr
     InputError
         Where a channel collects nothing, or the three can't tell colours apart.
     """
-    sensor = preset(sensor) if isinstance(sensor, str) else sensor
-    light = illuminant(light) if isinstance(light, str) else light
     neutral, to_srgb, _, _ = _under(sensor, light)
     _, _, to_camera_a, to_xyz_a = _under(sensor, illuminant("A"))
     _, _, to_camera_d65, to_xyz_d65 = _under(sensor, illuminant("D65"))
@@ -65,7 +61,7 @@ def iso_speed(sensor: SensorConfig) -> float | None:
     if electrons_per_cd_m2 <= 0:
         return None
     per_lux_s = electrons_per_cd_m2 / camera_equation(sensor.lens)
-    return ISO_SATURATION_LUX_S * per_lux_s / as_read(sensor).metered_well_e
+    return ISO_SATURATION_LUX_S * per_lux_s / sensor.metered_well_e
 
 
 def _in_bands(spectrum: Spectrum) -> Light:

@@ -9,7 +9,7 @@ from isp.colour.colour_fit import ColourFit, fit_colours
 from isp.picture import Picture
 from isp.processors.catalogue import Processor
 from scenes.reflectances import color_checker, held
-from sensor.binning import as_read, of_read_pixels
+from sensor.binning import pixel_sums
 from sensor.cfa import channels, mask, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import falloff
@@ -80,6 +80,6 @@ def develop_to_scale(
 
 def mean_electrons(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> dict[str, float]:
     """Mean expected electrons of each channel's pixels in the raw image."""
-    read_e, tile = of_read_pixels(expected_e, sensor), as_read(sensor).cfa
-    shape = (read_e.shape[0], read_e.shape[1])
-    return {channel: float(read_e[mask(tile, channel, shape)].mean()) for channel in channels(tile)}
+    electrons = pixel_sums(expected_e, sensor)
+    shape = (electrons.shape[0], electrons.shape[1])
+    return {name: float(electrons[mask(sensor.cfa, name, shape)].mean()) for name in channels(sensor.cfa)}

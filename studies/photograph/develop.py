@@ -15,17 +15,16 @@ from isp.picture import Picture
 from isp.processors.own import processor_of, require_consent
 from render.illuminants import illuminant
 from rodcone.brief import brief
-from rodcone.colour_spaces import luminance_of_srgb
-from rodcone.errors import InputError, require_kind, require_range, unknown
+from rodcone.colour_spaces import white_of
+from rodcone.errors import InputError, require_range, unknown
 from rodcone.types import Floats
 from sensor.burst import merged_raw
 from sensor.calibration import ColourCalibration
 from sensor.cfa import channels, is_bayer, plain
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import open_raw
-from studies.metrics.truth import WHITE_AT, WHITE_PERCENTILE  # the demo's rule, here on the picture's own luminance
 from studies.study.scene_source import asked_size
-from studies.study.study import AS_SHOT, WHITE_BALANCES
+from studies.study.study import AS_SHOT, WHITE_BALANCES, default_balance
 
 # Lights that the matrices under A and D65 know as well as their own temperature: the presets' neutral is met to 1 % in
 # R, G and B and 6 % in W. Under lamps with bands of their own B is up to 26 % off, and W by a factor of two.
@@ -56,7 +55,7 @@ def develop(
     calibration: ColourCalibration | None = None,
     *,
     processor: str | None = None,
-    white_balance: str = AS_SHOT,
+    white_balance: str | None = None,
     trust_code: bool = False,
 ) -> Picture:
     """Develop a raw image into a linear picture.
@@ -69,9 +68,10 @@ def develop(
     processor : str, optional
         Of `isp.processors.catalogue.PROCESSORS`, or ``mine.py:develop`` (`isp.processors.own.processor_of`); ``bayer``,
         ``interleaved``, ``kriging`` or ``any_mosaic``, by the mosaic, where left out.
-    white_balance : str
+    white_balance : str, optional
         ``as-shot``: the calibration's neutral; an illuminant such as ``D65``: its neutral, from the calibration's
         matrices; or ``gray-world`` as in the paper, with the as-shot neutral where the picture is too dark for that.
+        Left out, as shot, and Gray World for ``interleaved_paper``, to whose method it belongs.
     trust_code : bool
         Consent to run ``mine.py``, which may do all that its user may.
 
@@ -81,7 +81,6 @@ def develop(
         For an unknown name, a file of one's own without consent, a raw image without colours, or a mosaic that the
         processor doesn't know.
     """
-    require_kind("raw", raw, RawImage, "give what capture or read_raw gives")
     name = processor or mosaic_processor(raw)
     require_consent("isp", name, trust_code)
     colour = calibration or raw.colour
@@ -90,7 +89,7 @@ def develop(
             "raw: it holds no colour calibration; allowed: one beside it; give calibrate(sensor, illuminant('D65')) too"
         )
     colours = fit_of_calibration(colour, channels(raw.cfa))
-    software, asked = processor_of(name), _asked_neutral(colour, white_balance)
+    software, asked = processor_of(name), _asked_neutral(colour, white_balance or default_balance(name))
     return software.develop(raw, colours, neutral=colour.neutral, balance=asked)
 
 
@@ -114,7 +113,7 @@ def develop_file(
     path: str | Path | Sequence[str | Path],
     isp: str | None = None,
     ev: float | None = None,
-    white_balance: str = AS_SHOT,
+    white_balance: str | None = None,
     encoding: str = "srgb",
     *,
     height: int | None = None,
@@ -135,7 +134,7 @@ def develop_file(
     ev : float, optional
         Brightness in stops: at 0 green's full well is white. Left out, the 99th percentile of the picture's luminance
         comes to 90 % of white, which noise raises in the deepest dark; for looking, not for measuring.
-    white_balance : str
+    white_balance : str, optional
         As of `develop`.
     encoding : str
         Of `isp.colour.encoding.ENCODINGS`.
@@ -191,5 +190,5 @@ def _scaled(linear: NDArray[np.float64], height: int | None, width: int | None) 
 
 def _stops(linear: NDArray[np.float64]) -> float:
     """Stops that bring the 99th percentile of luminance to 90 % of white; 0 for a picture without light."""
-    bright = float(np.percentile(luminance_of_srgb(linear), WHITE_PERCENTILE))
-    return float(np.log2(WHITE_AT / bright)) if bright > 0 else 0.0
+    white = white_of(linear)
+    return -float(np.log2(white)) if white > 0 else 0.0

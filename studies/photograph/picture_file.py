@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.encoding import ENCODINGS
+from isp.colour.encoding import ENCODINGS, quantise
+from isp.picture import Picture
 from rodcone.errors import InputError, unknown
 from rodcone.files import replacing
-from studies.photograph.icc import icc_profile
-from studies.photograph.png import to_png
+from studies.photograph.png import icc_profile, to_png
 
 ENDINGS = (".png", ".tif", ".tiff")
 BITS = (8, 16)
@@ -26,29 +26,47 @@ def check_picture_file(path: Path, bits: int, encoding: str) -> None:
         raise unknown("encoding", encoding, ENCODINGS)
 
 
-def write_picture(encoded: NDArray[np.float64], path: str | Path, bits: int = 8, encoding: str = "srgb") -> None:
-    """Write an encoded picture (h, w, 3) in [0, 1]; it appears whole or not at all.
+def write_picture(
+    picture: Picture | NDArray[np.floating], path: str | Path, bits: int = 8, encoding: str = "srgb"
+) -> None:
+    """Write a picture, whole or not at all.
+
+    Parameters
+    ----------
+    picture : Picture or (h, w, 3) or (h, w) array
+        A `Picture` is linear and encodes itself. An array is one that is encoded, 0 black and 1 white.
+    path : path
+        Ends in ``.png``, ``.tif`` or ``.tiff``.
+    bits : int
+        8 or 16 a channel.
+    encoding : str
+        Of `isp.colour.encoding.ENCODINGS`; that of an array.
 
     Raises
     ------
     InputError
-        As `check_picture_file`.
+        As `check_picture_file` and `isp.colour.encoding.quantise`.
     OSError
         Where the folder is missing or can't be written.
+
+    Warns
+    -----
+    UserWarning
+        Where values are clipped: how many.
     """
     path = Path(path)
     check_picture_file(path, bits, encoding)
+    encoded = picture.encode(encoding=encoding) if isinstance(picture, Picture) else picture
     write = to_png if path.suffix.lower() == ".png" else to_tiff
-    content = write(encoded, bits, encoding)
+    content = write(quantise(encoded, bits), encoding)
     with replacing(path) as (place,):
         place.write_bytes(content)
 
 
-def to_tiff(encoded: NDArray[np.float64], bits: int = 8, encoding: str = "srgb") -> bytes:
-    """TIFF file (revision 6.0, deflate) of an encoded picture (h, w, 3) in [0, 1], its colour profile in it."""
+def to_tiff(samples: NDArray[np.unsignedinteger], encoding: str = "srgb") -> bytes:
+    """TIFF file (revision 6.0, deflate) of samples (h, w, 3) as `quantise` gives them, their colour profile in it."""
     import tifffile
 
-    samples = np.rint(encoded * (2**bits - 1)).astype(f"u{bits // 8}")
     file = BytesIO()
     tifffile.imwrite(
         file,

@@ -1,7 +1,8 @@
 """Pictures as PNG of 8 or 16 bits a channel (Pillow writes no RGB of 16), lossless.
 
 What the numbers mean: for sRGB the chunk `sRGB`. For Display P3 both `cICP`, four numbers that say it exactly and that
-programs of PNG's third edition (W3C, 2025) put first, and `iCCP`, a profile that older ones read.
+programs of PNG's third edition (W3C, 2025) put first, and `iCCP`, a profile that older ones read
+(ICC.1:2022, version 4.4).
 """
 
 import struct
@@ -10,8 +11,8 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.encoding import ENCODINGS
-from studies.photograph.icc import icc_profile
+from isp.colour.encoding import ENCODINGS, Encoding
+from rodcone.colour_spaces import D50_XYZ, adapt_to_d65, rgb_to_xyz
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _RGB, _PERCEPTUAL, _UP = 2, 0, 2  # colour type, sRGB rendering intent, filter: the difference from the row above
@@ -19,11 +20,11 @@ _RGB, _PERCEPTUAL, _UP = 2, 0, 2  # colour type, sRGB rendering intent, filter: 
 _P3_CODES = bytes([12, 13, 0, 1])
 
 
-def to_png(encoded: NDArray[np.float64], bits: int = 8, encoding: str = "srgb") -> bytes:
-    """PNG file (W3C PNG, 3rd edition) of an encoded picture (h, w, 3) in [0, 1]."""
-    height, width = encoded.shape[:2]
-    samples = np.rint(encoded * (2**bits - 1)).astype(f">u{bits // 8}")
-    rows = np.frombuffer(samples.tobytes(), np.uint8).reshape(height, -1)
+def to_png(samples: NDArray[np.unsignedinteger], encoding: str = "srgb") -> bytes:
+    """PNG file (W3C PNG, 3rd edition) of samples (h, w, 3) as `isp.colour.encoding.quantise` gives them."""
+    height, width = samples.shape[:2]
+    bits = 8 * samples.itemsize
+    rows = np.frombuffer(samples.astype(f">u{samples.itemsize}").tobytes(), np.uint8).reshape(height, -1)
     filtered = np.empty((height, rows.shape[1] + 1), np.uint8)
     filtered[:, 0] = _UP
     filtered[0, 1:] = rows[0]
@@ -43,3 +44,47 @@ def _colour_chunks(encoding: str) -> tuple[tuple[bytes, bytes], ...]:
 
 def _chunk(name: bytes, content: bytes) -> bytes:
     return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
+
+
+# Curve of IEC 61966-2-1 as the parameters g, a, b, c, d of ICC's function type 3: linear under d.
+_CURVE = (2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045)
+_HEADER = 128
+
+
+def icc_profile(encoding: Encoding) -> bytes:
+    """Display profile of three primaries and one curve."""
+    to_d50 = np.linalg.inv(adapt_to_d65(np.eye(3), D50_XYZ).T)
+    columns = (to_d50 @ rgb_to_xyz(encoding.primaries_xy)).T
+    curve = b"para" + bytes(4) + struct.pack(">HH", 3, 0) + _fixed(*_CURVE)
+    content = {
+        b"desc": _text(encoding.title),
+        b"cprt": _text("CC0"),
+        b"wtpt": _xyz(*D50_XYZ),
+        b"chad": b"sf32" + bytes(4) + _fixed(*to_d50.ravel()),
+        **{name + b"XYZ": _xyz(*column) for name, column in zip((b"r", b"g", b"b"), columns, strict=True)},
+        **{name + b"TRC": curve for name in (b"r", b"g", b"b")},
+    }
+    table, body = struct.pack(">I", len(content)), b""
+    for name, value in content.items():
+        place = _HEADER + 4 + 12 * len(content) + len(body)
+        table += name + struct.pack(">II", place, len(value))
+        body += value.ljust(-(-len(value) // 4) * 4, b"\0")
+    size = _HEADER + len(table) + len(body)
+    header = struct.pack(">I4sI4s4s4s", size, bytes(4), 0x04400000, b"mntr", b"RGB ", b"XYZ ")
+    header += struct.pack(">6H", 2026, 1, 1, 0, 0, 0) + b"acsp"
+    return (header.ljust(68, b"\0") + _fixed(*D50_XYZ)).ljust(_HEADER, b"\0") + table + body
+
+
+def _fixed(*values: float) -> bytes:
+    """Numbers of 16 bits before and behind the point."""
+    return struct.pack(f">{len(values)}i", *(round(float(value) * 65536) for value in values))
+
+
+def _xyz(*values: float) -> bytes:
+    return b"XYZ " + bytes(4) + _fixed(*values)
+
+
+def _text(text: str) -> bytes:
+    """One text, in English."""
+    coded = text.encode("utf-16-be")
+    return b"mluc" + bytes(4) + struct.pack(">II", 1, 12) + b"enUS" + struct.pack(">II", len(coded), 28) + coded

@@ -14,22 +14,21 @@ from render.radiance_files.radiance_source import extent_of, is_radiance_file, i
 from render.scene import Scene, film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.user_scene.scene_parts import SceneFile
-from rodcone.errors import InputError, require_range, require_whole
+from rodcone.errors import InputError, require_fields, require_whole
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
-from sensor.binning import as_read, check_blocks
+from sensor.binning import check_frame
 from sensor.burst import burst
-from sensor.cfa import channels, check_covers, is_bayer
+from sensor.cfa import channels, is_bayer
 from sensor.config import SensorConfig
 from sensor.device import draw_device
-from sensor.exposure import AUTO, exposure_by_rule_s
+from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_by_rule_s
 from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending, write_raw
 from studies.photograph.calibrate import calibrate, iso_speed
-from studies.study.exposures import parse_exposure
-from studies.study.levels import parse_level
+from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.study.scene_source import asked_level, asked_size, open_scene
@@ -50,9 +49,7 @@ class Order:
     sensor, cfa : str
         Preset by name or file; mosaic, where it isn't the preset's own.
     exposure : str
-        A rule of `sensor.exposure.RULES`, or a time such as ``20ms``.
-    exposure_s : float, optional
-        The time in seconds, in place of `exposure`; 0 for a dark frame.
+        A rule of `sensor.exposure.RULES`, or a time such as ``20ms`` or ``1/50``; ``0s`` for a dark frame.
     level : str, optional
         Such as ``25cd/m2``; the scene's own where left out.
     lights : tuple of str
@@ -77,8 +74,7 @@ class Order:
     out: str | Path
     sensor: str | Path = "low_noise"
     cfa: str | None = None
-    exposure_s: float | None = None
-    exposure: str = AUTO
+    exposure: str = AUTO_INFORMATION
     level: str | None = None
     lights: tuple[str, ...] = ()
     chart: str | None = None
@@ -92,6 +88,9 @@ class Order:
     trust: bool = False
     extend: str | None = None
     force: bool = False
+
+    def __post_init__(self) -> None:
+        require_fields(self)
 
 
 @dataclass(frozen=True)
@@ -179,6 +178,9 @@ def take(order: Order, step: Step | None = None) -> Taken:
     paths = tuple(path for frame, place in zip(raws, places, strict=True) for path in write_raw(frame, place))
     if bayer is not None:
         paths += write_raw(bayer, out.with_stem(out.stem + "_bayer"))
+    if not converted and "W" in channels(raw.cfa):
+        other = f"{paths[-1].name}, re-mosaiced" if bayer is not None else "a .dng of one exposure, re-mosaiced"
+        notes += [f"{out.name}: other programs read its mosaic as four colours, such as GMCY; for them give {other}"]
     facts = {
         "paths": [str(path) for path in paths],
         "source": str(order.source),
@@ -201,7 +203,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
 def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     """Sensor, scene (None: a stored radiance) and exposure time (None: by a rule), or `InputError`."""
     sensor = preset(order.sensor, order.cfa)
-    check_ending(Path(order.out), as_read(sensor).cfa)
+    check_ending(Path(order.out), sensor.cfa)
     require_whole("spp", order.spp, 1, 1 << 16, "give samples per pixel")
     require_whole("frames", order.frames, 1, MOST_FRAMES, "give exposures of a burst")
     require_whole("seed", order.seed, 0, 2**31, "give a whole number")
@@ -237,25 +239,17 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     opened = open_scene(str(order.source), order.trust, order.extend, chart=order.chart)
     asked_level(opened.scene, order.level)
     height, width = _size(order, opened)
-    check_covers(sensor.cfa, (height, width))
-    check_blocks(sensor, (height, width))
+    check_frame(sensor, (height, width))
     require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
     return sensor, opened, exposure_s
 
 
 def _asked_exposure_s(order: Order, names: tuple[str, ...]) -> float | None:
     """Exposure time [s]; None where a rule chooses it, for which the mosaic needs the channels that it looks at."""
-    if order.exposure != AUTO and order.exposure_s is not None:
-        raise InputError(
-            f"exposure_s: {order.exposure_s!r} and exposure {order.exposure!r}; allowed: one; leave one out"
-        )
-    if order.exposure_s is not None:
-        require_range("exposure_s", order.exposure_s, 0.0, 1e7, "give seconds, 0 or more")
-        return order.exposure_s
-    time_s = parse_exposure(order.exposure, "exposure")
+    time_s = parse_exposure(order.exposure, "exposure", 0.0)
     if time_s is not None:
         return time_s
-    if order.exposure != AUTO and "W" not in names:
+    if order.exposure == AUTO_W and "W" not in names:
         raise InputError(
             f"exposure: {order.exposure!r} looks at W, which {names} lacks; allowed: a mosaic with W; "
             f"give {AUTO}, or a time such as 20ms"

@@ -7,12 +7,10 @@ import numpy as np
 
 from render.illuminants import illuminant
 from render.spectrum import VISIBLE_NM, Floats
-from sensor.binning import as_read
 from sensor.capture import expose
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.device import draw_device
-from sensor.readings.reading import SWITCHED
 from sensor.readout import electrons_at_snr, noise_variance
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons
 
@@ -59,7 +57,7 @@ def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float) -> Floats:
     """
     even = replace(sensor, pixel=replace(sensor.pixel, crosstalk=0.0))
     # each is a frame of its own, for which a camera may switch its gain
-    fields = electrons.ravel()[:, None] if sensor.readout == SWITCHED else electrons[None]
+    fields = electrons.ravel()[:, None] if sensor.chip.switched else electrons[None]
     variance = np.reshape([noise_variance(field, even, exposure_s) for field in fields], electrons.shape)
     return np.asarray(electrons / np.sqrt(variance))
 
@@ -84,7 +82,7 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
     """SNR of each channel's pixel over light; NaN where its well is full."""
     of = channel_e(sensor, light_of(light), 1.0, exposure_s)
     electrons = dict(zip(channels(sensor.cfa), of[:, None] * luminance_cd_m2, strict=True))
-    full_e = as_read(sensor).pixel.full_well_e
+    full_e = sensor.pixel.full_well_e
     return {name: np.where(e < full_e, snr(e, sensor, exposure_s), np.nan) for name, e in electrons.items()}
 
 
@@ -115,8 +113,8 @@ def even_field(
     alone = replace(sensor, cfa=(channel,))
     electrons, shape = float(channel_e(alone, light, luminance_cd_m2, exposure_s)[0]), (FIELD_SIDE, FIELD_SIDE)
     rng = np.random.default_rng(0)
-    photodiode_e = electrons / 4 if alone.binning else electrons
-    raw = expose(np.full(shape, photodiode_e), alone, exposure_s, draw_device(alone, shape, rng), rng)
-    mean_e = float(raw.electrons.mean()) - as_read(alone).pixel.dark_current_e_per_s * raw.exposure_s
+    device = draw_device(alone, shape, rng)
+    raw = expose(np.full(shape, electrons / alone.chip.sites**2), alone, exposure_s, device, rng)
+    mean_e = float(raw.electrons.mean()) - alone.pixel.dark_current_e_per_s * raw.exposure_s
     simulated_db = 20 * log10(mean_e / float(raw.electrons.std())) if mean_e > 0 else float("nan")
     return EvenField(electrons, 20 * log10(float(snr(np.array(electrons), alone, exposure_s))), simulated_db)

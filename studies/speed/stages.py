@@ -117,7 +117,7 @@ def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
     most = 2 * bench.samples[-1]
     (one, reference_times), (other, _) = timed({str(n): call(most, bench.seed + n) for n in (1, 2)}, 0).values()
     relit = [each.relight(luminance_cd_m2=bench.level_cd_m2) for each in (one, other)]
-    yard = yardstick((relit[0], relit[1]), (one.coverage > 0) | (other.coverage > 0), sensor)
+    yard = yardstick((relit[0], relit[1]), (one.coverage.mean > 0) | (other.coverage.mean > 0), sensor)
     points = []
     for choice, (transport, times) in made.items():
         image_e = electrons(transport.relight(luminance_cd_m2=bench.level_cd_m2), sensor, yard.exposure_s)

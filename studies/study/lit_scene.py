@@ -19,9 +19,9 @@ from render.scene import Scene, film_size
 from render.scene_range import check_range
 from render.spectrum import Floats, Spectrum
 from render.transport import Transport
-from rodcone.digests import digest, digest_file
+from rodcone.digests import digest_file, digest_inputs
 from rodcone.errors import InputError, require_keys
-from sensor.binning import check_blocks
+from sensor.binning import check_frame
 from sensor.presets import preset
 from studies.study.equal_area import require_pixels
 from studies.study.levels import parse_level
@@ -72,7 +72,7 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         check_radiance_file(choice.source, study.levels)
         if choice.chart:
             raise InputError(f"scenes: chart for {choice.source}, a picture; leave it out")
-        identity = digest(
+        identity = digest_inputs(
             [
                 [digest_file(file) for file in files_of(choice.source)],
                 None if choice.light is None else illuminant(choice.light),
@@ -92,10 +92,10 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
     check_range(scene, *study.render.range_nm)
     size = film_size(opened.size, study.render.size)
     for name in study.sensors:
-        check_blocks(preset(name), size)
+        check_frame(preset(name), size)
     if study.equal_area is not None:
         require_pixels(study.equal_area, study.sensors, size)
-    identity = digest([digest_scene(scene), size])
+    identity = digest_inputs([digest_scene(scene), size])
     return OpenedScene(choice=choice, scene=scene, size=size, identity=identity, notes=tuple(opened.notes))
 
 
@@ -297,4 +297,4 @@ def open_all(study: Study) -> dict[SceneChoice, OpenedScene]:
 
 def digest_scene(scene: Scene) -> str:
     """Hash of a scene, the meshes and bitmaps that it names by their content."""
-    return digest([scene, file_digests(scene.geometry)])
+    return digest_inputs([scene, file_digests(scene.geometry)])

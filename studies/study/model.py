@@ -21,6 +21,29 @@ class RenderModel:
 
 
 @dataclass(frozen=True)
+class LensTerms:
+    """Terms of the lens that a study states for all of its sensors; None leaves one to each sensor.
+
+    Attributes
+    ----------
+    diffraction : float, optional
+        1 for an ideal aperture, as `sensor.config.LensConfig`.
+    veiling_glare : float, optional
+        Share of the light.
+    horizontal_view_deg : float, optional
+        Angle of view for cos^4.
+    """
+
+    diffraction: float | None = None
+    veiling_glare: float | None = None
+    horizontal_view_deg: float | None = None
+
+    def on(self, lens: LensConfig) -> LensConfig:
+        """Return a lens with the terms that are stated."""
+        return replace(lens, **{name: value for name, value in vars(self).items() if value is not None})
+
+
+@dataclass(frozen=True)
 class ImageModel:
     """The lens whose terms an image holds (0: left out), and the readout.
 

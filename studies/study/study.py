@@ -11,20 +11,20 @@ from render.illuminants import illuminant
 from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_reflectance
 from render.spectrum import VISIBLE_NM
 from rodcone.brief import brief
-from rodcone.errors import InputError, require_range, require_whole, unknown
-from sensor.binning import as_read
-from sensor.exposure import AUTO, LONGEST_S
+from rodcone.errors import InputError, require_fields, require_range, require_whole, unknown
+from sensor.exposure import AUTO_INFORMATION, LONGEST_S
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.study.equal_area import EqualArea
-from studies.study.exposures import parse_exposure
-from studies.study.levels import parse_level
+from studies.study.levels import parse_exposure, parse_level
 from studies.study.light_range import check_known, check_range
+from studies.study.model import LensTerms
 
 OWN = "own"  # the spectrum that the scene's lights have
 MOST_FRAMES = 64
-# Gray World from the picture, or the neutral of the scene's light, as a camera notes it in its raw files.
-WHITE_BALANCES = GRAY_WORLD, AS_SHOT = "gray-world", "as-shot"
+# The neutral of the scene's light, as a camera notes it in its raw files, or Gray World from the picture.
+WHITE_BALANCES = AS_SHOT, GRAY_WORLD = "as-shot", "gray-world"
+PAPER_METHOD = "interleaved_paper"  # the processor to whose published method Gray World belongs
 _LISTS = ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "frames", "seeds")
 FILES = (".xml", ".toml", ".csv", *ENDINGS)  # endings of values that name a file
 
@@ -57,7 +57,9 @@ class SceneChoice:
         return label(self.chart or self.source)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "source", str(self.source))  # from Python it may be a Path
+        source: object = self.source  # from Python it may be a Path
+        object.__setattr__(self, "source", str(source) if isinstance(source, Path) else source)
+        require_fields(self)
 
 
 @dataclass(frozen=True)
@@ -95,25 +97,6 @@ class RenderLimits:
 
 
 @dataclass(frozen=True)
-class LensTerms:
-    """What a full model of the lens holds where the preset leaves it out; a plan skips what the noise hides.
-
-    Attributes
-    ----------
-    diffraction : float
-        1 for an ideal aperture, as `sensor.config.LensConfig`.
-    veiling_glare : float
-        Share of the light; 1 % is a good photographic lens by the index of ISO 9358.
-    horizontal_view_deg : float, optional
-        Angle of view for cos^4; left out, the scene's camera's own.
-    """
-
-    diffraction: float = 1.0
-    veiling_glare: float = 0.01
-    horizontal_view_deg: float | None = None
-
-
-@dataclass(frozen=True)
 class BudgetShares:
     """Noise variance that a plan's approximations may add, over the sensor's own: together, and Monte Carlo's."""
 
@@ -147,7 +130,7 @@ class Condition:
     level: str
     exposure: str
     sensor: str
-    white_balance: str = GRAY_WORLD
+    white_balance: str = AS_SHOT
     frames: int = 1
 
 
@@ -158,6 +141,8 @@ class Study:
     `trust_code` is the consent to run the user's own Python files among `processors`; no study file can give it.
     `sensor_side_um` gives all sensors one longer side: pixels follow from each pitch, and pictures are averaged to the
     pixels of the coarsest before they are measured. Left out, a pixel of the render is one of every sensor.
+    `white_balances` left out are those that `default_balance` has for the processors.
+    `title` heads the report; where it is empty, `name` does.
 
     Raises
     ------
@@ -168,13 +153,14 @@ class Study:
     scenes: tuple[SceneChoice, ...]
     levels: tuple[str, ...]
     spectra: tuple[str, ...] = (OWN,)
-    exposures: tuple[str, ...] = (AUTO,)
+    exposures: tuple[str, ...] = (AUTO_INFORMATION,)
     sensors: tuple[str, ...] = ("low_noise",)
-    white_balances: tuple[str, ...] = (GRAY_WORLD,)
+    white_balances: tuple[str, ...] = ()
     processors: tuple[str, ...] = ("interleaved", "bayer")
     seeds: tuple[int, ...] = (0,)
     frames: tuple[int, ...] = (1,)
     name: str = "study"
+    title: str = ""
     longest_exposure_s: float = LONGEST_S
     sensor_side_um: float | None = None
     render: RenderLimits = field(default_factory=RenderLimits)
@@ -185,7 +171,13 @@ class Study:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "sensors", tuple(map(str, self.sensors)))  # from Python they may be Paths
+        for name in _LISTS:  # from Python they may be lists, and files Paths
+            if isinstance(values := getattr(self, name), list | tuple):
+                object.__setattr__(self, name, tuple(str(x) if isinstance(x, Path) else x for x in values))
+        for part in (self, self.render, self.lens, self.budget):
+            require_fields(part)
+        balances = self.white_balances or tuple(dict.fromkeys(map(default_balance, self.processors)))
+        object.__setattr__(self, "white_balances", balances)
         _check_axes(self)
         _check_cameras(self)
         _check_numbers(self)
@@ -195,8 +187,12 @@ class Study:
         """Size that all sensors share; None where each has the render's pixels."""
         if self.sensor_side_um is None:
             return None
-        read = [as_read(vary(preset(name), mosaic)) for name in self.sensors for mosaic in mosaics(self)]
-        return EqualArea(self.sensor_side_um, max(sensor.pixel.pitch_um for sensor in read))
+        return EqualArea(self.sensor_side_um, max(preset(name).pixel.pitch_um for name in self.sensors))
+
+
+def default_balance(processor: str) -> str:
+    """White balance of a processor where none is stated: as shot, Gray World with the paper's method."""
+    return GRAY_WORLD if processor == PAPER_METHOD else AS_SHOT
 
 
 def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:
@@ -263,7 +259,7 @@ def _check_cameras(study: Study) -> None:
     for name in study.sensors:
         own = preset(name)
         # sensors of one size are compared at the coarsest's pixels
-        if study.sensor_side_um is None and bool(own.binning) != bool(preset(study.sensors[0]).binning):
+        if study.sensor_side_um is None and own.chip.sites != preset(study.sensors[0]).chip.sites:
             raise InputError(
                 f"sensors: {name!r} and {study.sensors[0]!r}, of which one bins: its pictures are half as large, and "
                 "have another truth; allowed: all bin, or none; give each a study of its own"
@@ -278,7 +274,7 @@ def _check_numbers(study: Study) -> None:
     if study.sensor_side_um is not None:
         require_range("sensor_side_um", study.sensor_side_um, 1.0, 1e6, "give micrometres, or leave it out")
         for name in study.sensors:
-            pitch_um = preset(name).pixel.pitch_um
+            pitch_um = preset(name).site_pitch_um
             across, most = round(study.sensor_side_um / pitch_um), f"{16 * pitch_um:g} to {8192 * pitch_um:g}"
             fix = f"{study.sensor_side_um:g} um is given; give {most}"
             require_whole(f"sensor_side_um: pixels across {label(name)}", across, 16, 8192, fix)
@@ -291,9 +287,12 @@ def _check_numbers(study: Study) -> None:
         require_range("render.max_seconds", limits.max_seconds, 1e-3, 1e7, "give seconds")
     if limits.noise_share is not None:
         require_range("render.noise_share", limits.noise_share, 1e-6, 1e3, "give a share of the noise variance: 0.03")
-    require_range("lens.diffraction", lens.diffraction, 0.0, 100.0, "give 1 for an ideal lens, 0 for none")
-    require_range("lens.veiling_glare", lens.veiling_glare, 0.0, 1.0, "give a fraction, 0 for none")
-    if lens.horizontal_view_deg is not None:
-        require_range("lens.horizontal_view_deg", lens.horizontal_view_deg, 0.0, 175.0, "give degrees, 0 for none")
+    for name, highest, hint in (
+        ("diffraction", 100.0, "give 1 for an ideal lens, 0 for none"),
+        ("veiling_glare", 1.0, "give a fraction, 0 for none"),
+        ("horizontal_view_deg", 175.0, "give degrees, 0 for none"),
+    ):
+        if (term := getattr(lens, name)) is not None:
+            require_range(f"lens.{name}", term, 0.0, highest, hint)
     require_range("budget.total", budget.total, 1e-6, 1e3, "give a share of the noise variance: 10 % is 0.1")
     require_range("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total")

@@ -1,16 +1,14 @@
 """Studies as TOML files, read strictly: a misspelt key is an error, not a night of computing lost."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 from pathlib import Path
-from typing import Any, get_args, get_origin
+from typing import Any, get_args
 
-from cattrs import AttributeValidationNote, ClassValidationError, Converter, ForbiddenExtraKeysError
 from cattrs.gen import make_dict_structure_fn
 
 from isp.processors.own import user_file
-from rodcone.errors import InputError, one_line, require_whole, unknown
-from rodcone.toml_file import parse_toml, read_toml
+from rodcone.errors import InputError, one_line, require_whole
+from rodcone.toml_file import is_tuple, parse_toml, read_toml, strict_converter, structured
 from studies.study.study import FILES, SceneChoice, Study
 
 _EXAMPLES = {"levels": '"1lux" or "25cd/m2"', "exposures": '"10ms"'}
@@ -57,11 +55,13 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
         content["trust_code"] = trust_code
         for axis in ("scenes", "sensors", "spectra", "processors"):
             content |= {axis: _beside(content[axis], Path(path).parent)} if axis in content else {}
-        return _CONVERTER.structure(content, Study)
-    except ClassValidationError as error:
-        raise InputError(f"study {str(path)!r}: {_first_fault(error)}") from error
+        return structured(content, Study, _CONVERTER, "see rodcone new study")
     except InputError as error:
-        raise InputError(f"study {str(path)!r}: {error}") from error
+        words = str(error)
+        example = _EXAMPLES.get(words.partition(":")[0])
+        if example and "not a text" in words:
+            words = f"{words}; write {example}"
+        raise InputError(f"study {str(path)!r}: {words}") from error
 
 
 def _set(content: dict[str, Any], change: str) -> None:
@@ -92,17 +92,6 @@ def _beside(value: Any, folder: Path) -> Any:
     return str(folder / value) if named else value
 
 
-def _strict(kind: type, allowed: tuple[type, ...], words: str) -> Callable[[Any, Any], Any]:
-    """Hook that refuses what Python would convert: a text that reads as a number, True as 1, 1 as True."""
-
-    def take(value: Any, _: Any) -> Any:
-        if isinstance(value, bool) != (kind is bool) or not isinstance(value, allowed):
-            raise InputError(f"{value!r} is not {words}")
-        return kind(value)
-
-    return take
-
-
 def _scene(value: Any, _: Any) -> SceneChoice:
     """Scene by its name alone, or as a table."""
     if isinstance(value, str):
@@ -120,36 +109,7 @@ def _axis(kind: Any) -> Callable[[Any, Any], Any]:
     )
 
 
-def _is_tuple(kind: Any) -> bool:
-    origin: Any = get_origin(kind)
-    return origin is tuple
-
-
-_CONVERTER = Converter(forbid_extra_keys=True)
-_CONVERTER.register_structure_hook(bool, _strict(bool, (bool,), "true or false"))
-_CONVERTER.register_structure_hook(str, _strict(str, (str,), "a text in quotes"))
-_CONVERTER.register_structure_hook(int, _strict(int, (int,), "a whole number"))
-_CONVERTER.register_structure_hook(float, _strict(float, (int, float), "a number"))
-_CONVERTER.register_structure_hook_factory(_is_tuple, _axis)
+_CONVERTER = strict_converter()
+_CONVERTER.register_structure_hook_factory(is_tuple, _axis)
 _scene_of_table = make_dict_structure_fn(SceneChoice, _CONVERTER, _cattrs_forbid_extra_keys=True)
 _CONVERTER.register_structure_hook(SceneChoice, _scene)
-
-
-def _first_fault(error: ClassValidationError) -> str:
-    """Words for the first fault; for an unknown key with the one that was likely meant."""
-    fault = min(error.exceptions, key=lambda each: not isinstance(each, ForbiddenExtraKeysError))
-    if isinstance(fault, ForbiddenExtraKeysError):
-        return str(unknown("key", sorted(fault.extra_fields)[0], [field.name for field in fields(fault.cl)]))
-    if isinstance(fault, KeyError):
-        return f"key {fault.args[0]!r} is missing; add it, or see rodcone new study"
-    if isinstance(fault, ClassValidationError):
-        words = _first_fault(fault)
-    elif isinstance(fault, InputError):
-        words = str(fault)
-    else:
-        words = "the value is not a table; allowed: a table of keys; see rodcone new study"
-    where = [note.name for note in getattr(fault, "__notes__", []) if isinstance(note, AttributeValidationNote)]
-    example = _EXAMPLES.get(where[0]) if where else None
-    if example and "not a text" in words:
-        words = f"{words}; write {example}"
-    return f"{where[0]}: {words}" if where else words

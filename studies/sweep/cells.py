@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit
-from rodcone.digests import digest
+from rodcone.digests import digest, digest_inputs
 from sensor.config import SensorConfig
 from studies.metrics.truth import Light
-from studies.study.exposures import parse_exposure
-from studies.study.levels import parse_level
+from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import RenderFacts
 from studies.study.study import Condition, label
 from studies.sweep.provenance import Provenance
@@ -115,11 +114,13 @@ def cell_key(
     frame: str,
     luminance_cd_m2: float,
     exposure_s: float,
-    colours: ColourFit,
     made_by: Provenance,
 ) -> str:
-    """Key of a cell: its place in the study, which decides its noise, and all that its picture is made from."""
-    return digest([labels(condition), processor, seed, frame, luminance_cd_m2, exposure_s, colours, made_by])
+    """Key of a cell: its place in the study, which decides its noise, and all that its picture is made from.
+
+    The processor's colours follow from the frame's sensor and light.
+    """
+    return digest_inputs([labels(condition), processor, seed, frame, luminance_cd_m2, exposure_s, made_by])
 
 
 def device_stream(sensor: str, mosaic: str, seed: int) -> np.random.Generator:

@@ -1,6 +1,8 @@
 """Cells on a cluster of `dask.distributed` (extra ``cluster``): the same cells and rows as in one process."""
 
 import logging
+import os
+import sys
 import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -40,9 +42,9 @@ def on_cluster(address: str, patience_s: float = PATIENCE_S) -> Iterator[Callabl
         For a cluster that doesn't answer, has no workers, workers of other code or with several threads each; later
         for one that goes away, or a cell that ended its worker too often.
     """
+    check_address(address)
     if find_spec("distributed") is None:
         raise InputError("cluster: dask.distributed is not installed; install it: pip install 'rodcone[cluster]'")
-    check_address(address)
     with _quiet(), closing(_client(address, patience_s)) as client:
         slots, threads = _survey(client, address, patience_s)
         yield partial(_run, client, address, slots, threads)
@@ -157,8 +159,19 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
                 f"cluster: {worker} runs {other[0]} {its.get(other[0])}, this is {_what_computes()[other[0]]}; "
                 "install the same, start it again"
             )
+    unsafe = [worker for worker, safe in client.run(_has_safe_path).items() if not safe]
+    if unsafe:
+        warnings.warn(
+            f"{unsafe[0]} imports Python files of the folder in which it started; start dask worker with "
+            "PYTHONSAFEPATH=1",
+            stacklevel=2,
+        )
     on_host = Counter(urlsplit(worker).hostname for worker in found)
     return len(found), max(1, min(count // on_host[urlsplit(worker).hostname] for worker, count in found.items()))
+
+
+def _has_safe_path() -> bool:
+    return sys.flags.safe_path or bool(os.environ.get("PYTHONSAFEPATH"))
 
 
 def _what_computes() -> dict[str, str]:

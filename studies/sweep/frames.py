@@ -20,7 +20,7 @@ from render.illuminants import illuminant, is_light_file
 from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
-from rodcone.digests import digest
+from rodcone.digests import digest, digest_inputs
 from rodcone.files import replacing
 from sensor.cfa import channels
 from sensor.config import SensorConfig
@@ -30,7 +30,7 @@ from sensor.response import expected_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
 from studies.study.equal_area import grid
-from studies.study.exposures import parse_exposure
+from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, in_lux, lux_per_cd_m2
 from studies.study.model import unit_exposure_s
 from studies.study.study import Study
@@ -87,7 +87,7 @@ def frame_key(
     """
     light = illuminant(spectrum) if is_light_file(spectrum) else spectrum
     area = [] if study.equal_area is None else [study.equal_area]
-    return digest([render, opened.identity, light, in_lux(study.levels), versions(), preset, sensor, *area])
+    return digest_inputs([render, opened.identity, light, in_lux(study.levels), versions(), preset, sensor, *area])
 
 
 def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None:

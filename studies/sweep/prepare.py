@@ -12,7 +12,7 @@ from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
 from isp.processors.own import own_version, processor_of, user_file
 from render.transport import Transport
-from rodcone.digests import digest, digest_bytes
+from rodcone.digests import digest_bytes, digest_inputs
 from rodcone.jit import backend
 from sensor.burst import merged_sensor
 from sensor.config import LensConfig, SensorConfig
@@ -22,7 +22,7 @@ from studies.budget.budget import render_share
 from studies.budget.model_plan import Plan
 from studies.metrics.truth import light_in_bands
 from studies.photograph.clock import Clock
-from studies.study.exposures import parse_exposure
+from studies.study.levels import parse_exposure
 from studies.study.lit_scene import (
     OpenedScene,
     level_luminance,
@@ -40,7 +40,8 @@ from studies.sweep.frames import UnitFrame, colours_under, exposure_s_of, frame_
 from studies.sweep.provenance import provenance, versions
 
 Progress = Callable[[float, float], None]
-RENDERS, FRAMES, PICTURES = "renders", "frames", "pictures"  # folders beside the results database
+# Folders beside the results database; the last is of a plan's renders.
+RENDERS, FRAMES, PICTURES, PILOTS = "renders", "frames", "pictures", "pilots"
 FELL_BACK = (
     "Neither LLVM nor CUDA answered: stock path + specfilm rendered in scalar_spectral, captures and the "
     "reconstruction ran their NumPy forms.",
@@ -127,7 +128,7 @@ def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> flo
 
 def _request(job: Job, opened: OpenedScene) -> str:
     asked = [opened.identity, job.plan.renders.get(opened.choice), job.study.render]
-    return digest([*asked, backend(), versions()])
+    return digest_inputs([*asked, backend(), versions()])
 
 
 def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
@@ -198,7 +199,7 @@ def _cell(
     software, exact = job.software[processor], job.plan.images[condition].exact
     made_by = provenance(record.facts.variant, processor, software.on_backend, job.own[processor], exact)
     return Cell(
-        key=cell_key(condition, label(processor), seed, frame.key, luminance, exposure_s, colours, made_by),
+        key=cell_key(condition, label(processor), seed, frame.key, luminance, exposure_s, made_by),
         condition=condition,
         processor=str(Path(processor).resolve()) if user_file(processor) else processor,
         seed=seed,

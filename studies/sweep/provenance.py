@@ -1,7 +1,6 @@
 """Where a cell's numbers come from: the render's variant, engines and versions. Cells that differ are not averaged."""
 
 import json
-import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
@@ -57,11 +56,6 @@ def versions(processor: str | None = None) -> dict[str, str]:
     if backend() != "numpy":
         made[backend()] = compiler_version()
     return made
-
-
-def machine() -> str:
-    """Operating system and Python, in words."""
-    return f"{platform.platform()}, Python {platform.python_version()}"
 
 
 def threads() -> int:

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from PIL import Image
 
-from rodcone.json_values import finite
+from rodcone.files import finite
 from studies.sweep.database import last_run
 from studies.sweep.prepare import PICTURES
 from studies.sweep.stored import read_whole
 
 GAP = 4  # pixels between the pictures of a sheet
+_ONE_OF = ("scene", "spectrum", "exposure", "white_balance", "frames", "seed")  # axes that a sheet doesn't show
 _JSON_COLUMNS = ("render", "lens", "balance", "mean_electrons", "versions")
 
 
@@ -30,7 +31,7 @@ def results_json(folder: Path) -> bytes:
 
 
 def overview(folder: Path) -> bytes:
-    """PNG of the pictures of a sweep's first scene, spectrum, exposure and seed.
+    """PNG of the pictures of a sweep's first scene, spectrum, exposure, white balance, burst and seed.
 
     A column for each level, a row for each sensor and processor; what isn't made yet is left white.
     """
@@ -39,8 +40,7 @@ def overview(folder: Path) -> bytes:
     shown = {
         (row.sensor, row.processor, row.level): row.picture
         for row in run.rows
-        if (row.scene, row.spectrum, row.exposure, row.seed)
-        == (first.scene, first.spectrum, first.exposure, first.seed)
+        if all(getattr(row, axis) == getattr(first, axis) for axis in _ONE_OF)
     }
     lines = list(dict.fromkeys((sensor, processor) for sensor, processor, _ in shown))
     with Image.open(BytesIO(read_whole(folder / PICTURES, first.picture))) as picture:

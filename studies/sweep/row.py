@@ -55,7 +55,7 @@ class Row:
     finished : str
         UTC.
     host, machine : str
-        Name, and operating system with Python.
+        Name, and processor, operating system and Python: the same cell on another has last bits of its own.
     worker : int
         Number of the thread that ran the cell, as the host counts them.
     """

@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from isp.colour.encoding import quantise
 from isp.processors.catalogue import Processor
 from isp.processors.own import own_version, processor_of
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
-from sensor.binning import block_sums, of_read_pixels
+from sensor.binning import block_sums, pixel_sums
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.device import draw_device
@@ -27,11 +28,12 @@ from studies.metrics.target_figures import target_figures
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import develop_to_scale, mean_electrons
 from studies.photograph.clock import timed
+from studies.photograph.machine import machine
 from studies.photograph.png import to_png
 from studies.study.equal_area import area_average
 from studies.study.study import AS_SHOT, label
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text
-from studies.sweep.provenance import in_words, machine, provenance, threads
+from studies.sweep.provenance import in_words, provenance, threads
 from studies.sweep.row import Row
 from studies.sweep.stored import is_whole, keep
 
@@ -65,8 +67,8 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     light = cell.luminance_cd_m2 * cell.exposure_s
     expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
     # of sensors of one size it has the coarsest's pixels already
-    truth, truth_png = _truth(cell.truth, bool(sensor.binning) and _array(cell.truth).shape[:2] == expected_e.shape)
-    errors_e = of_read_pixels(_array(cell.errors), sensor) * light
+    truth, truth_png = _truth(cell.truth, sensor.chip.sites > 1 and _array(cell.truth).shape[:2] == expected_e.shape)
+    errors_e = pixel_sums(_array(cell.errors), sensor) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
     frames = cell.condition.frames
@@ -114,7 +116,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         **figures,
         mc_share=charged_share(
             errors_e * frames,
-            of_read_pixels(expected_e, sensor) * frames,
+            pixel_sums(expected_e, sensor) * frames,
             merged_sensor(sensor, frames),
             cell.exposure_s * frames,
         ),
@@ -127,7 +129,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         readout_engine=raw.engine,
         development_engine=picture.engine,
         versions=cell.made_by.versions,
-        picture=keep(cell.pictures, to_png(encoded), ".png"),
+        picture=keep(cell.pictures, to_png(quantise(encoded)), ".png"),
         truth=keep(cell.pictures, truth_png, ".png"),
         render_s=cell.render.facts.seconds,
         capture_s=capture_s,
@@ -172,7 +174,7 @@ def _worked_out(path: Path, binned: bool) -> tuple[TruePicture, bytes]:
     if binned:
         linear = np.moveaxis(block_sums(np.moveaxis(linear, -1, 0)) / 4, 0, -1)
     truth = true_picture(linear)
-    return truth, to_png(truth.encoded)
+    return truth, to_png(quantise(truth.encoded))
 
 
 def _array(path: Path) -> Image:

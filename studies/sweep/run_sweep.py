@@ -2,10 +2,8 @@
 
 import json
 import platform
-import shutil
-import time
 from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from itertools import chain
@@ -15,17 +13,19 @@ from typing import Any
 from isp.processors.catalogue import require_libraries
 from rodcone.progress import Step, render_words, told
 from studies.budget.model_plan import Plan
+from studies.budget.plan import plan as plan_of
 from studies.photograph.clock import FIRST, Clock
 from studies.study.lit_scene import open_all
 from studies.study.study import Study, conditions, label
 from studies.sweep.cells import Cell
 from studies.sweep.database import add, done, forget_old, note_run, note_stages, open_results, want
-from studies.sweep.prepare import PICTURES, Job, known_cells, scene_cells
+from studies.sweep.folder import at_work, claim
+from studies.sweep.prepare import PICTURES, PILOTS, Job, known_cells, scene_cells
 from studies.sweep.row import Row
+from studies.sweep.workers import InThisProcess, run
 
 # Such as `partial(studies.sweep.workers.run_in_processes, workers=4)`.
 Runner = Callable[[Sequence[Cell]], Generator[Row, None, None]]
-LEFT_S = 3600.0  # after which a temporary file has no writer any more: writing one takes seconds
 RENDER_SHARE = 0.5  # of the progress bar that a scene's render takes; how long it takes isn't known before
 
 
@@ -55,8 +55,8 @@ class Swept:
 def sweep(
     study: Study,
     out: str | Path,
-    plan: Plan,
-    runner: Runner,
+    plan: Plan | None = None,
+    runner: Runner | None = None,
     step: Step | None = None,
     *,
     keep_old: bool = False,
@@ -72,10 +72,11 @@ def sweep(
     study : Study
     out : str or Path
         Folder; made where it isn't there.
-    plan : Plan
-        Of `studies.budget.model_plan.as_stated`, `studies.budget.plan.plan` or `reference_plan`.
-    runner : callable
-        Takes cells, gives rows as they come.
+    plan : Plan, optional
+        Of `studies.budget.model_plan.as_stated`, `studies.budget.plan.plan` or `reference_plan`; left out, of `plan`,
+        whose pilots stay in the folder.
+    runner : callable, optional
+        Takes cells, gives rows as they come; left out, cells are made in this process.
     step : callable, optional
         Called with what is being done and the share that is done; left out, a notebook shows a bar.
     keep_old : bool
@@ -86,7 +87,8 @@ def sweep(
     Raises
     ------
     InputError
-        For a scene that can't be opened or a library that is missing, before anything is rendered.
+        For a scene that can't be opened, a library that is missing, or a folder that holds other files and no sweep;
+        before anything is rendered.
     OSError
         Where the folder can't be written, or the disk is full.
     """
@@ -94,12 +96,13 @@ def sweep(
     for name in study.processors:
         require_libraries(name)
     scenes = open_all(study)
-    out.mkdir(parents=True, exist_ok=True)
-    _clear(out)
-    with told(step) as show, open_results(out) as base:
+    claim(out)
+    plan = plan or plan_of(study, cache=out / PILOTS, step=step)
+    runner = runner or (lambda cells: run(cells, InThisProcess()))
+    with told(step) as show, open_results(out) as base, at_work(out):
         job = Job(study, plan, out, base, clock)
         now = datetime.now(UTC).isoformat(timespec="seconds")
-        run = note_run(base, now, platform.node(), json.dumps(_noted(study)))
+        number = note_run(base, now, platform.node(), json.dumps(_noted(study)))
         found = [known_cells(job, opened) for opened in scenes.values()]
         count = len(conditions(study)) * len(study.processors) * len(study.seeds) // len(scenes)
         keys: list[Sequence[str | None]] = [
@@ -115,11 +118,11 @@ def sweep(
             keys[index] = asked
             want(base, chain.from_iterable(keys))
             kept = done(base, out / PICTURES, asked)
-            made += _run(job, run, [cell for cell in cells if cell.key not in kept], runner, part)
+            made += _run(job, number, [cell for cell in cells if cell.key not in kept], runner, part)
         if not keep_old:
             forget_old(base)
         stages = clock.stages()
-        note_stages(base, run, stages)
+        note_stages(base, number, stages)
     return Swept(out, count * len(scenes), made, sum(stages.values()), tuple(notes))
 
 
@@ -127,15 +130,6 @@ def _noted(study: Study) -> dict[str, Any]:
     """Study as the results database notes it, with files by the names that rows have."""
     named = {axis: [label(value) for value in getattr(study, axis)] for axis in ("processors", "spectra")}
     return asdict(study) | named | {"scenes": [asdict(scene) | {"source": scene.label} for scene in study.scenes]}
-
-
-def _clear(out: Path) -> None:
-    """Remove files that a killed run left half written; younger ones may belong to a run that is at work now."""
-    for pattern in (".part-*", "*.part"):  # of `rodcone.files.replacing` and `render.cache.save_transport`
-        for path in list(out.rglob(pattern)):
-            with suppress(OSError):  # another sweep may clear it too
-                if time.time() - path.stat().st_mtime > LEFT_S:
-                    shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step) -> int:

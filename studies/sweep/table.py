@@ -1,8 +1,10 @@
 """A sweep's figures as a table: means over the seeds, a line for each combination of the axes that are asked for."""
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from html import escape
 from io import BytesIO
 from pathlib import Path
 
@@ -94,11 +96,16 @@ def lines(
 
 def markdown(table: Sequence[TableLine], by: Sequence[str], show: Sequence[str]) -> str:
     """Table in Markdown; ``mean ± half width``, to three digits; no half width where the seeds don't differ."""
-    cells = [[*by, *show], ["---"] * len(by) + ["---:"] * len(show)]
+    cells = [[*by, *map(_plain, show)], ["---"] * len(by) + ["---:"] * len(show)]
     for line in table:
         figures = [_mean_text(mean, half) for mean, half in zip(line.means, line.halves, strict=True)]
-        cells.append([*(text.replace("|", "\\|") for text in line.at), *figures])
+        cells.append([*map(_plain, line.at), *figures])
     return "\n".join(f"| {' | '.join(row)} |" for row in cells)
+
+
+def _plain(text: str) -> str:
+    """Text that Markdown shows as it is: names of files and of figures come from outside."""
+    return re.sub(r"([|\[\]`*\\])", r"\\\1", escape(" ".join(text.split()), quote=False))
 
 
 def _line(at: tuple[str, ...], group: Sequence[Row], folder: Path, show: Sequence[str]) -> TableLine:

@@ -14,6 +14,7 @@ from multiprocessing.connection import wait as wait_for
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from rodcone.child_process import SAFE_PATH
 from rodcone.errors import InputError
 from studies.study.study import Condition
 from studies.sweep.cells import Cell
@@ -24,7 +25,8 @@ LEAVE_S = 10.0  # time for an idle worker to end, while libraries release thread
 MOST_DEATHS = 3  # a cell is given up after it was held by so many workers that died; the last two ran it alone
 # What BLAS libraries and OpenMP read at their import: set before a worker starts.
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-
+# After a kill, multiprocessing's own process removes the semaphores, and would warn that it did.
+_QUIET_TRACKER = "ignore:resource_tracker:UserWarning"
 
 Kind = tuple[Condition, str]
 
@@ -171,8 +173,9 @@ def run_in_processes(cells: Sequence[Cell], workers: int) -> Generator[Row, None
 @contextmanager
 def _pool(workers: int, threads: int) -> Iterator[ProcessPoolExecutor]:
     """Pool of spawned processes, all of them started: forked ones would share locks of Dr.Jit's and BLAS's threads."""
-    pool, others = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin), active_children()
+    others = active_children()
     with _inherited(threads):
+        pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin)
         for _ in range(workers):  # each submission starts one, as none is idle yet
             pool.submit(cores)
     impatience = threading.Timer(LEAVE_S, _end, ([process for process in active_children() if process not in others],))
@@ -193,9 +196,14 @@ def _end(processes: Sequence[BaseProcess]) -> None:
 
 @contextmanager
 def _inherited(threads: int) -> Iterator[None]:
-    """Environment and signal mask for processes started within: threads, and Ctrl-C for this process to handle."""
-    before = {name: os.environ.get(name) for name in _THREAD_VARIABLES}
-    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, str(threads)))
+    """Environment and signal mask for processes started within: Ctrl-C is for this process to handle."""
+    variables = {
+        **SAFE_PATH,
+        **dict.fromkeys(_THREAD_VARIABLES, str(threads)),
+        "PYTHONWARNINGS": ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), _QUIET_TRACKER))),
+    }
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

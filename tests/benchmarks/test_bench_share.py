@@ -133,6 +133,7 @@ def test_a_quantile_that_holds_the_references_noise_stands_in_brackets() -> None
     assert told_figure(found, "mean") == "0.4"
 
 
+@pytest.mark.thorough
 def test_a_picture_comes_from_a_process_of_its_own(
     folder: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.emva1288.characterise import measure, plan_for
 from sensor.emva1288.photon_transfer import bench
 from sensor.presets import preset
@@ -246,6 +247,7 @@ def test_a_stranger_finds_what_was_put_in(chip, emva):
     check_dark_current_and_columns(sensor, found)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", PRESETS)
 def test_our_procedure_finds_what_the_stranger_finds_in_the_same_frames(name, emva):
     data_1288, results_1288, sums = emva

@@ -20,7 +20,8 @@ from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from render.spectrum import VISIBLE_NM, Spectrum
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.curves import Responses, rgbw
 from sensor.optics import camera_equation, form_image
 from sensor.response import expected_electrons

@@ -16,7 +16,7 @@ import tifffile
 from builders import raw_image
 from numpy.typing import NDArray
 
-from isp.bilinear import bilinear
+from isp.planes import bilinear
 from isp.remosaic import remosaic
 from render.illuminants import illuminant
 from render.photometry import tristimulus

@@ -85,11 +85,11 @@ SENSOR = (
     _fault(
         "conversion gain inverted",
         "sensor/readout.py",
-        "read_e / own.gain_e_per_dn",
-        "read_e * own.gain_e_per_dn",
+        "read_e / converter.gain_e_per_dn",
+        "read_e * converter.gain_e_per_dn",
         *_READOUT,
     ),
-    _fault("black level missing", "sensor/readout.py", " + own.black_dn)", ")", *_READOUT),
+    _fault("black level missing", "sensor/readout.py", " + converter.black_dn)", ")", *_READOUT),
     _fault("converter rounds down", "sensor/readout.py", "np.rint(read_e", "np.floor(read_e", *_READOUT),
     _fault(
         "well does not clip",
@@ -209,8 +209,8 @@ SENSOR = (
     _fault(
         "auto exposure forgets the share of the well",
         "sensor/exposure.py",
-        "min(longest_s, well_share * as_read(sensor)",
-        "min(longest_s, as_read(sensor)",
+        "min(longest_s, well_share * sensor",
+        "min(longest_s, sensor",
         "sensor/test_exposure",
     ),
     _fault(
@@ -456,7 +456,7 @@ ISP = (
     ),
     _fault(
         "white balance inverted",
-        "isp/colour/gray_world.py",
+        "isp/colour/white_balance.py",
         "means[green] / np.where(certain, means, 1.0)",
         "np.where(certain, means, 1.0) / means[green]",
         *_COLOUR,
@@ -574,8 +574,8 @@ STUDIES = (
     _fault(
         "white among the lamps",
         "studies/metrics/truth.py",
-        "white_of(transport.scattered_luminance(luminance_cd_m2=luminance_cd_m2), transport.coverage)",
-        "white_of(transport.relight().luminance(), 0 * transport.coverage)",
+        "white_of(transport.scattered_luminance(luminance_cd_m2=luminance_cd_m2), transport.coverage.mean)",
+        "white_of(transport.relight().luminance(), 0 * transport.coverage.mean)",
         "studies/metrics/test_truth_metrics",
         "studies/study/test_lit_scene",
     ),
@@ -715,7 +715,7 @@ RENDERS = (
     ),
     _fault(
         "white at another percentile",
-        "studies/metrics/truth.py",
+        "rodcone/colour_spaces.py",
         "= 99.0, 0.9",
         "= 90.0, 0.9",
         "studies/metrics/test_truth_metrics",
@@ -851,8 +851,8 @@ ACCOUNTING = (
     _fault(
         "keys without versions",
         "studies/sweep/cells.py",
-        "exposure_s, colours, made_by])",
-        "exposure_s, colours])",
+        "exposure_s, made_by])",
+        "exposure_s])",
         "studies/sweep/test_cells",
         "studies/sweep/test_provenance",
     ),

@@ -3,6 +3,7 @@
 python tests/faults/plant_faults.py                    all faults; results are kept in out/faults.json, so it can go on
 python tests/faults/plant_faults.py --only "cos^3"     one of them
 python tests/faults/plant_faults.py --draw 5           five, drawn by the date
+python tests/faults/plant_faults.py --make-test        caught by the tests of `make test` alone?
 """
 
 import argparse
@@ -27,6 +28,7 @@ from fault_catalogue import FAULTS, Fault
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = ("rodcone", "render", "scenes", "sensor", "isp", "studies", "tests", "benchmarks", "pyproject.toml")
 MINUTES = 8  # for one fault's tests
+ALL, MAKE_TEST = "not slow", "not slow and not thorough"  # what `make test-all` and `make test` run
 
 
 def planted(fault: Fault, text: str) -> str:
@@ -53,10 +55,10 @@ def copy_project(target: Path) -> None:
             shutil.copy2(source, target / part)
 
 
-def run_tests(copy: Path, tests: Sequence[str]) -> tuple[int, str]:
+def run_tests(copy: Path, tests: Sequence[str], markers: str) -> tuple[int, str]:
     """Exit code of pytest at the first failure, and the test that failed."""
     environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-m", "not slow", "-p", "no:cacheprovider", *tests]
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-m", markers, "-p", "no:cacheprovider", *tests]
     done = subprocess.run(
         command, cwd=copy, env=environment, capture_output=True, text=True, timeout=60 * MINUTES, check=False
     )
@@ -64,14 +66,14 @@ def run_tests(copy: Path, tests: Sequence[str]) -> tuple[int, str]:
     return done.returncode, failed[1] if failed else done.stdout[-400:]
 
 
-def plant(fault: Fault, copy: Path) -> dict[str, Any]:
+def plant(fault: Fault, copy: Path, markers: str = ALL) -> dict[str, Any]:
     """Result of one fault; the copy is as before afterwards."""
     file = copy / fault.file
     text = file.read_text()
     start = time.perf_counter()
     try:
         file.write_text(planted(fault, text))
-        code, test = run_tests(copy, fault.tests)
+        code, test = run_tests(copy, fault.tests, markers)
     finally:
         file.write_text(text)
     # Exit code 1 alone means that tests ran and one failed; a fault that can't even be imported proves nothing.
@@ -105,8 +107,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", metavar="NAME", help="one fault by its name")
     parser.add_argument("--draw", type=int, metavar="N", help="this many, drawn by the date")
-    parser.add_argument("--results", type=Path, default=ROOT / "out" / "faults.json", metavar="FILE")
+    parser.add_argument("--make-test", action="store_true", help="with the tests of `make test` alone")
+    parser.add_argument("--results", type=Path, metavar="FILE")
     options = parser.parse_args()
+    markers = MAKE_TEST if options.make_test else ALL
+    options.results = options.results or ROOT / "out" / f"faults{'-make-test' * options.make_test}.json"
     known: dict[str, Any] = json.loads(options.results.read_text()) if options.results.exists() else {}
     faults = chosen(options)
     with tempfile.TemporaryDirectory(prefix="faults-") as folder:
@@ -114,7 +119,7 @@ def main() -> int:
         copy_project(copy)
         for fault in faults:
             if known.get(fault.name, {}).get("digest") != digest(fault):
-                known[fault.name] = plant(fault, copy)
+                known[fault.name] = plant(fault, copy, markers)
                 options.results.parent.mkdir(parents=True, exist_ok=True)
                 options.results.write_text(json.dumps(known, indent=1))
             result = known[fault.name]

@@ -13,7 +13,9 @@ from typing import Any, get_type_hints
 import numpy as np
 from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_elements, pages, tiff_tags
 
+from isp.ple.prior import OWN, load_prior
 from render.cache import load_transport, save_transport
+from render.error_estimates import Halves
 from render.illuminants import illuminant
 from render.loader import Film, integrator_name, variant
 from render.radiance import SpectralRadiance
@@ -96,7 +98,7 @@ def _exr_samples() -> list[Sample]:
             header["tiles"] = OpenEXR.TileDescription()
         OpenEXR.File(header, channels).write(str(folder / "a.exr"))
 
-    made = [_made(lambda folder: write_exr(folder / "a.exr", SpectralRadiance(values, NM), scene="a"))]
+    made = [_made(lambda folder: write_exr(SpectralRadiance(values, NM), folder / "a.exr", scene="a"))]
     for kind, compression, dtype in (
         (OpenEXR.scanlineimage, OpenEXR.ZIP_COMPRESSION, np.float16),
         (OpenEXR.scanlineimage, OpenEXR.NO_COMPRESSION, np.float32),
@@ -357,7 +359,7 @@ def _cache_samples() -> list[Sample]:
         NM,
         np.full(NM.size, 70.0),
         irradiance=irradiance,
-        half_difference=planes[1],
+        light=Halves(planes[0], planes[1]),
         variance=planes[2],
         integrator=integrator_name(),
         variant=variant(),
@@ -458,5 +460,6 @@ TARGETS: dict[str, Target] = {
     "curves": Target(_curve_samples, {".csv": any_text}, _read_curves),
     "scene": Target(_scene_samples, {".xml": any_text, ".spd": any_text}, load_scene_file),
     "cache": Target(_cache_samples, {".npz": any_bytes}, _read_cached),
+    "prior": Target(lambda: [{"prior.npz": OWN.read_bytes()}], {".npz": any_bytes}, load_prior),
     "ledger": Target(_ledger_samples, {".sqlite": pages}, lambda path: read_rows(path.parent, everything=True)),
 }

@@ -19,7 +19,7 @@ FINDINGS = sorted((FUZZ / "findings").iterdir())
 QUICK = 20  # inputs of each target in `make test`
 NAMES = (
     *("exr", "mat", "dng", "tiff", "photograph", "noise_profile", "study", "sensor", "report", "darktable", "library"),
-    *("cube", "photo", "lamp", "curves", "scene", "cache", "ledger"),
+    *("cube", "photo", "lamp", "curves", "scene", "cache", "prior", "ledger"),
 )
 
 
@@ -46,6 +46,7 @@ def test_every_reader_is_a_target(fuzz: Any) -> None:
     assert tuple(fuzz.targets.TARGETS) == NAMES
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", NAMES)
 def test_valid_files_are_read_and_changed_ones_refused_or_read(name: str, fuzz: Any, folder: Path) -> None:
     target = fuzz.targets.TARGETS[name]
@@ -63,6 +64,7 @@ def test_valid_files_are_read_and_changed_ones_refused_or_read(name: str, fuzz: 
     assert seen & ({"refused"} if name != "noise_profile" else {"accepted"})  # which tells by None that there is none
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("found", FINDINGS, ids=lambda path: path.name)
 def test_what_was_found_once_is_refused_or_read(found: Path, fuzz: Any, folder: Path) -> None:
     target = fuzz.targets.TARGETS[found.name.split("-")[0]]
@@ -118,6 +120,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("told", "read"), READERS.values(), ids=READERS)
 def test_a_reader_that_does_harm_is_noticed(
     told: str, read: Callable[[Path], object], fuzz: Any, folder: Path, monkeypatch: pytest.MonkeyPatch
@@ -153,6 +156,7 @@ sys.exit(run.main())
 """
 
 
+@pytest.mark.thorough
 def test_a_reader_that_ends_or_stops_its_process_is_noticed_and_the_rest_goes_on(tmp_path: Path) -> None:
     code = PLANTED.format(fuzz=str(FUZZ), out=str(tmp_path))
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=100)

@@ -1,7 +1,7 @@
 """A hard case: a situation, what it must keep, and the margin by which it keeps it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 from render.radiance import SpectralRadiance
 from sensor.cfa import BAYER, Tile
 from sensor.config import SensorConfig
-from sensor.presets import low_noise
+from sensor.presets import preset
 
 Image = NDArray[np.float64]
+
+
+def low_noise() -> SensorConfig:
+    """Preset behind a lens that draws points as points: each term of the lens has cases of its own."""
+    sensor = preset("low_noise")
+    return replace(sensor, lens=replace(sensor.lens, diffraction=0.0))
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from hard.case import Case, Margin, Situation, worst_of
+from hard.case import Case, Margin, Situation, low_noise, worst_of
 from hard.chain import expected
 from hard.light import at_level, cropped, even, scaled_to
 
@@ -15,7 +15,6 @@ from sensor.cfa import MOSAICS, Tile
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.device import draw_device
-from sensor.presets import low_noise
 
 CHIP_SIDE = 1024  # a megapixel: its mean is known to a thousandth of the spread
 CHIP_SIGMAS = 5.0  # standard errors: a false alarm of 6e-7

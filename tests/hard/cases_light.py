@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from hard.case import Case, Margin, Situation, worse, worst_of
+from hard.case import Case, Margin, Situation, low_noise, worse, worst_of
 from hard.chain import CAMERAS, develop, expected, shoot
 from hard.invariants_raw import bias
 from hard.light import (
@@ -27,7 +27,7 @@ from isp.interleaved import reconstruct
 from render.radiance import SpectralRadiance
 from sensor.cfa import channel_map, channels
 from sensor.config import LensConfig, SensorConfig
-from sensor.presets import low_noise, table1_pixel
+from sensor.presets import table1_pixel
 
 MIDDLE = SIDE // 2
 

@@ -4,11 +4,11 @@ from math import inf
 from typing import Any
 
 import numpy as np
-from hard.case import Case, Situation
+from hard.case import Case, Situation, low_noise
 from hard.light import GLINT_CD_M2, SIDE, at_level, even, times
 
 from render.radiance import SpectralRadiance
-from sensor.presets import low_noise, table1_pixel
+from sensor.presets import table1_pixel
 
 
 def _settings(luminance_cd_m2: float = 30.0, **develop: Any) -> Situation:

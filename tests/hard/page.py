@@ -1,7 +1,8 @@
-"""Writes docs/hard_cases.md: every hard case and its margins. `make hard-cases` runs it."""
+"""Writes docs/hard_cases.md and its tables in docs/results: hard cases and margins. `make hard-cases` runs it."""
 
 import sys
 from collections.abc import Sequence
+from csv import writer
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +18,10 @@ COLUMNS = (*INVARIANTS, OWN)
 
 TEXT = """# Hard cases
 
-`make hard-cases` takes each case through the whole chain, from radiance to expected electrons, a raw image, and the
-pictures of the interleaved and the Bayer camera, measures how far it is from breaking each invariant, and writes this
-page. `pytest tests/hard -k sun_glint` runs one case. Both fail for anything that isn't kept and isn't listed below as a
-limit. The scene is `cornell_box` at 64 × 64 pixels, rendered once and lit anew, the camera `low_noise` with an RGBW and
-a Bayer mosaic, 10 ms, unless a case says otherwise.
+`make hard-cases` takes each case through the whole chain, measures how far it is from breaking each invariant, and
+writes this page. `pytest tests/hard -k sun_glint` runs one case. Both fail for anything that breaks an invariant and
+isn't listed below as a limit. Unless a case says otherwise, the scene is `cornell_box` at 64 × 64 pixels, the camera
+`low_noise` with an RGBW and a Bayer mosaic, the exposure 10 ms.
 
 {summary}
 
@@ -29,11 +29,9 @@ a Bayer mosaic, 10 ms, unless a case says otherwise.
 
 {invariants}
 
-Numbers are the worst error found as a share of what is allowed: up to 1 the invariant is kept. A dash: it says nothing
-about the case. Allowed are, for the invariants of electrons, 10⁻⁶ of a pixel's expected electrons; for bias of the mean
-of 32 raw images or 12 pictures, each with a chip of its own, what a false-alarm rate of 10⁻⁶ gives (a thirtieth of a
-sample's noise in the mean of a channel, and up to a fifth in a picture); for mirrored and cut pictures what the
-arithmetic's rounding makes of the samples.
+A number is the worst error as a share of what is allowed: up to 1 the invariant is kept. Electrons may differ by 10⁻⁶
+of a pixel's expected electrons; the mean of 32 raw images or 12 pictures by what a false-alarm rate of 10⁻⁶ allows;
+mirrored and cut pictures by the arithmetic's rounding.
 
 ## Limits
 
@@ -41,22 +39,16 @@ What isn't kept, by how much, and why. `tests/hard` holds this list to be exact.
 
 {limits}
 
-## Kept by single cases besides
+## Tables
 
-{promises}
+Every case with its margins, empty where an invariant says nothing about it: [hard_cases.csv](results/hard_cases.csv).
 
-## All cases
+Where stages run in single precision, the same arithmetic in double precision stands beside it:
+[hard_cases_precision.csv](results/hard_cases_precision.csv). A search of {tried} sets of parameters a stage, first at
+random, then by steps from the worst, looks for the largest error beside the least noise that a sensor can have. Bounds
+are counted roundings, u = 2⁻²⁴ of the number that is rounded.
 
-{catalogue}
-
-## Single against double precision
-
-Where stages run in single precision, the same arithmetic in double precision stands beside it. A search of {tried} sets
-of parameters a stage, first at random, then by steps from the worst, looks for the largest error beside the sensor's
-noise: the least that a sensor can have, shot noise and the dark noise that the parameters say. Bounds are counted
-roundings, u = 2⁻²⁴ of the number that is rounded; the last column is the nearest that any error came to its bound.
-
-{precision}
+The largest error is {worst} of the noise, in stage *{stage}*.
 """
 
 
@@ -70,22 +62,25 @@ def main() -> int:
         print(case.name, *unexpected(results[-1]), sep="\n    ", flush=True)
     stages = [search(stage, np.random.default_rng([8, number])) for number, stage in enumerate(STAGES)]
     PAGE.write_text(page(results, stages), encoding="utf-8")
+    for name, rows in (("hard_cases", catalogue(results)), ("hard_cases_precision", precision(stages))):
+        with (PAGE.parent / "results" / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
+            writer(file, lineterminator="\n").writerows(rows)
     print(f"\n{summary(results)}\n{PAGE}")
     return int(any(unexpected(result) for result in results))
 
 
 def page(results: Sequence[Result], stages: Sequence[Worst]) -> str:
     """The whole page."""
+    worst = max(stages, key=lambda stage: stage.found.share_of_noise)
     return TEXT.format(
         summary=summary(results),
         invariants="\n".join(
             f"- **{name}**: {(measure.__doc__ or '').splitlines()[0]}" for name, measure in INVARIANTS.items()
         ),
         limits=limits(results),
-        promises=promises(results),
-        catalogue=catalogue(results),
         tried=stages[0].tried,
-        precision=precision(stages),
+        worst=f"{worst.found.share_of_noise:.1g}",
+        stage=worst.stage.name,
     )
 
 
@@ -113,38 +108,34 @@ def limits(results: Sequence[Result]) -> str:
     return table(["case", "not kept", "worst", "allowed there", "why"], rows)
 
 
-def promises(results: Sequence[Result]) -> str:
-    """Table of what single cases must keep besides."""
-    rows = [[f"`{r.case.name}`", r.case.promise, share_text(r.margins[OWN])] for r in results if r.case.own]
-    return table(["case", OWN, "share"], rows)
-
-
-def catalogue(results: Sequence[Result]) -> str:
+def catalogue(results: Sequence[Result]) -> list[list[str]]:
     """Table of all cases: the worst error of each invariant as a share of what is allowed."""
-    rows = []
+    rows = [["case", "how it is set up", *COLUMNS, "kept", f"{OWN} invariant"]]
     for result in results:
         shares = [share_text(result.margins[name]) for name in COLUMNS]
-        rows.append([f"`{result.case.name}`", result.case.setup, *shares, "no" if result.broken else "yes"])
-    return table(["case", "how it is set up", *COLUMNS, "kept"], rows)
+        kept = "no" if result.broken else "yes"
+        rows.append(
+            [result.case.name, result.case.setup, *shares, kept, result.case.promise if result.case.own else ""]
+        )
+    return rows
 
 
-def precision(stages: Sequence[Worst]) -> str:
+def precision(stages: Sequence[Worst]) -> list[list[str]]:
     """Table of the worst that each stage's search found."""
-    rows = []
+    rows = [["stage", "worst parameters", "error [e⁻]", "noise [e⁻]", "share", "bound", "share of it"]]
     for worst in stages:
         parameters = ", ".join(f"{name} {value:.3g}" for name, value in worst.parameters.items() if name != "seed")
-        found = worst.found
-        error, noise, share = f"{found.error_e:.2g}", f"{found.noise_e:.3g}", f"{found.share_of_noise:.1g}"
+        error, noise = f"{worst.found.error_e:.2g}", f"{worst.found.noise_e:.3g}"
+        share = f"{worst.found.share_of_noise:.1g}"
         rows.append([worst.stage.name, parameters, error, noise, share, worst.stage.bound, share_text(worst.bound)])
-    return table(["stage", "worst parameters", "error [e⁻]", "noise [e⁻]", "share", "bound", "share of it"], rows)
+    return rows
 
 
 def share_text(margin: Margin | None) -> str:
-    """Share of what is allowed, to two digits; a dash where the invariant says nothing."""
+    """Share of what is allowed, to two digits; nothing where the invariant says nothing."""
     if margin is None:
-        return "–"
-    text = f"{margin.share:.2g}" if margin.share < 1000 else f"{margin.share:.0e}"
-    return text if margin.kept else f"**{text}**"
+        return ""
+    return f"{margin.share:.2g}" if margin.share < 1000 else f"{margin.share:.0e}"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -9,7 +9,7 @@ from hard.case import Margin, worse, worst_of
 from hard.invariants_raw import allowed_errors, bias
 from hard.invariants_symmetry import cut, mirrored
 
-from isp.bilinear import bilinear
+from isp.planes import bilinear
 from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map
 
 

@@ -33,6 +33,7 @@ def test_error_beside_noise_and_beside_its_bound_may_be_worst_in_different_pixel
     assert found.bound == Margin(4.0, 8.0, "e⁻")
 
 
+@pytest.mark.sample(3)
 @needs_kernel
 @pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)
 def test_a_short_search_finds_nothing_beyond_the_bound_that_the_roundings_give(stage):

@@ -43,6 +43,7 @@ def test_the_transforms_least_value_is_no_light() -> None:
     assert unstabilise(np.array([2 * np.sqrt(0.375), 0.0]), 0.0) == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["dual_gain", "split_pixel", "staggered"])
 def test_merged_readings_have_a_noise_of_one_in_every_range_of_light(name: str) -> None:
     sensor, shape = preset(name), (128, 128)
@@ -72,6 +73,7 @@ def test_the_pieces_of_merged_readings_meet_and_rise() -> None:
     np.testing.assert_array_equal(stable[: dark.size], stabilise(dark, raw.dark_noise_e, raw.prnu))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["dual_gain", "split_pixel", "staggered"])
 def test_the_mean_of_merged_readings_comes_back_in_every_range_of_light(name: str) -> None:
     """What a denoiser that averages stabilised samples gives, beside the mean of the samples themselves."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders import BAYER_PHASES, raw_image
 
-from isp.bilinear import bilinear
+from isp.planes import bilinear
 from sensor.cfa import BAYER, MOSAICS
 from sensor.raw import RawImage
 

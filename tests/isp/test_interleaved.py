@@ -38,6 +38,7 @@ def scene(shape, level, tile=RGBW, seed=0):
     return exposure(electrons + rng.normal(0.0, 2.0, shape), tile)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("function", [reconstruct, reconstruct_reference])
 @pytest.mark.parametrize("tile", RGBW_PHASES + BAYER_PHASES)
 def test_flat_field_stays_flat_to_the_border(tile, function):
@@ -46,6 +47,7 @@ def test_flat_field_stays_flat_to_the_border(tile, function):
     assert np.abs(result / 900.0 - 1.0).max() < 1e-6
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("sigma_d", [1.5, 4.0, math.inf])
 @pytest.mark.parametrize("tile", [RGBW, BAYER])
 def test_without_similarity_an_impulse_is_the_spatial_weight_in_closed_form(tile, sigma_d):
@@ -214,6 +216,7 @@ def single_precision(raw, settings):
     return FULL * np.maximum(1e-4, 16 * 2.0**-24 * -sum_weights(raw, settings).largest)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("sigma_s", [0.1, 4.0])
 @pytest.mark.parametrize(("shape", "tile", "level", "seed"), KERNEL_CASES)
 def test_kernel_is_the_reference_in_single_precision(shape, tile, level, seed, sigma_s):
@@ -240,6 +243,7 @@ def half_saturated(turns=0):
     return exposure(np.rot90(electrons, turns))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("turns", [0, 1, 2, 3])
 def test_threads_of_every_guide_are_the_reference(turns):
     raw, settings = half_saturated(turns), Settings(patch=5, sigma_s=20.0)  # so large that both halves count
@@ -288,6 +292,7 @@ EXTREME_FRAMES = {
 }
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("function", [reconstruct_with_noise, "reference"])
 @pytest.mark.parametrize("sigma", [1e-3, 1e6, math.inf])
 @pytest.mark.parametrize("name", EXTREME_FRAMES)
@@ -308,6 +313,7 @@ def test_extreme_input_gives_finite_results_within_the_range_of_the_samples(name
         assert (result.noise_gain <= 1.0 + 1e-5).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("sigma_s", [1e-3, 1e-2])
 def test_with_a_tiny_sigma_the_result_lies_among_the_samples_that_tie_for_the_best(sigma_s):
     """Single precision can't tell log weights apart that differ by its rounding: any mean of those samples is right."""

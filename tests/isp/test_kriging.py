@@ -21,6 +21,7 @@ def mosaic(planes, tile):
     return np.choose(np.vectorize(channels(tile).index)(channel_map(tile, shape)), np.moveaxis(planes, -1, 0))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", TILES)
 @pytest.mark.parametrize("slopes", [(0.0, 0.0), (0.7, 0.0), (-0.3, 0.5)])
 def test_constant_and_linear_planes_come_out_exactly_to_the_border(name, slopes):
@@ -32,6 +33,7 @@ def test_constant_and_linear_planes_come_out_exactly_to_the_border(name, slopes)
     np.testing.assert_allclose(found, planes, rtol=0, atol=1e-7)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["quad_bayer", "quad_rgbw", "bayer"])
 def test_a_raw_image_s_flat_field_stays_flat(name):
     tile = MOSAICS[name]
@@ -40,6 +42,7 @@ def test_a_raw_image_s_flat_field_stays_flat(name):
     np.testing.assert_allclose(found, planes, atol=0.3)  # the inverse transform's quarter of an electron of shot noise
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["quad_bayer", "quad_rgbw"])
 def test_white_noise_comes_out_with_the_stated_variance(name):
     tile = MOSAICS[name]
@@ -78,6 +81,7 @@ def response(name, period, grey):
     return float(2 * ((found[..., channels(tile).index("G")][inner] - 100.0) / 20.0 * wave[inner]).mean())
 
 
+@pytest.mark.thorough
 def test_quad_bayer_resolves_grey_well_and_a_colour_by_itself_less():
     """Channels are taken to vary together: what one does alone, in pairs of pixels, is told two thirds as strong."""
     assert response("quad_bayer", 16, grey=True) == pytest.approx(1.0, abs=0.01)
@@ -87,6 +91,7 @@ def test_quad_bayer_resolves_grey_well_and_a_colour_by_itself_less():
     assert 0.6 < response("quad_bayer", 8, grey=False) < response("bayer", 8, grey=False) < 0.75
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["quad_rgbw", "rgbw"])
 def test_a_full_w_does_not_tell_the_others_what_they_are(name):
     tile = MOSAICS[name]
@@ -99,6 +104,7 @@ def test_a_full_w_does_not_tell_the_others_what_they_are(name):
     np.testing.assert_allclose(found[..., :3], ramp[..., :3], rtol=2e-2)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("level_e", [0.0, 1.0, 10.0, 300.0])
 def test_an_even_field_has_no_bias_from_the_dark_on(level_e):
     sensor = preset("low_noise", "quad_bayer")

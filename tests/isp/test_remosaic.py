@@ -36,6 +36,7 @@ def test_the_tile_is_bayer_with_red_where_it_was(cfa: Tile) -> None:
     assert "".join(tile).index("R") == "".join(cfa).index("R")
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("cfa", PHASES)
 def test_a_flat_field_stays_flat_to_the_border(cfa: Tile) -> None:
     made = remosaic(raw(cfa, flat()))
@@ -43,6 +44,7 @@ def test_a_flat_field_stays_flat_to_the_border(cfa: Tile) -> None:
         assert set(made.dn[mask(made.cfa, channel, made.shape)].tolist()) == {LEVELS_E[channel] + 100}
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("cfa", PHASES)
 def test_sites_on_which_both_mosaics_agree_keep_their_sample(cfa: Tile) -> None:
     clean = raw(cfa, flat())
@@ -54,6 +56,7 @@ def test_sites_on_which_both_mosaics_agree_keep_their_sample(cfa: Tile) -> None:
     np.testing.assert_array_equal(made.dn[agree], noisy.dn[agree])
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("cfa", PHASES)
 def test_a_ramp_is_sampled_where_the_new_pixel_lies(cfa: Tile, axis: int) -> None:
@@ -94,6 +97,7 @@ def test_other_mosaics_are_refused(cfa: Tile) -> None:
 # Quads
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["quad_bayer", "quad_rgbw"])
 def test_a_quad_becomes_its_plain_mosaic_and_planes_stay_planes(name: str) -> None:
     cfa = MOSAICS[name]

@@ -8,7 +8,8 @@ import pytest
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from sensor.cfa import RGBW, mask
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device
 from sensor.optics import form_image
 from sensor.readout import read_out

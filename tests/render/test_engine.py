@@ -11,6 +11,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
+from operator import attrgetter
 from types import SimpleNamespace
 
 import numpy as np
@@ -99,7 +100,7 @@ def test_a_wall_under_a_constant_environment_is_exact():
     assert made.radiance == pytest.approx(np.full((1, 8, *SIZE), 0.5), rel=1e-6)
     assert made.irradiance == pytest.approx(np.full((1, 8), np.pi), rel=1e-5)
     assert made.relative_mc_error < 1e-6
-    assert not made.coverage.any()
+    assert not made.coverage.mean.any()
 
 
 def two_lights():
@@ -162,7 +163,7 @@ def test_the_stated_variance_is_the_scatter_of_pixels_about_the_closed_form(wall
 
 def test_the_half_difference_has_the_stated_variance(wall):
     count = wall.radiance[0, 0].size
-    half = (wall.half_difference[0, 0].astype(np.float64) ** 2).sum() / wall.variance[0, 0].mean(dtype=np.float64)
+    half = (wall.light.difference[0, 0].astype(np.float64) ** 2).sum() / wall.variance[0, 0].mean(dtype=np.float64)
     # The one is the other, but for what pooling counts twice at the picture's edge.
     assert half / count == pytest.approx(1.0, abs=0.02)
 
@@ -196,6 +197,7 @@ def test_the_reference_plane_under_a_constant_environment_gets_pi_times_its_radi
     assert wall.illuminance_lux(25.0) == pytest.approx(50.0 * np.pi, rel=5e-3)
 
 
+@pytest.mark.thorough
 def test_a_lamp_of_half_angle_30_degrees_gives_a_quarter_of_pi_and_hides_that_much_sky(two):
     sky, lamp = two.irradiance / np.pi
     # The card is 3 cm wide, the lamp 87 cm away: the form factor at its middle holds within 1e-3.
@@ -213,7 +215,7 @@ def test_color_checker_patches_are_reflectance_times_sky_in_every_band():
         x, y = (column - 2.5) * 0.045, (1.5 - row) * 0.045
         left, top = round(w / 2 + x / pixel_m) - 1, round(h / 2 - y / pixel_m) - 1
         here = np.s_[:, top : top + pixels_of_patch, left : left + pixels_of_patch]
-        seen, half = made.radiance[0][here].astype(np.float64), made.half_difference[0][here].astype(np.float64)
+        seen, half = made.radiance[0][here].astype(np.float64), made.light.difference[0][here].astype(np.float64)
         truth = reflectance.band_average(BANDS_NM, WIDTH_NM)
         # Under a constant environment only the jitter within a band scatters, much alike in all pixels, since they
         # share the offsets of a half: the halves' means tell it. On a grey patch, float32's rounding.
@@ -225,19 +227,19 @@ def test_color_checker_patches_are_reflectance_times_sky_in_every_band():
     assert np.quantile(np.abs(z), 0.9) < 25.0
 
 
-@pytest.mark.parametrize("max_depth", [2, 3, 16])
+@pytest.mark.parametrize("max_depth", [2, 3, 16, 1 << 16])
 def test_a_glowing_cavity_is_the_geometric_series_of_its_reflectance(max_depth):
     camera = {"type": "perspective", "fov": 60.0, "to_world": to_world(look_at((0.3, 0, 0), (0, 0, 1)))}
     # A cube: Mitsuba samples a sphere from inside with a bias of 5e-4, in its own integrator too.
     cavity = {"type": "cube", "flip_normals": True, "bsdf": matte(grey(0.8)), "emitter": {"type": "area"}}
     groups = {"glow": LightGroup(("cavity/emitter",), flat())}
     scene = Scene("furnace", {"type": "scene", "sensor": camera, "cavity": cavity}, groups)
-    made = render(scene, (8, 8), wavelength_nm=BANDS_NM, spp=512, max_depth=max_depth)
+    made = render(replace(scene, max_depth=max_depth), (8, 8), wavelength_nm=BANDS_NM, spp=512)
     truth = (1 - 0.8**max_depth) / (1 - 0.8)
     error = np.sqrt(made.variance[0, 0].sum(dtype=np.float64)) / 64
     assert error < 0.01 * truth
     assert np.abs(made.radiance[0].mean(axis=(1, 2), dtype=np.float64) - truth).max() < bound(1) * error
-    assert (made.coverage == 1).all()
+    assert (made.coverage.mean == 1).all()
 
 
 def stock(scene, spp, seed):
@@ -256,6 +258,7 @@ def stock(scene, spp, seed):
     return passes.mean(axis=0), passes.var(axis=0, ddof=1) / 16
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("lamp", [{}, {"power": 600.0}, {"power": 600.0, "spectrum": illuminant("D50")}])
 def test_relit_groups_sum_to_what_stock_mitsuba_renders_directly(two, lamp):
     scene = two_lights()
@@ -277,8 +280,8 @@ def test_relit_groups_sum_to_what_stock_mitsuba_renders_directly(two, lamp):
 def test_a_lamp_in_view_is_taken_out_of_the_light_and_what_it_covers_out_of_the_area(two):
     """The lamp has 200 cd/m^2, a little less in these bands, and nothing that it lights more than 40."""
     dark = two.relight(powers={"sky": 0.0}).luminance()
-    sky, lamp = (seen[0] for seen in two.seen)
-    assert two.coverage == pytest.approx(sky + lamp, abs=1e-6)
+    sky, lamp = (seen.mean[0] for seen in two.seen)
+    assert two.coverage.mean == pytest.approx(sky + lamp, abs=1e-6)
     assert 5 < (lamp == 1).sum() < 200
     assert 5 < ((lamp > 0) & (lamp < 1)).sum() < 100
     assert (dark[lamp == 1] > 150).all()
@@ -286,7 +289,7 @@ def test_a_lamp_in_view_is_taken_out_of_the_light_and_what_it_covers_out_of_the_
     left = dark - lamp * dark[lamp == 1].min()
     assert (left > -1e-3).all()
     level = two.level(powers={"sky": 0.0})
-    assert level.value == pytest.approx(left.sum() / (1 - two.coverage).sum(), rel=1e-4)
+    assert level.value == pytest.approx(left.sum() / (1 - two.coverage.mean).sum(), rel=1e-4)
     assert level.relative_error < 0.01
     lit = two.relight(powers={"sky": 0.0}, luminance_cd_m2=10.0)
     assert lit.luminance() == pytest.approx(dark * 10.0 / level.value, rel=1e-5)
@@ -300,7 +303,7 @@ def test_a_black_wall_is_black():
 
 
 def test_a_wall_in_front_of_the_sky_hides_it(wall):
-    assert not wall.coverage.any()
+    assert not wall.coverage.mean.any()
 
 
 def small(seed=0, **options):
@@ -309,8 +312,8 @@ def small(seed=0, **options):
 
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
     one, again, other = small(7), small(7), small(8)
-    for name in ("radiance", "variance", "half_difference", "irradiance", "coverage"):
-        assert np.array_equal(getattr(one, name), getattr(again, name)), name
+    for name in ("radiance", "variance", "light.difference", "irradiance", "coverage.mean"):
+        assert np.array_equal(attrgetter(name)(one), attrgetter(name)(again)), name
     assert not (one.radiance == other.radiance).any()
 
 
@@ -335,7 +338,7 @@ def apart(scene):
 def test_groups_and_halves_draw_from_seeds_of_their_own():
     made = render(apart(two_lights()), SIZE, wavelength_nm=BANDS_NM[:4], width_nm=50.0, spp=64, seed=2)
     assert made.shared is None
-    sky, lamp = (made.half_difference[g, 0] / np.sqrt(np.maximum(made.variance[g, 0], 1e-20)) for g in (0, 1))
+    sky, lamp = (made.light.difference[g, 0] / np.sqrt(np.maximum(made.variance[g, 0], 1e-20)) for g in (0, 1))
     noisy = (made.variance[:, 0] > 1e-8).all(axis=0)
     assert noisy.sum() > 60
     assert abs(np.corrcoef(sky[noisy], lamp[noisy])[0, 1]) < bound(1) / np.sqrt(noisy.sum())
@@ -384,6 +387,7 @@ def test_samples_end_a_render_before_an_error_out_of_reach():
     assert (made.spp, made.stopped_by) == (16, "samples")
 
 
+@pytest.mark.thorough
 def test_time_asked_for_ends_a_render_after_one_run_at_least():
     made = small(max_seconds=0.001, spp=None)
     assert (made.spp, made.stopped_by) == (32, "seconds")
@@ -418,10 +422,11 @@ def test_a_render_that_is_gone_on_from_has_the_bits_of_one_that_was_not_interrup
     finally:
         dr.set_thread_count(threads)
     assert on.spp == whole.spp == 160
-    for name in ("radiance", "half_difference", "variance", "coverage", "coverage_difference", "irradiance"):
-        assert np.array_equal(getattr(on, name), getattr(whole, name)), name
-    for one, other in zip((*on.seen, *on.seen_difference), (*whole.seen, *whole.seen_difference), strict=True):
-        assert np.array_equal(one, other)
+    for name in ("radiance", "light.difference", "variance", "coverage.mean", "coverage.difference", "irradiance"):
+        assert np.array_equal(attrgetter(name)(on), attrgetter(name)(whole)), name
+    for one, other in zip(on.seen, whole.seen, strict=True):
+        assert np.array_equal(one.mean, other.mean)
+        assert np.array_equal(one.difference, other.difference)
     assert on.level() == whole.level()
     assert part.spp == stops[-1], "what was gone on from is untouched"
 

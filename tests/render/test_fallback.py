@@ -36,7 +36,7 @@ print(json.dumps({
     "error": (np.sqrt(made.variance[0].sum(axis=(1, 2), dtype=np.float64)) / made.radiance[0, 0].size).tolist(),
     "scatter": made.radiance[0].var(axis=(1, 2), dtype=np.float64).tolist(),
     "plane": made.irradiance[0].tolist(),
-    "stop": [made.spp, made.stopped_by, bool(made.coverage.any())],
+    "stop": [made.spp, made.stopped_by, bool(made.coverage.mean.any())],
     "same": bool(np.array_equal(made.radiance, again.radiance)),
     "far": [float(far.radiance[0, 0, 0].mean()), float(far.irradiance[0, 0])],
     "engine": result.engine,

@@ -63,6 +63,7 @@ def firefly():
     return scene_of(camera, lamp, ground=ground, ball=ball(0, 0.6, 0, 0.2, glass()))
 
 
+@pytest.mark.thorough
 @only_dense
 def test_fireflies_are_finite_and_a_render_full_of_them_does_not_claim_to_be_done():
     made = render(firefly(), (16, 16), wavelength_nm=BANDS_NM, max_spp=256, noise=0.05, seed=6)
@@ -98,7 +99,7 @@ def test_a_black_scene_is_black_at_no_error_and_has_no_level():
     lit = made.relight({"lamp": "sodium_low"})
     assert not made.radiance.any()
     assert not made.variance.any()
-    assert not made.coverage.any()
+    assert not made.coverage.mean.any()
     assert not lit.values.any()
     assert lit.relative_mc_error == 0.0
     assert not made.band_error({"lamp": "sodium_low"}).any()
@@ -176,14 +177,16 @@ import numpy as np
 from rodcone.jit import dr
 dr.set_thread_count(int(sys.argv[1]))
 from render.engine import render
+from operator import attrgetter
 from scenes.catalog import load
 made = render(load("cornell_box"), (40, 56), wavelength_nm=np.arange(430.0, 780.0, 100.0), spp=32, seed=4)
-for name in ("radiance", "variance", "half_difference", "irradiance", "coverage"):
-    print(name, hashlib.sha256(np.ascontiguousarray(getattr(made, name)).tobytes()).hexdigest())
+for name in ("radiance", "variance", "light.difference", "irradiance", "coverage.mean"):
+    print(name, hashlib.sha256(np.ascontiguousarray(attrgetter(name)(made)).tobytes()).hexdigest())
 print(made.radiance.any(), made.irradiance.any())
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(backend() != "llvm", reason="threads are the LLVM backend's")
 def test_the_same_seed_gives_the_same_bits_whatever_the_number_of_threads():
     said = []

@@ -196,7 +196,7 @@ def test_a_lamp_of_a_file_has_a_luminance_of_one_in_any_unit_and_is_read_anew(tm
     ("text", "words"),
     [
         ("wavelength_nm,a,b\n400,1,1\n700,1,1\n", "has 2 columns beside wavelength_nm; allowed: 1"),
-        ("nm,a\n400,1\n700,1\n", "has header"),
+        ("watts,a\n400,1\n700,1\n", "has header"),
         ("wavelength_nm,a\n400,1\n700,-1\n", "finite numbers >= 0"),
         ("wavelength_nm,a\n400,1\n700,nan\n", "finite numbers >= 0"),
         ("wavelength_nm,a\n0.4,1\n0.7,1\n", "led.csv"),

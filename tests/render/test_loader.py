@@ -1,6 +1,9 @@
 """Loading: what light groups share, that sharing changes no bit, and that a kernel compiles once for all passes."""
 
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +33,7 @@ def test_groups_hold_the_same_shapes_and_surfaces() -> None:
     assert all(own == surfaces[0] for own in surfaces)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("group", ["moon", "led"])
 def test_a_group_is_the_same_picture_as_a_scene_of_it_alone(group: str) -> None:
     """To the bit for the first group, whose seed is the same; shapes, surfaces and rows of the table are its own."""
@@ -63,3 +67,52 @@ def test_tables_anywhere_in_memory_are_read_by_one_kernel() -> None:
             kernels |= {kernel["hash"] for kernel in dr.kernel_history() if "hash" in kernel}
         assert np.array_equal(np.array(read[1])[:, 0], table[1, 3, 4:])
     assert len(kernels) == 1
+
+
+ENVIRONMENT = """
+import sys
+import numpy as np
+import OpenEXR
+from rodcone.jit import dr
+dr.set_thread_count(1)
+from render.engine import render
+from render.user_scene.scene_file import load_scene_file
+OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage},
+             {"RGB": np.full((32, 64, 3), 0.5, np.float32)}).write("sky.exr")
+open("sky.xml", "w").write('''<scene version="3.0.0"><sensor type="perspective"/>
+<shape type="sphere"><point name="center" value="0,0,9"/></shape>
+<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter></scene>''')
+made = render(load_scene_file("sky.xml").scene, (2, 2), wavelength_nm=np.array([550.0, 650.0]), spp=4)
+print(made.radiance.any(), dr.thread_count())
+"""
+
+
+def test_a_machine_of_one_core_reads_an_environment_map(tmp_path: Path) -> None:
+    """Mitsuba reads OpenEXR in Dr.Jit's threads, without the one that asks: with one thread alone it never ended."""
+    command = [sys.executable, "-c", ENVIRONMENT]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "True 1\n"
+
+
+GUEST = """
+import numpy as np
+import rodcone
+import mitsuba as mi
+mi.set_variant("scalar_rgb")
+before = repr(mi.file_resolver())
+scene = mi.load_dict(mi.cornell_box())
+picture = np.array(mi.render(scene, spp=1, seed=3))
+first = rodcone.render(rodcone.load("cornell_box"), (4, 4), spp=4)
+assert np.allclose(np.array(mi.render(scene, spp=1, seed=3)), picture, rtol=1e-4)  # threads add in any order
+again = rodcone.render(rodcone.load("cornell_box"), (4, 4), spp=4)
+again.relight(illuminance_lux=5.0)  # traces the meter, late
+print(mi.variant(), repr(mi.file_resolver()) == before, np.array_equal(first.radiance, again.radiance))
+"""
+
+
+def test_a_users_own_variant_search_path_and_scene_are_as_they_were(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", GUEST], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, "scalar_rgb True True\n"), done.stderr

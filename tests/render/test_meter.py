@@ -183,6 +183,7 @@ def test_a_folder_of_renders_keeps_the_irradiance(tmp_path, loads):
     assert len(loads) == 2, "a damaged file is made again"
 
 
+@pytest.mark.thorough
 def test_the_error_told_is_the_scatter_over_seeds():
     """The mean of the squared errors told, over the variance of 24 seeds: a ratio of chi-squared to its expectation."""
     count, lights = 24, {"point": {"type": "point", "position": [0.1, 0.3, 0.0]}, "sky": {"type": "constant"}}

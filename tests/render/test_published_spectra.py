@@ -22,6 +22,7 @@ def of_colour_science() -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
     observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
     sun = colour.plotting.datasets.SD_ASTMG173_DIRECT_CIRCUMSOLAR
     means = Spectrum(sun.wavelengths, sun.values).band_average(SUN_NM, np.ones_like(SUN_NM))
+    camera = colour.MSDS_CAMERA_SENSITIVITIES["Nikon 5100 (NPL)"]
     names = [*LIGHTS, *(f"LED-{kind}" for kind in LEDS)]
     tables = {
         "illuminants": {name: colour.SDS_ILLUMINANTS[name] for name in names},
@@ -34,6 +35,9 @@ def of_colour_science() -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
         },
         **{key: {name: (x.wavelengths, x.values) for name, x in group.items()} for key, group in tables.items()},
         "sun": {"direct": (SUN_NM, means)},
+        "nikon_d5100": {
+            name: (camera.wavelengths, column) for name, column in zip("RGB", camera.values.T, strict=True)
+        },
     }
 
 

@@ -31,6 +31,7 @@ def drawn(paths, groups):
     return paths.pop("camera", 0) / (SIZE[0] * SIZE[1] * groups)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("plane", [True, False], ids=["plane", "no plane"])
 @pytest.mark.parametrize("name", names())
 def test_every_scene_tells_the_samples_it_drew(name, plane, paths):
@@ -45,6 +46,7 @@ def test_every_scene_tells_the_samples_it_drew(name, plane, paths):
     assert paths.pop("meter", 0) == plane * units * METER_PATHS
 
 
+@pytest.mark.sample(13)
 @pytest.mark.parametrize("asked", [1, 2, 3, 4, 5, 7, 9, 11, 13, 17, 23, 33, 41, 67, 100, 128, 136, 512, 1000])
 @pytest.mark.parametrize("limit", ["spp", "max_spp"])
 def test_at_most_an_eighth_more_is_drawn_than_asked_for(limit, asked, paths):
@@ -54,6 +56,7 @@ def test_at_most_an_eighth_more_is_drawn_than_asked_for(limit, asked, paths):
     assert made.spp <= 1.125 * (asked + 1)
 
 
+@pytest.mark.thorough
 def test_each_pixel_has_the_samples_that_its_count_tells(monkeypatch):
     """By the numbers of the pixels that the tracer was handed, two light groups and both halves together."""
     scene, size = replace(load("night_street"), reference_plane=None), (12, 18)
@@ -97,5 +100,5 @@ def test_parts_count_by_their_samples(paths):
     # What was added has the same expectation: six standard errors, and no pixel is weighed twice.
     error = np.sqrt(part.variance.astype(np.float64) * first * (1 / more + 1 / first))
     assert np.abs(added - part.radiance).max() < 6 * error.max()
-    scattered = whole.radiance - np.stack(whole.seen)
+    scattered = whole.radiance - np.stack([seen.mean for seen in whole.seen])
     assert scattered.mean(axis=(2, 3)) == pytest.approx(whole.scene_means.radiance, rel=1e-5)

@@ -58,6 +58,7 @@ def test_a_description_holds_plain_values_alone(name):
     assert kinds(load(name).description) <= {str, int, float, bool, list, Matrix4}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", names())
 def test_mitsuba_loads_a_description_in_the_scalar_and_the_active_variant(name):
     mi, description = mitsuba_module(), load(name).description

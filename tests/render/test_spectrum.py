@@ -52,6 +52,7 @@ def test_a_band_across_a_point_of_uneven_spacing_weighs_its_pieces_by_width():
     assert spectrum.band_average(410.0, 20.0) == pytest.approx(area / 20, rel=1e-14)
 
 
+@pytest.mark.thorough
 @given(
     start=st.floats(200, 500),
     steps=st.lists(st.floats(0.01, 200), min_size=1, max_size=12),

@@ -8,7 +8,7 @@ from builders import transport_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from render.error_estimates import SharedPaths
+from render.error_estimates import Halves, SharedPaths
 from render.illuminants import illuminant
 from render.level import SceneMeans
 from render.photometry import luminance
@@ -31,7 +31,7 @@ def transport(radiance=None, *, seed=0, seen=None, irradiance=..., **changes):
         {"sky": LightGroup(("sky",), illuminant("D65"), 100.0), "lamp": LightGroup(("lamp",), RAMP, 0.3)},
         NM,
         WIDTH_NM,
-        half_difference=(radiance * rng.uniform(-0.5, 0.5, radiance.shape)).astype(np.float32),
+        light=Halves(radiance, (radiance * rng.uniform(-0.5, 0.5, radiance.shape)).astype(np.float32)),
         variance=(radiance * rng.uniform(0.0, 0.1, radiance.shape)).astype(np.float32) ** 2,
         seen=seen,
         irradiance=rng.uniform(1.0, 4.0, (2, NM.size)) if irradiance is ... else irradiance,
@@ -120,7 +120,7 @@ def test_the_mean_luminance_asked_for_is_that_of_what_is_no_light(level):
     wall = 1e-4 * transport().radiance * (1 - seen.sum(axis=0))
     made = transport(wall + seen[:, None], seen=seen)
     lit = made.relight(luminance_cd_m2=level)
-    uncovered = 1 - made.coverage
+    uncovered = 1 - made.coverage.mean
     assert uncovered.sum() == 30 - 2.125
     assert made.scattered_luminance(luminance_cd_m2=level).sum() / uncovered.sum() == pytest.approx(level, rel=1e-5)
     assert lit.luminance()[uncovered == 1].sum() < level * uncovered.sum()  # the third pixel's wall belongs to it
@@ -224,7 +224,7 @@ def test_halves_average_to_the_relit_radiance(level):
 def test_halves_differ_by_twice_the_half_difference():
     made = transport()
     even, odd = made.relight_halves({"sky": flat(), "lamp": flat()}, powers={"sky": 1.0, "lamp": 0.0})
-    expected = np.moveaxis(2.0 * made.half_difference[0].astype(np.float64), 0, -1)
+    expected = np.moveaxis(2.0 * made.light.difference[0].astype(np.float64), 0, -1)
     scale = np.moveaxis(made.radiance[0], 0, -1)
     assert np.abs((even.values.astype(np.float64) - odd.values) - expected).max() <= 4e-7 * scale.max()
 
@@ -232,7 +232,7 @@ def test_halves_differ_by_twice_the_half_difference():
 def test_halves_whose_noise_crosses_zero_still_average_to_the_relit_radiance():
     """Clipped at 0 they would differ by less than the render's noise."""
     made = transport()
-    made = replace(made, half_difference=made.radiance * np.float32(-3.0))
+    made = replace(made, light=Halves(made.radiance, made.radiance * np.float32(-3.0)))
     even, odd = made.relight_halves()
     lit = made.relight().values
     assert even.values.min() < 0

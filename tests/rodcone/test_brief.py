@@ -86,4 +86,4 @@ def test_values_of_the_chain_are_short_lines() -> None:
         assert len(text) < 750, text  # a transport has fourteen arrays
         assert "\n" not in text
     assert repr(load("still_life")).startswith("Scene(name='still_life', geometry={type, sensor, ")
-    assert "lens=LensConfig(f_number=2.8), responses=Responses(curves={R, G, B, W})" in repr(sensor)
+    assert "lens=LensConfig(f_number=2.8, diffraction=1), responses=Responses(curves={R, G, B, W})" in repr(sensor)

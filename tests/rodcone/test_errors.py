@@ -32,12 +32,12 @@ def test_of_a_message_too_long_both_ends_are_told() -> None:
     assert str(InputError(f"again: {error}")).endswith("; correct it")
 
 
-@pytest.mark.parametrize("value", [10**400, -(10**400), math.nan, math.inf, "3", None, 5.000001, -1e-9])
+@pytest.mark.parametrize("value", [True, 10**400, -(10**400), math.nan, math.inf, "3", None, 5.000001, -1e-9])
 def test_what_is_no_number_of_the_range_is_refused(value: object) -> None:
     with pytest.raises(InputError, match="is outside 0 to 5; give less"):
         require_range("side", value, 0.0, 5.0, "give less")
 
 
-@pytest.mark.parametrize("value", [0, 5, 2.5, True])
+@pytest.mark.parametrize("value", [0, 5, 2.5])
 def test_numbers_within_the_range_pass(value: float) -> None:
     require_range("side", value, 0.0, 5.0, "give less")

@@ -41,6 +41,7 @@ def in_five_gb(arguments: list[str], folder: Path) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_run_of_4000_by_4000_in_5_gb_is_refused_in_one_line_before_it_renders(command: str, tmp_path: Path) -> None:
     code, out, err = in_five_gb(COMMANDS[command], tmp_path)
@@ -57,6 +58,7 @@ def test_a_run_of_4000_by_4000_in_5_gb_is_refused_in_one_line_before_it_renders(
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
 
 
+@pytest.mark.thorough
 def test_the_need_is_the_one_that_a_dry_run_tells(tmp_path: Path) -> None:
     code, out, err = in_five_gb([*COMMANDS["sweep"], "--dry-run"], tmp_path)
     dry = re.search(r"at most (\d+\.\d) GB of memory", out)

@@ -9,7 +9,8 @@ from PIL import Image
 
 from isp.picture import Picture
 from render.radiance import SpectralRadiance
-from rodcone.notebook import SIDE, WHITE_AT, html_of, preview_png
+from rodcone.colour_spaces import WHITE_AT
+from rodcone.notebook import SIDE, html_of, preview_png
 
 
 def pixels(png: bytes) -> np.ndarray:
@@ -106,3 +107,10 @@ def test_nothing_is_drawn_before_it_is_shown(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(Image, "fromarray", lambda *_: pytest.fail("drawn"))
     radiance = SpectralRadiance(np.ones((4, 4, 3)), np.array([450.0, 550.0, 650.0]))
     assert radiance.shape == (4, 4)
+
+
+def test_names_from_outside_are_shown_and_not_run() -> None:
+    name = "<script>alert(1)</script>' onerror='x"
+    shown = html_of(name, {name: [name]}, preview_png(np.ones((4, 4))))
+    assert "<script" not in shown
+    assert "' onerror" not in shown

@@ -29,6 +29,7 @@ def test_the_suns_beam_is_the_tables_and_its_disk_has_the_suns_size():
     assert groups["sky"].power * np.pi == pytest.approx(13_454.0, rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_the_sun_lights_the_table_unblocked_with_its_solid_angle_times_the_cosine():
     scene = load("still_life_outdoor")
     corner, above = np.array([-0.22, 0.0002, 0.50]), np.array([-0.22, 1.2, 0.51])  # the meter card
@@ -56,7 +57,7 @@ def test_the_two_halves_have_their_stated_luminances_and_no_light_crosses():
     size = 48
     nm = np.arange(400.0, 780.0, 40.0)
     made = render(load("lit_and_shadowed", dark_cd_m2=0.002, lit_cd_m2=25.0), (size, size), wavelength_nm=nm, spp=128)
-    assert not made.coverage.any()
+    assert not made.coverage.mean.any()
     for index, (name, group) in enumerate(made.groups.items()):
         lit = made.relight(powers={other: 0.0 for other in made.groups if other != name}).luminance()
         left, right = lit[:, : size // 2], lit[:, size // 2 :]
@@ -94,7 +95,7 @@ def test_the_street_holds_more_than_five_decades_and_shows_all_its_lights():
     made = render(load("night_street"), (96, 96), wavelength_nm=BANDS_NM, spp=64)
     assert (made.radiance.max(axis=(1, 2, 3)) > 0.1).all()  # unit emission fills a tenth of some pixel
     seen = made.relight().luminance()
-    lit = seen[(seen > 0) & (made.coverage == 0)]
+    lit = seen[(seen > 0) & (made.coverage.mean == 0)]
     assert seen.max() / np.percentile(lit, 1) > 1e5
-    moonlit = made.relight(powers={"sodium": 0.0, "led": 0.0, "window": 0.0}).luminance()[(made.coverage == 0)]
+    moonlit = made.relight(powers={"sodium": 0.0, "led": 0.0, "window": 0.0}).luminance()[(made.coverage.mean == 0)]
     assert 1e-4 < np.median(moonlit[moonlit > 0]) < 0.05  # 0.25 lux on plaster or asphalt, or its reflection

@@ -92,4 +92,4 @@ def test_the_cornell_box_is_red_on_the_left_green_on_the_right_and_white_between
     assert right < 0.7
     assert 0.7 < back[16:24].mean() < 1.5
     assert (blue > 0).all()
-    assert made.coverage.any()
+    assert made.coverage.mean.any()

@@ -7,10 +7,11 @@ import pytest
 
 from rodcone.errors import InputError
 from rodcone.jit import backend
-from sensor.binning import as_read, block_sums, of_read_pixels
+from sensor.binning import binned, binned_tile, block_sums, photosites, pixel_sums
 from sensor.capture import expose
-from sensor.cfa import BAYER, MOSAICS, RGBW, binned_tile, quad, tile_of
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.cfa import BAYER, MOSAICS, RGBW, quad, tile_of
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.config_file import read_sensor
 from sensor.curves import built_in
 from sensor.device import draw_device
@@ -22,14 +23,10 @@ BOTH = pytest.mark.parametrize("binning", ["charge", "digital"])
 
 
 def camera(binning, cfa="quad_bayer", bits=14, black_level_dn=64, **pixel):
-    return SensorConfig(
-        replace(QUIET, **pixel),
-        LensConfig(2.8),
-        cfa=tile_of(cfa),
-        bits=bits,
-        black_level_dn=black_level_dn,
-        binning=binning,
+    photodiodes = SensorConfig(
+        replace(QUIET, **pixel), LensConfig(2.8), cfa=tile_of(cfa), bits=bits, black_level_dn=black_level_dn
     )
+    return photodiodes if binning == "" else binned(photodiodes, binning)
 
 
 def even_frame(sensor, photo_e, shape=(64, 64), exposure_s=0.1, seed=1, exact=True):
@@ -62,7 +59,7 @@ def test_a_mosaic_whose_2x2_pixels_differ_is_refused_in_one_line(cfa):
     with pytest.raises(
         InputError, match=r"binning: 2x2 pixels of the mosaic .* aren't of one channel; allowed"
     ) as found:
-        SensorConfig(QUIET, LensConfig(2.8), cfa=tile_of(cfa), responses=built_in(), binning="charge")
+        binned(SensorConfig(QUIET, LensConfig(2.8), cfa=tile_of(cfa), responses=built_in()), "charge")
     assert "\n" not in str(found.value)
 
 
@@ -73,9 +70,9 @@ def test_a_tile_of_three_pixels_is_refused_for_what_its_second_repeat_holds():
 
 @BOTH
 def test_a_processor_s_mosaic_is_the_raw_image_s(binning):
-    assert vary(camera(binning), "rgbw").cfa == MOSAICS["quad_rgbw"]
-    assert as_read(vary(camera(binning), "bayer")).cfa == BAYER
-    assert as_read(vary(camera(binning), "rgbw_nd")).cfa == RGBW
+    assert photosites(vary(camera(binning), "rgbw")).cfa == MOSAICS["quad_rgbw"]
+    assert vary(camera(binning), "bayer").cfa == BAYER
+    assert vary(camera(binning), "rgbw_nd").cfa == RGBW
 
 
 # The raw image
@@ -113,11 +110,10 @@ def test_prnu_of_four_pixels_is_averaged_and_dsnu_added(binning, exact):
         pytest.skip("Dr.Jit has no backend here")
     pixel = {"prnu": 0.05, "dsnu_e": 20.0, "full_well_e": 8000.0}
     sensor = camera(binning, **pixel)
-    one = replace(sensor, binning="")
-    chip, apart = (draw_device(s, (64, 64), np.random.default_rng(5)) for s in (sensor, one))
+    chip, apart = (draw_device(s, (64, 64), np.random.default_rng(5)) for s in (sensor, photosites(sensor)))
     np.testing.assert_array_equal(chip.photo_response, apart.photo_response)  # one chip, read in two ways
     offsets_e = block_sums(apart.dark_offset_e)
-    np.testing.assert_allclose(of_read_pixels(apart.dark_offset_e, sensor), offsets_e)
+    np.testing.assert_allclose(pixel_sums(apart.dark_offset_e, sensor), offsets_e)
     expected = 1000.0 * block_sums(apart.photo_response) + offsets_e
     rng, n = np.random.default_rng(6), 64
     frames = [expose(np.full((64, 64), 1000.0), sensor, 0.1, chip, rng, exact=exact).electrons for _ in range(n)]
@@ -181,7 +177,7 @@ def test_all_full_reads_white(binning):
         ({"dark_current_e_per_s": 70.0}, 28.0, 28.0),
         ({"hot_pixel_share": 0.1, "hot_pixel_dark_current_e_per_s": 70.0}, 20.44, 20.44),  # 4 * (0.7 + 0.09 * 49)
         # the sum through one amplifier; or through each of two what its two pixels hold, 2 x 0.0009 x (200 + 200^2),
-        # of which `as_read` leaves half of 0.0009 of the shot noise out
+        # of which `binned` leaves half of 0.0009 of the shot noise out
         ({"column_gain_spread": 0.03}, 0.0009 * (400.0 + 400.0**2), 2 * 0.0009 * (200.0 / 2 + 200.0**2)),
         ({"crosstalk": 0.1}, 0.0, 0.0),
     ],
@@ -219,6 +215,7 @@ REAL = {
 }
 
 
+@pytest.mark.sample(1)
 @BOTH
 @pytest.mark.parametrize("exact", [True, False])
 @pytest.mark.parametrize("photo_e", [0.0, 5.0, 100.0, 5000.0])
@@ -253,10 +250,24 @@ def test_light_for_an_snr_is_of_the_sum(binning):
     assert electrons / np.sqrt(noise_variance(np.full((1, 1), electrons), sensor, 0.1)[0, 0]) == pytest.approx(10.0)
 
 
-def test_a_sensor_that_does_not_bin_is_read_as_it_is():
+def test_the_photodiodes_of_a_sensor_that_does_not_bin_are_its_pixels():
     sensor = camera("")
-    assert as_read(sensor) is sensor
-    assert as_read(as_read(camera("charge"))) == as_read(camera("charge"))
+    assert photosites(sensor) is sensor
+    assert sensor.undivided == sensor
+
+
+@BOTH
+def test_photodiodes_by_themselves_are_what_was_binned(binning):
+    one = camera("", **REAL)
+    assert photosites(binned(one, binning)) == one
+
+
+@BOTH
+@pytest.mark.parametrize("change", [{"prnu": 0.3}, {"read_noise_e": 9.0}])
+def test_a_pixel_changed_without_its_photodiodes_is_no_chip(binning, change):
+    sensor = camera(binning)
+    with pytest.raises(InputError, match=r"pixel: it isn't four of the chip's photodiodes; allowed"):
+        draw_device(replace(sensor, pixel=replace(sensor.pixel, **change)), (8, 8), np.random.default_rng(0))
 
 
 # Hostile input
@@ -272,16 +283,16 @@ def test_an_odd_size_is_refused_in_one_line(binning, shape):
     assert "\n" not in str(found.value)
 
 
-@pytest.mark.parametrize("binning", ["analog", "Charge", 2, None, False, ["charge"]])
+@pytest.mark.parametrize("binning", ["", "analog", "Charge", 2, None, False, ["charge"]])
 def test_another_binning_is_refused(binning):
     with pytest.raises(InputError, match=r"binning: .*allowed: charge, digital"):
-        camera(binning)
+        binned(camera(""), binning)
 
 
 def test_a_sum_beyond_16_bits_is_refused():
     with pytest.raises(InputError, match=r"bits: 15 with binning 'digital'.*up to 14"):
         camera("digital", bits=15)
-    assert camera("charge", bits=16).binning == "charge"
+    assert camera("charge", bits=16).chip.in_charge
 
 
 @pytest.mark.parametrize("binned_well_e", [-1.0, 7999.0, np.nan, 1e13])
@@ -310,7 +321,7 @@ def test_a_sensor_file_names_binning_and_its_well(tmp_path):
     path = tmp_path / "quad.toml"
     path.write_text(PRESET.format(cfa="quad_rgbw", binning='"charge"'))
     sensor = read_sensor(path)
-    assert (sensor.binning, as_read(sensor).pixel.full_well_e, as_read(sensor).cfa) == ("charge", 20_000.0, RGBW)
+    assert (sensor.chip.in_charge, sensor.pixel.full_well_e, sensor.cfa) == (True, 20_000.0, RGBW)
 
 
 @pytest.mark.parametrize(

@@ -121,6 +121,7 @@ def mean_electrons(radiance, sensor, frames, **options):
     return np.mean([raw.electrons for raw in raws], axis=0)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "lens", [{}, {"horizontal_view_deg": 70.0}, {"diffraction": 1.0, "veiling_glare": 0.1, "defocus_um": 5.0}]
 )
@@ -187,6 +188,7 @@ print(json.dumps({"engine": raw.engine, "dn": raw.dn.tolist()}))
 """
 
 
+@pytest.mark.thorough
 def test_without_llvm_the_numpy_form_runs_and_the_raw_image_says_so():
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT_LLVM],

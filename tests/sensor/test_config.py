@@ -9,7 +9,8 @@ from render.radiance import SpectralRadiance
 from render.spectrum import flat
 from rodcone.errors import InputError
 from sensor.cfa import BAYER, RGBW
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.optics import form_image
 from sensor.presets import low_noise, names, preset, table1_output, table1_pixel

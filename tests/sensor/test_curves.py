@@ -78,8 +78,9 @@ def write(folder, text):
     return path
 
 
-def test_a_csv_gives_the_curves_that_it_holds(tmp_path):
-    path = write(tmp_path, "wavelength_nm, R,W\n400,0.1,0.5\n\n500,0.3,1.0\n610,0,0.75\n")
+@pytest.mark.parametrize("name", ["wavelength_nm", "nm", "Wavelength (nm)", "lambda", "λ [nm]"])
+def test_a_csv_gives_the_curves_that_it_holds(tmp_path, name):
+    path = write(tmp_path, f"{name}, R,W\n400,0.1,0.5\n\n500,0.3,1.0\n610,0,0.75\n")
     responses = read_csv(path)
     assert set(responses.curves) == {"R", "W"}
     np.testing.assert_array_equal(responses.curves["R"].wavelength_nm, [400.0, 500.0, 610.0])
@@ -91,7 +92,8 @@ def test_a_csv_gives_the_curves_that_it_holds(tmp_path):
 @pytest.mark.parametrize(
     ("text", "parts"),
     [
-        ("nm,R\n400,0.1\n500,0.2\n", ("['nm', 'R']", "wavelength_nm and one channel a column")),
+        ("x,R\n400,0.1\n500,0.2\n", ("['x', 'R']", "(or wavelength, lambda, nm) and one channel a column")),
+        ("wavelength,R\n0.4,0.1\n0.5,0.2\n", ("wavelengths up to 0.5", "convert them")),
         ("wavelength_nm\n400\n500\n", ("['wavelength_nm']", "one channel a column")),
         ("wavelength_nm,R,G\n400,0.1\n500,0.2\n", ("['wavelength_nm', 'R', 'G']",)),
         ("wavelength_nm,R\n", ("wavelength_nm", "header")),

@@ -7,7 +7,8 @@ import pytest
 
 from rodcone.errors import InputError
 from sensor.cfa import RGBW
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
 
 

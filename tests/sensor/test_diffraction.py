@@ -11,7 +11,8 @@ from scipy.special import j0, j1
 from render.engine import render
 from render.radiance import SpectralRadiance
 from scenes.catalog import load
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf
 from sensor.optics import camera_equation, falloff, form_image
 
@@ -197,6 +198,7 @@ def theory(frequency, f_number, pitch_um, degrees, defocus_um=0.0):
     return np.abs(optics * np.sinc(along) * np.sinc(across))
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(
     ("f_number", "pitch_um", "defocus_um", "samples"),
     [(2.8, 2.2, 0.0, 4), (1.4, 2.2, 0.0, 4), (8.0, 2.2, 0.0, 4), (2.8, 6.0, 0.0, 8), (2.8, 2.2, 3.0, 4)],

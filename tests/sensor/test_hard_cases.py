@@ -10,7 +10,8 @@ from render.spectrum import flat
 from sensor.burst import merge
 from sensor.capture import capture
 from sensor.cfa import MOSAICS
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.device import Device, draw_device
 from sensor.exposure import LONGEST_S, auto_exposure_s
@@ -49,7 +50,7 @@ def shoot(sensor, value, shape, exact, exposure_s=0.01, seed=0):
     device = draw_device(sensor, shape, np.random.default_rng([seed, 0]))
     rng = np.random.default_rng([seed, 1])
     raw = capture(scene(value, shape), sensor, exposure_s, device, rng, exact=exact)
-    assert raw.dn.dtype == (np.float32 if sensor.readings else np.uint16)
+    assert raw.dn.dtype == (np.float32 if sensor.chip.readings else np.uint16)
     assert raw.dn.max() <= raw.white_dn
     assert np.isfinite(raw.electrons).all()
     return raw
@@ -66,6 +67,7 @@ def test_without_light_a_frame_reads_black_and_half_lies_on_either_side(name, ex
     assert not raw.saturated.any()
 
 
+@pytest.mark.sample(1)
 @EXACT
 def test_one_photon_in_a_megapixel_is_found_in_as_many_frames_as_poisson_says(exact):
     pixel = PixelConfig(2.2, 0.9, 1000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)

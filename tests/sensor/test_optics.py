@@ -8,7 +8,8 @@ import pytest
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.optics import SpectralIrradiance, camera_equation, form_image
 
 ISET_NM = np.arange(400.0, 701.0, 10.0)  # samples 10 nm apart, summed as rectangles

@@ -9,7 +9,8 @@ import pytest
 from render.spectrum import Spectrum
 from rodcone.errors import InputError
 from sensor.cfa import BAYER, MOSAICS, RGBW
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.config_file import read_sensor
 from sensor.curves import read_csv, rgbw
 from sensor.presets import low_noise, names, preset, preset_file, table1_output, table1_pixel
@@ -37,9 +38,9 @@ def refusal(path, *parts):
 def test_every_preset_is_a_file_that_says_what_it_is_and_names_every_pixel_term(name):
     text = preset_file(name).read_text("utf-8")
     assert text.startswith("# ")
-    table = text.partition("[pixel]")[2].partition("[[readings]]" if preset(name).readings else "[lens]")[0]
+    table = text.partition("[pixel]")[2].partition("[[readings]]" if preset(name).chip.readings else "[lens]")[0]
     terms = {field.name for field in fields(PixelConfig)} - {"binned_well_e"}  # of a sensor that bins
-    if preset(name).readings:
+    if preset(name).chip.readings:
         terms -= {"read_noise_e", "dsnu_e", "full_well_e"}  # each reading's own
     assert {line.split(" = ")[0] for line in table.splitlines() if " = " in line and line[0] != "#"} == terms
     assert preset(name).cfa == RGBW
@@ -50,17 +51,17 @@ def test_no_other_file_lies_beside_the_presets():
 
 
 @pytest.mark.parametrize(
-    ("camera", "read_noise_e", "dsnu_e", "prnu"),
+    ("camera", "read_noise_e", "dsnu_e", "prnu", "diffraction"),
     [
-        (table1_pixel, 4580.0 / 30.0, 6000.0 / 30.0, 0.017),
-        (table1_output, 4580.0 / (30.0 * 7.98), 6000.0 / (30.0 * 7.98), 0.017),
-        (low_noise, 1.5, 1.0, 0.01),
+        (table1_pixel, 4580.0 / 30.0, 6000.0 / 30.0, 0.017, 0.0),  # the paper has no blur
+        (table1_output, 4580.0 / (30.0 * 7.98), 6000.0 / (30.0 * 7.98), 0.017, 0.0),
+        (low_noise, 1.5, 1.0, 0.01, 1.0),
     ],
 )
 @pytest.mark.parametrize("cfa", ["rgbw", "bayer"])
-def test_the_files_hold_the_last_bit_of_table_1_s_quotients(camera, read_noise_e, dsnu_e, prnu, cfa):
+def test_the_files_hold_the_last_bit_of_table_1_s_quotients(camera, read_noise_e, dsnu_e, prnu, diffraction, cfa):
     pixel = PixelConfig(2.2, 0.9, 15_000.0, read_noise_e, dsnu_e, prnu, analog_gain=7.98)
-    expected = SensorConfig(pixel, LensConfig(2.8), cfa=MOSAICS[cfa])
+    expected = SensorConfig(pixel, LensConfig(2.8, diffraction=diffraction), cfa=MOSAICS[cfa])
     assert camera(cfa) == expected
     assert camera(cfa).gain_e_per_dn == expected.gain_e_per_dn
 
@@ -96,13 +97,13 @@ def test_the_least_file_leaves_the_rest_at_its_defaults(tmp_path):
 @pytest.mark.parametrize(
     ("text", "parts"),
     [
-        ("", ("pixel", "is not a table", "[pixel]")),
-        (LEAST, ("lens", "is not a table", "[lens]")),
-        ("pixel = 3\n" + LENS, ("pixel: 3 is not a table",)),
+        ("", ("pixel is missing", "add it")),
+        (LEAST, ("lens is missing", "add it")),
+        ("pixel = 3\n" + LENS, ("pixel: the value is not a table",)),
         (LEAST + "read_nose_e = 3\n" + LENS, ("pixel key: 'read_nose_e' is unknown", "did you mean 'read_noise_e'?")),
         (LEAST + LENS + "fnumber = 3\n", ("lens key: 'fnumber'", "did you mean 'f_number'?")),
         ("bit = 12\n" + LEAST + LENS, ("key: 'bit'", "did you mean 'bits'?")),
-        (LEAST.replace("prnu = 0.01\n", "") + LENS, ("pixel: prnu is missing", "add it to [pixel]")),
+        (LEAST.replace("prnu = 0.01\n", "") + LENS, ("pixel: prnu is missing", "see rodcone new preset")),
         (LEAST.replace("prnu = 0.01", "prnu = 1.7") + LENS, ("prnu: 1.7", "1.7 % is 0.017")),
         (LEAST.replace("prnu = 0.01", 'prnu = "0.01"') + LENS, ("prnu: '0.01'",)),
         (LEAST.replace("prnu = 0.01", "prnu = true") + LENS, ("prnu: True is not a number",)),
@@ -177,8 +178,8 @@ def test_measured_responses_are_read_beside_the_file_with_all_that_it_states(tmp
             STATED.replace("[400, 700]", "[300, 700]") + 'quantum_efficiency = "included"\n',
             ("range_nm: (300.0, 700.0)",),
         ),
-        (STATED.replace('"curves.csv"', "3") + "quantum_efficiency = 0.5\n", ("csv: 3 is not a file's name",)),
-        ("responses = 3\n", ("responses: 3 is not a table",)),
+        (STATED.replace('"curves.csv"', "3") + "quantum_efficiency = 0.5\n", ("csv: 3 is not a text in quotes",)),
+        ("responses = 3\n", ("responses: the value is not a table",)),
     ],
 )
 def test_responses_that_leave_something_to_guess_are_refused(tmp_path, text, parts):

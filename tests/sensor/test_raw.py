@@ -47,6 +47,7 @@ def test_a_saturated_pixel_is_missed_with_at_most_the_stated_probability(sigma_d
     assert missed <= STATED
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("camera", "probability"), [(table1_pixel, STATED), (table1_output, STATED), (low_noise, STATED)]
 )

@@ -10,7 +10,8 @@ import pytest
 from scipy import stats
 
 from rodcone.errors import InputError
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device, draw_device
 from sensor.readout import read_out
 

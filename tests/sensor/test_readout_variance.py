@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
 from sensor.readout import noise_variance, read_out, spread_charge
 

@@ -10,7 +10,8 @@ from render.radiance import SpectralRadiance
 from render.spectrum import flat
 from rodcone.errors import InputError
 from sensor.cfa import BAYER, RGBW, mask
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.optics import form_image
 from sensor.response import channel_electrons, expected_electrons

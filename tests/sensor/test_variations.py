@@ -1,6 +1,5 @@
 """Filters of other cameras: sums and densities of the own curves, and cameras that carry them."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from render.photometry import photons_per_joule, tristimulus
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker
+from sensor.binning import binned
 from sensor.cfa import MOSAICS, RGBW, channels
 from sensor.curves import Responses, complementary, matched_transmittance, neutral_density, read_csv, read_curve, rgbw
 from sensor.presets import preset
@@ -79,9 +79,9 @@ def test_variations_are_named_by_what_they_change() -> None:
 
 @pytest.mark.parametrize("binning", ["charge", "digital"])
 def test_a_camera_that_bins_shows_no_quad(binning: str) -> None:
-    camera = replace(preset("low_noise"), cfa=MOSAICS["quad_bayer"], binning=binning)
-    assert vary(camera, "rgbw").cfa == MOSAICS["quad_rgbw"]
-    assert vary(camera, "mono").cfa == ("WW", "WW")
+    camera = binned(preset("low_noise", "quad_bayer"), binning)
+    assert vary(camera, "rgbw").cfa == MOSAICS["rgbw"]
+    assert vary(camera, "mono").cfa == ("W",)
     for name in ("quad_bayer", "quad_rgbw"):
         with pytest.raises(
             InputError, match=rf"cfa: '{name}' .*binning '{binning}'.* such as {name[5:]}; .*leave"

@@ -5,8 +5,10 @@ measured; slopes must lie within 4 of their own (false-alarm rate 6.3e-5 each). 
 """
 
 import numpy as np
+import pytest
 
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
 from sensor.readout import read_out
 
@@ -49,6 +51,7 @@ def dark_variances():
     return SENSOR.pixel.read_noise_e**2 + SENSOR.gain_e_per_dn**2 / 12, SENSOR.pixel.dsnu_e**2
 
 
+@pytest.mark.thorough
 def test_temporal_noise_has_slope_1_and_gives_back_the_gain():
     signal, temporal, _ = series(LEVELS_E).T
     read, _ = dark_variances()

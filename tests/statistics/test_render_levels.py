@@ -80,6 +80,7 @@ def check(found):
     assert low < chi_square(values, (values * errors) ** 2) < high
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", SIZES)
 def test_three_seeds_give_one_level(name):
     """The two seeds of a frame with lamps at the rims of pixels once had levels of 1 to 2."""

@@ -98,7 +98,7 @@ def dense(scene, **options):
 
 def compared(scene, block, made, lit, direct):
     """Welch's test of block means, lights in view left out: they are as bright in both, their rims drown the rest."""
-    away = ~maximum_filter(made.coverage > 0, 3)
+    away = ~maximum_filter(made.coverage.mean > 0, 3)
     emitted = [g.spectrum.band_average(made.wavelength_nm, made.width_nm) * g.power for g in scene.groups.values()]
     variance = np.einsum("gb,gbhw->bhw", np.square(emitted), made.variance.astype(np.float64))
     if made.shared:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device
 from sensor.readout import read_out
 
@@ -72,6 +73,7 @@ def test_the_exact_probabilities_are_themselves_right_where_they_can_be_worked_o
     assert p @ (levels - 26.0) ** 2 == pytest.approx(26.0 + 25.0 + 1.7**2 / 12, abs=1e-5)
 
 
+@pytest.mark.sample(10)
 @pytest.mark.parametrize("read_noise_e", [0.0, 0.4, 3.0])
 @pytest.mark.parametrize("gain_e_per_dn", GAINS)
 @pytest.mark.parametrize("mean_e", MEANS_E)
@@ -95,6 +97,7 @@ def test_a_well_that_clips_in_the_midst_of_the_distribution_has_its_exact_moment
     assert_moments(frame(mean_e, sensor, 12), exact_probabilities(mean_e, sensor))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("bits", [1, 16])
 @pytest.mark.parametrize("read_noise_e", [0.0, 3.0])
 @pytest.mark.parametrize("mean_e", [10.0, 26.0])

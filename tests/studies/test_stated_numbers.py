@@ -25,7 +25,7 @@ def test_bands_and_samples_are_those_of_the_stored_render(tmp_path: Path) -> Non
     (stored,) = (tmp_path / "renders").iterdir()  # 32 bytes of digest go before NumPy's file
     with np.load(BytesIO(stored.read_bytes()[32:])) as render, open_results(tmp_path) as base:
         (row,) = rows(base)
-        assert row.bands == render["radiance"].shape[1] == 8
+        assert row.bands == render["light_mean"].shape[1] == 8
         assert row.spp == 2 * (limits.spp // 2 + 1), "a half has whole points"
 
 
@@ -60,6 +60,7 @@ def test_the_results_state_the_render_and_the_exposures_that_were_made(
     study = Study(
         (SceneChoice("slanted_edge"),),
         ("0.001cd/m2", "1000cd/m2"),
+        exposures=("auto",),
         longest_exposure_s=longest_s,
         render=RenderLimits(size=size, spp=33, noise_share=1e-6),
     )
@@ -75,7 +76,7 @@ def test_the_results_state_the_render_and_the_exposures_that_were_made(
     assert (low, high) == pytest.approx((380, 780))
     assert bands * told["width_nm"] == pytest.approx(high - low)
     # One light of one power in every band: the error of the mean over pixels, by their halves' scatter.
-    halves = transport.half_difference.sum(axis=(0, 1))
+    halves = transport.light.difference.sum(axis=(0, 1))
     error = halves.std() / halves.size**0.5 / transport.radiance.sum(axis=(0, 1)).mean()
     assert told["relative_level_error"] == pytest.approx(error, rel=0.3)
     well = low_noise().pixel.full_well_e

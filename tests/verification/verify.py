@@ -1,7 +1,7 @@
 """All that is too long for `make test`, part by part: ``python tests/verification/verify.py [--part NAME]``.
 
-Slow tests (hard cases among them), the tests of `make test` with NumPy's baseline alone, planted faults, damaged files
-and the soak. What a part found is kept in out/verify.json beside the state of the code it was found with, so an
+Slow tests (hard cases among them), every other test as on other processors, planted faults, damaged files and the
+soak. What a part found is kept in out/verify.json beside the state of the code it was found with, so an
 ended run goes on where it was; a part that fails is tried again the next time. Prints the table that
 docs/verification.md holds.
 """
@@ -57,9 +57,10 @@ def tried() -> dict[str, int]:
     return {name: sum(row[name] for row in rows) for name in ("tried", "refused", "accepted", "findings")}
 
 
-def plain_processor() -> Found:
-    code, said = command("tests/plain_cpu.py", "-q", "-m", "not slow")
-    return code == 0, said.strip().splitlines()[-1].strip("= ")
+def any_cpu() -> Found:
+    code, said = command("tests/any_cpu/any_cpu.py", "-q", "-n", "auto", "-m", "not slow")
+    rows = (re.split(r" *\| *", line) for line in said.splitlines() if line.startswith("| "))
+    return code == 0, "; ".join(f"{row[1]}: {row[4]}" for row in rows if row[1] != "configuration")
 
 
 def damaged_files() -> Found:
@@ -85,7 +86,7 @@ def code_digest() -> str:
 
 def parts(wanted: str | None) -> list[tuple[str, Callable[[], Found]]]:
     """Steps by name; the slow tests a step a file."""
-    alone = {"plain processor": plain_processor, "faults": faults, "damaged files": damaged_files, "soak": soak}
+    alone = {"any CPU": any_cpu, "faults": faults, "damaged files": damaged_files, "soak": soak}
     if wanted in alone:
         return [(str(wanted), alone[str(wanted)])]
     if wanted not in (None, "slow tests"):

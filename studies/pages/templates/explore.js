@@ -1,14 +1,15 @@
-// The explorer: builds its controls from what the program says of itself, asks for a picture at every change, and shows
-// an answer only where nothing newer has been asked. `render` is what a notebook's widget calls, and the page too.
+// The explorer: builds its controls from what the program says of itself, and asks for a picture at every change: one at a
+// time, the next with the newest values as soon as the answer is painted, so that pictures follow a slider that moves.
+// `render` is what a notebook's widget calls, and the page too.
 
 const CAMERA = ["exposure", "exposure_s", "sensor", "mosaic", "lens", "pixel", "bits", "processor", "settings",
   "white_balance", "shot_noise", "seed", "exposure_number", "frames"];
 const TITLES = {
-  picture: "Picture", truth: "Truth", raw: "Raw mosaic", noise: "Noise only", "luminance error": "Error of luminance",
+  picture: "Picture", truth: "Reference", raw: "Raw mosaic", noise: "Noise only", "luminance error": "Error of luminance",
   "colour error": "Error of colour, CIEDE2000", flip: "Error as seen, FLIP", snr: "SNR map",
 };
 const SCALES = {
-  truth: "noise-free, in the scene's light", raw: "white: full well",
+  truth: "in the scene's light, without the sensor's noise", raw: "white: full well",
   noise: "grey: none; black and white: 4 standard deviations", "luminance error": "grey: none; white: +25 % of white",
   "colour error": "dark: 0; yellow: 10 and more", flip: "dark: 0; yellow: 1", snr: "dark: 0 dB; yellow: 40 dB and more",
 };
@@ -30,53 +31,98 @@ const SETTINGS = {
   sigma_d: ["σ of distance", 0.3, 30, "log", "px"], sigma_s: ["σ of similarity", 0.1, 3000, "log", "noise"],
 };
 const CHANNELS = { R: "var(--red)", G: "var(--green)", B: "var(--blue)", W: "var(--ink)", C: "var(--blue)", M: "var(--red)", Y: "var(--green)" };
-const STEPS = 1000;
+// What each control is; shown where the pointer rests on its name.
+const TERMS = {
+  scene: "What is photographed. Another one is rendered first; the cameras stay as they are.",
+  level: "Mean luminance of the scene, lamps that are seen themselves left out.",
+  "level name": "Usual levels of light.",
+  reference_light: "Light under which colours of a file or of a scene's own lamps are judged; white in it is white.",
+  exposure: "How the exposure time is chosen. auto: the 99th percentile of green at 80 % of the well. auto:W: the same of W. auto:information: where the raw image tells most of the scene. time: as stated.",
+  exposure_s: "The time, or the longest that the rule may choose.",
+  frames: "Exposures that are merged into one: noise falls with the root of their number, the time rises with it.",
+  seed: "Of the chip's fixed patterns and of the noise: the same seed makes the same bits.",
+  f_number: "Focal length over the diameter of the aperture: light falls with its square.",
+  defocus_um: "Diameter of the disc on the sensor that a point out of focus becomes.",
+  diffraction: "Width of a point's image over that of an ideal round aperture; 0: without diffraction.",
+  veiling_glare: "Share of the light that scatters evenly over the picture (about ISO 9358's index).",
+  sensor: "Pixel, lens and converter to begin with. A .toml file, with the .csv files that it names, can be dropped on the page.",
+  mosaic: "Colour filters in front of the pixels; W is none.",
+  bits: "Of the analogue-to-digital converter: 2 to that power are its steps.",
+  shot_noise: "Light and dark current come as Poisson counts. No camera is without.",
+  read_noise_e: "Standard deviation of what reading a dark pixel adds, anew at every exposure.",
+  dsnu_e: "Dark signal non-uniformity: standard deviation over pixels of their fixed dark offset.",
+  prnu: "Photo-response non-uniformity: standard deviation over pixels of their relative sensitivity; 0.01 is 1 %.",
+  dark_current_e_per_s: "Electrons that every pixel collects without light.",
+  column_gain_spread: "Standard deviation over columns of their amplifiers' relative gain.",
+  column_offset_e: "Standard deviation over columns of their fixed dark offset.",
+  hot_pixel_share: "Share of pixels that leak.", hot_pixel_dark_current_e_per_s: "Dark current of the pixels that leak, beside the others'.",
+  crosstalk: "Share of a pixel's electrons that each of its four neighbours collects in its place.",
+  full_well_e: "Electrons at which a pixel is full.",
+  processor: "What makes the picture from the raw image. Slow ones begin when the sliders rest.",
+  white_balance: "as-shot: by the scene's light, which the camera is told. gray-world: the mean of the picture is taken for grey.",
+  neighbourhood: "Width of the window whose samples are averaged (Ω).", patch: "Width of the patches that are compared; 1: pixels.",
+  sigma_d: "Standard deviation of the weight by distance.", sigma_s: "Standard deviation of the weight by similarity, in units of the noise.",
+};
+const HELP = [
+  ["Drag a slider", "The picture follows; its caption states its own settings, the small figure how long it took."],
+  ["Views", "Two stand beside one another, under a wipe, or in one place: of camera A or B, or the reference, the render itself."],
+  ["Keys", "F flips between the two, E takes another exposure, arrow keys on a picture move the pixel that is measured."],
+  ["Sensor", "Drop a sensor's .toml on the page, together with the .csv files that it names. rodcone new preset low_noise -o my.toml writes one."],
+  ["Copy Python", "The program that makes this picture or figure again, to the bit."],
+  ["Further", "rodcone explore --help; docs/explore.md says what each picture is."],
+];
+const STEPS = 1000, STALE_MS = 400;
 
 function render({ model, el }) {
-  let number = 0, latest = 0, hello, state, edited = "a", cursor = null, stale, pictureSize = [1, 1];
+  let number = 0, changes = 0, hello, state, edited = "a", cursor = null, stale, shown, pictureSize = [1, 1];
   const page = Math.random().toString(36).slice(2); // a notebook sends every view of a widget all its messages
-  const waits = new Map(); // number -> what to do with the answer
+  const underWay = {}, waiting = {}; // by kind: the request that has no answer yet, and the one to send after it
+  let sent = {}; // the last request for pictures: its number, how many changes went before, its sides, when
   const held = []; // the last picture of each view: one that stays as it is comes without bytes
   const root = make("div", { class: "explore" });
   el.append(root);
 
   // Messages
-  const ask = (message, then) => {
-    Object.assign(message, { number: ++number, page });
-    if (then) waits.set(number, then);
-    model.send(message);
-    return number;
-  };
+  // `make` gives the message when it is sent, of the values of that moment.
+  function ask(kind, make, then) {
+    if (underWay.scene) return; // all is asked anew once it is there
+    if (underWay[kind]) { waiting[kind] = [make, then]; return; }
+    underWay[kind] = { number: ++number, then };
+    model.send({ kind, number, page, ...make(number) });
+  }
   model.on("msg:custom", (header, buffers) => {
     if ("page" in header && (header.page === page) === (header.kind === "taken over")) return;
-    if (header.kind === "hello") begin(header);
-    else if (header.kind === "show") {
-      buffers.forEach((bytes, index) => { if (bytes.byteLength) held[index] = bytes; });
-      if (header.number === latest) paint(header);
-    }
-    else if (header.kind === "error") fail(header);
-    else if (header.kind === "taken over") status("Another page has taken over; open this one again to take it back.", true);
-    else if (header.kind === "ended") status("The program has ended; nothing here is computed any more.", true);
-    else waits.get(header.number)?.(header, buffers);
-    waits.delete(header.number);
+    if (header.kind === "taken over") return status("Another page has taken over; open this one again to take it back.", true);
+    if (header.kind === "ended") return status("The program has ended; nothing here is computed any more.", true);
+    const kinds = header.number === null ? Object.keys(underWay) : [header.of ?? header.kind]; // null: of no request that it could read
+    if (header.kind === "error") fail(header, kinds);
+    else if (header.kind === "scene") begin(header, state);
+    else if (header.kind === "show") receive(header, buffers); // unasked too: a finer render's, a slow processor's
+    else if (underWay[header.kind]?.number === header.number) underWay[header.kind].then?.(header, buffers);
+    kinds.filter(kind => header.number === null || underWay[kind]?.number === header.number).forEach(kind => {
+      delete underWay[kind];
+      const next = waiting[kind];
+      delete waiting[kind];
+      if (next) ask(kind, ...next);
+    });
   });
-  ask({ kind: "hello" });
+  ask("hello", () => ({}), header => begin(header));
 
   // What is asked
   const controls = side => side === "b" ? { ...state.a, ...state.b } : state.a;
   const sides = () => [...new Set(state.views.map(([side]) => side))];
   function change() {
-    const used = sides();
-    latest = ask({
-      kind: "show", cameras: used.map(controls), views: state.views.map(([side, view]) => [used.indexOf(side), view]),
+    root.dataset.asked = ++changes;
+    ask("show", number => {
+      sent = { number, changes, sides: sides(), at: performance.now() };
+      clearTimeout(stale);
+      stale = setTimeout(() => root.classList.add("waiting"), STALE_MS);
+      return { cameras: sent.sides.map(controls), views: state.views.map(([side, view]) => [sent.sides.indexOf(side), view]) };
     });
-    root.dataset.asked = latest;
-    clearTimeout(stale);
-    stale = setTimeout(() => root.classList.add("waiting"), 150);
   }
-  function fail({ number: of, message }) {
+  function fail({ message }, kinds) {
     status(message, true);
-    if (of === latest) { clearTimeout(stale); root.classList.add("waiting"); root.dataset.failed = of; }
+    if (kinds.includes("show")) { clearTimeout(stale); root.classList.add("waiting"); root.dataset.failed = sent.changes; }
   }
   function status(text, bad = false) {
     parts.status.textContent = text;
@@ -84,10 +130,15 @@ function render({ model, el }) {
   }
 
   // What is shown
+  function receive(header, buffers) {
+    buffers.forEach((bytes, index) => { if (bytes.byteLength) held[index] = bytes; });
+    if (header.number === sent.number || header.number >= shown?.number) paint(header);
+  }
   function paint(header) {
-    const [height, width] = pictureSize = header.size;
+    const [height, width] = pictureSize = header.size, newest = header.number === sent.number;
+    shown = { ...header, sides: newest ? sent.sides : shown.sides };
     header.views.forEach(([camera, view], index) => {
-      parts.captions[index].textContent = caption(header, camera, view, sides()[camera]);
+      parts.captions[index].textContent = caption(header, camera, view, shown.sides[camera]);
       const canvas = parts.canvases[index], bytes = held[index];
       if (canvas.shows === bytes) return;
       canvas.shows = bytes;
@@ -102,62 +153,84 @@ function render({ model, el }) {
     });
     clearTimeout(stale);
     root.classList.remove("waiting");
-    root.dataset.painted = header.number;
+    if (newest) root.dataset.painted = sent.changes;
     root.dataset.last = header.last;
-    const slow = header.cameras.map(each => each.waiting_for).filter(Boolean);
+    if (newest && underWay.show) parts.latency.textContent = `${Math.round(performance.now() - sent.at)} ms`;
+    const slow = header.cameras.filter(each => each.waiting_for).map(({ waiting_for, controls }) => waiting_for === controls.processor
+      ? `${waiting_for} with these settings is at work; the picture is of its default ones. `
+      : `${waiting_for} is at work; the picture is ${controls.processor}'s. `);
     parts.cancel.hidden = !slow.length;
     const few = header.last ? "" : `Preview, ${width} × ${height} pixels at ${format(header.spp)} samples; a finer one is being rendered. `;
-    status(few + (slow.length ? `${slow.join(", ")} is at work; the picture is ${header.cameras.map(each => each.controls.processor).join(", ")}'s. ` : "")
+    status(few + slow.join("")
       + header.notes.join(" "));
     root.dispatchEvent(new CustomEvent("painted", { detail: header, bubbles: true }));
     // after the frame: what they take is not taken from the picture's
-    requestAnimationFrame(() => setTimeout(() => { if (header.number === latest) refreshFigures(); }));
+    requestAnimationFrame(() => setTimeout(() => { if (root.dataset.painted === root.dataset.asked) refreshFigures(); }));
   }
   function caption(header, camera, view, side) {
     const told = header.cameras[camera].controls, facts = header.facts[camera];
-    const name = view === "truth" ? TITLES[view] : `${side.toUpperCase()}: ${TITLES[view]}`;
+    const name = view === "truth" ? `${TITLES[view]}, ${header.spp ? `${format(header.spp)} samples, render noise ${(100 * header.render_error).toPrecision(2)} %` : "from the file"}` : `${side.toUpperCase()}: ${TITLES[view]}`;
     if (view !== "picture") return `${name}: ${SCALES[view]}`;
     const snr = facts.snr_db === null ? "" : `, green's SNR ${facts.snr_db.toFixed(1)} dB`;
     return `${name}: ${told.processor}, ${seconds(facts.exposure_s)}, ${(100 * facts.saturated).toPrecision(2)} % full${snr}`;
   }
 
   // Figures follow the picture: asked once it is painted, dim until theirs is there
+  const shownCamera = index => [shown.cameras[shown.views[index][0]].controls];
   function refreshFigures() {
-    const [side] = state.views[0], of = latest;
+    let of;
     parts.figures.classList.add("waiting");
-    ask({ kind: "histogram", cameras: [controls(side)] }, ({ histogram }) => {
-      if (of !== latest) return;
+    ask("histogram", () => { of = root.dataset.painted; return { cameras: shownCamera(0) }; }, ({ histogram, python, noise_note }) => {
+      figures.histogram = python;
+      parts.noise.textContent = noise_note;
+      parts.noise.hidden = !noise_note;
       drawHistogram(parts.histogram, histogram);
-      parts.figures.classList.remove("waiting");
+      parts.figures.classList.toggle("waiting", of !== root.dataset.asked);
       root.dataset.figures = of;
     });
-    if (cursor) askPixel();
+    if (cursor && cursor.row < pictureSize[0] && cursor.column < pictureSize[1]) askPixel();
   }
   function askPixel() {
-    const of = latest, { side, row, column } = cursor;
-    if (row >= pictureSize[0] || column >= pictureSize[1]) return;
-    ask({ kind: "pixel", cameras: [controls(side)], row, column }, ({ pixel }) => { if (of === latest) drawPixel(parts.budget, parts.spectrum, pixel); });
+    ask("pixel", () => ({ cameras: shownCamera(cursor.index), row: cursor.row, column: cursor.column }), ({ pixel, python }) => {
+      figures.pixel = python;
+      drawPixel(parts.budget, parts.spectrum, pixel);
+    });
   }
   function point(index, row, column) {
     const [height, width] = pictureSize;
-    cursor = { side: state.views[index][0], row: clamp(row, 0, height - 1), column: clamp(column, 0, width - 1) };
-    askPixel();
+    cursor = { index, row: clamp(row, 0, height - 1), column: clamp(column, 0, width - 1) };
+    if (shown) askPixel();
   }
 
   // The page
-  const parts = { canvases: [], captions: [], selects: [] };
-  function begin(header) {
+  const parts = { canvases: [], captions: [], selects: [] }, figures = {}; // figures: the Python of each
+  function begin(header, before) {
     hello = header;
-    state = { a: header.controls, b: { ...pick(header.controls, CAMERA), mosaic: "bayer", processor: "bayer", settings: {} },
-      views: [["a", "picture"], ["a", "truth"]] };
+    const own = structuredClone(header.controls);
+    state = { a: own, b: { ...pick(own, CAMERA), mosaic: "bayer", processor: "bayer", settings: {} },
+      views: [["a", "picture"], ["a", "truth"]], ...before };
+    if (before) state.a = { ...own, ...pick(before.a, [...CAMERA, "level_cd_m2"]) };
+    [underWay, waiting].forEach(kinds => Object.keys(kinds).forEach(kind => delete kinds[kind]));
+    shown = undefined;
+    cursor = null;
     parts.status = make("p", { class: "status", role: "status" });
+    parts.noise = make("p", { class: "status bad noise", hidden: "" });
+    parts.latency = make("small", { class: "latency", title: "From the last change that was sent to its picture" });
     parts.cancel = make("button", { type: "button", hidden: "" }, "Cancel");
-    parts.cancel.onclick = () => { ask({ kind: "cancel" }); parts.cancel.hidden = true; status("Cancelled: the picture is the quick processor's."); };
+    parts.cancel.onclick = () => { ask("cancel", () => ({})); parts.cancel.hidden = true; status("Cancelled: the picture is the quick processor's."); };
     parts.controls = make("form", { class: "controls", "aria-label": "Controls" });
     parts.controls.onsubmit = event => event.preventDefault();
     parts.stage = make("section", { class: "stage", "aria-label": "Pictures" });
     root.replaceChildren(
-      make("header", {}, make("h1", {}, header.title), make("div", { class: "said" }, parts.status, parts.cancel)),
+      make("header", {}, make("h1", {}, "rodcone explore"),
+        header.scenes.length ? choice("Scene", header.scenes.map(each => [each, each]), header.title, name => {
+          root.classList.add("waiting");
+          status(`${name} is being opened.`);
+          ask("scene", () => ({ name }));
+        }, "scene") : make("span", {}, header.title),
+        make("div", { class: "said" }, parts.status, parts.cancel), parts.latency,
+        button("Reset", () => begin(hello)), button("Help", () => showDialog("rodcone explore", make("dl", {}, ...HELP.flatMap(([term, text]) => [make("dt", {}, term), make("dd", {}, text)]))))),
+      parts.noise,
       make("div", { class: "bench" }, parts.controls, parts.stage));
     buildStage();
     buildControls();
@@ -185,7 +258,7 @@ function render({ model, el }) {
       parts.canvases[index] = canvas;
       parts.captions[index] = make("figcaption", {});
       const buttons = make("div", { class: "buttons" },
-        button("Copy Python", () => python(index, state.views[index][1])), button("PNG", () => save({ kind: "png", cameras: [controls(state.views[index][0])], view: state.views[index][1] }, "image/png")));
+        button("Copy Python", () => showPython(shown?.python[index])), button("PNG", () => canvas.toBlob(blob => download("explored.png", blob))));
       return make("figure", {}, canvas, parts.captions[index], buttons);
     });
     parts.pictures = make("div", { class: "pictures side" }, ...figures);
@@ -200,8 +273,8 @@ function render({ model, el }) {
     parts.budget = make("div", { class: "budget" }, "Point at a pixel.");
     parts.spectrum = drawing("Spectrum of the pixel, and its electrons by channel");
     parts.figures = make("div", { class: "figures" },
-      panel("Histogram", parts.histogram, button("Copy Python", () => python(0, "histogram"))),
-      panel("Light budget of the pixel", parts.budget, button("Copy Python", () => cursor && python(cursor.side, `pixel ${cursor.row} ${cursor.column}`))),
+      panel("Histogram", parts.histogram, button("Copy Python", () => showPython(figures.histogram))),
+      panel("Light budget of the pixel", parts.budget, button("Copy Python", () => showPython(figures.pixel))),
       panel("Its spectrum through the filters", parts.spectrum));
     parts.stage.append(make("div", { class: "bar" }, ...parts.selects, layout, parts.wipeRow), parts.pictures, parts.figures);
     root.addEventListener("keydown", event => {
@@ -225,6 +298,14 @@ function render({ model, el }) {
     }, `${name}.${key}`, sliders[key][1] === 0));
     const mosaics = [...new Set(processors.flatMap(([, each]) => each.mosaics))];
     const rule = camera.exposure === "time";
+    const nameOfLevel = () => Object.entries(hello.levels).find(([, value]) => value === round(state.a.level_cd_m2))?.[0] ?? "";
+    const levelName = choice("By name", [["", "–"], ...Object.entries(hello.levels).map(([name, value]) => [name, `${name}, ${format(value)} cd/m²`])], nameOfLevel(), name => {
+      if (name) state.a.level_cd_m2 = hello.levels[name];
+      buildControls();
+      change();
+    }, "level name");
+    const sensorFile = make("input", { type: "file", accept: ".toml,.csv", multiple: "", hidden: "", "aria-label": "A sensor's .toml file, with the .csv files that it names" });
+    sensorFile.onchange = () => takeSensor(sensorFile.files);
     const group = (name, ...children) => {
       const details = make("details", { "data-name": name }, make("summary", {}, name), ...children);
       details.open = parts.controls.children.length ? open.has(name) : true;
@@ -232,7 +313,12 @@ function render({ model, el }) {
     };
     parts.controls.replaceChildren(...[
       group("Light",
-        slider(["Level", 1e-4, 1e5, "log", "cd/m²"], state.a.level_cd_m2, value => { state.a.level_cd_m2 = value; change(); }, "level"),
+        slider(["Level", 1e-4, 1e5, "log", "cd/m²"], state.a.level_cd_m2, value => {
+          state.a.level_cd_m2 = value;
+          levelName.querySelector("select").value = nameOfLevel();
+          change();
+        }, "level"),
+        levelName,
         ...Object.entries(hello.groups).flatMap(([name, coloured]) => lamp(name, coloured)),
         Object.values(hello.groups)[0] && choice("Judged under", hello.illuminants.map(each => [each, each]), state.a.reference_light,
           value => { state.a.reference_light = value; change(); }, "reference_light")),
@@ -250,8 +336,12 @@ function render({ model, el }) {
         make("div", { class: "row" }, button("Another exposure (E)", another), make("small", {}, `number ${camera.exposure_number}`))),
       group("Lens", ...terms("lens", LENS, preset.lens)),
       group("Sensor",
-        choice("Preset", Object.keys(hello.sensors).map(each => [each, each]), camera.sensor,
-          value => { Object.assign(camera, { lens: {}, pixel: {}, bits: null }); set("sensor", value, true); }, "sensor"),
+        choice("Preset", [...Object.keys(hello.sensors).map(each => [each, each.split(/[\\/]/).pop()]), ["file", "from a file …"]], camera.sensor, value => {
+          if (value === "file") { buildControls(); return sensorFile.click(); }
+          Object.assign(camera, { lens: {}, pixel: {}, bits: null });
+          set("sensor", value, true);
+        }, "sensor"),
+        sensorFile,
         choice("Mosaic", mosaics.map(each => [each, each]), camera.mosaic, value => {
           if (!hello.processors[camera.processor].mosaics.includes(value)) {
             camera.processor = processors.find(([, each]) => each.mosaics.includes(value))[0];
@@ -266,6 +356,9 @@ function render({ model, el }) {
         choice("Processor", processors.map(([name, each]) => [name, each.slow ? `${name} (slow)` : name]), camera.processor, value => {
           const { mosaics } = hello.processors[value];
           if (!mosaics.includes(camera.mosaic)) camera.mosaic = mosaics[0];
+          if ((value === "interleaved_paper") !== (camera.processor === "interleaved_paper")) { // whose method is Gray World
+            camera.white_balance = value === "interleaved_paper" ? "gray-world" : hello.defaults.white_balance;
+          }
           camera.settings = {};
           set("processor", value, true);
         }, "processor"),
@@ -274,13 +367,27 @@ function render({ model, el }) {
         ...terms("settings", SETTINGS, hello.processors[camera.processor].settings)),
       group("Save",
         make("div", { class: "buttons" },
-          button("Raw as DNG", () => save({ kind: "dng", cameras: [controls(edited)] }, "image/x-adobe-dng")),
-          hello.saves.study && button("Study as TOML", () => ask({ kind: "study", cameras: [controls(edited)] }, ({ files }) => {
+          button("Raw as DNG", () => ask("dng", () => ({ cameras: [controls(edited)] }), ({ name }, [bytes]) => download(name, new Blob([bytes], { type: "image/x-adobe-dng" })))),
+          hello.saves.study && button("Study as TOML", () => ask("study", () => ({ cameras: [controls(edited)] }), ({ files }) => {
             Object.entries(files).forEach(([name, text]) => download(name, new Blob([text], { type: "text/plain" })));
           })))),
     ]);
     if (focused) parts.controls.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
   }
+  async function takeSensor(files) {
+    const text = Object.fromEntries(await Promise.all([...files].map(async file => [file.name, await file.text()])));
+    ask("sensor", () => ({ files: text }), ({ sensor, terms }) => {
+      hello.sensors[sensor] = terms;
+      Object.assign(target(), { sensor, lens: {}, pixel: {}, bits: null });
+      buildControls();
+      change();
+    });
+  }
+  root.ondragover = event => event.preventDefault();
+  root.ondrop = event => {
+    event.preventDefault();
+    if (event.dataTransfer.files.length) takeSensor(event.dataTransfer.files);
+  };
   function lamp(name, coloured) {
     const own = () => state.a.lamps[name] ??= { spectrum: "own", power: 1, table: [] };
     const now = state.a.lamps[name] ?? { spectrum: "own", power: 1, table: [] };
@@ -315,22 +422,21 @@ function render({ model, el }) {
   }
 
   // Saving
-  function python(side, view) {
-    const of = typeof side === "number" ? state.views[side][0] : side;
-    ask({ kind: "python", cameras: [controls(of)], view }, ({ text }) => {
-      root.dataset.python = text;
-      const area = make("textarea", { readonly: "", rows: "18", cols: "90", "aria-label": "Python" });
-      area.value = text;
-      const dialog = make("dialog", {}, make("h2", {}, "Python that makes it again, to the bit"), area,
-        make("form", { method: "dialog" }, make("button", {}, "Close")));
-      dialog.onclose = () => dialog.remove();
-      root.append(dialog);
-      dialog.showModal();
-      area.select();
-      navigator.clipboard?.writeText(text).then(() => status("Copied."), () => status("Copy it from the window: the browser doesn't let the page."));
-    });
+  function showPython(text) {
+    if (!text) return;
+    root.dataset.python = text;
+    const area = make("textarea", { readonly: "", rows: "18", cols: "90", "aria-label": "Python" });
+    area.value = text;
+    showDialog("Python that makes it again, to the bit", area);
+    area.select();
+    navigator.clipboard?.writeText(text).then(() => status("Copied."), () => status("Copy it from the window: the browser doesn't let the page."));
   }
-  const save = (message, type) => ask(message, ({ name }, [bytes]) => download(name, new Blob([bytes], { type })));
+  function showDialog(title, ...children) {
+    const dialog = make("dialog", {}, make("h2", {}, title), ...children, make("form", { method: "dialog" }, make("button", {}, "Close")));
+    dialog.onclose = () => dialog.remove();
+    root.append(dialog);
+    dialog.showModal();
+  }
   function download(name, blob) {
     const link = make("a", { href: URL.createObjectURL(blob), download: name });
     link.click();
@@ -355,13 +461,13 @@ function choice(title, options, value, act, key = title) {
   const select = make("select", { "data-key": key }, ...options.map(([name, text]) => make("option", { value: name }, text)));
   select.value = value;
   select.onchange = () => act(select.value);
-  return make("label", { class: "choice" }, make("span", {}, title), select);
+  return make("label", { class: "choice" }, term(title, key), select);
 }
 function checkbox(title, value, act, key) {
   const box = make("input", { type: "checkbox", "data-key": key });
   box.checked = value;
   box.oninput = () => act(box.checked);
-  return make("label", { class: "check" }, box, title);
+  return make("label", { class: "check" }, box, term(title, key));
 }
 // Rows of wavelength and value of a CSV, under a line of names or none; or the number of the first line that is no such row.
 function tableOf(text) {
@@ -376,7 +482,12 @@ function tableOf(text) {
 function numberBox(title, value, act, key) {
   const box = make("input", { type: "number", min: "0", step: "1", value, "data-key": key });
   box.oninput = () => box.checkValidity() && box.value !== "" && act(Number(box.value));
-  return make("label", { class: "choice" }, make("span", {}, title), box);
+  return make("label", { class: "choice" }, term(title, key), box);
+}
+// The name of a control, with its definition where there is one.
+function term(title, key) {
+  const text = TERMS[key.split(".").pop()];
+  return make("span", text ? { class: "term", title: text } : {}, title);
 }
 // A range beside a number box; both say the same value, the box to the digit.
 function slider([title, from, to, way, unit], value, act, key, off = false) {
@@ -401,7 +512,7 @@ function slider([title, from, to, way, unit], value, act, key, off = false) {
     act(Number(box.value));
   };
   const zero = off && button("off", () => { box.value = 0; box.oninput(); });
-  return make("div", { class: "slider" }, make("span", {}, title), box, make("small", {}, unit), zero, range);
+  return make("div", { class: "slider" }, term(title, key), box, make("small", {}, unit), zero, range);
 }
 function drawing(title) {
   const element = document.createElementNS("http://www.w3.org/2000/svg", "svg");

@@ -3,7 +3,7 @@
 function fillChoices() {
   const values = data.axes[of.compared].values.map((name, value) => [value, name]);
   for (const id of ["a", "b"]) {
-    const options = id === "b" || lengths[of.compared] > 1 ? [...values, [TRUTH, "Truth"]] : values;
+    const options = id === "b" || lengths[of.compared] > 1 ? [...values, [TRUTH, "Reference"]] : values;
     byId(id).replaceChildren(...options.map(([value, name]) => make("option", { value }, name)));
     byId(id).value = of[id];
   }
@@ -43,9 +43,10 @@ function moveTo(axis, value) {
   fit();
 }
 byId("level").addEventListener("input", (event) => moveTo(LEVEL_AXIS, Number(event.target.value)));
-for (const select of all("[data-axis]")) {
-  select.addEventListener("input", () => moveTo(Number(select.dataset.axis), Number(select.value)));
+for (const input of all("[data-axis]")) {
+  input.addEventListener("input", () => moveTo(Number(input.dataset.axis), Number(input.value)));
 }
+for (const id of ["lead-metric", "beside-metric"]) byId(id)?.addEventListener("input", showComparison);
 for (const input of all("[name=view], [name=show]")) {
   input.addEventListener("change", () => {
     state[input.name] = input.value;
@@ -55,7 +56,10 @@ for (const input of all("[name=view], [name=show]")) {
   });
 }
 for (const input of all("[name=metric]")) input.addEventListener("change", showComparison);
-for (const id of ["column", "row"]) byId(id).addEventListener("input", () => (drawing = drawLoupe()));
+for (const [axis, id] of ["row", "column"].entries()) {
+  byId(id).addEventListener("input", () => (drawing = drawLoupe()));
+  byId(id).addEventListener("change", () => (byId(id).value = clamp(byId(id).value, 0, size()[axis] - 1)));
+}
 
 // Wipe, and A or B
 

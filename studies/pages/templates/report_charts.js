@@ -32,8 +32,7 @@ function drawTables(of, place) {
     const lines = data.metrics.map((metric) => {
       const cells = range(lengths[of.along]).map((step) => {
         const here = moved(at, of.along, step);
-        const [a, b] = [of.a, of.b].map((value) => cellAt(moved(here, of.compared, value)));
-        return verdictCell(metric, verdict(metric, a, b));
+        return verdictCell(metric, verdict(metric, of, here));
       });
       return make("tr", {}, metricHead(metric), ...cells);
     });
@@ -45,29 +44,50 @@ function drawTables(of, place) {
   });
 }
 
-// A against each other value of the axis, over all conditions: ahead, level, behind.
-function drawCounts(of) {
-  const places = placesBut(of.compared);
-  const others = range(lengths[of.compared]).filter((value) => value !== of.a);
-  const lines = data.metrics.map((metric) => {
-    const cells = others.map((other) => {
-      const found = places.map((place) => {
-        const [a, b] = [of.a, other].map((value) => cellAt(moved(place, of.compared, value)));
-        return verdict(metric, a, b).outcome;
-      });
-      const count = (outcome) => found.filter((one) => one === outcome).length;
-      const said = ["ahead", "level", "behind"].map((outcome) => `${count(outcome)} ${outcome}`);
-      const drawn = ["ahead", "level", "behind"].map((outcome) =>
-        make("span", { class: outcome }, `${MARKS[outcome]}${count(outcome)} `));
-      return make("td", { class: other === of.b ? "chosen" : "" },
-        make("span", { class: "sr" }, said.join(", ")), make("span", { "aria-hidden": "true" }, ...drawn));
-    });
-    return make("tr", {}, metricHead(metric), ...cells);
+// A's lead over each other value of the axis in one metric: places down, light across; means over scenes; counts.
+function drawBeside(of, metric) {
+  const { leads, means, counts } = data.comparisons[of.compared];
+  const levels = data.axes[LEVEL_AXIS].values;
+  const rows = range(lengths[of.compared]).filter((value) => value !== of.a).flatMap((other) => {
+    const line = (title, verdictOf) => make("tr", { class: other === of.b ? "chosen" : "" },
+      make("th", { scope: "row" }, [data.axes[of.compared].values[other], title].filter(Boolean).join(", ")),
+      ...levels.map((_, step) => verdictCell(metric, verdictOf(step))));
+    const lines = data.groups[of.compared].map((title, group) => line(title, (step) =>
+      verdictAt(leads, of.a, other, metric, withLevel(group, step, of.compared))));
+    const key = of.a < other ? `${of.a} ${other}` : `${other} ${of.a}`;
+    for (const mean of means[key]) lines.push(line(mean.title, (step) => verdictAt({ [key]: mean }, of.a, other, metric, step)));
+    const counted = pairOf(counts, of.a, other, metric);
+    const three = counted.sign > 0 ? counted.one : [...counted.one].reverse();
+    lines[0].append(make("td", { rowspan: lines.length, class: "n" }, three.join(" / ")));
+    return lines;
   });
-  const names = data.axes[of.compared].values;
-  const head = others.map((other) => make("th", { scope: "col" }, `beside ${names[other]}`));
-  return make("table", { class: "cells verdicts beside-all" },
-    make("thead", {}, make("tr", {}, make("th", { scope: "col" }, names[of.a]), ...head)), make("tbody", {}, ...lines));
+  const head = ["beside", ...levels, "ahead / level / behind"];
+  return make("table", { class: "cells verdicts" },
+    make("thead", {}, make("tr", {}, ...head.map((name) => make("th", { scope: "col" }, name)))), make("tbody", {}, ...rows));
+}
+
+// Index of a group at a light level, among the places but for the axis compared: the level lies before the last axis.
+function withLevel(group, step, compared) {
+  const last = compared === lengths.length - 1 ? 1 : lengths.at(-1);
+  return (Math.floor(group / last) * lengths[LEVEL_AXIS] + step) * last + (group % last);
+}
+
+// The lead of A over B along the axis, with its interval, and the band of what nobody sees.
+function drawLead(of, place, metric) {
+  const found = range(lengths[of.along]).map((step) => verdict(metric, of, moved(place, of.along, step)));
+  const ends = found.filter((one) => one.lead !== null).flatMap(({ lead, half }) => [lead - (half ?? 0), lead + (half ?? 0)]);
+  if (!ends.length) return "";
+  const bounds = [Math.min(...ends, -1.5 * metric.seen), Math.max(...ends, 1.5 * metric.seen)];
+  const { chart, xs, up } = frameOf(`Lead in ${metric.name}`, of, place, bounds);
+  const band = { class: "unseen", x: LEFT, width: RIGHT - LEFT, y: up(metric.seen), height: up(-metric.seen) - up(metric.seen) };
+  const words = (step) => `${data.axes[of.along].values[step]}: ${found[step].outcome}, ${leadText(metric, found[step])}`;
+  chart.prepend(make("rect", band));
+  chart.append(make("line", { class: "axis", x1: LEFT, x2: RIGHT, y1: up(0), y2: up(0) }),
+    make("text", { class: "tick", x: RIGHT, y: up(metric.seen) - 4, "text-anchor": "end" }, "A better"),
+    make("text", { class: "tick", x: RIGHT, y: up(-metric.seen) + 12, "text-anchor": "end" }, "B better"),
+    make("text", { class: "tick", x: LEFT + 4, y: up(-metric.seen) - 4 }, "grey: not seen"),
+    drawLine(0, xs, found.map((one) => (one.lead === null ? null : [one.lead, one.half])), words, up));
+  return chart;
 }
 
 // Round steps that enclose low to high, about four of them.
@@ -104,12 +124,12 @@ function positions(of, place) {
   return { xs: values.map(across), ticks, name: known ? "scene luminance, cd/m²" : data.axes[of.along].name };
 }
 
-function drawChart(metric, of, place, bounds) {
+// A chart without its lines: ticks of both axes, and where values lie.
+function frameOf(title, of, place, bounds) {
   const ticks = ticksOf(...bounds);
   const [low, high] = [ticks[0], ticks.at(-1)];
   const up = (value) => BOTTOM - ((value - low) / (high - low)) * (BOTTOM - TOP);
   const { xs, ticks: across, name } = positions(of, place);
-  const title = `${metric.name}${metric.unit ? `, ${metric.unit}` : ""}: ${data.axes[of.rows].values[place[of.rows]]}`;
   const chart = make("svg", { class: "chart", viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label":
     `${title}, over ${name}. The table of all numbers holds the figures.` });
   if (place[of.along] < xs.length) {
@@ -123,16 +143,23 @@ function drawChart(metric, of, place, bounds) {
     chart.append(make("text", { class: "tick", x, y: BOTTOM + 16, "text-anchor": "middle" }, text));
   }
   chart.append(make("text", { class: "tick", x: RIGHT, y: HEIGHT - 5, "text-anchor": "end" }, name));
+  return { chart, xs, up };
+}
+
+function drawChart(metric, of, place, bounds) {
+  const title = `${metric.name}${metric.unit ? `, ${metric.unit}` : ""}: ${data.axes[of.rows].values[place[of.rows]]}`;
+  const { chart, xs, up } = frameOf(title, of, place, bounds);
   for (const slot of range(lengths[of.compared]).reverse()) {
     const cells = xs.map((_, step) => cellAt(moved(moved(place, of.along, step), of.compared, slot)));
-    const found = cells.map((cell) => meanOf(data.cells[cell].values[metric.key]));
-    chart.append(drawLine(metric, slot, xs, found, cells, up));
+    const found = cells.map((cell) => figureOf(metric, cell));
+    const words = (step) => `${data.cells[cells[step]].alt}: ${figureText(metric, cells[step])}`;
+    chart.append(drawLine(slot, xs, found, words, up));
   }
   return chart;
 }
 
 // A line with its band, broken where a figure is unknown.
-function drawLine(metric, slot, xs, found, cells, up) {
+function drawLine(slot, xs, found, words, up) {
   const line = make("g", { class: `slot${slot % 4} turn${Math.floor(slot / 4)}` });
   let [path, upper, lower] = ["", [], []];
   const endBand = () => {
@@ -141,17 +168,16 @@ function drawLine(metric, slot, xs, found, cells, up) {
   };
   found.forEach((one, step) => {
     if (!one) return endBand();
-    path += `${found[step - 1] ? "L" : "M"}${xs[step]} ${up(one.mean)}`;
-    if (one.half === null) return;
-    upper.push(`${xs[step]} ${up(one.mean + one.half)}`);
-    lower.push(`${xs[step]} ${up(one.mean - one.half)}`);
+    path += `${found[step - 1] ? "L" : "M"}${xs[step]} ${up(one[0])}`;
+    if (one[1] === null) return;
+    upper.push(`${xs[step]} ${up(one[0] + one[1])}`);
+    lower.push(`${xs[step]} ${up(one[0] - one[1])}`);
   });
   endBand();
   line.append(make("path", { class: "line", d: path }));
   found.forEach((one, step) => {
     if (!one) return;
-    const words = `${data.cells[cells[step]].alt}: ${figureText(metric, cells[step])}`;
-    line.append(make("g", { class: "mark" }, make("title", {}, words), markOf(slot, xs[step], up(one.mean))));
+    line.append(make("g", { class: "mark" }, make("title", {}, words(step)), markOf(slot, xs[step], up(one[0]))));
   });
   return line;
 }
@@ -169,8 +195,8 @@ function drawCharts(of, place, chosen) {
     const ends = range(lengths[of.rows]).flatMap((row) => range(lengths[of.along]).flatMap((step) =>
       range(lengths[of.compared]).flatMap((value) => {
         const at = moved(moved(moved(place, of.rows, row), of.along, step), of.compared, value);
-        const found = meanOf(data.cells[cellAt(at)].values[metric.key]);
-        return found ? [found.mean - (found.half ?? 0), found.mean + (found.half ?? 0)] : [];
+        const found = figureOf(metric, cellAt(at));
+        return found ? [found[0] - (found[1] ?? 0), found[0] + (found[1] ?? 0)] : [];
       })));
     return [metric.key, ends.length ? [Math.min(...ends), Math.max(...ends)] : null];
   }));

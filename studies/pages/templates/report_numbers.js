@@ -1,35 +1,39 @@
 "use strict";
-// Where a cell lies, its mean and interval over seeds, and which of two pictures is better: the sums of
-// studies/pages/report_compare.py, for whatever the reader chooses.
+// What the page's data says of a cell and of any two: every figure, interval and verdict is the program's own.
 const data = JSON.parse(document.getElementById("data").textContent);
 const lengths = data.axes.map((axis) => axis.values.length);
-const LEVEL_AXIS = 4;
+const [BALANCE_AXIS, LEVEL_AXIS] = [4, 5];
 const MARKS = { ahead: "▲", level: "=", behind: "▼", unknown: "?" };
+const OUTCOMES = Object.fromEntries(Object.keys(MARKS).map((name) => [name[0], name]));
+const OPPOSITE = { ahead: "behind", behind: "ahead", level: "level", unknown: "unknown" };
 
-// Index of a cell from its place along each axis, in the order of data.axes; and such a place changed along one axis.
+// Index of a cell from its place along each axis, in the order of data.axes, and such a place changed along one axis;
+// index of a place among those of all axes but some.
 const cellAt = (place) => place.reduce((index, at, axis) => index * lengths[axis] + at, 0);
 const moved = (place, axis, at) => place.map((before, index) => (index === axis ? at : before));
+const indexBut = (place, ...left) =>
+  place.reduce((index, at, axis) => (left.includes(axis) ? index : index * lengths[axis] + at), 0);
 const range = (count) => [...Array(count).keys()];
 
-// Mean over seeds with half of its 95 % interval, by Student's t; one seed has no interval.
-function meanOf(values) {
-  if (!values?.length) return null;
-  const count = values.length;
-  const mean = values.reduce((sum, value) => sum + value, 0) / count;
-  if (count === 1) return { mean, half: null };
-  const variance = values.reduce((sum, value) => sum + (value - mean) ** 2, 0) / (count - 1);
-  return { mean, half: data.t * Math.sqrt(variance / count) };
+// Mean over seeds of a cell's figure, and half of its interval; null where it is unknown.
+const figureOf = (metric, cell) => data.cells[cell].figures[metric.key] ?? null;
+
+// What was found of value `a` beside value `b` of an axis: by `i j` with i < j, seen from `a`.
+function pairOf(found, a, b, metric) {
+  const one = found[a < b ? `${a} ${b}` : `${b} ${a}`]?.[metric.key];
+  return one && { one, sign: a < b ? 1 : -1 };
 }
 
-// How the first cell does beside the second: mean of each seed's difference, positive where the first is better.
-function verdict(metric, cell, other) {
-  const [first, second] = [cell, other].map((index) => data.cells[index].values[metric.key]);
-  if (!first || !second) return { outcome: "unknown", lead: null };
-  const lead = meanOf(first.map((value, seed) => (metric.higher ? 1 : -1) * (value - second[seed])));
-  const { mean, half } = lead;
-  if (half === null) return { outcome: "unknown", lead: mean };
-  return { outcome: mean - half > 0 ? "ahead" : mean + half < 0 ? "behind" : "level", lead: mean };
+// How value `a` does beside value `b` of the axis compared, at the index of a place but for that axis.
+function verdictAt(found, a, b, metric, index) {
+  const pair = pairOf(found, a, b, metric);
+  const lead = pair?.one[1][index] ?? null;
+  if (lead === null) return { outcome: "unknown", lead: null, half: null };
+  const outcome = OUTCOMES[pair.one[0][index]];
+  return { outcome: pair.sign > 0 ? outcome : OPPOSITE[outcome], lead: pair.sign * lead, half: pair.one[2][index] };
 }
+const verdict = (metric, of, place, b = of.b) =>
+  verdictAt(data.comparisons[of.compared].leads, of.a, b, metric, indexBut(place, of.compared));
 
 // A number with so many decimals; a zero has no sign, and with `plus` a larger one has its own.
 function fixed(value, digits, plus = false) {
@@ -48,21 +52,8 @@ function leadText(metric, { outcome, lead }) {
 }
 
 function figureText(metric, cell) {
-  const found = meanOf(data.cells[cell].values[metric.key]);
+  const found = figureOf(metric, cell);
   if (!found) return "—";
-  const half = found.half === null ? "" : ` ± ${fixed(found.half, metric.digits)}`;
-  return `${fixed(found.mean, metric.digits)}${half}${metric.unit ? ` ${metric.unit}` : ""}`;
-}
-
-// All places but for one axis: each with the first value of it.
-function placesBut(axis) {
-  return range(lengths.reduce((product, length) => product * length, 1) / lengths[axis]).map((index) => {
-    const place = [];
-    for (let at = lengths.length - 1; at >= 0; at -= 1) {
-      const length = at === axis ? 1 : lengths[at];
-      place[at] = index % length;
-      index = Math.floor(index / length);
-    }
-    return place;
-  });
+  const half = found[1] === null ? "" : ` ± ${fixed(found[1], metric.digits)}`;
+  return `${fixed(found[0], metric.digits)}${half}${metric.unit ? ` ${metric.unit}` : ""}`;
 }

@@ -10,7 +10,7 @@ const of = firstComparison; // which axes are compared, along and rows, and the 
 const state = { place: moved(lengths.map(() => 0), LEVEL_AXIS, firstLevel), view: "wipe", show: "picture", wipe: 50 };
 let drawing = Promise.resolve(); // the last drawing of the viewer, for who waits for it
 
-const valueName = (value) => (value === TRUTH ? "Truth" : data.axes[of.compared].values[value]);
+const valueName = (value) => (value === TRUTH ? data.references[state.place[0]] : data.axes[of.compared].values[value]);
 const sceneAndLight = (place) => place[0] * lengths[1] + place[1];
 const placeOf = (value) => (value === TRUTH ? state.place : moved(state.place, of.compared, value));
 const size = () => data.sizes[placeOf(of.a)[0]];
@@ -120,12 +120,13 @@ async function drawLoupe() {
   const part = { left: left / width, top: top / height, width: LOUPE[0] / width, height: LOUPE[1] / height };
   for (const [name, share] of Object.entries(part)) byId("frame").style[name] = `${100 * share}%`;
   const at = clamp(row, 0, height - 1) * width + clamp(column, 0, width - 1);
-  for (const [name, value] of [["A", of.a], ["B", of.b], ["T", TRUTH]]) {
+  const three = [["A", of.a], ["B", of.b], ["T", TRUTH]];
+  for (const [name] of three) { // all of them before the first error map is awaited
     const canvas = byId(`loupe-${name}`);
     [canvas.width, canvas.height] = LOUPE;
     if (canvas.source) canvas.getContext("2d").drawImage(canvas.source, left, top, ...LOUPE, 0, 0, ...LOUPE);
-    byId(`pixel-${name}`).textContent = await pixelText(value, at);
   }
+  for (const [name, value] of three) byId(`pixel-${name}`).textContent = await pixelText(value, at);
 }
 
 async function pixelText(value, at) {
@@ -141,12 +142,13 @@ const FACTS = { exposure: "Exposure", saturated: "Saturated", mc_share: "Render'
 
 function drawNumbers() {
   const cells = [of.a, of.b].map((value) => (value === TRUTH ? null : cellAt(placeOf(value))));
-  const lines = data.metrics.filter((metric) => cells.some((cell) => cell !== null && data.cells[cell].values[metric.key]))
+  const lines = data.metrics.filter((metric) => cells.some((cell) => cell !== null && figureOf(metric, cell)))
     .map((metric) => make("tr", {}, metricHead(metric),
       ...cells.map((cell) => make("td", { class: "n" }, cell === null ? "—" : figureText({ ...metric, unit: "" }, cell))),
-      verdictCell(metric, cells.includes(null) ? { outcome: "unknown", lead: null } : verdict(metric, ...cells))));
-  const facts = Object.entries(FACTS).map(([key, name]) => make("tr", { class: "fact" }, make("th", { scope: "row" }, name),
-    ...cells.map((cell) => make("td", { class: "n" }, cell === null ? "—" : data.cells[cell][key])), make("td", {})));
+      verdictCell(metric, cells.includes(null) || of.a === of.b ? { outcome: "unknown", lead: null } : verdict(metric, of, state.place))));
+  const told = ([key]) => cells.some((cell) => cell !== null && data.cells[cell][key]);
+  const facts = Object.entries(FACTS).filter(told).map(([key, name]) => make("tr", { class: "fact" }, make("th", { scope: "row" }, name),
+    ...cells.map((cell) => make("td", { class: "n" }, cell === null ? "—" : data.cells[cell][key] || "—")), make("td", {})));
   byId("numbers").replaceChildren(...lines, ...facts);
 }
 
@@ -166,17 +168,21 @@ function show() {
   const level = data.levels[sceneAndLight(state.place)][state.place[LEVEL_AXIS]];
   byId("viewer").style.setProperty("--w", width);
   byId("viewer").style.setProperty("--h", height);
-  byId("level-name").textContent = level.name;
-  byId("level-light").textContent = [level.light, level.source].filter(Boolean).join(" · ");
+  const levels = of.compared === LEVEL_AXIS; // then A and B are two of them
+  byId("level-name").textContent = levels ? [of.a, of.b].map(valueName).join(" beside ") : level.name;
+  byId("level-light").textContent = levels ? "" : [level.light, level.source].filter(Boolean).join(" · ");
   byId("level").value = state.place[LEVEL_AXIS];
   byId("level").setAttribute("aria-valuetext", level.spoken);
-  for (const [name, value] of [["A", of.a], ["B", of.b]]) {
+  for (const [name, value] of [["A", of.a], ["B", of.b], ["T", TRUTH]]) {
     all(`[data-name="${name}"]`).forEach((place) => (place.textContent = valueName(value)));
   }
-  for (const select of all("[data-axis]")) {
-    select.value = state.place[select.dataset.axis];
-    select.closest("label").hidden = Number(select.dataset.axis) === of.compared;
+  for (const input of all("[data-axis]")) {
+    const at = state.place[input.dataset.axis];
+    if (input.type === "radio") input.checked = Number(input.value) === at;
+    else input.value = at;
+    input.closest("label").hidden = Number(input.dataset.axis) === of.compared;
   }
+  for (const fixed of all(".fixed")) fixed.hidden = !all("label", fixed).some((label) => !label.hidden);
   byId("level").closest(".slider").hidden = lengths[LEVEL_AXIS] < 2 || of.compared === LEVEL_AXIS;
   byId("side").hidden = state.view !== "side";
   byId("pair").hidden = state.view === "side";
@@ -199,10 +205,27 @@ function show() {
 function showComparison() {
   const pair = of.b !== TRUTH && of.a !== of.b;
   byId("verdicts").replaceChildren(...(pair ? drawTables(of, state.place) : []));
-  byId("counts").replaceChildren(...(lengths[of.compared] > 2 ? [drawCounts(of)] : []));
+  const metricOf = (id) => data.metrics.find((metric) => metric.key === byId(id)?.value);
+  const rivals = of.a !== TRUTH && Object.keys(data.comparisons[of.compared].counts).length;
+  byId("beside")?.replaceChildren(...(rivals ? [drawBeside(of, metricOf("beside-metric"))] : []));
+  byId("lead-chart")?.replaceChildren(...(pair ? [drawLead(of, state.place, metricOf("lead-metric"))] : []));
+  showAnswer();
   const chosen = new Set(all("[name=metric]:checked").map((input) => input.value));
   byId("drawn").replaceChildren(...drawCharts(of, state.place, chosen));
   tellScrolls();
+}
+
+// The words of the headline for A and B in this place.
+function showAnswer() {
+  if (!byId("said")) return;
+  const group = indexBut(state.place, of.compared, LEVEL_AXIS);
+  const { answers, over } = data.comparisons[of.compared];
+  const answer = answers[`${of.a} ${of.b}`]?.[group];
+  byId("place").textContent = data.groups[of.compared][group] ?? "";
+  byId("said").textContent = answer?.said ?? data.alone;
+  byId("light").textContent = answer?.light ?? "";
+  byId("times").textContent = answer?.times ?? "";
+  byId("elsewhere").textContent = over[`${of.a} ${of.b}`] ?? "";
 }
 
 // Whole multiples keep pixels crisp; a picture wider than its place shrinks to fit.
@@ -217,7 +240,7 @@ function fit() {
   const whole = (factor * width) / ratio;
   const shown = beside < 512 || whole === 0 ? beside : whole;
   byId("viewer").style.setProperty("--shown", `${shown}px`);
-  byId("scale").textContent = `${width} × ${height} pixels; one of them takes ${fixed((shown * ratio) / width, shown === whole ? 0 : 1)} screen pixels across.`;
+  byId("scale").textContent = `${width} × ${height} pixels, shown × ${fixed((shown * ratio) / width, shown === whole ? 0 : 1)}`;
 }
 
 // Tables that are wider than their place say so.

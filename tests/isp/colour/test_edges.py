@@ -147,6 +147,7 @@ def test_a_lamp_smaller_than_2_x_2_has_no_colour_in_rims(width, grey):
 SHAPES = [(129, 9), (2, 2), (2, 7), (5, 2), (4, 3)]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("engine", ["kernel"], indirect=True)
 @pytest.mark.parametrize(("tile", "shape"), [*product([RGBW], SHAPES), (RGBW_4X4, (129, 9)), (RGBW_4X4, (4, 5))])
 def test_both_engines_agree(monkeypatch, tile, shape):

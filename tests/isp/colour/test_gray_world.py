@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isp.colour.gray_world import gray_world
+from isp.colour.white_balance import gray_world
 
 MEANS = np.array([3.0, 6.0, 2.0])
 ERRORS = np.array([0.1, 0.1, 0.1])

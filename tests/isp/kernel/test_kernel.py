@@ -71,6 +71,7 @@ def random_settings(rng, tile, patch):
     )
 
 
+@pytest.mark.sample(3)
 @needs_kernel
 @pytest.mark.parametrize("seed", range(24))
 def test_random_inputs_give_the_reference(seed):
@@ -115,6 +116,7 @@ def hard_frames():
 HARD_FRAMES = hard_frames()
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize("distance", ["noise", "raw"])
 @pytest.mark.parametrize("name", HARD_FRAMES)
 def test_hard_frames_give_finite_results_within_the_range_of_the_samples(name, distance):
@@ -155,6 +157,7 @@ def test_nothing_beyond_the_frame_is_averaged(patch, white, settings):
     )
 
 
+@pytest.mark.sample(2)
 @needs_kernel
 @pytest.mark.parametrize("shape", [(2, 2), (3, 9), (9, 3), (2, 30), (30, 2)])
 @pytest.mark.parametrize("tile", [("RW",), ("R", "W")])
@@ -164,6 +167,7 @@ def test_frames_may_be_smaller_than_a_patch_and_than_a_packet(shape, tile):
     assert np.abs(reconstruct(raw, settings) - reconstruct_reference(raw, settings)).max() < 1e-4 * FULL
 
 
+@pytest.mark.thorough
 @needs_kernel
 def test_a_pixel_without_a_similar_neighbour_keeps_its_sample_and_takes_the_nearest_of_the_others():
     raw = exposure(HARD_FRAMES["no similar neighbour"][0])
@@ -210,6 +214,7 @@ def test_reliability_takes_the_mean_of_the_patch_reflected_at_the_border():
     assert got[0, 0] == pytest.approx(reliability_of_mean(corner, 2.0))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("function", [reconstruct, reconstruct_reference])
 def test_in_the_dark_similarity_falls_back_to_the_distance_weight(function):
     rng = np.random.default_rng(3)

@@ -31,6 +31,7 @@ def frame(tile, shape=(85, 61)):
     return raw_image(dn, tile, white_dn=4100.0, read_noise_e=2.0, dsnu_e=0.0)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4])
 @pytest.mark.parametrize("sigma_s", [8.0, 0.5])  # the small one needs the running maximum in places
 def test_the_height_of_strips_changes_no_bit(tile, sigma_s, monkeypatch):

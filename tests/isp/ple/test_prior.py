@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import fields
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ def test_the_shipped_prior_is_for_the_projects_own_curves_and_says_where_it_is_f
     assert OWN.stat().st_size < 1_400_000
 
 
+@pytest.mark.thorough
 def test_covariances_are_symmetric_and_positive_in_the_patch_and_in_its_middle():
     for size in (8, 4):
         held = mixture(own_prior(), size).covariances
@@ -45,5 +47,45 @@ def test_a_prior_is_read_as_it_was_written_but_for_half_precision(tmp_path):
 def test_a_file_that_is_no_prior_is_refused_in_one_line(tmp_path, content):
     (tmp_path / "prior.npz").write_bytes(content)
     with pytest.raises(InputError, match=r"^prior: .*prior.npz.* can't be read: .*rodcone train") as error:
+        load_prior(tmp_path / "prior.npz")
+    assert "\n" not in str(error.value)
+
+
+def arrays(**changes):
+    with np.load(OWN) as file:
+        return {**file, **changes}
+
+
+HOSTILE = {  # each a few kB on disk
+    "zeros that take 256 MiB": lambda path: zeros_in_a_zip(path, 1 << 28),
+    "a shape of 4 EiB": lambda path: shape_alone(path, (1 << 30, 1 << 30)),
+    "pickles": lambda path: np.savez(path, **arrays(rest=np.array([{}, {}], dtype=object))),
+    "not a number": lambda path: np.savez(path, **arrays(rest=np.full_like(own_prior().rest, np.nan))),
+    "other shapes": lambda path: np.savez(path, **arrays(rest=np.ones(3))),
+    "a million Gaussians": lambda path: np.savez_compressed(path, **without_directions(1_000_000)),
+}
+
+
+def without_directions(components):
+    """Shapes that fit each other: covariances of a million Gaussians would take 262 GB."""
+    empty, ones = np.zeros((components, 0), np.float32), np.full(components, 1e-6, np.float32)
+    return arrays(basis=np.zeros((256, 0)), centres=empty, factors=empty, weights=ones, rest=ones)
+
+
+def zeros_in_a_zip(path, size):
+    with ZipFile(path, "w", ZIP_DEFLATED) as file, file.open("mean.npy", "w", force_zip64=True) as entry:
+        for _ in range(size >> 24):
+            entry.write(bytes(1 << 24))
+
+
+def shape_alone(path, shape):
+    with ZipFile(path, "w") as file, file.open("neutrals_e.npy", "w") as entry:
+        np.lib.format.write_array_header_1_0(entry, {"descr": "<f4", "fortran_order": False, "shape": shape})
+
+
+@pytest.mark.parametrize("write", HOSTILE.values(), ids=HOSTILE)
+def test_a_hostile_prior_is_refused_in_one_line(tmp_path, write):
+    write(tmp_path / "prior.npz")
+    with pytest.raises(InputError, match=r"^prior: .*prior.npz") as error:
         load_prior(tmp_path / "prior.npz")
     assert "\n" not in str(error.value)

@@ -33,6 +33,7 @@ def grey(level_e, tile, shape=(96, 96)):
     return np.broadcast_to(level_e, shape) * share
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("tile", TILES)
 @pytest.mark.parametrize("level_e", [0.01, 0.3, 10.0, 300.0, 10_000.0])
 def test_a_flat_field_keeps_its_mean(tile, level_e):
@@ -46,6 +47,7 @@ def test_a_flat_field_keeps_its_mean(tile, level_e):
             assert abs(plane.mean() - expected) < max(0.005 * expected, 4 * error), name
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4, QUAD_BAYER, QUAD_RGBW])
 @pytest.mark.parametrize("side", [1, 4])
 def test_a_lamp_in_the_dark_has_no_frame_around_it(tile, side):
@@ -68,6 +70,7 @@ def test_a_lamp_in_the_dark_has_no_frame_around_it(tile, side):
     assert np.abs(mean.mean(axis=0)).max() < 0.05
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("tile", [RGBW, RGBW_4X4, QUAD_RGBW])
 def test_a_full_sample_is_a_lower_bound(tile):
     # W fills along a ramp, in the middle of patches; above, the colours say how far
@@ -82,6 +85,7 @@ def test_a_full_sample_is_a_lower_bound(tile):
     assert above == pytest.approx(own_prior().neutral_e[3] * ramp[ramp > 4500], rel=0.1)
 
 
+@pytest.mark.thorough
 def test_threads_change_nothing(monkeypatch):
     raw = exposure(grey(np.linspace(1, 200, 128), RGBW, (96, 128)), RGBW, np.random.default_rng(7))
     monkeypatch.setattr(estimate, "STRIP", 500)
@@ -101,6 +105,7 @@ def test_any_size_of_frame_will_do(tile, shape):
     assert np.isfinite(planes).all()
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("tile", TILES)
 @pytest.mark.parametrize(("stride", "size"), [(1, PATCH), (2, mosaic.CELLS)])
 def test_a_patchs_own_light_is_the_frames_up_to_its_border_and_varies_as_stated(tile, stride, size):
@@ -123,6 +128,7 @@ def test_a_patchs_own_light_is_the_frames_up_to_its_border_and_varies_as_stated(
     assert np.var(means[1:], axis=0)[inside].mean() * 40 / 39 == pytest.approx(stated, rel=4.5 * np.sqrt(2 / draws))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("tile", [RGBW, BAYER])
 @pytest.mark.parametrize("times", [(2, 2), (2, 1), (1, 2)])
 def test_a_tile_written_twice_is_the_same_mosaic(tile, times):
@@ -133,6 +139,7 @@ def test_a_tile_written_twice_is_the_same_mosaic(tile, times):
         assert np.array_equal(once, again)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("shift", [(1, 0), (2, 3)])
 def test_a_4x4_mosaic_that_begins_elsewhere_gives_as_good_a_picture(shift):
     # the same samples, less the first rows and columns: patches and cells fall on other phases

@@ -40,6 +40,7 @@ def _with_1(y):
     return np.concatenate([y, np.ones((len(y), 1))], axis=1)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("tile", [RGBW, BAYER, *(MOSAICS[name] for name in ("rgbw_4x4", "quad_bayer", "quad_rgbw"))])
 @pytest.mark.parametrize("light_e", [0.5, 20.0, 2000.0])
 def test_over_signals_drawn_from_the_prior_the_error_is_0_in_the_mean_and_varies_as_the_closed_form(tile, light_e):

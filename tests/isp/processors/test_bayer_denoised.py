@@ -7,7 +7,7 @@ import pytest
 from builders import BAYER_PHASES, raw_image
 
 from isp.interleaved import reconstruct
-from isp.processors import bm3d
+from isp.processors import sub_images
 from isp.processors.bayer_denoised import NOISE_AFTER_DEMOSAICKING
 from isp.processors.catalogue import PROCESSORS
 from sensor.cfa import BAYER, Tile, mask
@@ -46,7 +46,7 @@ def test_demosaicked_first_the_denoiser_sees_opponent_planes_and_what_their_nois
         return planes
 
     library = SimpleNamespace(bm3d=nothing, BM3DProfile=SimpleNamespace)
-    monkeypatch.setattr(bm3d, "optional_library", lambda name, extra: library)
+    monkeypatch.setattr(sub_images, "optional_library", lambda name, extra: library)
     image = exposure(expected_e(cfa, (34, 38), 1000.0), cfa)
     picture = PROCESSORS["bayer_residual_bm3d"].develop(image, np.eye(3), balance=[0.5, 1.0, 0.4])
     for index, gain in enumerate((2.0, 1.0, 2.5)):

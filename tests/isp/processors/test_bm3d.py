@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from builders import RGBW_4X4, raw_image
 
-from isp.processors.bm3d import bm3d
 from isp.processors.catalogue import PROCESSORS
+from isp.processors.sub_images import bm3d
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels, mask
 from sensor.raw import RawImage

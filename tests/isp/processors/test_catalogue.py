@@ -67,6 +67,7 @@ def require_library(name: str) -> None:
         pytest.importorskip(library, reason=f"rodcone[{extra}] is not installed")
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("shape", [(30, 33), (17, 16)])
 @pytest.mark.parametrize("name", QUICK)
 def test_a_flat_grey_field_stays_flat_and_grey_to_the_border_in_every_phase(name: str, shape: tuple[int, int]) -> None:
@@ -77,6 +78,7 @@ def test_a_flat_grey_field_stays_flat_and_grey_to_the_border_in_every_phase(name
         assert picture.balance == dict.fromkeys(channels(tile), "gray world")
 
 
+@pytest.mark.sample(11)
 @pytest.mark.parametrize("name", QUICK)
 def test_a_grey_ramp_into_saturation_takes_no_colour(name: str) -> None:
     # Colours clip one after the other: G at its full well, R and B (balanced) at twice and 2.5 times it. What doesn't
@@ -92,6 +94,7 @@ def test_a_grey_ramp_into_saturation_takes_no_colour(name: str) -> None:
     assert bright == pytest.approx(np.full(bright.shape, bright[0, 0, 0]), rel=1e-5)
 
 
+@pytest.mark.sample(17)
 @pytest.mark.parametrize("name", QUICK)
 def test_bright_ends_at_greens_full_well_or_where_w_alone_is_the_luminance_at_w_s(name: str) -> None:
     require_library(name)
@@ -131,6 +134,7 @@ def test_a_given_balance_takes_the_place_of_gray_world(name: str) -> None:
     assert level.rgb == pytest.approx(np.full((20, 20, 3), expected), rel=1e-5, abs=MISSES_E.get(name, 0.0))
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize("name", QUICK)
 def test_listed_defects_are_mended_before_any_processor_sees_them(name: str) -> None:
     require_library(name)

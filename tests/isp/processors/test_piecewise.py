@@ -36,6 +36,7 @@ def test_a_flat_grey_field_stays_flat_and_grey_in_every_phase(name, tile):
     assert rgb == pytest.approx(np.full(rgb.shape, 1000.0), rel=1e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", INDEX)
 def test_highlights_stay_grey_and_end_at_greens_full_well(name):
     tile = RGBW_PHASES[0] if name == "ple_rgbw" else BAYER_PHASES[0]
@@ -70,6 +71,7 @@ def test_own_curves_are_not_warned_of():
     assert set(picture.balance) == set(channels(raw.cfa))
 
 
+@pytest.mark.sample(7)
 @pytest.mark.parametrize(("tile", "at"), LARGE)
 def test_a_flat_grey_field_stays_flat_and_grey_wherever_a_4x4_tile_begins(tile, at):
     turned = tuple("".join(row) for row in np.roll([list(row) for row in tile], (-at[0], -at[1]), (0, 1)))
@@ -77,6 +79,7 @@ def test_a_flat_grey_field_stays_flat_and_grey_wherever_a_4x4_tile_begins(tile, 
     assert rgb == pytest.approx(np.full(rgb.shape, 1000.0), rel=1.5e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["rgbw_4x4", "quad_bayer", "quad_rgbw"])
 def test_highlights_of_4x4_tiles_stay_grey_and_end_at_greens_full_well(name):
     tile = MOSAICS[name]
@@ -88,6 +91,7 @@ def test_highlights_of_4x4_tiles_stay_grey_and_end_at_greens_full_well(name):
     assert rgb[:, -20:] == pytest.approx(np.full((24, 20, 3), FULL_E), rel=2e-3)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("name", "tile"), PHASES)
 def test_on_a_2x2_tile_any_mosaics_processor_is_that_mosaics_own(name, tile):
     raw = grey(tile, np.geomspace(1, 5000, 30) * np.ones((25, 1)))

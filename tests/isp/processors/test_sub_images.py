@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders import BAYER_PHASES, RGBW_PHASES, raw_image
 
-from isp.processors import bm3d
+from isp.processors import sub_images
 from isp.processors.sub_images import Mix, bm3d_mosaic, hadamard, principal_components
 from sensor.cfa import Tile, mask
 from sensor.raw import RawImage
@@ -36,7 +36,7 @@ def test_a_denoiser_that_does_nothing_gives_the_mosaic_back(
         return planes
 
     library = SimpleNamespace(bm3d=nothing, BM3DProfile=SimpleNamespace)
-    monkeypatch.setattr(bm3d, "optional_library", lambda name, extra: library)
+    monkeypatch.setattr(sub_images, "optional_library", lambda name, extra: library)
     image = raw(cfa, shape)
     root = 2 * np.sqrt(image.electrons + 0.375 + image.dark_noise_e**2)
     correction = 0.25 + np.sqrt(1.5) / 4 / root - 1.375 / root**2 + 0.625 * np.sqrt(1.5) / root**3

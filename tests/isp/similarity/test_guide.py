@@ -74,6 +74,7 @@ def test_a_single_plane_of_independent_pixels_has_twice_the_patch_area():
     assert np.count_nonzero(table - 50.0) == 1  # D of n pairs of unit variance is 2n, whatever the overlap
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4])
 @pytest.mark.parametrize("patch", [1, 5])
 def test_noise_distance_is_the_mean_over_random_mosaics(tile, patch):

@@ -43,6 +43,7 @@ def few_spectra(bands, rank, seed=1):
     return smooth.astype(np.float32), rng.uniform(0.05, 0.9, (bands, *SIZE)).astype(np.float32)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     ("bands", "rank", "calls"), [(20, 6, 2), (20, 2, 2), (6, 6, 2), (4, 4, 2), (3, 3, 1), (1, 1, 1)]
 )
@@ -54,6 +55,7 @@ def test_light_of_few_spectra_comes_back_from_a_denoiser_that_does_nothing(bands
     assert all(picture.shape == (*SIZE, 3) for picture, _ in idle)
 
 
+@pytest.mark.thorough
 def test_what_the_denoiser_gets_knows_no_texture_and_no_unit(idle) -> None:
     """Light over albedo, whatever the texture and the power; the guide is the normal, and grey."""
     _, albedo = few_spectra(20, 1)
@@ -128,6 +130,7 @@ def test_first_surfaces_of_a_flat_wall() -> None:
     assert np.ptp(normal, axis=(1, 2)) == pytest.approx(np.zeros(3), abs=1e-5)
 
 
+@pytest.mark.thorough
 @only_dense
 def test_first_surfaces_are_seen_through_glass_and_by_mirrors() -> None:
     """Bands beyond 40 come in parts; the still life's glass ball shows what is behind it, never a black hole."""

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from render import engine
-from render.denoised.measured_error import measured_error
-from render.denoised.relight import relight_denoised
+from render.denoised.relight import measured_error, relight_denoised
 from render.engine import render
 from rodcone.errors import InputError
 from rodcone.jit import backend
@@ -31,16 +30,25 @@ def made(box):
 
 
 def planes(transport):
-    return {name: x for name, x in vars(transport.denoised).items() if name != "fold_points"}
+    of = transport.denoised
+    halves = {"indirect": of.indirect, "folds": of.folds}
+    return {"radiance": of.radiance} | {
+        f"{name} {k}": x for name, both in halves.items() for k, x in vars(both).items()
+    }
 
 
+@pytest.mark.thorough
 def test_the_unbiased_light_keeps_its_bits(box, made) -> None:
     plain = render(box, SIZE, spp=32, **ASKED)
     assert plain.denoised is None
-    for name in ("radiance", "half_difference", "variance", "coverage", "relative_mc_error", "spp"):
+    for one, other in ((plain.light, made.light), (plain.coverage, made.coverage)):
+        assert np.array_equal(one.mean, other.mean)
+        assert np.array_equal(one.difference, other.difference)
+    for name in ("variance", "relative_mc_error", "spp"):
         assert np.array_equal(getattr(plain, name), getattr(made, name))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("first", "spp"), [(16, 32), (96, 192)], ids=["uniform", "after a pilot"])
 def test_stopped_and_resumed_or_cached_gives_the_bits_of_one_go(first, spp, box, tmp_path) -> None:
     made = render(box, SIZE, spp=spp, denoise=True, **ASKED)
@@ -58,25 +66,24 @@ def test_stopped_and_resumed_or_cached_gives_the_bits_of_one_go(first, spp, box,
 
 
 def test_only_indirect_light_is_changed(made) -> None:
-    direct = np.maximum(made.radiance - made.denoised.indirect, 0)
+    direct = np.maximum(made.radiance - made.denoised.indirect.mean, 0)
     smooth = made.denoised.radiance - direct
     assert smooth.min() >= -1e-6
     # A denoiser keeps the light but for some hundredths: it takes single bright samples for noise.
-    assert smooth.mean() == pytest.approx(made.denoised.indirect.mean(), rel=0.05)
+    assert smooth.mean() == pytest.approx(made.denoised.indirect.mean.mean(), rel=0.05)
 
 
 def test_a_single_scattering_has_nothing_to_denoise(box) -> None:
     direct = render(box, SIZE, spp=8, denoise=True, max_depth=2, **ASKED)
     assert np.array_equal(direct.denoised.radiance, direct.radiance)
-    assert not direct.denoised.indirect.any()
+    assert not direct.denoised.indirect.mean.any()
 
 
 def test_folds_are_independent_of_the_render_and_of_each_other(made) -> None:
     """Correlations of the errors of single pixels, 1024 x 8 bands which share paths: under 5 of 1/sqrt(1024)."""
-    folds = made.denoised
-    error = made.half_difference[0]
-    apart = [folds.fold_mean[0] + sign * folds.fold_difference[0] - made.denoised.radiance[0] for sign in (1, -1)]
-    for one, other in ((error, apart[0]), (error, apart[1]), (error, folds.fold_difference[0])):
+    folds, error = made.denoised.folds[0], made.light.difference[0]
+    apart = [folds.mean + sign * folds.difference - made.denoised.radiance[0] for sign in (1, -1)]
+    for one, other in ((error, apart[0]), (error, apart[1]), (error, folds.difference)):
         for band in range(BANDS_NM.size):
             a, b = (np.clip(x[band] / np.sqrt(made.radiance[0, band]), -0.2, 0.2).ravel() for x in (one, other))
             assert abs(np.corrcoef(a, b)[0, 1]) < 5 / 32
@@ -90,6 +97,7 @@ def test_levels_are_those_of_the_unbiased_light(made) -> None:
     assert 0 < own[0].relative_mc_error < 1
 
 
+@pytest.mark.thorough
 def test_relighting_is_a_sum_of_groups() -> None:
     made = render(load("still_life_outdoor"), SIZE, spp=8, denoise=True, **ASKED)
     whole = relight_denoised(made)
@@ -100,6 +108,7 @@ def test_relighting_is_a_sum_of_groups() -> None:
         )
 
 
+@pytest.mark.thorough
 def test_the_told_error_is_the_true_one(box) -> None:
     """Told less true mean squared error of luminance, 16 renders: within 4 of its standard errors (6e-5).
 

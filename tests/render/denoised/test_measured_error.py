@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from render.denoised.measured_error import measured_error
+from render.denoised.relight import measured_error
 
 # Student's 95 % quantile with 15 degrees of freedom (Fisher and Yates, table III).
 STUDENT_15 = 1.753

@@ -1,6 +1,7 @@
 """A constant environment along another light's paths: the same light as by itself, and an error that knows of both."""
 
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ pytestmark = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA he
 
 BANDS_NM, WIDTH_NM, SIZE, BLOCK = np.array([430.0, 500.0, 570.0, 640.0]), 30.0, (32, 40), 8
 FALSE_ALARM = 1e-5
-ARRAYS = ("radiance", "variance", "half_difference", "irradiance")
+ARRAYS = ("radiance", "variance", "light.difference", "irradiance")
 
 
 def courtyard():
@@ -69,6 +70,7 @@ def blocks(planes):
     return planes.reshape(*planes.shape[:-2], h, BLOCK, w, BLOCK).mean(axis=(-3, -1), dtype=np.float64)
 
 
+@pytest.mark.thorough
 def test_the_sky_along_another_lights_paths_is_the_sky_by_itself(both):
     alone = made(sky_by_itself(courtyard()), spp=256, seed=8)
     variance = blocks(both.variance[0]) + blocks(alone.variance[0])
@@ -88,6 +90,7 @@ def test_only_the_sky_shares_paths_and_it_is_told_with_which(both):
     assert made(sky_by_itself(courtyard()), spp=8).shared is None
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_stated_variance_of_both_lights_is_the_scatter_of_renders(several, sign):
     """Where errors rise together, and where one falls as the other rises; half of the renders tell where that is."""
@@ -127,7 +130,7 @@ def test_a_render_gone_on_from_and_a_cached_one_keep_the_correlation(tmp_path):
     noisy = (whole.variance > 1e-6 * whole.radiance**2).all(axis=0)
     assert np.count_nonzero(noisy) > 1000
     assert on.shared.correlation[noisy] == pytest.approx(whole.shared.correlation[noisy], abs=1e-3)
-    assert all(np.array_equal(getattr(on, name), getattr(again, name)) for name in ARRAYS)
+    assert all(np.array_equal(attrgetter(name)(on), attrgetter(name)(again)) for name in ARRAYS)
     assert again.shared.groups == on.shared.groups
     assert np.array_equal(again.shared.correlation, on.shared.correlation)
     assert again.relative_mc_error == on.relative_mc_error

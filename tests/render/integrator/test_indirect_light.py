@@ -55,15 +55,16 @@ def mirrored() -> Scene:
     return Scene("mirrored", geometry, {"lamp": LightGroup(emitters=("lamp/emitter",), spectrum=flat(1.0))})
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("make", [two_lights, lambda: load("cornell_box")], ids=["two_lights", "cornell_box"])
 def test_without_mirrors_direct_light_is_what_paths_of_two_segments_bring(make) -> None:
     whole, direct = drawn(make(), 8), drawn(make(), 2)
     assert whole.indirect is not None
-    assert whole.indirect.mean() > 0.02 * whole.radiance.mean()
-    scale = direct.radiance.max()
-    assert np.allclose(whole.radiance - whole.indirect, direct.radiance, rtol=1e-5, atol=1e-5 * scale)
+    assert whole.indirect.mean.mean() > 0.02 * whole.light.mean.mean()
+    scale = direct.light.mean.max()
+    assert np.allclose(whole.light.mean - whole.indirect.mean, direct.light.mean, rtol=1e-5, atol=1e-5 * scale)
     assert direct.indirect is not None
-    assert not direct.indirect.any()
+    assert not direct.indirect.mean.any()
 
 
 def test_light_is_direct_in_a_mirror_and_indirect_from_one() -> None:
@@ -75,15 +76,18 @@ def test_light_is_direct_in_a_mirror_and_indirect_from_one() -> None:
     whole, direct = drawn(scene, 3), drawn(scene, 2)
     assert whole.indirect is not None
     mirror, ground = np.s_[0, :, :11], np.s_[0, :, 12:]
-    assert (whole.radiance > direct.radiance)[mirror].mean() > 0.1  # beside the lamp in it, the floor
-    assert not whole.indirect[mirror].any()
-    assert whole.indirect[ground].mean() > 0.01 * direct.radiance[ground].mean()
-    assert np.allclose((whole.radiance - whole.indirect)[ground], direct.radiance[ground], rtol=1e-5, atol=1e-6)
+    assert (whole.light.mean > direct.light.mean)[mirror].mean() > 0.1  # beside the lamp in it, the floor
+    assert not whole.indirect.mean[mirror].any()
+    assert whole.indirect.mean[ground].mean() > 0.01 * direct.light.mean[ground].mean()
+    assert np.allclose(
+        (whole.light.mean - whole.indirect.mean)[ground], direct.light.mean[ground], rtol=1e-5, atol=1e-6
+    )
 
 
 def test_raw_light_keeps_its_bits() -> None:
     scene = two_lights()
     apart, plain = drawn(scene, 8), drawn(scene, 8, apart=False)
     assert plain.indirect is None
-    for name in ("radiance", "difference", "coverage"):
-        assert np.array_equal(getattr(apart, name), getattr(plain, name))
+    for one, other in ((apart.light, plain.light), (apart.coverage, plain.coverage)):
+        assert np.array_equal(one.mean, other.mean)
+        assert np.array_equal(one.difference, other.difference)

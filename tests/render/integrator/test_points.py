@@ -34,6 +34,7 @@ def test_the_sequence_is_sobol_s() -> None:
     assert np.array_equal(sequence(), published())
 
 
+@pytest.mark.sample(2)
 @only_jit
 @pytest.mark.parametrize("power", [0, 1, 3, 4, 7])
 def test_a_pixel_has_one_point_in_each_of_as_many_intervals(power: int) -> None:

@@ -238,6 +238,7 @@ def stock(path: Path) -> np.ndarray:
     return np.stack([picture.mean(axis=(0, 1)) for picture in made]) / WIDTH_NM
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("lamps", LAMPS)
 @pytest.mark.parametrize("paint", PAINTS)
 def test_each_kind_of_reflectance_renders_as_in_stock_mitsuba(paint: str, lamps: str, tmp_path: Path) -> None:
@@ -245,12 +246,14 @@ def test_each_kind_of_reflectance_renders_as_in_stock_mitsuba(paint: str, lamps:
     compare(write_scene(tmp_path, PAINTS[paint], lights), rows=lamps == "one spectrum" and paint in IN_ROWS)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("surface", SURFACES)
 def test_each_kind_of_surface_renders_as_in_stock_mitsuba(surface: str, tmp_path: Path) -> None:
     lights = "".join(lamp(index, 3) for index in range(2))
     compare(write_scene(tmp_path, SURFACES[surface], lights), rows=False)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("scene", SCENES)
 def test_each_kind_of_camera_and_slide_renders_as_in_stock_mitsuba(scene: str, tmp_path: Path) -> None:
     camera, lights = SCENES[scene]

@@ -62,6 +62,7 @@ def test_saved_scene_struct_is_read(tmp_path: Path) -> None:
     assert read.values == pytest.approx(PHOTONS * JOULE, rel=2e-7)  # rounded twice
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("names", [("dmin", "dmax"), ("min", "max")])
 @pytest.mark.parametrize("dtype", [np.uint16, np.uint32])
 def test_photons_of_old_files_are_stretched_from_integers(tmp_path: Path, dtype: Any, names: tuple[str, str]) -> None:
@@ -111,6 +112,7 @@ def in_form(form: str, photons: np.ndarray, tmp_path: Path) -> Path:
     return save(tmp_path, photons=photons, wave=NM)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("form", ["basis", "struct", "photons"])
 @pytest.mark.parametrize(("count", "share"), [(1, "0.108"), (9, "0.968")])  # of 5 x 6 x 31 = 930 samples
 def test_a_few_photons_below_zero_become_zero_and_are_told_in_every_form(
@@ -140,6 +142,7 @@ def test_uneven_wavelengths_are_told(tmp_path: Path) -> None:
     assert read.wavelength_nm.tolist() == [400, 412.5, 430]  # bands meet at 405 and 420 nm
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("variables", "told"),
     [

@@ -111,6 +111,7 @@ def test_a_reader_that_ends_or_hangs_is_an_error_here(
         read_numbers(path, ["x"])
 
 
+@pytest.mark.thorough
 def test_bytes_that_swell_to_more_than_their_file_may_hold_are_refused(tmp_path: Path) -> None:
     """10 kB hold 10 MB of zeros, each of them a double: 80 MB, where 64 MiB are allowed; 40 MB do no harm."""
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

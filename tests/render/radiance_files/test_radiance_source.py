@@ -61,7 +61,7 @@ def test_radiance_whose_square_is_over_float32_has_a_finite_error() -> None:
 
 def test_ending_tells_the_reader(tmp_path: Path) -> None:
     radiance = SpectralRadiance(VALUES, NM, width_nm=WIDTHS)
-    write_exr(tmp_path / "a.EXR", radiance)
+    write_exr(radiance, tmp_path / "a.EXR")
     assert np.array_equal(load_radiance(tmp_path / "a.EXR").values, VALUES)
     scipy.io.savemat(tmp_path / "a.mat", {"photons": np.ones((2, 3, 2)), "wave": [500.0, 510.0]})
     assert load_radiance(str(tmp_path / "a.mat")).shape == (2, 3)

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 from render.engine import render
-from render.loader import mitsuba_module
+from render.loader import as_guest, mitsuba_module
 from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_parts import LONGEST_CHAIN
 from render.user_scene.scene_paths import MOST_NESTED
@@ -276,7 +276,31 @@ def test_what_the_engine_brings_itself_is_left_out_and_told(tmp_path: Path) -> N
         *("perspective", "directional")
     }
     told = " ".join(opened.notes)
-    assert all(word in told for word in ("'volpath'", "1 of 2 cameras", "crop"))
+    assert all(word in told for word in ("'volpath'", "paths of any length", "1 of 2 cameras", "crop"))
+
+
+PATH_OF_3 = '<integrator type="path"><integer name="max_depth" value="3"/></integrator>'
+
+
+@pytest.mark.parametrize(
+    ("integrator", "depth"),
+    [
+        ("", 8),
+        ('<integrator type="path"/>', 65536),
+        ('<integrator type="path"><integer name="max_depth" value="-1"/></integrator>', 65536),
+        ('<integrator type="path"><integer name="max_depth" value="17"/></integrator>', 17),
+        ('<integrator type="direct"/>', 2),
+        (f'<integrator type="aov">{PATH_OF_3}</integrator>', 3),
+    ],
+    ids=["none", "path", "infinite", "stated", "direct", "inside another"],
+)
+def test_paths_are_as_long_as_the_file_states(integrator: str, depth: int, tmp_path: Path) -> None:
+    assert load_scene_file(write(tmp_path, integrator, CAMERA, SUN)).scene.max_depth == depth
+
+
+def test_a_scene_without_a_shape_is_refused_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="it has no shape, so nothing is lit; add one"):
+        render(load_scene_file(write(tmp_path, CAMERA, SUN)).scene, (4, 4), spp=4)
 
 
 def test_a_cameras_film_and_sampler_may_stand_beside_it(tmp_path: Path) -> None:
@@ -435,10 +459,6 @@ REFUSED = {
         [CAMERA, SUN, '<shape type="disk"><string name="type" value="evil"/></shape>'],
         ["property name 'type'"],
     ),
-    "negative spectrum": (
-        [CAMERA, SUN, '<bsdf type="diffuse"><spectrum name="reflectance" value="400:-1,500:1"/></bsdf>'],
-        [">= 0"],
-    ),
     "film of no pixels": ([CAMERA.replace('value="8"', 'value="0"'), SUN], ["film width", "give pixels"]),
 }
 
@@ -449,6 +469,31 @@ def test_what_cannot_be_rendered_is_refused_with_place_and_fix(
 ) -> None:
     told = refusal(write(tmp_path, *parts))
     assert [word for word in words if word not in told] == []
+
+
+NUMBERS = {  # by the name in the message, and how it is written; of the second kind -1 is a number like any other
+    "radius": '<shape type="sphere"><float name="radius" value="{}"/></shape>',
+    "alpha": '<bsdf type="roughplastic"><float name="alpha" value="{}"/></bsdf>',
+    "intensity": '<emitter type="point"><rgb name="intensity" value="1,{},1"/></emitter>',
+    "irradiance": '<emitter type="directional"><spectrum name="irradiance" value="400:1,700:{}"/></emitter>',
+    "reflectance": '<bsdf type="diffuse"><spectrum name="reflectance" value="{}"/></bsdf>',
+    "values": '<texture type="irregular"><string name="wavelengths" value="400,700"/>'
+    '<string name="values" value="0.1, {}"/></texture>',
+}
+SIGNED = {
+    "center": '<shape type="sphere"><point name="center" x="0" y="{}" z="0"/></shape>',
+    "to_world": '<shape type="sphere"><transform name="to_world"><translate x="{}"/></transform></shape>',
+    "scale": '<bsdf type="bumpmap"><float name="scale" value="{}"/><texture type="checkerboard"/></bsdf>',
+}
+
+
+@pytest.mark.parametrize(("name", "part"), [*NUMBERS.items(), *SIGNED.items()])
+def test_numbers_that_are_none_or_below_0_are_refused_by_name(name: str, part: str, tmp_path: Path) -> None:
+    wrong = ("nan", "inf") if name in SIGNED else ("nan", "inf", "-1")
+    for number in wrong:
+        told = refusal(write(tmp_path, CAMERA, SUN, part.format(number)))
+        assert f": {name}: {number} is not allowed; allowed: finite numbers" in told
+    load_scene_file(write(tmp_path, CAMERA, SUN, part.format("-1" if name in SIGNED else "0.5")))
 
 
 def test_missing_and_malformed_files_are_named_with_the_line(tmp_path: Path) -> None:
@@ -536,14 +581,15 @@ def test_a_stock_name_never_loads_a_file_beside_the_scene(tmp_path: Path, monkey
     # Mitsuba looks for plugins/NAME.so on its search path, in which the working directory comes first.
     monkeypatch.chdir(tmp_path)
     (tmp_path / "plugins").mkdir()
-    for name in ("diffuse", "sphere", "hair"):
+    for name in ("diffuse", "sphere", "principledthin"):
         (tmp_path / "plugins" / f"{name}.so").write_text("hostile")
     mi = mitsuba_module()
     mi.file_resolver().prepend(str(tmp_path))  # as where Mitsuba was imported in this folder
-    opened = load_scene_file(write(tmp_path, CAMERA, SUN, '<shape type="sphere"><bsdf type="hair"/></shape>'))
-    stock = Path(mi.__file__).parent
-    assert Path(str(mi.file_resolver().resolve("plugins/hair.so"))) == stock / "plugins" / "hair.so"
-    mi.load_dict(opened.scene.description)
+    opened = load_scene_file(write(tmp_path, CAMERA, SUN, '<shape type="sphere"><bsdf type="principledthin"/></shape>'))
+    assert render(opened.scene, (4, 4), spp=4).radiance.any()
+    with as_guest():
+        found = Path(str(mi.file_resolver().resolve("plugins/principledthin.so")))
+    assert found == Path(mi.__file__).parent / "plugins" / "principledthin.so"
 
 
 @pytest.mark.usefixtures("nothing_is_loaded")

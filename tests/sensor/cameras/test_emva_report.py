@@ -83,6 +83,7 @@ def test_what_a_report_does_not_tell_is_left_out(tmp_path):
     assert "# full_well_e =   # not told: needed" in text
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("saturation", "prnu"), [(2000.0, 0.0), (10_000.0, 0.0), (10_000.0, 0.01)])
 def test_the_clip_is_where_the_variance_of_clipped_pixels_is_greatest_at_the_saturation(saturation, prnu):
     clip = clip_over_saturation(saturation, 5.0, prnu)

@@ -121,6 +121,11 @@ def test_a_folder_that_is_no_copy_and_one_that_holds_cameras_are_refused(tmp_pat
         convert(tmp_path / "made", tmp_path / "other")
     with pytest.raises(InputError, match="exists; allowed"):
         convert(tmp_path / "copy", library.parent)
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "LICENSE").write_text("mine")
+    with pytest.raises(InputError, match="LICENSE' exists; allowed"):
+        convert(tmp_path / "copy", tmp_path / "thesis")
+    assert [path.read_text() for path in (tmp_path / "thesis").iterdir()] == ["mine"]
 
 
 @pytest.mark.parametrize(

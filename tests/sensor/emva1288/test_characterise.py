@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from rodcone.errors import InputError
+from sensor.binning import binned
 from sensor.cfa import MOSAICS
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
 from sensor.emva1288.characterise import ExposurePlan, characterise, configured, measure, plan_for
 from sensor.emva1288.photon_transfer import bench
@@ -190,7 +192,7 @@ def _read_by_engine(light_e, sensor, device, exposure_s, rng):
 @pytest.mark.parametrize("binning", ["charge", "digital"])
 def test_every_term_of_a_chip_that_bins_is_found_where_four_pixels_put_it(binning):
     pixel = replace(PIXEL, hot_pixel_share=0.002)  # as few as real: then a sum holds hardly ever two
-    quad = replace(SENSOR, pixel=pixel, cfa=MOSAICS["quad_bayer"], binning=binning, bits=12)
+    quad = binned(replace(SENSOR, pixel=pixel, cfa=MOSAICS["quad_bayer"], bits=12), binning)
     found = characterise(quad, (160, 320), seed=1)
     # ten comparisons within 4.5 standard errors: false-alarm rate 7e-5
     assert {figure.name: off(figure) for figure in found.figures if figure.error and abs(off(figure)) > 4.5} == {}

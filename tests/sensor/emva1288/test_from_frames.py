@@ -35,6 +35,7 @@ def measure(sensor, frames, *, bright=4):
     return figures_of_frames(flats, frames(0.0, 4), sensor.cfa, sensor.white_dn)
 
 
+@pytest.mark.thorough
 def test_the_intervals_hold_what_was_configured_in_95_of_100_runs_give_or_take_3():
     """A binomial of 200 runs at 0.95 has a standard deviation of 1.5 %: outside 92-98 % with probability 5 %."""
     sensor = chip()
@@ -112,6 +113,7 @@ def test_frames_that_are_not_flat_or_not_frames_of_a_bench_are_refused_in_one_li
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.thorough
 def test_even_frames_are_not_refused():
     """Noise alone is, once in a thousand frames: once in 25 runs of this test, were its seeds not fixed."""
     sensor = chip()

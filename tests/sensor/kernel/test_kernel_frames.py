@@ -8,7 +8,8 @@ from scipy import stats
 
 from rodcone.jit import backend, dr
 from sensor.cfa import MOSAICS
-from sensor.config import LensConfig, PixelConfig, SensorConfig
+from sensor.chip import PixelConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device, draw_device
 from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import SpectralIrradiance

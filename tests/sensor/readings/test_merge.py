@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from render.illuminants import illuminant
 from rodcone.errors import InputError
 from sensor.burst import merged_raw
 from sensor.capture import expose
@@ -33,6 +34,7 @@ def levels_of(sensor):
     return np.array([*np.geomspace(0.1, 0.9 * at[-1], 17), *fine])
 
 
+@pytest.mark.thorough
 @EXACT
 @pytest.mark.parametrize("name", HDR)
 def test_the_merge_has_the_mean_of_the_light_and_the_noise_of_the_closed_form(name, exact):
@@ -59,7 +61,7 @@ def test_readings_covary_as_their_charges_and_photodiodes_say(name, draw, light)
     device = draw_device(sensor, SHAPE, chips)
     keys = {}
     samples = []
-    for number, reading in enumerate(sensor.readings):
+    for number, reading in enumerate(sensor.chip.readings):
         own = of_reading(sensor, number)
         key = keys.setdefault(reading.charge, int(rng.integers(2**63)))
         dn = draw(np.full(SHAPE, light * reading.share), own, device.readings[number], TIME_S, key, number)
@@ -130,7 +132,8 @@ def test_the_first_reading_alone_is_what_a_chip_with_one_reading_gives():
 
 
 def test_a_camera_that_switches_gives_one_gain_s_frame():
-    sensor = replace(preset("dual_gain"), readout="switched")
+    sensor = preset("dual_gain")
+    sensor = replace(sensor, chip=replace(sensor.chip, readout="switched"))
     device = draw_device(sensor, (32, 32), np.random.default_rng(1))
     for light, index in ((100.0, 0), (5000.0, 1)):
         own = of_reading(sensor, index)
@@ -161,12 +164,12 @@ def test_a_raw_file_holds_merged_samples_and_their_noise_bit_for_bit(name, endin
     device = draw_device(sensor, (32, 40), np.random.default_rng(1))
     light = np.geomspace(0.1, 2 * sensor.pixel.full_well_e, 32 * 40).reshape(32, 40)
     raw = expose(light, sensor, TIME_S, device, np.random.default_rng(2))
-    raw = replace(raw, colour=calibrate(sensor, "D65"))
+    raw = replace(raw, colour=calibrate(sensor, illuminant("D65")))
     back = read_raw(write_raw(raw, tmp_path / f"shot{ending}")[0])
     np.testing.assert_array_equal(back.dn, raw.dn)
     assert back.dn.dtype == np.float32
     assert back.noise_steps == raw.noise_steps
-    assert len(raw.noise_steps) == len(sensor.readings) - 1
+    assert len(raw.noise_steps) == len(sensor.chip.readings) - 1
     np.testing.assert_array_equal(back.saturated, raw.saturated)
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
-from sensor.config import pixel_of_readings
+from sensor.chip import Reading
+from sensor.config import with_readings
 from sensor.device import draw_device
 from sensor.presets import low_noise, preset
 from sensor.readings.merge import noise_of_merged
@@ -20,7 +21,6 @@ from sensor.readings.noise import (
     switched_to,
     whole_share,
 )
-from sensor.readings.reading import Reading
 from sensor.readout import electrons_at_snr, noise_sources, noise_variance
 from studies.photograph.snr import even_field, light_of, snr
 
@@ -36,7 +36,11 @@ REAL = {
 
 def sensor_of(*readings, **pixel):
     own = low_noise()
-    return replace(own, pixel=pixel_of_readings(replace(own.pixel, **pixel), readings), readings=readings)
+    return with_readings(replace(own, pixel=replace(own.pixel, **pixel)), readings)
+
+
+def switched(sensor):
+    return replace(sensor, chip=replace(sensor.chip, readout="switched"))
 
 
 def dual(high=2.0, low=6.0, **pixel):
@@ -52,7 +56,7 @@ def test_each_reading_s_own_variance_is_that_of_a_chip_that_is_read_once(name):
     sensor = replace(sensor, pixel=replace(sensor.pixel, **REAL))
     light = np.array([0.0, 0.3, 40.0, 5000.0])
     total = sum(covariances(light, sensor, 0.02).values())
-    for index, reading in enumerate(sensor.readings):
+    for index, reading in enumerate(sensor.chip.readings):
         alone = noise_variance(light * reading.share, of_reading(sensor, index), 0.02)
         np.testing.assert_allclose(total[:, index, index] * reading.share**2, alone, rtol=1e-12)
 
@@ -110,7 +114,7 @@ def test_at_a_seam_half_of_the_pixels_have_lost_the_reading():
 
 
 def test_a_camera_that_switches_takes_the_quietest_gain_that_holds_the_bright_end():
-    sensor = replace(preset("dual_gain"), readout="switched")
+    sensor = switched(preset("dual_gain"))
     high, low = (of_reading(sensor, index) for index in (0, 1))
     assert [switched_to(sensor, np.array([e])) for e in (10.0, 1746.0, 1747.0, 8e3, 1e5)] == [0, 0, 1, 1, 1]
     frame = np.array([[5.0, 1000.0], [20.0, 3000.0]])
@@ -125,7 +129,8 @@ def test_a_camera_that_switches_takes_the_quietest_gain_that_holds_the_bright_en
 @pytest.mark.parametrize("readout", ["merged", "switched"])
 @pytest.mark.parametrize("ratio", [1.0, 10.0, 40.0])
 def test_the_light_for_an_snr_gives_back_the_snr(ratio, readout):
-    sensor = replace(preset("dual_gain"), readout=readout)
+    sensor = preset("dual_gain")
+    sensor = replace(sensor, chip=replace(sensor.chip, readout=readout))
     electrons = electrons_at_snr(ratio, sensor, 0.01)
     assert float(snr(np.array([electrons]), sensor, 0.01)[0]) == pytest.approx(ratio, rel=1e-4)
     assert electrons_at_snr(1e4, sensor, 0.01) == np.inf
@@ -158,7 +163,7 @@ def test_a_sensor_for_a_burst_holds_the_variance_of_its_merged_frames(name):
 
 def test_a_switched_cameras_noise_is_of_the_gain_that_the_frame_is_read_at():
     own = preset("dual_gain")
-    sensor = replace(own, readout="switched", pixel=replace(own.pixel, crosstalk=0.2))
+    sensor = switched(replace(own, pixel=replace(own.pixel, crosstalk=0.2)))
     lamps = np.full((40, 40), 300.0)
     lamps[::6, ::6] = 3500.0
     read = of_reading(sensor, switched_to(sensor, lamps))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rodcone.errors import InputError
+from sensor.chip import Reading
 from sensor.config_file import read_sensor
 from sensor.exposure import exposure_of_electrons_s
 from sensor.presets import preset, preset_file
-from sensor.readings.reading import Reading
 
 PIXEL = "[pixel]\npitch_um = 2.2\nfill_factor = 0.9\nprnu = 0.01\n"
 LENS = "[lens]\nf_number = 2.8\n"
@@ -27,20 +27,20 @@ def read(folder, text):
 
 def test_a_file_s_readings_are_the_sensor_s_and_its_pixel_tells_their_ends(tmp_path):
     sensor = read(tmp_path, PIXEL + LARGE + SMALL + LENS)
-    assert sensor.readings == (Reading(2, 1, 2000, 0.9, 1.0, "large"), Reading(6, 3, 9000, 0.1, 1.0, "small"))
+    assert sensor.chip.readings == (Reading(2, 1, 2000, 0.9, 1.0, "large"), Reading(6, 3, 9000, 0.1, 1.0, "small"))
     assert sensor.pixel.full_well_e == 90_000
     assert sensor.pixel.read_noise_e == pytest.approx(2 / 0.9)
     assert sensor.metered_well_e == pytest.approx(2000 / 0.9)
     assert read(tmp_path, PIXEL + ONE + OTHER + LENS).metered_well_e == 9000
     assert preset("low_noise").metered_well_e == 15_000
-    assert preset("low_noise").readings == ()
+    assert preset("low_noise").chip.readings == ()
 
 
 def test_switching_and_merging_are_a_word_of_the_file(tmp_path):
-    assert read(tmp_path, PIXEL + ONE + OTHER + LENS).readout == "merged"
-    assert read(tmp_path, 'readout = "switched"\n' + PIXEL + ONE + OTHER + LENS).readout == "switched"
+    assert read(tmp_path, PIXEL + ONE + OTHER + LENS).chip.readout == "merged"
+    assert read(tmp_path, 'readout = "switched"\n' + PIXEL + ONE + OTHER + LENS).chip.readout == "switched"
     text = preset_file("dual_gain").read_text("utf-8")
-    assert read(tmp_path, text.replace('readout = "merged"', 'readout = "switched"')).readout == "switched"
+    assert read(tmp_path, text.replace('readout = "merged"', 'readout = "switched"')).chip.readout == "switched"
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_switching_and_merging_are_a_word_of_the_file(tmp_path):
         (PIXEL + ONE * 9 + LENS, ("readings: 9 is outside 2 to 8",)),
         (PIXEL + LENS + "[readings]\nread_noise_e = 2\n", ("readings:", "no list of tables", "[[readings]]")),
         ("readings = []\n" + PIXEL + LENS, ("readings: []",)),
-        ("readings = [1, 2]\n" + PIXEL + LENS, ("readings: 1 is not a table",)),
+        ("readings = [1, 2]\n" + PIXEL + LENS, ("readings: [1, 2] is no list of tables",)),
         (PIXEL + "read_noise_e = 2\n" + ONE + OTHER + LENS, ("pixel: read_noise_e beside [[readings]]",)),
         (PIXEL + ONE.replace("dsnu_e = 1\n", "") + OTHER + LENS, ("readings: dsnu_e is missing",)),
         (PIXEL + ONE + OTHER + "gain = 4\n" + LENS, ("readings key: 'gain' is unknown",)),
@@ -59,7 +59,7 @@ def test_switching_and_merging_are_a_word_of_the_file(tmp_path):
         (PIXEL + ONE.replace("= 2000", "= 0") + OTHER + LENS, ("full_well_e: 0",)),
         (PIXEL + ONE.replace("= 2000", '= "2000"') + OTHER + LENS, ("full_well_e: '2000'",)),
         (PIXEL + ONE.replace("= 2000", "= true") + OTHER + LENS, ("full_well_e: True",)),
-        (PIXEL + ONE + OTHER + "photodiode = 3\n" + LENS, ("photodiode: 3 is not a name",)),
+        (PIXEL + ONE + OTHER + "photodiode = 3\n" + LENS, ("photodiode: 3 is not a text in quotes",)),
         (PIXEL + ONE + OTHER + "time_share = 0\n" + LENS, ("time_share: 0",)),
         (PIXEL + (ONE + "time_share = 0.5\n") * 2 + LENS, ("time_share: [0.5, 0.5]", "divide by 0.5")),
         (PIXEL + ONE + OTHER + "light_share = 0.5\n" + LENS, ("light_share: [1.0, 0.5]", "name photodiodes apart")),
@@ -68,7 +68,7 @@ def test_switching_and_merging_are_a_word_of_the_file(tmp_path):
         ('readout = "switched"\n' + PIXEL + LARGE + SMALL + LENS, ("readout: 'switched' between shares",)),
         ('readout = "switched"\n' + PIXEL + "read_noise_e = 1\ndsnu_e = 1\nfull_well_e = 9\n" + LENS, ("without",)),
         ('binning = "charge"\ncfa = "quad_bayer"\n' + PIXEL + ONE + OTHER + LENS, ("binning: 'charge' with several",)),
-        ("readout = [1]\n" + PIXEL + ONE + OTHER + LENS, ("readout: [1] is unknown",)),
+        ("readout = [1]\n" + PIXEL + ONE + OTHER + LENS, ("readout: [1] is not a text in quotes",)),
     ],
 )
 def test_readings_that_no_pixel_has_are_refused_in_one_line(tmp_path, text, parts):

@@ -10,10 +10,11 @@ import pytest
 from sensor.presets import preset
 from studies.budget import plan as planning
 from studies.budget.check import BudgetCheck, check_plan
-from studies.budget.model_plan import Plan
+from studies.budget.model_plan import Plan, as_stated
 from studies.budget.plan import plan, reference_plan
 from studies.budget.plan_text import cost_over_reference
 from studies.commands.cli import main
+from studies.study.model import LensTerms
 from studies.study.study import Condition, RenderLimits, SceneChoice, Study, conditions
 
 SMALL = Study(
@@ -43,6 +44,7 @@ def planned(cache: Path) -> Plan:
     return plan(SMALL, cache=cache)
 
 
+@pytest.mark.thorough
 def test_a_plan_has_a_render_for_each_scene_and_an_image_for_each_condition(planned: Plan) -> None:
     (model,) = planned.renders.values()
     assert list(planned.renders) == list(SMALL.scenes)
@@ -58,7 +60,7 @@ def test_a_plan_has_a_render_for_each_scene_and_an_image_for_each_condition(plan
 def test_the_dark_hides_what_daylight_shows(planned: Plan) -> None:
     dark, bright = (planned.images[condition] for condition in conditions(SMALL))
     assert dark.lens.veiling_glare == 0.0
-    assert bright.lens.diffraction == SMALL.lens.diffraction
+    assert bright.lens.diffraction == 1.0
     assert bright.lens.horizontal_view_deg == pytest.approx(20.0)  # the scene's own camera
     assert not bright.exact
 
@@ -70,6 +72,7 @@ def test_effects_left_out_keep_within_their_share(planned: Plan) -> None:
         assert off_e**2 <= room * row.noise_e**2
 
 
+@pytest.mark.thorough
 def test_a_plan_is_always_the_same(planned: Plan, cache: Path) -> None:
     assert plan(SMALL) == planned
     assert plan(SMALL, cache=cache) == planned  # from the cache
@@ -94,13 +97,24 @@ def test_the_reference_leaves_nothing_out() -> None:
         assert image.lens.horizontal_view_deg == pytest.approx(20.0)
 
 
-def test_a_sensors_own_lens_goes_before_the_studys(tmp_path: Path) -> None:
+def test_what_a_study_states_of_the_lens_goes_before_the_sensors_own_and_that_before_what_is_filled_in(
+    tmp_path: Path,
+) -> None:
     own = tmp_path / "mine.toml"
     text = planning.preset.__globals__["preset_file"]("low_noise").read_text()
-    own.write_text(text.replace("f_number = 2.8", "f_number = 2.8\ndiffraction = 2.0\nveiling_glare = 0.2"))
+    own.write_text(text.replace("diffraction = 1.0", "diffraction = 2.0\nveiling_glare = 0.2"))
     assert preset(str(own)).lens.diffraction == 2.0
-    reference = reference_plan(replace(SMALL, sensors=(str(own),)))
-    assert {(image.lens.diffraction, image.lens.veiling_glare) for image in reference.images.values()} == {(2.0, 0.2)}
+    study = replace(SMALL, sensors=(str(own),))
+    stated = replace(study, lens=LensTerms(diffraction=0.0))
+    for made, expected in (
+        (reference_plan(study), (2.0, 0.2)),
+        (as_stated(study), (2.0, 0.2)),
+        (reference_plan(stated), (0.0, 0.2)),
+        (as_stated(stated), (0.0, 0.2)),
+        (as_stated(replace(SMALL, sensors=("table1_output",))), (0.0, 0.0)),
+        (as_stated(SMALL), (1.0, 0.0)),  # a pixel of today has a lens
+    ):
+        assert {(image.lens.diffraction, image.lens.veiling_glare) for image in made.images.values()} == {expected}
 
 
 def test_a_picture_file_is_planned_in_its_own_bands(tmp_path: Path) -> None:
@@ -109,7 +123,7 @@ def test_a_picture_file_is_planned_in_its_own_bands(tmp_path: Path) -> None:
 
     values = np.random.default_rng(1).uniform(0.1, 1.0, (24, 24, 8)).astype(np.float32)
     path = tmp_path / "scene.exr"
-    write_exr(path, SpectralRadiance(values, np.arange(405.0, 780.0, 50.0)))
+    write_exr(SpectralRadiance(values, np.arange(405.0, 780.0, 50.0)), path)
     found = plan(replace(SMALL, scenes=(SceneChoice(str(path)),)))
     assert not found.renders
     assert len(found.images) == 2

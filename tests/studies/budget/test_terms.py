@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from builders import transport_of
 
+from render.error_estimates import Halves
 from render.illuminants import illuminant
 from render.loader import mitsuba_module
 from render.scene import LightGroup
@@ -48,12 +49,13 @@ def transport(planes, *, noise=0.0, spectrum=None, seed=0) -> Transport:
     planes = np.asarray(planes, np.float32)
     shape = planes.shape[1:]
     drawn = np.random.default_rng(seed).normal(0.0, noise, (2, *shape))
+    radiance = (planes * (1 + drawn[0]))[None].astype(np.float32)
     return transport_of(
-        (planes * (1 + drawn[0]))[None].astype(np.float32),
+        radiance,
         {"light": LightGroup(("light",), spectrum or illuminant("D65"))},
         NM,
         WIDTH_NM,
-        half_difference=(planes * drawn[1])[None].astype(np.float32),
+        light=Halves(radiance, (planes * drawn[1])[None].astype(np.float32)),
         variance=((planes * noise) ** 2)[None].astype(np.float32),
         spp=128,
     )
@@ -72,7 +74,8 @@ def halved(low=0.2, high=0.8) -> np.ndarray:
 def found(made: Transport, counts=(40,), **lens) -> Effects:
     sensor = low_noise()
     groups = {count: groups_of(made.width_nm, count) for count in counts}
-    return effects(made, sensor, replace(sensor.lens, **lens), groups, np.random.default_rng(0))
+    stated = replace(sensor.lens, **({"diffraction": 0.0} | lens))
+    return effects(made, sensor, stated, groups, np.random.default_rng(0))
 
 
 def rms(pair) -> float:

@@ -110,6 +110,7 @@ def measured() -> list[Stage]:
     return list(stages(TINY, load(TINY.scene), preset(TINY.sensor)))
 
 
+@pytest.mark.thorough
 def test_every_stage_is_measured(measured: list[Stage]) -> None:
     assert len(measured) == STAGES
     for made in measured:
@@ -141,6 +142,7 @@ class Page(HTMLParser):
         self.fetched += [v for k, v in attrs if k in ("src", "href") and v and not v.startswith(("data:", "#"))]
 
 
+@pytest.mark.thorough
 def test_the_page_fetches_nothing_runs_nothing_and_escapes_everything(measured: list[Stage]) -> None:
     results = {
         "rodcone": "0.1.0",

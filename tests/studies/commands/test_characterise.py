@@ -61,6 +61,7 @@ def test_json_holds_the_figures_and_the_series_and_no_nan(capsys, found):
     assert None in data["series"]["linearity_share"]  # outside 5-95 % of saturation
 
 
+@pytest.mark.thorough
 def test_the_plot_is_one_svg_with_every_level_in_it_and_nothing_from_outside(capsys, tmp_path, found):
     path = tmp_path / "new" / "plot.svg"
     assert call(["characterise", "low_noise", "-o", str(path), *SMALL], capsys)[0] == 0
@@ -82,6 +83,7 @@ def test_the_plot_is_one_svg_with_every_level_in_it_and_nothing_from_outside(cap
     assert list(tmp_path.rglob("*")) == [tmp_path / "new", path]
 
 
+@pytest.mark.thorough
 def test_points_of_the_linear_plot_lie_on_their_line(found):
     xs, ys = np.array(marks(transfer_svg(found, "low_noise"))[0]).T
     below = found.transfer.light_e < 0.7 * found.saturation_e
@@ -93,10 +95,12 @@ def test_points_of_the_linear_plot_lie_on_their_line(found):
     np.testing.assert_allclose(np.polyval(up, ys), found.transfer.variance_dn2, atol=5.0)
 
 
+@pytest.mark.thorough
 def test_the_same_measurement_gives_the_same_bytes(found):
     assert transfer_svg(found, "low_noise") == transfer_svg(found, "low_noise")
 
 
+@pytest.mark.thorough
 def test_a_title_with_angle_brackets_is_text(found):
     root = ElementTree.fromstring(transfer_svg(found, "<script>&"))
     assert "<script>&" in [text.text for text in root.iter(f"{SPACE}text")]

@@ -45,6 +45,7 @@ def test_it_prints_intervals_and_writes_a_preset(frames, tmp_path, capsys):
 
 
 def test_what_is_not_allowed_is_told_in_one_line(frames, tmp_path, capsys):
+    pytest.importorskip("rawpy", reason="rodcone[photographs] (LibRaw) is not installed")
     flats, darks = frames
     (tmp_path / "taken.toml").write_text("mine", "utf-8")
     (tmp_path / "broken.dng").write_bytes(b"II*\0" + b"\xff" * 60)

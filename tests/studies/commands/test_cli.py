@@ -23,7 +23,9 @@ def call(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int,
         (["demo", "--scene", "stil_life"], ["scene", "'stil_life'", "still_life"]),
         (["demo", "--sensor", "lownoise"], ["sensor preset", "'lownoise'", "did you mean 'low_noise'?"]),
         (["demo", "--level", "25nits"], ["unit", "'nits'", "cd/m2, lux"]),
-        (["demo", "--longest-exposure-s", "-1"], ["longest_exposure_s", "-1", "give seconds above 0"]),
+        (["demo", "--longest-exposure", "-1s"], ["--longest-exposure", "'-1s' is not a time", "write 20ms"]),
+        (["snr", "low_noise", "--exposure", "33"], ["--exposure", "'33' is not a time", "write 33ms or 33s"]),
+        (["new", "study", "mine.toml"], ["out: none is given", "write rodcone new study -o mine.toml"]),
         (["demo", "--size", "big"], ["--size", "big"]),
         (["demo", "--bogus", "3"], ["--bogus"]),
         (["dome"], ["dome", "demo"]),
@@ -65,7 +67,7 @@ def test_the_package_runs_as_the_command() -> None:
 def test_doctor_names_library_variant_and_packages(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = call(["doctor"], capsys)
     assert code == 0
-    for word in ("LLVM", "Mitsuba variant", "package sensor", "rodcone's own"):
+    for word in ("LLVM", "Mitsuba variant", "extra explore", "rodcone's own", "all is well"):
         assert word in out
 
 
@@ -76,6 +78,7 @@ def test_demo_prints_the_report_alone_on_stdout(capsys: pytest.CaptureFixture[st
     assert (tmp_path / "o" / "report.html").stat().st_size > 10_000
 
 
+@pytest.mark.thorough
 def test_a_reader_who_has_enough_ends_the_command_in_silence() -> None:
     command = "import sys; from studies.commands.cli import main; main(['list'])"
     with subprocess.Popen([sys.executable, "-c", command], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:

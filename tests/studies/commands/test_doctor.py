@@ -1,8 +1,10 @@
 """What the doctor tells, and that it sees a foreign package without failing at its import."""
 
 import os
+import re
 import subprocess
 import sys
+import tomllib
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
@@ -19,7 +21,7 @@ def test_every_row_is_there_and_this_environment_is_sound() -> None:
     found = doctor.findings()
     rows = {each.name: each for each in found}
     wanted = {"rodcone", "Python", "platform", "CPU threads", "LLVM", "backend", "Mitsuba variant", "Dr.Jit threads"}
-    wanted |= {*doctor.NEEDED, doctor.LLVM_WHEEL, *(f"package {name}" for name in doctor.PACKAGES)}
+    wanted |= {*doctor.NEEDED, doctor.LLVM_WHEEL, "packages", *(f"extra {name}" for name in doctor.EXTRAS)}
     assert wanted <= rows.keys()
     assert len(rows) == len(found), "a name stands twice"
     assert all("\n" not in each.value and each.value for each in found)
@@ -35,7 +37,10 @@ def test_one_fault_makes_the_exit_code_1(monkeypatch: pytest.MonkeyPatch, capsys
         with pytest.raises(SystemExit) as ended:
             main(["doctor"])
         assert ended.value.code == code
-        assert [line.split() for line in capsys.readouterr().out.splitlines()] == [[e.name, e.value] for e in found]
+        *rows, verdict = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
+        assert [[name, value.strip()] for name, value in rows] == [[each.name, each.value] for each in found]
+        words = "wrong: b; mend what stands beside" if code else "all is well"
+        assert [text.strip() for text in verdict] == ["verdict", words]
 
 
 def test_without_llvm_and_cuda_the_fallback_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,6 +128,14 @@ def test_a_distribution_that_wrote_into_rodcones_folder_is_found(
     monkeypatch.syspath_prepend(tmp_path)
     assert doctor.intruders(tmp_path) == {"scenes": "stage-tools"}
     assert doctor.intruders(tmp_path / "elsewhere") == {}
+
+
+def test_the_extras_are_those_of_the_project_and_what_they_bring() -> None:
+    project = tomllib.loads((HOME / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    named = {name: [re.split("[<>=~]", text)[0] for text in texts] for name, texts in project.items()}
+    assert {name: list(brought) for name, (_, brought) in doctor.EXTRAS.items()} == {
+        name: brought for name, brought in named.items() if name not in ("docs", "bench", "test", "dev")
+    }
 
 
 def test_a_missing_distribution_is_a_fault_only_where_it_is_needed() -> None:

@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import colour
@@ -54,6 +56,7 @@ def test_the_temperatures_are_those_of_the_spectra(name: str) -> None:
     assert found_k == pytest.approx(stated_k, rel=0.01)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("kind", "names"), [("lights", [*illuminants.names(), "3000K"]), ("sensors", ["the presets"])])
 def test_curves_are_drawn_with_every_name(
     kind: str, names: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -87,3 +90,13 @@ def test_what_has_no_curves_or_no_place_is_refused_in_one_line(
     assert words in told.err
     assert len(told.err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_lists_import_no_renderer() -> None:
+    """Nor what takes long to load: 0.2 to 0.6 s of processor time a command, where a list of mosaics took 1.7 s."""
+    program = (
+        "import sys; from studies.commands.cli import app; app('list', result_action='return_value'); "
+        "print([name for name in ('mitsuba', 'matplotlib', 'colour', 'scipy.ndimage') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"

@@ -122,6 +122,16 @@ def test_a_profile_of_darktable_tells_the_noise_of_its_camera(tmp_path, capsys):
     assert tomllib.loads(path.read_text("utf-8"))["pixel"]["full_well_e"] == 5e4
 
 
+def test_a_reports_gain_that_is_set_aside_is_told(tmp_path, capsys):
+    report = tmp_path / "report.toml"
+    lines = REPORT.read_text("utf-8").splitlines()
+    kept = [line for line in lines if not line.startswith("black_level_dn")]
+    report.write_text("\n".join(line if not line.startswith("K ") else "K = 0.36" for line in kept), "utf-8")
+    code, _, err = call(capsys, "new", "preset", "low_noise", "--noise", report, "-o", tmp_path / "mine.toml")
+    assert (code, err.count("\n")) == (0, 1)
+    assert "K = 0.36 DN/e- is set aside: without black_level_dn it doesn't tell where the converter ends" in err
+
+
 def test_a_report_with_a_preset_that_lends_is_ready_for_any_scene(tmp_path, capsys):
     path = tmp_path / "mine.toml"
     assert call(capsys, "new", "preset", "low_noise", "--noise", REPORT, "-o", path) == (0, f"{path}\n", "")

@@ -67,7 +67,7 @@ def test_facts_are_one_json_object(scene: Path, tmp_path: Path, capsys: pytest.C
     assert facts["largest_band_error"] == pytest.approx(0.0, abs=1e-6)  # nothing here varies with wavelength
     assert facts["mean_luminance_cd_m2"] == pytest.approx(25.0, rel=1e-5)
     assert err == f"rodcone: {facts['notes'][0]}\n"
-    assert "integrator 'path' is left out" in err
+    assert "integrator 'path': the engine brings its own, with paths of any length" in err
 
 
 def test_another_illuminant_comes_at_the_same_luminance(

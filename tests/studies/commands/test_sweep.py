@@ -13,11 +13,14 @@ from typing import Any
 
 import pytest
 import sweep_sample as SAMPLE
+from any_cpu.any_cpu import environment
 
 from studies.commands.cli import app, main
 from studies.study.study_file import read_study
 from studies.sweep.database import VERSION
+from studies.sweep.export import read_rows
 
+REPORT = Path(__file__).parents[3] / "sensor" / "cameras" / "reports" / "flir_bfs_u3_50s5m.toml"
 TEXT = """
 scenes = [{source = "scene.exr", light = "E"}]
 levels = ["1cd/m2", "25cd/m2"]
@@ -61,6 +64,7 @@ def test_sweep_prints_the_ledger_alone_and_the_table_follows(
     assert [line.split(",")[3] for line in table] == ["1cd/m2", "25cd/m2"]
 
 
+@pytest.mark.thorough
 def test_a_sweep_follows_the_plan_and_reference_models_everything(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -76,7 +80,46 @@ def test_a_sweep_follows_the_plan_and_reference_models_everything(
     lenses = [
         (json.loads(lens)["diffraction"], json.loads(lens)["veiling_glare"]) for lens, share in table if not share
     ]
-    assert sorted(lenses) == [(0.0, 0.0)] * 2 + [(1.0, 0.01)] * 2
+    assert sorted(lenses) == [(1.0, 0.0)] * 2 + [(1.0, 0.01)] * 2
+
+
+def test_a_template_untouched_but_for_two_sensors_ranks_them_as_shot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By night, where Gray World takes a sodium lamp for a grey wall and turns the answer round."""
+    mine, chip, out = tmp_path / "mine.toml", tmp_path / "chip.toml", tmp_path / "out"
+    assert call(["new", "study", "-o", str(mine)], capsys)[0] == 0
+    assert call(["new", "preset", "low_noise", "--noise", str(REPORT), "-o", str(chip)], capsys)[0] == 0
+    quick = (
+        *("scenes=['night_street']", "levels=['1cd/m2']", f"sensors=['low_noise', '{chip}']"),
+        *("processors=['interleaved']", "seeds=1", "render.size=64", "render.spp=64"),
+    )
+    ranks = {}
+    for balance in ((), ("white_balances=['as-shot']",), ("white_balances=['gray-world']",)):
+        asked = [part for change in (*quick, *balance) for part in ("--set", change)]
+        assert call(["sweep", str(mine), "-o", str(out), "--workers", "1", "--as-stated", *asked], capsys)[0] == 0
+        ranks[balance] = [row.sensor for row in sorted(read_rows(out), key=lambda row: row.psnr_db)]
+    default, as_shot, gray_world = ranks.values()
+    assert default == as_shot == gray_world[::-1] == ["low_noise", "chip.toml"]
+
+
+@pytest.mark.thorough
+def test_what_one_processor_made_another_finds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A sweep goes on on another machine: neither the render nor a picture is made again."""
+    path = tmp_path / "study.toml"
+    path.write_text(
+        'scenes = ["metamers"]\nspectra = ["F11"]\nlevels = ["1lux"]\nprocessors = ["bayer", "interleaved"]\n'
+        'exposures = ["auto", "auto:information"]\n[render]\nsize = 16\nspp = 1\n',
+        "utf-8",
+    )
+    command = ["sweep", str(path), "-o", str(tmp_path / "out"), "--workers", "1", "--as-stated", "--json"]
+    code, text, _ = call(command, capsys)
+    assert (code, json.loads(text)["made"]) == (0, 4)
+    renders = sorted((tmp_path / "out" / "renders").iterdir())
+    again = [sys.executable, "-c", "from studies.commands.cli import main; main()", *command]
+    other = environment("nehalem", "numpy-baseline")
+    assert json.loads(subprocess.check_output(again, env=other, text=True, stderr=subprocess.DEVNULL))["made"] == 0
+    assert sorted((tmp_path / "out" / "renders").iterdir()) == renders
 
 
 def test_dry_run_counts_and_computes_nothing(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,6 +21,7 @@ from studies.explore.views import VIEWS
 from studies.metrics.truth import light_in_bands, shown_white_cd_m2, true_srgb
 
 
+@pytest.mark.thorough
 def test_what_is_kept_changes_no_bit():
     """After any changes, in any order, pictures and figures are those of an empty memory."""
     transport, memo, rng = small_transport(), Memo(), random.Random(1)
@@ -142,6 +143,7 @@ def test_another_exposure_is_of_the_same_chip_and_another_seed_is_another_chip()
     assert not np.array_equal(first.device.dark_offset_e, other.device.dark_offset_e)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(backend() == "numpy", reason="no Dr.Jit backend, no kernels")
 def test_no_kernel_is_compiled_after_the_first_changes():
     """Of 60 changes of all controls the last 40 compile nothing: every value is an argument of a kernel."""
@@ -174,6 +176,6 @@ def test_each_slow_processor_has_a_quick_one_of_its_mosaic():
     assert {"ple", "ple_rgbw", "ple_bayer", "bayer_bm3d", "rgbw_park_fair"} <= set(slow)
     assert "interleaved" not in slow
     for name in slow:
-        quick = stand_in(name)
-        assert quick is not None
+        quick = stand_in(Controls(processor=name, mosaic=PROCESSORS[name].mosaic), 1000).processor
+        assert not is_slow(quick)
         assert PROCESSORS[quick].mosaic == PROCESSORS[name].mosaic

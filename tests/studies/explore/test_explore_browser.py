@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Iterator
+from functools import partial
 from random import Random
 from typing import Any
 
@@ -16,6 +17,7 @@ pytest.importorskip("websockets", reason="needs rodcone[explore]")
 import explore_browser as EXPLORE
 
 import render.engine as ENGINE
+from sensor.presets import preset_file
 from studies.explore.messages import hello
 from studies.explore.source import RenderOptions, open_source
 
@@ -23,6 +25,8 @@ pytestmark = pytest.mark.skipif(
     CHROME.CHROMIUM is None or sys.platform == "win32",
     reason="needs `chromium` on PATH (Debian: apt install chromium) and POSIX file descriptors",
 )
+OPTIONS = RenderOptions(size=48, spp=4, band_nm=50.0)
+SCENES = {name: partial(open_source, name, OPTIONS) for name in ("color_checker", "still_life_outdoor")}
 MODES = [(1280, False), (1280, True), (1920, False), (1920, True), (390, False), (390, True)]
 
 
@@ -35,7 +39,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    with EXPLORE.served(open_source("still_life_outdoor", RenderOptions(size=48, spp=4, band_nm=50.0))) as address:
+    with EXPLORE.served(SCENES["still_life_outdoor"]()) as address:
         yield address
 
 
@@ -69,6 +73,7 @@ def check_changes(page: Any, count: int, seed: int) -> int:
     return painted
 
 
+@pytest.mark.thorough
 def test_each_picture_is_that_of_the_copied_python(browser, address, one_render):
     page = CHROME.Page(browser, address)
     EXPLORE.settle(page)
@@ -91,6 +96,7 @@ def test_the_page_asks_no_other_host(browser, address):
     assert page.complaints() == []
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("width", "dark"), MODES)
 def test_the_page_fits_and_is_readable(browser, address, width, dark):
     page = CHROME.Page(browser, address, width=width, dark=dark)
@@ -110,6 +116,42 @@ def test_the_page_fits_and_is_readable(browser, address, width, dark):
     assert min(boxes) > 100
 
 
+CHOOSE = """(() => { const select = document.querySelector('[data-key="%s"]');
+  select.value = %r; select.dispatchEvent(new Event("change")); })()"""
+DROP = """(() => { const given = new DataTransfer(); given.items.add(new File([%r], "chip.toml"));
+  document.querySelector(".explore").dispatchEvent(new DragEvent("drop", { dataTransfer: given })); })()"""
+WAIT = "new Promise(done => (function look() { %s ? done() : setTimeout(look, 20); })())"
+
+
+@pytest.fixture
+def offered() -> Iterator[str]:
+    """Address of an explorer of its own: the scene that a page chooses is its session's."""
+    with EXPLORE.served(SCENES["still_life_outdoor"](), SCENES) as address:
+        yield address
+
+
+def test_level_by_name_a_dropped_sensor_another_scene_and_back(browser, offered, one_render, tmp_path, monkeypatch):
+    """Each is in the copied Python; a scene keeps the cameras; *Reset* brings all back."""
+    monkeypatch.chdir(tmp_path)
+    chip = preset_file("low_noise").read_text("utf-8").replace("read_noise_e = 1.5", "read_noise_e = 9.0")
+    (tmp_path / "chip.toml").write_text(chip, "utf-8")
+    page = CHROME.Page(browser, offered)
+    EXPLORE.settle(page)
+    page.value(CHOOSE % ("level name", "moonlight"))
+    page.value(DROP % chip)
+    page.value(WAIT % "document.querySelector('[data-key=\"pixel.read_noise_e box\"]').value === '9'")
+    page.value(CHOOSE % ("scene", "color_checker"))
+    page.value(WAIT % "!document.querySelector('[data-key=\"power sky\"]')")
+    EXPLORE.settle(page)
+    code = EXPLORE.copied_python(page)
+    assert all(each in code for each in ("'color_checker'", "level_cd_m2=0.036", "sensor='chip.toml'"))
+    assert np.array_equal(EXPLORE.picture(page), EXPLORE.ran(code))
+    page.value("[...document.querySelectorAll('header button')].find(each => each.textContent === 'Reset').click()")
+    EXPLORE.settle(page)
+    assert "controls = Controls()" in EXPLORE.copied_python(page)
+    assert "Reference, 4 samples, render noise" in page.value("document.querySelectorAll('figcaption')[1].textContent")
+
+
 def answered(page, views, script):
     """Value of a script in a page whose program is the script: `asked` holds what the page sends, `tell` answers.
 
@@ -120,7 +162,7 @@ def answered(page, views, script):
     answer = {
         "kind": "show", "cameras": [{"controls": said["controls"], "waiting_for": None}], "views": views,
         "facts": [{"exposure_s": 0.01, "saturated": 0.0, "snr_db": None}],
-        "size": [1, 1], "spp": 4, "last": True, "notes": [],
+        "size": [1, 1], "spp": 4, "render_error": 0.1, "last": True, "notes": [],
     }  # fmt: skip
     return page.value(
         f"""(async () => {{
@@ -128,33 +170,44 @@ def answered(page, views, script):
           const asked = [], el = document.createElement("div"), seen = [], answer = {json.dumps(answer)};
           let tell;
           document.body.append(el);
-          explorer.render({{ model: {{ send: each => asked.push(each), on: (_, listener) => tell = listener }}, el }});
-          tell({json.dumps({**said, "kind": "hello"})}, []);
+          const send = each => asked.push(structuredClone(each));
+          explorer.render({{ model: {{ send, on: (_, listener) => tell = listener }}, el }});
+          tell({json.dumps({**said, "kind": "hello", "number": 1})}, []);
           const level = el.querySelector("[data-key=level]");
           {script}
         }})()"""
     )
 
 
-def test_an_old_answer_is_never_shown(browser, address):
-    """The page's module with a program that answers the older of two questions last, and first."""
-    old, young, seen = answered(
+def test_one_picture_is_asked_at_a_time_the_next_with_the_newest_values_and_no_old_one_comes_back(browser, address):
+    """The page's module with a program that answers every third change, and an old question once more."""
+    levels, painted = answered(
         CHROME.Page(browser, address),
         [[0, "picture"]],
         """
-          const root = el.firstChild;
-          level.value = 900;
-          level.dispatchEvent(new Event("input"));
-          const [old, young] = asked.filter(each => each.kind === "show").map(each => each.number);
-          for (const number of [old, young, old]) {
-            tell({ ...answer, number }, [new DataView(new ArrayBuffer(3))]);
-            seen.push(root.dataset.painted ?? "none");
+          const shows = () => asked.filter(each => each.kind === "show");
+          const grey = value => [new DataView(new Uint8Array([value, value, value]).buffer)];
+          for (let moved = 1; moved <= 9; moved++) {
+            level.value = moved;
+            level.dispatchEvent(new Event("input"));
+            if (moved % 3 === 0) tell({ ...answer, number: shows().at(-1).number }, grey(moved));
+            seen.push(el.querySelector("canvas").getContext("2d").getImageData(0, 0, 1, 1).data[0]);
           }
-          return [old, young, seen];
+          tell({ ...answer, number: shows()[1].number }, grey(99));
+          seen.push(el.querySelector("canvas").getContext("2d").getImageData(0, 0, 1, 1).data[0]);
+          return [shows().map(each => each.cameras[0].level_cd_m2), seen];
         """,
     )
-    assert old < young
-    assert seen == ["none", str(young), str(young)]
+    steps = [float(f"{1e-4 * 1e9 ** (step / 1000):.4g}") for step in (3, 6, 9)]
+    assert levels == [25.0, *steps]
+    assert painted == [0, 0, 3, 3, 3, 6, 6, 6, 9, 9]
+
+
+def test_pictures_are_painted_while_a_slider_is_dragged(browser, address):
+    """A mouse's events, one each 16 ms, for 2 s: without them a picture waited until the slider came to rest."""
+    page = CHROME.Page(browser, address)
+    EXPLORE.settle(page)
+    assert len(page.value(EXPLORE.DRAG % ("level", 0.2, 0.8, 2000))) / 2 > 0
 
 
 LOAD = """new Promise(done => {
@@ -166,6 +219,7 @@ LOAD = """new Promise(done => {
 })"""
 
 
+@pytest.mark.thorough
 def test_a_lamp_from_a_csv_file_is_in_the_copied_python(browser, address, one_render):
     page = CHROME.Page(browser, address)
     EXPLORE.settle(page)
@@ -183,7 +237,7 @@ def test_a_lamp_from_a_csv_file_is_in_the_copied_python(browser, address, one_re
     assert not np.array_equal(EXPLORE.picture(page), before)
 
 
-def test_a_picture_without_bytes_is_the_last_one_sent_even_where_that_came_too_late(browser, address):
+def test_a_picture_without_bytes_is_the_last_one_sent(browser, address):
     seen = answered(
         CHROME.Page(browser, address),
         [[0, "picture"], [0, "truth"]],
@@ -193,15 +247,14 @@ def test_a_picture_without_bytes_is_the_last_one_sent_even_where_that_came_too_l
           const red = each => each.getContext("2d").getImageData(0, 0, 1, 1).data[0];
           const look = () => seen.push([...el.querySelectorAll("canvas")].map(red));
           level.dispatchEvent(new Event("input"));
-          const [old, young] = asked.filter(each => each.kind === "show").map(each => each.number);
-          tell({ ...answer, number: old }, [grey(10), grey(20)]);
+          tell({ ...answer, number: 2 }, [grey(10), grey(20)]);
           look();
-          tell({ ...answer, number: young }, [grey(30), none]);
+          tell({ ...answer, number: 3 }, [grey(30), none]);
           look();
           return seen;
         """,
     )
-    assert seen == [[0, 0], [30, 20]]
+    assert seen == [[10, 20], [30, 20]]
 
 
 def test_two_views_over_one_connection_take_no_answers_of_each_other(browser, address):
@@ -221,8 +274,8 @@ def test_two_views_over_one_connection_take_no_answers_of_each_other(browser, ad
             listeners.forEach(each => each(header, []));
             begun.push(views.map(el => el.querySelector("canvas") !== null));
           }};
-          tell({{ ...{json.dumps({**said, "kind": "hello"})}, page: first }});
-          tell({{ ...{json.dumps({**said, "kind": "hello"})}, page: second }});
+          tell({{ ...{json.dumps({**said, "kind": "hello", "number": 1})}, page: first }});
+          tell({{ ...{json.dumps({**said, "kind": "hello", "number": 1})}, page: second }});
           tell({{ kind: "taken over", page: second }});
           return [begun, views.map(el => el.querySelector(".status").textContent.includes("taken over"))];
         }})()"""
@@ -250,6 +303,7 @@ def test_keys_move_the_measured_pixel_and_take_another_exposure(browser, address
     assert not np.array_equal(first, EXPLORE.picture(page))
 
 
+@pytest.mark.thorough
 def test_a_slow_processor_can_be_cancelled_and_its_picture_comes_when_the_sliders_rest(browser, address, one_render):
     page = CHROME.Page(browser, address)
     EXPLORE.settle(page)

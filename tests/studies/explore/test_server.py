@@ -14,10 +14,10 @@ from explore_sample import small_transport
 pytest.importorskip("uvicorn", reason="needs rodcone[explore]")
 pytest.importorskip("websockets", reason="needs rodcone[explore]")
 
-from rodcone.errors import InputError
+from rodcone.errors import MOST_TOLD, InputError
 from studies.explore.controls import Controls, Lamp, controls_from, to_json
 from studies.explore.messages import read_message
-from studies.explore.server import listen, make_server
+from studies.explore.server import BURST_S, MOST_A_SECOND, MOST_CHARACTERS_A_SECOND, listen, make_server
 from studies.explore.session import Session
 from studies.explore.source import of_transport
 
@@ -139,9 +139,20 @@ HOSTILE = [
     '{"kind": "show", "number": 1, "cameras": [{"settings": {"neighbourhood": 1e9}}], "views": [[0, "raw"]]}',
     '{"kind": "pixel", "number": 1, "cameras": [{}], "row": "0", "column": 0}',
     '{"kind": "pixel", "number": 1, "cameras": [{}], "row": 1e9, "column": 0}',
-    '{"kind": "python", "number": 1, "cameras": [{}], "view": "picture\'; import os"}',
-    '{"kind": "python", "number": 1, "cameras": [{}], "view": "pixel 1 2); import os"}',
-    '{"kind": "study", "number": 1, "cameras": [{}]}',
+    '{"kind": "pixel", "number": 1, "cameras": [{}], "row": 1, "column": "2); import os"}',
+    '{"kind": "scene", "number": 1, "name": "SECRET"}', '{"kind": "scene", "number": 1, "name": ["still_life"]}',
+    *(f'{{"kind": "sensor", "number": 1, "files": {files}}}' for files in (
+        "[]", "{}", '{"../chip.toml": ""}', '{"/chip.toml": ""}', '{"chip.py": ""}', '{"LONG.toml": ""}',
+        '{"a.toml": 3}', '{"a.toml": "", "b.toml": ""}', '{"a.csv": "1,2"}', '{"a.toml": "= 3"}',
+        r'{"a.toml": "[responses]\ncsv = \"SECRET\""}', r'{"a.toml": "[responses]\nir_cut = \"../secret.CSV\""}',
+        r'{"a.toml": "[responses]\nir_cut = [\"SECRET\"]"}', '{"a.toml": "responses = 3"}',
+    )),
+    '{"kind": "study", "number": 1, "cameras": [{}]}', '{"kind": "LONG", "number": 1}',
+    '{"kind": "hello", "number": 1, "LONG": 2}', '{"kind": "show", "number": 1, "cameras": "LONG", "views": []}',
+    '{"kind": "show", "number": 1, "cameras": [{"sensor": "LONG"}], "views": [[0, "raw"]]}',
+    '{"kind": "show", "number": 1, "cameras": [{"lamps": {"LONG": {}}}], "views": [[0, "raw"]]}',
+    '{"kind": "show", "number": 1, "cameras": [{"lens": "LONG"}], "views": [[0, "raw"]]}',
+    '{"kind": "show", "number": 1, "cameras": [{}], "views": [[0, "LONG"]]}',
 ]  # fmt: skip
 
 
@@ -151,10 +162,11 @@ def test_hostile_messages_get_one_line_and_the_next_is_answered(served, tmp_path
     secret.write_text("password,hunter2\n1,2\n", "utf-8")
     with connected(port, f"/{token}/live", origin=f"http://127.0.0.1:{port}", max_size=None) as connection:
         for text in HOSTILE:
-            connection.send(text.replace("SECRET", secret.as_posix()))
+            connection.send(text.replace("SECRET", secret.as_posix()).replace("LONG", "y" * 150_000))
             header = received(connection)
             assert header["kind"] == "error", text[:80]
             assert "\n" not in header["message"]
+            assert len(header["message"]) <= MOST_TOLD
             assert "program failed" not in header["message"], header
             assert "password" not in header["message"], header
         connection.send(b"\x00\x01")
@@ -162,6 +174,19 @@ def test_hostile_messages_get_one_line_and_the_next_is_answered(served, tmp_path
         connection.send('{"kind": "show", "number": 5, "cameras": [{}], "views": [[0, "picture"]]}')
         header = received(connection)
         assert (header["kind"], header["number"], header["size"]) == ("show", 5, [40, 48])
+
+
+@pytest.mark.parametrize(("text", "most"), [("{", MOST_A_SECOND), ("{" * 150_000, MOST_CHARACTERS_A_SECOND / 150_000)])
+def test_a_page_that_floods_is_read_at_its_pace(served, text, most):
+    port, token = served
+    count = round((BURST_S + 1) * most)
+    with connected(port, f"/{token}/live", origin=f"http://127.0.0.1:{port}", max_size=None) as connection:
+        start = time.monotonic()
+        for _ in range(count):
+            connection.send(text)
+        for _ in range(count):
+            received(connection)
+        assert time.monotonic() - start > 0.9  # 1 s by the loop's clock, which began with the connection
 
 
 @pytest.mark.parametrize(

@@ -4,14 +4,25 @@ import json
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from explore_sample import small_transport
+from explore_sample import BANDS, small_transport
 
+import rodcone as public
 from rodcone.errors import InputError
+from sensor.presets import preset_file
+from sensor.readout import noise_variance
+from studies.explore.chain import expose_scene
+from studies.explore.controls import Controls
+from studies.explore.memo import Memo
+from studies.explore.render_noise import noise_note, noise_share
 from studies.explore.session import Session
+from studies.explore.slow import stand_in
 from studies.explore.source import Rendered, of_transport
+from studies.study.study import SceneChoice
 
 
 class Page:
@@ -42,6 +53,74 @@ class Page:
 def message(kind: str, number: int, **more: Any) -> str:
     shown = {"cameras": [{}], "views": [[0, "picture"]]} if kind == "show" else {}
     return json.dumps({"kind": kind, "number": number} | shown | more)
+
+
+def test_another_scene_is_shown_and_one_that_is_not_offered_is_refused():
+    page, other = Page(), public.render("color_checker", (16, 24), spp=4, **BANDS)
+    session = Session(of_transport(small_transport()), {"chart": lambda: replace(of_transport(other), title="chart")})
+    send = page.send
+    session.connect(send)
+    session.take(message("show", 1), send)
+    assert page.wait("show", 1)["size"] == [40, 48]
+    session.take(message("scene", 2, name="charts"), send)
+    assert "did you mean 'chart'?" in page.wait("error", 2)["message"]
+    session.take(message("scene", 3, name="chart"), send)
+    header = page.wait("scene", 3)
+    assert (header["title"], header["scenes"], header["groups"]) == (
+        "chart",
+        ["chart"],
+        dict.fromkeys(other.groups, False),
+    )
+    session.take(message("show", 4), send)
+    assert page.wait("show", 4)["size"] == [16, 24]
+    session.close()
+
+
+def test_a_sensor_that_was_dropped_makes_the_pictures_of_its_file(tmp_path, monkeypatch):
+    text = preset_file("low_noise").read_text("utf-8").replace("full_well_e = 15000", "full_well_e = 3000")
+    text += '\n[responses]\ncsv = "curves.csv"\nrange_nm = [400, 700]\nquantum_efficiency = "included"\n'
+    files = {"chip.toml": text, "curves.csv": "wavelength_nm,R,G,B,W\n400,.1,.1,.5,.6\n700,.5,.2,.1,.7\n"}
+    for name, content in files.items():
+        (tmp_path / name).write_text(content, "utf-8")
+    page, source = Page(), of_transport(small_transport())
+    session = Session(replace(source, scene=SceneChoice("still_life_outdoor")))
+    send = page.send
+    session.connect(send)
+    session.take(message("sensor", 1, files=files), send)
+    header = page.wait("sensor", 1)
+    camera = {"sensor": header["sensor"]}
+    assert header["terms"]["pixel"]["full_well_e"] == 3000
+    session.take(message("show", 2, cameras=[camera]), send)
+    python = page.wait("show", 2)["python"][0]
+    session.take(message("study", 3, cameras=[camera]), send)
+    study = page.wait("study", 3)["files"]
+    session.close()
+    assert not Path(header["sensor"]).exists()
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(
+        python.replace("transport = ...", "from explore_sample import small_transport\ntransport = small_transport()"),
+        names,
+    )
+    assert names["picture"].tobytes() == page.buffers[-2][0]
+    assert {name: study[name] for name in files} == files
+    assert 'sensors = ["chip.toml"]' in study["study.toml"]
+
+
+def test_the_renders_noise_is_that_of_independent_renders():
+    """Beside half the mean squared difference of two renders: both are noisy, within a factor of 1.5."""
+    controls = Controls(exposure="time", exposure_s=0.02)
+    renders = [public.render("still_life_outdoor", (40, 48), spp=16, seed=seed, **BANDS) for seed in range(2)]
+    memos = [Memo(), Memo()]
+    first, second = (expose_scene(transport, controls, memo) for transport, memo in zip(renders, memos, strict=True))
+    own_e2 = noise_variance(first.expected_e, first.sensor, first.exposure_s)
+    inside = np.maximum(first.expected_e, second.expected_e) < first.sensor.pixel.full_well_e
+    wanted = ((first.expected_e - second.expected_e)[inside] ** 2).mean() / 2 / own_e2[inside].mean()
+    share = noise_share(first, controls, memos[0])
+    assert wanted / 1.5 < share < wanted * 1.5
+    assert noise_share(first, replace(controls, frames=4), memos[0]) == pytest.approx(4 * share)
+    assert noise_note(0.99, 64) == ""
+    assert "--spp 256" in noise_note(3.2, 64)
 
 
 @pytest.mark.parametrize("good_states", [0, 1])
@@ -76,6 +155,23 @@ def test_a_render_that_fails_is_told_and_asked_for_once(good_states):
             assert "it has no material" in page.wait("error", number)["message"]
     session.close()
     assert failed == 1
+
+
+WIDE = {"neighbourhood": 41.0, "patch": 9.0}
+
+
+@pytest.mark.parametrize(
+    ("controls", "pixels", "shown"),
+    [
+        (Controls(), 2048**2, Controls()),
+        (Controls(settings=WIDE), 64**2, Controls(settings=WIDE)),
+        (Controls(settings=WIDE), 256**2, Controls()),
+        (Controls(processor="interleaved_paper", settings=WIDE), 256**2, Controls(processor="interleaved_paper")),
+        (Controls(processor="ple_bayer", mosaic="bayer"), 64**2, Controls(processor="bayer", mosaic="bayer")),
+    ],
+)
+def test_what_takes_seconds_has_a_stand_in_while_it_is_at_work_where_it_can_be_ended(controls, pixels, shown):
+    assert stand_in(controls, pixels) == shown
 
 
 @pytest.fixture

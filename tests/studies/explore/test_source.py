@@ -21,8 +21,8 @@ from studies.study.study import SceneChoice
 def test_a_scene_is_shown_small_first_and_then_whole():
     states = open_source("flat_field", RenderOptions(size=136, spp=2, band_nm=100.0)).states()
     first, last = next(states), next(states)
-    assert (first.transport.coverage.shape, first.last) == ((FIRST_SIDE, FIRST_SIDE), False)
-    assert (last.transport.coverage.shape, last.last) == ((136, 136), True)
+    assert (first.transport.coverage.mean.shape, first.last) == ((FIRST_SIDE, FIRST_SIDE), False)
+    assert (last.transport.coverage.mean.shape, last.last) == ((136, 136), True)
     assert last.transport.wavelength_nm.size == 4
     assert next(states, None) is None
 
@@ -30,7 +30,7 @@ def test_a_scene_is_shown_small_first_and_then_whole():
 def test_a_file_of_radiance_is_photographed_as_it_is(tmp_path: Path):
     radiance = public.render("flat_field", (16, 20), wavelength_nm=np.arange(400.0, 780.0, 40.0), spp=2).relight()
     path = tmp_path / "seen.exr"
-    public.write_exr(path, radiance)
+    public.write_exr(radiance, path)
     source = open_source(str(path), RenderOptions())
     (state,) = source.states()
     assert source.groups == {next(iter(state.transport.groups)): True}
@@ -43,7 +43,7 @@ def test_a_file_of_radiance_is_photographed_as_it_is(tmp_path: Path):
 def test_reflectances_take_other_lamps_and_the_copied_python_has_their_light(tmp_path: Path):
     path, study = tmp_path / "seen.png", tmp_path / "study.toml"
     rng = np.random.default_rng(1)
-    path.write_bytes(to_png(rng.uniform(0.2, 0.8, (16, 20, 3))))
+    path.write_bytes(to_png(rng.integers(50, 200, (16, 20, 3), np.uint8)))
     study.write_text(
         'levels = ["25cd/m2"]\nspectra = ["A"]\nscenes = [{ source = "seen.png", light = "D50" }]\n', "utf-8"
     )
@@ -63,7 +63,7 @@ def test_reflectances_take_other_lamps_and_the_copied_python_has_their_light(tmp
 def test_memory_for_a_photograph_is_that_of_its_pixels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A photograph of one colour is packed to a few hundred bytes, by which it would seem to need nothing."""
     path, asked = tmp_path / "plain.png", []
-    path.write_bytes(to_png(np.full((64, 48, 3), 0.4)))
+    path.write_bytes(to_png(np.full((64, 48, 3), 102, np.uint8)))
     monkeypatch.setattr("studies.explore.source.require_memory", lambda need, force: asked.append(need))
     open_source(str(path), RenderOptions())
     assert asked == [memory(64 * 48, DEFAULT_WAVELENGTH_NM.size, 1)]
@@ -102,7 +102,7 @@ def test_a_study_is_where_the_page_begins(tmp_path: Path):
     own = source.controls
     assert (own.level_cd_m2, own.exposure, own.exposure_s, own.seed) == (3.0, "time", 0.005, 3)
     assert (own.sensor, own.mosaic, own.processor) == ("table1_output", "bayer", "bayer")
-    assert dict(own.lens) == {"diffraction": 1.0, "veiling_glare": 0.02}
+    assert dict(own.lens) == {"veiling_glare": 0.02}
     assert own.lamps["softbox"].spectrum == "A"
     assert (source.render.size, source.render.spp) == (32, 2)
 

@@ -52,7 +52,7 @@ def test_without_shot_noise_the_budget_is_that_of_the_other_terms(terms):
 
 def test_the_light_budget_of_a_pixel():
     """Photons from the radiance by the camera equation; the own filter's electrons are the expected ones."""
-    controls = Controls(exposure=TIME, exposure_s=0.01, lens={"f_number": 4.0})
+    controls = Controls(exposure=TIME, exposure_s=0.01, lens={"f_number": 4.0, "diffraction": 0.0})
     exposed = photograph(small_transport(), controls).exposed
     row, column = 20, 11
     told = pixel(exposed, row, column)

@@ -48,8 +48,7 @@ def test_the_widget_shows_what_python_makes(widget):
     assert header["number"] == 2
     shot = photograph(small_transport(), Controls(**asked))
     assert np.array_equal(np.frombuffer(picture, np.uint8).reshape(40, 48, 3), shot.picture)
-    header, _ = answer(widget, {"kind": "python", "number": 3, "cameras": [asked], "view": "picture"})
-    assert "transport = ..." in header["text"]
+    assert "transport = ..." in header["python"][0]
     header, _ = answer(widget, {"kind": "study", "number": 4, "cameras": [asked]})
     assert header["kind"] == "error"
 

@@ -26,6 +26,7 @@ def ran(code: str) -> dict[str, object]:
     return names
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("view", [*VIEWS])
 def test_the_python_of_a_view_makes_its_bits(view):
     controls = random_controls(random.Random(view))
@@ -33,6 +34,7 @@ def test_the_python_of_a_view_makes_its_bits(view):
     assert np.array_equal(ran(python_of(RENDER, controls, view))["picture"], VIEWS[view](shot))
 
 
+@pytest.mark.thorough
 def test_the_python_of_figures_makes_their_numbers():
     controls = random_controls(random.Random(7))
     exposed = photograph(small_transport(), controls).exposed
@@ -40,6 +42,7 @@ def test_the_python_of_figures_makes_their_numbers():
     assert ran(python_of(RENDER, controls, "pixel 3 5"))["figure"] == pixel(exposed, 3, 5)
 
 
+@pytest.mark.thorough
 def test_the_python_of_a_source_makes_its_transport():
     source = open_source("still_life", RenderOptions(size=20, spp=20, band_nm=80.0))
     states = list(source.states())
@@ -92,6 +95,7 @@ def test_a_study_asks_the_same(tmp_path: Path):
     [
         (SceneChoice("color_checker", light="A", chart="chart.csv"), False, Controls()),
         (SceneChoice("scene.xml", extend="hold"), False, Controls()),
+        (SceneChoice('two\nlines, "\\, \x7f.xml'), False, Controls()),
         (SceneChoice("radiance.exr", light="A"), True, Controls(reference_light="A")),
         (SceneChoice("still_life"), False, Controls(lamps={"softbox": Lamp("lamp.csv")})),
     ],

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from rodcone.colour_spaces import decode_srgb, encode_srgb, luminance_of_srgb
+from rodcone.colour_spaces import WHITE_AT, decode_srgb, encode_srgb, luminance_of_srgb
 from studies.metrics.chart_colours import WHITE_PATCH, daylight_delta_e, daylight_srgb, pair_delta_e, true_pair_delta_e
-from studies.metrics.truth import WHITE_AT
 
 
 def chart_of(colours: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -36,6 +36,7 @@ def chart() -> Figure:
     return figure
 
 
+@pytest.mark.thorough
 def test_the_same_figure_is_the_same_file_however_often_and_in_whichever_order_it_is_written() -> None:
     for make in (chart, lambda: picture_rows([[("a", PICTURE)], [("b", PICTURE)]])):
         first, second = make(), make()
@@ -44,6 +45,7 @@ def test_the_same_figure_is_the_same_file_however_often_and_in_whichever_order_i
         assert svg_text(first) == svg_text(second) == svg
 
 
+@pytest.mark.thorough
 def test_drawing_leaves_matplotlib_as_it_was() -> None:
     before = dict(rcParams)
     png_bytes(picture_rows([[("a", PICTURE)]]))

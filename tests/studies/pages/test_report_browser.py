@@ -1,6 +1,7 @@
 """The report in headless Chromium: what the browser refuses, what the controls change, what is on the screen."""
 
 import json
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,7 +19,7 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 from studies.metrics.flip import flip
 from studies.pages import report_text as text
 from studies.pages.report import render_report
-from studies.pages.report_compare import Comparison, counts, first_comparison, verdicts
+from studies.pages.report_compare import CAMERA, comparisons, groups_of
 from studies.pages.report_data import ReportData
 from studies.pages.report_pictures import ReportPictures, opened
 
@@ -97,6 +98,7 @@ def pick(page: Any, control: str, value: object) -> None:
     page.value(f"(() => {{ const one = {control}; one.value = {value!r}; one.dispatchEvent(new Event('input')) }})()")
 
 
+@pytest.mark.thorough
 def test_page_is_quiet_and_asks_for_nothing(browser: Any, report: Path) -> None:
     page = Page(browser, report)
     page.value("Promise.all([...document.images].map((image) => image.decode()))")
@@ -105,6 +107,7 @@ def test_page_is_quiet_and_asks_for_nothing(browser: Any, report: Path) -> None:
     assert page.complaints() == []
 
 
+@pytest.mark.thorough
 def test_it_opens_with_the_wipe_at_512_pixels_where_something_is_seen(browser: Any, report: Path) -> None:
     page = Page(browser, report, height=800)
     results = SAMPLE.sample_report()
@@ -120,6 +123,7 @@ def test_it_opens_with_the_wipe_at_512_pixels_where_something_is_seen(browser: A
     assert page.value("document.documentElement.scrollHeight") < 6 * 800
 
 
+@pytest.mark.thorough
 def test_slider_by_keyboard_changes_picture_and_numbers(browser: Any, report: Path) -> None:
     page = Page(browser, report)
     results = SAMPLE.sample_report()
@@ -137,6 +141,7 @@ def test_slider_by_keyboard_changes_picture_and_numbers(browser: Any, report: Pa
     assert page.complaints() == []
 
 
+@pytest.mark.thorough
 def test_any_two_are_compared_and_the_truth(browser: Any, report: Path) -> None:
     page = Page(browser, report)
     results = SAMPLE.sample_report()
@@ -144,7 +149,7 @@ def test_any_two_are_compared_and_the_truth(browser: Any, report: Path) -> None:
     pick(page, "byId('level')", 0)
     pick(page, "byId('b')", "truth")
     found = shown(page)
-    assert found["names"] == ["A: Interleaved", "B: Truth"]
+    assert found["names"] == ["A: Interleaved", "B: Reference, 256 samples"]
     assert found["a"] == row_of(results, 14)
     truth = opened(standard()[1].files["truth"])[5]
     assert found["b"] == [int(value) for pixel in truth for value in (*pixel, 255)]
@@ -158,6 +163,7 @@ def test_any_two_are_compared_and_the_truth(browser: Any, report: Path) -> None:
     assert page.complaints() == []
 
 
+@pytest.mark.thorough
 def test_loupe_and_pixel_values_are_those_of_the_picture(browser: Any, report: Path) -> None:
     page = Page(browser, report, height=800)
     results = SAMPLE.sample_report()
@@ -182,6 +188,7 @@ def test_loupe_and_pixel_values_are_those_of_the_picture(browser: Any, report: P
     assert page.value("[byId('column').value, byId('row').value]") == ["20", "30"], "two screen pixels each"
 
 
+@pytest.mark.thorough
 def test_error_maps_are_ciede2000_and_flip_of_each_pixel(browser: Any, report: Path) -> None:
     page = Page(browser, report)
     results = SAMPLE.sample_report()
@@ -204,6 +211,7 @@ def test_error_maps_are_ciede2000_and_flip_of_each_pixel(browser: Any, report: P
     assert page.complaints() == []
 
 
+@pytest.mark.thorough
 def test_ciede2000_is_sharmas_on_colours_where_hues_turn(browser: Any, report: Path) -> None:
     """Some of the pairs of table 1 of Sharma, Wu & Dalal 2005, made to catch wrong means of hues."""
     pairs = [
@@ -219,6 +227,7 @@ def test_ciede2000_is_sharmas_on_colours_where_hues_turn(browser: Any, report: P
         assert page.value(f"deltaE({list(one)}, {list(other)}, 0)") == pytest.approx(wanted, abs=1e-4)
 
 
+@pytest.mark.thorough
 def test_wipe_and_a_or_b(browser: Any, report: Path) -> None:
     page = Page(browser, report)
     page.value("document.documentElement.style.scrollBehavior = 'auto'; byId('stage').scrollIntoView()")
@@ -238,10 +247,11 @@ def test_wipe_and_a_or_b(browser: Any, report: Path) -> None:
     page.value("document.querySelector('[name=view][value=side]').click()")
     shown(page)
     names = page.value("[...document.querySelectorAll('#side figcaption')].map((one) => one.textContent)")
-    assert names == ["Interleaved", "Bayer", "Truth"]
+    assert names == ["Interleaved", "Bayer", "Reference, 256 samples"]
     assert page.value("getComputedStyle(byId('pair')).display") == "none"
 
 
+@pytest.mark.thorough
 def test_fits_the_window(browser: Any, report: Path) -> None:
     page = Page(browser, report)
     for dark in (False, True):
@@ -256,48 +266,121 @@ def test_fits_the_window(browser: Any, report: Path) -> None:
     assert page.value(hint) == "none"
 
 
-def test_verdicts_of_the_script_are_those_of_the_page_and_of_python(browser: Any, tmp_path: Path) -> None:
-    """The script draws the same tables as are written without it; and counts as Python does what it alone shows."""
-    cameras = ("interleaved", "bayer", "ple_rgbw", "ple_bayer")
+@cache
+def compared() -> ReportData:
+    """A report of four cameras, two sensors and three seeds, without pictures in it."""
 
     def moved(made: Any) -> Any:
         at = [ord(letter) for letter in f"{made.sensor}{made.level}{made.processor}"]
         draw = np.random.default_rng([*at, made.seed]).standard_normal
-        known = {metric.key: 20 + 0.3 * at[-1] % 3 + draw() for metric in text.METRICS[:8]}
+        known = {metric.key: 20 + metric.seen * (0.4 * (sum(at) % 5) + 0.1 * draw()) for metric in text.METRICS[:8]}
         return replace(made, **known)
 
+    cameras = ("interleaved", "bayer", "ple_rgbw", "ple_bayer")
     results = SAMPLE.sample_report(moved, cameras=cameras, seeds=(0, 1, 2))
-    results = replace(results, cells=tuple(replace(cell, picture=None) for cell in results.cells))
-    file = tmp_path / "report.html"
-    file.write_text(render_report(results, SAMPLE.sample_pictures(results)), encoding="utf-8")
+    return replace(results, cells=tuple(replace(cell, picture=None) for cell in results.cells))
+
+
+@pytest.fixture(scope="module")
+def four(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of `compared`."""
+    file: Path = tmp_path_factory.mktemp("four") / "report.html"
+    file.write_text(render_report(compared(), SAMPLE.sample_pictures(compared())), encoding="utf-8")
+    return file
+
+
+def test_the_scripts_tables_are_those_of_the_page_and_signs_turn_with_a_and_b(browser: Any, four: Path) -> None:
+    """The script draws what is written without it; with A and B swapped every lead has the other sign."""
     read = "[...document.querySelectorAll('#verdicts tr')].map((row) => [...row.children].map((cell) => [cell.className, cell.textContent.trim()]))"  # noqa: E501
-    written = Page(browser, file, script=False).value(read)
-    page = Page(browser, file)
+    written = Page(browser, four, script=False).value(read)
+    page = Page(browser, four)
     assert page.value(read) == written
     assert len(written) == 2 * 9
-    outcomes = {cell[0].split()[-1] for row in written for cell in row[1:]}
-    assert {"ahead", "level", "behind"} <= outcomes
-    for a, b in ((0, 1), (3, 0)):
+    assert {"ahead", "level", "behind"} <= {cell[0].split()[-1] for row in written for cell in row[1:]}
+    pick(page, "byId('a')", 3)
+    pick(page, "byId('b')", 2)
+    other = {"ahead": "behind", "behind": "ahead", "▲": "▼", "▼": "▲", "+": "−", "−": "+"}
+    for before, after in zip(written, page.value(read), strict=True):
+        turned = [
+            ["".join(other.get(part, part) for part in re.split(r"(ahead|behind|[▲▼+−])", words)) for words in cell]
+            for cell in before
+        ]
+        assert after == (turned if before[1][0] != "n" else before)
+
+
+def test_a_beside_every_other_has_the_leads_of_every_place_and_counts(browser: Any, four: Path) -> None:
+    page, report = Page(browser, four), compared()
+    found = comparisons(report)[CAMERA]
+    for a in (0, 2):
+        pick(page, "byId('a')", a)
+        for metric in (text.PSNR, text.FLIP):
+            pick(page, "byId('beside-metric')", metric.key)
+            read = "[...document.querySelectorAll('#beside tbody tr')].map((row) => [...row.children].map((cell) => cell.textContent))"  # noqa: E501
+            rows = page.value(read)
+            assert len(rows) == 3 * 2, "three others, two sensors"
+            for index, row in enumerate(rows):
+                other, group = [value for value in range(4) if value != a][index // 2], index % 2
+                lead = groups_of(report, CAMERA, a, other)[group].pair.leads[metric.key]
+                shown = [cell.split()[-1].replace("−", "-") for cell in row[1:8]]
+                assert [float(value) for value in shown] == pytest.approx(
+                    lead.mean.tolist(), abs=0.51 * 10**-metric.digits
+                )
+                assert [cell.split(",")[0] for cell in row[1:8]] == lead.outcome.tolist()
+                if group == 0:
+                    counted = found["counts"][f"{min(a, other)} {max(a, other)}"][metric.key]
+                    assert row[8] == " / ".join(map(str, counted if a < other else counted[::-1]))
+
+
+def test_question_answer_and_first_chart_follow_the_menus(browser: Any, four: Path) -> None:
+    page, answers = Page(browser, four), comparisons(compared())
+    said = "['place', 'said', 'light', 'elsewhere', 'times'].map((id) => byId(id).textContent)"
+    mark = "document.querySelector('#lead-chart .mark title').textContent"
+    for a, b, sensor in ((2, 3, 0), (2, 3, 1), (0, 1, 1), (3, 0, 0)):
         pick(page, "byId('a')", a)
         pick(page, "byId('b')", b)
-        of = replace(first_comparison(results), a=a, b=b)
-        drawn = [[cell[0].split()[-1] for cell in row[1:]] for row in page.value(read) if row[1][0] != "n"]
-        wanted = [[one.outcome for one in verdicts(results, of, metric, row)]
-                  for row in range(2) for metric in text.METRICS[:8]]  # fmt: skip
-        assert drawn == wanted
-        table = page.value("[...document.querySelectorAll('#counts tbody tr')].map((row) => [...row.querySelectorAll("
-                           "'td .sr')].map((one) => one.textContent))")  # fmt: skip
-        others = [value for value in range(4) if value != a]
-        assert table == [
-            [_said(counts(results, Comparison(of.compared, of.along, of.rows, a, other), metric)) for other in others]
-            for metric in text.METRICS[:8]
-        ]
+        pick(page, "document.querySelector('[data-axis=\"2\"]')", sensor)
+        of = answers[CAMERA]
+        words = of["answers"][f"{a} {b}"][sensor]
+        place = ["table1_output", "low_noise"][sensor]
+        assert page.value(said) == [place, words["said"], words["light"], of["over"][f"{a} {b}"], words["times"]]
+        names = [text.camera_name(compared().cameras[value]) for value in (a, b)]
+        assert page.value("document.querySelector('.question').textContent").startswith(" beside ".join(names))
+        lead = groups_of(compared(), CAMERA, a, b)[sensor].pair.leads["psnr_db"]
+        outcome = str(lead.outcome[0])
+        words = text.lead_text(text.PSNR, float(lead.mean[0]), clear=outcome in ("ahead", "behind"))
+        assert page.value(mark) == f"moonlight: {outcome}, {words}"
+    assert page.value("document.querySelector('h1').textContent") == "What is seen?"
+    # the band of what nobody sees is twice 0.5 dB high
+    scale = "(() => { const ticks = [...document.querySelectorAll('#lead-chart .grid')].map((line) => Number(line.getAttribute('y1'))); const texts = [...document.querySelectorAll('#lead-chart text[text-anchor=end]')].map((one) => Number(one.textContent.replace('−', '-'))).filter(Number.isFinite); return (texts[1] - texts[0]) / (ticks[0] - ticks[1]) })()"  # noqa: E501
+    height = page.value("Number(document.querySelector('#lead-chart .unseen').getAttribute('height'))")
+    assert height * page.value(scale) == pytest.approx(2 * 0.5, rel=1e-6)
+    pick(page, "byId('b')", "truth")
+    assert page.value(said)[1:4] == ["", "", ""]
+    pick(page, "byId('compared')", 5)
+    assert page.value("byId('level-name').textContent") == "moonlight beside street light"
+    assert page.value(said)[1] == "", "light levels are no rivals"
 
 
-def _said(found: dict[str, int]) -> str:
-    return ", ".join(f"{found[outcome]} {outcome}" for outcome in ("ahead", "level", "behind"))
+def test_all_three_details_are_drawn_before_the_error_maps(browser: Any, report: Path) -> None:
+    page = Page(browser, report)
+    page.value("drawing")
+    drawn = """(() => {
+      errorsOf = () => new Promise(() => {});
+      byId("column").value = 70;
+      drawLoupe();
+      return new Promise((done) => setTimeout(() => done(["A", "B", "T"].map((name) =>
+        [...byId(`loupe-${name}`).getContext("2d").getImageData(0, 0, 32, 16).data].filter(
+          (value, at) => at % 4 === 3 && value).length)))); })()"""
+    assert page.value(drawn) == [512, 512, 512]
 
 
+def test_a_column_outside_the_picture_goes_back_to_its_last(browser: Any, report: Path) -> None:
+    page = Page(browser, report)
+    page.value("(() => { byId('column').value = 9999; byId('column').dispatchEvent(new Event('change')) })()")
+    assert page.value("byId('column').value") == "255"
+
+
+@pytest.mark.thorough
 def test_exposures_are_chosen_and_compared(browser: Any, axes: Path) -> None:
     page = Page(browser, axes)
     results = SAMPLE.sample_axes()
@@ -332,6 +415,7 @@ def views(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.mark.thorough
 def test_choice_of_scene_and_light_changes_pictures_truth_and_numbers(browser: Any, views: Path) -> None:
     page = Page(browser, views)
     pick(page, "byId('level')", 0)
@@ -355,6 +439,7 @@ def test_choice_of_scene_and_light_changes_pictures_truth_and_numbers(browser: A
     assert page.requests() == []
 
 
+@pytest.mark.thorough
 def test_a_picture_left_out_is_shown_from_its_file_or_said_to_be_gone(browser: Any, views: Path) -> None:
     page = Page(browser, views)
     for axis, value in ((0, 1), (1, 1), (2, 1)):
@@ -383,6 +468,7 @@ def shown_safely(page: Any) -> dict[str, Any]:
     return value
 
 
+@pytest.mark.thorough
 def test_choice_of_metrics_and_rows_shows_their_charts(browser: Any, views: Path) -> None:
     page = Page(browser, views)
     drawn = "[...document.querySelectorAll('[data-metric=%s]')].filter((one) => one.getClientRects().length).length"
@@ -400,6 +486,7 @@ def test_choice_of_metrics_and_rows_shows_their_charts(browser: Any, views: Path
     assert page.complaints() == []
 
 
+@pytest.mark.thorough
 def test_every_control_has_a_name_for_a_screen_reader(browser: Any, axes: Path) -> None:
     page = Page(browser, axes)
     shown(page)
@@ -419,6 +506,7 @@ def test_every_control_has_a_name_for_a_screen_reader(browser: Any, axes: Path) 
     assert all(node["name"]["value"] for node in pictures)
 
 
+@pytest.mark.thorough
 def test_everything_is_reached_by_keyboard_and_the_focus_is_seen(browser: Any, axes: Path) -> None:
     page = Page(browser, axes)
     shown(page)
@@ -433,6 +521,7 @@ def test_everything_is_reached_by_keyboard_and_the_focus_is_seen(browser: Any, a
     assert [name for name in reached if name in order] == order
 
 
+@pytest.mark.thorough
 def test_print_holds_every_level_and_no_control(browser: Any, axes: Path) -> None:
     page = Page(browser, axes, width=720)
     shown(page)
@@ -459,6 +548,7 @@ def test_screen_is_not_blank(browser: Any, report: Path, dark: bool) -> None:
     assert np.unique(colours).size > 5000, "noise pictures hold many colours"
 
 
+@pytest.mark.thorough
 def test_without_script_summary_pictures_and_numbers_stand(browser: Any, report: Path) -> None:
     page = Page(browser, report, script=False)
     visible = (
@@ -472,11 +562,13 @@ def test_without_script_summary_pictures_and_numbers_stand(browser: Any, report:
     assert page.value("location.hash") == "#overview"
 
 
+@pytest.mark.thorough
 def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
     results, pictures = standard()
     results = replace(
         results,
         name=HOSTILE,
+        title=HOSTILE,
         scenes=(replace(results.scenes[0], name=HOSTILE),),
         levels=(replace(results.levels[0], name=HOSTILE), *results.levels[1:]),
         notes=(HOSTILE,),
@@ -494,6 +586,7 @@ def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
     assert page.complaints() == []
 
 
+@pytest.mark.thorough
 def test_policy_refuses_injected_script_and_fetch(browser: Any, report: Path) -> None:
     page = Page(browser, report)
     page.value(

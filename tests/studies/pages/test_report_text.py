@@ -61,10 +61,11 @@ def test_times_choose_their_unit() -> None:
     assert said == ["66 ms", "0.12 ms", "41.2 s", "0 s"]
 
 
-def test_an_exposure_is_named_with_a_white_balance_that_isnt_gray_worlds() -> None:
-    ways = [text.way_name(*way) for way in (("auto", "gray-world"), ("auto:W", "gray-world"), ("2ms", "as-shot"))]
-    assert text.group_names(["s"], ways) == [
+def test_exposures_and_white_balances_are_named_where_there_are_several() -> None:
+    ways = [text.way_name("auto"), text.way_name("2ms", 4)]
+    assert text.group_names(["s"], ways, ["as-shot"]) == [
         "s, exposure automatic",
-        "s, exposure automatic for W",
-        "s, exposure 2\N{NO-BREAK SPACE}ms, white balance as-shot",
+        "s, exposure 2\N{NO-BREAK SPACE}ms, 4 frames",
     ]
+    balances = ["as-shot", "gray-world"]
+    assert text.group_names(["s"], ["auto"], balances) == ["s, balanced as shot", "s, balanced by Gray World"]

@@ -2,6 +2,7 @@
 
 from base64 import b64decode
 
+import pytest
 from report_sample import sample_pictures, sample_report
 
 from sensor.presets import preset
@@ -25,6 +26,7 @@ def test_an_snr_that_no_light_gives_is_a_dash(monkeypatch):
     assert {row[2:] for row in snr_rows(SENSORS)} == {(MISSING, MISSING, MISSING)}
 
 
+@pytest.mark.thorough
 def test_the_plot_lies_in_its_address_and_both_in_the_report():
     head, _, content = snr_image(SENSORS).partition(",")
     assert head == "data:image/svg+xml;base64"

@@ -90,6 +90,7 @@ def test_a_rows_seconds_are_each_of_its_own_step(work: Work, tmp_path: Path) -> 
     assert sum(row.first_s for row in found) == sum(seconds for _, seconds in work.done) - 4 * 111.0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("workers", [1, 2])
 def test_the_reports_stages_add_up_to_the_runs_wall_clock(workers: int, work: Work, tmp_path: Path) -> None:
     """A run that is ended and gone on with; of two workers, each second of work is half a second of the clock's."""
@@ -184,6 +185,7 @@ print(json.dumps(told))
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(backend() == "numpy", reason="nothing is compiled without a backend")
 def test_no_kernel_is_compiled_or_loaded_within_the_seconds_told(tmp_path: Path) -> None:
     """From darkness over some saturated pixels to all, by Dr.Jit's own history, in a process that starts without."""

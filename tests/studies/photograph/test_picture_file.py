@@ -8,11 +8,10 @@ import pytest
 import tifffile
 from PIL import Image, ImageCms
 
-from isp.colour.encoding import ENCODINGS, encode
+from isp.colour.encoding import ENCODINGS, encode, quantise
 from rodcone.errors import InputError
-from studies.photograph.icc import icc_profile
 from studies.photograph.picture_file import to_tiff, write_picture
-from studies.photograph.png import to_png
+from studies.photograph.png import icc_profile, to_png
 
 LINEAR = np.random.default_rng(5).uniform(0.05, 0.7, (7, 90, 3))
 
@@ -33,7 +32,7 @@ def test_littlecms_reads_the_profile_and_takes_the_picture_to_srgb(name: str) ->
 
 
 def test_a_p3_png_says_so_twice() -> None:
-    content = to_png(encode(LINEAR, "display-p3"), 16, "display-p3")
+    content = to_png(quantise(encode(LINEAR, "display-p3"), 16), "display-p3")
     # cICP comes before the picture: primaries 12 (P3, D65), transfer 13 (sRGB), RGB, full range (ITU-T H.273)
     assert b"\0\0\0\4cICP\x0c\x0d\0\1" in content.split(b"IDAT")[0]
     assert b"sRGB\0" not in content
@@ -42,7 +41,7 @@ def test_a_p3_png_says_so_twice() -> None:
 
 
 def test_an_srgb_png_says_srgb_alone() -> None:
-    content = to_png(encode(LINEAR, "srgb"))
+    content = to_png(quantise(encode(LINEAR, "srgb")))
     assert b"\0\0\0\1sRGB\0" in content
     assert b"iCCP" not in content
     assert b"cICP" not in content
@@ -52,13 +51,13 @@ def test_an_srgb_png_says_srgb_alone() -> None:
 @pytest.mark.parametrize("bits", [8, 16])
 def test_a_tiff_holds_the_numbers_and_the_profile(bits: int, name: str) -> None:
     encoded = encode(LINEAR, name)
-    with tifffile.TiffFile(BytesIO(to_tiff(encoded, bits, name))) as file:
+    with tifffile.TiffFile(BytesIO(to_tiff(quantise(encoded, bits), name))) as file:
         page = file.pages[0]
         np.testing.assert_array_equal(page.asarray(), np.rint(encoded * (2**bits - 1)))
         assert (page.bitspersample, page.photometric.name) == (bits, "RGB")
         assert page.iccprofile == icc_profile(ENCODINGS[name])
     if bits == 8:
-        with Image.open(BytesIO(to_tiff(encoded, bits, name))) as picture:
+        with Image.open(BytesIO(to_tiff(quantise(encoded, bits), name))) as picture:
             np.testing.assert_array_equal(np.asarray(picture), np.rint(encoded * 255))
 
 

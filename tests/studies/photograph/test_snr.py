@@ -6,7 +6,7 @@ from math import inf, pi
 import numpy as np
 import pytest
 
-from sensor.binning import as_read
+from sensor.binning import binned
 from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.presets import low_noise, table1_output
@@ -76,8 +76,8 @@ def test_four_pixels_that_bin_take_a_quarter_of_the_light_and_their_read_noise_o
         sensor.pixel, prnu=0.0, dsnu_e=0.0, dark_current_e_per_s=0.0, read_noise_e=10.0, column_gain_spread=0.0
     )
     plain = replace(sensor, pixel=quiet)
-    quad = replace(plain, binning=binning)
-    roundings_e2 = 4 * plain.gain_e_per_dn**2 / 12 if binning == "digital" else as_read(quad).gain_e_per_dn ** 2 / 12
+    quad = binned(plain, binning)
+    roundings_e2 = 4 * plain.gain_e_per_dn**2 / 12 if binning == "digital" else quad.gain_e_per_dn**2 / 12
     dark_e2 = (4 if binning == "digital" else 1) * 100.0 + roundings_e2
     one, four = (next(x for x in light_for_snr(5.0, s, "D65", EXPOSURE_S) if x.channel == "G") for s in (plain, quad))
     assert four.electrons == pytest.approx(12.5 + np.sqrt(12.5**2 + 25 * dark_e2), rel=1e-9)

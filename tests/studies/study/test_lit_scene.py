@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from render.error_estimates import Halves
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import as_transport
@@ -34,7 +35,7 @@ def transport(luminances: tuple[float, float] = (100.0, 3.0)) -> Transport:
     halves = np.zeros((2, NM.size, 2, 2), dtype=np.float32)
     halves[0, :, :, 0] = halves[1, :, :, 1] = 1.0
     groups = {name: LightGroup((), illuminant("D65") * x) for name, x in zip("ab", luminances, strict=True)}
-    return replace(flat, radiance=halves, half_difference=0 * halves, variance=0 * halves, groups=groups)
+    return replace(flat, light=Halves(halves, 0 * halves), variance=0 * halves, groups=groups)
 
 
 @pytest.mark.parametrize("spectrum", ["A", "F11", "LED-B3"])

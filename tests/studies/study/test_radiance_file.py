@@ -16,14 +16,14 @@ NM = 385.0 + 10 * np.arange(40)
 def ramp(path: Path, height: int = 20, width: int = 26, error: float = 0.0) -> Path:
     """Picture in equal-energy greys, darker from left to right."""
     values = np.broadcast_to(np.linspace(1.0, 0.05, width)[None, :, None], (height, width, NM.size))
-    write_exr(path, SpectralRadiance(values * 1e-3, NM, error))
+    write_exr(SpectralRadiance(values * 1e-3, NM, error), path)
     return path
 
 
 def test_what_is_assumed_of_a_file_is_told(tmp_path: Path) -> None:
     path = tmp_path / "a.exr"
     uneven = np.array([450.0, 500.0, 600.0])
-    write_exr(path, SpectralRadiance(np.ones((16, 16, 3)), uneven, width_nm=np.ones(3)))
+    write_exr(SpectralRadiance(np.ones((16, 16, 3)), uneven, width_nm=np.ones(3)), path)
     path.write_bytes(path.read_bytes().replace(b"rodconeBands_nm", b"rodconeBandz_nm"))
     transport, light, told = open_radiance_file(path, None)
     assert transport.width_nm.tolist() == [50, 75, 100]

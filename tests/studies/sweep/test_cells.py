@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isp.colour.colour_fit import ColourFit
 from rodcone.digests import digest
 from studies.study.study import Condition, SceneChoice
 from studies.sweep.cells import cell_key, device_stream, exposure_stream, labels
@@ -62,11 +61,9 @@ def test_streams_are_those_of_the_first_release() -> None:
 
 
 def test_a_key_changes_with_each_thing_that_decides_a_picture() -> None:
-    fit = ColourFit(("R", "G", "B"), np.ones(3), np.eye(3), np.eye(3))
-    other_fit = replace(fit, mean=np.array([1.0, 1.0, np.nextafter(1.0, 2.0)]))
     made_by = Provenance("llvm_ad_spectral", "llvm", "numpy", "{}")
-    given = (AT, "bayer", 0, "frame", 25.0, 0.01, fit, made_by)
-    others = (replace(AT, level="1lux"), "interleaved", 1, "other", 25.1, 0.011, other_fit)
+    given = (AT, "bayer", 0, "frame", 25.0, 0.01, made_by)
+    others = (replace(AT, level="1lux"), "interleaved", 1, "other", 25.1, 0.011)
     keys = [cell_key(*given)]
     for place, other in enumerate(others):
         changed = list(given)
@@ -74,7 +71,7 @@ def test_a_key_changes_with_each_thing_that_decides_a_picture() -> None:
         keys.append(cell_key(*changed))  # type: ignore[arg-type]
     for field in ("variant", "readout_engine", "development_engine", "versions"):
         keys.append(cell_key(*given[:-1], replace(made_by, **{field: "another"})))  # type: ignore[arg-type]
-    assert len(set(keys)) == 1 + 7 + 4
+    assert len(set(keys)) == 1 + 6 + 4
     assert cell_key(*given) == keys[0]
 
 
@@ -86,6 +83,6 @@ def test_a_row_names_files_without_their_folder() -> None:
         "level": "1cd/m2",
         "exposure": "auto",
         "sensor": "mine.toml",
-        "white_balance": "gray-world",
+        "white_balance": "as-shot",
         "frames": 1,
     }

@@ -132,6 +132,7 @@ def test_a_cluster_that_goes_away_is_told_in_one_line_and_what_is_done_is_kept(
 
 
 def test_a_cluster_that_does_not_answer_is_told_in_time() -> None:
+    pytest.importorskip("distributed", reason="rodcone[cluster] is not installed")
     began = time.monotonic()
     with (
         pytest.raises(InputError, match=r"doesn't answer within 0\.5 s") as told,
@@ -150,7 +151,7 @@ def test_what_is_no_address_is_refused(address: str) -> None:
 
 
 def test_settings_for_tls_that_do_not_fit_the_address_are_told(tmp_path: Path) -> None:
-    import dask
+    dask = pytest.importorskip("dask", reason="rodcone[cluster] is not installed")
 
     with pytest.raises(InputError, match="needs certificates"), on_cluster("tls://127.0.0.1:8786", 0.5):
         pass

@@ -29,6 +29,7 @@ def changed(folder: Path, path: Path) -> bool:
     return after != before
 
 
+@pytest.mark.thorough
 def test_all_that_making_a_picture_imports_decides_it() -> None:
     """Measured in a process of its own: whatever of `studies` making a frame and running a cell load."""
     script = (
@@ -40,18 +41,21 @@ def test_all_that_making_a_picture_imports_decides_it() -> None:
     assert {Path(file).resolve() for file in loaded} <= set(deciding_modules())
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("package", ["rodcone", "render", "scenes", "sensor", "isp"])
 def test_every_module_before_the_studies_decides(copy: Path, package: str) -> None:
     paths = sorted((copy / package).rglob("*.py"))
     assert [path for path in (paths[0], paths[-1]) if not changed(copy, path)] == []
 
 
+@pytest.mark.thorough
 def test_a_byte_of_any_deciding_module_changes_the_version(copy: Path) -> None:
     deciding = deciding_modules(copy)
     assert {"quality", "truth", "camera", "png", "lit_scene", "run_cell"} <= {path.stem for path in deciding}
     assert [path for path in deciding if not changed(copy, path)] == []
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("folder", ["pages", "commands", "paper"])
 def test_what_shows_results_decides_nothing(copy: Path, folder: str) -> None:
     paths = sorted((copy / "studies" / folder).rglob("*.py"))

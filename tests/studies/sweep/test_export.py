@@ -5,8 +5,6 @@ from dataclasses import asdict, replace
 from io import StringIO
 from pathlib import Path
 
-import pandas as pd
-import pyarrow.parquet
 import pytest
 from sweep_sample import ROW
 
@@ -31,14 +29,16 @@ def test_csv_holds_every_value_and_numbers_as_they_are() -> None:
 
 
 def test_parquet_and_pandas_hold_the_same_values(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas", reason="rodcone[pandas] is not installed")
+    parquet = pytest.importorskip("pyarrow.parquet", reason="rodcone[parquet] is not installed")
     table = [ROW, replace(ROW, key="01", illuminance_lux=500.0)]
     write_table(table, tmp_path / "t.parquet")
-    read = pyarrow.parquet.read_table(tmp_path / "t.parquet").to_pylist()
+    read = parquet.read_table(tmp_path / "t.parquet").to_pylist()
     assert read == [asdict(row) for row in table]
     frame = to_pandas(table)
     assert list(frame.columns) == list(COLUMNS)
     assert frame.loc[1, "illuminance_lux"] == 500.0
-    assert pd.isna(frame.loc[0, "illuminance_lux"])
+    assert pandas.isna(frame.loc[0, "illuminance_lux"])
     assert frame["exposure_s"].tolist() == [ROW.exposure_s] * 2
 
 

@@ -19,14 +19,13 @@ from rodcone.jit import backend, dr
 from rodcone.llvm import LIBLLVM
 from studies.budget.model_plan import Plan
 from studies.commands.cli import main
-from studies.pages.duels import contests_of
 from studies.pages.report_sweep import sweep_report
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import provenance
 from studies.sweep.cells import Cell
 from studies.sweep.database import add, open_results
 from studies.sweep.export import read_rows
-from studies.sweep.provenance import Provenance, versions
+from studies.sweep.provenance import Provenance, require_alike, versions
 from studies.sweep.row import Row
 from studies.sweep.run_cell import run_cell
 from studies.sweep.run_sweep import sweep
@@ -60,6 +59,7 @@ def kernels_in(work: Callable[[], Row]) -> tuple[Row, int]:
         return row, len([one for one in dr.kernel_history() if "cache_hit" in one])
 
 
+@pytest.mark.sample(3)
 @pytest.mark.skipif(backend() == "numpy", reason="no kernel runs without a backend")
 @pytest.mark.parametrize("exact", [True, False])
 @pytest.mark.parametrize("name", [name for name, one in PROCESSORS.items() if one.extra is None])
@@ -116,6 +116,7 @@ print(json.dumps([row.threads, threads() - others, backend()]))
 """
 
 
+@pytest.mark.sample(1)
 @pytest.mark.skipif(backend() != "llvm", reason="Dr.Jit's threads are LLVM's")
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted in /proc")
 @pytest.mark.parametrize("count", [1, 3])
@@ -127,6 +128,7 @@ def test_threads_told_are_those_that_the_working_process_has(count: int, tmp_pat
     assert json.loads(done.stdout.splitlines()[-1]) == [count, count, "llvm"]
 
 
+@pytest.mark.thorough
 def test_rows_of_two_processes_tell_their_own_threads_not_the_parents(tmp_path: Path) -> None:
     SAMPLE.swept(SAMPLE.small_study(tmp_path), tmp_path / "out", partial(run_in_processes, workers=2))
     found = read_rows(tmp_path / "out")
@@ -154,6 +156,7 @@ def restored() -> Iterator[None]:
     provenance.versions.cache_clear()
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("restored")
 def test_cells_of_other_versions_are_made_anew_and_kept_where_that_is_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -174,13 +177,12 @@ def test_cells_of_other_versions_are_made_anew_and_kept_where_that_is_asked_for(
     told = [json.loads(row.versions)["numpy"] for row in read_rows(out, everything=True)]
     assert sorted(told) == ["1.9"] + 4 * [metadata.version("numpy")]
     assert {json.loads(row.versions)["numpy"] for row in read_rows(out)} == {metadata.version("numpy")}
-    assert len(contests_of([replace(row, processor=name) for row in read_rows(out) for name in ("a", "b")])) == 2
     assert sweep_report(out)[0].environment["numpy"] == metadata.version("numpy")
     assert SAMPLE.swept(study, out).made == 0
     assert len(read_rows(out, everything=True)) == 4, "removed where it isn't asked for"
 
 
-def test_a_report_or_ranking_over_mixed_cells_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_a_report_over_mixed_cells_is_refused_in_one_line(tmp_path: Path) -> None:
     study, out = SAMPLE.small_study(tmp_path), tmp_path / "out"
     SAMPLE.swept(study, out)
     for change, words in (
@@ -192,7 +194,7 @@ def test_a_report_or_ranking_over_mixed_cells_is_refused_in_one_line(tmp_path: P
         found = read_rows(out)
         mixed = [*found[:-1], replace(found[-1], **change)]  # type: ignore[arg-type]
         with pytest.raises(InputError, match=words) as told:
-            contests_of(mixed)
+            require_alike(mixed)
         assert "\n" not in str(told.value)
     with open_results(out) as base:
         add(base, replace(found[-1], variant="llvm_ad_spectral"))
@@ -216,6 +218,7 @@ def in_numpy(*arguments: str) -> str:
     return done.stdout
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(backend() != "llvm", reason="two engines are to meet in one folder")
 def test_a_folder_swept_without_a_backend_and_then_with_one_holds_no_mean_of_both(tmp_path: Path) -> None:
     """The second sweep makes all anew; each row tells its own engine, threads and LLVM."""

@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from multiprocessing import active_children
@@ -34,8 +34,8 @@ from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import run_cell as cell_run
 from studies.sweep.cells import Cell
 from studies.sweep.database import open_results, rows
+from studies.sweep.folder import at_work
 from studies.sweep.row import Row
-from studies.sweep.run_sweep import LEFT_S
 from studies.sweep.workers import run, run_in_processes
 
 content, half_pictures, here, parts_left, small_study, swept = (
@@ -132,6 +132,7 @@ def test_a_wider_study_leaves_the_cells_it_shares_as_they_are(tmp_path: Path) ->
     assert set(before) < set(content(tmp_path / "out"))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
 def test_an_ended_run_is_gone_on_with_and_ends_as_one_never_ended(error: type[BaseException], tmp_path: Path) -> None:
     study = small_study(tmp_path)
@@ -185,6 +186,7 @@ def rows_of(out: Path) -> list[Row]:
         return rows(base)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("column", "cells"), [("picture", 1), ("truth", 4)])
 def test_a_picture_that_is_gone_is_made_again(column: str, cells: int, tmp_path: Path) -> None:
     """All four cells are compared with one truth: white is white at both levels."""
@@ -197,20 +199,42 @@ def test_a_picture_that_is_gone_is_made_again(column: str, cells: int, tmp_path:
     assert (out / "pictures" / getattr(rows_of(out)[0], column)).exists()
 
 
-def test_what_a_killed_run_had_begun_to_write_is_cleared_when_it_is_old(tmp_path: Path) -> None:
+def test_what_a_killed_run_left_is_cleared_and_nothing_else(tmp_path: Path) -> None:
+    """A sweep at work in the same folder keeps what it is writing; files of others stay, whatever their names."""
     study, out = small_study(tmp_path), tmp_path / "out"
     swept(study, out)
-    old, new, file = out / "pictures" / "ab" / ".part-x", out / "frames" / ".part-y", out / "renders" / "z.part"
-    for path in (old, new, file.parent):
-        path.mkdir(parents=True)
-    (old / "half.png").write_bytes(b"half")
-    file.write_bytes(b"half")
-    for path in (old, file):
-        os.utime(path, (time.time() - 2 * LEFT_S,) * 2)
+    name = ".rodcone-0123456789abcdef"
+    left = [out / "pictures" / "ab" / f"{name}.png", out / "frames" / name, out / "pilots" / f"{name}.npz"]
+    kept = ["thesis.part/1.tex", "pictures/.part-x/a.png", "pictures/film.part", f"{name}.html", f"frames/{name}.d/a"]
+    for path in [*left, *(out / place for place in kept)]:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"half")
+        os.utime(path, (0, 0))
+    (out / "renders").mkdir(exist_ok=True)
+    (out / "renders" / name).symlink_to(out / kept[0])
     before = content(out)
+    with at_work(out):
+        for path in left:
+            path.write_bytes(b"half")
+        assert swept(study, out).made == 0
+        assert all(path.exists() for path in left)
     assert swept(study, out).made == 0
-    assert (old.exists(), new.exists(), file.exists()) == (False, True, False)
+    assert not any(path.exists() for path in left)
+    assert all((out / place).read_bytes() == b"half" for place in kept)
+    assert (out / "renders" / name).is_symlink()
     assert content(out) == before
+
+
+def test_a_folder_with_other_files_is_refused_and_left_as_it_was(tmp_path: Path) -> None:
+    out = tmp_path / "Downloads"
+    (out / "pictures").mkdir(parents=True)
+    (out / "film.part").write_bytes(b"half")
+    with pytest.raises(InputError, match=r"Downloads holds other files, such as 'film.part'"):
+        swept(small_study(tmp_path), out)
+    assert sorted(path.name for path in out.rglob("*")) == ["film.part", "pictures"]
+    (tmp_path / "new").mkdir()
+    (tmp_path / "new" / ".gitignore").write_text("*")
+    assert swept(small_study(tmp_path), tmp_path / "new").made == 4
 
 
 @pytest.mark.parametrize("damage", ["{", "{}", "[]", '{"light": 1, "auto_s": [], "white_cd_m2": "x"}'])
@@ -306,6 +330,7 @@ def test_a_finer_request_goes_on_from_the_coarser_render_and_makes_its_cells_ane
     assert 0 < fine.mc_share < coarse.mc_share
 
 
+@pytest.mark.thorough
 def test_two_processes_one_of_them_killed_give_what_one_gives(tmp_path: Path) -> None:
     study = small_study(tmp_path, seeds=tuple(range(6)))
     swept(study, tmp_path / "serial")
@@ -351,7 +376,8 @@ def started(script: Path, folder: Path, out: Path, workers: int) -> "subprocess.
         str(folder),
         str(out),
     ]
-    process = subprocess.Popen([*arguments, str(workers)], stdout=subprocess.PIPE, text=True, start_new_session=True)
+    pipe = subprocess.PIPE
+    process = subprocess.Popen([*arguments, str(workers)], stdout=pipe, stderr=pipe, text=True, start_new_session=True)
     assert process.stdout is not None
     with process.stdout as told:
         assert told.readline() == "ready\n"
@@ -401,6 +427,8 @@ def test_killed_at_ten_random_moments_and_gone_on_with_is_as_never_killed(worker
                 break
             time.sleep(0.1)
         assert running_in(process.pid) == []
+        with process.stderr or nullcontext("") as errors:
+            assert list(errors) == []  # such as a warning of semaphores, which multiprocessing has removed by now
         if (tmp_path / "out" / "ledger.sqlite").exists():
             with open_results(tmp_path / "out") as base:
                 grew.append(len(rows(base, everything=True)))

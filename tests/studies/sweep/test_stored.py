@@ -50,6 +50,7 @@ def flip(path: Path, place: int) -> None:
     path.write_bytes(bytes(content))
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", ["electrons", "errors", "truth"])
 def test_a_flipped_bit_in_what_cells_share_is_told_and_made_again(name: str, tmp_path: Path) -> None:
     """In the exponent of the last number: 16 binary orders, which no file format notices."""
@@ -72,6 +73,7 @@ def test_a_flipped_bit_in_what_cells_share_is_told_and_made_again(name: str, tmp
     assert np.array_equal(np.load(path), right)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(("column", "cells"), [("picture", 1), ("truth", 4)])
 @pytest.mark.parametrize("cut", [0, 1, -1])
 def test_a_picture_that_is_cut_is_made_again(column: str, cells: int, cut: int, tmp_path: Path) -> None:
@@ -162,6 +164,7 @@ def told_in_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -
     return code
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_damaged_ledger_is_one_line_and_no_row_is_another(
     name: str, whole: tuple[Path, list[Row]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -180,6 +183,7 @@ def test_a_damaged_ledger_is_one_line_and_no_row_is_another(
         assert [row.key for row in read_rows(out)] == [row.key for row in right], "made again where it had to be"
 
 
+@pytest.mark.thorough
 def test_a_sweep_of_two_scenes_ended_in_its_first_gives_a_report_that_counts_all_cells(tmp_path: Path) -> None:
     """After its first cell, of two seeds: no figure has all of its seeds, nor the second scene a picture's size."""
     SAMPLE.picture(tmp_path / "other.exr", (24, 16))

@@ -8,6 +8,7 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 
+from isp.colour.encoding import quantise
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
@@ -50,6 +51,13 @@ def test_means_and_intervals_are_those_of_the_seeds() -> None:
     ]
 
 
+def test_names_from_outside_are_shown_and_not_interpreted() -> None:
+    name = "<img src=x onerror=alert(1)>|[a](javascript:b)\n# `c`.exr"
+    (line,) = lines([replace(ROWS[0], scene=name)], HERE, ["scene"], ["psnr_db"], {})
+    row = markdown([line], ["scene"], ["psnr_db"]).splitlines()[2:]
+    assert row == [r"| &lt;img src=x onerror=alert(1)&gt;\|\[a\](javascript:b) # \`c\`.exr | 20.0 |"]
+
+
 def test_one_seed_has_no_interval_and_a_figure_that_a_seed_lacks_has_no_mean() -> None:
     (line,) = lines(ROWS[:1], HERE, [], ["psnr_db"], {})
     assert (line.means, line.halves) == ((20.0,), (None,))
@@ -80,7 +88,7 @@ def test_chart_colours_are_read_from_the_pictures(tmp_path: Path) -> None:
     linear = np.full((128, 128, 3), 0.2)
     for mask, colour in zip(masks, daylight_srgb(), strict=True):
         linear[mask] = colour
-    picture = keep(tmp_path / PICTURES, to_png(encode_srgb(linear)), ".png")
+    picture = keep(tmp_path / PICTURES, to_png(quantise(encode_srgb(linear))), ".png")
     row = replace(ROWS[0], scene="color_checker", picture=picture)
     (line,) = lines([row], tmp_path, [], ["daylight_delta_e"], {})
     # 8 bits, and cyan's and a few others' share beyond sRGB clipped: well under one, far from none

@@ -68,6 +68,7 @@ def cells(tmp_path: Path) -> list[Cell]:
         return [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("at_once", [1, 3, 100])
 def test_every_cell_comes_back_once(at_once: int, cells: list[Cell]) -> None:
     with ThreadPoolExecutor(2) as pool:
@@ -103,6 +104,7 @@ def test_a_broken_executor_tells_which_cells_it_held(cells: list[Cell]) -> None:
     assert {cell.key for cell in lost.value.cells} == {cell.key for cell in cells[1:3]}
 
 
+@pytest.mark.thorough
 def test_a_cell_that_ends_its_worker_is_given_up_and_all_others_are_made(
     cells: list[Cell], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -116,6 +118,7 @@ def test_a_cell_that_ends_its_worker_is_given_up_and_all_others_are_made(
     assert active_children() == []
 
 
+@pytest.mark.thorough
 def test_workers_share_the_cores_and_the_environment_is_left_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
@@ -125,6 +128,7 @@ def test_workers_share_the_cores_and_the_environment_is_left_as_it_was(monkeypat
     assert (os.environ["OMP_NUM_THREADS"], os.environ.get("MKL_NUM_THREADS")) == ("7", None)
 
 
+@pytest.mark.thorough
 def test_a_worker_that_can_not_leave_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     """As one whose neighbour was killed with the queue's lock in its hands, just when all cells were done."""
     monkeypatch.setattr(workers, "LEAVE_S", 0.5)

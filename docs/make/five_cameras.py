@@ -1,0 +1,372 @@
+"""Cameras that exist beside the paper's pixel, on sensors of one size: `docs/make/five_cameras.py SWEEP PAGE`."""
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import log10
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from real_cameras import REPORTS
+
+from rodcone.errors import InputError
+from rodcone.files import replacing
+from scenes.catalog import load
+from sensor.cameras.emva_report import read_report
+from sensor.cfa import channels
+from sensor.config import SensorConfig
+from sensor.presets import preset
+from sensor.variations import vary
+from studies.metrics.confidence import mean_with_confidence
+from studies.metrics.truth import Light, light_in_bands
+from studies.pages import report_text
+from studies.pages.plots import CHART, COLOURS, INK, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
+from studies.pages.report_markdown import code, lead_cells
+from studies.pages.report_text import (
+    DELTA_E,
+    FLIP,
+    MISSING,
+    ON_TARGETS,
+    PSNR,
+    Metric,
+    duration,
+    fixed,
+    level_text,
+    percent,
+    plain_name,
+    significant,
+    table,
+)
+from studies.pages.verdict import OUTCOMES, Floats, Leads, leads
+from studies.photograph.snr import FIELD_SIDE, even_field
+from studies.study.equal_area import EqualArea
+from studies.study.study import label
+from studies.sweep.database import LastRun, last_run
+from studies.sweep.provenance import require_alike
+from studies.sweep.row import Row
+
+RGBW, BAYER = "ple_rgbw", "ple_bayer"
+SHOWN = tuple(metric for metric in report_text.METRICS if metric not in ON_TARGETS)
+LINES = dict(zip((*COLOURS, SOFT, "#9a7d0a", INK), ("-", "-", "-", "-", "-", "--", ":"), strict=True))  # a sensor each
+TEXT = Path(__file__).with_name("five_cameras_page.md")
+AT_NM = 530.0  # where the quantum efficiency of a sensor without a report is told
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One light level: rows by name, of a sensor or a processor, each in the order of the seeds."""
+
+    level: str
+    luminance_cd_m2: float
+    rows: Mapping[str, tuple[Row, ...]]
+
+    def figures(self, name: str, metric: Metric) -> Floats:
+        """Figures of a metric, (seed,)."""
+        return np.array([getattr(row, metric.key) for row in self.rows[name]])
+
+    def mean(self, name: str, metric: Metric) -> float:
+        """Mean of a metric over the seeds."""
+        return float(self.figures(name, metric).mean())
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One sensor of the study with the mosaic that it has here, and the development that stands for it."""
+
+    name: str
+    sensor: SensorConfig
+    processor: str
+
+    @property
+    def words(self) -> str:
+        """Name in tables."""
+        return f"{self.name}, {'RGBW' if self.processor == RGBW else 'Bayer'}"
+
+
+def write_page(run: LastRun, folder: Path, out: Path) -> None:
+    """Write the page and its figure, both or neither.
+
+    Parameters
+    ----------
+    run : LastRun
+        Of a study of one scene, spectrum, exposure and white balance, with `BAYER` and `RGBW`.
+    folder : Path
+        For the page's own command.
+    out : Path
+        Ends in ``.md``; the figure goes beside it, ending in ``.svg``.
+
+    Raises
+    ------
+    InputError
+        For another study, or one that isn't whole.
+    """
+    require_alike(run.rows)
+    entries = [_entry(given) for given in run.study["sensors"]]
+    conditions = {entry.name: conditions_of(run.rows, entry.name) for entry in entries}
+    kinds = {entry.processor for entry in entries}
+    there = set.intersection(*(set(x.rows) for of_sensor in conditions.values() for x in of_sensor))
+    if not kinds == {BAYER, RGBW} <= there or not run.study.get("sensor_side_um"):
+        raise InputError(
+            f"study: {folder} is not of sensors of one size; allowed: one with sensor_side_um, {BAYER} and {RGBW}, "
+            "sensors of files and a preset; start from rodcone new study real_cameras"
+        )
+    if len(entries) > len(LINES):
+        raise InputError(f"sensors: {len(entries)} are too many for one figure; allowed: {len(LINES)}; leave some out")
+    stops = {entry.name: entry.sensor.lens.f_number for entry in entries}
+    if len(set(stops.values())) > 1:
+        raise InputError(f"f_number: {stops} are not one; allowed: one aperture for all; correct the sensors' files")
+    page = page_of(run.study, entries, conditions, folder, out)
+    figure = figure_of(beside_each_other(conditions, entries))
+    with replacing(out, out.with_suffix(".svg")) as (to_page, to_figure):
+        to_page.write_text(page, "utf-8")
+        to_figure.write_text(svg_text(figure), "utf-8")
+
+
+def _entry(given: str) -> Entry:
+    """Sensor of a file with Bayer, as it exists, or a preset with RGBW."""
+    own, real = preset(given), given.endswith(".toml")
+    return Entry(plain_name(label(given)), vary(own, "bayer" if real else "rgbw"), BAYER if real else RGBW)
+
+
+def conditions_of(rows: Sequence[Row], sensor: str) -> list[Condition]:
+    """Return the light levels of one sensor, from dark to bright, with its rows by processor.
+
+    Raises
+    ------
+    InputError
+        Where a processor lacks a picture that another has, or there are fewer than two seeds.
+    """
+    found: dict[str, dict[str, dict[int, Row]]] = {}
+    for row in rows:
+        if plain_name(row.sensor) == sensor:
+            found.setdefault(row.level, {}).setdefault(row.processor, {})[row.seed] = row
+    seeds = sorted({row.seed for row in rows})
+    lacking = [level for level, of in found.items() for by_seed in of.values() if sorted(by_seed) != seeds]
+    if len(seeds) < 2 or lacking:
+        raise InputError(
+            f"seeds: {seeds} of {sensor} lack pictures at {lacking}; allowed: two seeds or more, and a whole sweep; "
+            "run rodcone sweep again, which makes what is missing"
+        )
+    conditions = [
+        Condition(
+            level,
+            next(iter(of.values()))[seeds[0]].luminance_cd_m2,
+            {name: tuple(by_seed[seed] for seed in seeds) for name, by_seed in of.items()},
+        )
+        for level, of in found.items()
+    ]
+    return sorted(conditions, key=lambda condition: condition.luminance_cd_m2)
+
+
+def beside_each_other(conditions: Mapping[str, Sequence[Condition]], entries: Sequence[Entry]) -> list[Condition]:
+    """Conditions in which the study's sensors, each with its development, stand where processors do."""
+    levels = zip(*(conditions[entry.name] for entry in entries), strict=True)
+    return [
+        replace(at[0], rows={entry.words: x.rows[entry.processor] for entry, x in zip(entries, at, strict=True)})
+        for at in levels
+    ]
+
+
+def leads_of(metric: Metric, conditions: Sequence[Condition], ours: str, theirs: str) -> Leads:
+    """Leads of one over another, by level."""
+    return leads(metric, *(np.array([x.figures(name, metric) for x in conditions]) for name in (ours, theirs)))
+
+
+def lead_table(metric: Metric, rows: Mapping[str, Leads], levels: Sequence[str]) -> str:
+    """Return a table of leads: a line each, light across."""
+    cells = [[code(name), *lead_cells(metric, lead)] for name, lead in rows.items()]
+    return table([f"lead in {_with_unit(metric)}", *levels], cells)
+
+
+def _light(scene: str) -> Light:
+    """Spectrum of the scene's first light, as the study has it."""
+    nm = np.arange(380.5, 780.0)
+    return light_in_bands(next(iter(load(scene).groups.values())).spectrum, nm, np.ones_like(nm))
+
+
+def page_of(
+    study: Mapping[str, Any],
+    entries: Sequence[Entry],
+    conditions: Mapping[str, Sequence[Condition]],
+    folder: Path,
+    out: Path,
+) -> str:
+    """Return the page's Markdown; parameters as `write_page`."""
+    beside = beside_each_other(conditions, entries)
+    levels = [level_text(x.level) for x in beside]
+    own = next(entry for entry in entries if entry.processor == RGBW)
+    area = EqualArea(study["sensor_side_um"], max(entry.sensor.pixel.pitch_um for entry in entries))
+    green, white = (own.sensor.responses.curves[channel] for channel in "GW")
+    at_peak = np.interp(green.wavelength_nm[green.values.argmax()], white.wavelength_nm, white.values)
+    scene = study["scenes"][0]["source"]
+    worst = max(row.mc_share for x in beside for rows in x.rows.values() for row in rows)
+    tables = {
+        "sensors": [sensors_table(entries, area)],
+        "summary": [summary_table(beside, own.words)],
+        "light": light_tables(entries, beside, _light(scene), area.coarsest_um),
+        "metrics": [metric_table(metric, beside) for metric in SHOWN],
+        "outcomes": [outcome_table(beside, own.words)],
+        "leads": [
+            lead_table(
+                metric, {x.words: leads_of(metric, beside, own.words, x.words) for x in entries if x != own}, levels
+            )
+            for metric in (PSNR, DELTA_E, FLIP)
+        ],
+        "white_pixel": [
+            lead_table(metric, {name: leads_of(metric, at, RGBW, BAYER) for name, at in conditions.items()}, levels)
+            for metric in (PSNR, DELTA_E, FLIP)
+        ],
+    }
+    return TEXT.read_text("utf-8").format(
+        folder=folder,
+        page=out.name,
+        figure=out.with_suffix(".svg").name,
+        scene=f"`{scene}`",
+        side=f"{area.side_um:g}",
+        f_number=f"{own.sensor.lens.f_number:g}",
+        longest=duration(study["longest_exposure_s"]),
+        coarsest=f"{area.coarsest_um:g}",
+        green_share=percent(float(green.values.max() / at_peak)),
+        field=FIELD_SIDE,
+        worst=percent(worst),
+        own=own.name,
+        **{name: "\n\n".join(parts) for name, parts in tables.items()},
+    )
+
+
+def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
+    """Return a table of the sensors' numbers as simulated; what no report tells stands in brackets."""
+    rows = []
+    for entry in entries:
+        path, pixel = REPORTS / f"{entry.name}.toml", entry.sensor.pixel
+        report = read_report(path) if path.is_file() else None
+        told = {} if report is None else report.figures
+        dsnu, prnu = f"{pixel.dsnu_e:.3g}", f"{100 * pixel.prnu:.3g}"
+        rows.append(
+            [
+                f"`{entry.name}`" + ("" if report is None else f": {report.camera}"),
+                f"{pixel.pitch_um:g}",
+                str(area.shape((1, 1), pixel.pitch_um)[0]),
+                _efficiency(entry.sensor, told),
+                f"{pixel.read_noise_e:.3g}",
+                significant(pixel.full_well_e),
+                significant(pixel.full_well_e / pixel.pitch_um**2),
+                dsnu if report is None or "DSNU1288" in told else f"({dsnu})",
+                prnu if report is None or "PRNU1288" in told else f"({prnu})",
+            ]
+        )
+    head = ["sensor", "pitch [µm]", "pixels across", "quantum efficiency", "read noise [e⁻]", "clip [e⁻]"]
+    return table([*head, "clip [e⁻/µm²]", "DSNU [e⁻]", "PRNU [%]"], rows)
+
+
+def _efficiency(sensor: SensorConfig, told: Mapping[str, float]) -> str:
+    """Simulated quantum efficiency of W, in brackets without a report; the report's beside it where it differs."""
+    at_nm, white = told.get("lambda_nm", AT_NM), sensor.responses.curves["W"]
+    value = 100 * sensor.pixel.fill_factor * float(np.interp(at_nm, white.wavelength_nm, white.values))
+    if not told:
+        return f"({value:.1f} % at {at_nm:g} nm: the paper's W, fill factor {sensor.pixel.fill_factor:g})"
+    published = "" if abs(value - told["eta"]) < 0.05 else f"; published: {told['eta']:g} %"  # half of the last digit
+    return f"{value:.1f} % at {at_nm:g} nm{published}"
+
+
+def light_tables(entries: Sequence[Entry], beside: Sequence[Condition], light: Light, coarsest_um: float) -> list[str]:
+    """Return tables over light: exposure time, electrons, SNR of a pixel and per area."""
+    levels = [level_text(condition.level) for condition in beside]
+    rows: dict[str, list[list[str]]] = {"exposure": [], "electrons": [], "snr": [], "area": []}
+    for entry in entries:
+        shown = [each for each in channels(entry.sensor.cfa) if each in "GW"]
+        rows["exposure"].append([entry.words, *(duration(each.rows[entry.words][0].exposure_s) for each in beside)])
+        for channel in shown:
+            cells: dict[str, list[str]] = {"electrons": [], "snr": [], "area": []}
+            for condition in beside:
+                row = condition.rows[entry.words][0]
+                field = even_field(entry.sensor, channel, light, row.luminance_cd_m2, row.exposure_s)
+                in_picture = json.loads(row.mean_electrons)[channel]
+                cells["electrons"].append(f"{significant(field.electrons)}, {significant(in_picture)}")
+                full = field.electrons >= entry.sensor.pixel.full_well_e
+                cells["snr"].append(MISSING if full else f"{fixed(field.snr_db, 1)}, {fixed(field.simulated_db, 1)}")
+                gain_db = 20 * log10(coarsest_um / entry.sensor.pixel.pitch_um)
+                cells["area"].append(MISSING if full else fixed(field.snr_db + gain_db, 1))
+            for key, values in cells.items():
+                rows[key].append([f"{entry.words}, {channel}", *values])
+    heads = {
+        "exposure": "exposure time",
+        "electrons": "electrons a pixel: even field, mean of the picture",
+        "snr": "SNR of a pixel [dB]: closed form, simulated",
+        "area": f"SNR of {coarsest_um:g} µm squared [dB]",
+    }
+    return [table([heads[key], *levels], of_key) for key, of_key in rows.items()]
+
+
+def metric_table(metric: Metric, beside: Sequence[Condition]) -> str:
+    """Return a table of one metric: sensors down, light across; the best of each column in bold."""
+    sign = 1 if metric.higher else -1
+    best = [sign * max(sign * condition.mean(name, metric) for name in condition.rows) for condition in beside]
+    rows = []
+    for name in beside[0].rows:
+        cells = []
+        for condition, most in zip(beside, best, strict=True):
+            found = mean_with_confidence([getattr(row, metric.key) for row in condition.rows[name]])
+            shown = fixed(found.mean, metric.digits)
+            shown = f"**{shown}**" if shown == fixed(most, metric.digits) else shown
+            cells.append(f"{shown} ± {fixed((found.high - found.low) / 2, metric.digits)}")
+        rows.append([name, *cells])
+    return table([_with_unit(metric), *(level_text(condition.level) for condition in beside)], rows)
+
+
+def summary_table(beside: Sequence[Condition], own: str) -> str:
+    """Return the first two sensors by PSNR at each level, and the place of one."""
+    rows = []
+    for condition in beside:
+        psnr_db = {name: condition.mean(name, PSNR) for name in condition.rows}
+        order = sorted(psnr_db, key=lambda name: -psnr_db[name])
+        cells = [f"{order.index(name) + 1}. {name}: {fixed(psnr_db[name], 1)} dB" for name in (*order[:2], own)]
+        rows.append([level_text(condition.level), *cells])
+    return table(["by PSNR", "first", "second", "the paper's pixel"], rows)
+
+
+def _with_unit(metric: Metric) -> str:
+    return f"{metric.name} [{metric.unit}]" if metric.unit else metric.name
+
+
+def outcome_table(beside: Sequence[Condition], own: str) -> str:
+    """Return at how many levels a sensor is ahead, level and behind each other one, by metric."""
+    rows = []
+    for other in (name for name in beside[0].rows if name != own):
+        found = [leads_of(metric, beside, own, other).outcome.tolist() for metric in SHOWN]
+        rows.append([other, *(" / ".join(str(outcomes.count(outcome)) for outcome in OUTCOMES) for outcomes in found)])
+    return table(["beside", *(metric.name for metric in SHOWN)], rows)
+
+
+@rc_context(STYLE)
+def figure_of(beside: Sequence[Condition]) -> Figure:
+    """Draw PSNR and median CIEDE2000 over light, a line a sensor."""
+    figure = blank(2.6 * CHART[0], 1.2 * CHART[1])
+    light = [condition.luminance_cd_m2 for condition in beside]
+    for axes, metric in zip(figure.subplots(1, 2), (PSNR, DELTA_E), strict=True):
+        values = {name: [condition.mean(name, metric) for condition in beside] for name in beside[0].rows}
+        for of_sensor, (colour, line) in zip(values.values(), LINES.items(), strict=False):
+            axes.semilogx(light, of_sensor, line, color=colour)
+        axes.set(title=_with_unit(metric), xlabel="cd/m²", xlim=(light[0], light[-1]))
+        plain_ticks(axes)
+        name_at_ends(axes, [(name, of[-1], colour) for (name, of), colour in zip(values.items(), LINES, strict=False)])
+    return figure
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Write the page of a sweep's folder, from where the sweep ran: its sensors' files are told as it was told them."""
+    try:
+        if len(arguments) != 2 or not arguments[1].endswith(".md"):
+            raise InputError(f"arguments: {list(arguments)} are not allowed; give the sweep's folder and a page.md")
+        folder, out = map(Path, arguments)
+        write_page(last_run(folder), folder, out)
+    except InputError as error:
+        raise SystemExit(f"five_cameras: {error}") from error
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,245 @@
+"""What stands before a public function: names become the values they stand for, and each argument's kind is checked.
+
+`rodcone.capture` is a function of the packages with these checks before it; the packages themselves trust what they are
+given. One table says what a parameter may be, whichever function it belongs to. Like the table of public names it
+points up by strings, which are imported when they are needed.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from importlib import import_module
+from inspect import Parameter, signature
+from math import inf
+from numbers import Integral
+from os import PathLike
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from rodcone.errors import InputError, require_kind, require_range
+from rodcone.time_text import parse_time
+
+Check = Callable[[str, Any], Any]  # takes the argument's name and value, gives what the function is called with
+
+
+def at(place: str) -> Any:
+    """Object at ``module:name``."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
+
+
+def _value(kind: str, fix: str, by_name: str = "") -> Check:
+    """Check for an object of the class at ``module:name``; the function at `by_name` makes one of a name or path."""
+
+    def check(name: str, value: Any) -> Any:
+        if by_name and isinstance(value, str | Path):
+            return at(by_name)(str(value))
+        require_kind(name, value, at(kind), fix)
+        return value
+
+    return check
+
+
+def _range(low: float, high: float, fix: str) -> Check:
+    """Check for a number within limits."""
+
+    def check(name: str, value: Any) -> Any:
+        require_range(name, value, low, high, fix)
+        return value
+
+    return check
+
+
+def _plain(kind: Any, words: str) -> Check:
+    """Check for an object of one of Python's own classes; True and False are no numbers."""
+
+    def check(name: str, value: Any) -> Any:
+        if not isinstance(value, kind) or (kind is Integral and isinstance(value, bool)) or value == "":
+            raise InputError(f"{name}: {_shown(value)} is not allowed; give {words}")
+        return value
+
+    return check
+
+
+def _seconds(name: str, value: Any) -> Any:
+    time_s = parse_time(value, name) if isinstance(value, str) else value
+    require_range(name, time_s, 0.0, 1e7, "give seconds, or a time such as '20ms'")
+    return time_s
+
+
+def _array(*shape: int, or_kind: str = "", least: float = -inf) -> Check:
+    """Check for an array of finite real numbers from `least` on, of a shape where one is given; or for an `or_kind`."""
+
+    def check(name: str, value: Any) -> Any:
+        import numpy as np
+
+        if or_kind and isinstance(value, at(or_kind)):
+            return value
+        array = at("rodcone.types:real_array")(name, value)
+        if shape and array.shape != shape:
+            raise InputError(f"{name}: shape {array.shape} is not allowed; give {shape}")
+        wrong = array.size - int(np.isfinite(array).sum())
+        if wrong:
+            raise InputError(f"{name}: {wrong} of {array.size} values are NaN or infinite; allowed: finite; mend them")
+        if array.size and array.min() < least:
+            raise InputError(f"{name}: {array.min():g} is not allowed; give {least:g} or more")
+        return array
+
+    return check
+
+
+def _size(name: str, value: Any) -> Any:
+    sides = list(value) if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping) else []
+    if len(sides) != 2 or not all(_passes(_WHOLE, x) and x > 0 for x in sides):
+        raise InputError(f"{name}: {_shown(value)} is not allowed; give (height, width) in pixels")
+    return int(sides[0]), int(sides[1])
+
+
+def _paths(name: str, value: Any) -> Any:
+    return [_PATH(name, one) for one in (value if isinstance(value, list | tuple) else [value])]
+
+
+def _each(kind: Check, least: int = 0) -> Check:
+    """Check for a sequence, at least so long, of which `kind` takes each."""
+
+    def check(name: str, value: Any) -> Any:
+        if not isinstance(value, list | tuple) or len(value) < least:
+            raise InputError(f"{name}: {_shown(value)} is not allowed; give a list{' of one or more' * least}")
+        return [kind(f"{name}[{place}]", one) for place, one in enumerate(value)]
+
+    return check
+
+
+def _shown(value: Any) -> str:
+    """A value as an error names it: itself where that is short, its class elsewhere."""
+    text = repr(value) if isinstance(value, str | bytes | int | float | complex | tuple | list) else ""
+    return text if 0 < len(text) <= 80 else f"a {type(value).__name__}"
+
+
+_WHOLE, _NUMBER = _plain(Integral, "a whole number"), _range(-1e12, 1e12, "give a number")
+_METRES = _range(1e-9, 1e9, "give metres")
+_TEXT, _FLAG = _plain(str, "text in quotes"), _plain(bool, "True or False")
+_PATH, _CALL = _plain((str, PathLike), "a path in quotes"), _plain(Callable, "a function")
+_RAW = _value("sensor.raw:RawImage", "give what capture or read_raw gives")
+
+# By the parameter's name, or the function's and the parameter's where it means something else there. What may be left
+# out may be None.
+CHECKS: Mapping[str, Check] = MappingProxyType(
+    {
+        "radiance": _value("render.radiance:SpectralRadiance", "give SpectralRadiance(...), or call its relight()"),
+        "irradiance": _value("sensor.optics:SpectralIrradiance", "give form_image(radiance, sensor)"),
+        "transport": _value("render.transport:Transport", "give rodcone.render(...)"),
+        "resume": _value("render.transport:Transport", "give what render gave before"),
+        "scene": _value("render.scene:Scene", "give rodcone.load(name), or the name alone", "scenes.catalog:load"),
+        "write_exr.scene": _TEXT,
+        "sensor": _value("sensor.config:SensorConfig", "give a preset's name or file", "sensor.presets:preset"),
+        "readings": _each(_value("sensor.chip:Reading", "give rodcone.Reading(...)"), least=1),
+        "device": _value("sensor.device:Device", "give draw_device(sensor, radiance.shape, rng)"),
+        "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),
+        "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", "render.illuminants:illuminant"),
+        **dict.fromkeys(("load_radiance.light", "light_for_snr.light"), _TEXT),
+        "reflectance": _value("render.spectrum:Spectrum", "give rodcone.grey(0.5) or rodcone.Spectrum(...)"),
+        "grey.reflectance": _range(0.0, 1.0, "give a share of the light"),
+        "raw": _RAW,
+        "frames": _each(_RAW, least=1),
+        "calibration": _value("sensor.calibration:ColourCalibration", "give calibrate(sensor, light)"),
+        "picture": _array(or_kind="isp.picture:Picture"),
+        "matrix": _array(or_kind="isp.colour.colour_fit:ColourFit"),
+        "balance": _array(or_kind="isp.colour.white_balance:WhiteBalance"),
+        "order": _value("studies.photograph.shot:Order", "give rodcone.Order(...)"),
+        "study": _value("studies.study.study:Study", "give a study's file", "studies.study.study_file:read_study"),
+        "plan": _value("studies.budget.model_plan:Plan", "give rodcone.plan(study)"),
+        "clock": _value("studies.photograph.clock:Clock", "leave it out"),
+        "executor": _value("concurrent.futures:Executor", "give a pool of concurrent.futures"),
+        **dict.fromkeys(("origin", "target", "up"), _array(3)),
+        "transforms": _each(_array(4, 4)),
+        "pose": _array(4, 4),
+        "range_nm": _array(2),
+        **dict.fromkeys(("expected_e", "linear", "planes", "neutral", "noise_gain"), _array()),
+        **dict.fromkeys(("wavelength_nm", "width_nm", "lines_nm", "one", "other", "weight"), _array()),
+        **dict.fromkeys(("width_m", "height_m"), _METRES),
+        "line_bands.width_nm": _range(0.01, 1e4, "give nanometres"),
+        "ratio": _range(1e-6, 1e6, "give signal over noise"),
+        "dark_current_e_per_s": _range(0.0, 1e12, "give electrons a second, 0 for none"),
+        **dict.fromkeys(("ev", "noise", "max_seconds", "longest_s", "percentile", "well_share"), _NUMBER),
+        "electrons": _array(least=0.0),
+        "exposure_s": _seconds,
+        **dict.fromkeys(("spp", "max_spp", "max_depth", "seed", "samples_per_pixel", "bits", "height"), _WHOLE),
+        **dict.fromkeys(("width", "at_once", "threads", "workers", "pictures"), _WHOLE),
+        **dict.fromkeys(("size", "shape"), _size),
+        **dict.fromkeys(("cfa", "tile"), lambda _, value: at("sensor.cfa:tile_of")(value)),
+        **dict.fromkeys(
+            ("name", "encoding", "channel", "isp", "readout", "way", "white_balance", "extend", "engine", "processor"),
+            _TEXT,
+        ),
+        **dict.fromkeys(("exact", "denoise", "trust", "trust_code", "everything", "keep_old"), _FLAG),
+        **dict.fromkeys(("path", "cache", "out", "folder", "preset.name"), _PATH),
+        **dict.fromkeys(("progress", "step", "runner"), _CALL),
+        "develop_file.path": _paths,
+        "read_study.changes": _each(_TEXT),
+        "cells": _each(_value("studies.sweep.cells:Cell", "give what sweep gives its runner")),
+        "table": _each(_value("studies.sweep.row:Row", "give read_rows(folder)")),
+        **dict.fromkeys(("spectra", "powers"), _plain(Mapping, "a dict by light group")),
+        **dict.fromkeys(("luminance_cd_m2", "illuminance_lux"), _NUMBER),
+        "bsdf": _plain(dict, "a Mitsuba node such as rodcone.matte(...)"),
+        **dict.fromkeys(("options", "more"), lambda _, value: value),
+    }
+)
+# Functions that look at the result, and warn.
+RESULTS = MappingProxyType(
+    {
+        "capture": ("sensor.exposure:warn_if_full", "sensor.exposure:warn_if_dark"),
+        "expose": ("sensor.exposure:warn_if_full",),
+    }
+)
+
+
+def door(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """A public function with the checks of its arguments before it.
+
+    Raises
+    ------
+    InputError
+        At a call: for an argument of another kind.
+    TypeError
+        At a call: for too many or too few arguments.
+    """
+    call = signature(function)
+    checks = {parameter: CHECKS.get(f"{name}.{parameter}") or CHECKS[parameter] for parameter in call.parameters}
+    order = f"{name}({', '.join(call.parameters)})"
+
+    @wraps(function)
+    def checked(*arguments: Any, **named: Any) -> Any:
+        try:
+            bound = call.bind(*arguments, **named)
+        except TypeError as error:
+            raise TypeError(f"{name}: {error}; call it as {order}") from None
+        given = {key: value for key, value in bound.arguments.items() if not _left_out(call.parameters[key], value)}
+        for key, value in given.items():
+            try:
+                bound.arguments[key] = checks[key](key, value)
+            except InputError:
+                for other, its in given.items():
+                    if _passes(checks[key], its) and _passes(checks[other], value):
+                        raise InputError(
+                            f"{name}: {key} and {other} stand in each other's place; write {order}"
+                        ) from None
+                raise
+        result = function(*bound.args, **bound.kwargs)
+        for place in RESULTS.get(name, ()):
+            at(place)(result)
+        return result
+
+    return checked
+
+
+def _left_out(parameter: Parameter, value: Any) -> bool:
+    return value is None and parameter.default is None
+
+
+def _passes(check: Check, value: Any) -> bool:
+    try:
+        check("", value)
+    except InputError:
+        return False
+    return True

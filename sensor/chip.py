@@ -1,0 +1,253 @@
+"""A pixel, and what stands behind it: photodiodes that bin, several readings. Set a term to 0 to switch it off."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import hypot
+
+from rodcone.brief import brief
+from rodcone.errors import InputError, require_fields, require_range, require_whole, unknown
+
+CHARGE, DIGITAL = BINNINGS = ("charge", "digital")
+MERGED, SWITCHED = "merged", "switched"  # what is done with several readings
+MOST_READINGS = 8
+
+
+@dataclass(frozen=True)
+class PixelConfig:
+    """A pixel (Table 1 of Parmar & Wandell 2009 names these parameters).
+
+    Attributes
+    ----------
+    pitch_um, fill_factor : float
+        Width and height [um]; the share of the area that collects light.
+    full_well_e : float
+        Electrons at which the pixel clips.
+    read_noise_e, dsnu_e : float
+        Standard deviation of temporal dark noise, and of the fixed dark offset over pixels [e-].
+    prnu : float
+        Standard deviation over pixels of the relative photo-response.
+    dark_current_e_per_s : float
+        Of every pixel, collected with the light and Poisson like it.
+    conversion_gain_uv_per_e, voltage_swing_v, analog_gain : float
+        Reported and used to convert noise given in volts; the well alone decides where pixels clip.
+    column_gain_spread : float
+        Standard deviation over columns of their amplifiers' relative gain; it acts on what the well gave, so behind the
+        Poisson draw and the clip.
+    column_offset_e : float
+        Standard deviation over columns of their fixed dark offset [e-], added where DSNU is.
+    hot_pixel_share, hot_pixel_dark_current_e_per_s : float
+        Share of pixels that leak, and the dark current that they have on top of the others'.
+    crosstalk : float
+        Share of a pixel's photo-electrons that each of its four neighbours collects instead.
+    binned_well_e : float
+        Electrons at which the sum of four pixels clips where they bin in charge: what the floating diffusion that they
+        share holds. 0 for four times the well.
+    """
+
+    pitch_um: float
+    fill_factor: float
+    full_well_e: float
+    read_noise_e: float
+    dsnu_e: float
+    prnu: float
+    dark_current_e_per_s: float = 0.0
+    conversion_gain_uv_per_e: float = 30.0
+    voltage_swing_v: float = 1.08
+    analog_gain: float = 1.0
+    column_gain_spread: float = 0.0
+    column_offset_e: float = 0.0
+    hot_pixel_share: float = 0.0
+    hot_pixel_dark_current_e_per_s: float = 0.0
+    crosstalk: float = 0.0
+    binned_well_e: float = 0.0
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        limits = {
+            "pitch_um": (1e-3, 1e4, "give micrometres"),
+            "fill_factor": (0.0, 1.0, "give a fraction"),
+            "full_well_e": (1.0, 1e12, "give electrons"),
+            "read_noise_e": (0.0, 1e9, "give electrons, 0 for none"),
+            "dsnu_e": (0.0, 1e9, "give electrons, 0 for none"),
+            "prnu": (0.0, 1.0, "give a fraction: 1.7 % is 0.017"),
+            "dark_current_e_per_s": (0.0, 1e12, "give electrons per second, 0 for none"),
+            "conversion_gain_uv_per_e": (1e-6, 1e9, "give microvolts per electron"),
+            "voltage_swing_v": (1e-6, 1e6, "give volts"),
+            "analog_gain": (1e-6, 1e6, "give a factor"),
+            "column_gain_spread": (0.0, 1.0, "give a fraction, 0 for none"),
+            "column_offset_e": (0.0, 1e9, "give electrons, 0 for none"),
+            "hot_pixel_share": (0.0, 1.0, "give a fraction, 0 for none"),
+            "hot_pixel_dark_current_e_per_s": (0.0, 1e12, "give electrons per second, 0 for none"),
+            "crosstalk": (0.0, 0.25, "give the share that goes to each of four neighbours, 0 for none"),
+        }
+        for name, (low, high, fix) in limits.items():
+            require_range(name, getattr(self, name), low, high, fix)
+        require_fields(self)
+        if self.binned_well_e:
+            fix = "the floating diffusion holds one full well at least; give electrons, 0 for four wells"
+            require_range("binned_well_e", self.binned_well_e, self.full_well_e, 1e12, fix)
+        require_range("prnu with column_gain_spread", self.fixed_gain, 0.0, 1.0, "make the root of their squares less")
+
+    @property
+    def fixed_dark_e(self) -> float:
+        """Standard deviation over pixels of all fixed dark offsets [e-]: DSNU and column offsets."""
+        return hypot(self.dsnu_e, self.column_offset_e)
+
+    @property
+    def fixed_gain(self) -> float:
+        """Standard deviation over pixels of all relative gains: PRNU and column gains."""
+        return hypot(self.prnu, self.column_gain_spread)
+
+    @property
+    def swing_e(self) -> float:
+        """Electrons that fill the voltage swing: reported, not applied (Table 1's disagrees with its own well)."""
+        return self.voltage_swing_v * 1e6 / self.conversion_gain_uv_per_e
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A reading: another gain, another time, or another part of the pixel.
+
+    Readings of one photodiode and one time are of the same charge, so of one shot noise.
+
+    Attributes
+    ----------
+    read_noise_e, dsnu_e, full_well_e : float
+        As `PixelConfig` has them, in electrons of this reading's own charge.
+    light_share : float
+        Share of the pixel's light, and of its dark current, that the photodiode collects.
+    time_share : float
+        Share of the exposure time, the longest's 1.
+    photodiode : str
+        Which one: readings of another have other shot noise and another PRNU.
+    """
+
+    read_noise_e: float
+    dsnu_e: float
+    full_well_e: float
+    light_share: float = 1.0
+    time_share: float = 1.0
+    photodiode: str = ""
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        limits = {
+            "read_noise_e": (0.0, 1e9, "give electrons, 0 for none"),
+            "dsnu_e": (0.0, 1e9, "give electrons, 0 for none"),
+            "full_well_e": (1.0, 1e12, "give electrons"),
+            "light_share": (1e-6, 1.0, "give the photodiode's share of the pixel's light"),
+            "time_share": (1e-6, 1.0, "give a share of the exposure time, the longest's 1"),
+        }
+        for name, (low, high, fix) in limits.items():
+            require_range(name, getattr(self, name), low, high, fix)
+        if not isinstance(self.photodiode, str):
+            raise InputError(f"photodiode: {self.photodiode!r} is not a name; allowed: a name in quotes; write so")
+
+    @property
+    def share(self) -> float:
+        """Share of the whole pixel's electrons in the whole exposure that this charge holds."""
+        return self.light_share * self.time_share
+
+    @property
+    def charge(self) -> tuple[str, float]:
+        """What readings of the same charge have in common: photodiode and time."""
+        return self.photodiode, self.time_share
+
+
+def check_readings(readings: Sequence[Reading], readout: str) -> None:
+    """Raise `InputError` for readings that no pixel has, or a readout that they can't have."""
+    if readout not in (MERGED, SWITCHED):
+        raise unknown("readout", readout, (MERGED, SWITCHED))
+    if not readings:
+        if readout == SWITCHED:
+            raise InputError(f"readout: {SWITCHED!r} without readings; allowed: with two or more; add [[readings]]")
+        return
+    require_whole("readings", len(readings), 2, MOST_READINGS, "give two or more, or describe the one in [pixel]")
+    lights = {x.photodiode: x.light_share for x in readings}
+    if any(lights[x.photodiode] != x.light_share for x in readings) or sum(lights.values()) > 1 + 1e-9:
+        raise InputError(
+            f"light_share: {[x.light_share for x in readings]} of the photodiodes {[x.photodiode for x in readings]}; "
+            "allowed: one share for each photodiode, 1 together; name photodiodes apart, or correct their shares"
+        )
+    times = [x.time_share for x in readings]
+    if max(times) != 1.0:
+        raise InputError(
+            f"time_share: {times}; allowed: shares of the longest time, one of 1; divide by {max(times):g}"
+        )
+    if readout == SWITCHED and {x.share for x in readings} != {1.0}:
+        raise InputError(f"readout: {SWITCHED!r} between shares of light or time; allowed: gains; write {MERGED!r}")
+
+
+@dataclass(frozen=True)
+class Binning:
+    """Four photodiodes of one channel behind each pixel of the raw image.
+
+    Attributes
+    ----------
+    way : {"charge", "digital"}
+        Summed as charge on their floating diffusion and read once, or read one by one and summed in digital numbers.
+    photodiode : PixelConfig
+        One of the four.
+    bits, black_level_dn, white_level_dn : int, and int or None
+        Of the converter, as of `SensorConfig`, where it reads one photodiode.
+    """
+
+    way: str
+    photodiode: PixelConfig
+    bits: int
+    black_level_dn: int | None
+    white_level_dn: int | None
+
+
+@dataclass(frozen=True)
+class Chip:
+    """What stands behind a pixel of the raw image, where that is more than one photodiode that is read once.
+
+    Attributes
+    ----------
+    binning : Binning or None
+    readings : tuple of Reading
+        Two or more; none for a pixel that is read once.
+    readout : str
+        ``merged``: all are read, and become one linear raw image; ``switched``: the one whose gain suits the light.
+    """
+
+    binning: Binning | None = None
+    readings: tuple[Reading, ...] = ()
+    readout: str = MERGED
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        check_readings(self.readings, self.readout)
+        if self.readings and self.binning:
+            raise InputError(
+                f"binning: {self.binning.way!r} with several readings; allowed: one of the two; leave one out"
+            )
+
+    @property
+    def sites(self) -> int:
+        """Photodiodes along either side of a pixel."""
+        return 1 if self.binning is None else 2
+
+    @property
+    def in_charge(self) -> bool:
+        """Whether photodiodes are summed before they are read."""
+        return self.binning is not None and self.binning.way == CHARGE
+
+    @property
+    def switched(self) -> bool:
+        """Whether each frame is read with one gain of several."""
+        return self.readout == SWITCHED
+
+
+def pixel_of_readings(pixel: PixelConfig, readings: Sequence[Reading]) -> PixelConfig:
+    """Pixel with the deepest well and the least dark noise that one of its readings has, over that one's share."""
+    return replace(
+        pixel,
+        full_well_e=max(x.full_well_e / x.share for x in readings),
+        read_noise_e=min(x.read_noise_e / x.share for x in readings),
+        dsnu_e=min(x.dsnu_e / x.share for x in readings),
+    )

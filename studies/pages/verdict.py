@@ -1,0 +1,138 @@
+"""Who is ahead: a lead over seeds beside the size that a person sees; the one place where pages decide it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from studies.pages.report_text import DELTA_E, FLIP, METRICS, PSNR, SSIM, Metric
+
+AHEAD, LEVEL, BEHIND, UNKNOWN = "ahead", "level", "behind", "unknown"
+OUTCOMES = (AHEAD, LEVEL, BEHIND)
+CONFIDENCE = 0.95
+SAME_BY = (PSNR, SSIM, DELTA_E, FLIP)  # by which two light levels give one picture; PU21 weighs errors by the light
+
+Floats = NDArray[np.float64]
+Figures = Mapping[str, Floats]  # by a metric's key, (level, seed); NaN where a figure is unknown
+
+
+@dataclass(frozen=True)
+class Leads:
+    """Leads of one picture over another, arrays of one shape.
+
+    Attributes
+    ----------
+    mean : array
+        Over seeds of each seed's difference, positive where the first is better.
+    half : array
+        Half the width of its 95 % interval (Student's t); NaN for one seed.
+    outcome : array of str
+        `AHEAD` or `BEHIND`: the interval is clear of 0, the lead as large as a person sees. `LEVEL`: it is smaller
+        than that, by its interval or, clear of 0, in the mean. `UNKNOWN`: the seeds can't tell, or there is one.
+    """
+
+    mean: Floats
+    half: Floats
+    outcome: NDArray[np.str_]
+
+
+def leads(metric: Metric, ours: Floats, theirs: Floats) -> Leads:
+    """Compare figures (..., seed) of pairs of pictures; NaN in one of a pair's seeds leaves its outcome unknown."""
+    difference = (1.0 if metric.higher else -1.0) * (ours - theirs)
+    mean, half = difference.mean(axis=-1), half_width(difference)
+    size = np.abs(mean)
+    clear, seen, unseen = size > half, size >= metric.seen, size + half < metric.seen
+    cases = [np.isnan(half), clear & seen & (mean > 0), clear & seen, clear | unseen]
+    return Leads(mean, half, np.select(cases, [UNKNOWN, AHEAD, BEHIND, LEVEL], UNKNOWN))
+
+
+def half_width(samples: Floats) -> Floats:
+    """Half the width of the mean's 95 % interval over the last axis, the seeds; NaN for one seed."""
+    count = samples.shape[-1]
+    if count == 1:
+        return np.full(samples.shape[:-1], np.nan)
+    quantile = float(student.isf((1 - CONFIDENCE) / 2, count - 1))
+    return np.asarray(quantile * samples.std(axis=-1, ddof=1) / np.sqrt(count))
+
+
+def same_light(ours: Figures, theirs: Figures) -> list[list[int]]:
+    """Part neighbouring light levels into runs in which neither side's picture changes by what a person sees.
+
+    Of the metrics `SAME_BY`, each level is compared with the first of its run.
+    """
+    runs: list[list[int]] = []
+    sides = [side[metric.key].mean(axis=-1) / metric.seen for metric in SAME_BY for side in (ours, theirs)]
+    figures = np.nan_to_num(np.array(sides), nan=np.inf, posinf=np.inf).T
+    for level, now in enumerate(figures):
+        before = figures[runs[-1][0]] if runs else None
+        if before is not None and np.isfinite(now).all() and (np.abs(now - before) < 1).all():
+            runs[-1].append(level)
+        else:
+            runs.append([level])
+    return runs
+
+
+def counts(ours: Figures, theirs: Figures) -> dict[str, dict[str, int]]:
+    """Count light levels by metric and outcome; levels that give one picture count once, by the mean of their leads."""
+    runs, counted = same_light(ours, theirs), {}
+    for metric in METRICS:
+        sides = (np.array([side[metric.key][run].mean(axis=0) for run in runs]) for side in (ours, theirs))
+        outcomes = leads(metric, *sides).outcome.tolist()
+        counted[metric.key] = {outcome: outcomes.count(outcome) for outcome in (*OUTCOMES, UNKNOWN)}
+    return counted
+
+
+@dataclass(frozen=True)
+class LightRatio:
+    """Times the light that one side needs at a level for the other's picture, and its 95 % interval over seeds."""
+
+    mean: float
+    low: float
+    high: float
+
+
+def light_ratio(light_cd_m2: Sequence[float], better: Floats, worse: Floats) -> list[LightRatio | None]:
+    """Light that `worse` needs for the PSNR that `better` has, over the level's own, by interpolation between levels.
+
+    Parameters
+    ----------
+    light_cd_m2 : sequence of float
+        The levels, rising.
+    better, worse : (level, seed) float64
+        PSNR [dB].
+
+    Returns
+    -------
+    list of LightRatio or None
+        One a level. None for one seed, where some seed's PSNR is reached at no level of the sweep, and where light no
+        longer improves the picture: there `worse` gains less than is seen from one level to the next.
+
+    Notes
+    -----
+    Between two levels PSNR is linear in the logarithm of the light. Of several places the one nearest to the level
+    counts. The interval is Student's, of the logarithms.
+    """
+    x = np.log(np.asarray(light_cd_m2, dtype=np.float64))
+    rises = np.diff(worse.mean(axis=1)) >= PSNR.seen
+    found: list[LightRatio | None] = []
+    for level in range(len(x)):
+        logs = np.array(
+            [_offset(x, worse[:, seed], better[level, seed], level, rises) for seed in range(worse.shape[1])]
+        )
+        half = float(half_width(logs))
+        mean = float(logs.mean())
+        known = np.isfinite(half)
+        found.append(LightRatio(*(float(np.exp(mean + step)) for step in (0.0, -half, half))) if known else None)
+    return found
+
+
+def _offset(x: Floats, curve: Floats, wanted: float, level: int, rises: NDArray[np.bool_]) -> float:
+    """Distance in log light from a level to the nearest place where a curve has a value; NaN where there is none."""
+    places = [
+        x[i] + (wanted - curve[i]) / (curve[i + 1] - curve[i]) * (x[i + 1] - x[i])
+        for i in np.flatnonzero(rises)
+        if curve[i] <= wanted <= curve[i + 1] and curve[i] < curve[i + 1]
+    ]
+    return min((place - x[level] for place in places), key=abs, default=float("nan"))

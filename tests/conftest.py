@@ -1,0 +1,29 @@
+"""What holds for all tests: one Dr.Jit thread in each of several workers, and which cases `make test` runs."""
+
+import os
+from collections import defaultdict
+
+import pytest
+
+from rodcone.jit import backend, dr
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Give each worker of pytest-xdist one thread of Dr.Jit."""
+    if "PYTEST_XDIST_WORKER" in os.environ and backend() == "llvm":
+        dr.set_thread_count(1)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark `thorough` what `sample(n)` leaves out: of a test's cases all but n, spread evenly from the first on."""
+    cases: dict[str, list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("sample"):
+            cases[item.nodeid.split("[")[0]].append(item)
+    for group in cases.values():
+        marker = group[0].get_closest_marker("sample")
+        count = min(marker.args[0], len(group)) if marker else 0
+        sampled = {i * len(group) // count for i in range(count)}
+        for index, item in enumerate(group):
+            if index not in sampled:
+                item.add_marker(pytest.mark.thorough)

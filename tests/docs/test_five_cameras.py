@@ -1,0 +1,164 @@
+"""Sensors of one size beside each other: presets made from the reports, places and leads by hand, studies refused."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sweep_sample as SAMPLE
+from five_cameras import _entry, main, sensors_table, write_page
+from real_cameras import REPORTS
+
+from rodcone.errors import InputError
+from sensor.cameras.emva_report import numbers_of, read_report
+from sensor.cameras.numbers import completed, curves_csv, lent_curves, missing, preset_text
+from sensor.presets import low_noise, preset_file
+from studies.study.equal_area import EqualArea
+from studies.study.study_file import read_study
+from studies.sweep.database import LastRun
+from studies.sweep.row import Row
+
+CONFIGS = Path(__file__).parents[2] / "studies" / "configs"
+PAGE = Path(__file__).parents[2] / "docs" / "five_cameras.md"
+STUDY = read_study(CONFIGS / "real_cameras.toml")
+FILES = [Path(name) for name in STUDY.sensors if name.endswith(".toml")]
+REAL = FILES[0].stem
+LIGHT = {"1cd/m2": 1.0, "10cd/m2": 10.0}
+# Mean PSNR [dB] by sensor and processor; seeds differ by 0.2 dB, in step.
+PSNR_DB = {
+    (FILES[0].name, "ple_bayer"): 30.0,
+    (FILES[0].name, "ple_rgbw"): 31.5,
+    ("table1_output", "ple_bayer"): 20.0,
+    ("table1_output", "ple_rgbw"): 24.0,
+}
+
+
+def run(**changes: object) -> LastRun:
+    """Two sensors, two processors, two levels and two seeds."""
+    made: list[Row] = [
+        SAMPLE.row(processor, seed, sensor=sensor, level=level, luminance_cd_m2=light, exposure_s=0.01,
+                   delta_e_median=5.0, psnr_db=mean + 0.2 * seed, ssim=0.5, delta_e_p95=9.0, s_cielab_median=4.0,
+                   s_cielab_p95=8.0, flip_mean=0.1, pu21_psnr_db=40.0,
+                   mean_electrons='{"R": 1.0, "G": 2.0, "B": 1.0, "W": 4.0}')
+        for (sensor, processor), mean in PSNR_DB.items()
+        for level, light in LIGHT.items()
+        for seed in (0, 1)
+    ]  # fmt: skip
+    study = {
+        "sensors": [str(FILES[0]), "table1_output"],
+        "scenes": [{"source": "still_life"}],
+        "sensor_side_um": 100.0,
+        "longest_exposure_s": 0.066,
+        **changes,
+    }
+    return LastRun(study, {}, len(made), made)
+
+
+def plain(path: Path) -> str:
+    """Text of a page with plain spaces and signs."""
+    return plain_text(path.read_text("utf-8"))
+
+
+def plain_text(text: str) -> str:
+    return text.translate({0xA0: " ", 0x202F: " ", 0x2212: "-"})
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_each_camera_of_the_study_is_what_its_report_makes(path: Path) -> None:
+    numbers = numbers_of(read_report(REPORTS / path.name))
+    assert not {"pitch_um", "full_well_e", "read_noise_e", "fill_factor"} & set(missing(numbers))  # never lent
+    assert numbers.efficiency is not None
+    whole = completed(numbers, low_noise(), "low_noise")
+    curves = lent_curves(low_noise(), "low_noise", whole)
+    name = f"{path.stem}_curves.csv"
+    title = f"{whole.source.split(':')[0]}, as its sources tell it."
+    assert path.read_text("utf-8") == preset_text(title, whole, curves, name)
+    assert (path.parent / name).read_text("utf-8") == curves_csv(whole, curves)
+
+
+def test_five_makers_are_there() -> None:
+    assert len({read_report(REPORTS / path.name).maker for path in FILES}) == 5
+
+
+def test_sensors_stand_beside_each_other_each_with_its_own_mosaic(tmp_path: Path) -> None:
+    write_page(run(), tmp_path, tmp_path / "five.md")
+    text = plain(tmp_path / "five.md")
+    assert (tmp_path / "five.svg").is_file()
+    # means over seeds: 30.1 and 24.1; a lead of 6.0 in step has no scatter
+    assert f"| 1 cd/m² | 1. {REAL}, Bayer: 30.1 dB | 2. table1_output, RGBW: 24.1 dB | 2. table1_output" in text
+    psnr = text.split("| PSNR [dB] | 1 cd/m² |", 1)[1]
+    # t of one degree of freedom is 12.706, the standard error 0.1
+    assert f"| {REAL}, Bayer | **30.1** ± 1.3 | **30.1** ± 1.3 |" in psnr
+    assert f"| `{REAL}, Bayer` | **-6.0 ± 0.0** | **-6.0 ± 0.0** |" in text
+    assert f"| {REAL}, Bayer | 0 / 0 / 2 | 0 / 2 / 0 |" in text
+    # the same pixel with both mosaics
+    assert f"| `{REAL}` | +1.5 ± 0.0 | +1.5 ± 0.0 |" in text
+    # 100 um at 6.9 and at 2.2 um
+    assert f"`{REAL}`: {read_report(REPORTS / FILES[0].name).camera} | 6.9 | 14 |" in text
+    assert "| `table1_output` | 2.2 | 45 | (76.2 % at 530 nm" in text
+
+
+def test_the_quantum_efficiency_is_the_simulated_one_and_the_published_stands_beside_it_where_it_differs() -> None:
+    entries = [_entry(str(CONFIGS / path)) for path in FILES]
+    rows = plain_text(sensors_table(entries, EqualArea(883.2, 6.9))).splitlines()[2:]
+    for entry, row in zip(entries, rows, strict=True):
+        told = read_report(REPORTS / f"{entry.name}.toml").figures
+        white = entry.sensor.responses.curves["W"]
+        simulated = 100 * np.interp(told["lambda_nm"], white.wavelength_nm, white.values)
+        cell = row.split(" | ")[3]
+        assert cell.startswith(f"{simulated:.1f} % at {told['lambda_nm']:g} nm")
+        assert ("published" in cell) == entry.name.startswith("framos")  # whose curve ends at 1 electron a photon
+    assert "86.5 % at 536 nm; published: 91.25 %" in rows[-1]
+
+
+def test_the_closed_form_stands_beside_the_simulated_field(tmp_path: Path) -> None:
+    write_page(run(), tmp_path, tmp_path / "five.md")
+    text = plain(tmp_path / "five.md")
+    rows = text.split("| SNR of a pixel [dB]: closed form, simulated |", 1)[1].split("\n\n")[0].splitlines()[2:]
+    assert [row.split(" | ")[0] for row in rows] == [
+        f"| {REAL}, Bayer, G",
+        "| table1_output, RGBW, G",
+        "| table1_output, RGBW, W",
+    ]
+    for row in rows:
+        for cell in row.strip("| ").split(" | ")[1:]:
+            closed, simulated = map(float, cell.split(", "))
+            assert simulated == pytest.approx(closed, abs=0.3)  # of 262 144 pixels; under 0 dB the mean scatters
+
+
+def test_another_study_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
+    slow = tmp_path / "slow.toml"
+    slow.write_text(preset_file("low_noise").read_text("utf-8").replace("f_number = 2.8", "f_number = 4.0"), "utf-8")
+    bayer = run()
+    bayer.rows[:] = [row for row in bayer.rows if row.processor == "ple_bayer"]
+    other = run(sensors=[str(slow), "table1_output"])
+    other.rows[:] = [replace(row, sensor="slow.toml") if row.sensor == FILES[0].name else row for row in other.rows]
+    alone = run(sensors=["table1_output"])
+    cases = {"sensor_side_um": run(sensor_side_um=None), "ple_rgbw": bayer, "f_number": other, "and a preset": alone}
+    for words, wrong in cases.items():
+        with pytest.raises(InputError, match=words):
+            write_page(wrong, tmp_path, tmp_path / "five.md")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["slow.toml"]
+
+
+def test_the_command_tells_faults_in_one_line(tmp_path: Path) -> None:
+    for arguments, words in (
+        ([], "give the sweep's folder and a page.md"),
+        ([str(tmp_path), str(tmp_path / "five.html")], "give the sweep's folder and a page.md"),
+        ([str(tmp_path), str(tmp_path / "five.md")], "it holds no ledger.sqlite"),
+    ):
+        with pytest.raises(SystemExit) as told:
+            main(arguments)
+        assert words in str(told.value)
+        assert "\n" not in str(told.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_page_in_docs_is_of_the_committed_study() -> None:
+    text = plain(PAGE)
+    for path in FILES:
+        assert f"| `{path.stem}`: {read_report(REPORTS / path.name).camera} |" in text
+    assert "rodcone new study real_cameras" in text
+    for level in ("0.036 cd/m²", "2 000 cd/m²"):
+        assert level in text
+    assert PAGE.with_suffix(".svg").is_file()

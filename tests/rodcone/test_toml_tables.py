@@ -1,0 +1,56 @@
+"""Tables as dataclasses: nothing is converted, and the first fault is named by its keys."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from rodcone.errors import InputError
+from rodcone.toml_file import strict_converter, structured
+
+
+@dataclass(frozen=True)
+class Lens:
+    f_number: float
+    name: str | None = None
+
+
+@dataclass(frozen=True)
+class Camera:
+    lens: Lens
+    bits: int = 12
+    range_nm: tuple[float, float] = (400.0, 700.0)
+    response: str | float = "included"
+    lenses: tuple[Lens, ...] = ()
+
+
+def camera(**content: Any) -> Camera:
+    return structured(content, Camera, strict_converter(), "see the manual")
+
+
+def test_a_table_becomes_the_dataclass_and_a_whole_number_a_number() -> None:
+    found = camera(lens={"f_number": 2, "name": "x"}, range_nm=[380, 780], response=0.5, lenses=[{"f_number": 4.0}])
+    assert found == Camera(Lens(2.0, "x"), 12, (380.0, 780.0), 0.5, (Lens(4.0),))
+    assert isinstance(found.lens.f_number, float)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({}, "lens is missing; add it, or see the manual"),
+        ({"lens": {}}, "lens: f_number is missing"),
+        ({"lens": 3}, "lens: the value is not a table; allowed: a table of keys; see the manual"),
+        ({"lens": {"f_number": "2"}}, "lens: f_number: '2' is not a number"),
+        ({"lens": {"f_number": True}}, "lens: f_number: True is not a number"),
+        ({"lens": {"f_numer": 2}}, "lens key: 'f_numer' is unknown; allowed: f_number, name; did you mean 'f_number'?"),
+        ({"lens": {"f_number": 2}, "bits": 1.5}, "bits: 1.5 is not a whole number"),
+        ({"lens": {"f_number": 2}, "range_nm": [400]}, "range_nm: [400] has 1 values; allowed: 2"),
+        ({"lens": {"f_number": 2}, "range_nm": "4007"}, "range_nm: '4007' is not a list"),
+        ({"lens": {"f_number": 2}, "response": [1]}, "response: [1] is not a text in quotes or a number"),
+        ({"lens": {"f_number": 2}, "lenses": [{"f_number": 2}, {}]}, "lenses: f_number is missing"),
+    ],
+)
+def test_the_first_fault_is_named(content: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError) as error:
+        camera(**content)
+    assert str(error.value).startswith(words)

@@ -1,0 +1,150 @@
+"""The page's answer in words, on tables made by hand: won, lost, mixed, level, one seed, one level, two sensors."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import report_sample as SAMPLE
+
+from studies.pages.headline import Pair, answer, in_light
+from studies.pages.report_compare import CAMERA, SENSOR, comparisons, groups_of, over_groups
+from studies.pages.report_data import ReportData
+from studies.pages.report_text import METRICS
+from studies.sweep.row import Row
+
+LEVELS, LIGHT = ("moonlight", "street", "office", "day"), (0.1, 1.0, 10.0, 100.0)
+SEEDS = (0, 1, 2)
+PSNR_DB = np.array([10.0, 20.0, 30.0, 30.1])  # of B
+
+
+def pair(seeds: int = 3, levels: int = 4, scatter: float = 0.001, **gains: list[float]) -> Pair:
+    """A pair whose first differs in the figures named, level by level, as the figures themselves do."""
+    draw = np.random.default_rng(5).standard_normal((levels, seeds))
+    draw = (draw - draw.mean(axis=1, keepdims=True)) / (draw.std(axis=1, keepdims=True) if seeds > 1 else 1)
+    theirs = {metric.key: np.full((levels, seeds), np.nan) for metric in METRICS}
+    theirs |= {key: np.full((levels, seeds), 0.5) for key in ("ssim", "flip_mean")}
+    theirs |= {"psnr_db": PSNR_DB[:levels, None] + np.zeros(seeds), "delta_e_median": np.full((levels, seeds), 5.0)}
+    theirs["delta_e_p95"] = np.full((levels, seeds), 15.0)
+    ours = {
+        key: values + np.array(gains.get(key, [0.0] * levels))[:, None] + scatter * draw * (key == "psnr_db")
+        for key, values in theirs.items()
+    }
+    return Pair(("A", "B"), ours, theirs, LEVELS[:levels], LIGHT[:levels])
+
+
+CASES = {
+    "all won": (pair(psnr_db=[3, 3, 3, 3]), "At every level: clearly better (PSNR +3.0 dB)."),
+    "all lost": (pair(psnr_db=[-3, -3, -3, -3]), "At every level: clearly worse (PSNR −3.0 dB)."),
+    "level": (pair(psnr_db=[-0.1, 0, 0.1, 0.2]), "At every level: no visible difference (PSNR −0.1 to +0.2 dB)."),
+    "fading": (
+        pair(psnr_db=[1.5, 0.6, -0.1, -0.1]),
+        "Moonlight: clearly better (PSNR +1.5 dB). Street: a little better (PSNR +0.6 dB). "
+        "From office on: no visible difference (PSNR −0.1 dB).",
+    ),
+    "a loss in another metric is said": (
+        pair(psnr_db=[1.5, 1.5, 0, 0], delta_e_p95=[2.1, 2.3, 2.1, 0]),
+        "Moonlight to street: better in part (PSNR +1.5 dB), worse in part (ΔE2000 95 % higher by 2.1 to 2.3). "
+        "Office: clearly worse (ΔE2000 95 % higher by 2.1). Day: no visible difference (PSNR 0.0 dB).",
+    ),
+    "errors that fall are gains": (
+        pair(delta_e_median=[-1.5] * 4, flip_mean=[-0.03] * 4),
+        "At every level: a little better (ΔE2000 median lower by 1.5, FLIP lower by 0.030).",
+    ),
+    "the larger of a family speaks for it": (
+        pair(delta_e_median=[-1.5] * 4, delta_e_p95=[-4] * 4),
+        "At every level: clearly better (ΔE2000 95 % lower by 4.0).",
+    ),
+    "undecided": (pair(scatter=1.0), "At every level: these seeds can't tell (PSNR 0.0 dB)."),
+    "one seed": (pair(1, psnr_db=[2, 0, 0, 0]), "One seed can't tell a difference from chance (PSNR 0.0 to +2.0 dB)."),
+    "one level": (pair(levels=1, psnr_db=[-0.7]), "A little worse (PSNR −0.7 dB)."),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("made", "words"), CASES.values(), ids=CASES.keys())
+def test_the_answer_is_in_words_with_sizes(made: Pair, words: str) -> None:
+    assert answer(made).replace("\N{NO-BREAK SPACE}", " ") == words
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if name != "one seed"])
+def test_the_other_way_round_every_better_is_a_worse(name: str) -> None:
+    made = CASES[name][0]
+    other = answer(replace(made, names=made.names[::-1], ours=made.theirs, theirs=made.ours))
+    swaps = {"better": "worse", "worse": "better", "lower": "higher", "higher": "lower", "+": "−", "−": "+"}
+    mirrored = "".join(swaps.get(part, part) for part in re.split(r"(better|worse|lower|higher|[+−])", answer(made)))
+    if "in part" in mirrored:  # gains come first
+        assert mirrored.count("better") == other.count("better")
+    elif " to " not in mirrored:
+        assert mirrored == other
+
+
+def test_in_light_the_worse_one_needs_more() -> None:
+    """10 dB a decade: 3 dB are a factor of 2.0; in the day more light gives nothing, and nothing is said."""
+    words = in_light(pair(psnr_db=[3, 0, 0, 0], scatter=0.01))
+    assert (
+        words
+        == "B needs more light for the same PSNR: 2 times at moonlight. As much light gives the same PSNR: street."
+    )
+    # a deviation of 0.5 sqrt(3/2) dB: half the interval is 4.303 x 0.612 / sqrt(3) = 1.52 dB, a factor of 1.42
+    assert "2 times at moonlight (1.4 to 2.8)" in in_light(pair(psnr_db=[3, 3, 0, 0], scatter=0.5))
+    # A's curve is 5, 15, 30: it has 10 dB after half a decade, and 20 after a third
+    lost = in_light(pair(psnr_db=[-5, -5, 0, 0], scatter=0.001))
+    assert lost == "A needs more light for the same PSNR: 3.2 times at moonlight, 2.2 times at street."
+    for silent in (pair(1, psnr_db=[3, 0, 0, 0]), pair(levels=1), replace(pair(), light_cd_m2=(0.1, None, 1.0, 2.0))):
+        assert in_light(silent) == ""
+
+
+def led(row: Row) -> Row:
+    """In the first sensor's dark RGBW gains 2 dB, in the second's light it loses 1, and Bayer is exposed for longer."""
+    gain = {("table1_output", "moonlight"): 2.0, ("low_noise", "street light"): -1.0}.get((row.sensor, row.level), 0.0)
+    return replace(
+        row,
+        psnr_db=20.0 + gain * (row.processor == "ple_rgbw"),
+        **dict.fromkeys(("ssim", "flip_mean"), 0.5),
+        **dict.fromkeys(("delta_e_median", "delta_e_p95", "s_cielab_median", "s_cielab_p95"), 5.0),
+        pu21_psnr_db=40.0,
+        exposure_s=0.02
+        if (row.sensor, row.processor, row.level) == ("low_noise", "ple_bayer", "street light")
+        else 0.01,
+    )
+
+
+def two_sensors(**axes: object) -> ReportData:
+    return SAMPLE.sample_report(led, levels=2, seeds=SEEDS, cameras=("ple_rgbw", "ple_bayer"), **axes)
+
+
+def test_every_place_has_its_answer_and_a_loss_elsewhere_is_told() -> None:
+    report = two_sensors()
+    found = comparisons(report)[CAMERA]
+    first, second = (one | {"said": one["said"].replace("\N{NO-BREAK SPACE}", " ")} for one in found["answers"]["0 1"])
+    assert (
+        first["said"] == "Moonlight: clearly better (PSNR +2.0 dB). Street light: no visible difference (PSNR 0.0 dB)."
+    )
+    assert (
+        second["said"] == "Moonlight: no visible difference (PSNR 0.0 dB). Street light: clearly worse (PSNR −1.0 dB)."
+    )
+    over = found["over"]["0 1"].replace("\N{NO-BREAK SPACE}", " ")
+    assert over == (
+        "Of 2 places: better somewhere in 1 (most: PSNR +2.0 dB, table1_output, moonlight); "
+        "worse somewhere in 1 (most: PSNR −1.0 dB, low_noise, street light)."
+    )
+    assert found["counts"]["0 1"]["psnr_db"] == [1, 2, 1]
+    assert over_groups(groups_of(two_sensors(sensors=SAMPLE.SENSORS[:1]), CAMERA, 0, 1)) == ""
+
+
+def test_by_the_mosaic_alone_is_said_only_where_the_times_agree() -> None:
+    first, second = (one["times"] for one in comparisons(two_sensors())[CAMERA]["answers"]["0 1"])
+    assert first.endswith("and the same exposure times: they differ by the mosaic alone.")
+    assert "mosaic alone" not in second
+    assert second.replace("\N{NO-BREAK SPACE}", " ").endswith(
+        "Exposure times differ: street light 10 ms against 20 ms."
+    )
+    others = SAMPLE.sample_report(levels=1, seeds=SEEDS, cameras=("interleaved", "bayer"))
+    assert comparisons(others)[CAMERA]["answers"]["0 1"][0]["times"] == ""
+
+
+def test_sensors_are_answered_too_and_conditions_are_not() -> None:
+    found = comparisons(two_sensors())
+    said = found[SENSOR]["answers"]["0 1"][0]["said"].replace("\N{NO-BREAK SPACE}", " ")
+    assert said == "At every level: clearly better (PSNR +1.0 to +2.0 dB)."
+    assert [bool(one["answers"]) for one in found] == [False, False, True, False, False, False, True]
