@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "faults"))
 
 import plant_faults as faults  # noqa: E402
-from fault_catalogue import FAULTS, Fault  # noqa: E402
+from plant_faults import FAULTS, Fault  # noqa: E402
 
 
 def test_there_are_at_least_forty_faults_each_with_a_name_of_its_own() -> None:
@@ -34,7 +34,7 @@ def test_a_fault_changes_the_code_and_what_it_leaves_is_still_python(fault: Faul
 
 
 def test_a_fault_whose_text_is_gone_is_told() -> None:
-    gone = Fault("gone", "sensor/readout.py", (("not there", "at all"),), ())
+    gone = Fault("gone", "sensor/readout.py", "", (("not + there", "at + all"),), ())
     with pytest.raises(SystemExit, match="stands 0 times"):
         faults.planted(gone, "x = 1\n")
 
@@ -48,7 +48,7 @@ def _project(folder: Path, test: str) -> Fault:
     (folder / "sensor").mkdir()
     (folder / "sensor" / "part.py").write_text("FACTOR = 2\n")
     (folder / "test_part.py").write_text(test)
-    return Fault("factor", "sensor/part.py", (("FACTOR = 2", "FACTOR = 3"),), ("test_part.py",))
+    return Fault("factor", "sensor/part.py", "", (("FACTOR = 2", "FACTOR = 3"),), ("test_part.py",))
 
 
 READS = "from pathlib import Path\nTEXT = (Path(__file__).parent / 'sensor' / 'part.py').read_text()\n"

@@ -1,4 +1,4 @@
-"""Plant each fault of the catalogue in a copy of the project and show that a test fails.
+"""Plant each fault of faults.toml in a copy of the project and show that a test fails.
 
 python tests/faults/plant_faults.py                    all faults; results are kept in out/faults.json, so it can go on
 python tests/faults/plant_faults.py --only "cos^3"     one of them
@@ -7,6 +7,7 @@ python tests/faults/plant_faults.py --make-test        caught by the tests of `m
 """
 
 import argparse
+import ast
 import hashlib
 import json
 import os
@@ -17,13 +18,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parent))
-from fault_catalogue import FAULTS, Fault
 
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = ("rodcone", "render", "scenes", "sensor", "isp", "studies", "tests", "benchmarks", "pyproject.toml")
@@ -31,13 +31,74 @@ MINUTES = 8  # for one fault's tests
 ALL, MAKE_TEST = "not slow", "not slow and not thorough"  # what `make test-all` and `make test` run
 
 
+@dataclass(frozen=True)
+class Fault:
+    """One mistake that a person could make.
+
+    Attributes
+    ----------
+    name : str
+    file : str
+        Below the repository's root.
+    function : str
+        The function of the file that it is in; empty for the whole file.
+    edits : tuple of pairs of str
+        Code that is there, and what the mistaken author wrote.
+    tests : tuple of str
+        Files of tests that should notice, the likeliest first.
+    """
+
+    name: str
+    file: str
+    function: str
+    edits: tuple[tuple[str, str], ...]
+    tests: tuple[str, ...]
+
+
+def read_faults() -> Iterator[Fault]:
+    """Faults of the catalogue beside this file."""
+    for place, group in tomllib.loads(Path(__file__).with_name("faults.toml").read_text("utf-8")).items():
+        file, _, function = place.partition("::")
+        tests = tuple(f"tests/{test}.py" for test in group["tests"])
+        for name, edits in group["faults"].items():
+            yield Fault(name, file, function, tuple(zip(edits[::2], edits[1::2], strict=True)), tests)
+
+
+FAULTS = tuple(read_faults())
+
+
+class _Exchange(ast.NodeTransformer):
+    """Puts one piece of syntax in the place of another, and counts the places."""
+
+    def __init__(self, there: str, instead: str) -> None:
+        self.old, self.new, self.count = _syntax(there), _syntax(instead), 0
+
+    def visit(self, node: ast.AST) -> Any:
+        if type(node) is not type(self.old) or ast.dump(node) != ast.dump(self.old):
+            return self.generic_visit(node)
+        self.count += 1
+        return self.new
+
+
+def _syntax(piece: str) -> ast.AST:
+    """Syntax of a statement, an expression, or an argument `name=value,`."""
+    if piece.endswith(","):
+        return ast.parse(f"_({piece})", mode="eval").body.keywords[0]
+    statement = ast.parse(piece).body[0]
+    return statement.value if isinstance(statement, ast.Expr) else statement
+
+
 def planted(fault: Fault, text: str) -> str:
-    """The file's text with the fault in it."""
+    """The file's code with the fault in it, without its comments."""
+    tree = ast.parse(text)
+    functions = [node for node in ast.walk(tree) if getattr(node, "name", None) == fault.function]
+    scope = functions[0] if functions else tree
     for there, instead in fault.edits:
-        if text.count(there) != 1:
-            raise SystemExit(f"{fault.name}: {there!r} stands {text.count(there)} times in {fault.file}; write it anew")
-        text = text.replace(there, instead)
-    return text
+        exchange = _Exchange(there, instead)
+        exchange.visit(scope)
+        if exchange.count != 1:
+            raise SystemExit(f"{fault.name}: {there!r} stands {exchange.count} times in {fault.file}; write it anew")
+    return ast.unparse(ast.fix_missing_locations(tree))
 
 
 def drawn(count: int, day: date) -> list[Fault]:
@@ -98,7 +159,7 @@ def chosen(options: argparse.Namespace) -> list[Fault]:
         return drawn(options.draw, date.today())
     faults = [fault for fault in FAULTS if options.only in (None, fault.name)]
     if not faults:
-        raise SystemExit(f"--only: {options.only!r} is no fault's name; see tests/faults/fault_catalogue.py")
+        raise SystemExit(f"--only: {options.only!r} is no fault's name; see tests/faults/faults.toml")
     return faults
 
 
