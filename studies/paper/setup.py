@@ -36,6 +36,7 @@ from studies.study.study import OWN, Condition, RenderLimits, SceneChoice, Study
 from studies.study.study_file import read_study
 from studies.sweep.cells import device_stream, exposure_stream
 from studies.sweep.export import read_rows
+from studies.sweep.folder import claim
 from studies.sweep.prepare import PICTURES, RENDERS
 from studies.sweep.row import Row
 from studies.sweep.run_sweep import sweep
@@ -142,9 +143,10 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
     study = Study((SceneChoice(scene),), ("1cd/m2",), render=RenderLimits(setup.size, setup.band_nm, spp))
     opened = open_choice(study.scenes[0], study)
     model = as_stated(study).renders[opened.choice]
-    folder = setup.out / SWEEP / RENDERS  # the sweeps' own: one render serves them and this
+    claim(setup.out / SWEEP)  # the sweeps' own folder: one render serves them and this
+    renders = setup.out / SWEEP / RENDERS
     transport, _ = make_transport(
-        opened, study, model, folder, lambda share, error: setup.step(f"{scene}: {render_words(error)}", share)
+        opened, study, model, renders, lambda share, error: setup.step(f"{scene}: {render_words(error)}", share)
     )
     group = transport.groups[white or next(iter(transport.groups))]
     return View(
