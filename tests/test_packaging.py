@@ -68,4 +68,4 @@ def test_the_source_archive_holds_what_make_needs(archives: tuple[Path, Path]) -
     with tarfile.open(archives[1]) as source:
         held = {name.split("/", 1)[1] for name in source.getnames() if "/" in name}
     tops = ("Makefile", "pyproject.toml", "LICENSE", "README.md", "VISION.md", "CONTRIBUTING.md", "CHANGELOG.md")
-    assert {*tops, "CITATION.cff", "tests/test_architecture.py"} | files_of(PACKAGES) <= held
+    assert {*tops, "CITATION.cff", "tests/test_architecture.py", "examples/01_picture.py"} | files_of(PACKAGES) <= held

@@ -1,0 +1,33 @@
+"""A first picture: a scene, its light, a sensor, a raw image, a developed picture.
+
+    python examples/01_picture.py [SIZE]
+
+SIZE is the picture's side in pixels. Writes picture.png.
+"""
+
+import sys
+
+import numpy as np
+
+import rodcone
+
+size = int(sys.argv[1]) if sys.argv[1:] else 256
+
+# Light transport, once: what a camera would see for unit emission of each light of the scene.
+transport = rodcone.render("still_life", (size, size), spp=64)
+# Radiance [W m^-2 sr^-1 nm^-1] at any level or spectrum, without another render. 0.5 cd/m2 is a street at night.
+radiance = transport.relight(luminance_cd_m2=0.5)
+print(f"radiance {radiance.values.shape}, mean luminance {radiance.luminance().mean():.2f} cd/m2")
+
+# A preset is a frozen value. A device is one chip of it, with the fixed patterns drawn for that chip.
+sensor = rodcone.low_noise(cfa="rgbw")
+device = rodcone.draw_device(sensor, radiance.shape, np.random.default_rng(1))
+
+# One exposure: photons, electrons, noise, digital numbers. The same generator gives the same frame.
+raw = rodcone.capture(radiance, sensor, "66ms", device, np.random.default_rng(2))
+print(f"raw image {raw.dn.dtype}, mean {raw.electrons.mean():.1f} electrons")
+
+# The camera's software knows the raw image and its calibration, nothing of the truth.
+picture = rodcone.develop(raw)
+print(f"SNR of green {picture.snr:.1f}; W gives {picture.substitution:.0%} of the luminance")
+rodcone.write_picture(picture, "picture.png")
