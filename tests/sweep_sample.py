@@ -63,6 +63,7 @@ ROW = Row(
     snr_db=-3.5,
     substitution=1,
     saturated=0.0,
+    balance_delta_e=4.125,
     balance="{}",
     mean_electrons="{}",
     variant="llvm_ad_spectral",

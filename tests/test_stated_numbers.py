@@ -31,7 +31,7 @@ ASKED |= {"budget_share"}
 FIGURES = {
     "psnr_db", "ssim", "delta_e_median", "delta_e_p95", "s_cielab_median", "s_cielab_p95", "flip_mean", "pu21_psnr_db",
     "mtf50_cy_per_px", "chart_delta_e_mean", "patch_snr_db", "snr_db", "substitution", "balance", "mean_electrons",
-    "illuminance_lux",
+    "balance_delta_e", "illuminance_lux",
 }  # fmt: skip
 # Names of files and places; the picture's is its digest, which is checked where it is read.
 NAMES = {"picture", "truth", "finished", "host", "machine", "worker"}

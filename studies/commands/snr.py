@@ -12,9 +12,10 @@ from rodcone.files import check_place, replacing
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from studies.commands.console import Flag, OutOrNone, Time, print_table, require_ending
+from studies.metrics.truth import GREY
 from studies.pages.report_text import MISSING
 from studies.pages.snr_chart import snr_svg
-from studies.photograph.snr import GREY, light_for_snr
+from studies.photograph.snr import light_for_snr
 
 RELATIVE = "*"  # behind the name of a sensor whose responses are relative
 HEAD = ("sensor", "channel", "electrons", "cd/m2", f"lux on {GREY:.0%} grey")

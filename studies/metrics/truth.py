@@ -16,6 +16,8 @@ from sensor.config import SensorConfig
 from sensor.optics import camera_equation
 from sensor.response import electrons_per_irradiance
 
+GREY = 0.18  # reflectance of a grey card
+
 
 @dataclass(frozen=True)
 class Light:

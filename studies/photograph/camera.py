@@ -3,18 +3,23 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from skimage.color import deltaE_ciede2000, xyz2lab
 
 from isp.colour.colour_fit import ColourFit, fit_colours
+from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
+from isp.planes import bilinear
 from isp.processors.catalogue import Processor
+from render.spectrum import Floats
+from rodcone.colour_spaces import SRGB_TO_XYZ
 from scenes.reflectances import color_checker, held
 from sensor.binning import pixel_sums
 from sensor.cfa import channels, mask, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import falloff
 from sensor.raw import RawImage
-from studies.metrics.truth import Light, neutral_electrons
+from studies.metrics.truth import GREY, Light, neutral_electrons
 
 
 def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> ColourFit:
@@ -76,6 +81,32 @@ def develop_to_scale(
     if sensor.lens.horizontal_view_deg:
         linear = linear / falloff(sensor.lens, linear.shape[:2])[..., None]
     return linear, picture
+
+
+def balance_delta_e(raw: RawImage, colours: ColourFit, neutral: Floats, balance: ArrayLike | None = None) -> float:
+    """CIEDE2000 of a neutral grey of `GREY` under the scene's light, after the white balance of an exposure.
+
+    The balance is that of the bilinear planes, and the colour matrix the one for no noise, whatever the processor: the
+    figure tells a balance, not a picture.
+
+    Parameters
+    ----------
+    raw : RawImage
+    colours : ColourFit
+        Of the processor's balanced colours.
+    neutral : (channel,) float64
+        What a neutral reads under the scene's light.
+    balance : (channel,) array_like, optional
+        Response to what should come out neutral; left out, Gray World finds it in the exposure.
+    """
+    white_balance = WhiteBalance.of(raw, neutral, balance)
+    gains, _ = white_balance.gains(raw, bilinear(raw))
+    balanced = dict(zip(channels(raw.cfa), gains * neutral, strict=True))
+    unit = balanced[unit_channel(raw.cfa)]
+    used = colours.channels[:3]
+    shown = GREY * colours.matrix(used) @ [balanced[name] / unit for name in used]
+    lab, grey = (xyz2lab(SRGB_TO_XYZ @ rgb) for rgb in (shown, np.full(3, GREY)))
+    return float(deltaE_ciede2000(lab, grey))
 
 
 def mean_electrons(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> dict[str, float]:

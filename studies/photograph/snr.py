@@ -12,9 +12,8 @@ from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.readout import electrons_at_snr, noise_variance
-from studies.metrics.truth import Light, light_in_bands, neutral_electrons
+from studies.metrics.truth import GREY, Light, light_in_bands, neutral_electrons
 
-GREY = 0.18  # reflectance of the card whose illuminance is told
 FIELD_SIDE = 512  # pixels of a simulated even field
 
 

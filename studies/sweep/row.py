@@ -39,6 +39,9 @@ class Row:
         Whether W stood for luminance.
     saturated : float
         Share of the pixels.
+    balance_delta_e : float or None
+        CIEDE2000 between a neutral grey of 18 % under the scene's light and the same after the white balance: 0 as
+        shot, what Gray World misses the light by else; None of a processor that tells no balance.
     balance, mean_electrons : str
         By channel, as JSON.
     variant, readout_engine, development_engine, versions : str
@@ -93,6 +96,7 @@ class Row:
     snr_db: float | None
     substitution: int | None
     saturated: float
+    balance_delta_e: float | None
     balance: str
     mean_electrons: str
     variant: str

@@ -26,7 +26,7 @@ from studies.metrics.appearance import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure
 from studies.metrics.target_figures import target_figures
 from studies.metrics.truth import neutral_electrons
-from studies.photograph.camera import develop_to_scale, mean_electrons
+from studies.photograph.camera import balance_delta_e, develop_to_scale, mean_electrons
 from studies.photograph.clock import timed
 from studies.photograph.machine import machine
 from studies.photograph.png import to_png
@@ -83,7 +83,8 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     saturated = raw.saturated
     # the neutral of the scene's light, as a raw file would note it; else Gray World's, from the picture
     as_shot = names["white_balance"] == AS_SHOT
-    options = {"balance": neutral_electrons(sensor, cell.light, raw.exposure_s)} if as_shot else {}
+    neutral = neutral_electrons(sensor, cell.light, raw.exposure_s)
+    options = {"balance": neutral} if as_shot else {}
     (linear, picture), develop_s, first_develop_s = timed(
         lambda: develop_to_scale(raw, processor, cell.colours, sensor, cell.light, cell.white_cd_m2, **options),
         *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),
@@ -123,6 +124,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),
         saturated=float(saturated.mean()),
+        balance_delta_e=balance_delta_e(raw, cell.colours, neutral, **options) if picture.balance else None,
         balance=json.dumps(dict(picture.balance)),
         mean_electrons=json.dumps(mean_electrons(sensor, expected_e)),
         variant=cell.made_by.variant,

@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 
+import colour
 import numpy as np
 import pytest
 
+from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import FAIR, PROCESSORS
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
@@ -17,8 +19,8 @@ from sensor.optics import form_image
 from sensor.presets import low_noise
 from sensor.response import expected_electrons
 from sensor.variations import vary
-from studies.metrics.truth import light_in_bands, true_srgb
-from studies.photograph.camera import colour_fit, develop_to_scale
+from studies.metrics.truth import light_in_bands, neutral_electrons, true_srgb
+from studies.photograph.camera import balance_delta_e, colour_fit, develop_to_scale
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
@@ -96,3 +98,24 @@ def test_every_camera_shows_the_colour_checkers_colours(name: str) -> None:
     hues = [(one - one.mean(-1, keepdims=True)).ravel() for one in (shown, right)]
     # Gray World on a chart that isn't grey shifts all of them; a matrix with its columns mixed up turns them
     assert np.corrcoef(*hues)[0, 1] > 0.9
+
+
+@pytest.mark.parametrize("tint", [1.0, 1.6])
+def test_the_balances_error_is_the_cast_that_it_gives_a_grey_card(tint: float) -> None:
+    """Gray World makes an even red field grey: a grey card then lacks as much red, and as shot nothing is wrong."""
+    sensor = vary(low_noise(), "bayer")
+    neutral = neutral_electrons(sensor, LIGHT, EXPOSURE_S) * 40.0
+    expected = np.full((64, 64), neutral[1])
+    expected[::2, ::2], expected[1::2, 1::2] = neutral[0] * tint, neutral[2]
+    assert sensor.cfa == ("RG", "GB")
+    quiet = replace(sensor, pixel=replace(sensor.pixel, crosstalk=0.0, prnu=0.0))
+    device = draw_device(quiet, (64, 64), np.random.default_rng(0))
+    raw = expose(expected, quiet, EXPOSURE_S, device, np.random.default_rng(1), exact=True)
+    assert not raw.saturated.any()
+    colours = ColourFit.of(np.eye(3))  # channels as they are
+    card = 0.18 * np.array([1 / tint, 1.0, 1.0])
+    white = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
+    lab = colour.XYZ_to_Lab(colour.RGB_to_XYZ([card, np.full(3, 0.18)], "sRGB"), white)
+    # 1024 samples a channel of 1000 e- and more are known to 0.1 %, some 0.1 of CIEDE2000
+    assert balance_delta_e(raw, colours, neutral) == pytest.approx(colour.delta_E(*lab, method="CIE 2000"), abs=0.2)
+    assert balance_delta_e(raw, colours, neutral, neutral) == pytest.approx(0.0, abs=1e-3)

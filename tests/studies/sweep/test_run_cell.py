@@ -121,6 +121,8 @@ def test_a_white_balance_as_shot_is_the_neutral_of_the_scenes_light(tmp_path: Pa
     assert [row.white_balance for row in rows] == ["gray-world", "as-shot"]
     assert [set(json.loads(row.balance).values()) for row in rows] == [{"gray world"}, {"given"}]
     assert rows[0].delta_e_median > 10.0
+    assert rows[0].balance_delta_e > 10.0  # a grey card would get the complement of the scene's colour
+    assert rows[1].balance_delta_e == pytest.approx(0.0, abs=1e-3)
     assert rows[1].delta_e_median < 4.0
     assert rows[0].mean_electrons == rows[1].mean_electrons
 
