@@ -20,8 +20,13 @@ class InputError(ValueError):
 
     def __init__(self, message: str) -> None:
         plain = "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in message)
-        half = MOST_TOLD // 2
-        super().__init__(plain if len(plain) <= MOST_TOLD else f"{plain[: half - 5]} ... {plain[-half:]}")
+        super().__init__(cut(plain))
+
+
+def cut(text: str) -> str:
+    """Leave the middle of an overlong text out."""
+    half = MOST_TOLD // 2
+    return text if len(text) <= MOST_TOLD else f"{text[: half - 5]} ... {text[-half:]}"
 
 
 def one_line(error: BaseException) -> str:

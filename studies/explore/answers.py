@@ -7,17 +7,19 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeAlias
 
+from render.illuminants import illuminant
 from rodcone.errors import InputError
+from sensor.raw_files.raw_file import write_raw
 from studies.explore.chain import expose_scene
 from studies.explore.controls import Controls, Lamp
 from studies.explore.dropped import write_dropped
-from studies.explore.files import dng_of
 from studies.explore.memo import Memo
 from studies.explore.messages import Header, sensor_terms
 from studies.explore.render_noise import noise_note, noise_share
 from studies.explore.source import Rendered, Source
 from studies.explore.views import histogram, pixel
 from studies.explore.written import python_of, study_of
+from studies.photograph.calibrate import calibrate, iso_speed
 
 Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 Dropped: TypeAlias = Mapping[str, TemporaryDirectory[str]]  # folders of the sensors that were dropped, by their file
@@ -30,13 +32,14 @@ def written(
     kind = message["kind"]
     if kind == "study":
         return {"files": _study(controls, rendered, source, dropped)}, ()
-    exposed = expose_scene(rendered.transport, controls, memo)
     if kind == "dng":
-        return {"name": "explored.dng"}, (dng_of(exposed, controls),)
+        return {"name": "explored.dng"}, (_dng(rendered, controls, memo),)
+    exposed = expose_scene(rendered.transport, controls, memo)
     if kind == "histogram":
         note = noise_note(noise_share(exposed, controls, memo), rendered.transport.spp) if rendered.last else ""
         if note and memo.kept("noise note", "") is None:
-            print(memo.of("noise note", "", lambda: note), file=sys.stderr)  # once for each render
+            memo.keep("noise note", "", note)
+            print(note, file=sys.stderr)  # once for each render
         python = python_text(rendered, controls, kind, dropped)
         return {"histogram": histogram(exposed.raw), "python": python, "noise_note": note}, ()
     row, column = message["row"], message["column"]
@@ -60,6 +63,26 @@ def take_sensor(files: Any, dropped: MutableMapping[str, TemporaryDirectory[str]
         raise
     dropped[str(path)] = folder
     return {"sensor": str(path), "terms": sensor_terms(sensor)}
+
+
+def _dng(rendered: Rendered, controls: Controls, memo: Memo) -> bytes:
+    """Digital negative of an exposure, its colours calibrated as `rodcone capture` does; of no burst."""
+    if controls.frames > 1:  # merged samples are no whole numbers as a negative's are
+        raise InputError("dng: a merged burst is no raw file; allowed: 1 frame; save the exposures one by one")
+    exposed = expose_scene(rendered.transport, controls, memo)
+    first = next(iter(exposed.transport.groups.values()))
+    light = illuminant(controls.reference_light) if first.coloured else first.spectrum
+    raw = replace(
+        exposed.raw,
+        camera=Path(controls.sensor).stem.encode("ascii", "replace").decode(),
+        f_number=exposed.sensor.lens.f_number,
+        iso=iso_speed(exposed.sensor),
+        colour=calibrate(exposed.sensor, light),
+    )
+    memo.check()
+    with TemporaryDirectory() as folder:
+        (path,) = write_raw(raw, Path(folder) / "explored.dng")
+        return path.read_bytes()
 
 
 def _study(controls: Controls, rendered: Rendered, source: Source, dropped: Dropped) -> dict[str, str]:

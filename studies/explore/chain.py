@@ -210,8 +210,12 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     device = memo.of("device", chip, _chip, sensor, shape, controls.seed)
     numbers = range(controls.exposure_number, controls.exposure_number + controls.frames)
     take = expose if controls.shot_noise else partial(read_out, draw=draw_mean_frame)
-    rngs = [_rng(controls.seed, _FRAME, number) for number in numbers]
-    raw = merged_raw([take(expected_e, sensor, exposure_s=exposure_s, device=device, rng=rng) for rng in rngs])
+    exposures = []
+    for number in numbers:
+        memo.check()
+        rng = _rng(controls.seed, _FRAME, number)
+        exposures.append(take(expected_e, sensor, exposure_s=exposure_s, device=device, rng=rng))
+    raw = merged_raw(exposures)
     return Exposed(
         *(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw, controls.shot_noise)
     )

@@ -1,4 +1,4 @@
-"""Results that are kept between changes."""
+"""Results that are kept between changes, and where work may end that nobody waits for any more."""
 
 import ctypes
 import sys
@@ -13,22 +13,43 @@ T = TypeVar("T")
 _KEPT = 8  # results a stage: four light groups before two cameras
 
 
+class Overtaken(Exception):
+    """Nobody waits for this work any more: a newer request came, or the page was closed."""
+
+
+def go_on() -> None:
+    """Let work go on whatever happens."""
+
+
 @dataclass(frozen=True)
 class Memo:
-    """The last results of each stage, by what decides them."""
+    """The last results of each stage, by what decides them.
 
+    Attributes
+    ----------
+    check : callable
+        Called before each stage; raises `Overtaken` where nobody waits for the result.
+    """
+
+    check: Callable[[], None] = go_on
     stages: dict[str, OrderedDict[Hashable, Any]] = field(default_factory=dict)
 
     def of(self, stage: str, key: Hashable, make: Callable[..., T], *arguments: Any) -> T:
         """Return the result kept under a key, or make it of the arguments."""
         kept = self.stages.setdefault(stage, OrderedDict())
         if key not in kept:
-            kept[key] = make(*arguments)
-            if len(kept) > _KEPT:
-                kept.popitem(last=False)
+            self.check()
+            self.keep(stage, key, make(*arguments))
         kept.move_to_end(key)
         result: T = kept[key]
         return result
+
+    def keep(self, stage: str, key: Hashable, result: Any) -> None:
+        """Keep a result under a key, in place of the oldest one."""
+        kept = self.stages.setdefault(stage, OrderedDict())
+        kept[key] = result
+        if len(kept) > _KEPT:
+            kept.popitem(last=False)
 
     def kept(self, stage: str, key: Hashable) -> Any:
         """Return the result kept under a key; None where there is none."""

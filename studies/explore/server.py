@@ -81,6 +81,7 @@ def make_app(session: Session, port: int, token: str) -> App:
                 session.take(text, send)
         finally:
             sending.cancel()
+            session.disconnect(send)
 
     routes = [
         routing.Route(f"/{token}/", file),

@@ -1,7 +1,9 @@
 """What the page asks and what it is answered: messages in, pictures and figures out, on one thread of its own.
 
-A page has one request of a kind under way; of several that wait, only the newest is answered. Every answer has the
-number of its request, the controls that it was made with, and the Python that makes it again.
+A page has one request of a kind under way; of several that wait, only the newest is answered. One that comes while an
+older one of its kind is at work ends that one between two stages; one that is answered first (`KINDS`) makes the other
+wait, and a render too, between two runs. Where the page is closed nothing goes on. Every answer has the number of its
+request, the controls that it was made with, and the Python that makes it again.
 """
 
 import sys
@@ -15,11 +17,11 @@ from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from isp.picture import Picture
-from rodcone.errors import InputError, one_line, unknown
+from rodcone.errors import InputError, cut, one_line, unknown
 from studies.explore.answers import Answer, python_text, take_sensor, written
 from studies.explore.chain import Exposed, Image, Shot, development_of, expose_scene, photograph, true_picture_of
 from studies.explore.controls import Controls, controls_from, to_json
-from studies.explore.memo import Memo, give_memory_back
+from studies.explore.memo import Memo, Overtaken, give_memory_back
 from studies.explore.messages import KINDS, Header, hello, read_message, read_views, unsent
 from studies.explore.slow import begin, stand_in
 from studies.explore.source import Rendered, Source
@@ -28,9 +30,11 @@ from studies.explore.warm import WARM
 
 Send: TypeAlias = Callable[[Header, Sequence[bytes]], None]
 
+_RANK = {kind: place for place, kind in enumerate(KINDS)}
 SOON = ("hello", "scene", "sensor")  # kinds of message that wait for no render
 REST_S = 0.4  # without a new setting, after which a slow processor begins
 TRIM_AFTER = 100  # turns of its thread
+MOST_NOTES = 8  # of an answer
 
 
 class Session:
@@ -47,12 +51,13 @@ class Session:
         self._scenes, self._cold = scenes, list(WARM)
         self._dropped: dict[str, TemporaryDirectory[str]] = {}  # folders of sensors' files, by the file
         self._pending: dict[str, Header] = {}
+        self._message: Header | None = None  # that is being answered
         self._slow: dict[str, Callable[[], None]] = {}  # what ends each job at work, by its camera
         self._begin_page("")
         self._begin_source(source)
         self._send: Send = lambda header, buffers: None
         self._asked_s = -REST_S  # when the last picture was asked for
-        self._closed = False
+        self._turns, self._alone, self._closed = 0, False, False
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._work, daemon=True, name="explorer")
         self._thread.start()
@@ -61,8 +66,16 @@ class Session:
         """Answer to another connection from now on; the one before is told."""
         with self._changed:
             self._send({"kind": "taken over"}, ())
-            self._send = send
+            self._send, self._alone = send, False
             self._begin_page("")
+            self._changed.notify()
+
+    def disconnect(self, send: Send) -> None:
+        """Rest until a page is opened: the one of this connection is closed."""
+        with self._changed:
+            if send is self._send:
+                self._alone = True
+                self._begin_page("")
 
     def take(self, text: str, send: Send) -> None:
         """Take a message of the connection that `send` belongs to; one that was taken over is not listened to.
@@ -98,7 +111,7 @@ class Session:
             folder.cleanup()
 
     def _begin_source(self, source: Source) -> None:
-        self._source, self._states, self._memo = source, source.states(), Memo()
+        self._source, self._states, self._memo = source, source.states(self._between_runs), Memo(self._check)
         self._rendered: Rendered | None = None
         self._rendering, self._failure = True, ""  # whether a finer state follows, and why none does
 
@@ -118,39 +131,67 @@ class Session:
 
     def _work(self) -> None:
         """Answer what is asked; where nothing is, do what is left to do."""
-        turns = 0
         while not self._closed:
-            message, act = self._next()
-            if (turns := turns + 1) % TRIM_AFTER == 0:
-                give_memory_back()
-            with warnings.catch_warnings(record=True) as told:
-                warnings.simplefilter("always")
-                try:
-                    if message is not None:
-                        header, buffers = self._answer(message)
-                        notes = sorted({str(each.message) for each in told}) + [self._failure] * bool(self._failure)
-                        self._send(header | _whose(message) | {"notes": notes}, buffers)
-                    else:
-                        act()
-                except InputError as error:
-                    self._fail(message, str(error))
-                except Exception as error:  # the page goes on; the terminal has the place
-                    traceback.print_exc(file=sys.stderr)
-                    words = InputError(f"the program failed: {type(error).__name__}: {error}; see its terminal")
-                    self._fail(message, str(words))
+            self._turn(*self._next(self._left_to_do))
 
-    def _next(self) -> tuple[Header | None, Callable[[], None]]:
+    def _turn(self, message: Header | None, act: Callable[[], None]) -> None:
+        """Answer a message, or act; what goes wrong is told in a line, and the page goes on."""
+        self._turns, self._message = self._turns + 1, message
+        if self._turns % TRIM_AFTER == 0:
+            give_memory_back()
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            try:
+                if message is not None:
+                    header, buffers = self._answer(message)
+                    notes = sorted({cut(str(each.message)) for each in warned})[:MOST_NOTES]
+                    notes += [self._failure] * bool(self._failure)
+                    self._send(header | _whose(message) | {"notes": notes}, buffers)
+                else:
+                    act()
+            except Overtaken:
+                pass
+            except InputError as error:
+                self._fail(message, str(error))
+            except Exception as error:  # the terminal has the place
+                traceback.print_exc(file=sys.stderr)
+                words = InputError(f"the program failed: {type(error).__name__}: {error}; see its terminal")
+                self._fail(message, str(words))
+        self._message = None
+
+    def _next(self, left_to_do: Callable[[], Callable[[], None] | None]) -> tuple[Header | None, Callable[[], None]]:
         """Take the message to answer, or what to do while nothing is asked; waits for one of them."""
         with self._changed:
             while not self._closed:
-                kind = next((kind for kind in KINDS if kind in self._pending), None)
-                if kind is not None and (self._rendered is not None or not self._rendering or kind in SOON):
+                kind = self._first_pending()
+                if kind is not None:
                     return self._pending.pop(kind), _nothing
-                act, left_s = self._left_to_do(), self._asked_s + REST_S - time.monotonic()
-                if act is not None and (left_s <= 0 or self._rendered is None):
+                act, left_s = left_to_do(), self._asked_s + REST_S - time.monotonic()
+                if act is not None and not self._alone and (left_s <= 0 or self._rendered is None):
                     return None, act
-                self._changed.wait(None if act is None else left_s)
+                self._changed.wait(None if act is None or self._alone else left_s)
         return None, _nothing
+
+    def _first_pending(self) -> str | None:
+        """Kind of the message that is answered next; none while it waits for the first render."""
+        kind = next((kind for kind in KINDS if kind in self._pending), None)
+        return kind if self._rendered is not None or not self._rendering or kind in SOON else None
+
+    def _check(self) -> None:
+        """Raise `Overtaken` where nobody waits for the work under way, or something else is answered first."""
+        with self._changed:
+            message, pending = self._message, self._first_pending()
+            left = self._closed or self._alone or (message is not None and message.get("page", "") != self._page)
+            if left or (message is None and pending is not None):
+                raise Overtaken
+            if message is None or pending is None:
+                return
+            kind = message["kind"]
+            if pending == kind and self._pending[kind]["number"] > message["number"]:
+                raise Overtaken
+            if _RANK[pending] < _RANK[kind]:
+                self._pending.setdefault(kind, message)
+                raise Overtaken
 
     def _left_to_do(self) -> Callable[[], None] | None:
         """What waits for the sliders to rest: a finer render, slow processors, kernels to compile."""
@@ -166,22 +207,35 @@ class Session:
 
     def _render_on(self) -> None:
         """Render the next state, and show what is in view again."""
-        self._rendering = False  # where this fails, none follows: a generator that raised is at its end
         try:
-            self._rendered = next(self._states)
-        except Exception as error:
-            self._failure = f"the render ended with {type(error).__name__}: {one_line(error)}"
+            rendered = next(self._states)
+        except Overtaken:  # by another scene or the end
             raise
-        self._rendering = not self._rendered.last
-        self._memo = Memo()
+        except Exception as error:
+            self._rendering = False  # none follows: a generator that raised is at its end
+            self._failure = cut(f"the render ended with {type(error).__name__}: {one_line(error)}")
+            raise
+        self._rendered, self._rendering, self._memo = rendered, not rendered.last, Memo(self._check)
         with self._changed:
             if self._shown is not None:
                 self._pending.setdefault("show", self._shown)
 
+    def _between_runs(self) -> None:
+        """Answer what is asked between two runs of a render, which goes on once the sliders rest."""
+        source = self._source
+        while self._source is source and (message := self._next(lambda: _nothing)[0]) is not None:
+            self._turn(message, _nothing)
+        if self._closed or self._source is not source:
+            raise Overtaken
+
     def _warm_up(self) -> None:
         """Compile the kernels of one of `WARM`."""
         assert self._rendered is not None
-        photograph(self._rendered.transport, self._cold.pop(), Memo())
+        controls = self._cold.pop()
+        try:
+            photograph(self._rendered.transport, controls, Memo(self._check))
+        except Overtaken:
+            self._cold.append(controls)
 
     def _answer(self, message: Header) -> Answer:
         kind = message["kind"]
@@ -229,7 +283,10 @@ class Session:
                 self._slow_wanted = True
             shots.append(shot)
             used.append(shown)
-        pictures = [VIEWS[view](shots[camera]) for camera, view in views]
+        pictures = []
+        for camera, view in views:
+            self._check()
+            pictures.append(VIEWS[view](shots[camera]))
         height, width = pictures[0].shape[:2]
         header = {
             "cameras": [
@@ -250,6 +307,7 @@ class Session:
         """Shot of an exposure; None where its processor is slow and hasn't been at work."""
         if stand_in(controls, exposed.raw.dn.size) == controls:
             development = development_of(exposed, controls, self._memo)
+            self._check()
             linear, picture = development.develop()
         else:
             found = self._memo.kept("slow", repr(controls))
@@ -273,12 +331,17 @@ class Session:
                 def done(result: tuple[Image, Picture] | InputError, key: str = key, memo: Memo = memo) -> None:
                     with self._changed:
                         self._slow.pop(key, None)
-                        memo.of("slow", key, lambda: result)  # kept as an answer is, errors too
+                        memo.keep("slow", key, result)  # as an answer is, errors too
                         if self._shown is shown:
                             self._pending.setdefault("show", shown)
                         self._changed.notify()
 
-                end = begin(development_of(expose_scene(rendered.transport, controls, memo), controls, memo), done)
+                try:
+                    development = development_of(expose_scene(rendered.transport, controls, memo), controls, memo)
+                except Overtaken:
+                    self._slow_wanted = True
+                    raise
+                end = begin(development, done)
                 with self._changed:
                     self._slow[key] = end
 

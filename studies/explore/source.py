@@ -46,7 +46,7 @@ class Source:
     ----------
     title : str
     states : callable
-        Gives `Rendered` ones, coarse to fine.
+        Gives `Rendered` ones, coarse to fine; calls its argument between two runs, which ends the render by raising.
     groups : mapping of str to bool
         Light groups, and whether one has colours of its own.
     controls : Controls
@@ -60,7 +60,7 @@ class Source:
     """
 
     title: str
-    states: Callable[[], Iterator[Rendered]]
+    states: Callable[[Callable[[], None]], Iterator[Rendered]]
     groups: Mapping[str, bool]
     controls: Controls = field(default_factory=Controls)
     scene: SceneChoice | None = None
@@ -83,7 +83,7 @@ class RenderOptions:
 
 def of_transport(transport: Transport) -> Source:
     """A transport that is there already."""
-    return Source("transport", lambda: iter((Rendered(transport, GIVEN, True),)), _coloured(transport.groups))
+    return Source("transport", lambda _: iter((Rendered(transport, GIVEN, True),)), _coloured(transport.groups))
 
 
 def open_source(source: str, limits: RenderOptions) -> Source:
@@ -167,7 +167,7 @@ def _of_choice(choice: SceneChoice, limits: RenderOptions) -> Source:
         )
         return Source(
             Path(choice.source).name,
-            lambda: iter((Rendered(transport, code, True),)),
+            lambda _: iter((Rendered(transport, code, True),)),
             _coloured(transport.groups),
             Controls(reference_light=choice.light or LIGHT),
             scene=choice,
@@ -192,7 +192,7 @@ def _of_choice(choice: SceneChoice, limits: RenderOptions) -> Source:
     )
     return Source(
         opened.scene.name,
-        lambda: _states(opened.scene, size, bands, limits, code),
+        lambda between: _states(opened.scene, size, bands, limits, code, between),
         _coloured(opened.scene.groups),
         scene=choice,
         render=RenderLimits(max(size), limits.band_nm, limits.spp, seed=limits.seed, range_nm=limits.range_nm),
@@ -201,7 +201,12 @@ def _of_choice(choice: SceneChoice, limits: RenderOptions) -> Source:
 
 
 def _states(
-    scene: Scene, size: tuple[int, int], bands: tuple[Floats, Floats], limits: RenderOptions, code: str
+    scene: Scene,
+    size: tuple[int, int],
+    bands: tuple[Floats, Floats],
+    limits: RenderOptions,
+    code: str,
+    between_runs: Callable[[], None],
 ) -> Iterator[Rendered]:
     """Render a few pixels, then all of them, then with all samples."""
     steps = [(size, limits.spp)]
@@ -212,7 +217,7 @@ def _states(
     done: dict[tuple[int, int], Transport] = {}
     for number, (film, spp) in enumerate(steps, 1):
         asked: dict[str, Any] = {"wavelength_nm": bands[0], "width_nm": bands[1], "spp": spp, "seed": limits.seed}
-        done[film] = render(scene, film, resume=done.get(film), **asked)
+        done[film] = render(scene, film, resume=done.get(film), progress=lambda *_: between_runs(), **asked)
         call = f"transport = rodcone.render(scene, {film!r}, spp={spp}, seed={limits.seed}, **bands)\n"
         yield Rendered(done[film], code + call, number == len(steps))
 

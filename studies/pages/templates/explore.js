@@ -71,10 +71,10 @@ const HELP = [
   ["Copy Python", "The program that makes this picture or figure again, to the bit."],
   ["Further", "rodcone explore --help; docs/explore.md says what each picture is."],
 ];
-const STEPS = 1000, STALE_MS = 400;
+const STEPS = 1000, STALE_MS = 400, REST_MS = 150;
 
 function render({ model, el }) {
-  let number = 0, changes = 0, hello, state, edited = "a", cursor = null, stale, shown, pictureSize = [1, 1];
+  let number = 0, changes = 0, hello, state, edited = "a", cursor = null, stale, rested, shown, pictureSize = [1, 1];
   const page = Math.random().toString(36).slice(2); // a notebook sends every view of a widget all its messages
   const underWay = {}, waiting = {}; // by kind: the request that has no answer yet, and the one to send after it
   let sent = {}; // the last request for pictures: its number, how many changes went before, its sides, when
@@ -89,6 +89,14 @@ function render({ model, el }) {
     if (underWay[kind]) { waiting[kind] = [make, then]; return; }
     underWay[kind] = { number: ++number, then };
     model.send({ kind, number, page, ...make(number) });
+  }
+  // What waits is sent though an older one is under way, which ends there: no answer to it comes, or none that is painted.
+  function overtake(kind) {
+    const next = waiting[kind];
+    if (!next) return;
+    delete waiting[kind];
+    delete underWay[kind];
+    ask(kind, ...next);
   }
   model.on("msg:custom", (header, buffers) => {
     if ("page" in header && (header.page === page) === (header.kind === "taken over")) return;
@@ -113,6 +121,8 @@ function render({ model, el }) {
   const sides = () => [...new Set(state.views.map(([side]) => side))];
   function change() {
     root.dataset.asked = ++changes;
+    clearTimeout(rested);
+    rested = setTimeout(() => overtake("show"), REST_MS);
     ask("show", number => {
       sent = { number, changes, sides: sides(), at: performance.now() };
       clearTimeout(stale);
@@ -132,7 +142,7 @@ function render({ model, el }) {
   // What is shown
   function receive(header, buffers) {
     buffers.forEach((bytes, index) => { if (bytes.byteLength) held[index] = bytes; });
-    if (header.number === sent.number || header.number >= shown?.number) paint(header);
+    if (header.number === sent.number || header.number === shown?.number) paint(header);
   }
   function paint(header) {
     const [height, width] = pictureSize = header.size, newest = header.number === sent.number;

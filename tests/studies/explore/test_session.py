@@ -2,7 +2,9 @@
 
 import json
 import threading
-from collections.abc import Iterator
+import time
+import warnings
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,16 +14,18 @@ import pytest
 from explore_sample import BANDS, small_transport
 
 import rodcone as public
-from rodcone.errors import InputError
+from rodcone.errors import MOST_TOLD, InputError
 from sensor.presets import preset_file
 from sensor.readout import noise_variance
+from studies.explore import answers, chain
+from studies.explore import session as SESSION
 from studies.explore.chain import expose_scene
 from studies.explore.controls import Controls
 from studies.explore.memo import Memo
 from studies.explore.render_noise import noise_note, noise_share
-from studies.explore.session import Session
+from studies.explore.session import MOST_NOTES, Session
 from studies.explore.slow import stand_in
-from studies.explore.source import Rendered, of_transport
+from studies.explore.source import Rendered, RenderOptions, of_transport, open_source
 from studies.study.study import SceneChoice
 
 
@@ -128,7 +132,7 @@ def test_a_render_that_fails_is_told_and_asked_for_once(good_states):
     failed, once = 0, threading.Event()
 
     class Failing(Iterator[Rendered]):
-        def __init__(self) -> None:
+        def __init__(self, _: Callable[[], None]) -> None:
             self.left = good_states
 
         def __next__(self) -> Rendered:
@@ -157,6 +161,169 @@ def test_a_render_that_fails_is_told_and_asked_for_once(good_states):
     assert failed == 1
 
 
+@pytest.fixture
+def session() -> Iterator[Session]:
+    made = Session(of_transport(small_transport()))
+    yield made
+    made.close()
+
+
+# What is under way ends, or waits, where nobody needs it any more
+
+BURST = {"cameras": [{"frames": 64, "processor": "bayer", "mosaic": "bayer"}]}
+
+
+@pytest.fixture
+def interrupted(session, monkeypatch):
+    """Make a session in which something happens at the third frame that is read out; the frames' count so far."""
+    frames: list[None] = []
+
+    def at_third(happens: Callable[[], None]) -> list[None]:
+        expose = chain.expose
+
+        def counted(*arguments: Any, **options: Any) -> Any:
+            frames.append(None)
+            if len(frames) == 3:
+                happens()
+            return expose(*arguments, **options)
+
+        monkeypatch.setattr(chain, "expose", counted)
+        return frames
+
+    monkeypatch.setattr(session, "_cold", [])
+    return at_third
+
+
+def test_a_burst_ends_for_a_newer_picture(session, interrupted):
+    page = Page()
+    send = page.send
+    session.connect(send)
+    frames = interrupted(lambda: session.take(message("show", 2), send))
+    session.take(message("show", 1, **BURST), send)
+    page.wait("show", 2)
+    assert len(frames) == 3 + 1
+    assert [each["number"] for each in page.headers] == [2]
+
+
+def test_a_burst_ends_where_its_page_is_closed(session, interrupted):
+    page, later = Page(), Page()
+    send, send_later = page.send, later.send
+    session.connect(send)
+    frames = interrupted(lambda: session.disconnect(send))
+    session.take(message("show", 1, **BURST), send)
+    while len(frames) < 3:
+        time.sleep(0.01)
+    time.sleep(0.5)  # enough for the other 61
+    assert len(frames) == 3
+    session.connect(send_later)
+    session.take(message("hello", 2), send_later)
+    later.wait("hello", 2)
+    assert page.headers == [{"kind": "taken over"}]
+
+
+@pytest.mark.parametrize("kind", ["dng", "histogram"])
+def test_a_file_or_a_figure_lets_a_picture_go_first(session, interrupted, kind):
+    page = Page()
+    send = page.send
+    session.connect(send)
+    interrupted(lambda: session.take(message("show", 3, cameras=[{"seed": 3}]), send))
+    for number in (1, 2):
+        session.take(message("show", number, cameras=[{"seed": number}]), send)
+        page.wait("show", number)
+    session.take(message(kind, 4, cameras=[{"seed": 9}]), send)
+    page.wait(kind, 4)
+    assert [each["kind"] for each in page.headers] == ["show", "show", "show", kind]
+
+
+def test_a_dng_is_interrupted_before_it_is_written(session, monkeypatch):
+    page = Page()
+    send = page.send
+    session.connect(send)
+    calibrate, made = answers.calibrate, []
+
+    def counted(*arguments: Any) -> Any:
+        made.append(None)
+        if len(made) == 1:
+            session.take(message("show", 2), send)
+        return calibrate(*arguments)
+
+    monkeypatch.setattr(answers, "calibrate", counted)
+    session.take(message("dng", 1, cameras=[{}]), send)
+    page.wait("dng", 1)
+    assert [each["kind"] for each in page.headers] == ["show", "dng"]
+
+
+@pytest.fixture
+def endless():
+    """A render whose second state never comes: it looks up between its runs for ever."""
+
+    def states(between_runs: Callable[[], None]) -> Iterator[Rendered]:
+        yield Rendered(small_transport(), "", False)
+        while True:
+            between_runs()
+
+    made = Session(
+        replace(of_transport(small_transport()), states=states), {"chart": lambda: of_transport(small_transport())}
+    )
+    yield made
+    made.close()
+
+
+def test_a_render_lets_pictures_go_first_and_ends_for_another_scene(endless):
+    """And with the session: without it the fixture would never end."""
+    page = Page()
+    send = page.send
+    endless.connect(send)
+    for number in (1, 2, 3):
+        endless.take(message("show", number), send)
+        assert page.wait("show", number)["last"] is False
+    endless.take(message("scene", 4, name="chart"), send)
+    page.wait("scene", 4)
+    endless.take(message("show", 5), send)
+    assert page.wait("show", 5)["last"] is True
+
+
+def test_a_render_looks_up_between_its_runs():
+    class Enough(Exception):
+        """Of this test."""
+
+    def stop() -> None:
+        raise Enough
+
+    states = open_source("flat_field", RenderOptions(size=16, spp=4, band_nm=100.0)).states(stop)
+    with pytest.raises(Enough):
+        next(states)
+
+
+def test_a_render_that_answered_between_its_runs_has_the_bits_of_one_go():
+    source = open_source("still_life_outdoor", RenderOptions(size=32, spp=64, band_nm=100.0))
+
+    def states(between_runs: Callable[[], None]) -> Iterator[Rendered]:
+        photographed.append(chain.photograph(small_transport(), Controls(seed=len(photographed))))
+        return source.states(lambda: photographed.append(chain.photograph(small_transport(), Controls())))
+
+    photographed: list[Any] = []
+    (*_, alone), (*_, answered) = source.states(lambda: None), states(lambda: None)
+    assert len(photographed) > 2
+    assert np.array_equal(alone.transport.radiance, answered.transport.radiance)
+
+
+def test_notes_of_an_answer_are_few_and_short(session, monkeypatch):
+    def warned(*arguments: Any) -> Any:
+        for number in range(50):
+            warnings.warn(f"{number} " + "y" * 100_000, stacklevel=2)
+        return {}, ()
+
+    monkeypatch.setattr(SESSION, "written", warned)
+    page = Page()
+    send = page.send
+    session.connect(send)
+    session.take(message("histogram", 1, cameras=[{}]), send)
+    notes = page.wait("histogram", 1)["notes"]
+    assert len(notes) == MOST_NOTES
+    assert max(map(len, notes)) <= MOST_TOLD
+
+
 WIDE = {"neighbourhood": 41.0, "patch": 9.0}
 
 
@@ -172,13 +339,6 @@ WIDE = {"neighbourhood": 41.0, "patch": 9.0}
 )
 def test_what_takes_seconds_has_a_stand_in_while_it_is_at_work_where_it_can_be_ended(controls, pixels, shown):
     assert stand_in(controls, pixels) == shown
-
-
-@pytest.fixture
-def session() -> Iterator[Session]:
-    made = Session(of_transport(small_transport()))
-    yield made
-    made.close()
 
 
 def test_a_connection_that_was_taken_over_is_not_listened_to(session):
@@ -236,7 +396,7 @@ def test_what_another_page_asked_is_not_answered_to_the_new_one():
     """Neither what waits for the first picture nor, at the next state of the render, what was shown."""
     go = [threading.Event(), threading.Event()]
 
-    def states() -> Iterator[Rendered]:
+    def states(_: Callable[[], None]) -> Iterator[Rendered]:
         for number, event in enumerate(go):
             assert event.wait(30)
             yield Rendered(small_transport(), "", number == 1)

@@ -12,6 +12,7 @@ from rodcone.memory import memory
 from studies.commands.cli import main
 from studies.explore.chain import photograph
 from studies.explore.controls import Lamp
+from studies.explore.memo import go_on
 from studies.explore.source import FIRST_SIDE, RenderOptions, open_source
 from studies.explore.written import python_of
 from studies.photograph.png import to_png
@@ -19,7 +20,7 @@ from studies.study.study import SceneChoice
 
 
 def test_a_scene_is_shown_small_first_and_then_whole():
-    states = open_source("flat_field", RenderOptions(size=136, spp=2, band_nm=100.0)).states()
+    states = open_source("flat_field", RenderOptions(size=136, spp=2, band_nm=100.0)).states(go_on)
     first, last = next(states), next(states)
     assert (first.transport.coverage.mean.shape, first.last) == ((FIRST_SIDE, FIRST_SIDE), False)
     assert (last.transport.coverage.mean.shape, last.last) == ((136, 136), True)
@@ -32,7 +33,7 @@ def test_a_file_of_radiance_is_photographed_as_it_is(tmp_path: Path):
     path = tmp_path / "seen.exr"
     public.write_exr(radiance, path)
     source = open_source(str(path), RenderOptions())
-    (state,) = source.states()
+    (state,) = source.states(go_on)
     assert source.groups == {next(iter(state.transport.groups)): True}
     assert photograph(state.transport, source.controls).picture.shape == (16, 20, 3)
     names: dict[str, object] = {}
@@ -48,7 +49,7 @@ def test_reflectances_take_other_lamps_and_the_copied_python_has_their_light(tmp
         'levels = ["25cd/m2"]\nspectra = ["A"]\nscenes = [{ source = "seen.png", light = "D50" }]\n', "utf-8"
     )
     source = open_source(str(study), RenderOptions())
-    (state,) = source.states()
+    (state,) = source.states(go_on)
     assert source.groups == {"light": False}
     assert dict(source.controls.lamps) == {"light": Lamp("A")}
     shot = photograph(state.transport, source.controls)
@@ -80,13 +81,13 @@ def test_the_chart_of_a_scene_is_opened_and_copied(tmp_path: Path):
         "utf-8",
     )
     source = open_source(str(study), RenderOptions())
-    (state,) = source.states()
+    (state,) = source.states(go_on)
     assert source.controls.frames == 4
     assert source.scene == SceneChoice("color_checker", chart=str(chart))
     names: dict[str, object] = {}
     exec(state.code.replace("import numpy", "import rodcone\nimport numpy"), names)
     assert np.array_equal(names["transport"].radiance, state.transport.radiance)  # type: ignore[attr-defined]
-    (colours,) = open_source("color_checker", RenderOptions(size=24, spp=2, band_nm=100.0)).states()
+    (colours,) = open_source("color_checker", RenderOptions(size=24, spp=2, band_nm=100.0)).states(go_on)
     assert not np.array_equal(colours.transport.radiance, state.transport.radiance)
 
 

@@ -13,6 +13,7 @@ from sensor.presets import preset
 from studies.explore.camera import camera_of
 from studies.explore.chain import photograph
 from studies.explore.controls import Controls, Lamp
+from studies.explore.memo import go_on
 from studies.explore.source import RenderOptions, of_transport, open_source
 from studies.explore.views import VIEWS, histogram, pixel
 from studies.explore.written import GIVEN, python_of, study_of
@@ -45,7 +46,7 @@ def test_the_python_of_figures_makes_their_numbers():
 @pytest.mark.thorough
 def test_the_python_of_a_source_makes_its_transport():
     source = open_source("still_life", RenderOptions(size=20, spp=20, band_nm=80.0))
-    states = list(source.states())
+    states = list(source.states(go_on))
     assert [state.last for state in states] == [False, True]
     for state in states:
         names = ran(python_of(state.code, Controls()))
@@ -55,7 +56,7 @@ def test_the_python_of_a_source_makes_its_transport():
 
 
 def test_a_transports_python_says_that_it_was_given():
-    (state,) = of_transport(small_transport()).states()
+    (state,) = of_transport(small_transport()).states(go_on)
     assert state.code == GIVEN
     assert "transport = ..." in python_of(state.code, Controls())
 
