@@ -1,4 +1,4 @@
-"""Answers for one camera: figures, text and files."""
+"""Answers: pictures of one or two cameras; figures, text and files of one."""
 
 import sys
 from collections.abc import Mapping, MutableMapping, Sequence
@@ -10,14 +10,15 @@ from typing import Any, TypeAlias
 from render.illuminants import illuminant
 from rodcone.errors import InputError
 from sensor.raw_files.raw_file import write_raw
-from studies.explore.chain import expose_scene
-from studies.explore.controls import Controls, Lamp
+from studies.explore.chain import Exposed, Shot, development_of, expose_scene, photograph, true_picture_of
+from studies.explore.controls import Controls, Lamp, to_json
 from studies.explore.dropped import write_dropped
 from studies.explore.memo import Memo
 from studies.explore.messages import Header, sensor_terms
 from studies.explore.render_noise import noise_note, noise_share
+from studies.explore.slow import stand_in
 from studies.explore.source import Rendered, Source
-from studies.explore.views import histogram, pixel
+from studies.explore.views import VIEWS, Bytes, facts, histogram, pixel
 from studies.explore.written import python_of, study_of
 from studies.photograph.calibrate import calibrate, iso_speed
 
@@ -45,6 +46,54 @@ def written(
     row, column = message["row"], message["column"]
     found = pixel(exposed, row, column)
     return {"pixel": found, "python": python_text(rendered, controls, f"pixel {row} {column}", dropped)}, ()
+
+
+def shown(
+    cameras: Sequence[Controls], views: Sequence[tuple[int, str]], rendered: Rendered, memo: Memo, dropped: Dropped
+) -> tuple[Header, list[Bytes], bool]:
+    """Header and pictures of each view, and whether a slow processor is left for later."""
+    shots, used = [], []
+    for controls in cameras:
+        exposed = expose_scene(rendered.transport, controls, memo)
+        shot, taken = _shot(controls, exposed, memo), controls
+        if shot is None:
+            taken = stand_in(controls, exposed.raw.dn.size)
+            shot = photograph(rendered.transport, taken, memo)
+        shots.append(shot)
+        used.append(taken)
+    pictures = []
+    for camera, view in views:
+        memo.check()
+        pictures.append(VIEWS[view](shots[camera]))
+    header = {
+        "cameras": [
+            {"controls": to_json(taken), "waiting_for": None if taken == controls else controls.processor}
+            for taken, controls in zip(used, cameras, strict=True)
+        ],
+        "views": [list(view) for view in views],
+        "python": [python_text(rendered, used[camera], view, dropped) for camera, view in views],
+        "facts": [facts(shot) for shot in shots],
+        "size": list(pictures[0].shape[:2]),
+        "spp": rendered.transport.spp,
+        "render_error": rendered.transport.relative_mc_error,
+    }
+    return header, pictures, used != list(cameras)
+
+
+def _shot(controls: Controls, exposed: Exposed, memo: Memo) -> Shot | None:
+    """Shot of an exposure; None where its processor is slow and hasn't been at work."""
+    if stand_in(controls, exposed.raw.dn.size) == controls:
+        development = development_of(exposed, controls, memo)
+        memo.check()
+        developed = development.develop()
+    else:
+        developed = memo.kept("slow", repr(controls))
+        if developed is None:
+            return None
+        if isinstance(developed, InputError):
+            raise developed
+    linear, picture = developed
+    return Shot(exposed, linear, *true_picture_of(exposed, controls, memo), picture)
 
 
 def python_text(rendered: Rendered, controls: Controls, view: str, dropped: Dropped) -> str:

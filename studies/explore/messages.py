@@ -120,6 +120,14 @@ def read_message(text: str) -> Header:
     return message
 
 
+def gives_way(message: Header, pending: Header) -> bool:
+    """Whether a message's answer waits, or ends, for a pending one: a newer one of its kind, or one answered first."""
+    if pending["kind"] == message["kind"]:
+        return bool(pending["number"] > message["number"])
+    kinds = list(KINDS)
+    return kinds.index(pending["kind"]) < kinds.index(message["kind"])
+
+
 def _refuse(constant: str) -> None:
     raise ValueError(constant)
 

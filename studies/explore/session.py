@@ -18,19 +18,18 @@ from typing import Any, TypeAlias
 
 from isp.picture import Picture
 from rodcone.errors import InputError, cut, one_line, unknown
-from studies.explore.answers import Answer, python_text, take_sensor, written
-from studies.explore.chain import Exposed, Image, Shot, development_of, expose_scene, photograph, true_picture_of
-from studies.explore.controls import Controls, controls_from, to_json
-from studies.explore.memo import Memo, Overtaken, give_memory_back
-from studies.explore.messages import KINDS, Header, hello, read_message, read_views, unsent
+from studies.explore.answers import Answer, shown, take_sensor, written
+from studies.explore.chain import Image, development_of, expose_scene, photograph
+from studies.explore.controls import Controls, controls_from
+from studies.explore.memo import Memo, Overtaken, give_memory_back, go_on
+from studies.explore.messages import KINDS, Header, gives_way, hello, read_message, read_views, unsent
 from studies.explore.slow import begin, stand_in
 from studies.explore.source import Rendered, Source
-from studies.explore.views import VIEWS, Bytes, facts
+from studies.explore.views import Bytes
 from studies.explore.warm import WARM
 
 Send: TypeAlias = Callable[[Header, Sequence[bytes]], None]
 
-_RANK = {kind: place for place, kind in enumerate(KINDS)}
 SOON = ("hello", "scene", "sensor")  # kinds of message that wait for no render
 REST_S = 0.4  # without a new setting, after which a slow processor begins
 TRIM_AFTER = 100  # turns of its thread
@@ -53,9 +52,9 @@ class Session:
         self._pending: dict[str, Header] = {}
         self._message: Header | None = None  # that is being answered
         self._slow: dict[str, Callable[[], None]] = {}  # what ends each job at work, by its camera
+        self._send: Send = lambda header, buffers: None
         self._begin_page("")
         self._begin_source(source)
-        self._send: Send = lambda header, buffers: None
         self._asked_s = -REST_S  # when the last picture was asked for
         self._turns, self._alone, self._closed = 0, False, False
         self._changed = threading.Condition()
@@ -142,35 +141,33 @@ class Session:
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")
             try:
-                if message is not None:
+                if message is None:
+                    act()
+                else:
                     header, buffers = self._answer(message)
                     notes = sorted({cut(str(each.message)) for each in warned})[:MOST_NOTES]
-                    notes += [self._failure] * bool(self._failure)
-                    self._send(header | _whose(message) | {"notes": notes}, buffers)
-                else:
-                    act()
+                    self._send(header | _whose(message) | {"notes": [*notes, *filter(None, [self._failure])]}, buffers)
             except Overtaken:
                 pass
             except InputError as error:
                 self._fail(message, str(error))
             except Exception as error:  # the terminal has the place
                 traceback.print_exc(file=sys.stderr)
-                words = InputError(f"the program failed: {type(error).__name__}: {error}; see its terminal")
-                self._fail(message, str(words))
+                words = f"the program failed: {type(error).__name__}: {error}; see its terminal"
+                self._fail(message, str(InputError(words)))
         self._message = None
 
     def _next(self, left_to_do: Callable[[], Callable[[], None] | None]) -> tuple[Header | None, Callable[[], None]]:
         """Take the message to answer, or what to do while nothing is asked; waits for one of them."""
         with self._changed:
             while not self._closed:
-                kind = self._first_pending()
-                if kind is not None:
-                    return self._pending.pop(kind), _nothing
+                if kind := self._first_pending():
+                    return self._pending.pop(kind), go_on
                 act, left_s = left_to_do(), self._asked_s + REST_S - time.monotonic()
                 if act is not None and not self._alone and (left_s <= 0 or self._rendered is None):
                     return None, act
                 self._changed.wait(None if act is None or self._alone else left_s)
-        return None, _nothing
+        return None, go_on
 
     def _first_pending(self) -> str | None:
         """Kind of the message that is answered next; none while it waits for the first render."""
@@ -181,16 +178,12 @@ class Session:
         """Raise `Overtaken` where nobody waits for the work under way, or something else is answered first."""
         with self._changed:
             message, pending = self._message, self._first_pending()
-            left = self._closed or self._alone or (message is not None and message.get("page", "") != self._page)
-            if left or (message is None and pending is not None):
+            left = self._closed or self._alone or (message and message.get("page", "") != self._page)
+            if left or (pending and not message):
                 raise Overtaken
-            if message is None or pending is None:
-                return
-            kind = message["kind"]
-            if pending == kind and self._pending[kind]["number"] > message["number"]:
-                raise Overtaken
-            if _RANK[pending] < _RANK[kind]:
-                self._pending.setdefault(kind, message)
+            if message and pending and gives_way(message, self._pending[pending]):
+                if pending != message["kind"]:
+                    self._pending.setdefault(message["kind"], message)
                 raise Overtaken
 
     def _left_to_do(self) -> Callable[[], None] | None:
@@ -209,11 +202,10 @@ class Session:
         """Render the next state, and show what is in view again."""
         try:
             rendered = next(self._states)
-        except Overtaken:  # by another scene or the end
-            raise
-        except Exception as error:
-            self._rendering = False  # none follows: a generator that raised is at its end
-            self._failure = cut(f"the render ended with {type(error).__name__}: {one_line(error)}")
+        except Exception as error:  # a generator that raised is at its end: none follows, or another scene's
+            self._rendering = isinstance(error, Overtaken)
+            words = cut(f"the render ended with {type(error).__name__}: {one_line(error)}")
+            self._failure = "" if self._rendering else words
             raise
         self._rendered, self._rendering, self._memo = rendered, not rendered.last, Memo(self._check)
         with self._changed:
@@ -223,8 +215,8 @@ class Session:
     def _between_runs(self) -> None:
         """Answer what is asked between two runs of a render, which goes on once the sliders rest."""
         source = self._source
-        while self._source is source and (message := self._next(lambda: _nothing)[0]) is not None:
-            self._turn(message, _nothing)
+        while self._source is source and (message := self._next(lambda: go_on)[0]):
+            self._turn(message, go_on)
         if self._closed or self._source is not source:
             raise Overtaken
 
@@ -238,7 +230,7 @@ class Session:
             self._cold.append(controls)
 
     def _answer(self, message: Header) -> Answer:
-        kind = message["kind"]
+        kind, rendered = message["kind"], self._rendered
         if kind == "scene":
             self._choose_scene(message["name"])
         if kind in ("hello", "scene"):
@@ -247,13 +239,11 @@ class Session:
             return take_sensor(message["files"], self._dropped), ()
         if kind == "cancel":
             return {}, ()
-        rendered = self._rendered
         if rendered is None:
             raise InputError(f"scene: {self._failure}; nothing can be shown; mend the scene and start again")
-        cameras = self._cameras(message)
         if kind == "show":
-            return self._show(message, cameras, rendered)
-        return written(message, cameras[0], rendered, self._source, self._memo, self._dropped)
+            return self._show(message, self._cameras(message), rendered)
+        return written(message, self._cameras(message)[0], rendered, self._source, self._memo, self._dropped)
 
     def _cameras(self, message: Header) -> list[Controls]:
         return [controls_from(each, self._source.controls, self._dropped) for each in message["cameras"]]
@@ -273,57 +263,16 @@ class Session:
             sent: list[Bytes] = []
             if message.get("page", "") == self._page:
                 self._shown, sent = message, self._sent
-        shots, used = [], []
-        for controls in cameras:
-            exposed = expose_scene(rendered.transport, controls, self._memo)
-            shot, shown = self._shot(controls, exposed), controls
-            if shot is None:
-                shown = stand_in(controls, exposed.raw.dn.size)
-                shot = photograph(rendered.transport, shown, self._memo)
-                self._slow_wanted = True
-            shots.append(shot)
-            used.append(shown)
-        pictures = []
-        for camera, view in views:
-            self._check()
-            pictures.append(VIEWS[view](shots[camera]))
-        height, width = pictures[0].shape[:2]
-        header = {
-            "cameras": [
-                {"controls": to_json(shown), "waiting_for": None if shown == controls else controls.processor}
-                for shown, controls in zip(used, cameras, strict=True)
-            ],
-            "views": [list(view) for view in views],
-            "python": [python_text(rendered, used[camera], view, self._dropped) for camera, view in views],
-            "facts": [facts(shot) for shot in shots],
-            "size": [height, width],
-            "spp": rendered.transport.spp,
-            "render_error": rendered.transport.relative_mc_error,
-            "last": not self._rendering,
-        }
-        return header, unsent(pictures, sent)
-
-    def _shot(self, controls: Controls, exposed: Exposed) -> Shot | None:
-        """Shot of an exposure; None where its processor is slow and hasn't been at work."""
-        if stand_in(controls, exposed.raw.dn.size) == controls:
-            development = development_of(exposed, controls, self._memo)
-            self._check()
-            linear, picture = development.develop()
-        else:
-            found = self._memo.kept("slow", repr(controls))
-            if found is None:
-                return None
-            if isinstance(found, InputError):
-                raise found
-            linear, picture = found
-        return Shot(exposed, linear, *true_picture_of(exposed, controls, self._memo), picture)
+        header, pictures, waiting = shown(cameras, views, rendered, self._memo, self._dropped)
+        self._slow_wanted |= waiting
+        return header | {"last": not self._rendering}, unsent(pictures, sent)
 
     def _begin_slow(self) -> None:
         """Set the slow processors of what is shown to work."""
-        self._slow_wanted, shown, rendered = False, self._shown, self._rendered
-        if shown is None or rendered is None:
+        self._slow_wanted, message, rendered = False, self._shown, self._rendered
+        if message is None or rendered is None:
             return
-        for controls in self._cameras(shown):
+        for controls in self._cameras(message):
             key, memo = repr(controls), self._memo
             quick = stand_in(controls, rendered.transport.coverage.mean.size) == controls
             if not quick and memo.kept("slow", key) is None and key not in self._slow:
@@ -332,8 +281,8 @@ class Session:
                     with self._changed:
                         self._slow.pop(key, None)
                         memo.keep("slow", key, result)  # as an answer is, errors too
-                        if self._shown is shown:
-                            self._pending.setdefault("show", shown)
+                        if self._shown is message:
+                            self._pending.setdefault("show", message)
                         self._changed.notify()
 
                 try:
@@ -349,7 +298,3 @@ class Session:
 def _whose(message: Header) -> Header:
     """What tells the page that it is an answer of its own."""
     return {key: message[key] for key in ("kind", "number", "page") if key in message}
-
-
-def _nothing() -> None:
-    """Nothing to do."""
