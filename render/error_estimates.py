@@ -3,7 +3,7 @@
 Both are estimated from pixels spread evenly over the picture, and cost little beside relighting.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from rodcone.brief import brief
 from rodcone.types import Floats, Planes
 
 SAMPLE_PIXELS = 1024  # with 40 bands the median of the error is then known to about 1 %
+LEAST_UNCOVERED = 1e-6  # of a pixel: less is rounding
 SUB_BANDS = 64  # of a band, over which a light's moments are summed: 0.16 nm in a band of 10 nm
 
 
@@ -94,32 +95,71 @@ def pooled(planes: Planes) -> Planes:
     return np.asarray((rows[..., :-2] + rows[..., 1:-1] + rows[..., 2:]) / planes.dtype.type(9))
 
 
-def variance_of(difference: Planes, rates: NDArray[np.uint32]) -> Planes:
-    """Variance of a mean of two halves, from half their difference: its square, pooled over 3x3 pixels.
+@dataclass(frozen=True)
+class GroupError:
+    """One draw of a light group's error, in two parts that are independent of each other.
 
-    Pooled as the variance of one sample, since pixels (h, w) have samples in the ratio of `rates`. One difference has
-    one degree of freedom; bands share their paths, and add none.
+    Attributes
+    ----------
+    scattered : (band, h, w) float32
+        Noise of scattered light, of one sample.
+    rim : (band, h, w) float32
+        What comes of a lamp that is seen in more or fewer samples of the pixel than it should be.
+    scale : (band, h, w) float32
+        Root of scattered light over its mean in 3x3 pixels.
     """
-    return pooled_by_sample(np.square(difference), rates)
+
+    scattered: Planes
+    rim: Planes
+    scale: Planes
+
+    def covariance(self, other: "GroupError", rates: NDArray[np.uint32]) -> Planes:
+        """Covariance with another group's error, or the variance with itself: (band, h, w).
+
+        Noise of scattered light is pooled over 3x3 pixels in ratio to the light: across an edge of light variance over
+        mean differs far less than variance. A lamp's rim counts in its own pixel alone, since a lamp is thousands of
+        times brighter than the dark beside it. One difference has one degree of freedom; bands share their paths, and
+        add none.
+        """
+        scattered = pooled(self.scattered * other.scattered) * self.scale * other.scale
+        return np.asarray(scattered / rates.astype(np.float32) + self.rim * other.rim)
 
 
-def pooled_by_sample(squares: Planes, rates: NDArray[np.uint32]) -> Planes:
-    """Squares of errors, pooled over 3x3 pixels whose samples are in the ratio of `rates`."""
-    if rates.min() == rates.max():
-        return pooled(squares)
-    samples = rates.astype(np.float32)
-    return np.asarray(pooled(squares * samples) / samples)
+def group_errors(
+    light: Halves, seen: Sequence[Halves], coverage: Planes, rates: NDArray[np.uint32]
+) -> list[GroupError]:
+    """Error of each group of light (group, band, h, w), from half the difference of the halves.
+
+    Parameters
+    ----------
+    coverage : (h, w) float32
+        Share of the samples in which a lamp is seen: what more of the lamp is seen, less is seen of what lies behind.
+    rates : (h, w) uint32
+        In the ratio of the pixels' samples.
+    """
+    root_rates = np.sqrt(rates.astype(np.float32))
+    uncovered = np.where(coverage < 1 - LEAST_UNCOVERED, 1 - coverage, 0)
+    errors = []
+    for group, lamp in enumerate(seen):
+        scattered = np.maximum(light[group].mean - lamp.mean, np.float32(0))
+        lamp_light = np.broadcast_to(lamp.mean, scattered.shape) * uncovered
+        behind = np.divide(scattered * coverage, lamp_light, out=np.zeros_like(scattered), where=lamp_light > 0)
+        rim = lamp.difference * (1 - behind)
+        means = pooled(scattered)
+        scale = np.sqrt(np.divide(scattered, means, out=np.zeros_like(means), where=means > 0))
+        errors.append(GroupError((light[group].difference - rim) * root_rates, rim, scale))
+    return errors
 
 
 def shared_paths(
-    groups: tuple[int, int], difference: Planes, variance: Planes, rates: NDArray[np.uint32]
+    groups: tuple[int, int], errors: Sequence[GroupError], variance: Planes, rates: NDArray[np.uint32]
 ) -> SharedPaths:
-    """Correlation of the errors of two groups, from half the difference of the halves (group, band, h, w)."""
+    """Correlation of the errors of two groups, whose variance is known."""
     one, other = groups
-    both = np.sqrt(variance[one]) * np.sqrt(variance[other])
-    product = pooled_by_sample(difference[one] * difference[other], rates)
-    found = np.divide(product, both, out=np.zeros_like(both), where=both > 0)
-    return SharedPaths(groups, np.clip(found, -1, 1, out=found))
+    deviations = np.sqrt(variance[one]) * np.sqrt(variance[other])
+    products = errors[one].covariance(errors[other], rates)
+    correlation = np.divide(products, deviations, out=np.zeros_like(deviations), where=deviations > 0)
+    return SharedPaths(groups, np.clip(correlation, -1, 1, out=correlation))
 
 
 def relative_error(emitted: Floats, radiance: Planes, variance: Planes, shared: SharedPaths | None = None) -> float:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.error_estimates import Halves, relative_error, shared_paths, variance_of
+from render.error_estimates import Halves, group_errors, relative_error, shared_paths
 from render.integrator.allocation import rates_of
 from render.integrator.dense import Tracer
 from render.integrator.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
@@ -112,8 +112,9 @@ def means_of(transport: Transport, *, apart: bool = False) -> Means:
 
 def errors_of(lights: Floats, means: Means) -> dict[str, Any]:
     """What a `Transport` tells of its Monte Carlo error under lights (group, band), from the means: fields by name."""
-    variance = variance_of(means.light.difference, means.rates)
-    shared = shared_paths(means.shared, means.light.difference, variance, means.rates) if means.shared else None
+    errors = group_errors(means.light, means.seen, means.coverage.mean, means.rates)
+    variance = np.stack([group.covariance(group, means.rates) for group in errors])
+    shared = shared_paths(means.shared, errors, variance, means.rates) if means.shared else None
     error = relative_error(lights, means.light.mean, variance, shared)
     return {"variance": variance, "shared": shared, "relative_mc_error": error}
 
