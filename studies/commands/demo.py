@@ -51,8 +51,9 @@ def demo(
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); may be given
         several times (seven levels from moonlight to daylight by default).
     processor
-        Processor such as bayer_menon; may be given several times. By default interleaved and bayer, the paper's method
-        and its reference, and ple_rgbw and ple_bayer, one method on both mosaics, with which the page leads.
+        Processor such as bayer_menon; may be given several times. By default interleaved, the paper's method; bayer,
+        bilinear, with Gray World its reference; and ple_rgbw and ple_bayer, one method on both mosaics, with which the
+        page leads. Each is balanced as shot, where the scene's light is known, and by Gray World.
     longest_exposure
         Longest exposure time, such as 66ms, the default, or 1/15.
     spp
