@@ -15,12 +15,13 @@ from studies.explore.controls import Controls, Lamp, to_json
 from studies.explore.dropped import write_dropped
 from studies.explore.memo import Memo
 from studies.explore.messages import Header, sensor_terms
-from studies.explore.render_noise import noise_note, noise_share
+from studies.explore.render_noise import noise_share
 from studies.explore.slow import stand_in
 from studies.explore.source import Rendered, Source
 from studies.explore.views import VIEWS, Bytes, facts, histogram, pixel
 from studies.explore.written import python_of, study_of
 from studies.photograph.calibrate import calibrate, iso_speed
+from studies.study.render_noise import noise_note
 
 Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 Dropped: TypeAlias = Mapping[str, TemporaryDirectory[str]]  # folders of the sensors that were dropped, by their file
@@ -40,7 +41,7 @@ def written(
         note = noise_note(noise_share(exposed, controls, memo), rendered.transport.spp) if rendered.last else ""
         if note and memo.kept("noise note", "") is None:
             memo.keep("noise note", "", note)
-            print(note, file=sys.stderr)  # once for each render
+            print(f"rodcone: {note}", file=sys.stderr)  # once for each render
         python = python_text(rendered, controls, kind, dropped)
         return {"histogram": histogram(exposed.raw), "python": python, "noise_note": note}, ()
     row, column = message["row"], message["column"]

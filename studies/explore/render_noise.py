@@ -1,15 +1,15 @@
-"""What the render's noise adds to the sensor's, and the line that says so."""
+"""What the render's noise adds to the sensor's."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sensor.optics import form_image
 from sensor.response import behind_filters, channel_electrons
-from studies.budget.budget import monte_carlo_share
 from studies.explore.chain import Exposed
 from studies.explore.controls import Controls, Lamp
 from studies.explore.lamps import alone
 from studies.explore.memo import Memo
+from studies.study.render_noise import monte_carlo_share
 
 
 def noise_share(exposed: Exposed, controls: Controls, memo: Memo) -> float:
@@ -26,17 +26,6 @@ def noise_share(exposed: Exposed, controls: Controls, memo: Memo) -> float:
     error_e = behind_filters(np.tensordot(powers, errors_e, axes=1), exposed.sensor) * exposed.scale
     share = monte_carlo_share(error_e * exposed.exposure_s, exposed.expected_e, exposed.sensor, exposed.exposure_s)
     return controls.frames * share
-
-
-def noise_note(share: float, spp: float) -> str:
-    """What to say of a share of 1 and more; nothing below."""
-    if share < 1:
-        return ""
-    times = f"{share:.2g}" if share < 10 else f"{share:.0f}"
-    return (
-        f"The render's noise variance is {times} times the sensor's: what looks like the sensor's noise is mostly the "
-        f"render's, in the reference too; --spp {2 ** int(np.ceil(np.log2(spp * share)))} brings it below"
-    )
 
 
 def _error_e(exposed: Exposed, name: str) -> NDArray[np.float64]:

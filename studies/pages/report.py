@@ -14,7 +14,6 @@ from typing import Any
 
 from markupsafe import Markup
 
-from studies.budget.budget import MOST_SHARE
 from studies.pages import report_text as text
 from studies.pages.page import address, own_file, write_out
 from studies.pages.report_compare import (
@@ -32,6 +31,7 @@ from studies.pages.report_data import ReportCell, ReportData, ReportLevel, Repor
 from studies.pages.report_pictures import ReportPictures
 from studies.pages.report_speed import speed_rows
 from studies.pages.snr_chart import snr_over_light
+from studies.study.render_noise import MOST_SHARE
 
 # One script, in this order.
 SCRIPTS = ("report_numbers.js", "report_colour.js", "report_charts.js", "report_viewer.js", "report.js")

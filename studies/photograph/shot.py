@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from isp.remosaic import remosaic
 from render.engine import render
 from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reflectance
 from render.scene import Scene, film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
@@ -18,7 +20,7 @@ from rodcone.errors import InputError, require_fields, require_whole
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
-from sensor.binning import check_frame
+from sensor.binning import check_frame, pixel_sums
 from sensor.burst import burst
 from sensor.cfa import channels, is_bayer
 from sensor.config import SensorConfig
@@ -27,10 +29,12 @@ from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_by_rule_s
 from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending, write_raw
+from sensor.response import expected_electrons
 from studies.photograph.calibrate import calibrate, iso_speed
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra
 from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
+from studies.study.render_noise import monte_carlo_share, noise_note, speckle_sizes
 from studies.study.scene_source import asked_level, asked_size, open_scene
 from studies.study.study import AS_SHOT, GRAY_WORLD, MOST_FRAMES
 
@@ -150,7 +154,8 @@ def take(order: Order, step: Step | None = None) -> Taken:
     # The exposure.
     if step:
         step("exposure", 0.9)
-    radiance = transport.relight(spectra, luminance_cd_m2=luminance_cd_m2, illuminance_lux=illuminance_lux)
+    asked: dict[str, Any] = {"luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
+    radiance = transport.relight(spectra, **asked)
     if exposure_s is None:
         exposure_s = exposure_by_rule_s(order.exposure, form_image(radiance, sensor), sensor)
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
@@ -164,6 +169,10 @@ def take(order: Order, step: Step | None = None) -> Taken:
     }
     raws = [replace(frame, **noted) for frame in taken]
     raw = raws[0]
+    if opened is not None:
+        even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **asked))
+        frame = (even - odd) / 2, (even + odd) / 2, sensor, exposure_s
+        notes += filter(None, [noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))])
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
         notes += [
@@ -198,6 +207,11 @@ def take(order: Order, step: Step | None = None) -> Taken:
         "left_out": list(left_out(sensor)),
     }
     return Taken(paths, facts, tuple(notes))
+
+
+def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
+    """Expected electrons of the raw image's pixels, shape (h, w)."""
+    return pixel_sums(expected_electrons(form_image(radiance, sensor), sensor, exposure_s), sensor)
 
 
 def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:

@@ -18,7 +18,6 @@ from sensor.burst import merged_sensor
 from sensor.config import LensConfig, SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
-from studies.budget.budget import render_share
 from studies.budget.model_plan import Plan
 from studies.metrics.truth import light_in_bands
 from studies.photograph.clock import Clock
@@ -33,6 +32,7 @@ from studies.study.lit_scene import (
     under,
     white_spectrum,
 )
+from studies.study.render_noise import render_share
 from studies.study.study import Condition, Study, conditions, label, mosaics
 from studies.sweep.cells import Cell, RenderRecord, cell_key
 from studies.sweep.database import note_render, render_record

@@ -21,7 +21,6 @@ from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.raw import RawImage
-from studies.budget.budget import charged_share
 from studies.metrics.appearance import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure
 from studies.metrics.target_figures import target_figures
@@ -31,6 +30,7 @@ from studies.photograph.clock import timed
 from studies.photograph.machine import machine
 from studies.photograph.png import to_png
 from studies.study.equal_area import area_average
+from studies.study.render_noise import charged_share
 from studies.study.study import AS_SHOT, label
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text
 from studies.sweep.provenance import in_words, provenance, threads

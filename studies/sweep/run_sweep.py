@@ -16,9 +16,10 @@ from studies.budget.model_plan import Plan
 from studies.budget.plan import plan as plan_of
 from studies.photograph.clock import FIRST, Clock
 from studies.study.lit_scene import open_all
+from studies.study.render_noise import noise_note
 from studies.study.study import Study, conditions, label
 from studies.sweep.cells import Cell
-from studies.sweep.database import add, done, forget_old, note_run, note_stages, open_results, want
+from studies.sweep.database import add, done, forget_old, note_run, note_stages, open_results, rows, want
 from studies.sweep.folder import at_work, claim
 from studies.sweep.prepare import PICTURES, PILOTS, Job, known_cells, scene_cells
 from studies.sweep.row import Row
@@ -121,9 +122,19 @@ def sweep(
             made += _run(job, number, [cell for cell in cells if cell.key not in kept], runner, part)
         if not keep_old:
             forget_old(base)
+        notes.update(dict.fromkeys(_noise_notes(rows(base))))
         stages = clock.stages()
         note_stages(base, number, stages)
     return Swept(out, count * len(scenes), made, sum(stages.values()), tuple(notes))
+
+
+def _noise_notes(made: Sequence[Row]) -> list[str]:
+    """For each scene whose render's noise exceeds a sensor's, where it does so most."""
+    worst: dict[str, Row] = {}
+    for row in made:
+        worst[row.scene] = max(worst.get(row.scene, row), row, key=lambda one: one.mc_share)
+    notes = [(row, noise_note(row.mc_share, row.spp)) for row in worst.values()]
+    return [f"{row.scene}, {row.level}, {row.sensor}, {row.processor}: {note}" for row, note in notes if note]
 
 
 def _noted(study: Study) -> dict[str, Any]:
@@ -136,8 +147,8 @@ def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step
     """Make cells, store each as it comes with the time taken so far; returns their number."""
     made = 0
     seconds, workers = dict[str, float](), set[tuple[str, int]]()
-    with closing(runner(missing)) as rows:
-        for row in rows:
+    with closing(runner(missing)) as coming:
+        for row in coming:
             add(job.base, row)
             made += 1
             workers.add((row.host, row.worker))

@@ -12,7 +12,7 @@ from sweep_sample import swept
 from render.engine import render
 from rodcone.jit import backend
 from sensor.presets import low_noise
-from studies.study import quiet_render
+from studies.study import render_noise
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep.database import open_results, rows
 from studies.sweep.results import results_json
@@ -55,7 +55,7 @@ def test_the_results_state_the_render_and_the_exposures_that_were_made(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     paths, made = count_paths(monkeypatch), []
-    monkeypatch.setattr(quiet_render, "render", lambda *a, **k: made.append(render(*a, **k)) or made[-1])
+    monkeypatch.setattr(render_noise, "render", lambda *a, **k: made.append(render(*a, **k)) or made[-1])
     size, longest_s = 16, 0.05
     study = Study(
         (SceneChoice("slanted_edge"),),

@@ -75,6 +75,23 @@ def test_a_scene_becomes_two_negatives_whose_paths_alone_are_printed(
 
 
 @pytest.mark.parametrize(
+    ("scene", "level", "told"),
+    [
+        ("cornell_box", "100cd/m2", "rodcone: the render's noise: variance is "),
+        ("cornell_box", "0.001cd/m2", ""),
+        ("flat_field", "100cd/m2", ""),
+    ],
+)
+def test_a_render_with_more_noise_than_the_sensor_is_told(
+    scene: str, level: str, told: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    arguments = ["capture", scene, "--size", "24", "--spp", "4", "--cfa", "bayer", "--level", level]
+    code, _, err = call([*arguments, "-o", str(tmp_path / "shot.dng")], capsys)
+    assert (code, err.count("\n")) == (0, bool(told))
+    assert err.startswith(told)
+
+
+@pytest.mark.parametrize(
     ("more", "name", "written"),
     [
         (["--cfa", "bayer_grbg"], "shot.dng", ["shot.dng"]),

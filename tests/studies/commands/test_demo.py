@@ -1,6 +1,7 @@
 """`rodcone demo` end to end, small: its files, its numbers, and what it refuses before it renders."""
 
 import json
+import re
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -124,10 +125,14 @@ def test_the_report_and_the_overview_stand_beside_the_results(folder: Path) -> N
 
 
 @pytest.mark.thorough
-def test_the_report_names_a_level_and_its_source(tmp_path: Path) -> None:
-    assert (
-        call(["--size", "16", "--spp", "2", "--sensor", "low_noise", "--level", "moonlight", "-o", str(tmp_path)]) == 0
-    )
+def test_the_report_names_a_level_and_its_source_and_a_noisy_render_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small = ["--size", "16", "--spp", "2", "--level", "moonlight", "--level", "sunlit day"]
+    assert call([*small, "-o", str(tmp_path)]) == 0
+    told = capsys.readouterr().err
+    assert re.search(r"^rodcone: still_life, sunlit day, low_noise, \w+: the render's noise: variance is", told, re.M)
+    assert re.search(r"; \d+ samples a pixel would do$", told, re.M)
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "moonlight" in page
     assert "10 photons per µm² and second" in page

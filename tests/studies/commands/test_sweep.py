@@ -64,6 +64,20 @@ def test_sweep_prints_the_ledger_alone_and_the_table_follows(
     assert [line.split(",")[3] for line in table] == ["1cd/m2", "25cd/m2"]
 
 
+@pytest.mark.parametrize(("level", "told"), [("100cd/m2", True), ("0.001cd/m2", False)])
+def test_a_render_with_more_noise_than_the_sensor_is_told(
+    level: str, told: bool, study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study.write_text(f'scenes = ["cornell_box"]\nlevels = ["{level}"]\nprocessors = ["bayer"]\n', "utf-8")
+    small = ["--set", "render.size=16", "--set", "render.spp=4", "--set", "render.band_nm=50.0"]
+    code, _, err = call(
+        ["sweep", str(study), "-o", str(study.with_suffix("")), "--workers", "1", "--as-stated", *small], capsys
+    )
+    assert code == 0
+    line = f"rodcone: cornell_box, {level}, low_noise, bayer: the render's noise: variance is"
+    assert [line in each for each in err.splitlines()] == [True, False] if told else [False]
+
+
 @pytest.mark.thorough
 def test_a_sweep_follows_the_plan_and_reference_models_everything(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

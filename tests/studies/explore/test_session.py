@@ -22,7 +22,7 @@ from studies.explore import session as SESSION
 from studies.explore.chain import expose_scene
 from studies.explore.controls import Controls
 from studies.explore.memo import Memo
-from studies.explore.render_noise import noise_note, noise_share
+from studies.explore.render_noise import noise_share
 from studies.explore.session import MOST_NOTES, Session
 from studies.explore.slow import stand_in
 from studies.explore.source import Rendered, RenderOptions, of_transport, open_source
@@ -123,8 +123,21 @@ def test_the_renders_noise_is_that_of_independent_renders():
     share = noise_share(first, controls, memos[0])
     assert wanted / 1.5 < share < wanted * 1.5
     assert noise_share(first, replace(controls, frames=4), memos[0]) == pytest.approx(4 * share)
-    assert noise_note(0.99, 64) == ""
-    assert "--spp 256" in noise_note(3.2, 64)
+
+
+def test_a_render_with_more_noise_than_the_sensor_is_told_on_the_page_and_once_on_stderr(capsys):
+    page = Page()
+    session = Session(of_transport(public.render("cornell_box", (24, 24), spp=4, **BANDS)))
+    send = page.send
+    session.connect(send)
+    for number, level in enumerate((100.0, 50.0, 1e-4), 1):
+        camera = {"level_cd_m2": level}
+        session.take(message("histogram", number, cameras=[camera]), send)
+        page.wait("histogram", number)
+    session.close()
+    notes = [header["noise_note"] for header in page.headers]
+    assert [note.startswith("the render's noise: variance is ") for note in notes] == [True, True, False]
+    assert capsys.readouterr().err == f"rodcone: {notes[0]}\n"
 
 
 @pytest.mark.parametrize("good_states", [0, 1])

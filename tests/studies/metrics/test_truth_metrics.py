@@ -17,9 +17,9 @@ from sensor.optics import form_image
 from sensor.presets import low_noise, table1_output
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
-from studies.budget.budget import charged_share, monte_carlo_share
 from studies.metrics.quality import measure, psnr_db
 from studies.metrics.truth import green_scale, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
+from studies.study.render_noise import charged_share, monte_carlo_share
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)

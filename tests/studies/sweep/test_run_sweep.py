@@ -29,7 +29,7 @@ from scenes.catalog import load
 from sensor.optics import form_image
 from sensor.presets import preset, preset_file
 from sensor.response import expected_electrons
-from studies.budget.budget import charged_share, monte_carlo_share
+from studies.study.render_noise import charged_share, monte_carlo_share
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import run_cell as cell_run
 from studies.sweep.cells import Cell

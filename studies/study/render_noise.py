@@ -1,9 +1,15 @@
-"""Monte Carlo noise of a render beside the sensor's own noise, in electrons."""
+"""Monte Carlo noise of a render beside the sensor's own noise: its share, the line that tells it, a render without."""
+
+from collections.abc import Callable
+from math import ceil, log2
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from render.denoised.relight import measured_error
+from render.engine import render
+from render.scene import Scene
 from render.transport import Transport
 from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
@@ -15,6 +21,11 @@ from sensor.response import channel_electrons, electrons_per_irradiance
 # many of the pixels it has to hold: a few look at a lamp's rim or a caustic.
 MOST_SHARE = 0.03
 OF_PIXELS = 0.95
+
+SPECKLE = 5.0  # standard deviations of the sensor's noise: chance alone gives 1 pixel in 2 million
+FIRST_SPP = 128  # enough to tell how many more it takes
+MARGIN = 1.05  # on samples that the share so far asks for: it is an estimate
+MOST_GROWTH = 4.0  # of samples from one look to the next
 
 
 def monte_carlo_share(
@@ -104,3 +115,73 @@ def render_share(
     weights = weights * camera_equation(sensor.lens)
     error_e = np.tensordot(weights, np.sqrt(np.maximum(variance, 0.0)), axes=1)
     return monte_carlo_share(error_e, expected_e, sensor, time_s, of_pixels=OF_PIXELS)
+
+
+def speckle_sizes(
+    error_e: NDArray[np.floating], expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float
+) -> NDArray[np.float64]:
+    """Errors beyond `SPECKLE`, over the sensor's own standard deviation there; shape (pixel,), below saturation.
+
+    Where the render's noise is under the sensor's only single bright samples reach so far. Parameters as of
+    `monte_carlo_share`, of one frame.
+    """
+    size = np.abs(error_e) / np.sqrt(noise_variance(expected_e, sensor, exposure_s))
+    return np.asarray(size[(size > SPECKLE) & (expected_e < sensor.pixel.full_well_e)])
+
+
+def noise_note(share: float, spp: float, speckles: NDArray[np.float64] | None = None) -> str:
+    """What to say of a render whose noise shows, with the samples that would do; nothing where it doesn't.
+
+    Parameters
+    ----------
+    share : float
+        Monte Carlo variance over the sensor's own.
+    spp : float
+        Samples a pixel of the render; 0 of a file, for which no number of samples can be given.
+    speckles : (pixel,) float64, optional
+        Of `speckle_sizes`.
+    """
+    if share >= 1:
+        times = f"{share:.2g}" if share < 10 else f"{share:.0f}"
+        what = f"variance is {times} times the sensor's: it shows in the pictures and in the reference"
+        factor = share
+    elif speckles is not None and speckles.size:
+        what = f"{speckles.size} pixels are speckles, single samples more than {SPECKLE:g} times the sensor's noise"
+        factor = float(speckles.max()) / SPECKLE  # a sample's part of a pixel falls as their number grows
+    else:
+        return ""
+    remedy = f"; {2 ** ceil(log2(spp * factor))} samples a pixel would do" if spp else ""
+    return f"the render's noise: {what}{remedy}"
+
+
+def render_quietly(
+    scene: Scene,
+    size: tuple[int, int],
+    share: Callable[[Transport], float],
+    *,
+    most_share: float,
+    max_spp: int,
+    max_seconds: float | None,
+    **options: Any,
+) -> Transport:
+    """Render until `share` is `most_share` or less, or samples or time are used up; what was made is kept.
+
+    Parameters
+    ----------
+    share : callable
+        The render's noise variance over the sensor's own, such as `render_share`.
+    most_share : float
+    max_spp : int
+        Samples a pixel, at most.
+    max_seconds : float or None
+        Time, at most.
+    **options
+        Of `render.engine.render`: bands, seed, cache, progress.
+    """
+    made, wanted = None, min(FIRST_SPP, max_spp)
+    while True:
+        made = render(scene, size, max_spp=wanted, max_seconds=max_seconds, resume=made, **options)
+        now = share(made)
+        if now <= most_share or made.stopped_by != "samples" or made.spp >= max_spp:
+            return made
+        wanted = min(max_spp, int(np.ceil(made.spp * min(MARGIN * now / most_share, MOST_GROWTH))))

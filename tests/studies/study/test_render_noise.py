@@ -12,9 +12,8 @@ from render.scene import LightGroup
 from scenes.catalog import load
 from sensor.presets import low_noise, table1_output
 from sensor.readout import noise_variance
-from studies.budget.budget import MOST_SHARE, OF_PIXELS, render_share
-from studies.study import quiet_render
-from studies.study.quiet_render import render_quietly
+from studies.study import render_noise
+from studies.study.render_noise import MOST_SHARE, OF_PIXELS, noise_note, render_quietly, render_share, speckle_sizes
 
 NM, WIDTH_NM = np.arange(405.0, 780.0, 50.0), np.full(8, 50.0)
 LONGEST_S = 0.066
@@ -74,7 +73,7 @@ def calls(monkeypatch):
         asked.append((max_spp, resume.spp if resume else None))
         return grey(0.1, spp=max_spp, stopped_by="seconds" if max_spp > 5000 else "samples")
 
-    monkeypatch.setattr(quiet_render, "render", answer)
+    monkeypatch.setattr(render_noise, "render", answer)
     return asked
 
 
@@ -115,3 +114,24 @@ def test_a_real_render_reaches_the_share_it_is_asked_for():
     assert made.spp > 128
     once = render(scene, (8, 8), max_spp=int(made.spp), **bands)  # the last chunk is drawn whole
     assert np.array_equal(once.radiance, made.radiance)
+
+
+def test_the_note_tells_what_shows_and_the_samples_that_would_do():
+    assert noise_note(0.99, 64) == ""
+    assert "3.2 times the sensor's" in noise_note(3.2, 64)
+    assert noise_note(3.2, 64).endswith("; 256 samples a pixel would do")  # 64 x 3.2 = 205, in powers of two
+    assert noise_note(3.2, 0).endswith("in the reference")  # of a file
+    bright = noise_note(0.2, 64, np.array([5.5, 12.0]))
+    assert "2 pixels are speckles" in bright
+    assert bright.endswith("; 256 samples a pixel would do")  # 64 x 12 / 5 = 154
+
+
+def test_single_bright_samples_are_counted_where_the_well_is_not_full():
+    """Errors of 4 and 6 standard deviations of 400 e- and the dark, on pixels below the well and beyond."""
+    sensor = low_noise("bayer")
+    expected_e = np.full((4, 6), 400.0)
+    expected_e[:, 3:] = 2 * sensor.pixel.full_well_e
+    deviation = np.sqrt(noise_variance(np.full((4, 6), 400.0), sensor, 0.01)[0, 0])
+    error_e = np.zeros((4, 6))
+    error_e[0, 0], error_e[1, 1], error_e[2, 4] = 4 * deviation, -6 * deviation, 60 * deviation
+    assert speckle_sizes(error_e, expected_e, sensor, 0.01) == pytest.approx([6.0], rel=1e-6)
