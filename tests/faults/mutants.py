@@ -61,7 +61,7 @@ TESTS = {  # below tests/, the likeliest first
 }
 LEFT_OUT = re.compile(r".*_(RShift|LShift|BitOr|BitAnd|BitXor)_.*|.*_(RShift|LShift|BitOr|BitAnd|BitXor)")
 # Loaded once; Dr.Jit and Mitsuba not, whose threads a fork would lose.
-LIBRARIES = ("colour", "hypothesis", "matplotlib.pyplot", "scipy.signal", "scipy.stats", "skimage.metrics", "tifffile")
+LIBRARIES = ("colour", "matplotlib.pyplot", "scipy.signal", "scipy.stats", "skimage.metrics", "tifffile")
 NEEDS_ARGUMENTS = ("VariableInserter", "VariableReplacer")
 
 
