@@ -130,10 +130,11 @@ def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
 
 def _lens(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float, view_deg: float) -> Stage:
     """Add the terms of the lens one after the other; all of them are the reference."""
-    falloff = replace(sensor.lens, horizontal_view_deg=view_deg)
-    glare = replace(falloff, diffraction=0.0, veiling_glare=0.01)
+    plain = replace(sensor.lens, diffraction=0.0)
+    falloff = replace(plain, horizontal_view_deg=view_deg)
+    glare = replace(falloff, veiling_glare=0.01)
     lenses = {
-        "plain": sensor.lens,
+        "plain": plain,
         "+ cos^4": falloff,
         "+ cos^4, glare": glare,
         "+ cos^4, glare, diffraction": replace(glare, diffraction=1.0),

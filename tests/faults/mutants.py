@@ -42,7 +42,7 @@ TESTS = {  # below tests/, the likeliest first
         ),
         *("studies/photograph/test_snr", "sensor/test_binning", "sensor/readings/test_noise"),
     ],
-    "isp/reference.py": ["isp/test_interleaved", "isp/kernel/test_kernel"],
+    "isp/reference.py": ["isp/kernel/test_kernel", "isp/test_interleaved"],
     "render/transport.py": [
         *("render/test_transport", "render/test_error_estimates", "render/test_scene_range", "rodcone/test_notebook")
     ],
@@ -57,7 +57,7 @@ TESTS = {  # below tests/, the likeliest first
         "studies/sweep/test_stored",
         "studies/sweep/test_export",
     ],
-    "studies/sweep/stored.py": ["studies/sweep/test_stored", "studies/sweep/test_database", "studies/sweep/test_table"],
+    "studies/sweep/stored.py": ["studies/sweep/test_database", "studies/sweep/test_table", "studies/sweep/test_stored"],
 }
 LEFT_OUT = re.compile(r".*_(RShift|LShift|BitOr|BitAnd|BitXor)_.*|.*_(RShift|LShift|BitOr|BitAnd|BitXor)")
 # Loaded once; Dr.Jit and Mitsuba not, whose threads a fork would lose.
