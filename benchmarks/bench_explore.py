@@ -19,7 +19,6 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 from random import Random
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -31,8 +30,8 @@ from studies.explore.source import RenderOptions, open_source
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
+import browser as CHROME
 import explore_browser as EXPLORE
-import report_browser as CHROME
 
 # Slider by its key, the least and largest place that it is moved to, and the targets of median and 95 % [ms].
 QUICK, OPTICS = (60.0, 120.0), (150.0, float("nan"))
@@ -82,19 +81,19 @@ def resident_mib() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
-def latencies_ms(page: CHROME.Page, key: str, low: float, high: float, changes: int) -> list[float]:
+def latencies_ms(page: Any, key: str, low: float, high: float, changes: int) -> list[float]:
     """Milliseconds of each change of one slider."""
     rng, found = Random(key), []
     for _ in range(changes):
         place = rng.uniform(low, high)
-        found.append(page.value(MOVED % (key, place, place)))
+        found.append(page.evaluate(MOVED % (key, place, place)))
         EXPLORE.settle(page, figures=True)
     return found
 
 
-def drag(page: CHROME.Page, key: str, low: float, high: float, seconds: float) -> tuple[float, float]:
+def drag(page: Any, key: str, low: float, high: float, seconds: float) -> tuple[float, float]:
     """Pictures painted a second while a slider is dragged, and mean age of what is seen after the first [ms]."""
-    painted = np.array(page.value(EXPLORE.DRAG % (key, low, high, 1000 * seconds)), dtype=float).reshape(-1, 2)
+    painted = np.array(page.evaluate(EXPLORE.DRAG % (key, low, high, 1000 * seconds)), dtype=float).reshape(-1, 2)
     EXPLORE.settle(page, figures=True)
     if len(painted) < 2:
         return len(painted) / seconds, np.nan
@@ -116,37 +115,32 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print_environment()
     kernels = CompiledKernels()
     source = open_source(asked.scene, RenderOptions(size=asked.size, spp=asked.spp))
-    with TemporaryDirectory() as profile, EXPLORE.served(source) as address:
-        browser = CHROME.Browser(Path(profile))
-        try:
-            page, rng = CHROME.Page(browser, address), Random(1)
+    with EXPLORE.served(source) as address, CHROME.chromium() as browser:
+        page, rng = CHROME.open_page(browser, address), Random(1)
+        EXPLORE.settle(page)
+        for _ in range(20):
+            EXPLORE.move(page, rng)
             EXPLORE.settle(page)
-            for _ in range(20):
-                EXPLORE.move(page, rng)
-                EXPLORE.settle(page)
-            page = CHROME.Page(browser, address)  # the controls as they were
-            time.sleep(asked.rest_s)
-            EXPLORE.settle(page, figures=True)
-            before = kernels.count
-            print(f"{asked.scene}, {asked.size} x {asked.size} pixels, {asked.changes} changes each")
-            print("| slider | median | 95 % | target: median | 95 % | painted a second, dragged | age |")
-            print("|---|---|---|---|---|---|---|")
-            for key, (low, high, median, most) in SLIDERS.items():
-                if key.startswith("power") and len(source.groups) < 2:
-                    continue
-                middle, late = np.percentile(latencies_ms(page, key, low, high, asked.changes), [50, 95])
-                rate, age_ms = drag(page, key, low, high, asked.drag_s)
-                jump = f"{middle:.0f} ms | {late:.0f} ms | {median:.0f} ms | {most:.0f} ms"
-                print(f"| {key} | {jump} | {rate:.1f} | {age_ms:.0f} ms |", flush=True)
-            print(f"kernels compiled meanwhile: {kernels.count - before}")
-            for number in range(1, asked.memory + 1):
-                EXPLORE.move(page, rng)
-                EXPLORE.settle(page)
-                browser.events.clear()  # Chromium tells of each picture; this process is the program's too
-                if number in (500, asked.memory) or number % max(1, asked.memory // 10) == 0:
-                    print(f"{number} changes: {resident_mib():.0f} MiB, {kernels.count - before} kernels", flush=True)
-        finally:
-            browser.close()
+        page = CHROME.open_page(browser, address)  # the controls as they were
+        time.sleep(asked.rest_s)
+        EXPLORE.settle(page, figures=True)
+        before = kernels.count
+        print(f"{asked.scene}, {asked.size} x {asked.size} pixels, {asked.changes} changes each")
+        print("| slider | median | 95 % | target: median | 95 % | painted a second, dragged | age |")
+        print("|---|---|---|---|---|---|---|")
+        for key, (low, high, median, most) in SLIDERS.items():
+            if key.startswith("power") and len(source.groups) < 2:
+                continue
+            middle, late = np.percentile(latencies_ms(page, key, low, high, asked.changes), [50, 95])
+            rate, age_ms = drag(page, key, low, high, asked.drag_s)
+            jump = f"{middle:.0f} ms | {late:.0f} ms | {median:.0f} ms | {most:.0f} ms"
+            print(f"| {key} | {jump} | {rate:.1f} | {age_ms:.0f} ms |", flush=True)
+        print(f"kernels compiled meanwhile: {kernels.count - before}")
+        for number in range(1, asked.memory + 1):
+            EXPLORE.move(page, rng)
+            EXPLORE.settle(page)
+            if number in (500, asked.memory) or number % max(1, asked.memory // 10) == 0:
+                print(f"{number} changes: {resident_mib():.0f} MiB, {kernels.count - before} kernels", flush=True)
 
 
 if __name__ == "__main__":

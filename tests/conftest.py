@@ -2,8 +2,11 @@
 
 import os
 from collections import defaultdict
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
+from browser import chromium
 
 from rodcone.jit import backend, dr
 
@@ -12,6 +15,13 @@ def pytest_configure(config: pytest.Config) -> None:
     """Give each worker of pytest-xdist one thread of Dr.Jit."""
     if "PYTEST_XDIST_WORKER" in os.environ and backend() == "llvm":
         dr.set_thread_count(1)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """One Chromium for a module's tests."""
+    with chromium() as started:
+        yield started
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

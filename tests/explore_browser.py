@@ -10,7 +10,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import report_browser as CHROME
 from numpy.typing import NDArray
 
 from studies.explore.server import listen, make_server
@@ -86,27 +85,27 @@ def served(source: Source, scenes: Mapping[str, Callable[[], Source]] = MappingP
             session.close()
 
 
-def settle(page: CHROME.Page, *, last: bool = True, figures: bool = False) -> str:
+def settle(page: Any, *, last: bool = True, figures: bool = False) -> str:
     """Wait for the page's newest picture; "painted", or "failed" where its settings were refused."""
-    said: str = page.value(SETTLED % (str(last).lower(), str(figures).lower()))
+    said: str = page.evaluate(SETTLED % (str(last).lower(), str(figures).lower()))
     return said
 
 
-def move(page: CHROME.Page, rng: Random) -> str:
+def move(page: Any, rng: Random) -> str:
     """Move a control at random."""
-    said: str = page.value(MOVE % (rng.random(), rng.random()))
+    said: str = page.evaluate(MOVE % (rng.random(), rng.random()))
     return said
 
 
-def picture(page: CHROME.Page, index: int = 0) -> NDArray[np.uint8]:
+def picture(page: Any, index: int = 0) -> NDArray[np.uint8]:
     """The pixels of a canvas, (h, w, 3)."""
-    width, height, text = page.value(PIXELS % index)
+    width, height, text = page.evaluate(PIXELS % index)
     return np.frombuffer(b64decode(text), np.uint8).reshape(height, width, 4)[..., :3]
 
 
-def copied_python(page: CHROME.Page, index: int = 0) -> str:
+def copied_python(page: Any, index: int = 0) -> str:
     """What the button under a picture copies."""
-    text: str = page.value(COPY % index)
+    text: str = page.evaluate(COPY % index)
     return text
 
 

@@ -7,9 +7,10 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import browser as CHROME
 import pytest
-import report_browser as CHROME
 
 from rodcone import __all__ as PUBLIC
 
@@ -199,27 +200,24 @@ def test_the_finished_pages_ask_no_host_for_anything(site: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-@pytest.mark.skipif(CHROME.CHROMIUM is None, reason="needs Chromium to open the documentation")
-def test_the_search_finds_how_tos_first_where_the_site_was_opened_as_a_file(site: Path, tmp_path: Path) -> None:
-    browser = CHROME.Browser(tmp_path)
+@CHROME.NEEDED
+def test_the_search_finds_how_tos_first_where_the_site_was_opened_as_a_file(site: Path, browser: Any) -> None:
     first = {}
     for words in SEARCHED:
-        page = CHROME.Page(browser, site / "index.html")
-        found = page.value(f"{SEARCH}({words!r})")
-        assert page.complaints() == []
+        page = CHROME.open_page(browser, site / "index.html")
+        found = page.evaluate(f"{SEARCH}({words!r})")
+        assert CHROME.complaints(page) == []
         first[words] = found[0].removeprefix(site.as_uri()).partition("?")[0] if found else ""
     assert {words: place for words, place in first.items() if SEARCHED[words] not in place} == {}
-    browser.close()
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-@pytest.mark.skipif(CHROME.CHROMIUM is None, reason="needs Chromium to open the documentation")
+@CHROME.NEEDED
 def test_a_browser_shows_the_pages_at_two_widths_in_light_and_dark_without_a_complaint(
-    site: Path, tmp_path: Path
+    site: Path, browser: Any
 ) -> None:
-    for number, (width, dark) in enumerate(VIEWS):
-        browser = CHROME.Browser(tmp_path / str(number))  # a profile each: the scheme is remembered
+    for width, dark in VIEWS:
         for name in (
             "index",
             "model",
@@ -228,12 +226,11 @@ def test_a_browser_shows_the_pages_at_two_widths_in_light_and_dark_without_a_com
             "api/commands",
             "api/sensor/readout",
         ):
-            page = CHROME.Page(browser, site / f"{name}.html", width=width, dark=dark)
-            assert page.complaints() == []
-            assert all(address.startswith("file:") for address in page.requests()), page.requests()
-            assert page.value("document.documentElement.scrollWidth") == width, f"{name} scrolls sideways at {width}"
-            assert page.value("[...document.images].filter(x => x.complete && !x.naturalWidth).length") == 0
-            assert page.value("document.body.dataset.mdColorScheme") == ("slate" if dark else "default")
-            ground = page.screenshot()[300:, :8, :].mean()  # the margin: what is beside it may be a picture
+            page = CHROME.open_page(browser, site / f"{name}.html", width=width, dark=dark)
+            assert CHROME.complaints(page) == []
+            assert all(address.startswith("file:") for address in CHROME.requests(page)), CHROME.requests(page)
+            assert page.evaluate("document.documentElement.scrollWidth") == width, f"{name} scrolls sideways at {width}"
+            assert page.evaluate("[...document.images].filter(x => x.complete && !x.naturalWidth).length") == 0
+            assert page.evaluate("document.body.dataset.mdColorScheme") == ("slate" if dark else "default")
+            ground = CHROME.screenshot(page)[300:, :8, :].mean()  # the margin: what is beside it may be a picture
             assert (ground < 100) if dark else (ground > 155), f"{name}: mean {ground:.0f}, dark: {dark}"
-        browser.close()

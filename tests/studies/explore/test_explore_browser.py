@@ -1,15 +1,14 @@
 """The explorer in headless Chromium: every picture is that of the copied Python, nothing else is asked of any host."""
 
 import json
-import sys
 from collections.abc import Iterator
-from functools import partial
+from functools import partial, wraps
 from random import Random
 from typing import Any
 
+import browser as CHROME
 import numpy as np
 import pytest
-import report_browser as CHROME
 
 pytest.importorskip("uvicorn", reason="needs rodcone[explore]")
 pytest.importorskip("websockets", reason="needs rodcone[explore]")
@@ -21,20 +20,10 @@ from sensor.presets import preset_file
 from studies.explore.messages import hello
 from studies.explore.source import RenderOptions, open_source
 
-pytestmark = pytest.mark.skipif(
-    CHROME.CHROMIUM is None or sys.platform == "win32",
-    reason="needs `chromium` on PATH (Debian: apt install chromium) and POSIX file descriptors",
-)
+pytestmark = CHROME.NEEDED
 OPTIONS = RenderOptions(size=48, spp=4, band_nm=50.0)
 SCENES = {name: partial(open_source, name, OPTIONS) for name in ("color_checker", "still_life_outdoor")}
 MODES = [(1280, False), (1280, True), (1920, False), (1920, True), (390, False), (390, True)]
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    started = CHROME.Browser(tmp_path_factory.mktemp("profile"))
-    yield started
-    started.close()
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +38,7 @@ def one_render(monkeypatch: pytest.MonkeyPatch) -> None:
     render = ENGINE.render
     made: dict[str, Any] = {}
 
+    @wraps(render)
     def rendered(*arguments: Any, **options: Any) -> Any:
         key = repr((arguments[0].name, arguments[1:], options))
         return made[key] if key in made else made.setdefault(key, render(*arguments, **options))
@@ -64,7 +54,7 @@ def check_changes(page: Any, count: int, seed: int) -> int:
         if number % 10 == 9:  # a burst of changes, of which the last alone counts
             told += [EXPLORE.move(page, rng) for _ in range(5)]
         if EXPLORE.settle(page) == "failed":
-            assert page.value("document.querySelector('.explore').classList.contains('waiting')")
+            assert page.evaluate("document.querySelector('.explore').classList.contains('waiting')")
             continue
         painted += 1
         index = number % 2
@@ -75,42 +65,42 @@ def check_changes(page: Any, count: int, seed: int) -> int:
 
 @pytest.mark.thorough
 def test_each_picture_is_that_of_the_copied_python(browser, address, one_render):
-    page = CHROME.Page(browser, address)
+    page = CHROME.open_page(browser, address)
     EXPLORE.settle(page)
     assert check_changes(page, 12, seed=1) >= 8
 
 
 @pytest.mark.slow
 def test_each_of_200_pictures_is_that_of_the_copied_python(browser, address, one_render):
-    page = CHROME.Page(browser, address)
+    page = CHROME.open_page(browser, address)
     EXPLORE.settle(page)
     assert check_changes(page, 200, seed=2) >= 150
 
 
 def test_the_page_asks_no_other_host(browser, address):
-    page = CHROME.Page(browser, address)
+    page = CHROME.open_page(browser, address)
     EXPLORE.settle(page, figures=True)
-    asked = page.requests()
+    asked = CHROME.requests(page)
     assert asked
     assert all(each.startswith(address) for each in asked), asked
-    assert page.complaints() == []
+    assert CHROME.complaints(page) == []
 
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(("width", "dark"), MODES)
 def test_the_page_fits_and_is_readable(browser, address, width, dark):
-    page = CHROME.Page(browser, address, width=width, dark=dark)
+    page = CHROME.open_page(browser, address, width=width, dark=dark)
     EXPLORE.settle(page, figures=True)
-    assert page.value("document.documentElement.scrollWidth") <= width
-    background = page.screenshot()[2, 2].astype(int)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    background = CHROME.screenshot(page)[2, 2].astype(int)
     assert (background.mean() < 60) if dark else (background.mean() > 200)
-    unnamed = page.value(
+    unnamed = page.evaluate(
         """[...document.querySelectorAll(".explore :is(input, select, button, canvas, textarea, svg)")].filter(each =>
            !each.getAttribute("aria-label") && !each.closest("label")?.textContent.trim() && !each.textContent.trim())
            .map(each => each.outerHTML)"""
     )
     assert unnamed == []
-    boxes = page.value(
+    boxes = page.evaluate(
         "[...document.querySelectorAll('.explore canvas')].map(each => each.getBoundingClientRect().width)"
     )
     assert min(boxes) > 100
@@ -135,21 +125,22 @@ def test_level_by_name_a_dropped_sensor_another_scene_and_back(browser, offered,
     monkeypatch.chdir(tmp_path)
     chip = preset_file("low_noise").read_text("utf-8").replace("read_noise_e = 1.5", "read_noise_e = 9.0")
     (tmp_path / "chip.toml").write_text(chip, "utf-8")
-    page = CHROME.Page(browser, offered)
+    page = CHROME.open_page(browser, offered)
     EXPLORE.settle(page)
-    page.value(CHOOSE % ("level name", "moonlight"))
-    page.value(DROP % chip)
-    page.value(WAIT % "document.querySelector('[data-key=\"pixel.read_noise_e box\"]').value === '9'")
-    page.value(CHOOSE % ("scene", "color_checker"))
-    page.value(WAIT % "!document.querySelector('[data-key=\"power sky\"]')")
+    page.evaluate(CHOOSE % ("level name", "moonlight"))
+    page.evaluate(DROP % chip)
+    page.evaluate(WAIT % "document.querySelector('[data-key=\"pixel.read_noise_e box\"]').value === '9'")
+    page.evaluate(CHOOSE % ("scene", "color_checker"))
+    page.evaluate(WAIT % "!document.querySelector('[data-key=\"power sky\"]')")
     EXPLORE.settle(page)
     code = EXPLORE.copied_python(page)
     assert all(each in code for each in ("'color_checker'", "level_cd_m2=0.036", "sensor='chip.toml'"))
     assert np.array_equal(EXPLORE.picture(page), EXPLORE.ran(code))
-    page.value("[...document.querySelectorAll('header button')].find(each => each.textContent === 'Reset').click()")
+    page.evaluate("[...document.querySelectorAll('header button')].find(each => each.textContent === 'Reset').click()")
     EXPLORE.settle(page)
     assert "controls = Controls()" in EXPLORE.copied_python(page)
-    assert "Reference, 4 samples, render noise" in page.value("document.querySelectorAll('figcaption')[1].textContent")
+    reference = page.evaluate("document.querySelectorAll('figcaption')[1].textContent")
+    assert "Reference, 4 samples, render noise" in reference
 
 
 def answered(page, views, script):
@@ -164,7 +155,7 @@ def answered(page, views, script):
         "facts": [{"exposure_s": 0.01, "saturated": 0.0, "snr_db": None}],
         "size": [1, 1], "spp": 4, "render_error": 0.1, "last": True, "notes": [],
     }  # fmt: skip
-    return page.value(
+    return page.evaluate(
         f"""(async () => {{
           const {{ default: explorer }} = await import(new URL("explore.js", location.href));
           const asked = [], el = document.createElement("div"), seen = [], answer = {json.dumps(answer)};
@@ -182,7 +173,7 @@ def answered(page, views, script):
 def test_one_picture_is_asked_at_a_time_the_next_with_the_newest_values_and_no_old_one_comes_back(browser, address):
     """The page's module with a program that answers every third change, and an old question once more."""
     levels, painted = answered(
-        CHROME.Page(browser, address),
+        CHROME.open_page(browser, address),
         [[0, "picture"]],
         """
           const shows = () => asked.filter(each => each.kind === "show");
@@ -205,9 +196,9 @@ def test_one_picture_is_asked_at_a_time_the_next_with_the_newest_values_and_no_o
 
 def test_pictures_are_painted_while_a_slider_is_dragged(browser, address):
     """A mouse's events, one each 16 ms, for 2 s: without them a picture waited until the slider came to rest."""
-    page = CHROME.Page(browser, address)
+    page = CHROME.open_page(browser, address)
     EXPLORE.settle(page)
-    assert len(page.value(EXPLORE.DRAG % ("level", 0.2, 0.8, 2000))) / 2 > 0
+    assert len(page.evaluate(EXPLORE.DRAG % ("level", 0.2, 0.8, 2000))) / 2 > 0
 
 
 LOAD = """new Promise(done => {
@@ -221,15 +212,15 @@ LOAD = """new Promise(done => {
 
 @pytest.mark.thorough
 def test_a_lamp_from_a_csv_file_is_in_the_copied_python(browser, address, one_render):
-    page = CHROME.Page(browser, address)
+    page = CHROME.open_page(browser, address)
     EXPLORE.settle(page)
     before = EXPLORE.picture(page)
     for text, line in (("400,1\n500,x\n700,2\n", 2), ("nm,value\n400;1\n\n500\n", 4), ("nm,value\nW,m2\n400,1\n", 2)):
-        assert f"line {line} of lamp.csv" in page.value(LOAD % text)
-    assert "fewer than two" in page.value(LOAD % "nm,value\n400,1\n")
+        assert f"line {line} of lamp.csv" in page.evaluate(LOAD % text)
+    assert "fewer than two" in page.evaluate(LOAD % "nm,value\n400,1\n")
     EXPLORE.settle(page)
     assert np.array_equal(EXPLORE.picture(page), before)
-    page.value(LOAD % "nm;value;remark\r\n380;0.25;blue\r\n# measured\r\n650;1e0\r\n780;2\r\n")
+    page.evaluate(LOAD % "nm;value;remark\r\n380;0.25;blue\r\n# measured\r\n650;1e0\r\n780;2\r\n")
     EXPLORE.settle(page)
     code = EXPLORE.copied_python(page)
     assert "table=((380.0, 0.25), (650.0, 1.0), (780.0, 2.0))" in code
@@ -239,7 +230,7 @@ def test_a_lamp_from_a_csv_file_is_in_the_copied_python(browser, address, one_re
 
 def test_a_picture_without_bytes_is_the_last_one_sent(browser, address):
     seen = answered(
-        CHROME.Page(browser, address),
+        CHROME.open_page(browser, address),
         [[0, "picture"], [0, "truth"]],
         """
           const none = new DataView(new ArrayBuffer(0));
@@ -259,10 +250,10 @@ def test_a_picture_without_bytes_is_the_last_one_sent(browser, address):
 
 def test_two_views_over_one_connection_take_no_answers_of_each_other(browser, address):
     """As a notebook's widget that is shown twice: both are sent all messages, and both count requests from 1."""
-    page = CHROME.Page(browser, address)
+    page = CHROME.open_page(browser, address)
     EXPLORE.settle(page)
     said = hello(open_source("still_life_outdoor", RenderOptions(size=48, spp=4)))
-    begun, status = page.value(
+    begun, status = page.evaluate(
         f"""(async () => {{
           const {{ default: explorer }} = await import(new URL("explore.js", location.href));
           const asked = [], listeners = [], views = [0, 1].map(() => document.createElement("div"));
@@ -285,18 +276,18 @@ def test_two_views_over_one_connection_take_no_answers_of_each_other(browser, ad
 
 
 def test_keys_move_the_measured_pixel_and_take_another_exposure(browser, address):
-    page = CHROME.Page(browser, address)
+    page = CHROME.open_page(browser, address)
     EXPLORE.settle(page, figures=True)
-    page.value("document.querySelector('.explore canvas').focus()")
-    page.press("ArrowDown", 40)
-    said = page.value(
+    page.evaluate("document.querySelector('.explore canvas').focus()")
+    page.keyboard.press("ArrowDown")
+    said = page.evaluate(
         """new Promise(done => (function look() { const text = document.querySelector(".budget p")?.textContent;
            text ? done(text) : setTimeout(look, 20); })())"""
     )
     assert said.startswith("Row 25, column 24")
     first = EXPLORE.picture(page)
-    page.press("e", 69)
-    page.value(
+    page.keyboard.press("e")
+    page.evaluate(
         "document.querySelector('.explore').dispatchEvent(new KeyboardEvent('keydown', {key: 'e', bubbles: true}))"
     )
     EXPLORE.settle(page)
@@ -305,22 +296,22 @@ def test_keys_move_the_measured_pixel_and_take_another_exposure(browser, address
 
 @pytest.mark.thorough
 def test_a_slow_processor_can_be_cancelled_and_its_picture_comes_when_the_sliders_rest(browser, address, one_render):
-    page = CHROME.Page(browser, address)
+    page = CHROME.open_page(browser, address)
     EXPLORE.settle(page)
     choose = """(() => { const select = document.querySelector("[data-key=processor]");
         select.value = %r; select.dispatchEvent(new Event("change")); })()"""
     waiting = "!document.querySelector('.said button').hidden"
-    page.value(choose % "ple_rgbw")
+    page.evaluate(choose % "ple_rgbw")
     EXPLORE.settle(page)
-    assert page.value(waiting)
-    assert "interleaved" in page.value("document.querySelector('.explore figcaption').textContent")
-    page.value("document.querySelector('.said button').click()")
-    assert not page.value(waiting)
-    page.value(choose % "interleaved")
+    assert page.evaluate(waiting)
+    assert "interleaved" in page.evaluate("document.querySelector('.explore figcaption').textContent")
+    page.evaluate("document.querySelector('.said button').click()")
+    assert not page.evaluate(waiting)
+    page.evaluate(choose % "interleaved")
     EXPLORE.settle(page)
-    page.value(choose % "ple_rgbw")
+    page.evaluate(choose % "ple_rgbw")
     EXPLORE.settle(page)
-    page.value(
+    page.evaluate(
         """new Promise(done => (function look() {
             document.querySelector(".said button").hidden ? done() : setTimeout(look, 50); })())"""
     )

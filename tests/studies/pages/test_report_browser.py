@@ -2,16 +2,14 @@
 
 import json
 import re
-import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import browser as CHROME
 import numpy as np
 import pytest
-import report_browser as CHROME
 import report_sample as SAMPLE
 from PIL import Image
 from skimage.color import deltaE_ciede2000, rgb2lab
@@ -26,20 +24,7 @@ from studies.pages.report_pictures import ReportPictures, opened
 HOSTILE = "</script><b>x</b><img src=x onerror=document.title='owned'><script>document.title='owned'</script>"
 
 
-Browser = CHROME.Browser
-Page = CHROME.Page
-pytestmark = pytest.mark.skipif(
-    CHROME.CHROMIUM is None or sys.platform == "win32",
-    reason="needs `chromium` on PATH (Debian: apt install chromium) and POSIX file descriptors",
-)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """One Chromium for this module's tests."""
-    started = Browser(tmp_path_factory.mktemp("profile"))
-    yield started
-    started.close()
+pytestmark = CHROME.NEEDED
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +46,7 @@ def axes(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def shown(page: Any) -> dict[str, Any]:
     """Return what the viewer shows and says, once it is drawn; pictures as the colours of their 5th row."""
-    value: dict[str, Any] = page.value(
+    value: dict[str, Any] = page.evaluate(
         """(async () => {
              await drawing;
              const [width] = [byId("under").width];
@@ -95,21 +80,22 @@ def row_of(results: ReportData, cell: int) -> list[int]:
 
 def pick(page: Any, control: str, value: object) -> None:
     """Choose a value of a select or an input."""
-    page.value(f"(() => {{ const one = {control}; one.value = {value!r}; one.dispatchEvent(new Event('input')) }})()")
+    chosen = f"one.value = {value!r}; one.dispatchEvent(new Event('input'))"
+    page.evaluate(f"(() => {{ const one = {control}; {chosen} }})()")
 
 
 @pytest.mark.thorough
 def test_page_is_quiet_and_asks_for_nothing(browser: Any, report: Path) -> None:
-    page = Page(browser, report)
-    page.value("Promise.all([...document.images].map((image) => image.decode()))")
+    page = CHROME.open_page(browser, report)
+    page.evaluate("Promise.all([...document.images].map((image) => image.decode()))")
     shown(page)
-    assert page.requests() == []
-    assert page.complaints() == []
+    assert CHROME.requests(page) == []
+    assert CHROME.complaints(page) == []
 
 
 @pytest.mark.thorough
 def test_it_opens_with_the_wipe_at_512_pixels_where_something_is_seen(browser: Any, report: Path) -> None:
-    page = Page(browser, report, height=800)
+    page = CHROME.open_page(browser, report, height=800)
     results = SAMPLE.sample_report()
     psnr_db = [cell.figures["psnr_db"] for cell in results.by_group[0]]
     level = next(index // 2 for index, value in enumerate(psnr_db) if value and value >= 22)
@@ -117,20 +103,20 @@ def test_it_opens_with_the_wipe_at_512_pixels_where_something_is_seen(browser: A
     assert found["level"] == results.levels[level].name
     assert found["a"] == row_of(results, 2 * level)
     assert found["b"] == row_of(results, 2 * level + 1)
-    box = page.value("(({top, width}) => [top, width])(byId('stage').getBoundingClientRect())")
+    box = page.evaluate("(({top, width}) => [top, width])(byId('stage').getBoundingClientRect())")
     assert box[1] == 512
     assert box[0] < 400, "half of the window at most stands above the picture"
-    assert page.value("document.documentElement.scrollHeight") < 6 * 800
+    assert page.evaluate("document.documentElement.scrollHeight") < 6 * 800
 
 
 @pytest.mark.thorough
 def test_slider_by_keyboard_changes_picture_and_numbers(browser: Any, report: Path) -> None:
-    page = Page(browser, report)
+    page = CHROME.open_page(browser, report)
     results = SAMPLE.sample_report()
-    page.value("document.getElementById('level').focus()")
-    page.press("Home", 36)
+    page.evaluate("document.getElementById('level').focus()")
+    page.keyboard.press("Home")
     before = shown(page)
-    page.press("ArrowRight", 39)
+    page.keyboard.press("ArrowRight")
     after = shown(page)
     assert (before["level"], after["level"]) == ("moonlight", "street light")
     psnr_db = SAMPLE.sample_row(1, 0, "interleaved").psnr_db
@@ -138,12 +124,12 @@ def test_slider_by_keyboard_changes_picture_and_numbers(browser: Any, report: Pa
     assert after["spoken"].startswith("street light, 0.5")
     assert "street light" in after["status"]
     assert after["a"] == row_of(results, 2) != before["a"]
-    assert page.complaints() == []
+    assert CHROME.complaints(page) == []
 
 
 @pytest.mark.thorough
 def test_any_two_are_compared_and_the_truth(browser: Any, report: Path) -> None:
-    page = Page(browser, report)
+    page = CHROME.open_page(browser, report)
     results = SAMPLE.sample_report()
     pick(page, "document.querySelector('[data-axis=\"2\"]')", 1)
     pick(page, "byId('level')", 0)
@@ -153,19 +139,19 @@ def test_any_two_are_compared_and_the_truth(browser: Any, report: Path) -> None:
     assert found["a"] == row_of(results, 14)
     truth = opened(standard()[1].files["truth"])[5]
     assert found["b"] == [int(value) for pixel in truth for value in (*pixel, 255)]
-    page.value("document.querySelector('[data-cell=\"27\"]').click()")
+    page.evaluate("document.querySelector('[data-cell=\"27\"]').click()")
     assert shown(page)["level"] == "daylight"
     assert shown(page)["a"] == row_of(results, 27)
     # Sensors in place of cameras: A and B are the two of them now, and the camera is chosen apart.
     pick(page, "byId('compared')", 2)
     assert shown(page)["names"] == ["A: table1_output", "B: low_noise"]
-    assert page.value("document.querySelector('[data-axis=\"2\"]').closest('label').hidden") is True
-    assert page.complaints() == []
+    assert page.evaluate("document.querySelector('[data-axis=\"2\"]').closest('label').hidden") is True
+    assert CHROME.complaints(page) == []
 
 
 @pytest.mark.thorough
 def test_loupe_and_pixel_values_are_those_of_the_picture(browser: Any, report: Path) -> None:
-    page = Page(browser, report, height=800)
+    page = CHROME.open_page(browser, report, height=800)
     results = SAMPLE.sample_report()
     pick(page, "byId('level')", 3)
     pick(page, "byId('column')", 100)
@@ -173,24 +159,24 @@ def test_loupe_and_pixel_values_are_those_of_the_picture(browser: Any, report: P
     shown(page)
     pictures = standard()[1]
     picture, truth = (opened(pictures.files[name]) for name in (results.cells[6].picture or "", "truth"))
-    color = page.value("[...byId('loupe-T').getContext('2d').getImageData(0, 0, 1, 1).data].slice(0, 3)")
+    color = page.evaluate("[...byId('loupe-T').getContext('2d').getImageData(0, 0, 1, 1).data].slice(0, 3)")
     assert color == truth[180 - 8, 100 - 16].tolist()
-    assert page.value("getComputedStyle(byId('loupe-T')).imageRendering") == "pixelated"
+    assert page.evaluate("getComputedStyle(byId('loupe-T')).imageRendering") == "pixelated"
     error = deltaE_ciede2000(rgb2lab(picture[180, 100] / 255), rgb2lab(truth[180, 100] / 255))
     errors = flip(picture / 255, truth / 255)[180, 100]
     red, green, blue = picture[180, 100]
-    told = page.value("byId('pixel-A').textContent")
+    told = page.evaluate("byId('pixel-A').textContent")
     assert told == f"sRGB {red} {green} {blue} · ΔE2000 {error:.1f} · FLIP {errors:.2f}"
     # The pointer carries it.
-    box = page.value("(({left, top}) => [left, top])(byId('stage').getBoundingClientRect())")
-    page.drag((box[0] + 21, box[1] + 31), (box[0] + 41, box[1] + 61))
+    box = page.evaluate("(({left, top}) => [left, top])(byId('stage').getBoundingClientRect())")
+    CHROME.drag(page, (box[0] + 21, box[1] + 31), (box[0] + 41, box[1] + 61))
     shown(page)
-    assert page.value("[byId('column').value, byId('row').value]") == ["20", "30"], "two screen pixels each"
+    assert page.evaluate("[byId('column').value, byId('row').value]") == ["20", "30"], "two screen pixels each"
 
 
 @pytest.mark.thorough
 def test_error_maps_are_ciede2000_and_flip_of_each_pixel(browser: Any, report: Path) -> None:
-    page = Page(browser, report)
+    page = CHROME.open_page(browser, report)
     results = SAMPLE.sample_report()
     pick(page, "byId('level')", 2)
     pictures = standard()[1]
@@ -199,16 +185,16 @@ def test_error_maps_are_ciede2000_and_flip_of_each_pixel(browser: Any, report: P
         ("delta_e", deltaE_ciede2000(rgb2lab(picture), rgb2lab(truth)), 2e-3),
         ("flip", flip(picture, truth), 0.51 / 255),
     ):
-        found = np.array(page.value(f"errorsOf(of.a, '{kind}').then((errors) => [...errors])")).reshape(exact.shape)
+        found = np.array(page.evaluate(f"errorsOf(of.a, '{kind}').then((errors) => [...errors])")).reshape(exact.shape)
         assert np.abs(found - exact).max() < step
-        page.value(f"document.querySelector('[name=show][value={kind}]').click()")
+        page.evaluate(f"document.querySelector('[name=show][value={kind}]').click()")
         assert shown(page)["a"] != row_of(results, 4)
-        assert page.value("byId('key').hidden") is False
-        top = page.value(f"MAP_TOP.{kind}")
-        colours = page.value(f"[0, {top}, {2 * top}].map((error) => heat(error / {top}))")
+        assert page.evaluate("byId('key').hidden") is False
+        top = page.evaluate(f"MAP_TOP.{kind}")
+        colours = page.evaluate(f"[0, {top}, {2 * top}].map((error) => heat(error / {top}))")
         assert colours[0] == [0, 0, 4]
         assert colours[1] == colours[2] == [252, 253, 191]
-    assert page.complaints() == []
+    assert CHROME.complaints(page) == []
 
 
 @pytest.mark.thorough
@@ -222,48 +208,48 @@ def test_ciede2000_is_sharmas_on_colours_where_hues_turn(browser: Any, report: P
         ((2.0776, 0.0795, -1.135), (0.9033, -0.0636, -0.5514), 0.9082),
         ((90.8027, -2.0831, 1.441), (91.1528, -1.6435, 0.0447), 1.4441),
     ]
-    page = Page(browser, report)
+    page = CHROME.open_page(browser, report)
     for one, other, wanted in pairs:
-        assert page.value(f"deltaE({list(one)}, {list(other)}, 0)") == pytest.approx(wanted, abs=1e-4)
+        assert page.evaluate(f"deltaE({list(one)}, {list(other)}, 0)") == pytest.approx(wanted, abs=1e-4)
 
 
 @pytest.mark.thorough
 def test_wipe_and_a_or_b(browser: Any, report: Path) -> None:
-    page = Page(browser, report)
-    page.value("document.documentElement.style.scrollBehavior = 'auto'; byId('stage').scrollIntoView()")
-    box = page.value("(({left, top, width}) => [left, top, width])(byId('stage').getBoundingClientRect())")
-    page.drag((box[0] + 0.5 * box[2], box[1] + 50), (box[0] + 0.25 * box[2], box[1] + 60))
-    assert page.value("byId('wiper').value") == "25"
-    assert "75%" in page.value("getComputedStyle(byId('over')).clipPath")
-    page.value("byId('wiper').focus()")
-    page.press("ArrowRight", 39)
-    assert page.value("byId('wiper').getAttribute('aria-valuetext')") == "26 % Interleaved, 74 % Bayer"
-    page.value("document.querySelector('[name=view][value=flip]').click(); document.activeElement.blur()")
+    page = CHROME.open_page(browser, report)
+    page.evaluate("document.documentElement.style.scrollBehavior = 'auto'; byId('stage').scrollIntoView()")
+    box = page.evaluate("(({left, top, width}) => [left, top, width])(byId('stage').getBoundingClientRect())")
+    CHROME.drag(page, (box[0] + 0.5 * box[2], box[1] + 50), (box[0] + 0.25 * box[2], box[1] + 60))
+    assert page.evaluate("byId('wiper').value") == "25"
+    assert "75%" in page.evaluate("getComputedStyle(byId('over')).clipPath")
+    page.evaluate("byId('wiper').focus()")
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("byId('wiper').getAttribute('aria-valuetext')") == "26 % Interleaved, 74 % Bayer"
+    page.evaluate("document.querySelector('[name=view][value=flip]').click(); document.activeElement.blur()")
     tags = "[byId('tag-A').hidden, byId('tag-B').hidden, byId('flip').textContent]"
-    assert page.value(tags) == [False, True, "Show B (key x)"]
+    assert page.evaluate(tags) == [False, True, "Show B (key x)"]
     for told in ([True, False, "Show A (key x)"], [False, True, "Show B (key x)"]):
-        page.press("x", 88)
-        assert page.value(tags) == told
-    page.value("document.querySelector('[name=view][value=side]').click()")
+        page.keyboard.press("x")
+        assert page.evaluate(tags) == told
+    page.evaluate("document.querySelector('[name=view][value=side]').click()")
     shown(page)
-    names = page.value("[...document.querySelectorAll('#side figcaption')].map((one) => one.textContent)")
+    names = page.evaluate("[...document.querySelectorAll('#side figcaption')].map((one) => one.textContent)")
     assert names == ["Interleaved", "Bayer", "Reference, 256 samples"]
-    assert page.value("getComputedStyle(byId('pair')).display") == "none"
+    assert page.evaluate("getComputedStyle(byId('pair')).display") == "none"
 
 
 @pytest.mark.thorough
 def test_fits_the_window(browser: Any, report: Path) -> None:
-    page = Page(browser, report)
+    page = CHROME.open_page(browser, report)
     for dark in (False, True):
         for width, height, wide in ((390, 844, 358), (1280, 800, 512), (1920, 1080, 768), (2560, 1440, 1024)):
-            page.show(width=width, height=height, dark=dark)
-            assert page.value("document.documentElement.scrollWidth") <= width
-            assert page.value("byId('stage').getBoundingClientRect().width") == pytest.approx(wide, abs=2)
-    page.show(width=390)
+            CHROME.show(page, width=width, height=height, dark=dark)
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            assert page.evaluate("byId('stage').getBoundingClientRect().width") == pytest.approx(wide, abs=2)
+    CHROME.show(page, width=390)
     hint = "getComputedStyle(document.querySelector('#verdicts .scroll'), '::before').content"
-    assert "scrolls sideways" in page.value(hint)
-    page.show(width=2560)
-    assert page.value(hint) == "none"
+    assert "scrolls sideways" in page.evaluate(hint)
+    CHROME.show(page, width=2560)
+    assert page.evaluate(hint) == "none"
 
 
 @cache
@@ -292,15 +278,15 @@ def four(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_scripts_tables_are_those_of_the_page_and_signs_turn_with_a_and_b(browser: Any, four: Path) -> None:
     """The script draws what is written without it; with A and B swapped every lead has the other sign."""
     read = "[...document.querySelectorAll('#verdicts tr')].map((row) => [...row.children].map((cell) => [cell.className, cell.textContent.trim()]))"  # noqa: E501
-    written = Page(browser, four, script=False).value(read)
-    page = Page(browser, four)
-    assert page.value(read) == written
+    written = CHROME.open_page(browser, four, script=False).evaluate(read)
+    page = CHROME.open_page(browser, four)
+    assert page.evaluate(read) == written
     assert len(written) == 2 * 9
     assert {"ahead", "level", "behind"} <= {cell[0].split()[-1] for row in written for cell in row[1:]}
     pick(page, "byId('a')", 3)
     pick(page, "byId('b')", 2)
     other = {"ahead": "behind", "behind": "ahead", "▲": "▼", "▼": "▲", "+": "−", "−": "+"}
-    for before, after in zip(written, page.value(read), strict=True):
+    for before, after in zip(written, page.evaluate(read), strict=True):
         turned = [
             ["".join(other.get(part, part) for part in re.split(r"(ahead|behind|[▲▼+−])", words)) for words in cell]
             for cell in before
@@ -309,14 +295,14 @@ def test_the_scripts_tables_are_those_of_the_page_and_signs_turn_with_a_and_b(br
 
 
 def test_a_beside_every_other_has_the_leads_of_every_place_and_counts(browser: Any, four: Path) -> None:
-    page, report = Page(browser, four), compared()
+    page, report = CHROME.open_page(browser, four), compared()
     found = comparisons(report)[CAMERA]
     for a in (0, 2):
         pick(page, "byId('a')", a)
         for metric in (text.PSNR, text.FLIP):
             pick(page, "byId('beside-metric')", metric.key)
             read = "[...document.querySelectorAll('#beside tbody tr')].map((row) => [...row.children].map((cell) => cell.textContent))"  # noqa: E501
-            rows = page.value(read)
+            rows = page.evaluate(read)
             assert len(rows) == 3 * 2, "three others, two sensors"
             for index, row in enumerate(rows):
                 other, group = [value for value in range(4) if value != a][index // 2], index % 2
@@ -332,7 +318,7 @@ def test_a_beside_every_other_has_the_leads_of_every_place_and_counts(browser: A
 
 
 def test_question_answer_and_first_chart_follow_the_menus(browser: Any, four: Path) -> None:
-    page, answers = Page(browser, four), comparisons(compared())
+    page, answers = CHROME.open_page(browser, four), comparisons(compared())
     said = "['place', 'said', 'light', 'elsewhere', 'times'].map((id) => byId(id).textContent)"
     mark = "document.querySelector('#lead-chart .mark title').textContent"
     for a, b, sensor in ((2, 3, 0), (2, 3, 1), (0, 1, 1), (3, 0, 0)):
@@ -342,28 +328,28 @@ def test_question_answer_and_first_chart_follow_the_menus(browser: Any, four: Pa
         of = answers[CAMERA]
         words = of["answers"][f"{a} {b}"][sensor]
         place = ["table1_output", "low_noise"][sensor]
-        assert page.value(said) == [place, words["said"], words["light"], of["over"][f"{a} {b}"], words["times"]]
+        assert page.evaluate(said) == [place, words["said"], words["light"], of["over"][f"{a} {b}"], words["times"]]
         names = [text.camera_name(compared().cameras[value]) for value in (a, b)]
-        assert page.value("document.querySelector('.question').textContent").startswith(" beside ".join(names))
+        assert page.evaluate("document.querySelector('.question').textContent").startswith(" beside ".join(names))
         lead = groups_of(compared(), CAMERA, a, b)[sensor].pair.leads["psnr_db"]
         outcome = str(lead.outcome[0])
         words = text.lead_text(text.PSNR, float(lead.mean[0]), clear=outcome in ("ahead", "behind"))
-        assert page.value(mark) == f"moonlight: {outcome}, {words}"
-    assert page.value("document.querySelector('h1').textContent") == "What is seen?"
+        assert page.evaluate(mark) == f"moonlight: {outcome}, {words}"
+    assert page.evaluate("document.querySelector('h1').textContent") == "What is seen?"
     # the band of what nobody sees is twice 0.5 dB high
     scale = "(() => { const ticks = [...document.querySelectorAll('#lead-chart .grid')].map((line) => Number(line.getAttribute('y1'))); const texts = [...document.querySelectorAll('#lead-chart text[text-anchor=end]')].map((one) => Number(one.textContent.replace('−', '-'))).filter(Number.isFinite); return (texts[1] - texts[0]) / (ticks[0] - ticks[1]) })()"  # noqa: E501
-    height = page.value("Number(document.querySelector('#lead-chart .unseen').getAttribute('height'))")
-    assert height * page.value(scale) == pytest.approx(2 * 0.5, rel=1e-6)
+    height = page.evaluate("Number(document.querySelector('#lead-chart .unseen').getAttribute('height'))")
+    assert height * page.evaluate(scale) == pytest.approx(2 * 0.5, rel=1e-6)
     pick(page, "byId('b')", "truth")
-    assert page.value(said)[1:4] == ["", "", ""]
+    assert page.evaluate(said)[1:4] == ["", "", ""]
     pick(page, "byId('compared')", 5)
-    assert page.value("byId('level-name').textContent") == "moonlight beside street light"
-    assert page.value(said)[1] == "", "light levels are no rivals"
+    assert page.evaluate("byId('level-name').textContent") == "moonlight beside street light"
+    assert page.evaluate(said)[1] == "", "light levels are no rivals"
 
 
 def test_all_three_details_are_drawn_before_the_error_maps(browser: Any, report: Path) -> None:
-    page = Page(browser, report)
-    page.value("drawing")
+    page = CHROME.open_page(browser, report)
+    page.evaluate("drawing")
     drawn = """(() => {
       errorsOf = () => new Promise(() => {});
       byId("column").value = 70;
@@ -371,18 +357,18 @@ def test_all_three_details_are_drawn_before_the_error_maps(browser: Any, report:
       return new Promise((done) => setTimeout(() => done(["A", "B", "T"].map((name) =>
         [...byId(`loupe-${name}`).getContext("2d").getImageData(0, 0, 32, 16).data].filter(
           (value, at) => at % 4 === 3 && value).length)))); })()"""
-    assert page.value(drawn) == [512, 512, 512]
+    assert page.evaluate(drawn) == [512, 512, 512]
 
 
 def test_a_column_outside_the_picture_goes_back_to_its_last(browser: Any, report: Path) -> None:
-    page = Page(browser, report)
-    page.value("(() => { byId('column').value = 9999; byId('column').dispatchEvent(new Event('change')) })()")
-    assert page.value("byId('column').value") == "255"
+    page = CHROME.open_page(browser, report)
+    page.evaluate("(() => { byId('column').value = 9999; byId('column').dispatchEvent(new Event('change')) })()")
+    assert page.evaluate("byId('column').value") == "255"
 
 
 @pytest.mark.thorough
 def test_exposures_are_chosen_and_compared(browser: Any, axes: Path) -> None:
-    page = Page(browser, axes)
+    page = CHROME.open_page(browser, axes)
     results = SAMPLE.sample_axes()
     pick(page, "byId('level')", 1)
     pick(page, "document.querySelector('[data-axis=\"3\"]')", 1)
@@ -392,12 +378,12 @@ def test_exposures_are_chosen_and_compared(browser: Any, axes: Path) -> None:
     pick(page, "byId('compared')", 3)
     assert shown(page)["names"] == ["A: automatic", "B: 10\N{NO-BREAK SPACE}ms"]
     # Seed by seed the second loses 3 dB exactly: the lead has no scatter.
-    assert page.value("document.querySelector('#numbers td:last-child').textContent") == "ahead, ▲ +3.0"
+    assert page.evaluate("document.querySelector('#numbers td:last-child').textContent") == "ahead, ▲ +3.0"
     for width in (360, 1280, 2560):
-        page.show(width=width)
-        assert page.value("document.documentElement.scrollWidth") <= width
-    assert page.complaints() == []
-    assert page.requests() == []
+        CHROME.show(page, width=width)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert CHROME.complaints(page) == []
+    assert CHROME.requests(page) == []
 
 
 @pytest.fixture(scope="module")
@@ -417,7 +403,7 @@ def views(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.thorough
 def test_choice_of_scene_and_light_changes_pictures_truth_and_numbers(browser: Any, views: Path) -> None:
-    page = Page(browser, views)
+    page = CHROME.open_page(browser, views)
     pick(page, "byId('level')", 0)
     pick(page, "byId('b')", "truth")
     seen = []
@@ -430,18 +416,18 @@ def test_choice_of_scene_and_light_changes_pictures_truth_and_numbers(browser: A
     assert [psnr for psnr, _, _ in seen] == ["10.0", "14.0", "18.0", "22.0"]
     assert len({picture for _, picture, _ in seen}) == len({truth for _, _, truth in seen}) == 4
     # The chart's picture is twice as wide as high, and its figure stands on it alone.
-    box = page.value("(({width, height}) => [width, height])(byId('stage').getBoundingClientRect())")
+    box = page.evaluate("(({width, height}) => [width, height])(byId('stage').getBoundingClientRect())")
     assert box[0] == pytest.approx(2 * box[1], abs=1)
-    assert "ΔE2000 of the chart" in page.value("byId('numbers').textContent")
+    assert "ΔE2000 of the chart" in page.evaluate("byId('numbers').textContent")
     pick(page, "document.querySelector('[data-axis=\"0\"]')", 0)
-    assert "ΔE2000 of the chart" not in page.value("byId('numbers').textContent")
-    assert page.complaints() == []
-    assert page.requests() == []
+    assert "ΔE2000 of the chart" not in page.evaluate("byId('numbers').textContent")
+    assert CHROME.complaints(page) == []
+    assert CHROME.requests(page) == []
 
 
 @pytest.mark.thorough
 def test_a_picture_left_out_is_shown_from_its_file_or_said_to_be_gone(browser: Any, views: Path) -> None:
-    page = Page(browser, views)
+    page = CHROME.open_page(browser, views)
     for axis, value in ((0, 1), (1, 1), (2, 1)):
         pick(page, f"document.querySelector('[data-axis=\"{axis}\"]')", value)
     pick(page, "byId('level')", 1)
@@ -451,7 +437,7 @@ def test_a_picture_left_out_is_shown_from_its_file_or_said_to_be_gone(browser: A
         "Not in this page, and its file isn't beside it: pictures/color_checker/A/1/1/bayer"
     )
     assert found["psnr"] == f"{10 + 8 + 4 + 2 + 1:.1f}"
-    asked = [address.rpartition("/")[2] for address in page.requests()]
+    asked = [address.rpartition("/")[2] for address in CHROME.requests(page)]
     assert set(asked) == {"interleaved", "bayer"}, "nothing but the two pictures"
     pick(page, "byId('level')", 0)
     assert shown_safely(page)["gone"] == ""
@@ -459,7 +445,7 @@ def test_a_picture_left_out_is_shown_from_its_file_or_said_to_be_gone(browser: A
 
 def shown_safely(page: Any) -> dict[str, Any]:
     """What is drawn, where a picture from a file can't be read back."""
-    value: dict[str, Any] = page.value(
+    value: dict[str, Any] = page.evaluate(
         """(async () => {
              await drawing;
              return {drawn: ["over", "under"].map((id) => !byId(id).hidden), gone: byId("gone").textContent,
@@ -470,28 +456,28 @@ def shown_safely(page: Any) -> dict[str, Any]:
 
 @pytest.mark.thorough
 def test_choice_of_metrics_and_rows_shows_their_charts(browser: Any, views: Path) -> None:
-    page = Page(browser, views)
+    page = CHROME.open_page(browser, views)
     drawn = "[...document.querySelectorAll('[data-metric=%s]')].filter((one) => one.getClientRects().length).length"
-    assert [page.value(drawn % key) for key in ("psnr_db", "flip_mean", "chart_delta_e_mean")] == [2, 2, 0]
-    page.value("document.querySelector('[name=metric][value=psnr_db]').click()")
-    assert [page.value(drawn % key) for key in ("psnr_db", "flip_mean")] == [0, 2]
-    assert page.value("document.querySelectorAll('[name=metric]').length") == 9, (
+    assert [page.evaluate(drawn % key) for key in ("psnr_db", "flip_mean", "chart_delta_e_mean")] == [2, 2, 0]
+    page.evaluate("document.querySelector('[name=metric][value=psnr_db]').click()")
+    assert [page.evaluate(drawn % key) for key in ("psnr_db", "flip_mean")] == [0, 2]
+    assert page.evaluate("document.querySelectorAll('[name=metric]').length") == 9, (
         "the eight of every scene, and the chart's"
     )
     pick(page, "byId('rows')", 0)
-    titles = page.value("[...document.querySelectorAll('#drawn h3')].map((one) => one.textContent)")
+    titles = page.evaluate("[...document.querySelectorAll('#drawn h3')].map((one) => one.textContent)")
     assert titles == ["still_life", "color_checker"]
     lines = "document.querySelector('figure[data-metric=flip_mean]').querySelectorAll('.mark').length"
-    assert page.value(lines) == 2 * 2, "two cameras at two levels"
-    assert page.complaints() == []
+    assert page.evaluate(lines) == 2 * 2, "two cameras at two levels"
+    assert CHROME.complaints(page) == []
 
 
 @pytest.mark.thorough
 def test_every_control_has_a_name_for_a_screen_reader(browser: Any, axes: Path) -> None:
-    page = Page(browser, axes)
+    page = CHROME.open_page(browser, axes)
     shown(page)
-    page.value("for (const fold of document.querySelectorAll('details')) fold.open = true")
-    nodes = page.send("Accessibility.getFullAXTree")["nodes"]
+    page.evaluate("for (const fold of document.querySelectorAll('details')) fold.open = true")
+    nodes = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")["nodes"]
     # Level, wipe; views and what is shown; compared, A, B, exposure, rows and across; the metrics; column and row.
     wanted = {"slider": 2, "radio": 6, "checkbox": 8, "spinbutton": 2, "button": 1}
     for role, count in wanted.items():
@@ -508,39 +494,38 @@ def test_every_control_has_a_name_for_a_screen_reader(browser: Any, axes: Path) 
 
 @pytest.mark.thorough
 def test_everything_is_reached_by_keyboard_and_the_focus_is_seen(browser: Any, axes: Path) -> None:
-    page = Page(browser, axes)
+    page = CHROME.open_page(browser, axes)
     shown(page)
     reached = []
     for _ in range(16):
-        page.press("Tab", 9)
-        reached.append(
-            page.value("document.activeElement.id || document.activeElement.name || document.activeElement.className")
-        )
-        assert page.value("getComputedStyle(document.activeElement).outlineStyle") != "none", reached[-1]
+        page.keyboard.press("Tab")
+        focus = "document.activeElement"
+        reached.append(page.evaluate(f"{focus}.id || {focus}.name || {focus}.className"))
+        assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") != "none", reached[-1]
     order = ["level", "a", "b", "view", "show", "wiper", "flip", "column", "row"]
     assert [name for name in reached if name in order] == order
 
 
 @pytest.mark.thorough
 def test_print_holds_every_level_and_no_control(browser: Any, axes: Path) -> None:
-    page = Page(browser, axes, width=720)
+    page = CHROME.open_page(browser, axes, width=720)
     shown(page)
-    page.show(width=720, medium="print")
+    CHROME.show(page, width=720, medium="print")
     visible = "[...document.querySelectorAll('%s')].filter((one) => one.checkVisibility()).length"
-    assert page.value(visible % "input, select, button") == 0
-    assert page.value(visible % ".sheet img") == 12
-    tops = page.value("[...document.querySelectorAll('.sheet')].map((sheet) => new Set([...sheet.children].map("
+    assert page.evaluate(visible % "input, select, button") == 0
+    assert page.evaluate(visible % ".sheet img") == 12
+    tops = page.evaluate("[...document.querySelectorAll('.sheet')].map((sheet) => new Set([...sheet.children].map("
                       "(item) => item.getBoundingClientRect().top)).size)")  # fmt: skip
     assert tops == [1, 1], "the levels of a contact sheet stand in one row"
     # A4 across, less 10 mm to each side, at CSS's 96 pixels an inch.
-    assert page.value("document.querySelector('#table table').scrollWidth") <= (297 - 2 * 10) / 25.4 * 96
+    assert page.evaluate("document.querySelector('#table table').scrollWidth") <= (297 - 2 * 10) / 25.4 * 96
 
 
 @pytest.mark.parametrize("dark", [False, True])
 def test_screen_is_not_blank(browser: Any, report: Path, dark: bool) -> None:
-    page = Page(browser, report, dark=dark)
+    page = CHROME.open_page(browser, report, dark=dark)
     shown(page)
-    top = page.screenshot()
+    top = CHROME.screenshot(page)
     paper = top[5, 5].mean()
     assert paper < 60 if dark else paper > 200
     assert 0.02 < (np.abs(top.astype(int) - top[5, 5]).max(axis=2) > 60).mean() < 0.6
@@ -550,16 +535,16 @@ def test_screen_is_not_blank(browser: Any, report: Path, dark: bool) -> None:
 
 @pytest.mark.thorough
 def test_without_script_summary_pictures_and_numbers_stand(browser: Any, report: Path) -> None:
-    page = Page(browser, report, script=False)
+    page = CHROME.open_page(browser, report, script=False)
     visible = (
         "[...document.querySelectorAll('main :is(input, select, button, canvas)')].filter((one) => one.offsetParent)"
     )
-    assert page.value(f"{visible}.length") == 0, "controls that can do nothing are shown"
-    assert page.value("document.querySelector('noscript').innerText").startswith("Without JavaScript")
-    assert page.value("document.querySelectorAll('.verdicts tbody tr').length") == 2 * 8
-    assert page.value("document.querySelectorAll('.sheet img').length") == 28
-    page.value("document.querySelector('noscript a[href=\"#overview\"]').click()")
-    assert page.value("location.hash") == "#overview"
+    assert page.evaluate(f"{visible}.length") == 0, "controls that can do nothing are shown"
+    assert page.evaluate("document.querySelector('noscript').innerText").startswith("Without JavaScript")
+    assert page.evaluate("document.querySelectorAll('.verdicts tbody tr').length") == 2 * 8
+    assert page.evaluate("document.querySelectorAll('.sheet img').length") == 28
+    page.evaluate("document.querySelector('noscript a[href=\"#overview\"]').click()")
+    assert page.evaluate("location.hash") == "#overview"
 
 
 @pytest.mark.thorough
@@ -577,19 +562,19 @@ def test_hostile_names_stay_text(browser: Any, tmp_path: Path) -> None:
     )
     file = tmp_path / "hostile.html"
     file.write_text(render_report(results, pictures), encoding="utf-8")
-    page = Page(browser, file)
-    assert page.value("document.title").startswith(HOSTILE)
-    assert page.value("document.querySelectorAll('img[src=x]').length") == 0
+    page = CHROME.open_page(browser, file)
+    assert page.evaluate("document.title").startswith(HOSTILE)
+    assert page.evaluate("document.querySelectorAll('img[src=x]').length") == 0
     pick(page, "byId('level')", 0)
     assert shown(page)["level"] == HOSTILE
-    assert page.requests() == []
-    assert page.complaints() == []
+    assert CHROME.requests(page) == []
+    assert CHROME.complaints(page) == []
 
 
 @pytest.mark.thorough
 def test_policy_refuses_injected_script_and_fetch(browser: Any, report: Path) -> None:
-    page = Page(browser, report)
-    page.value(
+    page = CHROME.open_page(browser, report)
+    page.evaluate(
         """(async () => {
              const script = document.createElement("script");
              script.textContent = "document.title = 'owned'";
@@ -600,7 +585,7 @@ def test_policy_refuses_injected_script_and_fetch(browser: Any, report: Path) ->
              await fetch("https://example.invalid/").catch(() => {});
            })()"""
     )
-    assert page.value("document.title") != "owned"
-    violations = json.dumps(page.complaints())
+    assert page.evaluate("document.title") != "owned"
+    violations = json.dumps(CHROME.complaints(page))
     for directive in ("script-src", "img-src", "default-src"):
         assert directive in violations

@@ -2,12 +2,12 @@
 
 import json
 import re
-import sys
 from pathlib import Path
+from typing import Any
 
+import browser as CHROME
 import numpy as np
 import pytest
-import report_browser as CHROME
 from PIL import Image
 
 from rodcone.colour_spaces import decode_srgb, encode_srgb
@@ -160,25 +160,18 @@ def test_numbers_and_ranges_in_words() -> None:
     assert value_text(at_least("", 0.94996, 0.95)) == "0.94996"
 
 
-@pytest.mark.skipif(
-    CHROME.CHROMIUM is None or sys.platform == "win32",
-    reason="needs `chromium` on PATH (Debian: apt install chromium) and POSIX file descriptors",
-)
-def test_page_is_quiet_in_a_browser_and_fits_a_phone(paper: Paper, folder: Path, tmp_path: Path) -> None:
-    browser = CHROME.Browser(tmp_path / "profile")
-    try:
-        shades = []
-        for dark in (False, True):
-            page = CHROME.Page(browser, folder / "paper.html", width=360, dark=dark)
-            page.value("Promise.all([...document.images].map((image) => image.decode()))")
-            assert page.requests() == []
-            assert page.complaints() == []
-            assert page.value("document.documentElement.scrollWidth") == 360
-            shades.append(float(np.median(page.screenshot())))
-        assert shades[0] > 200  # the page's own shade: light
-        assert shades[1] < 60  # and dark
-    finally:
-        browser.close()
+@CHROME.NEEDED
+def test_page_is_quiet_in_a_browser_and_fits_a_phone(paper: Paper, folder: Path, browser: Any) -> None:
+    shades = []
+    for dark in (False, True):
+        page = CHROME.open_page(browser, folder / "paper.html", width=360, dark=dark)
+        page.evaluate("Promise.all([...document.images].map((image) => image.decode()))")
+        assert CHROME.requests(page) == []
+        assert CHROME.complaints(page) == []
+        assert page.evaluate("document.documentElement.scrollWidth") == 360
+        shades.append(float(np.median(CHROME.screenshot(page))))
+    assert shades[0] > 200  # the page's own shade: light
+    assert shades[1] < 60  # and dark
 
 
 @pytest.mark.slow
