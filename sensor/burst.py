@@ -19,7 +19,7 @@ from sensor.raw import RawImage
 from sensor.readings.noise import CLEAR_SIGMAS
 
 BURST_WHITE_DN = 65_535.0  # of a merged burst, whose samples are no whole numbers
-_Read = TypeVar("_Read", PixelConfig, Reading)
+_Dark = TypeVar("_Dark", PixelConfig, Reading)
 _ROUNDS = 6  # of the weights: a further one changes less than a thousandth of the merged noise
 
 # Fields that all frames must share: what turns DN into electrons, and the noise that weighs them.
@@ -114,7 +114,9 @@ def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merg
         )
         full &= rate * groups[start].exposure_s >= clear_e
     photo_rate = rate - dark_current_e_per_s
-    fixed = (first.dsnu_e * per_s) ** 2 + (first.prnu * photo_rate) ** 2
+    # `prnu` holds the columns' gains too, which act on dark current as well.
+    of_columns = first.column_gain_spread**2 * (rate**2 - photo_rate**2)
+    fixed = (first.dsnu_e * per_s) ** 2 + (first.prnu * photo_rate) ** 2 + of_columns
     return Merged(rate_e_per_s=photo_rate, temporal_variance=variance, fixed_variance=fixed, saturated=full)
 
 
@@ -179,17 +181,22 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
 def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
     """Sensor whose one exposure of `count` times the time holds the noise that a merged burst of `count` does.
 
-    Its pixels are undivided: four photodiodes of a burst are no binning of four bursts.
+    Its pixels are undivided: four photodiodes of a burst are no binning of four bursts. Its quantisation is `count`
+    times as large a variance as that of the burst's roundings.
     """
-    readings = tuple(_of_burst(reading, count) for reading in sensor.chip.readings)
-    pixel = pixel_of_readings(sensor.pixel, readings) if readings else _of_burst(sensor.pixel, count)
+
+    def burst_of(dark: _Dark) -> _Dark:
+        return replace(
+            dark,
+            read_noise_e=dark.read_noise_e * sqrt(count),
+            dsnu_e=dark.dsnu_e * count,
+            full_well_e=dark.full_well_e * count,
+        )
+
+    readings = tuple(burst_of(reading) for reading in sensor.chip.readings)
+    pixel = replace(sensor.pixel, column_offset_e=sensor.pixel.column_offset_e * count)
+    pixel = pixel_of_readings(pixel, readings) if readings else burst_of(pixel)
     return replace(sensor, pixel=pixel, chip=Chip(readings=readings, readout=sensor.chip.readout))
-
-
-def _of_burst(one: _Read, count: int) -> _Read:
-    return replace(
-        one, read_noise_e=one.read_noise_e * sqrt(count), dsnu_e=one.dsnu_e * count, full_well_e=one.full_well_e * count
-    )
 
 
 def _grouped(frames: Sequence[RawImage]) -> list[_Group]:

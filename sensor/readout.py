@@ -13,7 +13,7 @@ from sensor.device import Device
 from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
 from sensor.readings.merge import merge_readings
-from sensor.readings.noise import merged_variance, merged_variances, of_reading, switched_to
+from sensor.readings.noise import dark_electrons, merged_variance, merged_variances, of_reading, switched_to
 
 # Digital numbers of one exposure from expected electrons, camera, chip, exposure time [s], key, and the reading's
 # number among those of one charge.
@@ -270,7 +270,7 @@ def _electrons_at_snr_of_readings(snr: float, sensor: SensorConfig, exposure_s: 
         return min((e for e, fit in zip(light_e, fits, strict=True) if fit), default=np.inf)
     levels = np.geomspace(1e-3, sensor.pixel.full_well_e, 8000)[:-1]
     ratio = levels / np.sqrt(merged_variance(levels, sensor, exposure_s))
-    above = np.flatnonzero(ratio >= snr)
+    above = np.flatnonzero((ratio >= snr) & (levels + dark_electrons(sensor, exposure_s) < sensor.pixel.full_well_e))
     if above.size == 0:
         return float("inf")
     part = slice(max(above[0] - 1, 0), above[0] + 1)
