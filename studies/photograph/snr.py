@@ -81,7 +81,7 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
     """SNR of each channel's pixel over light; NaN where its well is full."""
     of = channel_e(sensor, light_of(light), 1.0, exposure_s)
     electrons = dict(zip(channels(sensor.cfa), of[:, None] * luminance_cd_m2, strict=True))
-    full_e = sensor.pixel.full_well_e
+    full_e = sensor.pixel.full_well_e - sensor.pixel.dark_current_e_per_s * exposure_s
     return {name: np.where(e < full_e, snr(e, sensor, exposure_s), np.nan) for name, e in electrons.items()}
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from render.error_estimates import Halves, SharedPaths
 from render.illuminants import illuminant
-from render.level import SceneMeans
+from render.level import Irradiance, SceneMeans
 from render.photometry import luminance
 from render.scene import LightGroup
 from render.spectrum import Spectrum, flat
@@ -148,6 +148,21 @@ def test_a_level_and_its_error_are_those_of_a_ratio_of_means():
     assert level.relative_error == pytest.approx(np.std(drawn) / level.value, rel=0.06)
     assert made.relight(luminance_cd_m2=3.0).relative_level_error == level.relative_error
     assert made.relight().relative_level_error is None
+
+
+def test_a_level_in_lux_is_told_with_the_scatter_of_its_meter():
+    """Against draws of what the meter may have measured, which know no formula of a sum's variance."""
+    rng = np.random.default_rng(6)
+    mean, spread = rng.uniform(0.5, 1.0, (2, NM.size)), rng.normal(size=(2 * NM.size, 4)) * 0.004
+    made = transport(meter=lambda: Irradiance(mean, spread @ spread.T))
+    drawn = []
+    for cause in rng.normal(size=(4000, 4)):
+        measured = Irradiance(mean + (spread @ cause).reshape(mean.shape), spread @ spread.T)
+        drawn.append(replace(made, meter=lambda measured=measured: measured).illuminance_lux(1.0))
+    told = made.relight(illuminance_lux=300.0).relative_level_error
+    # The deviation of 4000 draws is known to 1.1 %.
+    assert told == pytest.approx(np.std(drawn) / made.illuminance_lux(1.0), rel=0.06)
+    assert made.relight(luminance_cd_m2=3.0).relative_level_error == 0.0  # of its means, which have no errors
 
 
 def test_the_illuminance_asked_for_is_reached_on_the_reference_plane():

@@ -86,6 +86,15 @@ def test_a_level_added_leaves_the_others_terms_alone(planned: Plan, cache: Path)
         assert {term.name: term.rms_e for term in same.terms if term.name in effects} == pytest.approx(effects)
 
 
+def test_a_burst_of_four_frames_has_four_times_each_error_and_four_times_the_shot_noise(cache: Path) -> None:
+    burst = replace(SMALL, levels=("100cd/m2",), exposures=("2ms",), frames=(1, 4), processors=("bayer",))
+    one, four = plan(burst, cache=cache).ledgers
+    assert (one.condition.frames, four.condition.frames) == (1, 4)
+    for single, merged in zip(one.terms[2:-1], four.terms[2:-1], strict=True):  # the kernel's bound isn't linear
+        assert merged.rms_e == pytest.approx(4 * single.rms_e)
+    assert 4.0 < four.noise_e**2 / one.noise_e**2 < 4.5  # PRNU, the same in each frame, grows as the square
+
+
 def test_the_reference_leaves_nothing_out() -> None:
     reference = reference_plan(replace(SMALL, spectra=("own", "sodium_low")))
     (model,) = reference.renders.values()

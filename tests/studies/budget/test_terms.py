@@ -293,6 +293,8 @@ def test_terms_grow_with_light_and_time_and_noise_falls_with_samples() -> None:
     assert once.monte_carlo(40, 256, frozenset()) == pytest.approx(once.monte_carlo(40, 64, frozenset()) / 4)
     signal = 2.0 * 0.01 * some.full.mean(axis=0)
     assert once.noise_variance == pytest.approx(noise_variance(signal, sensor, 0.01).mean())
+    levelled = weigh(CONDITION, "rgbw", sensor, some, 2.0, 0.01, replace(QUIET, level=1e-4))
+    assert levelled.level == pytest.approx(((0.01 * signal) ** 2).mean())  # 1 % of each pixel
     # noise of one sample a pixel is the pilot's times its samples; the margin is that of the mean over pixels
     square = (0.02 * signal) ** 2 * 128
     assert square.mean() < once.sharp < square.mean() + 1.2 * NOISE_MARGIN * square.std() / square.size**0.5
@@ -348,6 +350,8 @@ def test_ledger_adds_effects_by_minkowski_and_noise_in_square() -> None:
     assert [term.name for term in row.terms if term.modelled] == ["diffraction", "cos^4"]
     assert row.rms_e**2 == pytest.approx(20.0 / 64 + 1.0 + (1.0 + 0.5 + 1.0 + 1e-3) ** 2)
     assert row.share == pytest.approx(row.rms_e**2 / 100.0)
+    for term in row.terms:
+        assert term.share == pytest.approx(term.rms_e**2 / 100.0)
     sharp = ledger(weighed(), 12, 64, frozenset({"diffraction"}))
     assert sharp.terms[0].rms_e ** 2 == pytest.approx(10.0 / 64)
 

@@ -12,7 +12,7 @@ from sensor.device import draw_device
 from sensor.presets import low_noise, table1_output
 from sensor.readout import electrons_at_snr
 from studies.paper.flat import shot_noise_alone
-from studies.photograph.snr import channel_e, even_field, light_for_snr, light_of, snr_at
+from studies.photograph.snr import channel_e, even_field, light_for_snr, light_of, snr, snr_at
 
 EXPOSURE_S = 0.033
 
@@ -37,6 +37,48 @@ def test_pixels_read_out_have_the_snr_that_was_asked_for(sensor) -> None:
         read.append(frame.electrons)
     # The mean holds dark current beside the light.
     assert electrons / np.std(read) == pytest.approx(5.0, rel=0.02)
+
+
+TERMS = {
+    "shot noise": {},
+    "read noise": {"read_noise_e": 20.0},
+    "dark current": {"dark_current_e_per_s": 2e4},
+    "hot pixels": {"hot_pixel_share": 0.02, "hot_pixel_dark_current_e_per_s": 1e4},
+    "DSNU": {"dsnu_e": 20.0},
+    "PRNU": {"prnu": 0.1},
+    "column gains": {"column_gain_spread": 0.1},
+    "column offsets": {"column_offset_e": 20.0},
+    "quantisation": {"bits": 9},
+}
+
+
+@pytest.mark.parametrize("term", TERMS)
+def test_each_term_counts_in_the_closed_form_as_pixels_scatter_by_it(term: str) -> None:
+    """One term at a time beside 400 e- and the shot noise of these, over 200 chips of 400 pixels in columns of ten."""
+    bits = TERMS[term].get("bits", 14)
+    silent = dict.fromkeys(("read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s", "crosstalk"), 0.0)
+    pixel = replace(low_noise().pixel, **silent | {name: v for name, v in TERMS[term].items() if name != "bits"})
+    sensor = replace(low_noise("bayer"), pixel=pixel, bits=bits, black_level_dn=None, white_level_dn=None)
+    read = []
+    for chip in range(200):
+        device = draw_device(sensor, (10, 40), np.random.default_rng([chip, 0]))
+        light_e = np.full((10, 40), 400.0)
+        read.append(expose(light_e, sensor, EXPOSURE_S, device, np.random.default_rng([chip, 1]), exact=True).electrons)
+    # 8000 columns know a deviation to 0.8 %, 80 000 pixels to 0.25 %: 4.5 of these, false-alarm rate 7e-6
+    told = float(snr(np.array([[400.0]]), sensor, EXPOSURE_S)[0, 0])
+    assert told == pytest.approx(400.0 / np.std(read), rel=4.5 * (0.008 if "column" in term else 0.003))
+
+
+def test_a_well_that_dark_current_fills_has_no_snr() -> None:
+    """Light of 60 % of the well, and dark electrons of 50 % in the exposure."""
+    sensor = low_noise("bayer")
+    well_e = sensor.pixel.full_well_e
+    hot = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=0.5 * well_e / EXPOSURE_S))
+    green_e = channel_e(sensor, light_of("D65"), 1.0, EXPOSURE_S)[1]
+    light = np.array([0.4, 0.6]) * well_e / green_e
+    assert np.isnan(snr_at(light, hot, "D65", EXPOSURE_S)["G"]).tolist() == [False, True]
+    assert np.isnan(snr_at(light, sensor, "D65", EXPOSURE_S)["G"]).tolist() == [False, False]
+    assert electrons_at_snr(0.999 * snr(np.array([[0.51 * well_e]]), hot, EXPOSURE_S)[0, 0], hot, EXPOSURE_S) == inf
 
 
 def test_beyond_fixed_patterns_or_the_well_no_light_is_enough() -> None:

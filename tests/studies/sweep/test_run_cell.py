@@ -24,6 +24,8 @@ from rodcone.colour_spaces import encode_srgb
 from rodcone.digests import digest_file
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker
+from sensor.burst import merged_raw
+from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
 from sensor.optics import falloff, form_image
@@ -144,6 +146,26 @@ def test_the_monte_carlo_share_is_of_the_pixels_below_saturation(tmp_path: Path)
     dark = pixel.read_noise_e**2 + pixel.dsnu_e**2 + sensor.gain_e_per_dn**2 / 12
     own = 400.0 + dark_e + (pixel.prnu * 400.0) ** 2 + dark
     assert row.mc_share == pytest.approx(9.0 / own, rel=1e-6)
+
+
+def test_the_monte_carlo_share_of_a_burst_is_over_the_noise_that_merged_frames_scatter_by(tmp_path: Path) -> None:
+    """20 e- in each of four frames, an error of 0.5 e- in the light, which all of them share; the noise by 60 chips."""
+    cell = made(tmp_path, levels=("1cd/m2",), exposures=("10ms",), seeds=(0,), frames=(4,))[0]
+    given = {}
+    for name, array in (("electrons", np.full(SAMPLE.SIZE, 20.0)), ("errors", np.full((1, *SAMPLE.SIZE), 0.5))):
+        file = BytesIO()
+        np.save(file, array / 0.01)  # at 1 cd/m^2 and 1 s
+        given[name] = tmp_path / keep(tmp_path, file.getvalue(), ".npy")
+    merged = []
+    for chip in range(60):
+        device = draw_device(cell.sensor, SAMPLE.SIZE, np.random.default_rng([chip, 0]))
+        stream = np.random.default_rng([chip, 1])
+        light = np.full(SAMPLE.SIZE, 20.0), cell.sensor, 0.01, device, stream
+        merged.append(merged_raw([expose(*light, exact=True) for _ in range(4)]).electrons)
+    # the merged frames' electrons of the light that one frame's 20 e- are, and its error with them; 19 200 pixels
+    # know a variance to 1 %, and columns share offsets
+    error_e = 0.5 * np.mean(merged) / 20.0
+    assert run_cell(replace(cell, **given)).mc_share == pytest.approx(error_e**2 / np.var(merged), rel=0.06)
 
 
 def test_a_cell_gives_the_same_row_and_picture_each_time(tmp_path: Path) -> None:
