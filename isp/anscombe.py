@@ -45,7 +45,7 @@ def stabilise(electrons: NDArray[Any], dark_noise_e: float, prnu: float) -> NDAr
 
 
 def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
-    """`stabilise` by the noise of a raw image, with its steps where readings of a pixel were merged.
+    """`stabilise` by the noise of a raw image, with its steps where a pixel was read several times.
 
     From a step on the variance is k e + s^2 + (p e)^2 with another k, s and p, whose integral is the transform at k e
     with PRNU p / k, over k. The pieces join where they meet.

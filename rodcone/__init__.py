@@ -46,7 +46,7 @@ _PUBLIC = {
     "table1_output": ("sensor.presets", "table1_output"),
     "PixelConfig": ("sensor.chip", "PixelConfig"),
     "Reading": ("sensor.chip", "Reading"),
-    "binned": ("sensor.binning", "binned"),
+    "binned": ("sensor.photodiodes", "binned"),
     "with_readings": ("sensor.config", "with_readings"),
     "draw_device": ("sensor.device", "draw_device"),
     "form_image": ("sensor.optics", "form_image"),

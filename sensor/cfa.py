@@ -134,6 +134,12 @@ def _repeated(cells: NDArray[Any], shape: tuple[int, int]) -> NDArray[Any]:
     return np.tile(cells, repeats)[: shape[0], : shape[1]]
 
 
+def block_sums(values: NDArray[Any]) -> NDArray[Any]:
+    """Sums over 2x2 pixels, shape (..., h, w) to (..., h / 2, w / 2)."""
+    rows = values[..., ::2, :] + values[..., 1::2, :]
+    return np.asarray(rows[..., ::2] + rows[..., 1::2])
+
+
 def check_covers(tile: Tile, shape: tuple[int, ...]) -> None:
     """Raise `InputError` unless a frame of `shape` is 2-D and holds a whole tile."""
     height, width = len(tile), len(tile[0])

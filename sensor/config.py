@@ -4,17 +4,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, hypot
 from numbers import Real
+from typing import Any
+
+from numpy.typing import NDArray
 
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_range, require_whole
 from rodcone.notebook import html_of
 from rodcone.plots import png_of
-from sensor.cfa import RGBW, Tile, channels, check_tile
+from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad
 from sensor.chip import MERGED, Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.curves import Responses, rgbw
 
 BLACK_SIGMAS = 5.0  # black level in dark standard deviations, so that clipping at 0 doesn't bias darks
+METERED_SHARE = 0.8  # of the well: where exposure puts a frame's bright end, and up to which a gain takes it
+METERED_PERCENTILE = 99.0
 
 
 @dataclass(frozen=True)
@@ -66,7 +71,7 @@ class SensorConfig:
     Attributes
     ----------
     pixel : PixelConfig
-        Of the raw image: of photodiodes that bin, the four together (`sensor.binning.binned`); of several readings,
+        Of the raw image: of photodiodes that bin, the four together (`sensor.photodiodes.binned`); of several readings,
         `pixel_of_readings`.
     lens : LensConfig
     cfa : tuple of str
@@ -151,6 +156,46 @@ class SensorConfig:
     def undivided(self) -> "SensorConfig":
         """The camera with one photodiode a pixel, for light that is known no finer than pixels."""
         return replace(self, chip=replace(self.chip, binning=None))
+
+    @property
+    def photosites(self) -> "SensorConfig":
+        """Camera of the photodiodes by themselves: `sensor.photodiodes.binned` undone."""
+        binning = self.chip.binning
+        if binning is None:
+            return self
+        return replace(
+            self,
+            pixel=binning.photodiode,
+            cfa=quad(self.cfa),
+            bits=binning.bits,
+            black_level_dn=binning.black_level_dn,
+            white_level_dn=binning.white_level_dn,
+            chip=Chip(),
+        )
+
+    def pixel_sums(self, values: NDArray[Any]) -> NDArray[Any]:
+        """What the raw image's pixels hold of values of photodiodes, shape (..., h, w).
+
+        Raises
+        ------
+        InputError
+            For an odd height or width of a camera that bins: a picture from a file may have any size.
+        """
+        self._check_even(values.shape[-2:])
+        return values if self.chip.sites == 1 else block_sums(values)
+
+    def check_frame(self, shape: tuple[int, ...]) -> None:
+        """Raise `InputError` for a frame of photodiodes that holds no tile of the mosaic, or no whole pixels."""
+        check_covers(self.cfa, shape)
+        self._check_even(shape)
+
+    def _check_even(self, shape: tuple[int, ...]) -> None:
+        if self.chip.binning and any(side % 2 for side in shape):
+            even = " x ".join(str(side + side % 2) for side in shape)
+            raise InputError(
+                f"size: {' x '.join(map(str, shape))} pixels with binning {self.chip.binning.way!r}; allowed: even "
+                f"height and width; give {even}"
+            )
 
     @property
     def white_dn(self) -> int:

@@ -9,11 +9,11 @@ from typing import Any
 from render.spectrum import Spectrum
 from rodcone.errors import InputError, one_line
 from rodcone.toml_file import read_toml, strict_converter, structured
-from sensor.binning import binned
 from sensor.cfa import Tile, channels, tile_of
 from sensor.chip import MERGED, Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_csv, read_curve, rgbw
+from sensor.photodiodes import binned
 
 _SETTINGS = ("bits", "black_level_dn", "white_level_dn", "window_nm")
 _OF_READINGS = ("read_noise_e", "dsnu_e", "full_well_e")  # keys of each of several readings, in place of the pixel's

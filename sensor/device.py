@@ -8,8 +8,9 @@ import scipy
 from numpy.typing import NDArray
 
 from rodcone.brief import brief
-from sensor.binning import block_sums, check_chip, check_frame, photosites
+from sensor.cfa import block_sums
 from sensor.config import SensorConfig
+from sensor.photodiodes import check_chip
 from sensor.random import NoiseTerm, draw_key, normals
 
 _MOST_KEPT = 1 << 18  # pixels of a chip whose draws are kept: 2 MB each
@@ -57,11 +58,11 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
     InputError
         Where the shape doesn't hold a tile of the mosaic, is odd for a sensor that bins, or `rng` isn't a Generator.
     """
-    check_frame(sensor, tuple(shape))
+    sensor.check_frame(tuple(shape))
     check_chip(sensor)
     in_charge = sensor.chip.in_charge
     key, one_row = draw_key(rng), (1, shape[1] // 2 if in_charge else shape[1])
-    pixel, readings = photosites(sensor).pixel, sensor.chip.readings
+    pixel, readings = sensor.photosites.pixel, sensor.chip.readings
     draws = _normals_kept if shape[0] * shape[1] <= _MOST_KEPT else normals
 
     def drawn(dsnu_e: float, photodiode: int, reading: int) -> Device:

@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError, require_range, unknown
-from sensor.binning import pixel_sums
 from sensor.cfa import channels, unit_channel
-from sensor.config import SensorConfig
+from sensor.config import METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.raw import RawImage
-from sensor.readings.noise import METERED_PERCENTILE, METERED_SHARE
 from sensor.readout import noise_variance
 from sensor.response import behind_filters, channel_electrons
 
@@ -42,7 +40,7 @@ def auto_exposure_s(
 ) -> float:
     """Exposure that puts a percentile of one channel's expected electrons at a share of the well [s].
 
-    Dark current and crosstalk are left out: the rule is about light. The well of several readings is
+    Dark current and crosstalk are left out: the rule is about light. The well is
     `SensorConfig.metered_well_e`.
 
     Parameters
@@ -80,7 +78,7 @@ def _share_of_well_s(
     percentile: float = METERED_PERCENTILE,
     well_share: float = METERED_SHARE,
 ) -> float:
-    bright = float(np.percentile(pixel_sums(per_second_e, sensor), percentile))
+    bright = float(np.percentile(sensor.pixel_sums(per_second_e), percentile))
     return min(longest_s, well_share * sensor.metered_well_e / bright) if bright > 0 else longest_s
 
 
@@ -134,7 +132,7 @@ def most_informative_s(per_second_e: NDArray[np.float64], sensor: SensorConfig, 
     times_s = list(dict.fromkeys(times_s))
     if len(times_s) == 1:
         return times_s[0]
-    per_second_e = pixel_sums(per_second_e, sensor)
+    per_second_e = sensor.pixel_sums(per_second_e)
     return max(times_s, key=lambda time_s: information_bits(per_second_e * time_s, sensor, time_s))
 
 

@@ -56,7 +56,7 @@ def philox(counter: tuple[NDArray[np.uint64], ...], key: int) -> tuple[NDArray[n
 def normals(key: int, term: NoiseTerm, shape: tuple[int, int], number: int = 0) -> NDArray[np.float64]:
     """Standard normal draw for each pixel, shape `shape` (Box-Muller on two 53-bit uniforms).
 
-    Draws of another `number` are independent: readings of one charge, patterns of one chip.
+    Draws of another `number` are independent: each reading of one charge, each pattern of one chip.
     """
     draws = np.empty(shape)
     columns = np.arange(shape[1], dtype=np.uint64)[None, :]

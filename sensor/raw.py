@@ -87,7 +87,7 @@ class RawImage:
     defects : (n, 2) intp, optional
         Row and column of each defective pixel, as a camera's maker lists them; None where there is none.
     noise_steps : tuple of NoiseStep
-        Where several readings of a pixel were merged, the noise from each level on at which one of them is full; up to
+        Of a pixel read several times, the noise from each level on at which one reading is full; up to
         the first one read_noise_e, dsnu_e and prnu hold.
 
     Raises

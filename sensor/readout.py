@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError, require_range
-from sensor.binning import block_sums, photosites, pixel_sums
+from sensor.cfa import block_sums
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.random import NoiseTerm, draw_key, normals, poisson
@@ -39,7 +39,7 @@ def draw_frame(
     one Poisson draw; the well clips; pixels that bin in charge are summed; the rest is `convert`. Of one key, each
     `reading` draws read noise of its own, and the same shot noise.
     """
-    pixel, expected = photosites(sensor).pixel, np.asarray(expected_e, dtype=np.float64)
+    pixel, expected = sensor.photosites.pixel, np.asarray(expected_e, dtype=np.float64)
 
     # PRNU scales the mean: after the draw the variance would be wrong. It is the spread of the whole pixel's response,
     # as a flat field shows it, so crosstalk, which leaves a flat field alone, comes first and doesn't smooth it.
@@ -64,14 +64,14 @@ def convert(
     if sensor.chip.in_charge:
         collected_e = np.minimum(block_sums(collected_e), sensor.pixel.full_well_e)
     else:
-        converter = photosites(sensor)
+        converter = sensor.photosites
     read_e = collected_e if device.column_gain is None else collected_e * device.column_gain
     read_e = read_e + device.dark_offset_e
     if converter.pixel.read_noise_e:
         read_e += converter.pixel.read_noise_e * normals(key, NoiseTerm.READ, read_e.shape, reading)
     dn = np.rint(read_e / converter.gain_e_per_dn + converter.black_dn)
     dn = np.clip(dn, 0, converter.white_dn).astype(np.uint16)
-    return dn if sensor.chip.in_charge else pixel_sums(dn, sensor)
+    return dn if sensor.chip.in_charge else sensor.pixel_sums(dn)
 
 
 def draw_mean_frame(
@@ -188,7 +188,7 @@ def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposu
     ----------
     expected_e : (h, w) float64
         Expected photo-electrons of the raw image's pixels, before crosstalk; of photodiodes that bin,
-        `sensor.binning.pixel_sums`.
+        `SensorConfig.pixel_sums`.
     sensor : SensorConfig
     exposure_s : float
         For the dark current [s].
@@ -281,7 +281,7 @@ def as_raw(
     dn: NDArray[np.uint16], sensor: SensorConfig, exposure_s: float, engine: str, hot: NDArray[np.bool_] | None = None
 ) -> RawImage:
     """Raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels."""
-    hot = None if hot is None else pixel_sums(hot, sensor)
+    hot = None if hot is None else sensor.pixel_sums(hot)
     pixel = sensor.pixel
     return RawImage(
         dn=dn,

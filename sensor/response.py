@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from render.photometry import photons_per_joule
 from render.spectrum import VISIBLE_NM, Floats
 from rodcone.errors import InputError, require_range
-from sensor.binning import photosites
 from sensor.cfa import channels, check_covers, mask
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
@@ -82,7 +81,7 @@ def behind_filters(electrons: NDArray[np.float64], sensor: SensorConfig) -> NDAr
         For a frame smaller than the mosaic's tile.
     """
     shape = (electrons.shape[0], electrons.shape[1])
-    mosaic = photosites(sensor).cfa
+    mosaic = sensor.photosites.cfa
     check_covers(mosaic, shape)
     result = np.empty(shape)
     for index, channel in enumerate(channels(mosaic)):

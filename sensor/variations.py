@@ -46,11 +46,10 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
         responses = change(sensor.responses)
     else:
         tile = MOSAICS[mosaic]
-        if sensor.chip.binning and plain(tile) != tile:
+        if sensor.chip.sites > 1 and plain(tile) != tile:
             raise InputError(
-                f"cfa: {mosaic!r} for a sensor with binning {sensor.chip.binning.way!r}, whose raw images hold no "
-                f"quad; allowed: what they hold, such as {mosaic.removeprefix('quad_')}; give that, or leave binning "
-                "out"
+                f"cfa: {mosaic!r} for a sensor that bins, whose raw images hold no quad; allowed: what they hold, such "
+                f"as {mosaic.removeprefix('quad_')}; give that, or a sensor that doesn't bin"
             )
         responses = with_channels(sensor.responses, channels(tile))
     return replace(sensor, cfa=tile, responses=responses)

@@ -54,7 +54,7 @@ def bm3d_mosaic(raw: RawImage, mix: Mix) -> Plane:
     InputError
         Without the library `bm3d`.
     """
-    plain = without_prnu(raw)  # of merged readings, with the noise of each range of light
+    plain = without_prnu(raw)  # of a pixel read several times, with the noise of each range of light
     odd = [(0, size % 2) for size in raw.shape]
     stable = np.pad(stabilise_raw(raw.electrons, plain), odd, mode="reflect")
     sites = np.stack([stable[row::2, column::2] for row in (0, 1) for column in (0, 1)], axis=-1)

@@ -29,7 +29,7 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
         B = m + z sqrt(m + s^2 + (p m)^2) + 2.25 / (1 + s^2)^2.
 
     z is `SIGMAS` up to the default sigma_s and rises with it: who lets all patches count as similar gets no bound, nor
-    does who takes the paper's distance. Where readings of a pixel were merged, the noise is that of `raw.noise_steps`.
+    does who takes the paper's distance. Of pixels read several times, the noise is that of `raw.noise_steps`.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ def dark_noise(dark: Stack, gain_dn_per_e: Estimate) -> Estimate:
 
 
 def dsnu(dark: Stack, gain_dn_per_e: Estimate) -> Estimate:
-    """Spread of the pixels' dark readings [e-], columns and hot pixels included."""
+    """Spread of the pixels' dark values [e-], columns and hot pixels included."""
     return _electrons(dark.spatial_dn2, _spread_error(_squares(dark.mean_dn)), gain_dn_per_e)
 
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from rodcone.device_arrays import ALIGNMENT, aligned, divide, divisor, tile_cell, upload
 from rodcone.jit import arrays, dr
-from sensor.binning import photosites, pixel_sums
 from sensor.cfa import channel_map, channels, check_covers
 from sensor.config import SensorConfig
 from sensor.device import Device
@@ -55,7 +54,7 @@ def expected_electrons_single(
     """
     jit = arrays()
     height, width, bands = values.shape
-    mosaic = photosites(sensor).cfa
+    mosaic = sensor.photosites.cfa
     check_covers(mosaic, (height, width))
     planes = _single(np.moveaxis(values, -1, 0).reshape(bands, -1))
     scalars = [[dr.opaque(jit.Float, float(weight)) for weight in row] for row in weights]
@@ -131,7 +130,7 @@ def read_frame(
     Binned in charge, the wells are filled here and a quarter as many pixels converted in NumPy.
     """
     expected_e = np.asarray(expected_e, dtype=np.float32)
-    jit, one = arrays(), photosites(sensor)
+    jit, one = arrays(), sensor.photosites
     pixel = one.pixel
     if pixel.crosstalk:
         expected_e = _single(spread_charge(np.minimum(expected_e, np.float64(LARGEST)), pixel.crosstalk))
@@ -166,7 +165,7 @@ def read_frame(
     read_e += upload(device.dark_offset_e, copy_under=COPY_UNDER) + read_noise_e
     dn = read_e / dr.opaque(jit.Float64, one.gain_e_per_dn) + dr.opaque(jit.Float64, one.black_dn)
     dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(one.white_dn))))
-    return pixel_sums(dn.numpy().astype(np.uint16).reshape(expected_e.shape), sensor)
+    return sensor.pixel_sums(dn.numpy().astype(np.uint16).reshape(expected_e.shape))
 
 
 def philox(counter: tuple[Any, ...], key: tuple[Any, Any]) -> tuple[Any, ...]:

@@ -15,13 +15,11 @@ import scipy
 from numpy.typing import NDArray
 
 from sensor.chip import Chip
-from sensor.config import SensorConfig
+from sensor.config import METERED_PERCENTILE, METERED_SHARE, SensorConfig
 
 # A reading, or a frame of a burst, counts where the merged light fills it to no more than 6 standard deviations under
 # its well: its own noise then clips once in 1e9 pixels.
 CLEAR_SIGMAS = 6.0
-METERED_SHARE = 0.8  # of the well: where exposure puts a frame's bright end, and up to which a gain takes it
-METERED_PERCENTILE = 99.0
 _LEVELS = 8192  # between which the variance of larger frames is interpolated: 0.3 % of light apart
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,6 @@ from isp.processors.catalogue import Processor
 from render.spectrum import Floats
 from rodcone.colour_spaces import SRGB_TO_XYZ
 from scenes.reflectances import color_checker, held
-from sensor.binning import pixel_sums
 from sensor.cfa import channels, mask, unit_channel
 from sensor.config import SensorConfig
 from sensor.optics import falloff
@@ -111,6 +110,6 @@ def balance_delta_e(raw: RawImage, colours: ColourFit, neutral: Floats, balance:
 
 def mean_electrons(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> dict[str, float]:
     """Mean expected electrons of each channel's pixels in the raw image."""
-    electrons = pixel_sums(expected_e, sensor)
+    electrons = sensor.pixel_sums(expected_e)
     shape = (electrons.shape[0], electrons.shape[1])
     return {name: float(electrons[mask(sensor.cfa, name, shape)].mean()) for name in channels(sensor.cfa)}

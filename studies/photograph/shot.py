@@ -20,7 +20,6 @@ from rodcone.errors import InputError, require_fields, require_whole
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
-from sensor.binning import check_frame, pixel_sums
 from sensor.burst import burst
 from sensor.cfa import channels, is_bayer
 from sensor.config import SensorConfig
@@ -211,7 +210,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
 
 def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
     """Expected electrons of the raw image's pixels, shape (h, w)."""
-    return pixel_sums(expected_electrons(form_image(radiance, sensor), sensor, exposure_s), sensor)
+    return sensor.pixel_sums(expected_electrons(form_image(radiance, sensor), sensor, exposure_s))
 
 
 def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
@@ -253,7 +252,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     opened = open_scene(str(order.source), order.trust, order.extend, chart=order.chart)
     asked_level(opened.scene, order.level)
     height, width = _size(order, opened)
-    check_frame(sensor, (height, width))
+    sensor.check_frame((height, width))
     require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
     return sensor, opened, exposure_s
 

@@ -21,7 +21,6 @@ from render.spectrum import Floats, Spectrum
 from render.transport import Transport
 from rodcone.digests import digest_file, digest_inputs
 from rodcone.errors import InputError, require_keys
-from sensor.binning import check_frame
 from sensor.presets import preset
 from studies.study.equal_area import require_pixels
 from studies.study.levels import parse_level
@@ -92,7 +91,7 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
     check_range(scene, *study.render.range_nm)
     size = film_size(opened.size, study.render.size)
     for name in study.sensors:
-        check_frame(preset(name), size)
+        preset(name).check_frame(size)
     if study.equal_area is not None:
         require_pixels(study.equal_area, study.sensors, size)
     identity = digest_inputs([digest_scene(scene), size])

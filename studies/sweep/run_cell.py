@@ -16,9 +16,9 @@ from isp.processors.own import own_version, processor_of
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
-from sensor.binning import block_sums, pixel_sums
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
+from sensor.cfa import block_sums
 from sensor.device import draw_device
 from sensor.raw import RawImage
 from studies.metrics.appearance import TruePicture, appearance, true_picture
@@ -68,7 +68,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
     # of sensors of one size it has the coarsest's pixels already
     truth, truth_png = _truth(cell.truth, sensor.chip.sites > 1 and _array(cell.truth).shape[:2] == expected_e.shape)
-    errors_e = pixel_sums(_array(cell.errors), sensor) * light
+    errors_e = sensor.pixel_sums(_array(cell.errors)) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
     frames = cell.condition.frames
@@ -117,7 +117,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         **figures,
         mc_share=charged_share(
             errors_e * frames,
-            pixel_sums(expected_e, sensor) * frames,
+            sensor.pixel_sums(expected_e) * frames,
             merged_sensor(sensor, frames),
             cell.exposure_s * frames,
         ),

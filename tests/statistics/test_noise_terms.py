@@ -12,7 +12,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from sensor.binning import binned
 from sensor.burst import merge, merged_raw, merged_sensor
 from sensor.cfa import MOSAICS
 from sensor.chip import PixelConfig, Reading
@@ -20,6 +19,7 @@ from sensor.config import LensConfig, SensorConfig, with_readings
 from sensor.device import draw_device
 from sensor.emva1288.characterise import configured, measure, plan_for
 from sensor.emva1288.photon_transfer import bench
+from sensor.photodiodes import binned
 from sensor.readings.noise import dark_electrons, whole_share
 from sensor.readout import electrons_at_snr, noise_sources, noise_variance, read_out
 

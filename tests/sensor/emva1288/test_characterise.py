@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from rodcone.errors import InputError
-from sensor.binning import binned
 from sensor.cfa import MOSAICS
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
@@ -15,6 +14,7 @@ from sensor.device import draw_device
 from sensor.emva1288.characterise import ExposurePlan, characterise, configured, measure, plan_for
 from sensor.emva1288.photon_transfer import bench
 from sensor.kernel.kernel import read_frame
+from sensor.photodiodes import binned
 from sensor.random import draw_key
 from sensor.readout import as_raw, read_out
 

@@ -6,9 +6,9 @@ from math import inf, pi
 import numpy as np
 import pytest
 
-from sensor.binning import binned
 from sensor.capture import expose
 from sensor.device import draw_device
+from sensor.photodiodes import binned
 from sensor.presets import low_noise, table1_output
 from sensor.readout import electrons_at_snr
 from studies.paper.flat import shot_noise_alone

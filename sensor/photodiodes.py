@@ -1,4 +1,4 @@
-"""Binning: 2x2 photodiodes of one channel become one pixel of the raw image.
+"""Four photodiodes of one channel, 2x2, as one pixel of the raw image: binning.
 
 In charge the four photodiodes empty into the floating diffusion that they share, which clips at its own well; column
 amplifier, read noise and converter come once, and the converter spans the well of the sum. Dark offsets are those of
@@ -9,14 +9,12 @@ times the black and the white level, four read noises and four roundings.
 
 from dataclasses import replace
 from math import hypot, inf, lcm, sqrt
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rodcone.errors import InputError, unknown
-from sensor.cfa import Tile, channel_map, check_covers, quad
-from sensor.chip import BINNINGS, CHARGE, DIGITAL, Binning, Chip
+from sensor.cfa import Tile, channel_map
+from sensor.chip import BINNINGS, CHARGE, DIGITAL, Binning
 from sensor.config import SensorConfig
 
 MOST_BITS_SUMMED = 14  # of a converter whose readings are summed by four: a raw image holds 16
@@ -79,22 +77,6 @@ def binned(sensor: SensorConfig, way: str) -> SensorConfig:
     )
 
 
-def photosites(sensor: SensorConfig) -> SensorConfig:
-    """Camera of the photodiodes by themselves, `binned` undone; one that doesn't bin as it is."""
-    one = sensor.chip.binning
-    if one is None:
-        return sensor
-    return replace(
-        sensor,
-        pixel=one.photodiode,
-        cfa=quad(sensor.cfa),
-        bits=one.bits,
-        black_level_dn=one.black_level_dn,
-        white_level_dn=one.white_level_dn,
-        chip=Chip(),
-    )
-
-
 def binned_tile(tile: Tile) -> Tile:
     """Tile of half the height and width whose pixels are 2x2 of `tile`: `quad` undone.
 
@@ -113,45 +95,12 @@ def binned_tile(tile: Tile) -> Tile:
     return tuple("".join(row) for row in first)
 
 
-def pixel_sums(values: NDArray[Any], sensor: SensorConfig) -> NDArray[Any]:
-    """What the raw image's pixels hold of values of photodiodes, shape (..., h, w).
-
-    Raises
-    ------
-    InputError
-        For an odd height or width of a camera that bins: a picture from a file may have any size.
-    """
-    _check_even(sensor, values.shape[-2:])
-    return values if sensor.chip.binning is None else block_sums(values)
-
-
-def block_sums(values: NDArray[Any]) -> NDArray[Any]:
-    """Sums over 2x2, shape (..., h, w) to (..., h / 2, w / 2)."""
-    rows = values[..., ::2, :] + values[..., 1::2, :]
-    return np.asarray(rows[..., ::2] + rows[..., 1::2])
-
-
-def check_frame(sensor: SensorConfig, shape: tuple[int, ...]) -> None:
-    """Raise `InputError` for a frame of photodiodes that holds no tile of the mosaic, or no whole pixels."""
-    check_covers(sensor.cfa, shape)
-    _check_even(sensor, shape)
-
-
-def _check_even(sensor: SensorConfig, shape: tuple[int, ...]) -> None:
-    if sensor.chip.binning and any(side % 2 for side in shape):
-        even = " x ".join(str(side + side % 2) for side in shape)
-        raise InputError(
-            f"size: {' x '.join(map(str, shape))} pixels with binning {sensor.chip.binning.way!r}; allowed: even "
-            f"height and width; give {even}"
-        )
-
-
 def check_chip(sensor: SensorConfig) -> None:
     """Raise `InputError` for a camera whose pixel or converter was changed without its photodiodes."""
-    one = sensor.chip.binning
-    if one and _converted(binned(photosites(sensor), one.way)) != _converted(sensor):
+    binning = sensor.chip.binning
+    if binning and _converted(binned(sensor.photosites, binning.way)) != _converted(sensor):
         raise InputError(
-            "pixel: it isn't four of the chip's photodiodes; allowed: as `sensor.binning.binned` makes it; change the "
+            "pixel: it isn't four of the chip's photodiodes; allowed: as rodcone.binned makes it; change the "
             "photodiodes instead"
         )
 

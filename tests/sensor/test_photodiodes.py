@@ -7,14 +7,14 @@ import pytest
 
 from rodcone.errors import InputError
 from rodcone.jit import backend
-from sensor.binning import binned, binned_tile, block_sums, photosites, pixel_sums
 from sensor.capture import expose
-from sensor.cfa import BAYER, MOSAICS, RGBW, quad, tile_of
+from sensor.cfa import BAYER, MOSAICS, RGBW, block_sums, quad, tile_of
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.config_file import read_sensor
 from sensor.curves import built_in
 from sensor.device import draw_device
+from sensor.photodiodes import binned, binned_tile
 from sensor.readout import electrons_at_snr, noise_sources, noise_variance
 from sensor.variations import vary
 
@@ -70,7 +70,7 @@ def test_a_tile_of_three_pixels_is_refused_for_what_its_second_repeat_holds():
 
 @BOTH
 def test_a_processor_s_mosaic_is_the_raw_image_s(binning):
-    assert photosites(vary(camera(binning), "rgbw")).cfa == MOSAICS["quad_rgbw"]
+    assert vary(camera(binning), "rgbw").photosites.cfa == MOSAICS["quad_rgbw"]
     assert vary(camera(binning), "bayer").cfa == BAYER
     assert vary(camera(binning), "rgbw_nd").cfa == RGBW
 
@@ -110,10 +110,10 @@ def test_prnu_of_four_pixels_is_averaged_and_dsnu_added(binning, exact):
         pytest.skip("Dr.Jit has no backend here")
     pixel = {"prnu": 0.05, "dsnu_e": 20.0, "full_well_e": 8000.0}
     sensor = camera(binning, **pixel)
-    chip, apart = (draw_device(s, (64, 64), np.random.default_rng(5)) for s in (sensor, photosites(sensor)))
+    chip, apart = (draw_device(s, (64, 64), np.random.default_rng(5)) for s in (sensor, sensor.photosites))
     np.testing.assert_array_equal(chip.photo_response, apart.photo_response)  # one chip, read in two ways
     offsets_e = block_sums(apart.dark_offset_e)
-    np.testing.assert_allclose(pixel_sums(apart.dark_offset_e, sensor), offsets_e)
+    np.testing.assert_allclose(sensor.pixel_sums(apart.dark_offset_e), offsets_e)
     expected = 1000.0 * block_sums(apart.photo_response) + offsets_e
     rng, n = np.random.default_rng(6), 64
     frames = [expose(np.full((64, 64), 1000.0), sensor, 0.1, chip, rng, exact=exact).electrons for _ in range(n)]
@@ -252,14 +252,14 @@ def test_light_for_an_snr_is_of_the_sum(binning):
 
 def test_the_photodiodes_of_a_sensor_that_does_not_bin_are_its_pixels():
     sensor = camera("")
-    assert photosites(sensor) is sensor
+    assert sensor.photosites is sensor
     assert sensor.undivided == sensor
 
 
 @BOTH
 def test_photodiodes_by_themselves_are_what_was_binned(binning):
     one = camera("", **REAL)
-    assert photosites(binned(one, binning)) == one
+    assert binned(one, binning).photosites == one
 
 
 @BOTH
