@@ -111,6 +111,7 @@ print(mi.variant(), repr(mi.file_resolver()) == before, np.array_equal(first.rad
 """
 
 
+@pytest.mark.thorough
 def test_a_users_own_variant_search_path_and_scene_are_as_they_were(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", GUEST], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False

@@ -196,6 +196,7 @@ def test_a_basis_that_would_swell_beyond_its_file_is_refused(tmp_path: Path) -> 
         read_iset_scene(path)
 
 
+@pytest.mark.thorough
 @settings(max_examples=12, deadline=None, derandomize=True)  # a process each
 @given(st.lists(st.tuples(st.integers(0, 1 << 16), st.integers(0, 255)), min_size=1, max_size=4))
 def test_changed_bytes_give_an_error_of_one_line_or_radiance(

@@ -97,6 +97,7 @@ def test_a_sweep_follows_the_plan_and_reference_models_everything(
     assert sorted(lenses) == [(1.0, 0.0)] * 2 + [(1.0, 0.01)] * 2
 
 
+@pytest.mark.thorough
 def test_a_template_untouched_but_for_two_sensors_ranks_them_as_shot(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

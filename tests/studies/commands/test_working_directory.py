@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scipy.io import savemat
 
 ROOT = Path(__file__).parents[3]
@@ -36,6 +37,7 @@ axes = ["height", "width", "wavelength"]
 """
 
 
+@pytest.mark.thorough
 def test_a_sweep_its_workers_a_mat_file_and_a_slow_processor_run_no_file_beside_them(tmp_path: Path) -> None:
     folder, script = tmp_path / "downloaded", tmp_path / "bin" / "run.py"
     for path in (folder, script.parent):
