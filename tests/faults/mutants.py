@@ -46,7 +46,7 @@ TESTS = {  # below tests/, the likeliest first
     "render/transport.py": [
         *("render/test_transport", "render/test_error_estimates", "render/test_scene_range", "rodcone/test_notebook")
     ],
-    "render/meter.py": ["render/test_meter", "render/test_cache"],
+    "render/meter.py": ["render/test_meter", "render/test_cache", "render/test_fallback"],
     "studies/pages/verdict.py": ["studies/pages/test_verdict", "studies/pages/test_headline"],
     "studies/pages/report_compare.py": [
         *("studies/pages/test_verdict", "studies/pages/test_headline", "studies/pages/test_report_sweep")
