@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.pages.report_data import ReportCell
 from studies.pages.report_text import (
     CHART,
     DELTA_E,
@@ -22,10 +23,14 @@ from studies.pages.report_text import (
     S_CIELAB_95,
     SSIM,
     Metric,
+    camera_name,
+    duration,
+    fixed,
     lead_text,
     significant,
 )
 from studies.pages.verdict import AHEAD, BEHIND, UNKNOWN, Figures, Leads, leads, light_ratio
+from studies.study.study import GRAY_WORLD
 
 # Metrics that say much the same: the largest of each family is named, and none is a vote.
 FAMILIES = ((PSNR, PU21, PATCHES), (SSIM, MTF50), (DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, CHART), (FLIP,))
@@ -33,6 +38,9 @@ DECIDING = (PSNR, SSIM, DELTA_E, FLIP)  # known on every scene: one that is unde
 CLEARLY = 2.0  # times what a person sees
 LIGHT_SEEN = 1.1  # times the light: shot noise then changes by 0.4 dB, less than is seen
 THIRD_STOP = 2 ** (1 / 3)  # times the light: the smallest step of a camera's dials
+SAME_TIME = 1.01  # exposure times whose ratio is below count as one
+# The same method on both mosaics, the one with a white pixel first; and what the paper compares.
+WHITE_PIXEL = ("ple_rgbw", "ple_bayer")
 
 
 @dataclass(frozen=True)
@@ -184,3 +192,84 @@ def in_light(pair: Pair) -> str:
     parts = [f"{worse} needs more light for the same PSNR: {', '.join(times)}" for worse, times in more.items()]
     parts += [f"as much light gives the same PSNR: {', '.join(alike)}"] if alike else []
     return "".join(f"{part[0].upper()}{part[1:]}. " for part in parts).strip()
+
+
+# Words of pairs in their places
+
+
+@dataclass(frozen=True)
+class Group:
+    """A pair in one place of the study: scene, light, sensor, ... but for what is compared and the light level.
+
+    `title` names what varies besides.
+    """
+
+    title: str
+    pair: Pair
+    ours: tuple[ReportCell, ...] = ()
+    theirs: tuple[ReportCell, ...] = ()
+
+
+def pair_words(group: Group) -> str:
+    """Say what the two have in common and what not: method, exposure times, the paper's reference."""
+    differ = []
+    for ours, theirs in zip(group.ours, group.theirs, strict=True):
+        times = [cell.first.exposure_s for cell in (ours, theirs) if cell.first]
+        if len(times) == 2 and max(times) > SAME_TIME * min(times):
+            differ.append(f"{group.pair.levels[ours.level]} {duration(times[0])} against {duration(times[1])}")
+    cameras = tuple(cells[0].camera for cells in (group.ours, group.theirs))
+    reference = "bayer" in cameras and _balances(*group.ours, *group.theirs) == {GRAY_WORLD}
+    said = ["Bayer, bilinear + Gray World, is the paper's reference."] if reference else []
+    if cameras == WHITE_PIXEL:
+        alone = "" if differ else ", and the same exposure times: they differ by the mosaic alone"
+        said.append(f"One method, prior and colour rule on both mosaics{alone}.")
+    if differ:
+        said.append(f"Exposure times differ: {'; '.join(differ)}.")
+    return " ".join(said)
+
+
+def _balances(*cells: ReportCell) -> set[str]:
+    return {cell.first.white_balance for cell in cells if cell.first}
+
+
+def balance_words(group: Group) -> str:
+    """Say where a white balance found in the picture misses the light visibly, and by more than the lead; else empty.
+
+    Both are of colour, CIEDE2000: the miss of the worse of the two cameras, and the lead in the pictures' median.
+    """
+    lead, cases = group.pair.leads[DELTA_E.key].mean, []
+    for level, cells in enumerate(zip(group.ours, group.theirs, strict=True)):
+        misses = [cell.figures["balance_delta_e"] or 0.0 if _balances(cell) == {GRAY_WORLD} else 0.0 for cell in cells]
+        miss, cell = max(misses), cells[int(np.argmax(misses))]
+        if miss >= DELTA_E.seen and miss > abs(lead[level]):
+            cases.append((miss, camera_name(cell.camera), group.pair.levels[level], float(lead[level])))
+    if not cases:
+        return ""
+    miss, camera, level_name, there = max(cases, key=lambda case: case[0])
+    return (
+        f"Gray World misses this scene's light by ΔE {fixed(miss, 1)} ({camera}, {level_name}); the lead is "
+        f"{fixed(abs(there), 1)}. It misses by more than the lead at {len(cases)} of {len(lead)} light levels."
+    )
+
+
+def over_groups(groups: Sequence[Group]) -> str:
+    """Say of several groups in how many one is better and worse somewhere, with the largest of each; else empty."""
+    if len(groups) < 2:
+        return ""
+    parts = []
+    for outcome, word in ((AHEAD, "better"), (BEHIND, "worse")):
+        sizes = []
+        for group in groups:
+            cases = [
+                (abs(lead.mean[level]) / metric.seen, metric, float(lead.mean[level]), group.pair.levels[level])
+                for metric in METRICS
+                for lead in [group.pair.leads[metric.key]]
+                for level in np.flatnonzero(lead.outcome == outcome).tolist()
+            ]
+            if cases:
+                sizes.append((*max(cases, key=lambda case: case[0]), group.title))
+        if sizes:
+            _, metric, lead, level, title = max(sizes, key=lambda case: case[0])
+            size = lead_text(metric, lead) + (f"{NBSP}{metric.unit}" if metric.unit else "")
+            parts.append(f"{word} somewhere in {len(sizes)} (most: {metric.name} {size}, {title}, {level})")
+    return f"Of {len(groups)} places: {'; '.join(parts) or 'in none a difference that is seen'}."

@@ -249,6 +249,7 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
         scene_shares=[known_shares(cells) for cells in report.by_scene],
         budget_share=budget_share(report),
         aim=MOST_SHARE,
+        meanings=[text.BALANCE_MEANINGS.get(balance, balance) for balance in report.balances],
         groups=[cells[0].group for cells in report.by_group],
         # Each scene under each spectrum: its title, its groups' indices, their titles within it, its known metrics.
         views=[

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.pages import report_text as text
-from studies.pages.headline import Pair, answer, in_light
+from studies.pages.headline import WHITE_PIXEL, Group, Pair, answer, balance_words, in_light, over_groups, pair_words
 from studies.pages.report_data import ReportCell, ReportData
-from studies.pages.verdict import AHEAD, BEHIND, OUTCOMES, Leads, counts, leads
+from studies.pages.verdict import AHEAD, OUTCOMES, Leads, counts, leads
 
-# The same method on both mosaics, the one with a white pixel first; and what the paper compares.
-WHITE_PIXEL = ("ple_rgbw", "ple_bayer")
 # Axes by their place in `ReportData.cells`, and in which order one is taken to compare or to part the charts by.
 SCENE, LIGHT, SENSOR, EXPOSURE, BALANCE, BRIGHTNESS, CAMERA = range(7)
 COMPARED_FIRST = (CAMERA, SENSOR, EXPOSURE, BALANCE, LIGHT, SCENE, BRIGHTNESS)
@@ -22,7 +20,6 @@ ALONG_FIRST = (BRIGHTNESS, EXPOSURE, SENSOR, LIGHT, SCENE, BALANCE, CAMERA)
 ROWS_FIRST = (SENSOR, EXPOSURE, SCENE, LIGHT, BALANCE, CAMERA, BRIGHTNESS)
 RIVALS = (SENSOR, EXPOSURE, BALANCE, CAMERA)  # what a person chooses; scenes and lights are what it is chosen for
 DRAWN = "generated"  # how the names of scenes begin that are drawn from a number
-SAME_TIME = 1.01  # exposure times whose ratio is below count as one
 
 
 @dataclass(frozen=True)
@@ -91,19 +88,6 @@ def grid(report: ReportData) -> NDArray[np.object_]:
     return cells.reshape([len(axis.values) for axis in axes_of(report)])
 
 
-@dataclass(frozen=True)
-class Group:
-    """A pair in one place of the study: scene, light, sensor, ... but for what is compared and the light level.
-
-    `title` names what varies besides.
-    """
-
-    title: str
-    pair: Pair
-    ours: tuple[ReportCell, ...] = ()
-    theirs: tuple[ReportCell, ...] = ()
-
-
 def groups_of(report: ReportData, axis: int, a: int, b: int) -> list[Group]:
     """Return the groups in which two values of an axis other than the light level are compared."""
     axes, levels = axes_of(report), [level.name for level in report.levels]
@@ -169,45 +153,6 @@ def verdicts(report: ReportData, of: Comparison, metric: text.Metric) -> Leads:
     return leads(metric, *figures)
 
 
-def exposure_words(group: Group) -> str:
-    """Say at which levels the two have other exposure times, or that both have the same ones."""
-    differ = []
-    for ours, theirs in zip(group.ours, group.theirs, strict=True):
-        times = [cell.first.exposure_s for cell in (ours, theirs) if cell.first]
-        if len(times) == 2 and max(times) > SAME_TIME * min(times):
-            differ.append(
-                f"{group.pair.levels[ours.level]} {text.duration(times[0])} against {text.duration(times[1])}"
-            )
-    white_pixel = tuple(cells[0].camera for cells in (group.ours, group.theirs)) == WHITE_PIXEL
-    one_method = "One method, prior and colour rule on both mosaics" if white_pixel else ""
-    if differ:
-        return f"{one_method and one_method + '. '}Exposure times differ: {'; '.join(differ)}."
-    return f"{one_method}, and the same exposure times: they differ by the mosaic alone." if white_pixel else ""
-
-
-def over_groups(groups: Sequence[Group]) -> str:
-    """Say of several groups in how many one is better and worse somewhere, with the largest of each; else empty."""
-    if len(groups) < 2:
-        return ""
-    parts = []
-    for outcome, word in ((AHEAD, "better"), (BEHIND, "worse")):
-        sizes = []
-        for group in groups:
-            cases = [
-                (abs(lead.mean[level]) / metric.seen, metric, float(lead.mean[level]), group.pair.levels[level])
-                for metric in text.METRICS
-                for lead in [group.pair.leads[metric.key]]
-                for level in np.flatnonzero(lead.outcome == outcome).tolist()
-            ]
-            if cases:
-                sizes.append((*max(cases, key=lambda case: case[0]), group.title))
-        if sizes:
-            _, metric, lead, level, title = max(sizes, key=lambda case: case[0])
-            size = text.lead_text(metric, lead) + (f"{text.NBSP}{metric.unit}" if metric.unit else "")
-            parts.append(f"{word} somewhere in {len(sizes)} (most: {metric.name} {size}, {title}, {level})")
-    return f"Of {len(groups)} places: {'; '.join(parts) or 'in none a difference that is seen'}."
-
-
 def comparisons(report: ReportData) -> list[dict[str, Any]]:
     """Return for each axis what the page's script shows of any two of its values, i and j.
 
@@ -232,7 +177,13 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
             groups = groups_of(report, axis, a, b)
             key = f"{a} {b}"
             across["answers"][key] = [
-                {"said": answer(x.pair), "light": in_light(x.pair), "times": exposure_words(x)} for x in groups
+                {
+                    "said": answer(x.pair),
+                    "light": in_light(x.pair),
+                    "balance": balance_words(x) if axis != BALANCE else "",
+                    "times": pair_words(x),
+                }
+                for x in groups
             ]
             across["over"][key] = over_groups(groups)
             if a < b:

@@ -2,8 +2,8 @@
 
 from math import isnan
 
-from studies.pages.headline import answer, in_light
-from studies.pages.report_compare import axes_of, first_comparison, groups_of, means_over_scenes, shown_metrics
+from studies.pages.headline import answer, balance_words, in_light
+from studies.pages.report_compare import BALANCE, axes_of, first_comparison, groups_of, means_over_scenes, shown_metrics
 from studies.pages.report_data import ReportData
 from studies.pages.report_text import MISSING, Metric, fixed, lead_text, table
 from studies.pages.verdict import AHEAD, BEHIND, OUTCOMES, Leads, counts
@@ -25,7 +25,16 @@ def markdown(report: ReportData, command: str, a: int) -> str:
     b = of.b if a == of.a else next(value for value in range(len(axis.values)) if value != a)
     words = [
         " ".join(
-            filter(None, ("-", code(group.title) if group.title else "", answer(group.pair), in_light(group.pair)))
+            filter(
+                None,
+                (
+                    "-",
+                    code(group.title) if group.title else "",
+                    answer(group.pair),
+                    in_light(group.pair),
+                    balance_words(group) if of.compared != BALANCE else "",
+                ),
+            )
         )
         for group in groups_of(report, of.compared, a, b)
     ]

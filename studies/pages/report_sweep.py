@@ -35,7 +35,7 @@ from studies.sweep.row import Row
 from studies.sweep.stored import read_whole
 
 # What seeds scatter: every figure of a row but its exposure and its electrons, which noise doesn't touch.
-SCATTERED = (*(metric.key for metric in METRICS), "snr_db", "saturated", "mc_share")
+SCATTERED = (*(metric.key for metric in METRICS), "snr_db", "saturated", "mc_share", "balance_delta_e")
 
 
 def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[ReportData, ReportPictures]:

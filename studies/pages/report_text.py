@@ -13,8 +13,14 @@ from studies.study.study import AS_SHOT, GRAY_WORLD, OWN
 MISSING = "—"
 NBSP = "\N{NO-BREAK SPACE}"
 AUTOMATIC = {AUTO: "automatic", AUTO_W: "automatic for W", AUTO_INFORMATION: "automatic by information"}
-CAMERA_NAMES = {"interleaved": "Interleaved", "bayer": "Bayer", "ple_rgbw": "PLE, RGBW", "ple_bayer": "PLE, Bayer"}
+CAMERA_NAMES = {
+    "interleaved": "Interleaved",
+    "bayer": "Bayer, bilinear",
+    "ple_rgbw": "PLE, RGBW",
+    "ple_bayer": "PLE, Bayer",
+}
 BALANCE_NAMES = {AS_SHOT: "balanced as shot", GRAY_WORLD: "balanced by Gray World"}
+BALANCE_MEANINGS = {AS_SHOT: "the scene's light is known", GRAY_WORLD: "the picture's mean is taken for grey"}
 # As the title writes them; elsewhere the short names stand beside their pictures.
 CAMERA_TITLES = {"interleaved": "Interleaved RGBW"}
 

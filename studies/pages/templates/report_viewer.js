@@ -224,6 +224,7 @@ function showAnswer() {
   byId("place").textContent = data.groups[of.compared][group] ?? "";
   byId("said").textContent = answer?.said ?? data.alone;
   byId("light").textContent = answer?.light ?? "";
+  byId("balance").textContent = answer?.balance ?? "";
   byId("times").textContent = answer?.times ?? "";
   byId("elsewhere").textContent = over[`${of.a} ${of.b}`] ?? "";
 }

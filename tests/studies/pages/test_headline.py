@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import report_sample as SAMPLE
 
-from studies.pages.headline import Pair, answer, in_light
-from studies.pages.report_compare import CAMERA, SENSOR, comparisons, groups_of, over_groups
+from studies.pages.headline import Pair, answer, in_light, over_groups
+from studies.pages.report_compare import CAMERA, SENSOR, comparisons, groups_of
 from studies.pages.report_data import ReportData
 from studies.pages.report_text import METRICS
 from studies.sweep.row import Row
@@ -141,6 +141,48 @@ def test_by_the_mosaic_alone_is_said_only_where_the_times_agree() -> None:
     )
     others = SAMPLE.sample_report(levels=1, seeds=SEEDS, cameras=("interleaved", "bayer"))
     assert comparisons(others)[CAMERA]["answers"]["0 1"][0]["times"] == ""
+
+
+@pytest.mark.parametrize(
+    ("misses", "lead", "words"),
+    [
+        (
+            {"bayer": 4.1, "ple_bayer": 3.9},
+            0.4,
+            "Gray World misses this scene's light by ΔE 4.1 (Bayer, bilinear, moonlight); the lead is 0.4. It misses "
+            "by more than the lead at 2 of 2 light levels.",
+        ),
+        (
+            {"bayer": 0.1, "ple_bayer": 3.0},
+            -2.9,
+            "Gray World misses this scene's light by ΔE 3.0 (PLE, Bayer, moonlight)",
+        ),
+        ({"bayer": 4.1, "ple_bayer": 3.9}, 4.2, ""),
+        ({"bayer": 4.1, "ple_bayer": 3.9}, -4.2, ""),
+        ({"bayer": 0.9, "ple_bayer": 0.9}, 0.0, ""),  # nobody sees it
+        ({"bayer": None, "ple_bayer": None}, 0.0, ""),  # a processor that tells no balance
+    ],
+)
+def test_a_balance_that_misses_the_light_by_more_than_the_lead_is_told(misses, lead, words) -> None:
+    def balanced(row: Row) -> Row:
+        better = lead * (row.processor == "bayer")
+        return replace(row, delta_e_median=9.0 - better, balance_delta_e=misses[row.processor])
+
+    def said(balance: str) -> str:
+        report = SAMPLE.sample_report(
+            balanced, levels=2, seeds=SEEDS, cameras=tuple(misses), sensors=SAMPLE.SENSORS[:1], balances=(balance,)
+        )
+        return str(comparisons(report)[CAMERA]["answers"]["0 1"][0]["balance"])
+
+    assert said("gray-world").startswith(words)
+    assert bool(said("gray-world")) == bool(words)
+    assert said("as-shot") == "", "as shot knows the light"
+
+
+def test_the_papers_reference_is_named_where_it_is_bilinear_and_gray_world() -> None:
+    both = SAMPLE.sample_report(levels=1, seeds=SEEDS, balances=("as-shot", "gray-world"), sensors=SAMPLE.SENSORS[:1])
+    found = [one["times"] for one in comparisons(both)[CAMERA]["answers"]["0 1"]]
+    assert found == ["", "Bayer, bilinear + Gray World, is the paper's reference."]
 
 
 def test_sensors_are_answered_too_and_conditions_are_not() -> None:

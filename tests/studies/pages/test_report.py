@@ -178,7 +178,7 @@ def test_unknown_numbers_become_dashes() -> None:
     of = SAMPLE.sample_report(some_unknown, notes=())
     outline = Outline(page_of(of))
     row = outline.rows[1 + 1 + 14 + 1 + 1]
-    assert row[2] == "Bayer"
+    assert row[2] == "Bayer, bilinear"
     assert set(row[3:16]) == {"—"}
     assert "NaN" not in outline.scripts[0]
     assert "Infinity" not in outline.scripts[0]
@@ -192,7 +192,7 @@ def test_error_budget_holds_each_picture_s_share_and_what_is_left_out() -> None:
     budget = page[page.index('<table class="cells budget">') : page.index('<details class="part" id="speed"')]
     rows = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", budget, re.DOTALL)]
     assert rows[0] == ["", "table1_output", "low_noise"]
-    assert rows[1] == ["Level", *["Interleaved", "Bayer"] * 2]
+    assert rows[1] == ["Level", *["Interleaved", "Bayer, bilinear"] * 2]
     for row, level in zip(rows[2:], range(7), strict=True):
         places = [(level, sensor.name, camera) for sensor in of.sensors for camera in of.cameras]
         shares = [text.percent(cell_at(of, *place).figures["mc_share"]) for place in places]
@@ -201,6 +201,59 @@ def test_error_budget_holds_each_picture_s_share_and_what_is_left_out() -> None:
     assert budget.count('class="n over') == over > 0
     assert "<dt>veiling glare</dt><dd>each per cent adds 1 %</dd>" in budget
     assert "<dt>aberrations</dt><dd>—</dd>" in budget
+
+
+KNOWN = {
+    "psnr_db": 21.26, "ssim": 0.71649, "delta_e_median": 3.14, "delta_e_p95": 14.16, "s_cielab_median": 2.72,
+    "s_cielab_p95": 12.18, "flip_mean": 0.12349, "pu21_psnr_db": 31.07, "mtf50_cy_per_px": 0.2346,
+    "chart_delta_e_mean": 6.78, "patch_snr_db": 18.24, "snr_db": 12.34, "exposure_s": 0.0125, "saturated": 0.012,
+    "mc_share": 0.025, "capture_s": 0.021, "develop_s": 1.5, "substitution": 1, "spp": 64.0,
+    "mean_electrons": json.dumps({"R": 12.34, "W": 1234.5}), "balance": json.dumps({"R": "calibrated", "G": "given"}),
+}  # fmt: skip
+
+
+def test_every_number_of_a_row_stands_in_the_table_with_its_factor_and_unit() -> None:
+    """Written once more by hand, of a row whose numbers are all different."""
+    of = SAMPLE.sample_report(lambda row: replace(row, **KNOWN), levels=3, sensors=SAMPLE.SENSORS[:1])
+    head, _, *rows = Outline(page_of(of)).rows
+    plain = [cell.replace("\N{NO-BREAK SPACE}", " ").replace("\N{NARROW NO-BREAK SPACE}", " ") for cell in rows[4]]
+    assert list(zip(head, plain, strict=True)) == [
+        ("Level", "living room"), ("Luminance", "8 cd/m²"), ("Camera", "Interleaved"), ("PSNR dB", "21.3"),
+        ("SSIM", "0.716"), ("ΔE2000, median", "3.1"), ("ΔE2000, 95 %", "14.2"), ("S-CIELAB, median", "2.7"),
+        ("S-CIELAB, 95 %", "12.2"), ("FLIP", "0.123"), ("PU21-PSNR dB", "31.1"), ("MTF50 cy/px", "0.235"),
+        ("ΔE2000 of the chart", "6.8"), ("SNR of the patches dB", "18.2"), ("Green SNR", "12.3 dB"),
+        ("Exposure", "12.5 ms"), ("Saturated", "1.2 %"), ("Render's noise", "2.5 %"), ("Substitution", "on"),
+        ("White balance", "calibrated for R"), ("Mean electrons", "R 12.3 W 1 230"), ("Capture", "21 ms"),
+        ("Develop", "1.5 s"),
+    ]  # fmt: skip
+
+
+def test_the_set_up_has_the_numbers_of_sensor_light_scene_and_time() -> None:
+    low_noise = SAMPLE.SENSORS[1].config
+    assert low_noise is not None
+    pixel = replace(low_noise.pixel, read_noise_e=1.5, dsnu_e=0.8, prnu=0.0123, full_well_e=15_000.0, pitch_um=2.2)
+    chip = replace(low_noise, pixel=pixel, lens=replace(low_noise.lens, f_number=2.8), bits=14)
+    of = SAMPLE.sample_report(
+        scenes=(replace(SAMPLE.sample_report(levels=1).scenes[0], width=96, height=64),),
+        sensors=SAMPLE.SENSORS[1:],
+        stages={"render": 30.0, "metrics": 10.0},
+    )
+    page = unescape(page_of(replace(of, sensors=(replace(of.sensors[0], config=chip),))))
+    page = page.replace("\N{NO-BREAK SPACE}", " ").replace("\N{NARROW NO-BREAK SPACE}", " ")
+    for words in (
+        "Read noise 1.5 e⁻, DSNU 0.8 e⁻, PRNU 1.2 %, well 15 000 e⁻, 2.2 µm pixels, f/2.8, 14 bits.",
+        "<dt>moonlight</dt><dd>0.036 cd/m² · 0.21 lux on the scene's reference plane. Parmar",
+        "<dt>daylight</dt><dd>5 000 cd/m² · 31 000 lux on",
+        "still_life, 96 × 64 pixels",
+        "it has the render's noise alone, 3.1 % of its light",
+        'aria-label="75.0 per cent"><rect width="75.0" height="10"/></svg></td><td class="n">30 s</td>',
+        'aria-label="25.0 per cent"><rect width="25.0" height="10"/></svg></td><td class="n">10 s</td>',
+        '<th scope="row">Together</th><td></td><td class="n">40 s</td>',
+    ):
+        assert words in page, words
+    data = json.loads(Outline(page_of(of)).scripts[0])
+    assert data["sizes"] == [[64, 96]], "height, width"
+    assert data["cells"][0]["x"] == 0.036
 
 
 @pytest.mark.thorough

@@ -223,7 +223,7 @@ def test_wipe_and_a_or_b(browser: Any, report: Path) -> None:
     assert "75%" in page.evaluate("getComputedStyle(byId('over')).clipPath")
     page.evaluate("byId('wiper').focus()")
     page.keyboard.press("ArrowRight")
-    assert page.evaluate("byId('wiper').getAttribute('aria-valuetext')") == "26 % Interleaved, 74 % Bayer"
+    assert page.evaluate("byId('wiper').getAttribute('aria-valuetext')") == "26 % Interleaved, 74 % Bayer, bilinear"
     page.evaluate("document.querySelector('[name=view][value=flip]').click(); document.activeElement.blur()")
     tags = "[byId('tag-A').hidden, byId('tag-B').hidden, byId('flip').textContent]"
     assert page.evaluate(tags) == [False, True, "Show B (key x)"]
@@ -233,7 +233,7 @@ def test_wipe_and_a_or_b(browser: Any, report: Path) -> None:
     page.evaluate("document.querySelector('[name=view][value=side]').click()")
     shown(page)
     names = page.evaluate("[...document.querySelectorAll('#side figcaption')].map((one) => one.textContent)")
-    assert names == ["Interleaved", "Bayer", "Reference, 256 samples"]
+    assert names == ["Interleaved", "Bayer, bilinear", "Reference, 256 samples"]
     assert page.evaluate("getComputedStyle(byId('pair')).display") == "none"
 
 
@@ -345,6 +345,49 @@ def test_question_answer_and_first_chart_follow_the_menus(browser: Any, four: Pa
     pick(page, "byId('compared')", 5)
     assert page.evaluate("byId('level-name').textContent") == "moonlight beside street light"
     assert page.evaluate(said)[1] == "", "light levels are no rivals"
+
+
+CHART = """(chart => ({
+  ticks: [...chart.querySelectorAll(".grid")].map(line => [+line.getAttribute("y1"),
+    Number(line.nextSibling.textContent.replace("−", "-"))]),
+  marks: [...chart.querySelectorAll(".slot0 circle")].map(one => [+one.getAttribute("cx"), +one.getAttribute("cy")]),
+  band: chart.querySelector(".slot0 .band").getAttribute("d"),
+  words: [...chart.querySelectorAll(".slot0 title")].map(one => one.textContent),
+}))(document.querySelector(%r))"""
+
+
+def mean_and_half(samples: list[float]) -> tuple[float, float]:
+    """Mean and half of Student's interval of three seeds."""
+    return float(np.mean(samples)), 4.30265 * float(np.std(samples, ddof=1)) / 3**0.5
+
+
+def test_marks_and_bands_of_the_charts_lie_where_the_rows_say(browser: Any, four: Path) -> None:
+    """Heights by the ticks' own labels, places by the logarithm of the light: leads, their sign, figures, intervals."""
+    page, report = CHROME.open_page(browser, four), compared()
+    pick(page, "byId('a')", 0)
+    pick(page, "byId('b')", 1)
+    light = [cell.luminance_cd_m2 for cell in report.by_group[0][::4]]
+    for metric, sign in ((text.PSNR, 1), (text.FLIP, -1)):
+        pick(page, "byId('lead-metric')", metric.key)
+        ours, theirs = ([cell.by_seed[metric.key] for cell in report.by_group[0][side::4]] for side in (0, 1))
+        gains = [[sign * (a - b) for a, b in zip(*pair, strict=True)] for pair in zip(ours, theirs, strict=True)]
+        for place, samples in ((f"#drawn [data-metric={metric.key}] svg", ours), ("#lead-chart svg", gains)):
+            wanted = np.array([mean_and_half(list(one)) for one in samples])
+            drawn = page.evaluate(CHART % place)
+            heights, labels = np.transpose(drawn["ticks"])
+            to_value = np.polyfit(heights, labels, 1)
+            assert to_value[0] < 0, "more is higher"
+            x, y = np.transpose(drawn["marks"])
+            assert np.polyval(to_value, y) == pytest.approx(wanted[:, 0], abs=1e-3 * np.ptp(labels))
+            assert x == pytest.approx(np.polyval(np.polyfit(np.log(light), x, 1), np.log(light)), abs=1e-6)
+            assert np.all(np.diff(x) > 0), "darkest left"
+            edge = np.polyval(to_value, [float(end.split(" ")[1]) for end in drawn["band"][1:-1].split("L")])
+            upper, lower = edge[: len(light)], edge[len(light) :][::-1]
+            assert upper == pytest.approx(wanted.sum(axis=1), abs=1e-3 * np.ptp(labels))
+            assert lower == pytest.approx(wanted[:, 0] - wanted[:, 1], abs=1e-3 * np.ptp(labels))
+    mean, half = mean_and_half(list(report.by_group[0][0].by_seed["psnr_db"]))
+    said = page.evaluate(CHART % "#drawn [data-metric=psnr_db] svg")["words"][0]
+    assert said.endswith(f": {mean:.1f} ± {half:.1f} dB")
 
 
 def test_all_three_details_are_drawn_before_the_error_maps(browser: Any, report: Path) -> None:

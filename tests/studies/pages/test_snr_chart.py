@@ -1,6 +1,7 @@
 """The report's table of light for an SNR, and its plot: numbers of `rodcone snr`, and nothing fetched."""
 
 from base64 import b64decode
+from math import pi, sqrt
 
 import pytest
 from report_sample import sample_pictures, sample_report
@@ -19,6 +20,18 @@ def test_a_row_a_channel_with_the_numbers_of_the_command():
     assert [row[:2] for row in rows] == [(name, channel) for name in SENSORS for channel in "RGBW"]
     green = light_for_snr(10.0, SENSORS["low_noise"], "D65", 0.033)[1]
     assert rows[1][2:] == tuple(map(significant, (green.electrons, green.luminance_cd_m2, green.illuminance_lux)))
+
+
+def test_lux_and_luminance_are_those_of_a_grey_card_and_electrons_those_of_the_snr():
+    """A perfectly matt card of 18 % gives 0.18 / pi cd/m^2 a lux; an SNR of 10 takes 100 electrons and the noise's."""
+    for name, _, electrons, luminance_cd_m2, lux in snr_rows(SENSORS):
+        pixel = SENSORS[name].pixel
+        signal_e, luminance, illuminance = (float(value.replace("\N{NARROW NO-BREAK SPACE}", "")) for value in
+                                            (electrons, luminance_cd_m2, lux))  # fmt: skip
+        assert luminance == pytest.approx(illuminance * 0.18 / pi, rel=0.01)
+        dark_e2 = pixel.read_noise_e**2 + pixel.dsnu_e**2 + pixel.dark_current_e_per_s * 0.033
+        noise_e2 = signal_e + dark_e2 + (pixel.prnu * signal_e) ** 2
+        assert signal_e / sqrt(noise_e2) == pytest.approx(10, rel=0.02)  # three digits, without quantisation
 
 
 def test_an_snr_that_no_light_gives_is_a_dash(monkeypatch):
