@@ -11,7 +11,7 @@ from rodcone.files import replacing
 from rodcone.progress import progress
 from scenes.catalog import load
 from sensor.presets import preset
-from studies.commands.console import Flag, Out, print_table
+from studies.commands.console import print_table
 from studies.pages.environment import environment
 from studies.pages.speed_page import bench_page
 from studies.photograph.machine import processor_facts
@@ -24,15 +24,15 @@ HEAD = (" choice", "seconds", "ratio", "processor", "ratio", "error, e-", "share
 
 def bench(
     *,
-    out: Out = Path("out/bench"),
+    out: Path = Path("out/bench"),
     scene: str = "still_life",
     sensor: str = "low_noise",
     level: str = "25cd/m2",
     size: int = 40,
     picture: int = 128,
-    full: Flag = False,
+    full: bool = False,
     seed: int = 0,
-    json: Flag = False,
+    json: bool = False,
 ) -> None:
     """Measure each stage's choices as time and error and write bench.html and bench.json.
 

@@ -15,7 +15,7 @@ from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
 from sensor.readings.noise import of_reading
-from studies.commands.console import Flag, OutOrNone, Time, print_table, require_ending, say
+from studies.commands.console import Time, print_table, require_ending, say
 from studies.pages.transfer_chart import transfer_svg
 
 HEAD = ("figure", "unit", "configured", "measured", "std. error", "in std. errors")
@@ -27,12 +27,12 @@ def characterise(
     preset: str | None = None,
     /,
     *,
-    flats: Annotated[Files, Parameter(name="--from", consume_multiple=True, negative_iterable=())] = None,
-    dark: Annotated[Files, Parameter(consume_multiple=True, negative_iterable=())] = None,
+    flats: Annotated[Files, Parameter(name="--from", consume_multiple=True)] = None,
+    dark: Annotated[Files, Parameter(consume_multiple=True)] = None,
     reading: int | None = None,
     window: int | None = None,
-    out: OutOrNone = None,
-    json: Flag = False,
+    out: Path | None = None,
+    json: bool = False,
     height: int = 256,
     width: int = 320,
     exposure: Time = 0.01,

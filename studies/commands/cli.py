@@ -8,7 +8,7 @@ from functools import cache
 from importlib import metadata
 from typing import Any
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Parameter
 
 from rodcone.errors import InputError
 from studies.commands.console import INTERRUPTED, say
@@ -23,7 +23,9 @@ _UNITS = {"us", "ms", "s", "lux", "cd/m2", "cd/m²", "K"}
 app = App(
     name="rodcone",
     help="Camera simulation from spectral scene to developed picture: interleaved RGBW beside Bayer.",
+    help_epilogue="-o is short for --out.",
     version=lambda: metadata.version("rodcone"),
+    default_parameter=Parameter(negative=()),  # a flag has no --no-flag, a list no --empty-list
 )
 
 
@@ -49,9 +51,12 @@ app.register_install_completion_command(help="Let this shell complete rodcone's 
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
-    """Arguments with a number below 0 and a unit put to what stands before: ``--level -5lux``, ``--exposure 20 ms``."""
+    """Arguments with ``-o`` written out, and numbers below 0 and units put to what stands before them.
+
+    Such as ``--level -5lux`` and ``--exposure 20 ms``.
+    """
     result: list[str] = []
-    for text in arguments:
+    for text in (f"--out{text[2:]}" if text == "-o" or text.startswith("-o=") else text for text in arguments):
         before = result[-1] if result else ""
         if before.startswith("--") and "=" not in before and _BELOW_ZERO.match(text):
             result[-1] += f"={text}"

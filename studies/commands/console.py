@@ -14,11 +14,6 @@ from rich.text import Text
 from rodcone.errors import InputError
 from rodcone.time_text import parse_time
 
-Out = Annotated[Path, Parameter(name=["--out", "-o"])]
-OutOrNone = Annotated[Path | None, Parameter(name=["--out", "-o"])]
-Flag = Annotated[bool, Parameter(negative="")]
-Several = Annotated[list[str] | None, Parameter(negative_iterable=())]
-
 
 def _seconds(_: Any, tokens: Sequence[Any]) -> float:
     """Seconds as a number, or a time with its unit."""

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.budget.model_plan import as_stated
-from studies.commands.console import Flag, Out, Seconds, Several, Time
+from studies.commands.console import Seconds, Time
 from studies.commands.sweep import check_memory, make_all
 from studies.photograph.clock import Clock
 from studies.study.study import SceneChoice
@@ -18,19 +18,19 @@ STUDY = Path(__file__).parent.parent / "configs" / "demo.toml"
 
 def demo(
     *,
-    out: Out = Path("out/demo"),
+    out: Path = Path("out/demo"),
     scene: str | None = None,
     size: int | None = None,
-    sensor: Several = None,
-    level: Several = None,
-    processor: Several = None,
+    sensor: list[str] | None = None,
+    level: list[str] | None = None,
+    processor: list[str] | None = None,
     longest_exposure: Time | None = None,
     spp: int | None = None,
     max_seconds: Seconds | None = None,
     seed: int = 0,
     light: str | None = None,
-    denoise: Flag = False,
-    force: Flag = False,
+    denoise: bool = False,
+    force: bool = False,
 ) -> None:
     """Photograph one scene from moonlight to daylight with RGBW and Bayer and write a report; prints its path.
 

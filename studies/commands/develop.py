@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rodcone.errors import InputError
 from rodcone.files import check_place
-from studies.commands.console import Flag, OutOrNone, print_result
+from studies.commands.console import print_result
 from studies.photograph.develop import develop_file
 from studies.photograph.picture_file import check_picture_file, write_picture
 
@@ -13,7 +13,7 @@ def develop(
     raw: Path,
     /,
     *more: Path,
-    out: OutOrNone = None,
+    out: Path | None = None,
     isp: str | None = None,
     bits: int = 8,
     ev: float | None = None,
@@ -21,8 +21,8 @@ def develop(
     height: int | None = None,
     width: int | None = None,
     encoding: str = "srgb",
-    trust_code: Flag = False,
-    json: Flag = False,
+    trust_code: bool = False,
+    json: bool = False,
 ) -> None:
     """Develop a raw file of `rodcone capture`, or any camera's with a Bayer mosaic, into a picture; prints its path.
 

@@ -4,7 +4,7 @@ import webbrowser
 from functools import partial
 
 from scenes.catalog import names
-from studies.commands.console import Flag, say
+from studies.commands.console import say
 from studies.explore.server import listen, make_server
 from studies.explore.session import Session
 from studies.explore.source import RenderOptions, open_source
@@ -19,9 +19,9 @@ def explore(
     band_nm: float = 20.0,
     seed: int = 0,
     port: int = 0,
-    no_browser: Flag = False,
-    trust_scene: Flag = False,
-    force: Flag = False,
+    no_browser: bool = False,
+    trust_scene: bool = False,
+    force: bool = False,
 ) -> None:
     """Play with a camera on a page of this machine: every control answers with the picture it makes.
 

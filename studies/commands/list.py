@@ -7,7 +7,7 @@ from typing import Literal
 
 from rodcone.errors import InputError
 from rodcone.files import check_place, replacing
-from studies.commands.console import Flag, OutOrNone, print_table, require_ending
+from studies.commands.console import print_table, require_ending
 
 # Each list imports its own catalogue: all of them together take a second to load.
 
@@ -36,7 +36,7 @@ TEMPERATURES = ("3000K", "D7000K")  # that stand for any
 Kind = Literal["scenes", "lights", "sensors", "mosaics", "processors", "metrics"]
 
 
-def list_names(kind: Kind | None = None, /, *, out: OutOrNone = None, json: Flag = False) -> None:
+def list_names(kind: Kind | None = None, /, *, out: Path | None = None, json: bool = False) -> None:
     """Print what the other commands know by name, with what each is.
 
     Parameters

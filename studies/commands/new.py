@@ -25,7 +25,7 @@ from sensor.cameras.numbers import (
 )
 from sensor.presets import preset as read_preset
 from sensor.presets import preset_file
-from studies.commands.console import Out, OutOrNone, require_ending, say
+from studies.commands.console import require_ending, say
 
 app = App(name="new", help="Write files to start from.")
 _STUDIES = Path(__file__).parent.parent / "configs"
@@ -37,7 +37,7 @@ def preset(
     name: str | None = None,
     /,
     *,
-    out: Out,
+    out: Path,
     camera: str | None = None,
     noise: Path | None = None,
     anchor: str | None = None,
@@ -120,7 +120,7 @@ def preset(
 
 
 @app.command
-def cameras(copy: Path, /, *, out: Out) -> None:
+def cameras(copy: Path, /, *, out: Path) -> None:
     """Convert a copy of rawtoaces-data (Academy Software Foundation, Apache-2.0) for --camera and rodcone list sensors.
 
     Parameters
@@ -135,7 +135,7 @@ def cameras(copy: Path, /, *, out: Out) -> None:
 
 
 @app.command
-def study(name: str = "light_levels", /, *, out: OutOrNone = None) -> None:
+def study(name: str = "light_levels", /, *, out: Path | None = None) -> None:
     """Copy an example of a study to a TOML file to change, for `rodcone sweep`; sensors that it names come with it.
 
     Parameters
@@ -168,7 +168,7 @@ def study(name: str = "light_levels", /, *, out: OutOrNone = None) -> None:
 
 
 @app.command
-def cluster(*, out: Out) -> None:
+def cluster(*, out: Path) -> None:
     """Copy settings of dask.distributed that suit sweeps, with the commands that start a cluster.
 
     Parameters

@@ -5,12 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from rodcone.progress import progress
-from studies.commands.console import Flag, Out, print_result
+from studies.commands.console import print_result
 from studies.paper.paper import as_json, make, write
 from studies.paper.setup import Setup
 
 
-def paper(*, out: Out = Path("out/paper"), size: int = 192, spp: int = 256, seeds: int = 4, json: Flag = False) -> None:
+def paper(
+    *, out: Path = Path("out/paper"), size: int = 192, spp: int = 256, seeds: int = 4, json: bool = False
+) -> None:
     """Compute the figures and claims of Parmar & Wandell 2009 and check each claim; prints the page's path.
 
     Parameters

@@ -13,7 +13,6 @@ from studies.budget.check import check_json, check_plan
 from studies.budget.plan import plan as plan_study
 from studies.budget.plan import reference_plan
 from studies.budget.plan_text import plan_json, plan_table, reasons
-from studies.commands.console import Flag, Several
 from studies.study.study_file import read_study
 
 
@@ -21,11 +20,11 @@ def plan(
     study: Path,
     /,
     *,
-    set: Several = None,
-    check: Flag = False,
+    set: list[str] | None = None,
+    check: bool = False,
     cache: Path | None = None,
-    trust_code: Flag = False,
-    json: Flag = False,
+    trust_code: bool = False,
+    json: bool = False,
 ) -> None:
     """Compute a study's error budget and choose the cheapest model within it.
 

@@ -17,7 +17,7 @@ from rodcone.errors import InputError
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import progress, render_words
-from studies.commands.console import INTERRUPTED, Flag, Out, Seconds, Several, print_result, require_ending, say
+from studies.commands.console import INTERRUPTED, Seconds, print_result, require_ending, say
 from studies.study.lit_scene import asked_spectra, render_facts
 from studies.study.scene_source import asked_level, asked_size, open_scene
 
@@ -28,11 +28,11 @@ def render(
     source: str,
     /,
     *,
-    out: Out = Path("render.exr"),
+    out: Path = Path("render.exr"),
     height: int | None = None,
     width: int | None = None,
     bands: str | None = None,
-    light: Several = None,
+    light: list[str] | None = None,
     chart: str | None = None,
     level: str | None = None,
     spp: int | None = None,
@@ -41,11 +41,11 @@ def render(
     max_depth: int | None = None,
     seed: int = 0,
     cache: Path | None = None,
-    trust_scene: Flag = False,
+    trust_scene: bool = False,
     extend: str | None = None,
-    denoise: Flag = False,
-    force: Flag = False,
-    json: Flag = False,
+    denoise: bool = False,
+    force: bool = False,
+    json: bool = False,
 ) -> int:
     """Render a scene into a spectral OpenEXR file; prints its path.
 

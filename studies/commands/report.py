@@ -4,7 +4,6 @@ from pathlib import Path
 
 from rodcone.errors import InputError, require_whole, unknown
 from rodcone.files import replacing
-from studies.commands.console import OutOrNone
 from studies.pages.report import render_report
 from studies.pages.report_compare import CAMERA, first_comparison
 from studies.pages.report_markdown import markdown
@@ -14,7 +13,7 @@ from studies.sweep.results import overview, results_json
 FILE, RESULTS, OVERVIEW = "report.html", "results.json", "overview.png"
 
 
-def report(folder: Path, /, *, out: OutOrNone = None, pictures: int | None = None, camera: str | None = None) -> None:
+def report(folder: Path, /, *, out: Path | None = None, pictures: int | None = None, camera: str | None = None) -> None:
     """Write the report of a sweep as one self-contained HTML file; prints its path.
 
     With an --out that ends in .md: its answer and its leads as Markdown tables.

@@ -3,6 +3,7 @@
 import json as notation
 from dataclasses import asdict, replace
 from math import isinf
+from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -11,7 +12,7 @@ from rodcone.errors import require_range
 from rodcone.files import check_place, replacing
 from sensor.config import SensorConfig
 from sensor.presets import preset
-from studies.commands.console import Flag, OutOrNone, Time, print_table, require_ending
+from studies.commands.console import Time, print_table, require_ending
 from studies.metrics.truth import GREY
 from studies.pages.report_text import MISSING
 from studies.pages.snr_chart import snr_svg
@@ -29,8 +30,8 @@ def snr(
     light: str = "D65",
     exposure: Time = 0.033,
     f_number: float | None = None,
-    out: OutOrNone = None,
-    json: Flag = False,
+    out: Path | None = None,
+    json: bool = False,
 ) -> None:
     """Print the light in which a sensor's pixels reach a signal-to-noise ratio, by channel.
 

@@ -19,7 +19,7 @@ from studies.budget.model_plan import Plan
 from studies.budget.model_plan import as_stated as plan_as_stated
 from studies.budget.plan import plan as plan_study
 from studies.budget.plan import reference_plan
-from studies.commands.console import INTERRUPTED, Flag, Out, Several, say
+from studies.commands.console import INTERRUPTED, say
 from studies.commands.estimate import Estimate, estimate
 from studies.commands.report import write_results
 from studies.photograph.clock import Clock
@@ -42,17 +42,17 @@ def sweep(
     study: Path,
     /,
     *,
-    out: Out = Path("out/sweep"),
-    set: Several = None,
+    out: Path = Path("out/sweep"),
+    set: list[str] | None = None,
     workers: int | None = None,
     cluster: str | None = None,
-    reference: Flag = False,
-    as_stated: Flag = False,
-    keep_old: Flag = False,
-    dry_run: Flag = False,
-    trust_code: Flag = False,
-    force: Flag = False,
-    json: Flag = False,
+    reference: bool = False,
+    as_stated: bool = False,
+    keep_old: bool = False,
+    dry_run: bool = False,
+    trust_code: bool = False,
+    force: bool = False,
+    json: bool = False,
 ) -> int:
     """Make every picture of a study, note each in a ledger and write a report; prints the ledger's path.
 
@@ -142,9 +142,7 @@ def make_all(
     return swept, report
 
 
-def export(
-    folder: Path, /, *, out: Out, everything: Annotated[bool, Parameter(name="--all", negative="")] = False
-) -> None:
+def export(folder: Path, /, *, out: Path, everything: Annotated[bool, Parameter(name="--all")] = False) -> None:
     """Write the cells of a sweep as a table, a row a cell; prints its path.
 
     Parameters

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from rodcone.errors import InputError
-from studies.commands.console import Several
 from studies.sweep.export import read_rows
 from studies.sweep.table import lines, markdown
 
@@ -14,7 +13,7 @@ def table(
     *,
     by: str = "spectrum,level,processor",
     show: str = "psnr_db,delta_e_median",
-    where: Several = None,
+    where: list[str] | None = None,
 ) -> None:
     """Print figures of a sweep as a Markdown table: means over the seeds, with the half width of their 95 % interval.
 

@@ -7,11 +7,11 @@ from isp.ple.prior import save_prior
 from rodcone.errors import InputError
 from rodcone.files import check_place
 from sensor.presets import preset
-from studies.commands.console import Flag, Out, print_result, require_ending
+from studies.commands.console import print_result, require_ending
 from studies.training.train import train_prior
 
 
-def train(*, sensor: str, out: Out, seed: int = 1, json: Flag = False) -> None:
+def train(*, sensor: str, out: Path, seed: int = 1, json: bool = False) -> None:
     """Train the prior over patches of a sensor's curves, which ple develops with; prints its path.
 
     Takes some three minutes on two cores and 1.5 GB. The prior serves every noise, well, exposure and mosaic of

@@ -1,7 +1,7 @@
 """One photograph as raw files: a scene or a stored radiance in, digital negatives out."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,45 +41,65 @@ MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly me
 _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Order:
     """What to photograph and how.
 
     Attributes
     ----------
-    source, out : str or Path
-        Scene by name or file, and the raw file to write.
-    sensor, cfa : str
-        Preset by name or file; mosaic, where it isn't the preset's own.
+    source : str or Path
+        Scene by name such as color_checker, a Mitsuba scene (.xml), a file of spectral radiance (.exr, or .mat of
+        ISETCam), a cube described by a .toml beside it (.npy, ENVI's .hdr, .mat), or a photograph (.jpg, .png).
+    out : str or Path
+        Raw file to write: .dng for Bayer and 2x2 RGBW (with a re-mosaiced Bayer one beside it, NAME_bayer.dng), .tif
+        with a .json beside it for any mosaic.
+    sensor : str or Path
+        Sensor preset by name, or a preset file.
+    cfa : str, optional
+        Mosaic, such as rgbw or bayer; the preset's own by default.
     exposure : str
-        A rule of `sensor.exposure.RULES`, or a time such as ``20ms`` or ``1/50``; ``0s`` for a dark frame.
+        Time such as 20ms or 1/50, 0s for a dark frame, or a rule: auto for the brightest green, auto:W for the
+        brightest W, auto:information for the one of the two whose samples hold more.
     level : str, optional
-        Such as ``25cd/m2``; the scene's own where left out.
-    lights : tuple of str
-        ``GROUP=ILLUMINANT`` or ``ILLUMINANT``, as `studies.study.lit_scene.asked_spectra`; of a file of radiance one
-        illuminant, the light that it was lit by.
+        Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
+        by default.
+    light : tuple of str
+        ILLUMINANT, such as A, in place of all of the scene's lights, or GROUP=ILLUMINANT in place of one group, each at
+        the same luminance; may be given several times. An illuminant is a name or a CSV file, such as sky=led.csv. For
+        a file of radiance the light that it was lit by.
     chart : str, optional
-        CSV file with the reflectances of color_checker's patches.
+        CSV file with the reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
     white_balance : str
-        Illuminant that the camera's neutral and colour matrix are set to; ``as-shot`` for the scene's first light.
-    size, height, width : int, optional
-        Longer side in pixels, or height and width, of which one keeps the proportions.
-    spp, seed : int
+        Illuminant, such as D65, under which the camera shows grey as grey; as-shot for the scene's first light, which
+        is known here, and that of --light, or D65, for a file of radiance.
+    size : int, optional
+        Longer side of the rendered picture in pixels; 256 by default, a .xml scene's film has its own, a file of
+        radiance keeps its own.
+    height : int, optional
+        Pixels; with one of height and width the other keeps the proportions.
+    width : int, optional
+        Pixels; as height.
+    spp : int
+        Samples a pixel of the render.
     frames : int
-        Exposures, with one chip and the scene standing still; each in a file of its own.
-    trust, extend
-        As of `studies.study.scene_source.open_scene`.
+        Exposures of a burst, each in a file of its own, NAME_1, NAME_2 and so on; develop merges them.
+    seed : int
+        Seed of the render, the chip and the exposure.
+    trust_scene : bool
+        Let a .xml scene load plug-ins of its own, which are native code, and files from anywhere.
+    extend : str, optional
+        hold: surfaces keep their end values outside their tables' wavelengths; by default bands there are refused.
     force : bool
         Run even where more memory is needed than is free.
     """
 
-    source: str | Path
-    out: str | Path
+    source: str | Path = field(kw_only=False)
+    out: str | Path = field(default="shot.dng", kw_only=False)
     sensor: str | Path = "low_noise"
     cfa: str | None = None
     exposure: str = AUTO_INFORMATION
     level: str | None = None
-    lights: tuple[str, ...] = ()
+    light: tuple[str, ...] = ()
     chart: str | None = None
     white_balance: str = AS_SHOT
     size: int | None = None
@@ -88,7 +108,7 @@ class Order:
     spp: int = 64
     frames: int = 1
     seed: int = 0
-    trust: bool = False
+    trust_scene: bool = False
     extend: str | None = None
     force: bool = False
 
@@ -126,14 +146,14 @@ def take(order: Order, step: Step | None = None) -> Taken:
 
     # What is looked at, and the light that the camera's colours are set to.
     if opened is None:
-        stated = order.lights[0] if order.lights else None
+        stated = order.light[0] if order.light else None
         known = stated or (None if balance is None or is_reflectance(order.source) else order.white_balance)
         transport, light, notes = open_radiance_file(order.source, known)
         spectra: dict[str, Spectrum] = {}
         luminance_cd_m2 = None if order.level is None else parse_level(order.level)[0]
         illuminance_lux = None
     else:
-        spectra = asked_spectra(opened.scene, order.lights)
+        spectra = asked_spectra(opened.scene, order.light)
         light, notes = _first_light(opened.scene, spectra)
         notes = [*notes, *opened.notes] if balance is None else [*opened.notes]
         luminance_cd_m2, illuminance_lux = asked_level(opened.scene, order.level)
@@ -231,7 +251,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
         )
     exposure_s = _asked_exposure_s(order, channels(sensor.cfa))
     if is_radiance_file(order.source):
-        if order.trust:
+        if order.trust_scene:
             raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")
         if order.chart:
             raise InputError(f"chart: {order.source!r} is a picture, which has its own; leave --chart out")
@@ -241,15 +261,15 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
             raise InputError(
                 f"{asked[0]}: {order.source!r} has its own; leave it out, or render the scene at that size"
             )
-        if len(order.lights) > 1 or "=" in "".join(order.lights):
+        if len(order.light) > 1 or "=" in "".join(order.light):
             raise InputError(
-                f"light: {' '.join(order.lights)!r} for a picture, whose light is in it; allowed: the illuminant that "
+                f"light: {' '.join(order.light)!r} for a picture, whose light is in it; allowed: the illuminant that "
                 "it was lit by, such as A; give one"
             )
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         require_memory(memory(*extent_of(order.source)), order.force)
         return sensor, None, exposure_s
-    opened = open_scene(str(order.source), order.trust, order.extend, chart=order.chart)
+    opened = open_scene(str(order.source), order.trust_scene, order.extend, chart=order.chart)
     asked_level(opened.scene, order.level)
     height, width = _size(order, opened)
     sensor.check_frame((height, width))
