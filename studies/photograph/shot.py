@@ -61,20 +61,18 @@ class Order:
         Time such as 20ms or 1/50, 0s for a dark frame, or a rule: auto for the brightest green, auto:W for the
         brightest W, auto:information for the one of the two whose samples hold more.
     level : str, optional
-        Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
-        by default.
+        Light, such as 25cd/m2 (mean scene luminance) or 500lux (on its reference plane); the scene's own by default.
     light : tuple of str
         ILLUMINANT, such as A, in place of all of the scene's lights, or GROUP=ILLUMINANT in place of one group, each at
-        the same luminance; may be given several times. An illuminant is a name or a CSV file, such as sky=led.csv. For
-        a file of radiance the light that it was lit by.
+        the same luminance; may be given several times. It is a name or a CSV file, such as sky=led.csv. For a file of
+        radiance the light that it was lit by.
     chart : str, optional
         CSV file with the reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
     white_balance : str
-        Illuminant, such as D65, under which the camera shows grey as grey; as-shot for the scene's first light, which
-        is known here, and that of --light, or D65, for a file of radiance.
+        Illuminant, such as D65, under which grey is shown as grey; as-shot for the scene's first light, which is known
+        here, and that of --light, or D65, for a file of radiance.
     size : int, optional
-        Longer side of the rendered picture in pixels; 256 by default, a .xml scene's film has its own, a file of
-        radiance keeps its own.
+        Longer side of the render in pixels; 256 by default; a .xml scene's film and a file of radiance have their own.
     height : int, optional
         Pixels; with one of height and width the other keeps the proportions.
     width : int, optional
@@ -144,19 +142,18 @@ def take(order: Order, step: Step | None = None) -> Taken:
     sensor, opened, exposure_s = _check(order)
     out, balance = Path(order.out), None if order.white_balance == AS_SHOT else illuminant(order.white_balance)
 
-    # What is looked at, and the light that the camera's colours are set to.
+    # what is looked at, and the light that the camera's colours are set to
     if opened is None:
         stated = order.light[0] if order.light else None
         known = stated or (None if balance is None or is_reflectance(order.source) else order.white_balance)
         transport, light, notes = open_radiance_file(order.source, known)
         spectra: dict[str, Spectrum] = {}
-        luminance_cd_m2 = None if order.level is None else parse_level(order.level)[0]
-        illuminance_lux = None
+        level: tuple[float | None, float | None] = (parse_level(order.level)[0] if order.level else None), None
     else:
         spectra = asked_spectra(opened.scene, order.light)
         light, notes = _first_light(opened.scene, spectra)
         notes = [*notes, *opened.notes] if balance is None else [*opened.notes]
-        luminance_cd_m2, illuminance_lux = asked_level(opened.scene, order.level)
+        level = asked_level(opened.scene, order.level)
     colour = calibrate(sensor, balance or light)
     check_place(out)  # before the render: it may take minutes
     if opened is not None:
@@ -173,20 +170,15 @@ def take(order: Order, step: Step | None = None) -> Taken:
     # The exposure.
     if step:
         step("exposure", 0.9)
-    asked: dict[str, Any] = {"luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
+    asked: dict[str, Any] = dict(zip(("luminance_cd_m2", "illuminance_lux"), level, strict=True))
     radiance = transport.relight(spectra, **asked)
     if exposure_s is None:
         exposure_s = exposure_by_rule_s(order.exposure, form_image(radiance, sensor), sensor)
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
     taken = burst(radiance, sensor, [exposure_s] * order.frames, device, np.random.default_rng([order.seed, _FRAME]))
     name = Path(order.sensor).stem.encode("ascii", "replace").decode()
-    noted: dict[str, Any] = {
-        "camera": name,
-        "f_number": sensor.lens.f_number,
-        "iso": iso_speed(sensor),
-        "colour": colour,
-    }
-    raws = [replace(frame, **noted) for frame in taken]
+    lens, iso = sensor.lens, iso_speed(sensor)
+    raws = [replace(frame, camera=name, f_number=lens.f_number, iso=iso, colour=colour) for frame in taken]
     raw = raws[0]
     if opened is not None:
         even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **asked))
