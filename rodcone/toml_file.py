@@ -12,7 +12,14 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_origin
 
-from cattrs import AttributeValidationNote, ClassValidationError, Converter, ForbiddenExtraKeysError
+from cattrs import (
+    AttributeValidationNote,
+    BaseValidationError,
+    ClassValidationError,
+    Converter,
+    ForbiddenExtraKeysError,
+    IterableValidationNote,
+)
 
 from rodcone.errors import InputError, unknown
 from rodcone.files import read_bounded
@@ -133,17 +140,22 @@ def _tuple_of(converter: Converter, kind: Any) -> Callable[[Any, Any], Any]:
     return take
 
 
-def _first_fault(error: ClassValidationError, fix: str) -> str:
+def _first_fault(error: BaseValidationError, fix: str) -> str:
     fault = min(error.exceptions, key=lambda each: not isinstance(each, ForbiddenExtraKeysError))
     if isinstance(fault, ForbiddenExtraKeysError):
         return str(unknown("key", sorted(fault.extra_fields)[0], [field.name for field in fields(fault.cl)]))
     if isinstance(fault, KeyError):
         return f"{fault.args[0]} is missing; add it, or {fix}"
-    if isinstance(fault, ClassValidationError):
+    if isinstance(fault, BaseValidationError):
         words = _first_fault(fault, fix)
     elif isinstance(fault, InputError):
         words = str(fault)
     else:
         words = f"the value is not a table; allowed: a table of keys; {fix}"
-    where = [note.name for note in getattr(fault, "__notes__", []) if isinstance(note, AttributeValidationNote)]
+    kinds = AttributeValidationNote, IterableValidationNote
+    where = [_place(note) for note in getattr(fault, "__notes__", []) if isinstance(note, kinds)]
     return f"{where[0]}{'' if words.startswith('key: ') else ':'} {words}" if where else words
+
+
+def _place(note: AttributeValidationNote | IterableValidationNote) -> str:
+    return note.name if isinstance(note, AttributeValidationNote) else str(note.index)

@@ -1,7 +1,7 @@
 """What the explorer's controls are set to, as one value, and how it is read from a message."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any
@@ -10,6 +10,7 @@ from isp.processors.catalogue import PROCESSORS, Processor
 from isp.settings import DEFAULTS, PAPER, Settings
 from render.illuminants import illuminant, is_light_file
 from rodcone.errors import InputError, require_keys, require_range, require_whole, unknown
+from rodcone.toml_file import strict_converter, structured
 from sensor.cfa import MOSAICS, channels
 from sensor.cfa import OWN as OWN_MOSAIC
 from sensor.exposure import AUTO_INFORMATION, LONGEST_S, RULES
@@ -183,20 +184,24 @@ def controls_from(content: Any, own: Controls = Controls(), dropped: Iterable[st
     InputError
         For anything else.
     """
-    given = dict(_object("controls", content))
-    readers = _readers()
-    require_keys("controls", given, readers)
-    values = {name: readers[name](name, value) for name, value in given.items()}
-    if values.get("sensor", own.sensor) not in (known := {*names(), own.sensor, *dropped}):
-        raise unknown("sensor", values["sensor"], known)
-    lamps = {f"lamps[{group!r}].spectrum": lamp.spectrum for group, lamp in values.get("lamps", {}).items()}
-    for name, light in {"reference_light": values.get("reference_light", LIGHT), **lamps}.items():
-        if is_light_file(light) and light not in light_files(own):
+    if not isinstance(content, dict):
+        raise InputError(f"controls: {content!r} is not allowed; give an object of keys and values")
+    lamps = content.get("lamps")
+    emitters = lamps.values() if isinstance(lamps, dict) else ()
+    spectra = [lamp.get("spectrum") for lamp in emitters if isinstance(lamp, dict)]
+    for light in (content.get("reference_light"), *spectra):  # before anything reads it
+        if isinstance(light, str) and is_light_file(light) and light not in light_files(own):
             raise InputError(
-                f"{name}: {light!r} is a file that the command didn't name; allowed: an illuminant's name; load the "
+                f"light: {light!r} is a file that the command didn't name; allowed: an illuminant's name; load the "
                 "file on the page, as a table"
             )
-    return Controls(**values)
+    controls = structured(content, Controls, _CONVERTER, "send what the page is told first")
+    if controls.sensor not in (known := {*names(), own.sensor, *dropped}):
+        raise unknown("sensor", controls.sensor, known)
+    for name, lamp in controls.lamps.items():
+        if len(lamp.table) > MOST_POINTS:
+            raise InputError(f"lamps[{name!r}].table: {len(lamp.table)} points; allowed: {MOST_POINTS}; thin it out")
+    return controls
 
 
 def light_files(controls: Controls) -> tuple[str, ...]:
@@ -215,60 +220,11 @@ def to_json(controls: Controls) -> dict[str, Any]:
     return result
 
 
-def _readers() -> dict[str, Callable[[str, Any], Any]]:
-    numbers = dict.fromkeys(("level_cd_m2", "exposure_s"), _number)
-    texts = dict.fromkeys(("reference_light", "exposure", "sensor", "mosaic", "processor", "white_balance"), _text)
-    wholes = dict.fromkeys(("seed", "exposure_number", "frames"), _whole)
-    tables = dict.fromkeys(("lens", "pixel", "settings"), _numbers)
-    bits = {"bits": lambda name, value: None if value is None else _whole(name, value)}
-    return {"lamps": _lamps, **numbers, **texts, **wholes, **tables, **bits, "shot_noise": _flag}
-
-
-def _object(name: str, value: Any) -> Mapping[str, Any]:
-    if not isinstance(value, dict):
-        raise InputError(f"{name}: {value!r} is not allowed; give an object of keys and values")
-    return value
-
-
-def _number(name: str, value: Any) -> float:
-    require_range(name, None if isinstance(value, bool) else value, -1e300, 1e300, "give a number")
+def _number(value: Any, _: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not -1e300 <= value <= 1e300:
+        raise InputError(f"{value!r} is not a number")
     return float(value)
 
 
-def _whole(name: str, value: Any) -> int:
-    require_whole(name, None if isinstance(value, bool) else value, 0, 2**31, "give a whole number")
-    return int(value)
-
-
-def _flag(name: str, value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise InputError(f"{name}: {value!r} is not allowed; give true or false")
-    return value
-
-
-def _text(name: str, value: Any) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"{name}: {value!r} is not allowed; give a text")
-    return value
-
-
-def _numbers(name: str, value: Any) -> dict[str, float]:
-    return {key: _number(f"{name}.{key}", each) for key, each in sorted(_object(name, value).items())}
-
-
-def _lamps(name: str, value: Any) -> dict[str, Lamp]:
-    return {group: _lamp(f"{name}[{group!r}]", each) for group, each in _object(name, value).items()}
-
-
-def _lamp(name: str, value: Any) -> Lamp:
-    given = _object(name, value)
-    require_keys(name, given, ("spectrum", "power", "table"))
-    points = given.get("table", [])
-    if (
-        not isinstance(points, list)
-        or len(points) > MOST_POINTS
-        or any(not isinstance(point, list) or len(point) != 2 for point in points)
-    ):
-        raise InputError(f"{name}.table: it is no list of [nm, value]; allowed: {MOST_POINTS} of them at most; mend it")
-    table = tuple((_number(f"{name}.table", nm), _number(f"{name}.table", value)) for nm, value in points)
-    return Lamp(_text(name, given.get("spectrum", OWN)), _number(f"{name}.power", given.get("power", 1.0)), table)
+_CONVERTER = strict_converter()
+_CONVERTER.register_structure_hook(float, _number)
