@@ -27,9 +27,8 @@ from sensor.optics import SpectralIrradiance, form_image
 from sensor.raw import RawImage
 from sensor.readout import draw_mean_frame, read_out
 from sensor.response import behind_filters, channel_electrons
-from studies.explore.camera import camera_of, own_camera
 from studies.explore.controls import TIME, Controls, Lamp, options_of
-from studies.explore.lamps import alone, lit_transport
+from studies.explore.equipment import alone, camera_of, lit_transport, own_camera
 from studies.explore.memo import Memo
 from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of
 from studies.photograph.camera import colour_fit, develop_to_scale

@@ -7,7 +7,7 @@ from sensor.optics import form_image
 from sensor.response import behind_filters, channel_electrons
 from studies.explore.chain import Exposed
 from studies.explore.controls import Controls, Lamp
-from studies.explore.lamps import alone
+from studies.explore.equipment import alone
 from studies.explore.memo import Memo
 from studies.study.render_noise import monte_carlo_share
 

@@ -11,8 +11,8 @@ from rodcone.errors import InputError
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.presets import preset, preset_file
-from studies.explore.camera import camera_of
 from studies.explore.controls import TIME, Controls, Lamp
+from studies.explore.equipment import camera_of
 from studies.study.radiance_file import LIGHT
 from studies.study.study import FILES, OWN, RenderLimits, SceneChoice
 

@@ -14,8 +14,20 @@ from sensor.response import channel_electrons
 from studies.pages import report_text as text
 from studies.pages.plots import picture_rows
 from studies.paper.claims import Claim, PaperFigure, at_least, at_most, near
-from studies.paper.flat import decibels, shot_noise_alone
-from studies.paper.setup import READINGS, TODAY, Setup, View, develop, exposures, sensor_of, shown, swept, view
+from studies.paper.setup import (
+    READINGS,
+    TODAY,
+    Setup,
+    View,
+    decibels,
+    develop,
+    exposures,
+    sensor_of,
+    shot_noise_alone,
+    shown,
+    swept,
+    view,
+)
 from studies.photograph.snr import channel_e, light_of, snr
 
 LARGE = "table1_output_6um"  # Figure 1(b)'s larger pixel, as cameras of the time had

@@ -15,9 +15,8 @@ from sensor.curves import rgbw
 from sensor.readout import noise_variance
 from studies.pages.plots import BLUE, CHART, COLOURS, GREEN, INK, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks
 from studies.paper.claims import Claim, PaperFigure, about, at_least
-from studies.paper.flat import without_prnu
 from studies.paper.numbers import MOONLIGHT_CD_M2
-from studies.paper.setup import READINGS, TODAY, sensor_of
+from studies.paper.setup import READINGS, TODAY, sensor_of, without_prnu
 from studies.photograph.snr import channel_e, light_of, snr
 
 NM: Floats = np.arange(400.0, 701.0, 2.0)  # the paper's range

@@ -12,8 +12,7 @@ from sensor.config import LensConfig
 from sensor.device import Device
 from sensor.readout import read_out
 from studies.paper.claims import Claim, ClaimCheck, about, near
-from studies.paper.flat import decibels, photons, shot_noise_alone
-from studies.paper.setup import READINGS, View, sensor_of
+from studies.paper.setup import READINGS, View, decibels, photons, sensor_of, shot_noise_alone
 from studies.photograph.snr import light_of
 
 MOONLIGHT_CD_M2 = DEMO_LEVELS[0].luminance_cd_m2

@@ -1,4 +1,4 @@
-"""What the figures share: cameras under both readings of Table 1, scenes rendered once, exposures and pictures."""
+"""What the figures share: cameras under both readings of Table 1, renders, exposures, pictures, even fields."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL
+from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_whole
@@ -21,7 +22,7 @@ from rodcone.progress import render_words
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
-from sensor.optics import form_image
+from sensor.optics import camera_equation, form_image
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.response import expected_electrons
@@ -232,3 +233,25 @@ def noise(pictures: Sequence[Image]) -> float:
 def quality_db(pictures: Sequence[Image], truth: Image) -> float:
     """Mean PSNR of pictures against the truth [dB], both linear and encoded for it."""
     return float(np.mean([psnr_db(encode_srgb(picture), encode_srgb(truth)) for picture in pictures]))
+
+
+def photons(light: Light, luminance_cd_m2: float, sensor: SensorConfig) -> float:
+    """Photons on the sensor from a uniform field behind the sensor's lens [um^-2 s^-1]."""
+    spectral = light.spectrum * luminance_cd_m2 * camera_equation(sensor.lens)
+    return float((spectral * photons_per_joule(light.wavelength_nm) * light.width_nm).sum() * 1e-12)
+
+
+def decibels(ratio: float) -> float:
+    """Ratio of amplitudes [dB]; minus infinity for 0."""
+    return float(20 * np.log10(ratio)) if ratio > 0 else -np.inf
+
+
+def without_prnu(sensor: SensorConfig) -> SensorConfig:
+    """Sensor whose pixels respond alike: what a camera has that corrects its fixed pattern."""
+    return replace(sensor, pixel=replace(sensor.pixel, prnu=0.0))
+
+
+def shot_noise_alone(sensor: SensorConfig) -> SensorConfig:
+    """Sensor with no noise but that of light, and a converter too fine to see."""
+    pixel = replace(sensor.pixel, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
+    return replace(sensor, pixel=pixel, bits=16)

@@ -10,9 +10,9 @@ from explore_sample import RENDER, random_controls, small_transport
 
 from rodcone.errors import InputError
 from sensor.presets import preset
-from studies.explore.camera import camera_of
 from studies.explore.chain import photograph
 from studies.explore.controls import Controls, Lamp
+from studies.explore.equipment import camera_of
 from studies.explore.memo import go_on
 from studies.explore.source import RenderOptions, of_transport, open_source
 from studies.explore.views import VIEWS, histogram, pixel
