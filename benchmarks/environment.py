@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rodcone.jit import backend, dr
 from rodcone.llvm import LIBLLVM
-from studies.photograph.machine import processor_facts
+from studies.photograph.clock import processor_facts
 from studies.speed.points import laps
 
 

@@ -148,7 +148,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "balance": _array(or_kind="isp.colour.white_balance:WhiteBalance"),
         "order": _value("studies.photograph.shot:Order", "give rodcone.Order(...)"),
         "study": _value("studies.study.study:Study", "give a study's file", "studies.study.study_file:read_study"),
-        "plan": _value("studies.budget.model_plan:Plan", "give rodcone.plan(study)"),
+        "plan": _value("studies.budget.ledger:Plan", "give rodcone.plan(study)"),
         "clock": _value("studies.photograph.clock:Clock", "leave it out"),
         "executor": _value("concurrent.futures:Executor", "give a pool of concurrent.futures"),
         **dict.fromkeys(("origin", "target", "up"), _array(3)),

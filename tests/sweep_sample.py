@@ -12,7 +12,7 @@ import numpy as np
 
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
-from studies.budget.model_plan import Plan, as_stated
+from studies.budget.ledger import Plan, as_stated
 from studies.study.study import SceneChoice, Study
 from studies.sweep.cells import Cell
 from studies.sweep.database import COLUMNS, FILE

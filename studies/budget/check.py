@@ -14,8 +14,7 @@ from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import electrons_per_irradiance, expected_electrons
 from sensor.variations import vary
-from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger
-from studies.budget.model_plan import Plan
+from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger, Plan
 from studies.study.lit_scene import level_luminance, lux_per_cd_m2, make_transport, open_all, photographed, under
 from studies.study.model import ImageModel
 from studies.study.study import Study

@@ -1,16 +1,19 @@
 """The error budget's ledger: each approximation in electrons, and as a share of the sensor's own noise variance."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rodcone.brief import brief
 from sensor.config import SensorConfig
+from sensor.presets import preset
 from sensor.readout import noise_variance
 from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
-from studies.study.study import Condition, label
+from studies.study.model import ImageModel, RenderModel
+from studies.study.study import Condition, SceneChoice, Study, conditions, label
 
 # Standard errors added to a mean over the pilot's pixels. Of noise a few pixels may hold most, here and in what is
 # predicted: whatever its distribution, at most 5 % exceed the mean by root 19 standard deviations (Cantelli).
@@ -225,3 +228,34 @@ def percent(share: float) -> str:
     if share >= 0.1:
         return f"{100 * share:.0f}%"
     return f"{100 * share:.2g}%" if share >= LEAST_SHOWN else "0%" if share == 0 else f"<{100 * LEAST_SHOWN:g}%"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Models of a study's scenes and conditions, and the share of the noise variance that each is predicted to add.
+
+    `ledgers` holds what that is made of, a row a condition and mosaic.
+    """
+
+    renders: Mapping[SceneChoice, RenderModel]
+    images: Mapping[Condition, ImageModel]
+    shares: Mapping[Condition, float] = field(default_factory=dict)
+    ledgers: tuple[Ledger, ...] = ()
+
+    __repr__ = brief
+
+    def _repr_html_(self) -> str:
+        if not self.ledgers:
+            return f"<p>Plan without a budget: renders {len(self.renders)}, images {len(self.images)}</p>"
+        return ledger_html(self.ledgers)
+
+
+def as_stated(study: Study) -> Plan:
+    """Plan without a budget: bands and samples as the study states, lenses as the study and its sensors state."""
+    low, high = study.render.range_nm
+    edges = np.linspace(low, high, max(1, round((high - low) / study.render.band_nm)) + 1)
+    centres, widths = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    render = RenderModel(tuple(centres.tolist()), tuple(widths.tolist()), study.render.spp, study.render.denoise)
+    lenses = {name: study.lens.on(preset(name).lens) for name in study.sensors}
+    images = {condition: ImageModel(lenses[condition.sensor]) for condition in conditions(study)}
+    return Plan(renders=dict.fromkeys(study.scenes, render), images=images)

@@ -18,8 +18,7 @@ from sensor.presets import preset
 from sensor.variations import vary
 from studies.budget.bands import counts, fine_bands, groups_of, wide_bands
 from studies.budget.choice import choose
-from studies.budget.ledger import KERNEL, PilotNoise, Weighed, ledger, weigh
-from studies.budget.model_plan import Plan
+from studies.budget.ledger import KERNEL, PilotNoise, Plan, Weighed, ledger, weigh
 from studies.budget.terms import LENS_TERMS, effects, horizontal_view_deg
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, level_luminance, lux_per_cd_m2, open_all, under, white_spectrum

@@ -7,8 +7,7 @@ from typing import Any
 from rich.table import Table
 
 from studies.budget.choice import image_ns, render_ns
-from studies.budget.ledger import KERNEL, LEAST_SHOWN, MONTE_CARLO, Term, condition_words, figures, percent
-from studies.budget.model_plan import Plan
+from studies.budget.ledger import KERNEL, LEAST_SHOWN, MONTE_CARLO, Plan, Term, condition_words, figures, percent
 from studies.budget.terms import LENS_TERMS
 from studies.study.study import SceneChoice, Study
 

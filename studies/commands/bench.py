@@ -14,7 +14,7 @@ from sensor.presets import preset
 from studies.commands.console import print_table
 from studies.pages.environment import environment
 from studies.pages.speed_page import bench_page
-from studies.photograph.machine import processor_facts
+from studies.photograph.clock import processor_facts
 from studies.speed.points import stage_json
 from studies.speed.stages import STAGES, Bench, more, stages
 from studies.study.levels import parse_level

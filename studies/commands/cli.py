@@ -30,7 +30,7 @@ app = App(
 
 
 app.command("studies.commands.bench:bench", name="bench", help="Measure speed against error, stage by stage.")
-app.command("studies.commands.capture:capture", name="capture", help="Photograph a scene into raw files.")
+app.command("studies.commands.develop:capture", name="capture", help="Photograph a scene into raw files.")
 app.command("studies.commands.characterise:characterise", name="characterise", help="Measure a chip after EMVA 1288.")
 app.command("studies.commands.demo:demo", name="demo", help="Photograph a scene from moonlight to daylight.")
 app.command("studies.commands.develop:develop", name="develop", help="Develop a raw file into a PNG.")
@@ -45,7 +45,7 @@ app.command("studies.commands.report:report", name="report", help="Write the rep
 app.command("studies.commands.snr:snr", name="snr", help="Print the light in which a pixel reaches an SNR.")
 app.command("studies.commands.sweep:sweep", name="sweep", help="Make every picture of a study, or those still missing.")
 app.command("studies.commands.sweep:export", name="export", help="Write a sweep's results as CSV or Parquet.")
-app.command("studies.commands.table:table", name="table", help="Print a sweep's figures as a Markdown table.")
+app.command("studies.commands.sweep:table", name="table", help="Print a sweep's figures as a Markdown table.")
 app.command("studies.commands.train:train", name="train", help="Train the prior of ple, ple_rgbw and ple_bayer.")
 app.register_install_completion_command(help="Let this shell complete rodcone's commands and options.")
 

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from studies.budget.model_plan import as_stated
+from studies.budget.ledger import as_stated
 from studies.commands.console import Seconds, Time
 from studies.commands.sweep import check_memory, make_all
 from studies.photograph.clock import Clock

@@ -1,12 +1,32 @@
-"""The command `rodcone develop`."""
+"""The commands `rodcone capture` and `rodcone develop`."""
 
+import sys
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from rodcone.errors import InputError
 from rodcone.files import check_place
-from studies.commands.console import print_result
+from rodcone.progress import progress
+from studies.commands.console import print_result, say
 from studies.photograph.develop import develop_file
 from studies.photograph.picture_file import check_picture_file, write_picture
+from studies.photograph.shot import Order, take
+
+
+def capture(order: Annotated[Order, Parameter(name="*")], *, json: bool = False) -> None:
+    """Photograph a scene and write raw files that raw converters open; prints their paths.
+
+    Parameters
+    ----------
+    json
+        Print one JSON object with the paths and facts of the exposure instead of the paths.
+    """
+    with progress(sys.stderr) as step:
+        taken = take(order, step)
+    say(*taken.notes)
+    print_result("\n".join(map(str, taken.paths)), taken.facts, json=json)
 
 
 def develop(

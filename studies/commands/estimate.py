@@ -6,7 +6,7 @@ from math import prod
 
 from render.radiance_files.radiance_source import extent_of
 from rodcone.memory import memory
-from studies.budget.model_plan import Plan
+from studies.budget.ledger import Plan
 from studies.study.equal_area import sensor_shapes
 from studies.study.lit_scene import OpenedScene
 from studies.study.study import SceneChoice, Study, conditions

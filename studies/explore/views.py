@@ -17,7 +17,7 @@ from sensor.raw import RawImage
 from sensor.readout import as_switched, noise_sources, noise_variance, spread_charge
 from sensor.response import electrons_per_irradiance
 from studies.explore.chain import Exposed, GroupFrame, Shot
-from studies.metrics.flip import flip
+from studies.metrics.appearance import flip
 
 Bytes = NDArray[np.uint8]
 Image = NDArray[np.float64]

@@ -4,7 +4,7 @@ from typing import Any
 
 from render.loader import variant
 from rodcone.jit import backend
-from studies.photograph.machine import machine
+from studies.photograph.clock import machine
 from studies.sweep.provenance import threads, versions
 
 

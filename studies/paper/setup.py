@@ -27,7 +27,7 @@ from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.response import expected_electrons
 from sensor.variations import vary
-from studies.budget.model_plan import as_stated
+from studies.budget.ledger import as_stated
 from studies.metrics.quality import psnr_db
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale

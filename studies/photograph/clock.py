@@ -1,9 +1,12 @@
-"""Seconds of a run by stages that add up to its wall clock, and of calls without what a process does once."""
+"""The machine that works, and its seconds: of a run by stages that add up, and of calls without what is done once."""
 
+import os
+import platform
 import time
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 FIRST, OTHER = "first calls", "other"
@@ -64,3 +67,24 @@ def timed(call: Callable[[], Result], *kind: Hashable) -> tuple[Result, float, f
     start = time.perf_counter()
     result = call()
     return result, time.perf_counter() - start, seconds
+
+
+def processor_name() -> str:
+    """Model of the processor, whose loops give a float its last bits."""
+    cpuinfo = Path("/proc/cpuinfo")
+    lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
+    names = (line.split(":", 1)[1].strip() for line in lines if "model name" in line)
+    return next(names, platform.processor() or platform.machine())
+
+
+def machine() -> str:
+    """Processor, operating system and Python, in words."""
+    return f"{processor_name()}, {platform.platform()}, Python {platform.python_version()}"
+
+
+def processor_facts() -> dict[str, Any]:
+    """Return the processor, its cores, and how busy they are."""
+    facts: dict[str, Any] = {"processor": processor_name(), "cores": os.cpu_count()}
+    if hasattr(os, "getloadavg"):
+        facts["load before the run"] = round(os.getloadavg()[0], 1)
+    return facts

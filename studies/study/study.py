@@ -16,8 +16,7 @@ from sensor.exposure import AUTO_INFORMATION, LONGEST_S
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.study.equal_area import EqualArea
-from studies.study.levels import parse_exposure, parse_level
-from studies.study.light_range import check_known, check_range
+from studies.study.levels import check_known, check_range, parse_exposure, parse_level
 from studies.study.model import LensTerms
 
 OWN = "own"  # the spectrum that the scene's lights have

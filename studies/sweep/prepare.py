@@ -18,7 +18,7 @@ from sensor.burst import merged_sensor
 from sensor.config import LensConfig, SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
-from studies.budget.model_plan import Plan
+from studies.budget.ledger import Plan
 from studies.metrics.truth import light_in_bands
 from studies.photograph.clock import Clock
 from studies.study.levels import parse_exposure

@@ -12,7 +12,7 @@ from typing import Any
 
 from isp.processors.catalogue import require_libraries
 from rodcone.progress import Step, render_words, told
-from studies.budget.model_plan import Plan
+from studies.budget.ledger import Plan
 from studies.budget.plan import plan as plan_of
 from studies.photograph.clock import FIRST, Clock
 from studies.study.lit_scene import open_all
@@ -74,7 +74,7 @@ def sweep(
     out : str or Path
         Folder; made where it isn't there.
     plan : Plan, optional
-        Of `studies.budget.model_plan.as_stated`, `studies.budget.plan.plan` or `reference_plan`; left out, of `plan`,
+        Of `studies.budget.ledger.as_stated`, `studies.budget.plan.plan` or `reference_plan`; left out, of `plan`,
         whose pilots stay in the folder.
     runner : callable, optional
         Takes cells, gives rows as they come; left out, cells are made in this process.

@@ -1,15 +1,108 @@
-"""Train the prior of a camera's curves, with its provenance."""
+"""Train the prior of a camera's curves, with its provenance.
+
+A mixture of Gaussians over patches, by expectation and maximisation (Dempster, Laird & Rubin 1977).
+"""
 
 import json
+from collections.abc import Iterable
 from hashlib import sha256
 from importlib import metadata
 
 import numpy as np
+from numpy.typing import NDArray
 
-from isp.ple.prior import Prior
+from isp.ple.prior import PATCH, Prior
 from sensor.config import SensorConfig
-from studies.training.em import draw_patches, fit_prior
-from studies.training.pictures import LIGHTS, draw_pictures, neutral_electrons, photograph_hashes
+from studies.training.pictures import LIGHTS, Planes, draw_pictures, neutral_electrons, photograph_hashes
+
+Matrix = NDArray[np.float32]
+
+COMPONENTS, DIRECTIONS, STEPS = 48, 112, 10
+PATCHES = 3500  # of each 65 536 pixels
+_LEAST_LIGHT = 5e-3  # of white, in a patch's mean: darker ones are grain
+_FLOOR = 2e-6  # added to every variance
+_LEAST_PART = 1e-3  # of a patch that still counts for a component
+
+
+def draw_patches(pictures: Iterable[Planes], rng: np.random.Generator) -> Matrix:
+    """Random patches, turned and mirrored, in roots of signal over the patch's mean W; shape (patch, 8 * 8 * 4)."""
+    drawn = []
+    for picture in pictures:
+        count = max(200, PATCHES * picture[..., 0].size // 65536)
+        ys, xs = (rng.integers(0, size - PATCH + 1, count) for size in picture.shape[:2])
+        patches = np.stack([picture[y : y + PATCH, x : x + PATCH] for y, x in zip(ys, xs, strict=True)])
+        turns = rng.integers(0, 8, count)
+        for turn in range(8):
+            turned = np.rot90(patches[turns == turn], turn % 4, axes=(1, 2))
+            patches[turns == turn] = turned[:, ::-1] if turn > 3 else turned
+        light = patches[..., 3].mean(axis=(1, 2))
+        kept = light > _LEAST_LIGHT
+        drawn.append(np.sqrt(patches[kept] / light[kept, None, None, None]).reshape(kept.sum(), -1))
+    result = np.concatenate(drawn)
+    rng.shuffle(result)
+    return result
+
+
+def fit_prior(patches: Matrix, neutrals_e: NDArray[np.float64], rng: np.random.Generator, source: str) -> Prior:
+    """Fit `COMPONENTS` Gaussians in the patches' `DIRECTIONS` principal directions.
+
+    Parameters
+    ----------
+    patches : (patch, 256) float32
+        Of `draw_patches`.
+    neutrals_e, source
+        As `isp.ple.prior.Prior`.
+    """
+    mean = patches.mean(axis=0)
+    centred = patches - mean
+    _, vectors = np.linalg.eigh((centred.T @ centred / len(centred)).astype(np.float64))
+    basis = np.ascontiguousarray(vectors[:, ::-1][:, :DIRECTIONS], dtype=np.float32)
+    reduced = centred @ basis
+    weights, centres, factors, parts = _expect_and_maximise(reduced, _first_parts(reduced, rng))
+    outside = np.maximum((centred**2).sum(axis=1) - (reduced**2).sum(axis=1), 0.0)
+    rest = np.maximum(parts.T @ outside / (weights * len(patches)) / (patches.shape[1] - DIRECTIONS), 1e-7)
+    return Prior(neutrals_e, mean, basis, weights, centres, factors, rest, source)
+
+
+def _first_parts(reduced: Matrix, rng: np.random.Generator) -> Matrix:
+    """Start: a third of the components by contrast, as even patches deserve their own, the others by k-means."""
+    count, even = len(reduced), COMPONENTS // 3
+    centres = reduced[rng.choice(count, COMPONENTS - even, replace=False)]
+    for _ in range(6):
+        distance = (centres**2).sum(axis=1) - 2 * reduced @ centres.T
+        nearest = distance.argmin(axis=1)
+        for k in np.flatnonzero(np.bincount(nearest, minlength=len(centres)) > 10):
+            centres[k] = reduced[nearest == k].mean(axis=0)
+    nearest += even
+    ordered = np.argsort(reduced[:, 1:].std(axis=1))[: count // 2]
+    for index, members in enumerate(np.array_split(ordered, even)):
+        nearest[members] = index
+    return np.asarray(np.eye(COMPONENTS, dtype=np.float32)[nearest])
+
+
+def _expect_and_maximise(reduced: Matrix, parts: Matrix) -> tuple[Matrix, Matrix, Matrix, Matrix]:
+    """Weights, centres, lower factors of the covariances, and each patch's part in each component."""
+    count, size = reduced.shape
+    centres, factors = np.empty((COMPONENTS, size), np.float32), np.empty((COMPONENTS, size, size), np.float32)
+    for _ in range(STEPS):
+        members = parts.sum(axis=0) + 1e-6
+        likelihood = np.empty_like(parts)
+        for k in range(COMPONENTS):
+            seen = parts[:, k] > _LEAST_PART
+            part = parts[seen, k, None]
+            centres[k] = (part * reduced[seen]).sum(axis=0) / members[k]
+            off = reduced[seen] - centres[k]
+            # A component of few patches is drawn towards 0: its covariance has more numbers than they can tell.
+            covariance = ((off * part).T @ off).astype(np.float64) / (members[k] + size)
+            factors[k] = np.linalg.cholesky(covariance + _FLOOR * np.eye(size))
+            inverse = np.linalg.inv(factors[k].astype(np.float64)).astype(np.float32)
+            scaled = (reduced - centres[k]) @ inverse.T
+            likelihood[:, k] = np.log(members[k] / count) - np.log(np.diag(factors[k])).sum() - 0.5 * (scaled**2).sum(1)
+        parts = np.exp(likelihood - likelihood.max(axis=1, keepdims=True))
+        parts /= parts.sum(axis=1, keepdims=True)
+    weights = (parts.sum(axis=0) + 1e-6) / count
+    return weights.astype(np.float32), centres, factors, parts
+
 
 _LIBRARIES = ("rodcone", "numpy", "scipy", "scikit-image", "colour-science")
 

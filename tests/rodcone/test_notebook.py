@@ -92,8 +92,7 @@ def test_a_transport_shows_its_own_lights() -> None:
 
 @pytest.mark.parametrize("empty", [True, False])
 def test_a_plan_shows_its_ledger(empty: bool) -> None:
-    from studies.budget.ledger import Ledger, Term
-    from studies.budget.model_plan import Plan
+    from studies.budget.ledger import Ledger, Plan, Term
     from studies.study.study import Condition, SceneChoice
 
     condition = Condition(SceneChoice("still_life"), "own", "<25cd/m2", "auto", "low_noise")

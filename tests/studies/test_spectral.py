@@ -20,7 +20,7 @@ from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import expected_electrons
 from studies.budget.bands import counts, fine_bands, groups_of
-from studies.budget.model_plan import as_stated
+from studies.budget.ledger import as_stated
 from studies.commands import new as new_command
 from studies.metrics.chart_colours import daylight_delta_e
 from studies.metrics.patches import patch_masks

@@ -10,7 +10,7 @@ import pytest
 from sensor.presets import preset
 from studies.budget import plan as planning
 from studies.budget.check import BudgetCheck, check_plan
-from studies.budget.model_plan import Plan, as_stated
+from studies.budget.ledger import Plan, as_stated
 from studies.budget.plan import plan, reference_plan
 from studies.budget.plan_text import cost_over_reference
 from studies.commands.cli import main

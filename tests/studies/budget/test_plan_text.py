@@ -5,8 +5,7 @@ from io import StringIO
 from rich.console import Console
 
 from sensor.presets import low_noise
-from studies.budget.ledger import Ledger, Term
-from studies.budget.model_plan import Plan
+from studies.budget.ledger import Ledger, Plan, Term
 from studies.budget.plan_text import plan_table
 from studies.study.model import ImageModel
 from studies.study.study import Condition, SceneChoice

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
-from studies.metrics.appearance import appearance, true_picture
-from studies.metrics.flip import flip
+from studies.metrics.appearance import appearance, flip, true_picture
 from studies.metrics.pu21 import pu21_psnr_db
 from studies.metrics.s_cielab import s_cielab
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from skimage.color import rgb2lab
 
-from studies.metrics.flip import flip
+from studies.metrics.appearance import flip
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE
 
 RNG = np.random.default_rng(0)

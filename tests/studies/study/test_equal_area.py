@@ -7,7 +7,7 @@ import pytest
 
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
-from studies.budget.model_plan import as_stated
+from studies.budget.ledger import as_stated
 from studies.budget.plan import plan
 from studies.commands.estimate import estimate
 from studies.study.equal_area import EqualArea, area_average

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.sweep.code_version import ROOT, code_version, deciding_modules
+from studies.sweep.provenance import ROOT, code_version, deciding_modules
 
 PACKAGES = ("rodcone", "render", "scenes", "sensor", "isp", "studies")
 

@@ -17,7 +17,7 @@ from isp.processors.catalogue import PROCESSORS
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from rodcone.llvm import LIBLLVM
-from studies.budget.model_plan import Plan
+from studies.budget.ledger import Plan
 from studies.commands.cli import main
 from studies.pages.report_sweep import sweep_report
 from studies.study.study import RenderLimits, SceneChoice, Study

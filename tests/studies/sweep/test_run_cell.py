@@ -32,7 +32,7 @@ from sensor.optics import falloff, form_image
 from sensor.presets import preset, preset_file
 from sensor.readout import read_out
 from sensor.response import expected_electrons
-from studies.budget.model_plan import Plan
+from studies.budget.ledger import Plan
 from studies.metrics.appearance import appearance, true_picture
 from studies.metrics.quality import measure
 from studies.metrics.truth import light_in_bands, neutral_electrons, true_srgb

@@ -14,10 +14,9 @@ from sensor.capture import capture
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import channel_electrons
-from studies.training import em, pictures
-from studies.training.em import draw_patches, fit_prior
+from studies.training import pictures, train
 from studies.training.pictures import PHOTOGRAPHS, draw_light, draw_surface, neutral_electrons, photograph
-from studies.training.train import train_prior
+from studies.training.train import draw_patches, fit_prior, train_prior
 
 
 def test_white_reads_1_in_every_channel_where_the_camera_knows_the_light(monkeypatch):
@@ -67,8 +66,8 @@ def test_patches_are_in_roots_of_signal_over_their_mean_w():
 
 
 def test_the_mixtures_mean_and_covariance_are_the_patches(monkeypatch):
-    monkeypatch.setattr(em, "COMPONENTS", 6)
-    monkeypatch.setattr(em, "DIRECTIONS", 10)
+    monkeypatch.setattr(train, "COMPONENTS", 6)
+    monkeypatch.setattr(train, "DIRECTIONS", 10)
     rng = np.random.default_rng(2)
     basis = np.linalg.qr(rng.standard_normal((256, 10)))[0]
     centres = rng.standard_normal((3, 10)) * 2
