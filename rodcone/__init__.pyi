@@ -53,7 +53,7 @@ from sensor.presets import table1_pixel as table1_pixel
 from sensor.raw import RawImage as RawImage
 from sensor.raw_files.raw_file import read_raw as read_raw
 from sensor.raw_files.raw_file import write_raw as write_raw
-from studies.budget.model_plan import Plan
+from studies.budget.ledger import Plan
 from studies.commands.report import write_report as report
 from studies.explore.widget import explore as explore
 from studies.photograph.clock import Clock
