@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -212,11 +212,7 @@ def light_files(controls: Controls) -> tuple[str, ...]:
 
 def to_json(controls: Controls) -> dict[str, Any]:
     """Controls as `controls_from` reads them."""
-    plain = {each.name: getattr(controls, each.name) for each in fields(controls)}
-    plain["lamps"] = {name: {**vars(lamp), "table": list(lamp.table)} for name, lamp in controls.lamps.items()}
-    for name in ("lens", "pixel", "settings"):
-        plain[name] = dict(plain[name])
-    result: dict[str, Any] = json.loads(json.dumps(plain, allow_nan=False))
+    result: dict[str, Any] = json.loads(json.dumps(asdict(controls), allow_nan=False))
     return result
 
 

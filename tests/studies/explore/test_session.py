@@ -37,7 +37,9 @@ class Page:
         self.buffers: list[Any] = []
         self.came = threading.Condition()
 
-    def send(self, header: dict[str, Any], buffers: Any) -> None:
+        self.send = self._take  # one value: a method is another at each look
+
+    def _take(self, header: dict[str, Any], buffers: Any) -> None:
         with self.came:
             self.headers.append(header)
             self.buffers.append(buffers)
@@ -54,6 +56,13 @@ class Page:
             return found()[-1]
 
 
+def connected(session: Session) -> Page:
+    """A page that asks a session."""
+    page = Page()
+    session.connect(page.send)
+    return page
+
+
 def message(kind: str, number: int, **more: Any) -> str:
     shown = {"cameras": [{}], "views": [[0, "picture"]]} if kind == "show" else {}
     return json.dumps({"kind": kind, "number": number} | shown | more)
@@ -62,20 +71,19 @@ def message(kind: str, number: int, **more: Any) -> str:
 def test_another_scene_is_shown_and_one_that_is_not_offered_is_refused():
     page, other = Page(), public.render("color_checker", (16, 24), spp=4, **BANDS)
     session = Session(of_transport(small_transport()), {"chart": lambda: replace(of_transport(other), title="chart")})
-    send = page.send
-    session.connect(send)
-    session.take(message("show", 1), send)
+    session.connect(page.send)
+    session.take(message("show", 1), page.send)
     assert page.wait("show", 1)["size"] == [40, 48]
-    session.take(message("scene", 2, name="charts"), send)
+    session.take(message("scene", 2, name="charts"), page.send)
     assert "did you mean 'chart'?" in page.wait("error", 2)["message"]
-    session.take(message("scene", 3, name="chart"), send)
+    session.take(message("scene", 3, name="chart"), page.send)
     header = page.wait("scene", 3)
     assert (header["title"], header["scenes"], header["groups"]) == (
         "chart",
         ["chart"],
         dict.fromkeys(other.groups, False),
     )
-    session.take(message("show", 4), send)
+    session.take(message("show", 4), page.send)
     assert page.wait("show", 4)["size"] == [16, 24]
     session.close()
 
@@ -88,15 +96,14 @@ def test_a_sensor_that_was_dropped_makes_the_pictures_of_its_file(tmp_path, monk
         (tmp_path / name).write_text(content, "utf-8")
     page, source = Page(), of_transport(small_transport())
     session = Session(replace(source, scene=SceneChoice("still_life_outdoor")))
-    send = page.send
-    session.connect(send)
-    session.take(message("sensor", 1, files=files), send)
+    session.connect(page.send)
+    session.take(message("sensor", 1, files=files), page.send)
     header = page.wait("sensor", 1)
     camera = {"sensor": header["sensor"]}
     assert header["terms"]["pixel"]["full_well_e"] == 3000
-    session.take(message("show", 2, cameras=[camera]), send)
+    session.take(message("show", 2, cameras=[camera]), page.send)
     python = page.wait("show", 2)["python"][0]
-    session.take(message("study", 3, cameras=[camera]), send)
+    session.take(message("study", 3, cameras=[camera]), page.send)
     study = page.wait("study", 3)["files"]
     session.close()
     assert not Path(header["sensor"]).exists()
@@ -128,11 +135,10 @@ def test_the_renders_noise_is_that_of_independent_renders():
 def test_a_render_with_more_noise_than_the_sensor_is_told_on_the_page_and_once_on_stderr(capsys):
     page = Page()
     session = Session(of_transport(public.render("cornell_box", (24, 24), spp=4, **BANDS)))
-    send = page.send
-    session.connect(send)
+    session.connect(page.send)
     for number, level in enumerate((100.0, 50.0, 1e-4), 1):
         camera = {"level_cd_m2": level}
-        session.take(message("histogram", number, cameras=[camera]), send)
+        session.take(message("histogram", number, cameras=[camera]), page.send)
         page.wait("histogram", number)
     session.close()
     notes = [header["noise_note"] for header in page.headers]
@@ -159,13 +165,12 @@ def test_a_render_that_fails_is_told_and_asked_for_once(good_states):
 
     page = Page()
     session = Session(replace(of_transport(small_transport()), states=Failing))
-    send = page.send  # one value: a method is another at each look
-    session.connect(send)
-    session.take(message("hello", 1), send)
+    session.connect(page.send)
+    session.take(message("hello", 1), page.send)
     page.wait("hello", 1)
     assert once.wait(20)
     for number in (2, 3):
-        session.take(message("show", number), send)
+        session.take(message("show", number), page.send)
         if good_states:
             assert "it has no material" in page.wait("show", number)["notes"][-1]
         else:
@@ -208,11 +213,9 @@ def interrupted(session, monkeypatch):
 
 
 def test_a_burst_ends_for_a_newer_picture(session, interrupted):
-    page = Page()
-    send = page.send
-    session.connect(send)
-    frames = interrupted(lambda: session.take(message("show", 2), send))
-    session.take(message("show", 1, **BURST), send)
+    page = connected(session)
+    frames = interrupted(lambda: session.take(message("show", 2), page.send))
+    session.take(message("show", 1, **BURST), page.send)
     page.wait("show", 2)
     assert len(frames) == 3 + 1
     assert [each["number"] for each in page.headers] == [2]
@@ -220,48 +223,43 @@ def test_a_burst_ends_for_a_newer_picture(session, interrupted):
 
 def test_a_burst_ends_where_its_page_is_closed(session, interrupted):
     page, later = Page(), Page()
-    send, send_later = page.send, later.send
-    session.connect(send)
-    frames = interrupted(lambda: session.disconnect(send))
-    session.take(message("show", 1, **BURST), send)
+    session.connect(page.send)
+    frames = interrupted(lambda: session.disconnect(page.send))
+    session.take(message("show", 1, **BURST), page.send)
     while len(frames) < 3:
         time.sleep(0.01)
     time.sleep(0.5)  # enough for the other 61
     assert len(frames) == 3
-    session.connect(send_later)
-    session.take(message("hello", 2), send_later)
+    session.connect(later.send)
+    session.take(message("hello", 2), later.send)
     later.wait("hello", 2)
     assert page.headers == [{"kind": "taken over"}]
 
 
 @pytest.mark.parametrize("kind", ["dng", "histogram"])
 def test_a_file_or_a_figure_lets_a_picture_go_first(session, interrupted, kind):
-    page = Page()
-    send = page.send
-    session.connect(send)
-    interrupted(lambda: session.take(message("show", 3, cameras=[{"seed": 3}]), send))
+    page = connected(session)
+    interrupted(lambda: session.take(message("show", 3, cameras=[{"seed": 3}]), page.send))
     for number in (1, 2):
-        session.take(message("show", number, cameras=[{"seed": number}]), send)
+        session.take(message("show", number, cameras=[{"seed": number}]), page.send)
         page.wait("show", number)
-    session.take(message(kind, 4, cameras=[{"seed": 9}]), send)
+    session.take(message(kind, 4, cameras=[{"seed": 9}]), page.send)
     page.wait(kind, 4)
     assert [each["kind"] for each in page.headers] == ["show", "show", "show", kind]
 
 
 def test_a_dng_is_interrupted_before_it_is_written(session, monkeypatch):
-    page = Page()
-    send = page.send
-    session.connect(send)
+    page = connected(session)
     calibrate, made = answers.calibrate, []
 
     def counted(*arguments: Any) -> Any:
         made.append(None)
         if len(made) == 1:
-            session.take(message("show", 2), send)
+            session.take(message("show", 2), page.send)
         return calibrate(*arguments)
 
     monkeypatch.setattr(answers, "calibrate", counted)
-    session.take(message("dng", 1, cameras=[{}]), send)
+    session.take(message("dng", 1, cameras=[{}]), page.send)
     page.wait("dng", 1)
     assert [each["kind"] for each in page.headers] == ["show", "dng"]
 
@@ -284,15 +282,13 @@ def endless():
 
 def test_a_render_lets_pictures_go_first_and_ends_for_another_scene(endless):
     """And with the session: without it the fixture would never end."""
-    page = Page()
-    send = page.send
-    endless.connect(send)
+    page = connected(endless)
     for number in (1, 2, 3):
-        endless.take(message("show", number), send)
+        endless.take(message("show", number), page.send)
         assert page.wait("show", number)["last"] is False
-    endless.take(message("scene", 4, name="chart"), send)
+    endless.take(message("scene", 4, name="chart"), page.send)
     page.wait("scene", 4)
-    endless.take(message("show", 5), send)
+    endless.take(message("show", 5), page.send)
     assert page.wait("show", 5)["last"] is True
 
 
@@ -328,10 +324,8 @@ def test_notes_of_an_answer_are_few_and_short(session, monkeypatch):
         return {}, ()
 
     monkeypatch.setattr(SESSION, "written", warned)
-    page = Page()
-    send = page.send
-    session.connect(send)
-    session.take(message("histogram", 1, cameras=[{}]), send)
+    page = connected(session)
+    session.take(message("histogram", 1, cameras=[{}]), page.send)
     notes = page.wait("histogram", 1)["notes"]
     assert len(notes) == MOST_NOTES
     assert max(map(len, notes)) <= MOST_TOLD
@@ -356,15 +350,14 @@ def test_what_takes_seconds_has_a_stand_in_while_it_is_at_work_where_it_can_be_e
 
 def test_a_connection_that_was_taken_over_is_not_listened_to(session):
     old, new = Page(), Page()
-    send_old, send_new = old.send, new.send
-    session.connect(send_old)
-    session.take(message("show", 1), send_old)
+    session.connect(old.send)
+    session.take(message("show", 1), old.send)
     old.wait("show", 1)
-    session.connect(send_new)
+    session.connect(new.send)
     old.wait("taken over", None)
-    session.take(message("show", 2), send_old)
-    session.take(message("hello", 3), send_old)
-    session.take(message("show", 1), send_new)
+    session.take(message("show", 2), old.send)
+    session.take(message("hello", 3), old.send)
+    session.take(message("show", 1), new.send)
     new.wait("show", 1)
     assert [each["number"] for each in new.headers] == [1]
     assert [each.get("number") for each in old.headers] == [1, None]
@@ -375,14 +368,13 @@ def test_a_picture_that_stays_as_it_is_is_sent_to_a_page_once(session):
     first, second = Page(), Page()
     views: list[Any] = [[0, "picture"], [0, "truth"]]
     for page in (first, second):
-        send = page.send
-        session.connect(send)
+        session.connect(page.send)
         for number in (1, 2):
-            session.take(message("show", number, cameras=[{"exposure_number": number}], views=views), send)
+            session.take(message("show", number, cameras=[{"exposure_number": number}], views=views), page.send)
             page.wait("show", number)
         lengths = [[len(each) for each in buffers] for buffers in page.buffers if buffers]
         assert lengths == [[40 * 48 * 3] * 2, [40 * 48 * 3, 0]]
-    session.take(message("show", 3, cameras=[{"exposure_number": 2}], views=views[::-1]), send)
+    session.take(message("show", 3, cameras=[{"exposure_number": 2}], views=views[::-1]), page.send)
     second.wait("show", 3)
     assert [len(each) for each in second.buffers[-1]] == [40 * 48 * 3] * 2
     assert second.buffers[-1][1] == second.buffers[-2][0]
@@ -390,17 +382,15 @@ def test_a_picture_that_stays_as_it_is_is_sent_to_a_page_once(session):
 
 def test_another_view_of_one_connection_takes_over(session):
     """As a notebook's widget that is shown twice: both count their requests from 1."""
-    page = Page()
-    send = page.send
-    session.connect(send)
+    page = connected(session)
     for view in ("first", "second"):
-        session.take(message("hello", 1, page=view), send)
-        session.take(message("show", 2, page=view), send)
+        session.take(message("hello", 1, page=view), page.send)
+        session.take(message("show", 2, page=view), page.send)
         assert page.wait("show", 2)["page"] == view
         page.headers = [each for each in page.headers if each["kind"] != "show"]
     assert [each["page"] for each in page.headers if each["kind"] == "taken over"] == ["first", "second"]
-    session.take(message("show", 3, page="first"), send)
-    session.take(message("show", 3, page="second"), send)
+    session.take(message("show", 3, page="first"), page.send)
+    session.take(message("show", 3, page="second"), page.send)
     assert page.wait("show", 3)["page"] == "second"
     assert [each["page"] for each in page.headers if each["kind"] == "show"] == ["second"]
 
@@ -415,14 +405,13 @@ def test_what_another_page_asked_is_not_answered_to_the_new_one():
             yield Rendered(small_transport(), "", number == 1)
 
     old, new = Page(), Page()
-    send_old, send_new = old.send, new.send
     session = Session(replace(of_transport(small_transport()), states=states))
-    session.connect(send_old)
-    session.take(message("show", 1), send_old)
-    session.connect(send_new)
+    session.connect(old.send)
+    session.take(message("show", 1), old.send)
+    session.connect(new.send)
     for event in go:
         event.set()
-    session.take(message("histogram", 2, cameras=[{}]), send_new)
+    session.take(message("histogram", 2, cameras=[{}]), new.send)
     new.wait("histogram", 2)
     session.close()
     assert [each["kind"] for each in new.headers] == ["histogram"]
