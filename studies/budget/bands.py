@@ -44,11 +44,11 @@ def groups_of(width_nm: Floats, count: int) -> list[NDArray[np.intp]]:
     """
     size = width_nm.size / min(count, width_nm.size)
     narrow = width_nm < FINE_NM / 4
-    made: list[NDArray[np.intp]] = []
+    groups: list[NDArray[np.intp]] = []
     for run in np.split(np.arange(width_nm.size), np.flatnonzero(np.diff(narrow.astype(int))) + 1):
         pieces = run.size if narrow[run[0]] else max(1, round(run.size / size))
-        made += np.array_split(run, pieces)
-    return made
+        groups += np.array_split(run, pieces)
+    return groups
 
 
 def wide_bands(nm: Floats, width_nm: Floats, groups: Sequence[NDArray[np.intp]]) -> tuple[Floats, Floats]:

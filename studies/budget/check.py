@@ -81,17 +81,17 @@ def check_plan(
     rows: list[CheckedCondition] = []
     seconds = {"planned": 0.0, "reference": 0.0}
     for choice, opened in open_all(study).items():
-        made = {}
+        transports = {}
         for name, model, offset in (("planned", planned, 0), ("reference", reference, REFERENCE_SEED)):
             step(f"{choice.source}, {name}", len(rows) / len(planned.ledgers))
             render = model.renders.get(choice)
-            made[name], _ = make_transport(opened, study, render, cache, lambda *_: None, seed_offset=offset)
-            seconds[name] += made[name].seconds
+            transports[name], _ = make_transport(opened, study, render, cache, lambda *_: None, seed_offset=offset)
+            seconds[name] += transports[name].seconds
         spp_over_reference = planned.renders[choice].spp / reference.renders[choice].spp if opened.scene else 0.0
         for row in planned.ledgers:
             if row.condition.scene == choice:
-                expected = model_electrons(made["planned"], row, planned.images[row.condition])
-                true = model_electrons(made["reference"], row, reference.images[row.condition])
+                expected = model_electrons(transports["planned"], row, planned.images[row.condition])
+                true = model_electrons(transports["reference"], row, reference.images[row.condition])
                 below = true < preset(row.condition.sensor).pixel.full_well_e * row.condition.frames
                 measured = float(np.sqrt(np.mean((expected - true)[below] ** 2))) if below.any() else 0.0
                 # The reference has noise of its own, of its samples and of its level.

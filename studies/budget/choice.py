@@ -49,11 +49,14 @@ def choose(rows: Sequence[Weighed], sizes: dict[int, int], shares: BudgetShares,
         by_condition.setdefault(row.condition, []).append(row)
     choices: list[tuple[float, Choice]] = []
     for count, bands in sizes.items():
-        lenses = {condition: _cheapest_lens(some, count, bands, shares) for condition, some in by_condition.items()}
-        found = {condition: lens for condition, lens in lenses.items() if lens is not None}
-        if len(found) < len(by_condition):
+        lenses = {
+            condition: _cheapest_lens(mosaic_rows, count, bands, shares)
+            for condition, mosaic_rows in by_condition.items()
+        }
+        lens_choices = {condition: lens for condition, lens in lenses.items() if lens is not None}
+        if len(lens_choices) < len(by_condition):
             continue
-        left_out = {condition: out for condition, (_, out) in found.items()}
+        left_out = {condition: out for condition, (_, out) in lens_choices.items()}
         # Samples a pixel that bring Monte Carlo noise under its share in every condition.
         wanted = ceil(
             max(
@@ -62,7 +65,7 @@ def choose(rows: Sequence[Weighed], sizes: dict[int, int], shares: BudgetShares,
             )
         )
         spp = min(max(wanted, FIRST_SPP), most_spp)
-        cost = sum(lens_ns for lens_ns, _ in found.values()) + render_ns(bands, spp)
+        cost = sum(lens_ns for lens_ns, _ in lens_choices.values()) + render_ns(bands, spp)
         choices.append((cost, Choice(count=count, spp=spp, wanted_spp=wanted, left_out=left_out)))
     return min(choices, key=itemgetter(0))[1]
 
@@ -87,10 +90,10 @@ def _cheapest_lens(
         return total_e**2 <= (shares.total - shares.monte_carlo) * row.noise_variance
 
     names = [*rows[0].lens, KERNEL]
-    found = [
+    fitting = [
         (image_ns(bands, set(names) - set(out)), frozenset(out))
-        for some in range(len(names) + 1)
-        for out in combinations(names, some)
+        for count_left_out in range(len(names) + 1)
+        for out in combinations(names, count_left_out)
         if all(fits(row, out) for row in rows)
     ]
-    return min(found, key=lambda each: (each[0], sorted(each[1])), default=None)
+    return min(fitting, key=lambda choice: (choice[0], sorted(choice[1])), default=None)

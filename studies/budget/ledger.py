@@ -122,7 +122,7 @@ def weigh(
     condition: Condition,
     mosaic: str,
     sensor: SensorConfig,
-    found: Effects,
+    sensor_effects: Effects,
     level_cd_m2: float,
     exposure_s: float,
     pilot: PilotNoise,
@@ -131,58 +131,63 @@ def weigh(
 
     Parameters
     ----------
-    found : Effects
+    sensor_effects : Effects
         At 1 cd/m^2 and 1 s.
     pilot : PilotNoise
     """
     scale = level_cd_m2 * exposure_s
     # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
-    expected_e = scale * np.maximum(found.full.mean(axis=0), 0.0)
+    expected_e = scale * np.maximum(sensor_effects.full.mean(axis=0), 0.0)
     below = expected_e < sensor.pixel.full_well_e
     # Where every pixel is saturated no error reaches the raw image: each is 0, of a variance of 1.
-    own = _mean(noise_variance(expected_e, sensor, exposure_s)[below]) or 1.0
-    blurred, sharp = found.blurred**2 * pilot.spp, found.sharp**2 * pilot.spp
+    noise_e2 = _mean(noise_variance(expected_e, sensor, exposure_s)[below]) or 1.0
+    blurred, sharp = sensor_effects.blurred**2 * pilot.spp, sensor_effects.sharp**2 * pilot.spp
     # Wavelengths are stratified within a half; what light a path carries is independent of its wavelength. Both are of
     # light before diffraction, and a pixel without light has neither noise nor jitter.
-    signal = (found.full + found.lens.get(DIFFRACTION, 0.0)).mean(axis=0)
+    signal = (sensor_effects.full + sensor_effects.lens.get(DIFFRACTION, 0.0)).mean(axis=0)
     relative = np.divide(sharp.mean(axis=0), signal**2, out=np.zeros_like(signal), where=signal > 0)
     spread = relative + 1 / pilot.half_spp
     return Weighed(
         condition=condition,
         mosaic=mosaic,
         exposure_s=exposure_s,
-        noise_variance=own,
+        noise_variance=noise_e2,
         blurred=scale**2 * _upper(blurred[:, below], NOISE_MARGIN),
         sharp=scale**2 * _upper(sharp[:, below], NOISE_MARGIN),
-        jitter={n: scale**2 * _upper((some.jitter * spread)[below], NOISE_MARGIN) for n, some in found.bands.items()},
+        jitter={
+            n: scale**2 * _upper((errors.jitter * spread)[below], NOISE_MARGIN)
+            for n, errors in sensor_effects.bands.items()
+        },
         level=_mean(expected_e[below] ** 2) * pilot.level,
-        bands={n: (scale * _rms(b.response, below), scale * _rms(b.light, below)) for n, b in found.bands.items()},
-        lens={name: scale * _rms(pair, below) for name, pair in found.lens.items()},
-        kernel=float(np.sqrt(_mean(kernel_rms_e(expected_e, max(found.bands))[below] ** 2))),
+        bands={
+            n: (scale * _rms(b.response, below), scale * _rms(b.light, below)) for n, b in sensor_effects.bands.items()
+        },
+        lens={name: scale * _rms(pair, below) for name, pair in sensor_effects.lens.items()},
+        kernel=float(np.sqrt(_mean(kernel_rms_e(expected_e, max(sensor_effects.bands))[below] ** 2))),
     )
 
 
 def ledger(weighed: Weighed, count: int, spp: int, left_out: frozenset[str]) -> Ledger:
     """Ledger of one model: its number of bands, samples (0 for a picture file), terms of lens and kernel left out."""
-    own = weighed.noise_variance
+    noise_e2 = weighed.noise_variance
     monte_carlo = weighed.monte_carlo(count, spp, left_out) if spp else 0.0
     level = weighed.level / spp if spp else 0.0
     response, light = weighed.bands[count]
     systematic = {RESPONSE: response, LIGHT: light, **weighed.lens, KERNEL: weighed.kernel}
-    random = [Term(MONTE_CARLO, monte_carlo**0.5, monte_carlo / own), Term(LEVEL, level**0.5, level / own)]
+    random = [Term(MONTE_CARLO, monte_carlo**0.5, monte_carlo / noise_e2), Term(LEVEL, level**0.5, level / noise_e2)]
     terms = []
     for name, rms_e in systematic.items():
         optional = name in weighed.lens or name == KERNEL
-        terms.append(Term(name, rms_e, rms_e**2 / own, modelled=optional and name not in left_out))
+        terms.append(Term(name, rms_e, rms_e**2 / noise_e2, modelled=optional and name not in left_out))
     square = monte_carlo + level + sum(term.rms_e for term in terms if not term.modelled) ** 2
     return Ledger(
         condition=weighed.condition,
         mosaic=weighed.mosaic,
         exposure_s=weighed.exposure_s,
-        noise_e=own**0.5,
+        noise_e=noise_e2**0.5,
         terms=(*random, *terms),
         rms_e=square**0.5,
-        share=square / own,
+        share=square / noise_e2,
     )
 
 

@@ -153,8 +153,8 @@ def full_lens(study: Study, lens: LensConfig, opened: OpenedScene) -> LensConfig
 
 def _spectra(opened: OpenedScene, study: Study) -> list[Spectrum]:
     """Every spectrum that the scene is lit by."""
-    own = [group.spectrum for group in opened.scene.groups.values()] if opened.scene else []
-    return own + [white_spectrum(opened, name) for name in study.spectra if name != OWN]
+    own_spectra = [group.spectrum for group in opened.scene.groups.values()] if opened.scene else []
+    return own_spectra + [white_spectrum(opened, name) for name in study.spectra if name != OWN]
 
 
 def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
@@ -168,7 +168,7 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
             auto_s = unit_exposure_s(lit.relight(luminance_cd_m2=1.0), preset(name).undivided)
             for mosaic in mosaics(study):
                 sensor = vary(preset(name), mosaic).undivided  # a pilot is coarser anyway
-                found = effects(lit, sensor, full_lens(study, sensor.lens, pilot.opened), pilot.groups, rng)
+                sensor_effects = effects(lit, sensor, full_lens(study, sensor.lens, pilot.opened), pilot.groups, rng)
                 for condition in conditions(study, pilot.opened.choice):
                     if (condition.spectrum, condition.sensor) == (spectrum, name):
                         level = level_luminance(condition.level, lux)
@@ -176,7 +176,7 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
                         if exposure_s is None:
                             exposure_s = min(study.longest_exposure_s, auto_s / level)
                         together = merged_sensor(sensor, condition.frames), exposure_s * condition.frames
-                        yield weigh(condition, mosaic, together[0], found, level, together[1], noise)
+                        yield weigh(condition, mosaic, together[0], sensor_effects, level, together[1], noise)
 
 
 def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:

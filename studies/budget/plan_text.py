@@ -54,9 +54,9 @@ def plan_table(plan: Plan) -> Table:
     )
     table.caption = f"under {100 * LEAST_SHOWN:g}% everywhere: {left_out}" if left_out else None
     table.caption_justify = "left"
-    shown = [name for name, is_small in zip(names, small, strict=True) if not is_small]
+    columns = [name for name, is_small in zip(names, small, strict=True) if not is_small]
     table.add_column("light", overflow="fold", min_width=17)
-    for name in ("noise, e-", "off, e-", "sum", *shown):
+    for name in ("noise, e-", "off, e-", "sum", *columns):
         table.add_column(name.replace(" ", "\n"), justify="right", no_wrap=True)
     lines: dict[tuple[str, ...], list[str]] = {}
     for row, line in zip(worse, words, strict=True):
@@ -112,7 +112,7 @@ def cost_over_reference(plan: Plan, reference: Plan, scene: SceneChoice) -> floa
         for row in plan.ledgers:
             if row.condition.scene == scene:
                 image = model.images[row.condition]
-                kept = [name for name, field in LENS_TERMS.items() if getattr(image.lens, field)]
-                cost += image_ns(bands, [*kept, KERNEL] if image.exact else kept)
+                modelled = [name for name, field in LENS_TERMS.items() if getattr(image.lens, field)]
+                cost += image_ns(bands, [*modelled, KERNEL] if image.exact else modelled)
         costs.append(cost)
     return costs[0] / costs[1]

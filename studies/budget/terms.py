@@ -107,7 +107,7 @@ def effects(
         blurred=_noise(transport, replace(sensor, lens=lens), rng),
         sharp=_noise(transport, replace(sensor, lens=replace(lens, diffraction=0.0)), rng),
         lens=without,
-        bands={factor: _band_errors(transport, halves, plain, bare, some) for factor, some in groups.items()},
+        bands={factor: _band_errors(transport, halves, plain, bare, chosen) for factor, chosen in groups.items()},
     )
 
 
@@ -158,10 +158,10 @@ def _noise(transport: Transport, sensor: SensorConfig, rng: np.random.Generator)
     deviation = np.moveaxis(np.sqrt(np.maximum(transport.relight_variance(luminance_cd_m2=1.0), 0.0)), 0, -1)
     signs = rng.choice(np.array([-1, 1], np.float32), (DRAWS, *deviation.shape[:2], 1))
     lights = [deviation, *((1 + sign) * deviation for sign in signs)]  # a lens takes no negative light
-    level, *drawn = _electrons(
+    level, *draws = _electrons(
         [SpectralRadiance(light, transport.wavelength_nm, 0.0, transport.width_nm) for light in lights], sensor
     )
-    return np.asarray(np.stack(drawn) - level)
+    return np.asarray(np.stack(draws) - level)
 
 
 def _electrons(halves: Sequence[SpectralRadiance], sensor: SensorConfig) -> Pair:
@@ -193,11 +193,11 @@ def _jitter(
     if positions == 1:
         return np.zeros(halves[0].shape)
     values = np.maximum(halves[0].values + halves[1].values, 0) / 2
-    drawn = []
+    radiances = []
     for position in range(positions):
         chosen = np.zeros_like(values)
         for group in groups:
             index = group[position * len(group) // positions]
             chosen[..., group] = values[..., [index]]
-        drawn.append(SpectralRadiance(chosen, halves[0].wavelength_nm, 0.0, halves[0].width_nm))
-    return np.asarray(_electrons(drawn, sensor).var(axis=0))
+        radiances.append(SpectralRadiance(chosen, halves[0].wavelength_nm, 0.0, halves[0].width_nm))
+    return np.asarray(_electrons(radiances, sensor).var(axis=0))

@@ -86,21 +86,21 @@ def characterise(
     if out is not None:
         require_ending(out, ".svg")
         check_place(out)
-    found = measure(sensor, (height, width), seed, exposure)
+    chip = measure(sensor, (height, width), seed, exposure)
     if out is not None:
         with replacing(out) as (place,):
-            place.write_text(transfer_svg(found, f"{preset}, characterised after EMVA 1288"), "utf-8")
+            place.write_text(transfer_svg(chip, f"{preset}, characterised after EMVA 1288"), "utf-8")
     if json:
-        print(notation.dumps(finite(_facts(found)), allow_nan=False))
+        print(notation.dumps(finite(_facts(chip)), allow_nan=False))
         return
     # The last column is measured less configured in standard errors; a figure without an error has none.
     rows = []
-    for figure in found.figures:
+    for figure in chip.figures:
         error, off = f"{figure.error:.2g}", f"{(figure.measured - figure.configured) / (figure.error or 1.0):+.1f}"
         errors = (error, off) if figure.error > 0 else ("", "")
         rows.append((figure.name, figure.unit, f"{figure.configured:.5g}", f"{figure.measured:.5g}", *errors))
     print_table(HEAD, rows, words=2)
-    print("\n".join(["", *(f"- {note}" for note in found.notes)]))
+    print("\n".join(["", *(f"- {note}" for note in chip.notes)]))
 
 
 def _measure_files(flats: list[Path], dark: list[Path], window: int | None, out: Path | None, json: bool) -> None:
@@ -110,19 +110,21 @@ def _measure_files(flats: list[Path], dark: list[Path], window: int | None, out:
         check_place(out)
         if out.exists():
             raise InputError(f"out: {str(out)!r} exists; allowed: a new file; choose another name or remove it")
-    found = measure_files(flats, dark, window)
+    camera = measure_files(flats, dark, window)
     rows = (
-        ("gain", "DN/e-", found.gain_dn_per_e),
-        ("read noise", "e-", found.read_noise_e),
-        ("DSNU", "e-", found.dsnu_e),
-        ("PRNU", "1", found.prnu),
+        ("gain", "DN/e-", camera.gain_dn_per_e),
+        ("read noise", "e-", camera.read_noise_e),
+        ("DSNU", "e-", camera.dsnu_e),
+        ("PRNU", "1", camera.prnu),
     )
     if out is not None:
-        text = preset_text(f"A camera measured from {flats[0].name} and others.", frame_numbers(found, flats), None, "")
+        text = preset_text(
+            f"A camera measured from {flats[0].name} and others.", frame_numbers(camera, flats), None, ""
+        )
         with replacing(out) as (place,):
             place.write_text(text, "utf-8")
     if json:
-        print(notation.dumps({**asdict(found), "levels_dn": found.levels_dn.tolist()}))
+        print(notation.dumps({**asdict(camera), "levels_dn": camera.levels_dn.tolist()}))
         return
     print_table(
         FRAMES_HEAD,
@@ -133,19 +135,19 @@ def _measure_files(flats: list[Path], dark: list[Path], window: int | None, out:
         say(f"{out}: pitch_um and fill_factor are yours to add, no frame tells them")
 
 
-def _facts(found: Characterisation) -> dict[str, Any]:
+def _facts(chip: Characterisation) -> dict[str, Any]:
     """Return the measurement as JSON holds it."""
     series = {
-        "light_e": found.transfer.light_e,
-        "mean_dn": found.transfer.mean_dn,
-        "variance_dn2": found.transfer.variance_dn2,
-        "snr": found.snr,
-        "linearity_share": found.linearity_share,
+        "light_e": chip.transfer.light_e,
+        "mean_dn": chip.transfer.mean_dn,
+        "variance_dn2": chip.transfer.variance_dn2,
+        "snr": chip.snr,
+        "linearity_share": chip.linearity_share,
     }
     return {
-        "figures": [vars(figure) for figure in found.figures],
+        "figures": [vars(figure) for figure in chip.figures],
         "series": {name: values.tolist() for name, values in series.items()},
-        "dark_mean_dn": found.dark_mean_dn,
-        "dark_variance_dn2": found.dark_variance_dn2,
-        "notes": list(found.notes),
+        "dark_mean_dn": chip.dark_mean_dn,
+        "dark_variance_dn2": chip.dark_variance_dn2,
+        "notes": list(chip.notes),
     }

@@ -50,10 +50,12 @@ def doctor() -> int:
     Exit code 1 where something is wrong.
     """
     found = findings()
-    wrong = [each.name for each in found if not each.ok]
+    wrong = [finding.name for finding in found if not finding.ok]
     verdict = f"wrong: {', '.join(wrong)}; mend what stands beside" if wrong else "all is well"
     rows = [*found, Finding("verdict", verdict, not wrong)]
-    print_table(("", ""), [(each.name, Text(each.value, style="" if each.ok else "red")) for each in rows], words=2)
+    print_table(
+        ("", ""), [(finding.name, Text(finding.value, style="" if finding.ok else "red")) for finding in rows], words=2
+    )
     return 1 if wrong else 0
 
 
@@ -63,7 +65,7 @@ def findings() -> tuple[Finding, ...]:
     home = Path(__file__).resolve().parents[2]
     others = intruders(home)
     packages = [package_finding(name, home, others.get(name)) for name in PACKAGES]
-    wrong = [each for each in packages if not each.ok]
+    wrong = [finding for finding in packages if not finding.ok]
     places = wrong or [Finding("packages", f"{', '.join(PACKAGES)}: rodcone's own, in {home}")]
     unknown = Finding("engine", "not imported: a package named below is not rodcone's own", False)
     return (
@@ -90,7 +92,7 @@ def distribution_finding(name: str, *, needed: bool = True) -> Finding:
 def extra_finding(name: str) -> Finding:
     """Whether an extra is installed, and what it is for; its absence is no fault."""
     purpose, distributions = EXTRAS[name]
-    installed = all(distribution_finding(each, needed=False).value != _ABSENT for each in distributions)
+    installed = all(distribution_finding(finding, needed=False).value != _ABSENT for finding in distributions)
     state = "installed" if installed else f"not installed; pip install 'rodcone[{name}]'"
     return Finding(f"extra {name}", f"{purpose}: {state}")
 

@@ -50,11 +50,11 @@ def list_names(kind: Kind | None = None, /, *, out: Path | None = None, json: bo
     """
     if out is not None:
         _write_gallery(kind, out)
-    found = {name: LISTS[name]() for name in ([kind] if kind else LISTS)}
+    lists = {name: LISTS[name]() for name in ([kind] if kind else LISTS)}
     if json:
-        print(notation.dumps(found))
+        print(notation.dumps(lists))
         return
-    for index, (name, lines) in enumerate(found.items()):
+    for index, (name, lines) in enumerate(lists.items()):
         print(f"{chr(10) * (index > 0)}{name}")
         print_table(("", ""), [(f"  {key}", text) for key, text in lines.items()], words=2)
 
@@ -74,7 +74,7 @@ def _write_gallery(kind: Kind | None, out: Path) -> None:
         text = lights_svg({name: illuminants.illuminant(name) for name in lights()})
     else:  # a * where channels don't share a unit
         measured = {
-            f"{name}{'' if each.balanced else '*'}": each.responses for name, each in measured_cameras().items()
+            f"{name}{'' if camera.balanced else '*'}": camera.responses for name, camera in measured_cameras().items()
         }
         text = responses_svg({"the presets": low_noise().responses, **measured})
     with replacing(out) as (place,):
@@ -104,14 +104,14 @@ def sensors() -> dict[str, str]:
     from sensor import presets
     from sensor.cameras.library import measured_cameras
 
-    found = {}
+    texts = {}
     for name in presets.names():
         remark, _ = presets.preset_file(name).read_text("utf-8").split("\n\n", 1)
-        found[name] = " ".join(remark.replace("#", " ").split())
-    for name, each in measured_cameras().items():
-        ratios = "" if each.balanced else ", each channel by itself"
-        found[name] = f"Measured response, relative{ratios}: {each.text}. rodcone new preset --camera."
-    return found
+        texts[name] = " ".join(remark.replace("#", " ").split())
+    for name, camera in measured_cameras().items():
+        ratios = "" if camera.balanced else ", each channel by itself"
+        texts[name] = f"Measured response, relative{ratios}: {camera.text}. rodcone new preset --camera."
+    return texts
 
 
 def mosaics() -> dict[str, str]:
@@ -126,8 +126,9 @@ def processors() -> dict[str, str]:
     from isp.processors.catalogue import PROCESSORS
 
     return {
-        name: f"{each.mosaic}: {each.source}{f'; pip install rodcone[{each.extra}]' if each.extra else ''}"
-        for name, each in PROCESSORS.items()
+        name: f"{processor.mosaic}: {processor.source}"
+        + (f"; pip install rodcone[{processor.extra}]" if processor.extra else "")
+        for name, processor in PROCESSORS.items()
     }
 
 

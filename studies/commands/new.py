@@ -181,13 +181,13 @@ def cluster(*, out: Path) -> None:
 
 def _named(study_file: Path) -> list[str]:
     """Files that an example names, and those that its sensors name, relative to its folder."""
-    found = []
+    files = []
     for name in read_toml(study_file).get("sensors", ()):
         if name.endswith(".toml"):
             responses = read_toml(study_file.parent / name).get("responses", {}).values()
             curves = [value for value in responses if isinstance(value, str) and value.endswith(".csv")]
-            found += [name, *(str(Path(name).parent / curve) for curve in curves)]
-    return list(dict.fromkeys(found))
+            files += [name, *(str(Path(name).parent / curve) for curve in curves)]
+    return list(dict.fromkeys(files))
 
 
 def _wants_curves(noise: Path | None) -> bool:
@@ -197,7 +197,7 @@ def _wants_curves(noise: Path | None) -> bool:
 
 def _if_measured(camera: str) -> MeasuredCamera | None:
     """Measured response where one of that name is at hand."""
-    return measured_camera(camera) if camera.lower() in {each.lower() for each in measured_cameras()} else None
+    return measured_camera(camera) if camera.lower() in {name.lower() for name in measured_cameras()} else None
 
 
 def _numbers(noise: Path | None, camera: str | None, iso: float | None, white_e: float | None) -> PixelNumbers:

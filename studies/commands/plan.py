@@ -48,12 +48,12 @@ def plan(
     checked = None
     with progress(sys.stderr) as step:
         chosen = plan_study(task, cache=cache, step=step)
-        found = plan_json(task, chosen, everything)
+        facts = plan_json(task, chosen, everything)
         if check:
             with nullcontext(cache) if cache else TemporaryDirectory() as folder:
                 checked = check_json(check_plan(task, chosen, everything, cache=Path(folder), step=step))
     if json:
-        print(notation.dumps(found | ({"check": checked} if checked else {})))
+        print(notation.dumps(facts | ({"check": checked} if checked else {})))
         return
     Console(width=None if sys.stdout.isatty() else 100).print(plan_table(chosen))
     print("\n".join(reasons(task, chosen, everything)))

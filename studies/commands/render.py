@@ -125,8 +125,10 @@ def render(
             progress=lambda share, error: step(render_words(error), share),
             denoise=denoise,
         )
-    asked: dict[str, Any] = {"luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
-    radiance = relight_denoised(transport, spectra, **asked)[0] if denoise else transport.relight(spectra, **asked)
+    level_asked: dict[str, Any] = {"luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
+    radiance = (
+        relight_denoised(transport, spectra, **level_asked)[0] if denoise else transport.relight(spectra, **level_asked)
+    )
     write_exr(radiance, out, scene=scene.name)
     # Say what was done
     say(*opened.notes)

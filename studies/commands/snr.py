@@ -61,16 +61,16 @@ def snr(
         require_ending(out, ".svg")
         check_place(out)
     opened = {name: _opened(name, f_number) for name in sensors}
-    found = {name: light_for_snr(at, sensor, light, exposure) for name, sensor in opened.items()}
+    light_by_sensor = {name: light_for_snr(at, sensor, light, exposure) for name, sensor in opened.items()}
     if out is not None:
         with replacing(out) as (place,):
-            shown = {f"{name}{RELATIVE * each.responses.relative}": each for name, each in opened.items()}
-            place.write_text(snr_svg(shown, light, exposure, at), "utf-8")
+            named = {f"{name}{RELATIVE * each.responses.relative}": each for name, each in opened.items()}
+            place.write_text(snr_svg(named, light, exposure, at), "utf-8")
     if json:
         rows = {
             name: [{k: None if v == float("inf") else v for k, v in asdict(x).items()}
                    | {"relative": opened[name].responses.relative} for x in of]
-            for name, of in found.items()
+            for name, of in light_by_sensor.items()
         }  # fmt: skip
         print(notation.dumps(rows))
         return
@@ -82,7 +82,7 @@ def snr(
                 x.channel,
                 *(MISSING if isinf(value) else f"{value:.4g}" for value in figures),
             )
-            for name, of in found.items()
+            for name, of in light_by_sensor.items()
             for x in of
             for figures in [(x.electrons, x.luminance_cd_m2, x.illuminance_lux)]
         ],
@@ -90,7 +90,7 @@ def snr(
     )
     if any(sensor.responses.relative for sensor in opened.values()):
         print(f"{RELATIVE} its responses are relative: the light of its rows holds up to one factor")
-    if any(isinf(x.electrons) for of in found.values() for x in of):
+    if any(isinf(x.electrons) for of in light_by_sensor.values() for x in of):
         print(f"{MISSING}: no light is enough: the well is full before, or fixed patterns alone are 1/{at:g} of it")
 
 

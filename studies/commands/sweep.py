@@ -96,8 +96,8 @@ def sweep(
     if workers is not None:
         require_whole("workers", workers, 1, MOST_WORKERS, "give processes")
     if dry_run:
-        found = _estimated(task, out, reference, workers or cores())
-        print(notation.dumps(vars(found)) if json else _words(found))
+        sizes = _estimated(task, out, reference, workers or cores())
+        print(notation.dumps(vars(sizes)) if json else _words(sizes))
         return 0
     check_memory(task, out, reference=reference, workers=0 if cluster else workers or cores(), force=force)
     with nullcontext(_local(workers)) if cluster is None else on_cluster(cluster) as runner:
@@ -112,8 +112,8 @@ def check_memory(study: Study, out: Path, *, reference: bool, workers: int, forc
     """Raise `InputError` where a study's processors lack a library, or more memory is needed than is free."""
     for name in study.processors:
         require_libraries(name)
-    found = _estimated(study, out, reference, workers)
-    require_memory(Memory(found.bytes, found.largest_bytes), force)
+    sizes = _estimated(study, out, reference, workers)
+    require_memory(Memory(sizes.bytes, sizes.largest_bytes), force)
 
 
 def make_all(
@@ -164,10 +164,10 @@ def _local(workers: int | None) -> Runner:
     return partial(run, executor=InThisProcess()) if count == 1 else partial(run_in_processes, workers=count)
 
 
-def _plan(study: Study, out: Path, reference: bool, stated: bool, step: Step) -> Plan:
+def _plan(study: Study, out: Path, reference: bool, as_stated: bool, step: Step) -> Plan:
     if reference:
         return reference_plan(study)
-    if stated:
+    if as_stated:
         return plan_as_stated(study)
     return plan_study(study, cache=out / PILOTS, step=lambda what, share: step(f"plan: {what}", 0.0))
 
@@ -178,10 +178,10 @@ def _estimated(study: Study, out: Path, reference: bool, workers: int) -> Estima
     return estimate(study, plan, open_all(study), workers, len(read_rows(out)) if (out / FILE).is_file() else 0)
 
 
-def _words(found: Estimate) -> str:
+def _words(sizes: Estimate) -> str:
     return (
-        f"{found.cells} cells, {found.kept} in the ledger from the last run; {found.renders} to render\n"
-        f"about {duration(found.seconds)} with {found.workers} workers, at most {found.bytes / 1e9:.1f} GB of memory; "
+        f"{sizes.cells} cells, {sizes.kept} in the ledger from the last run; {sizes.renders} to render\n"
+        f"about {duration(sizes.seconds)} with {sizes.workers} workers, at most {sizes.bytes / 1e9:.1f} GB of memory; "
         "renders and cells that exist already are counted too"
     )
 

@@ -116,12 +116,12 @@ def _line_spread(picture: NDArray[np.float64], slope: float, start: float) -> ND
     distance = (
         np.arange(width) - centre[:, None]
     ) * cosine * OVERSAMPLING + half  # in bins, from the first one's start
-    used = (distance >= 0) & (distance < 2 * half)
-    bins, middles = distance[used].astype(int), np.arange(2 * half) + 0.5
+    within = (distance >= 0) & (distance < 2 * half)
+    bins, middles = distance[within].astype(int), np.arange(2 * half) + 0.5
     counts = np.bincount(bins, minlength=2 * half)
     if not counts.all():
         raise InputError("luminance: some quarter pixels of the edge hold no sample; tilt it by 5 degrees")
-    place, value = (np.bincount(bins, of[used], minlength=2 * half) / counts for of in (distance, picture))
+    place, value = (np.bincount(bins, of[within], minlength=2 * half) / counts for of in (distance, picture))
     edge = np.interp(middles, place, value)
     window = 0.54 + 0.46 * np.cos(np.pi * (middles[1:-1] / half - 1))
     return np.asarray((edge[2:] - edge[:-2]) / 2 * window)
@@ -131,11 +131,11 @@ def _spectrum(spread: NDArray[np.float64]) -> tuple[Floats, Floats]:
     """Frequencies [cycles/px] and response, less that of the derivative (2 bins wide) and of the bin."""
     fine = 8 * spread.size  # zeros beside it: a finer grid of frequencies
     frequency = np.fft.rfftfreq(fine, 1 / OVERSAMPLING)
-    kept = frequency <= HIGHEST_CYCLES_PER_PX
-    size = np.abs(np.fft.rfft(spread, fine))[kept]
-    frequency = frequency[kept]
-    own = np.sinc(2 * frequency / OVERSAMPLING) * np.sinc(frequency / OVERSAMPLING)
-    return np.asarray(frequency), np.asarray(size / size[0] / own)
+    within = frequency <= HIGHEST_CYCLES_PER_PX
+    size = np.abs(np.fft.rfft(spread, fine))[within]
+    frequency = frequency[within]
+    bin_response = np.sinc(2 * frequency / OVERSAMPLING) * np.sinc(frequency / OVERSAMPLING)
+    return np.asarray(frequency), np.asarray(size / size[0] / bin_response)
 
 
 def _first_half(frequency: Floats, mtf: Floats) -> float:

@@ -26,9 +26,9 @@ def pu21_encode(luminance_cd_m2: ArrayLike) -> NDArray[np.float64]:
     InputError
         For a value that is NaN or infinite.
     """
-    given = np.asarray(luminance_cd_m2, dtype=np.float64)
-    require_finite(luminance_cd_m2=given)
-    power = np.clip(given, LEAST_CD_M2, MOST_CD_M2) ** _P[3]
+    luminance = np.asarray(luminance_cd_m2, dtype=np.float64)
+    require_finite(luminance_cd_m2=luminance)
+    power = np.clip(luminance, LEAST_CD_M2, MOST_CD_M2) ** _P[3]
     return np.maximum(_P[6] * (((_P[0] + _P[1] * power) / (1 + _P[2] * power)) ** _P[4] - _P[5]), 0.0)
 
 

@@ -102,9 +102,9 @@ def balance_delta_e(raw: RawImage, colours: ColourFit, neutral: Floats, balance:
     gains, _ = white_balance.gains(raw, bilinear(raw))
     balanced = dict(zip(channels(raw.cfa), gains * neutral, strict=True))
     unit = balanced[unit_channel(raw.cfa)]
-    used = colours.channels[:3]
-    shown = GREY * colours.matrix(used) @ [balanced[name] / unit for name in used]
-    lab, grey = (xyz2lab(SRGB_TO_XYZ @ rgb) for rgb in (shown, np.full(3, GREY)))
+    names = colours.channels[:3]
+    card = GREY * colours.matrix(names) @ [balanced[name] / unit for name in names]
+    lab, grey = (xyz2lab(SRGB_TO_XYZ @ rgb) for rgb in (card, np.full(3, GREY)))
     return float(deltaE_ciede2000(lab, grey))
 
 

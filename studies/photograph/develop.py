@@ -89,8 +89,8 @@ def develop(
             "raw: it holds no colour calibration; allowed: one beside it; give calibrate(sensor, illuminant('D65')) too"
         )
     colours = fit_of_calibration(colour, channels(raw.cfa))
-    software, asked = processor_of(name), _asked_neutral(colour, white_balance or default_balance(name))
-    return software.develop(raw, colours, neutral=colour.neutral, balance=asked)
+    software, response = processor_of(name), _asked_neutral(colour, white_balance or default_balance(name))
+    return software.develop(raw, colours, neutral=colour.neutral, balance=response)
 
 
 def _asked_neutral(colour: ColourCalibration, white_balance: str) -> Floats | None:
@@ -150,7 +150,7 @@ def develop_file(
     if ev is not None:
         require_range("ev", ev, -40.0, 40.0, "give stops")
     paths = [path] if isinstance(path, str | Path) else list(path)
-    opened = [open_raw(each) for each in paths]
+    opened = [open_raw(file) for file in paths]
     raw, file_facts = merged_raw([frame for frame, _ in opened]), opened[0][1]
     if raw.colour is None:
         raise InputError(
@@ -160,7 +160,7 @@ def develop_file(
     linear = _scaled(picture.rgb / raw.full_well_e, height, width)
     stops = _stops(linear) if ev is None else ev
     facts = {
-        "raw": str(paths[0]) if len(paths) == 1 else [str(each) for each in paths],
+        "raw": str(paths[0]) if len(paths) == 1 else [str(file) for file in paths],
         "isp": isp or mosaic_processor(raw),
         "engine": picture.engine,
         "ev": stops,
@@ -177,13 +177,13 @@ def develop_file(
 
 def _scaled(linear: NDArray[np.float64], height: int | None, width: int | None) -> NDArray[np.float64]:
     """Picture of fewer pixels, each the mean of its area."""
-    own = linear.shape[0], linear.shape[1]
-    size = asked_size(own, height, width)
-    if size[0] > own[0] or size[1] > own[1]:
+    raw_size = linear.shape[0], linear.shape[1]
+    size = asked_size(raw_size, height, width)
+    if size[0] > raw_size[0] or size[1] > raw_size[1]:
         raise InputError(
-            f"height, width: {size} is more than the raw file's {own}; allowed: as many or fewer; give less"
+            f"height, width: {size} is more than the raw file's {raw_size}; allowed: as many or fewer; give less"
         )
-    if size == own:
+    if size == raw_size:
         return linear
     return np.asarray(resize_local_mean(linear, size, channel_axis=-1))
 

@@ -144,8 +144,8 @@ def take(order: Order, step: Step | None = None) -> Taken:
 
     # what is looked at, and the light that the camera's colours are set to
     if opened is None:
-        stated = order.light[0] if order.light else None
-        known = stated or (None if balance is None or is_reflectance(order.source) else order.white_balance)
+        light_name = order.light[0] if order.light else None
+        known = light_name or (None if balance is None or is_reflectance(order.source) else order.white_balance)
         transport, light, notes = open_radiance_file(order.source, known)
         spectra: dict[str, Spectrum] = {}
         level: tuple[float | None, float | None] = (parse_level(order.level)[0] if order.level else None), None
@@ -170,8 +170,8 @@ def take(order: Order, step: Step | None = None) -> Taken:
     # The exposure.
     if step:
         step("exposure", 0.9)
-    asked: dict[str, Any] = dict(zip(("luminance_cd_m2", "illuminance_lux"), level, strict=True))
-    radiance = transport.relight(spectra, **asked)
+    level_terms: dict[str, Any] = dict(zip(("luminance_cd_m2", "illuminance_lux"), level, strict=True))
+    radiance = transport.relight(spectra, **level_terms)
     if exposure_s is None:
         exposure_s = exposure_by_rule_s(order.exposure, form_image(radiance, sensor), sensor)
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
@@ -181,7 +181,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
     raws = [replace(frame, camera=name, f_number=lens.f_number, iso=iso, colour=colour) for frame in taken]
     raw = raws[0]
     if opened is not None:
-        even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **asked))
+        even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **level_terms))
         frame = (even - odd) / 2, (even + odd) / 2, sensor, exposure_s
         notes += filter(None, [noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))])
     saturated = float(raw.saturated.mean())

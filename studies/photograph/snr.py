@@ -72,8 +72,8 @@ def light_for_snr(ratio: float, sensor: SensorConfig, light: str, exposure_s: fl
     electrons = electrons_at_snr(ratio, sensor, exposure_s)
     of = channel_e(sensor, light_of(light), 1.0, exposure_s)
     return [
-        LightForSnr(channel, electrons, electrons / own, electrons / own * pi / GREY)
-        for channel, own in zip(channels(sensor.cfa), of.tolist(), strict=True)
+        LightForSnr(channel, electrons, electrons / per_cd_m2, electrons / per_cd_m2 * pi / GREY)
+        for channel, per_cd_m2 in zip(channels(sensor.cfa), of.tolist(), strict=True)
     ]
 
 

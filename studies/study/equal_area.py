@@ -43,8 +43,8 @@ class EqualArea:
 
 def sensor_shapes(area: EqualArea, sensors: Sequence[str], picture: tuple[int, int]) -> dict[str, tuple[int, int]]:
     """Height and width of each sensor in pixels, for a picture's proportions."""
-    own = {name: preset(name) for name in sensors}
-    return {name: area.shape(picture, *grid(each)) for name, each in own.items()}
+    opened = {name: preset(name) for name in sensors}
+    return {name: area.shape(picture, *grid(sensor)) for name, sensor in opened.items()}
 
 
 def grid(sensor: SensorConfig) -> tuple[float, int]:
@@ -77,14 +77,14 @@ def area_average(values: NDArray[Real], shape: tuple[int, int]) -> NDArray[Real]
         The picture's mean is kept.
     """
     rows, columns = (
-        _overlaps(own, other).astype(values.dtype) for own, other in zip(values.shape, shape, strict=False)
+        _overlaps(pixels, other).astype(values.dtype) for pixels, other in zip(values.shape, shape, strict=False)
     )
     along = np.tensordot(rows, values, axes=1)
     return np.ascontiguousarray(np.moveaxis(np.tensordot(columns, along, axes=(1, 1)), 0, 1))
 
 
-def _overlaps(own: int, other: int) -> NDArray[np.float64]:
-    """Share of each of `own` intervals in each of `other` on the same length, shape (other, own); rows sum to 1."""
-    ends, starts = np.arange(1, own + 1) / own, np.arange(own) / own
+def _overlaps(pixels: int, other: int) -> NDArray[np.float64]:
+    """Share of each of `pixels` intervals in each of `other` on the same length, (other, pixels); rows sum to 1."""
+    ends, starts = np.arange(1, pixels + 1) / pixels, np.arange(pixels) / pixels
     low, high = np.arange(other)[:, None] / other, np.arange(1, other + 1)[:, None] / other
     return np.asarray(np.maximum(np.minimum(ends, high) - np.maximum(starts, low), 0.0) * other)

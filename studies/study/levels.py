@@ -74,7 +74,7 @@ def check_known(spectrum: str, range_nm: tuple[float, float]) -> None:
     if range_nm[0] >= VISIBLE_NM[0] and range_nm[1] <= VISIBLE_NM[1]:
         return
     ends = zip(light.wavelength_nm[[0, -1]], light.values[[0, -1]], (range_nm[0], -range_nm[1]), (1, -1), strict=True)
-    short = [nm for nm, value, asked, sign in ends if sign * nm > asked and value > _RUN_OUT * light.values.max()]
+    short = [nm for nm, value, edge_nm, sign in ends if sign * nm > edge_nm and value > _RUN_OUT * light.values.max()]
     if short or lines_nm(spectrum):
         raise InputError(
             f"spectra: {spectrum!r} is known over {light.wavelength_nm[0]:g}-{light.wavelength_nm[-1]:g} nm, and "

@@ -135,7 +135,7 @@ def make_transport(
         return transport, tuple(assumed)
     limits = study.render
     progress(0.0, np.inf)
-    asked: dict[str, Any] = {
+    terms: dict[str, Any] = {
         "wavelength_nm": model.wavelength_nm,
         "width_nm": model.width_nm,
         "max_spp": model.spp,
@@ -146,9 +146,9 @@ def make_transport(
         "denoise": model.denoise,
     }
     if limits.noise_share is None or share is None:
-        transport = render(opened.scene, opened.size, **asked)
+        transport = render(opened.scene, opened.size, **terms)
     else:
-        transport = render_quietly(opened.scene, opened.size, share, most_share=limits.noise_share, **asked)
+        transport = render_quietly(opened.scene, opened.size, share, most_share=limits.noise_share, **terms)
     if transport.stopped_by == "interrupt":
         raise KeyboardInterrupt
     return transport, ()
@@ -233,7 +233,7 @@ def asked_spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
     InputError
         For an unknown group or illuminant, or a group that is dark or has colours of its own.
     """
-    found: dict[str, Spectrum] = {}
+    spectra: dict[str, Spectrum] = {}
     for text in lights:
         group, equals, name = text.rpartition("=")
         if not name or bool(group) != bool(equals):
@@ -242,14 +242,14 @@ def asked_spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
                 "illuminant for all lights, such as A"
             )
         require_keys(f"scene {scene.name}: light group", [group] if group else [], scene.groups)
-        for each in [group] if group else scene.groups:
-            lit = scene.groups[each]
-            own = spectral_luminance(lit.spectrum)
-            if lit.coloured or own <= 0:
+        for lit_name in [group] if group else scene.groups:
+            lit = scene.groups[lit_name]
+            luminance_of_1 = spectral_luminance(lit.spectrum)
+            if lit.coloured or luminance_of_1 <= 0:
                 why = "has colours of its own" if lit.coloured else "is dark"
-                raise InputError(f"light: group {each!r} of scene {scene.name} {why}; leave it as it is")
-            found[each] = illuminant(name) * own
-    return found
+                raise InputError(f"light: group {lit_name!r} of scene {scene.name} {why}; leave it as it is")
+            spectra[lit_name] = illuminant(name) * luminance_of_1
+    return spectra
 
 
 def spectral_luminance(spectrum: Spectrum) -> float:

@@ -56,10 +56,12 @@ def monte_carlo_share(
         return 0.0
     monte_carlo = error_e[inside] ** 2
     planes = expected_e.reshape(-1, *expected_e.shape[-2:])  # the noise of crosstalk needs neighbours of one plane
-    own = np.stack([noise_variance(plane, sensor, exposure_s) for plane in planes]).reshape(expected_e.shape)[inside]
+    sensor_noise_e2 = np.stack([noise_variance(plane, sensor, exposure_s) for plane in planes]).reshape(
+        expected_e.shape
+    )[inside]
     if of_pixels is None:
-        return float(monte_carlo.mean() / own.mean())
-    return float(np.quantile(monte_carlo / own, of_pixels))
+        return float(monte_carlo.mean() / sensor_noise_e2.mean())
+    return float(np.quantile(monte_carlo / sensor_noise_e2, of_pixels))
 
 
 def charged_share(
@@ -81,8 +83,8 @@ def charged_share(
     inside = expected_e < sensor.pixel.full_well_e
     if not inside.any():
         return 0.0
-    own = noise_variance(expected_e, sensor, exposure_s)[inside].sum() / inside.size
-    return measured_error(errors_e[0], errors_e[1], inside / own).upper
+    sensor_noise_e2 = noise_variance(expected_e, sensor, exposure_s)[inside].sum() / inside.size
+    return measured_error(errors_e[0], errors_e[1], inside / sensor_noise_e2).upper
 
 
 def render_share(
@@ -178,10 +180,10 @@ def render_quietly(
     **options
         Of `render.engine.render`: bands, seed, cache, progress.
     """
-    made, wanted = None, min(FIRST_SPP, max_spp)
+    transport, wanted = None, min(FIRST_SPP, max_spp)
     while True:
-        made = render(scene, size, max_spp=wanted, max_seconds=max_seconds, resume=made, **options)
-        now = share(made)
-        if now <= most_share or made.stopped_by != "samples" or made.spp >= max_spp:
-            return made
-        wanted = min(max_spp, int(np.ceil(made.spp * min(MARGIN * now / most_share, MOST_GROWTH))))
+        transport = render(scene, size, max_spp=wanted, max_seconds=max_seconds, resume=transport, **options)
+        now = share(transport)
+        if now <= most_share or transport.stopped_by != "samples" or transport.spp >= max_spp:
+            return transport
+        wanted = min(max_spp, int(np.ceil(transport.spp * min(MARGIN * now / most_share, MOST_GROWTH))))

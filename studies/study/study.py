@@ -209,9 +209,9 @@ def mosaics(study: Study) -> tuple[str, ...]:
 def label(value: Any) -> str:
     """Name of a value of an axis in rows and seeds: a file's name without its folder, any other value as it is."""
     text = str(value)
-    own = user_file(text)
-    if own is not None:
-        return f"{own[0].name}:{own[1]}"
+    user_code = user_file(text)
+    if user_code is not None:
+        return f"{user_code[0].name}:{user_code[1]}"
     return Path(text).name if Path(text).suffix.lower() in FILES else text
 
 
@@ -256,15 +256,15 @@ def _check_cameras(study: Study) -> None:
         require_consent("processors", name, study.trust_code)
         processor_of(name)
     for name in study.sensors:
-        own = preset(name)
+        sensor = preset(name)
         # sensors of one size are compared at the coarsest's pixels
-        if study.sensor_side_um is None and own.chip.sites != preset(study.sensors[0]).chip.sites:
+        if study.sensor_side_um is None and sensor.chip.sites != preset(study.sensors[0]).chip.sites:
             raise InputError(
                 f"sensors: {name!r} and {study.sensors[0]!r}, of which one bins: its pictures are half as large, and "
                 "have another truth; allowed: all bin, or none; give each a study of its own"
             )
         for mosaic in mosaics(study):
-            vary(own, mosaic)
+            vary(sensor, mosaic)
 
 
 def _check_numbers(study: Study) -> None:

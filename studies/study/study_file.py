@@ -85,7 +85,7 @@ def _set(content: dict[str, Any], change: str) -> None:
 def _beside(value: Any, folder: Path) -> Any:
     """Value of an axis in which files are found from anywhere: their names are those of files in the study's folder."""
     if isinstance(value, list):
-        return [_beside(each, folder) for each in value]
+        return [_beside(item, folder) for item in value]
     if isinstance(value, dict):
         return value | {key: _beside(value[key], folder) for key in ("source", "light", "chart") if key in value}
     named = isinstance(value, str) and (Path(value).suffix.lower() in FILES or user_file(value))

@@ -149,7 +149,7 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
         if count != 1:
             raise InputError(f"cluster: {worker} has {count} threads; allowed: 1; start dask worker with --nthreads 1")
     try:
-        theirs, found = client.run(_what_computes), client.run(cores)
+        theirs, cores_of = client.run(_what_computes), client.run(cores)
     except ImportError as error:
         raise InputError(f"cluster: a worker lacks rodcone ({one_line(error)}); install it there") from error
     for worker, its in theirs.items():
@@ -166,8 +166,8 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
             "PYTHONSAFEPATH=1",
             stacklevel=2,
         )
-    on_host = Counter(urlsplit(worker).hostname for worker in found)
-    return len(found), max(1, min(count // on_host[urlsplit(worker).hostname] for worker, count in found.items()))
+    on_host = Counter(urlsplit(worker).hostname for worker in cores_of)
+    return len(cores_of), max(1, min(count // on_host[urlsplit(worker).hostname] for worker, count in cores_of.items()))
 
 
 def _has_safe_path() -> bool:

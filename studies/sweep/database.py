@@ -130,9 +130,9 @@ def _connected(path: Path, options: str) -> Iterator[sqlite3.Connection]:
 
 
 def _check_whole(base: sqlite3.Connection, path: Path) -> None:
-    found = base.execute("PRAGMA integrity_check(1)").fetchone()[0]
-    if found != "ok":
-        raise InputError(f"{path}: it is damaged ({one_line(found)}); run the sweep again in another folder")
+    verdict = base.execute("PRAGMA integrity_check(1)").fetchone()[0]
+    if verdict != "ok":
+        raise InputError(f"{path}: it is damaged ({one_line(verdict)}); run the sweep again in another folder")
 
 
 def _prepare(base: sqlite3.Connection, path: Path) -> None:
@@ -171,9 +171,9 @@ def add(base: sqlite3.Connection, row: Row) -> None:
 
 def done(base: sqlite3.Connection, pictures: Path, keys: Iterable[str]) -> set[str]:
     """Which of these cells have an undamaged row and undamaged pictures, which a power cut may have taken."""
-    asked = set(keys)
-    found = (row for row in _sound_rows(base) if row.key in asked)
-    return {row.key for row in found if is_whole(pictures / row.picture) and is_whole(pictures / row.truth)}
+    wanted = set(keys)
+    sound = (row for row in _sound_rows(base) if row.key in wanted)
+    return {row.key for row in sound if is_whole(pictures / row.picture) and is_whole(pictures / row.truth)}
 
 
 def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
@@ -204,13 +204,13 @@ def last_run(folder: Path) -> LastRun:
     """
     with read_results(folder) as base:
         runs = [_require_sound(values, "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
-        made, wanted = rows(base), base.execute("SELECT count(*) FROM wanted").fetchone()[0]
-    if not runs or not made:
+        cells, wanted = rows(base), base.execute("SELECT count(*) FROM wanted").fetchone()[0]
+    if not runs or not cells:
         raise InputError(f"{folder}: its last run has made no cell yet; run rodcone sweep, which goes on")
     study, seconds = runs[-1][2], Counter[str]()
     for stages in (json.loads(run[3]) for run in runs if run[2] == study):
         seconds.update(stages)
-    return LastRun(json.loads(study), dict(seconds), wanted, made)
+    return LastRun(json.loads(study), dict(seconds), wanted, cells)
 
 
 def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:
@@ -246,10 +246,10 @@ def note_stages(base: sqlite3.Connection, run: int, stages: Mapping[str, float])
 
 def render_record(base: sqlite3.Connection, request: str) -> RenderRecord | None:
     """Record of a render that was asked for before; None where there is none, or a damaged one."""
-    found = base.execute("SELECT * FROM renders WHERE request = ?", (request,)).fetchone()
-    if found is None or not _is_sound(found):
+    values = base.execute("SELECT * FROM renders WHERE request = ?", (request,)).fetchone()
+    if values is None or not _is_sound(values):
         return None
-    stored = json.loads(found[1])
+    stored = json.loads(values[1])
     facts = RenderFacts(**stored.pop("facts"))
     return RenderRecord(facts=facts, notes=tuple(stored.pop("notes")), **stored)
 

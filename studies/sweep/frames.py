@@ -131,22 +131,22 @@ def make_frames(
     else:
         views = relight_denoised(transport, luminance_cd_m2=1.0)
     white, area = shown_white_cd_m2(transport, 1.0), study.equal_area
-    shown = views[0] if area is None else area.view(views[0], area.coarsest_um)
+    picture = views[0] if area is None else area.view(views[0], area.coarsest_um)
     scene = {
         "light": {name: value.tolist() for name, value in vars(light).items()},
         "white_cd_m2": white,
         "lux_per_cd_m2": lux_per_cd_m2(transport, study.levels),
-        "truth": keep(folder, _npy(true_srgb(shown, light, white)), ".npy"),
+        "truth": keep(folder, _npy(true_srgb(picture, light, white)), ".npy"),
     }
     for key, (preset, sensor) in wanted.items():
-        own: tuple[SpectralRadiance, ...] = views
+        radiances: tuple[SpectralRadiance, ...] = views
         if area is not None:
-            own = tuple(area.view(view, *grid(sensor)) for view in views)
-        whole, one, other = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in own)
+            radiances = tuple(area.view(view, *grid(sensor)) for view in views)
+        whole, one, other = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in radiances)
         errors = [(one - other) / 2] if transport.denoised is None else [whole - one, whole - other]
         facts = scene | {
-            "auto_s": unit_exposure_s(own[0], preset),
-            "auto_w_s": unit_exposure_s(own[0], sensor, "W" if "W" in channels(sensor.cfa) else None),
+            "auto_s": unit_exposure_s(radiances[0], preset),
+            "auto_w_s": unit_exposure_s(radiances[0], sensor, "W" if "W" in channels(sensor.cfa) else None),
             "electrons": keep(folder, _npy(whole), ".npy"),
             "errors": keep(folder, _npy(np.stack(errors).astype(np.float32)), ".npy"),
         }

@@ -127,18 +127,21 @@ def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> flo
 
 
 def _request(job: Job, opened: OpenedScene) -> str:
-    asked = [opened.identity, job.plan.renders.get(opened.choice), job.study.render]
-    return digest_inputs([*asked, backend(), versions()])
+    terms = [opened.identity, job.plan.renders.get(opened.choice), job.study.render]
+    return digest_inputs([*terms, backend(), versions()])
 
 
 def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
     """The preset and the sensor as modelled of each frame: levels, exposures and seeds share it."""
-    found = {}
+    sensors = {}
     for condition in conditions(job.study, opened.choice):
-        own, lens = preset(condition.sensor), job.plan.images[condition].lens
+        unmodelled, lens = preset(condition.sensor), job.plan.images[condition].lens
         for mosaic in mosaics(job.study):
-            found[condition.spectrum, condition.sensor, lens, mosaic] = own, replace(vary(own, mosaic), lens=lens)
-    return found
+            sensors[condition.spectrum, condition.sensor, lens, mosaic] = (
+                unmodelled,
+                replace(vary(unmodelled, mosaic), lens=lens),
+            )
+    return sensors
 
 
 def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: Transport) -> None:

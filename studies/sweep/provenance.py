@@ -33,13 +33,13 @@ def code_version(root: Path = ROOT) -> str:
 
 def deciding_modules(root: Path = ROOT) -> list[Path]:
     """Modules of `studies` that decide a picture: `_DECIDING`, and all that these import."""
-    found, waiting = set[Path](), list(_DECIDING)
+    paths, waiting = set[Path](), list(_DECIDING)
     while waiting:
         name = waiting.pop()
         path = root.joinpath(*name.split(".")).with_suffix(".py")
-        if not path.is_file() or path in found:  # a package, which decides nothing, or a name within a module
+        if not path.is_file() or path in paths:  # a package, which decides nothing, or a name within a module
             continue
-        found.add(path)
+        paths.add(path)
         with _PARSING:
             tree = ast.parse(path.read_text("utf-8"))
         for node in ast.walk(tree):
@@ -47,7 +47,7 @@ def deciding_modules(root: Path = ROOT) -> list[Path]:
                 waiting += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
             elif isinstance(node, ast.Import):
                 waiting += [alias.name for alias in node.names if alias.name.split(".")[0] == "studies"]
-    return sorted(found)
+    return sorted(paths)
 
 
 _PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "scikit-image", "colour-science", "flip-evaluator")
@@ -73,7 +73,9 @@ class Provenance:
     versions: str
 
 
-def provenance(variant: str, processor: str, on_backend: bool, own: Mapping[str, str], exact: bool) -> Provenance:
+def provenance(
+    variant: str, processor: str, on_backend: bool, user_versions: Mapping[str, str], exact: bool
+) -> Provenance:
     """Provenance of a cell made in this process; `exact` as `studies.study.model.ImageModel`.
 
     A user's own processor is in it by `own`, its `isp.processors.own.own_version`; what its file imports isn't.
@@ -82,7 +84,7 @@ def provenance(variant: str, processor: str, on_backend: bool, own: Mapping[str,
         variant=variant,
         readout_engine="numpy" if exact else backend(),
         development_engine=backend() if on_backend else "numpy",
-        versions=json.dumps({**versions(processor), **own}, sort_keys=True),
+        versions=json.dumps({**versions(processor), **user_versions}, sort_keys=True),
     )
 
 

@@ -22,11 +22,11 @@ def results_json(folder: Path) -> bytes:
 
     A row has the columns of `studies.sweep.row.Row`, those in JSON as objects; a number that isn't finite is null.
     """
-    run, made = last_run(folder), []
+    run, cells = last_run(folder), []
     for row in run.rows:
         values = finite(vars(row))
-        made.append(values | {name: json.loads(values[name]) for name in _JSON_COLUMNS})
-    results = {"rodcone": metadata.version("rodcone"), "study": run.study, "stages": run.stages, "rows": made}
+        cells.append(values | {name: json.loads(values[name]) for name in _JSON_COLUMNS})
+    results = {"rodcone": metadata.version("rodcone"), "study": run.study, "stages": run.stages, "rows": cells}
     return (json.dumps(results, indent=1, allow_nan=False) + "\n").encode()
 
 
@@ -37,16 +37,16 @@ def overview(folder: Path) -> bytes:
     """
     run = last_run(folder)
     first = run.rows[0]
-    shown = {
+    pictures = {
         (row.sensor, row.processor, row.level): row.picture
         for row in run.rows
         if all(getattr(row, axis) == getattr(first, axis) for axis in _ONE_OF)
     }
-    lines = list(dict.fromkeys((sensor, processor) for sensor, processor, _ in shown))
+    lines = list(dict.fromkeys((sensor, processor) for sensor, processor, _ in pictures))
     with Image.open(BytesIO(read_whole(folder / PICTURES, first.picture))) as picture:
         width, height = picture.width + GAP, picture.height + GAP
     sheet = Image.new("RGB", (len(run.study["levels"]) * width - GAP, len(lines) * height - GAP), "white")
-    for (sensor, processor, level), name in shown.items():
+    for (sensor, processor, level), name in pictures.items():
         with Image.open(BytesIO(read_whole(folder / PICTURES, name))) as picture:
             sheet.paste(picture, (run.study["levels"].index(level) * width, lines.index((sensor, processor)) * height))
     file = BytesIO()

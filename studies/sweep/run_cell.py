@@ -74,8 +74,8 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
 
     def burst() -> RawImage:
         stream = exposure_stream(cell.condition, processor.mosaic, cell.seed)
-        asked = expected_e, sensor, cell.exposure_s, device, stream
-        return merged_raw([expose(*asked, exact=engine == "numpy") for _ in range(frames)])
+        exposure = expected_e, sensor, cell.exposure_s, device, stream
+        return merged_raw([expose(*exposure, exact=engine == "numpy") for _ in range(frames)])
 
     raw, capture_s, first_capture_s = timed(burst, *("capture", engine, names["sensor"], shape, frames))
     # Develop to linear sRGB in which white is 1.
@@ -154,11 +154,11 @@ def limit_threads(most: int) -> None:
 
 def _check_provenance(cell: Cell, processor: Processor) -> None:
     exact, name = cell.made_by.readout_engine == "numpy", cell.processor
-    own = in_words(provenance(cell.made_by.variant, name, processor.on_backend, own_version(name), exact))
-    for name, asked in in_words(cell.made_by).items():
-        if own.get(name) != asked:
+    here = in_words(provenance(cell.made_by.variant, name, processor.on_backend, own_version(name), exact))
+    for name, version in in_words(cell.made_by).items():
+        if here.get(name) != version:
             raise InputError(
-                f"worker on {platform.node()}: its {name} is {own.get(name)}, the sweep's is {asked}; allowed: the "
+                f"worker on {platform.node()}: its {name} is {here.get(name)}, the sweep's is {version}; allowed: the "
                 "same; install the same rodcone with the same packages and start the worker again"
             )
 

@@ -104,34 +104,34 @@ def sweep(
         job = Job(study, plan, out, base, clock)
         now = datetime.now(UTC).isoformat(timespec="seconds")
         number = note_run(base, now, platform.node(), json.dumps(_noted(study)))
-        found = [known_cells(job, opened) for opened in scenes.values()]
+        known = [known_cells(job, opened) for opened in scenes.values()]
         count = len(conditions(study)) * len(study.processors) * len(study.seeds) // len(scenes)
         keys: list[Sequence[str | None]] = [
-            [cell.key for cell in cells] if cells else [None] * count for cells in found
+            [cell.key for cell in cells] if cells else [None] * count for cells in known
         ]
         want(base, chain.from_iterable(keys))
-        made, notes = 0, dict[str, None]()
+        count_made, notes = 0, dict[str, None]()
         for index, opened in enumerate(scenes.values()):
             part = _part(show, index, len(scenes))
-            cells = found[index] or scene_cells(job, opened, _rendering(part))
-            asked = [cell.key for cell in cells]
+            cells = known[index] or scene_cells(job, opened, _rendering(part))
+            asked_keys = [cell.key for cell in cells]
             notes.update(dict.fromkeys(cells[0].render.notes))
-            keys[index] = asked
+            keys[index] = asked_keys
             want(base, chain.from_iterable(keys))
-            kept = done(base, out / PICTURES, asked)
-            made += _run(job, number, [cell for cell in cells if cell.key not in kept], runner, part)
+            stored = done(base, out / PICTURES, asked_keys)
+            count_made += _run(job, number, [cell for cell in cells if cell.key not in stored], runner, part)
         if not keep_old:
             forget_old(base)
         notes.update(dict.fromkeys(_noise_notes(rows(base))))
         stages = clock.stages()
         note_stages(base, number, stages)
-    return Swept(out, count * len(scenes), made, sum(stages.values()), tuple(notes))
+    return Swept(out, count * len(scenes), count_made, sum(stages.values()), tuple(notes))
 
 
-def _noise_notes(made: Sequence[Row]) -> list[str]:
+def _noise_notes(cells: Sequence[Row]) -> list[str]:
     """For each scene whose render's noise exceeds a sensor's, where it does so most."""
     worst: dict[str, Row] = {}
-    for row in made:
+    for row in cells:
         worst[row.scene] = max(worst.get(row.scene, row), row, key=lambda one: one.mc_share)
     notes = [(row, noise_note(row.mc_share, row.spp)) for row in worst.values()]
     return [f"{row.scene}, {row.level}, {row.sensor}, {row.processor}: {note}" for row, note in notes if note]
@@ -145,21 +145,21 @@ def _noted(study: Study) -> dict[str, Any]:
 
 def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step) -> int:
     """Make cells, store each as it comes with the time taken so far; returns their number."""
-    made = 0
+    count = 0
     seconds, workers = dict[str, float](), set[tuple[str, int]]()
     with closing(runner(missing)) as coming:
         for row in coming:
             add(job.base, row)
-            made += 1
+            count += 1
             workers.add((row.host, row.worker))
             for name, value in _steps(row).items():
                 seconds[name] = seconds.get(name, 0.0) + value
             note_stages(job.base, run, job.clock.stages(_on_the_clock(seconds, len(workers))))
-            share = RENDER_SHARE + (1 - RENDER_SHARE) * made / len(missing)
-            part(f"cell {made} of {len(missing)}", share)
+            share = RENDER_SHARE + (1 - RENDER_SHARE) * count / len(missing)
+            part(f"cell {count} of {len(missing)}", share)
     for name, value in _on_the_clock(seconds, len(workers)).items():
         job.clock.add(name, value)
-    return made
+    return count
 
 
 def _steps(row: Row) -> dict[str, float]:

@@ -24,8 +24,8 @@ def keep(folder: Path, content: bytes | memoryview, ending: str) -> str:
 def is_whole(path: Path) -> bool:
     """Whether a file is there and holds what it is named after; its content is read once a process."""
     try:
-        found = path.stat()
-        return _holds_its_name(path, found.st_mtime_ns, found.st_size)
+        status = path.stat()
+        return _holds_its_name(path, status.st_mtime_ns, status.st_size)
     except OSError:
         return False
 

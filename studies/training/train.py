@@ -26,7 +26,7 @@ _LEAST_PART = 1e-3  # of a patch that still counts for a component
 
 def draw_patches(pictures: Iterable[Planes], rng: np.random.Generator) -> Matrix:
     """Random patches, turned and mirrored, in roots of signal over the patch's mean W; shape (patch, 8 * 8 * 4)."""
-    drawn = []
+    rows = []
     for picture in pictures:
         count = max(200, PATCHES * picture[..., 0].size // 65536)
         ys, xs = (rng.integers(0, size - PATCH + 1, count) for size in picture.shape[:2])
@@ -36,9 +36,9 @@ def draw_patches(pictures: Iterable[Planes], rng: np.random.Generator) -> Matrix
             turned = np.rot90(patches[turns == turn], turn % 4, axes=(1, 2))
             patches[turns == turn] = turned[:, ::-1] if turn > 3 else turned
         light = patches[..., 3].mean(axis=(1, 2))
-        kept = light > _LEAST_LIGHT
-        drawn.append(np.sqrt(patches[kept] / light[kept, None, None, None]).reshape(kept.sum(), -1))
-    result = np.concatenate(drawn)
+        bright = light > _LEAST_LIGHT
+        rows.append(np.sqrt(patches[bright] / light[bright, None, None, None]).reshape(bright.sum(), -1))
+    result = np.concatenate(rows)
     rng.shuffle(result)
     return result
 
@@ -88,10 +88,10 @@ def _expect_and_maximise(reduced: Matrix, parts: Matrix) -> tuple[Matrix, Matrix
         members = parts.sum(axis=0) + 1e-6
         likelihood = np.empty_like(parts)
         for k in range(COMPONENTS):
-            seen = parts[:, k] > _LEAST_PART
-            part = parts[seen, k, None]
-            centres[k] = (part * reduced[seen]).sum(axis=0) / members[k]
-            off = reduced[seen] - centres[k]
+            members_of = parts[:, k] > _LEAST_PART
+            part = parts[members_of, k, None]
+            centres[k] = (part * reduced[members_of]).sum(axis=0) / members[k]
+            off = reduced[members_of] - centres[k]
             # A component of few patches is drawn towards 0: its covariance has more numbers than they can tell.
             covariance = ((off * part).T @ off).astype(np.float64) / (members[k] + size)
             factors[k] = np.linalg.cholesky(covariance + _FLOOR * np.eye(size))
