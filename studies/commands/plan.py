@@ -2,14 +2,11 @@
 
 import json as notation
 import sys
-from contextlib import nullcontext
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from rich.console import Console
 
 from rodcone.progress import progress
-from studies.budget.check import check_json, check_plan
 from studies.budget.plan import plan as plan_study
 from studies.budget.plan import reference_plan
 from studies.budget.plan_text import plan_json, plan_table, reasons
@@ -21,7 +18,6 @@ def plan(
     /,
     *,
     set: list[str] | None = None,
-    check: bool = False,
     cache: Path | None = None,
     trust_code: bool = False,
     json: bool = False,
@@ -34,8 +30,6 @@ def plan(
         Study file (.toml), as `rodcone new study` writes one.
     set
         KEY=VALUE that replaces the file's own, such as budget.total=0.05; may be given several times.
-    check
-        Render both models as well, and compare their expected electrons with what the budget predicts.
     cache
         Folder of renders to use and to fill.
     trust_code
@@ -45,22 +39,10 @@ def plan(
     """
     task = read_study(study, set or (), trust_code=trust_code)
     everything = reference_plan(task)
-    checked = None
     with progress(sys.stderr) as step:
         chosen = plan_study(task, cache=cache, step=step)
-        facts = plan_json(task, chosen, everything)
-        if check:
-            with nullcontext(cache) if cache else TemporaryDirectory() as folder:
-                checked = check_json(check_plan(task, chosen, everything, cache=Path(folder), step=step))
     if json:
-        print(notation.dumps(facts | ({"check": checked} if checked else {})))
+        print(notation.dumps(plan_json(task, chosen, everything)))
         return
     Console(width=None if sys.stdout.isatty() else 100).print(plan_table(chosen))
     print("\n".join(reasons(task, chosen, everything)))
-    if checked:
-        print(
-            "Check: the prediction covers {covered:.1%} of {conditions} conditions, median of predicted over measured "
-            "{median_ratio:.2f}; renders took {planned_s:.1f} s planned, {reference_s:.1f} s reference".format(
-                **checked
-            )
-        )

@@ -17,8 +17,6 @@ from sensor.optics import form_image
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons
 
-KEPT = 0.995  # share of the pixels whose mean is told beside the whole: without those that rare paths rule
-PARTS_OF_FIGURE = 0.1  # of a figure, that the references' own may reach
 Image = NDArray[np.float64]
 
 
@@ -46,24 +44,6 @@ class Yardstick:
     inside: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Shares:
-    """Squared error over the sensor's noise variance, over pixels and channels.
-
-    Attributes
-    ----------
-    median, mean, p95 : float
-        `p95` is the value that 95 % stay under.
-    mean_of_kept : float
-        Mean over the 99.5 % of the pixels that were least uncertain beforehand.
-    """
-
-    median: float
-    mean: float
-    p95: float
-    mean_of_kept: float
-
-
 def electrons(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float) -> Image:
     """Expected electrons behind every filter at every pixel, shape (channel, h, w)."""
     return np.moveaxis(channel_electrons(form_image(radiance, sensor), sensor, exposure_s), -1, 0)
@@ -84,16 +64,10 @@ def yardstick(
 def share_map(image_e: Image, yard: Yardstick) -> Image:
     """Squared error over the sensor's noise variance, (channel, h, w): pooled over 3x3 pixels, NaN outside."""
     one, other = yard.references
-    return _pooled_share((image_e - one) * (image_e - other), yard)
+    return pooled_share((image_e - one) * (image_e - other), yard)
 
 
-def own_share_map(yard: Yardstick) -> Image:
-    """The same of the references themselves: the mean of what each is off, from the difference of the two."""
-    one, other = yard.references
-    return _pooled_share((one - other) ** 2 / 2, yard)
-
-
-def _pooled_share(squared_e2: Image, yard: Yardstick) -> Image:
+def pooled_share(squared_e2: Image, yard: Yardstick) -> Image:
     """Pool each pixel's own share, over the pixels inside alone: no bright error counts against a dark pixel."""
     weight = pooled(yard.inside.astype(np.float64))
     total = pooled(np.where(yard.inside, squared_e2 / yard.noise_e2, 0.0))
@@ -106,28 +80,3 @@ def mean_error(image_e: Image, yard: Yardstick) -> tuple[float, float]:
     squared_e2 = float(((image_e - one) * (image_e - other))[yard.inside].mean())
     share = float(np.nanmean(share_map(image_e, yard)))
     return float(np.sqrt(max(squared_e2, 0.0))), max(share, 0.0)
-
-
-def least_uncertain(deviation_e: Image, yard: Yardstick) -> NDArray[np.bool_]:
-    """Find the 99.5 % of the pixels inside with the smallest variance over the sensor's, (channel, h, w).
-
-    Parameters
-    ----------
-    deviation_e : (channel, h, w) float64
-        Standard deviation of the references.
-    """
-    share = np.where(yard.inside, deviation_e**2 / yard.noise_e2, np.inf)
-    return np.asarray(share <= np.quantile(share[yard.inside], KEPT))
-
-
-def shares(share: Image, kept: NDArray[np.bool_]) -> Shares:
-    """Sum a map up; NaN counts for nothing."""
-    inside = np.isfinite(share)
-    values = share[inside]
-    median, p95 = np.quantile(values, [0.5, 0.95]).tolist()
-    return Shares(median, float(values.mean()), p95, float(share[inside & kept].mean()))
-
-
-def is_known(figure: float, of_references: float) -> bool:
-    """Whether the references' own figure is small enough beside the one that is judged."""
-    return abs(of_references) <= PARTS_OF_FIGURE * figure

@@ -1,25 +1,19 @@
 """The share of a render's error in the sensor's noise: known noise on a flat picture, and what is left out."""
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from render.radiance import SpectralRadiance
 from sensor.presets import low_noise
-from studies.speed.share import (
-    KEPT,
-    Shares,
-    Yardstick,
-    electrons,
-    is_known,
-    least_uncertain,
-    mean_error,
-    own_share_map,
-    share_map,
-    shares,
-    yardstick,
-)
+from studies.speed.share import Yardstick, electrons, mean_error, share_map, yardstick
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "benchmarks"))
+
+from bench_share import KEPT, Shares, is_known, least_uncertain, own_share_map, shares
 
 NM = np.arange(390.0, 780.0, 20.0)
 SIDE, CHANNELS = 96, 4
