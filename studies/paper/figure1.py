@@ -17,15 +17,15 @@ from studies.paper.claims import Claim, PaperFigure, at_least, at_most, near
 from studies.paper.setup import (
     READINGS,
     TODAY,
+    Camera,
     Setup,
     View,
     decibels,
     develop,
     exposures,
+    quality_db,
     sensor_of,
     shot_noise_alone,
-    shown,
-    swept,
     view,
 )
 from studies.photograph.snr import channel_e, light_of, snr
@@ -81,8 +81,8 @@ def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     seen = replace(view(setup, "lit_and_shadowed", None, "lamp"), level=f"{LIT_CD_M2:g}cd/m2")
     rows, half = [], seen.radiance.shape[1] // 2
     for reading in READINGS:
-        sensor = sensor_of(reading, "bayer")
-        linear, _ = develop(exposures(seen, reading, "66ms", "bayer")[0], seen, sensor, "bayer")
+        camera = Camera(reading, "bayer")
+        linear, _ = develop(camera, exposures(camera, seen, "66ms")[0], seen)
         raised = linear.copy()
         raised[:, :half] *= DARK_GAIN
         rows.append(
@@ -144,12 +144,13 @@ def claims_1b(shot_db: float, all_db: Mapping[str, float], psnr_gain_db: float) 
 
 def figure_1b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Pictures of the study `paper_1b.toml`, and the SNR."""
-    rows = swept(setup, "1b")
-    by_sensor = {
-        pitch: [row for row in rows if row.sensor == f"table1_output_{pitch}um"] for pitch in (LARGE_UM, SMALL_UM)
-    }
-    psnr = {pitch: float(np.mean([row.psnr_db for row in own])) for pitch, own in by_sensor.items()}
-    pictures = [(f"{pitch} µm, PSNR {psnr[pitch]:.1f} dB", shown(setup, own[0])) for pitch, own in by_sensor.items()]
+    seen = view(setup, "still_life", LUMINANCE_CD_M2)
+    psnr, pictures = {}, []
+    for pitch in (LARGE_UM, SMALL_UM):
+        camera = Camera("table1_output", "bayer", pitch)
+        developed = [develop(camera, raw, seen)[0] for raw in exposures(camera, seen, "10ms", setup.seeds)]
+        psnr[pitch] = quality_db(developed, seen.truth)
+        pictures.append((f"{pitch} µm, PSNR {psnr[pitch]:.1f} dB", encode_srgb(developed[0])))
     everything = {name: gain_db(name) for name in READINGS}
     claims = claims_1b(gain_db("table1_output", shot_alone=True), everything, psnr[LARGE_UM] - psnr[SMALL_UM])
     caption = (

@@ -19,6 +19,7 @@ from studies.paper.setup import (
     DEFAULT,
     PAPER,
     READINGS,
+    Camera,
     Image,
     Setup,
     View,
@@ -26,7 +27,6 @@ from studies.paper.setup import (
     exposures,
     noise,
     quality_db,
-    sensor_of,
     view,
 )
 from studies.photograph.camera import colour_fit
@@ -91,14 +91,14 @@ def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Colour image, W image and result under both readings."""
     seen = view(setup, "still_life", LUMINANCE_CD_M2)
     stages, rows = {name: dict[str, Stages]() for name in CAMERAS}, []
-    for reading, threshold in READINGS.items():
-        sensor = sensor_of(reading)
-        raws = exposures(seen, reading, "20ms", count=setup.seeds)
+    for reading in READINGS:
+        sensor = Camera(reading).sensor
+        raws = exposures(Camera(reading), seen, "20ms", setup.seeds)
         colour = [colour_image(raw, seen, sensor) for raw in raws]
         white = [white_image(raw, seen, sensor) for raw in raws]
         shown = {f"{reading}: colour": colour, "W": white}
         for name in CAMERAS:
-            result = [develop(raw, seen, sensor, name, substitution_snr=threshold)[0] for raw in raws]
+            result = [develop(Camera(reading, name), raw, seen)[0] for raw in raws]
             stages[name][reading] = Stages(
                 noise(colour), noise(white), quality_db(colour, seen.truth), quality_db(result, seen.truth)
             )

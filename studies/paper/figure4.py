@@ -16,7 +16,7 @@ from sensor.raw import RawImage
 from studies.pages.plots import ORANGE, SIDE, STYLE, blank, show_picture
 from studies.paper.claims import Claim, PaperFigure, at_least
 from studies.paper.numbers import MOONLIGHT_CD_M2
-from studies.paper.setup import READINGS, Image, Setup, exposures, view
+from studies.paper.setup import READINGS, Camera, Image, Setup, exposures, view
 
 PATCH = 5  # ours: the paper doesn't say
 ASIDE, AWAY = 4, 8  # pixels from the edge to x, and from x to y and to z: even, so that all lie alike in the tile
@@ -98,7 +98,7 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         seen = view(setup, "slanted_edge", level)
         columns = edge_columns(seen.radiance.luminance())
         for reading in READINGS:
-            raw = exposures(seen, reading, "20ms")[0]
+            raw = exposures(Camera(reading), seen, "20ms")[0]
             found = triplets(raw, columns)
             shares[f"{reading}, {name}"] = found.share
             if name == next(iter(LEVELS)):

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from isp.colour.highlights import saturated_nearby
 from isp.planes import bilinear
-from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from sensor.cfa import channels, mask
 from sensor.raw import RawImage
@@ -19,13 +18,13 @@ from studies.paper.setup import (
     DEFAULT,
     PAPER,
     READINGS,
+    Camera,
     Image,
     Setup,
     View,
     develop,
     exposures,
     quality_db,
-    sensor_of,
     view,
 )
 
@@ -131,16 +130,16 @@ def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     seen = view(setup, "still_life", LUMINANCE_CD_M2)
     found = {name: dict[str, Bright]() for name in CAMERAS}
     gains_db, rows = {name: dict[str, float]() for name in CAMERAS}, []
-    for reading, threshold in READINGS.items():
+    for reading in READINGS:
         early_db = {name: quality_db(_shoot(setup, seen, reading, name)[1], seen.truth) for name in EARLY}
         shown = {}
         for camera in CAMERAS:
-            raws, made = _shoot(setup, seen, reading, camera, substitution_snr=threshold)
+            raws, made = _shoot(setup, seen, reading, camera)
             found[camera][reading] = measure_bright(raws[0], made[0], seen)
             own_db = quality_db(made, seen.truth)
             gains_db[camera] |= {f"{name}, {reading}": own_db - other_db for name, other_db in early_db.items()}
             shown["result" if camera == PAPER else "by the default"] = encode_srgb(made[0])
-        full_e = sensor_of(reading, pitch_um=PITCH_UM).pixel.full_well_e
+        full_e = raws[0].full_well_e
         planes = bilinear(raws[0])
         rows.append(
             [
@@ -155,10 +154,8 @@ def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     )
 
 
-def _shoot(
-    setup: Setup, seen: View, reading: str, processor: str, **options: float
-) -> tuple[list[RawImage], list[Image]]:
+def _shoot(setup: Setup, seen: View, reading: str, processor: str) -> tuple[list[RawImage], list[Image]]:
     """Exposures and pictures of one processor."""
-    sensor = sensor_of(reading, PROCESSORS[processor].mosaic, PITCH_UM)
-    raws = exposures(seen, reading, "66ms", processor, count=setup.seeds, pitch_um=PITCH_UM)
-    return raws, [develop(raw, seen, sensor, processor, **options)[0] for raw in raws]
+    camera = Camera(reading, processor, PITCH_UM)
+    raws = exposures(camera, seen, "66ms", setup.seeds)
+    return raws, [develop(camera, raw, seen)[0] for raw in raws]

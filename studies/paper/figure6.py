@@ -1,14 +1,13 @@
 """Figure 6: Bayer and interleaved at 5, 10 and 20 ms, Table 1 at 25 cd/m^2; W replaces the luminance at 5 ms alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 from skimage.color import deltaE_ciede2000, rgb2lab
 
-from isp.substitution import SUBSTITUTION_SNR
-from rodcone.colour_spaces import decode_srgb, encode_srgb
+from rodcone.colour_spaces import encode_srgb
 from studies.pages.plots import picture_rows
 from studies.paper.claims import Claim, PaperFigure, at_least, at_most, beside, near
 from studies.paper.setup import (
@@ -16,6 +15,7 @@ from studies.paper.setup import (
     DEFAULT,
     PAPER,
     READINGS,
+    Camera,
     Image,
     Setup,
     View,
@@ -23,12 +23,8 @@ from studies.paper.setup import (
     exposures,
     noise,
     quality_db,
-    sensor_of,
-    shown,
-    swept,
     view,
 )
-from studies.sweep.row import Row
 
 LUMINANCE_CD_M2 = 25.0
 SUBSTITUTED = {"5ms": True, "10ms": False, "20ms": False}  # what the paper shows
@@ -116,65 +112,43 @@ def claims_6(
 
 
 def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """Pictures of the study `paper_6.toml`, and what substitution does at 5 ms.
-
-    A processor in a sweep substitutes by the threshold of `table1_output`; under the other reading the interleaved
-    cameras' exposures are drawn again and developed with that reading's own.
-    """
-    rows = swept(setup, "6")
+    """Pictures of the study `paper_6.toml`, each reading with its own threshold of substitution, and what that does."""
     seen = view(setup, "still_life", LUMINANCE_CD_M2)
     outcomes: dict[str, dict[str, Outcome]] = {name: {} for name in ("bayer", *CAMERAS)}
     table = []
-    for (reading, threshold), camera in product(READINGS.items(), outcomes):
+    for reading, processor in product(READINGS, outcomes):
         pictures: list[tuple[str, Image]] = []
         for exposure in SUBSTITUTED:
-            if camera == "bayer" or threshold == SUBSTITUTION_SNR:
-                own = [row for row in rows if (row.sensor, row.exposure, row.processor) == (reading, exposure, camera)]
-                outcome, encoded = _of_sweep(setup, own)
-            else:
-                outcome, encoded = _again(setup, seen, reading, exposure, camera, threshold)
-            outcomes[camera][f"{reading}, {exposure}"] = outcome
-            words = {"bayer": "Bayer", PAPER: "interleaved", DEFAULT: "the default"}[camera]
+            outcome, encoded = _photograph(setup, seen, Camera(reading, processor), exposure)
+            outcomes[processor][f"{reading}, {exposure}"] = outcome
+            words = {"bayer": "Bayer", PAPER: "interleaved", DEFAULT: "the default"}[processor]
             words += ", W's luminance" if outcome.substituted else ""
             pictures.append((f"{words}, {exposure}" if pictures else f"{reading}: {words}, {exposure}", encoded))
         table.append(pictures)
     paper, default = (
-        claims_6(outcomes["bayer"], outcomes[name], {reading: swap(setup, seen, reading, name) for reading in READINGS})
+        claims_6(
+            outcomes["bayer"],
+            outcomes[name],
+            {reading: swap(setup, seen, Camera(reading, name)) for reading in READINGS},
+        )
         for name in (PAPER, DEFAULT)
     )
     caption = "Bayer, interleaved and the default with Table 1's pixel at 25 cd/m², by exposure time."
     return PaperFigure("6", caption, picture_rows(table)), beside(paper, default)
 
 
-def swap(setup: Setup, seen: View, reading: str, camera: str) -> Swap:
+def swap(setup: Setup, seen: View, camera: Camera) -> Swap:
     """Substitution at `DARKEST`, always against never."""
-    sensor = sensor_of(reading)
-    raws = exposures(seen, reading, DARKEST, count=setup.seeds)
-    without, with_white = (
-        [develop(raw, seen, sensor, camera, substitution_snr=threshold)[0] for raw in raws]
-        for threshold in (0.0, np.inf)
-    )
+    raws = exposures(camera, seen, DARKEST, setup.seeds)
+    without, with_white = ([develop(camera, raw, seen, threshold)[0] for raw in raws] for threshold in (0.0, np.inf))
     means = (rgb2lab(encode_srgb(np.mean(pictures, axis=0))) for pictures in (without, with_white))
     return Swap(noise(without) / noise(with_white), float(np.median(deltaE_ciede2000(*means))))
 
 
-def _of_sweep(setup: Setup, rows: Sequence[Row]) -> tuple[Outcome, Image]:
-    """Outcome of the sweep's rows of one condition, and its first picture, encoded."""
-    pictures = [shown(setup, row) for row in rows]
-    decided = [row.substitution for row in rows if row.substitution is not None]
-    share = float(np.mean(decided)) if decided else None
-    psnr = float(np.mean([row.psnr_db for row in rows]))
-    return Outcome(noise([decode_srgb(picture) for picture in pictures]), psnr, share), pictures[0]
-
-
-def _again(
-    setup: Setup, seen: View, reading: str, exposure: str, camera: str, threshold: float
-) -> tuple[Outcome, Image]:
-    """As `_of_sweep`, developed with another threshold of substitution."""
-    made = [
-        develop(raw, seen, sensor_of(reading), camera, substitution_snr=threshold)
-        for raw in exposures(seen, reading, exposure, count=setup.seeds)
-    ]
-    pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in made]  # as the sweep's files hold them
-    share = float(np.mean([bool(picture.substituted) for _, picture in made]))
+def _photograph(setup: Setup, seen: View, camera: Camera, exposure: str) -> tuple[Outcome, Image]:
+    """Outcome of one condition, and its first picture, encoded."""
+    made = [develop(camera, raw, seen) for raw in exposures(camera, seen, exposure, setup.seeds)]
+    pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in made]  # as a screen shows them
+    decisions = [picture.substituted for _, picture in made if picture.substituted is not None]
+    share = float(np.mean(decisions)) if decisions else None
     return Outcome(noise(pictures), quality_db(pictures, seen.truth), share), encode_srgb(pictures[0])

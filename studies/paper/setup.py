@@ -1,14 +1,11 @@
 """What the figures share: cameras under both readings of Table 1, renders, exposures, pictures, even fields."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
-import PIL.Image
 from numpy.typing import NDArray
 
 from isp.picture import Picture
@@ -18,7 +15,7 @@ from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_whole
-from rodcone.progress import render_words
+from rodcone.progress import Step, render_words
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -34,18 +31,10 @@ from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import make_transport, open_choice
 from studies.study.study import OWN, Condition, RenderLimits, SceneChoice, Study
-from studies.study.study_file import read_study
 from studies.sweep.cells import device_stream, exposure_stream
-from studies.sweep.export import read_rows
-from studies.sweep.folder import claim
-from studies.sweep.prepare import PICTURES, RENDERS
-from studies.sweep.row import Row
-from studies.sweep.run_sweep import sweep
-from studies.sweep.workers import InThisProcess, run
 
 Image = NDArray[np.float64]
-CONFIGS = Path(__file__).parent.parent / "configs"
-SWEEP = "sweep"  # folder of the results database and of all renders, below the command's own
+RENDERS = "renders"  # folder of them, below the command's own
 # Readings of Table 1, each with the SNR under which W replaces the luminance (docs/decisions/0005).
 READINGS: Mapping[str, float] = MappingProxyType(
     {"table1_pixel": SUBSTITUTION_SNR_TABLE1_PIXEL, "table1_output": SUBSTITUTION_SNR}
@@ -53,7 +42,6 @@ READINGS: Mapping[str, float] = MappingProxyType(
 TODAY = "low_noise"  # a pixel of today with Table 1's geometry, for comparison
 # The paper's own method, which its claims are tested with, and the default, whose values stand beside them.
 PAPER, DEFAULT = CAMERAS = ("interleaved_paper", "interleaved")
-Step = Callable[[str, float], None]  # what is being done, and the share of it (0..1)
 # Samples over those of the setup: the dark half's own noise hides far more, and a constant environment needs few.
 _SPP_SHARE = {"lit_and_shadowed": 0.25, "slanted_edge": 0.25}
 
@@ -132,6 +120,27 @@ def sensor_of(reading: str, mosaic: str = "rgbw", pitch_um: int | None = None) -
     return vary(own, mosaic)
 
 
+@dataclass(frozen=True)
+class Camera:
+    """A reading of Table 1, and the processor that develops its exposures and decides its mosaic.
+
+    Attributes
+    ----------
+    reading, processor : str
+    pitch_um : int, optional
+        As `sensor_of` takes it.
+    """
+
+    reading: str
+    processor: str = PAPER
+    pitch_um: int | None = None
+
+    @property
+    def sensor(self) -> SensorConfig:
+        """Its sensor, with the processor's mosaic."""
+        return sensor_of(self.reading, PROCESSORS[self.processor].mosaic, self.pitch_um)
+
+
 def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | None = None) -> View:
     """A scene at a mean luminance, None for its lights' own powers; rendered once, then read from the folder.
 
@@ -144,10 +153,12 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
     study = Study((SceneChoice(scene),), ("1cd/m2",), render=RenderLimits(setup.size, setup.band_nm, spp))
     opened = open_choice(study.scenes[0], study)
     model = as_stated(study).renders[opened.choice]
-    claim(setup.out / SWEEP)  # the sweeps' own folder: one render serves them and this
-    renders = setup.out / SWEEP / RENDERS
     transport, _ = make_transport(
-        opened, study, model, renders, lambda share, error: setup.step(f"{scene}: {render_words(error)}", share)
+        opened,
+        study,
+        model,
+        setup.out / RENDERS,
+        lambda share, error: setup.step(f"{scene}: {render_words(error)}", share),
     )
     group = transport.groups[white or next(iter(transport.groups))]
     return View(
@@ -159,61 +170,35 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
     )
 
 
-def swept(setup: Setup, figure: str) -> list[Row]:
-    """Rows of a figure's study (`studies/configs/paper_*.toml`), swept at this size into the results database."""
-    study = read_study(CONFIGS / f"paper_{figure}.toml")
-    study = replace(study, seeds=tuple(range(setup.seeds)), render=RenderLimits(setup.size, setup.band_nm, setup.spp))
-    folder = setup.out / SWEEP
-    plan = as_stated(study)
-    sweep(study, folder, plan, partial(run, executor=InThisProcess()), setup.step)
-    return read_rows(folder)
-
-
-def shown(setup: Setup, row: Row) -> Image:
-    """Picture of a row of `swept`, encoded sRGB (h, w, 3)."""
-    with PIL.Image.open(setup.out / SWEEP / PICTURES / row.picture) as file:
-        return np.asarray(file, dtype=np.float64) / 255
-
-
-def exposures(
-    seen: View, reading: str, exposure: str, processor: str = PAPER, count: int = 1, pitch_um: int | None = None
-) -> list[RawImage]:
-    """Exposures by as many chips, drawn as a sweep draws its cells.
-
-    Parameters
-    ----------
-    seen : View
-    reading : str
-        Of Table 1; with `pitch_um` as `sensor_of`.
-    exposure : str
-        Time as a study writes it, such as ``20ms``.
-    processor : str
-        That is to develop them: it decides the mosaic.
-    count : int
-    pitch_um : int, optional
-    """
-    mosaic = PROCESSORS[processor].mosaic
-    sensor, exposure_s = sensor_of(reading, mosaic, pitch_um), parse_exposure(exposure) or 0.0
+def exposures(camera: Camera, seen: View, exposure: str, count: int = 1) -> list[RawImage]:
+    """Exposures by as many chips, drawn as a sweep draws its cells; `exposure` as studies write it: ``20ms``."""
+    sensor, exposure_s = camera.sensor, parse_exposure(exposure) or 0.0
+    mosaic = PROCESSORS[camera.processor].mosaic
     expected_e = expected_electrons(form_image(seen.radiance, sensor), sensor, exposure_s)
-    name = reading if pitch_um is None else f"{reading}_{pitch_um}um"
+    name = camera.reading if camera.pitch_um is None else f"{camera.reading}_{camera.pitch_um}um"
     condition = Condition(scene=SceneChoice(seen.scene), spectrum=OWN, level=seen.level, exposure=exposure, sensor=name)
     made = []
     for seed in range(count):
         device = draw_device(sensor, expected_e.shape, device_stream(name, mosaic, seed))
-        made.append(
-            expose(expected_e, sensor, exposure_s, device, exposure_stream(condition, mosaic, seed), exact=True)
-        )
+        stream = exposure_stream(condition, mosaic, seed)
+        made.append(expose(expected_e, sensor, exposure_s, device, stream, exact=True))
     return made
 
 
-def develop(
-    raw: RawImage, view: View, sensor: SensorConfig, processor: str = PAPER, **options: Any
-) -> tuple[Image, Picture]:
-    """Develop an exposure as `develop_to_scale` does, with the colours fitted under the view's light."""
-    used = PROCESSORS[processor]
-    return develop_to_scale(
-        raw, used, colour_fit(sensor, used, view.light), sensor, view.light, view.white_cd_m2, **options
-    )
+def develop(camera: Camera, raw: RawImage, seen: View, substitution_snr: float | None = None) -> tuple[Image, Picture]:
+    """Develop an exposure as `develop_to_scale` does, with the colours fitted under the view's light.
+
+    Parameters
+    ----------
+    substitution_snr : float, optional
+        SNR under which W replaces the luminance, for `CAMERAS`; the reading's own of `READINGS` where left out.
+    """
+    sensor, processor = camera.sensor, PROCESSORS[camera.processor]
+    options = {}
+    if camera.processor in CAMERAS:
+        options["substitution_snr"] = READINGS[camera.reading] if substitution_snr is None else substitution_snr
+    colours = colour_fit(sensor, processor, seen.light)
+    return develop_to_scale(raw, processor, colours, sensor, seen.light, seen.white_cd_m2, **options)
 
 
 def noise(pictures: Sequence[Image]) -> float:
