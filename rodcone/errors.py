@@ -66,6 +66,13 @@ def require_kind(name: str, value: object, kind: type, fix: str) -> None:
         raise InputError(f"{name}: {article} {type(value).__name__} is none; allowed: {kind.__name__}; {fix}")
 
 
+def require_absent(place: str, **options: object) -> None:
+    """Raise `InputError` for the first of some options that is given where it has no meaning; `place` says where."""
+    for name, value in options.items():
+        if value is not None and value is not False and value != ():
+            raise InputError(f"{name.replace('_', '-')}: {value!r} {place}; leave it out")
+
+
 def require_keys(what: str, given: Iterable[str], allowed: Iterable[str]) -> None:
     """Raise `InputError` for the first key of `given` that is not in `allowed`."""
     allowed = list(allowed)

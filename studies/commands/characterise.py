@@ -7,15 +7,15 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from rodcone.errors import InputError, require_whole
-from rodcone.files import check_place, finite, replacing
+from rodcone.errors import InputError, require_absent, require_whole
+from rodcone.files import check_place, finite
 from sensor.cameras.frames import frame_numbers, measure_files
 from sensor.cameras.numbers import preset_text
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
 from sensor.readings.noise import of_reading
-from studies.commands.console import Time, print_table, require_ending, say
+from studies.commands.console import Time, print_table, require_ending, require_new, say, write_text
 from studies.pages.transfer_chart import transfer_svg
 
 HEAD = ("figure", "unit", "configured", "measured", "std. error", "in std. errors")
@@ -67,16 +67,12 @@ def characterise(
         Seed of the chip and of its frames.
     """
     if flats or dark:
-        if preset is not None:
-            raise InputError(f"preset: {preset!r} beside raw files; allowed: a preset, or --from and --dark; give one")
-        if reading is not None:
-            raise InputError(f"reading: {reading} beside raw files; allowed with a preset; leave it out")
+        require_absent("beside raw files; allowed: a sensor, or --from and --dark", preset=preset, reading=reading)
         _measure_files(flats or [], dark or [], window, out, json)
         return
     if preset is None:
         raise InputError("preset: none is given; allowed: PRESET, or raw files by --from and --dark; give one")
-    if window is not None:
-        raise InputError(f"window: {window} for {preset!r}; allowed with --from and --dark; leave it out")
+    require_absent(f"for {preset!r}; allowed: with --from and --dark", window=window)
     sensor = sensor_preset(preset)
     if reading is not None:
         if not sensor.chip.readings:
@@ -88,8 +84,7 @@ def characterise(
         check_place(out)
     chip = measure(sensor, (height, width), seed, exposure)
     if out is not None:
-        with replacing(out) as (place,):
-            place.write_text(transfer_svg(chip, f"{preset}, characterised after EMVA 1288"), "utf-8")
+        write_text(out, transfer_svg(chip, f"{preset}, characterised after EMVA 1288"))
     if json:
         print(notation.dumps(finite(_facts(chip)), allow_nan=False))
         return
@@ -106,10 +101,8 @@ def characterise(
 def _measure_files(flats: list[Path], dark: list[Path], window: int | None, out: Path | None, json: bool) -> None:
     """Print what raw files tell, and write it as a preset."""
     if out is not None:
-        require_ending(out, ".toml")
+        require_new(out, ".toml")
         check_place(out)
-        if out.exists():
-            raise InputError(f"out: {str(out)!r} exists; allowed: a new file; choose another name or remove it")
     camera = measure_files(flats, dark, window)
     rows = (
         ("gain", "DN/e-", camera.gain_dn_per_e),
@@ -118,11 +111,8 @@ def _measure_files(flats: list[Path], dark: list[Path], window: int | None, out:
         ("PRNU", "1", camera.prnu),
     )
     if out is not None:
-        text = preset_text(
-            f"A camera measured from {flats[0].name} and others.", frame_numbers(camera, flats), None, ""
-        )
-        with replacing(out) as (place,):
-            place.write_text(text, "utf-8")
+        title = f"A camera measured from {flats[0].name} and others."
+        write_text(out, preset_text(title, frame_numbers(camera, flats), None, ""))
     if json:
         print(notation.dumps({**asdict(camera), "levels_dn": camera.levels_dn.tolist()}))
         return

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Literal
 
 from rodcone.errors import InputError
-from rodcone.files import check_place, replacing
-from studies.commands.console import print_table, require_ending
+from rodcone.files import check_place
+from studies.commands.console import print_table, require_ending, write_text
 
 # Each list imports its own catalogue: all of them together take a second to load.
 
@@ -77,8 +77,7 @@ def _write_gallery(kind: Kind | None, out: Path) -> None:
             f"{name}{'' if camera.balanced else '*'}": camera.responses for name, camera in measured_cameras().items()
         }
         text = responses_svg({"the presets": low_noise().responses, **measured})
-    with replacing(out) as (place,):
-        place.write_text(text, "utf-8")
+    write_text(out, text)
 
 
 def scenes() -> dict[str, str]:

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from cyclopts import App
 
-from rodcone.errors import InputError, require_keys, require_range
+from rodcone.errors import InputError, require_absent, require_keys, require_range
 from rodcone.files import check_place, replacing
 from rodcone.toml_file import read_toml
 from sensor.cameras.convert import convert
@@ -25,7 +25,7 @@ from sensor.cameras.numbers import (
 )
 from sensor.presets import preset as read_preset
 from sensor.presets import preset_file
-from studies.commands.console import require_ending, say
+from studies.commands.console import require_new, say
 
 app = App(name="new", help="Write files to start from.")
 _STUDIES = Path(__file__).parent.parent / "configs"
@@ -73,16 +73,12 @@ def preset(
     if camera is None and noise is None:
         if name is None:
             raise InputError("name: none is given; allowed: a preset's name, --camera or --noise; give one")
-        for option, value in (("anchor", anchor), ("iso", iso), ("white-e", white_e)):
-            if value is not None:
-                raise InputError(
-                    f"{option}: {value} for {name!r}; allowed with --camera or --noise; add one, or leave it out"
-                )
+        require_absent(f"for {name!r}; allowed: with --camera or --noise", anchor=anchor, iso=iso, white_e=white_e)
         _copy(preset_file(name), out, ".toml")
         return
-    _require_new(out, ".toml")
+    require_new(out, ".toml")
     curves_file = out.parent / f"{out.stem}_curves.csv"
-    _require_new(curves_file, ".csv")
+    require_new(curves_file, ".csv")
     lender = None if name is None else read_preset(name)
     # what the sources tell
     measured = None if camera is None else measured_camera(camera) if _wants_curves(noise) else _if_measured(camera)
@@ -202,10 +198,8 @@ def _if_measured(camera: str) -> MeasuredCamera | None:
 
 def _numbers(noise: Path | None, camera: str | None, iso: float | None, white_e: float | None) -> PixelNumbers:
     ending = None if noise is None else noise.suffix.lower()
-    if (iso is not None or white_e is not None) and ending != ".json":
-        raise InputError(
-            "iso: it has no place here; allowed: --iso and --white-e with a noiseprofiles.json; leave it out"
-        )
+    if ending != ".json":
+        require_absent("here; allowed: with a noiseprofiles.json", iso=iso, white_e=white_e)
     if noise is None:
         return PixelNumbers("no source of noise is given")
     if ending == ".toml":
@@ -231,15 +225,9 @@ def _anchor(text: str) -> tuple[float, float]:
     return value, at_nm
 
 
-def _require_new(out: Path, ending: str) -> None:
-    require_ending(out, ending)
-    if out.exists():
-        raise InputError(f"out: {str(out)!r} exists; allowed: a new file; choose another name or remove it")
-
-
 def _copy(source: Path, out: Path, ending: str, beside: Mapping[Path, Path] = MappingProxyType({})) -> None:
     """Copy a file to a new one, after the files that belong beside it, and print its path."""
-    _require_new(out, ending)
+    require_new(out, ending)
     for target, other in {**beside, out: source}.items():
         if target != out:
             target.parent.mkdir(exist_ok=True)

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from rodcone.errors import InputError, require_whole, unknown
+from rodcone.errors import InputError, require_absent, require_whole, unknown
 from rodcone.files import replacing
+from studies.commands.console import write_text
 from studies.pages.report import render_report
 from studies.pages.report_compare import CAMERA, first_comparison
 from studies.pages.report_markdown import markdown
@@ -34,11 +35,9 @@ def report(folder: Path, /, *, out: Path | None = None, pictures: int | None = N
         require_whole("pictures", pictures, 1, 100_000, "give a number of pictures")
     path = out or folder / FILE
     if path.suffix.lower() == ".md":
-        with replacing(path) as (place,):
-            place.write_text(_markdown(folder, path, camera), "utf-8")
-    elif camera is not None:
-        raise InputError(f"camera: {camera!r} is for Markdown; the page has a menu; allowed: an --out that ends in .md")
+        write_text(path, _markdown(folder, path, camera))
     else:
+        require_absent("for a page, which has a menu; allowed: with an --out that ends in .md", camera=camera)
         write_report(folder, path, pictures)
     print(path)
 
@@ -84,7 +83,5 @@ def write_report(folder: str | Path, path: str | Path, pictures: int | None = No
         Where the file can't be written.
     """
     path = Path(path)
-    page = render_report(*sweep_report(Path(folder), pictures))
-    with replacing(path) as (place,):
-        place.write_text(page, "utf-8")
+    write_text(path, render_report(*sweep_report(Path(folder), pictures)))
     return path

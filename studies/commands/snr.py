@@ -9,10 +9,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from rodcone.errors import require_range
-from rodcone.files import check_place, replacing
+from rodcone.files import check_place
 from sensor.config import SensorConfig
 from sensor.presets import preset
-from studies.commands.console import Time, print_table, require_ending
+from studies.commands.console import Time, print_table, require_ending, write_text
 from studies.metrics.truth import GREY
 from studies.pages.report_text import MISSING
 from studies.pages.snr_chart import snr_svg
@@ -63,9 +63,8 @@ def snr(
     opened = {name: _opened(name, f_number) for name in sensors}
     light_by_sensor = {name: light_for_snr(at, sensor, light, exposure) for name, sensor in opened.items()}
     if out is not None:
-        with replacing(out) as (place,):
-            named = {f"{name}{RELATIVE * each.responses.relative}": each for name, each in opened.items()}
-            place.write_text(snr_svg(named, light, exposure, at), "utf-8")
+        named = {f"{name}{RELATIVE * sensor.responses.relative}": sensor for name, sensor in opened.items()}
+        write_text(out, snr_svg(named, light, exposure, at))
     if json:
         rows = {
             name: [{k: None if v == float("inf") else v for k, v in asdict(x).items()}

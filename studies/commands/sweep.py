@@ -12,7 +12,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from isp.processors.catalogue import require_libraries
-from rodcone.errors import InputError, require_whole
+from rodcone.errors import InputError, require_absent, require_whole
 from rodcone.memory import Memory, require_memory
 from rodcone.progress import Step, duration, progress
 from studies.budget.ledger import Plan
@@ -89,10 +89,10 @@ def sweep(
     """
     clock = Clock()
     task = read_study(study, set or (), trust_code=trust_code)
-    if reference and as_stated:
-        raise InputError("reference: it can't go with --as-stated; leave one of them out")
-    if cluster is not None and workers is not None:
-        raise InputError("workers: a cluster has its own; leave --workers or --cluster out")
+    if reference:
+        require_absent("beside --reference", as_stated=as_stated)
+    if cluster is not None:
+        require_absent("beside --cluster, which has workers of its own", workers=workers)
     if workers is not None:
         require_whole("workers", workers, 1, MOST_WORKERS, "give processes")
     if dry_run:

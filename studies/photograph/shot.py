@@ -16,7 +16,7 @@ from render.radiance_files.radiance_source import extent_of, is_radiance_file, i
 from render.scene import Scene, film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.user_scene.scene_parts import SceneFile
-from rodcone.errors import InputError, require_fields, require_whole
+from rodcone.errors import InputError, require_absent, require_fields, require_whole
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
@@ -234,8 +234,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     require_whole("seed", order.seed, 0, 2**31, "give a whole number")
     if order.size is not None:
         require_whole("size", order.size, 1, 8192, "give the picture's longer side in pixels")
-    if order.size is not None and (order.height is not None or order.width is not None):
-        raise InputError(f"size: {order.size!r} beside height or width; allowed: one of the two ways; leave one out")
+        require_absent("beside --size", height=order.height, width=order.width)
     if order.white_balance == GRAY_WORLD:
         raise InputError(
             f"white_balance: {GRAY_WORLD!r} is found in a picture; allowed: {AS_SHOT} or an illuminant such as D65; "
@@ -243,16 +242,9 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
         )
     exposure_s = _asked_exposure_s(order, channels(sensor.cfa))
     if is_radiance_file(order.source):
-        if order.trust_scene:
-            raise InputError(f"trust-scene: {order.source!r} is no .xml scene; leave --trust-scene out")
-        if order.chart:
-            raise InputError(f"chart: {order.source!r} is a picture, which has its own; leave --chart out")
-        if order.extend:
-            raise InputError(f"extend: {order.source!r} is a picture, which has no surfaces; leave --extend out")
-        if asked := [name for name in ("size", "height", "width") if getattr(order, name) is not None]:
-            raise InputError(
-                f"{asked[0]}: {order.source!r} has its own; leave it out, or render the scene at that size"
-            )
+        scene_options = ("trust_scene", "chart", "extend", "size", "height", "width")
+        place = f"for {str(order.source)!r}, a stored picture; allowed: with a scene that is rendered"
+        require_absent(place, **{name: getattr(order, name) for name in scene_options})
         if len(order.light) > 1 or "=" in "".join(order.light):
             raise InputError(
                 f"light: {' '.join(order.light)!r} for a picture, whose light is in it; allowed: the illuminant that "

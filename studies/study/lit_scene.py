@@ -20,7 +20,7 @@ from render.scene_range import check_range
 from render.spectrum import Floats, Spectrum
 from render.transport import Transport
 from rodcone.digests import digest_file, digest_inputs
-from rodcone.errors import InputError, require_keys
+from rodcone.errors import InputError, require_absent, require_keys
 from sensor.presets import preset
 from studies.study.equal_area import require_pixels
 from studies.study.levels import parse_level
@@ -66,11 +66,8 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         lights that have colours of their own, or a size for a sensor that bins or has more.
     """
     if is_radiance_file(choice.source):
-        if choice.extend:
-            raise InputError(f"scenes: extend for {choice.source}, a picture without surfaces; leave it out")
+        require_absent(f"for {choice.source}, a picture without surfaces", extend=choice.extend, chart=choice.chart)
         check_radiance_file(choice.source, study.levels)
-        if choice.chart:
-            raise InputError(f"scenes: chart for {choice.source}, a picture; leave it out")
         identity = digest_inputs(
             [
                 [digest_file(file) for file in files_of(choice.source)],

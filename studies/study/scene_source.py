@@ -7,7 +7,7 @@ from render.radiance_files.radiance_source import ENDINGS
 from render.scene import Scene
 from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_parts import SceneFile
-from rodcone.errors import InputError, require_whole
+from rodcone.errors import InputError, require_absent, require_whole
 from scenes.catalog import load
 from studies.study.levels import parse_level
 
@@ -39,12 +39,9 @@ def open_scene(
         file.
     """
     if Path(source).suffix.lower() == ".xml":
-        for name, value in (("light", light), ("chart", chart)):
-            if value is not None:
-                raise InputError(f"scenes: {name} {value!r} for {source}; allowed: none, a file has its own")
+        require_absent(f"for {source}, a file that has its own", light=light, chart=chart)
         return load_scene_file(source, trust=trust, extend=extend)
-    if trust:
-        raise InputError(f"trust-scene: {source!r} is no .xml scene; leave --trust-scene out")
+    require_absent(f"for {source!r}; allowed: with an .xml scene", trust_scene=trust)
     if suffix := Path(source).suffix.lower():
         what = _OTHER_FILES.get(suffix, f"no file that is a scene ({suffix})")
         read = (".xml",) if suffix in ENDINGS else (".xml", *ENDINGS)

@@ -169,7 +169,7 @@ def test_an_anchor_beside_a_digital_negative_needs_curves_that_it_scales(tmp_pat
         (["--camera", "Maker Model One", "--anchor", "50@530"], "anchor: 50.0"),
         (["--camera", "Maker Model One", "--anchor", "0.5@nan"], "anchor: nan"),
         (["--camera", "Maker Model One", "--anchor", "0.5@@530"], "such as 0.5@530"),
-        (["--camera", "Maker Model One", "--iso", "100"], "--iso and --white-e with a noiseprofiles.json"),
+        (["--camera", "Maker Model One", "--iso", "100"], "allowed: with a noiseprofiles.json"),
         (["--noise", "absent.toml"], "can't be read"),
         (["--noise", "absent.json"], "give --camera"),
         (["--noise", "absent.dng"], "there is no such file"),

@@ -145,7 +145,7 @@ BAD = {
     "bands of nothing": (["{scene}", "--bands", "700:400:-10"], ["'700:400:-10'"]),
     "endless bands": (["{scene}", "--bands", "400:inf:10"], ["'400:inf:10'"]),
     "noise": (["{scene}", "--noise", "-1"], ["noise: -1", "0.02"]),
-    "trust without file": (["still_life", "--trust-scene"], ["'still_life' is no .xml scene"]),
+    "trust without file": (["still_life", "--trust-scene"], ["trust-scene: True for 'still_life'"]),
     "no way to extend": (["{scene}", "--extend", "hol"], ["extend: 'hol'", "did you mean 'hold'?"]),
     "hostile": (["{hostile}"], ["(line 2, col 1)", "<path> lets a scene load native code", "--trust-scene"]),
 }

@@ -76,7 +76,7 @@ def test_the_longer_side_is_as_asked_and_a_file_keeps_its_own_proportions(tmp_pa
     choice = SceneChoice(str(tmp_path / "wide.xml"))
     assert open_choice(choice, STUDY).size == (40, 80)
     assert open_choice(choice, study).size == (48, 96)
-    with pytest.raises(InputError, match="a file has its own"):
+    with pytest.raises(InputError, match="a file that has its own"):
         open_choice(replace(choice, light="A"), STUDY)
 
 
