@@ -11,16 +11,14 @@ from rodcone.files import finite, replacing
 from studies.pages.environment import environment
 from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import png_bytes, svg_text
-from studies.paper.bilateral import bilateral_claims
 from studies.paper.claims import VERDICTS, Claim, PaperFigure, default_text, range_text, value_text
 from studies.paper.figure1 import figure_1a, figure_1b
 from studies.paper.figure2 import figure_2
-from studies.paper.figure3 import figure_3
-from studies.paper.figure4 import figure_4
-from studies.paper.figure5 import figure_5
 from studies.paper.figure6 import figure_6
+from studies.paper.figures_3_5 import figure_3, figure_5
 from studies.paper.numbers import number_claims
-from studies.paper.setup import READINGS, Setup, view
+from studies.paper.patches import figure_4, section_3_1
+from studies.paper.setup import Setup, view
 
 Made = tuple[PaperFigure, tuple[Claim, ...]]
 
@@ -61,7 +59,7 @@ def make(setup: Setup) -> Paper:
         step("begins", 0.0)
         made.append(maker(replace(setup, step=step)))
     numbers = number_claims(view(setup, "still_life", 1.0))
-    claims = (*numbers, *(claim for _, own in made for claim in own), *bilateral_claims(tuple(READINGS)))
+    claims = (*numbers, *(claim for _, own in made for claim in own), *section_3_1())
     facts = {"size": setup.size, "spp": setup.spp, "seeds": setup.seeds, "rodcone": metadata.version("rodcone")}
     return Paper(tuple(figure for figure, _ in made), claims, facts | {"environment": environment()})
 

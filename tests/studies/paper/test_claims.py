@@ -5,15 +5,13 @@ from math import inf, nan
 
 import pytest
 
-from studies.paper.bilateral import filter_claims
 from studies.paper.claims import Claim, ClaimCheck, about, at_least, at_most, near
 from studies.paper.figure1 import claims_1a, claims_1b
 from studies.paper.figure2 import Gain, signal_claims, signal_ratios, snr_claims
-from studies.paper.figure3 import Stages, claims_3
-from studies.paper.figure4 import claims_4
-from studies.paper.figure5 import Bright, claims_5
 from studies.paper.figure6 import Outcome, Swap, claims_6
+from studies.paper.figures_3_5 import Bright, Stages, claims_3, claims_5
 from studies.paper.numbers import photon_claims, range_claim, table_claim
+from studies.paper.patches import claims_4, filter_claims
 
 YES, PARTLY, NO = "reproduced", "reproduced under a condition", "not reproduced"
 PIXEL, OUTPUT = "table1_pixel", "table1_output"

@@ -14,10 +14,10 @@ from rodcone.colour_spaces import decode_srgb, encode_srgb
 from studies.commands.cli import main
 from studies.paper.claims import ClaimCheck, at_least, at_most, range_text, value_text
 from studies.paper.figure1 import gain_db
-from studies.paper.figure4 import edge_columns
-from studies.paper.figure5 import likeness
+from studies.paper.figures_3_5 import likeness
 from studies.paper.numbers import moonlight_photons
 from studies.paper.paper import Paper, as_json, make, write
+from studies.paper.patches import edge_columns
 from studies.paper.setup import READINGS, Setup, noise, sensor_of
 
 pytestmark = pytest.mark.thorough

@@ -1,0 +1,227 @@
+"""Figures 3 and 5: W in low light, where colours are noisy, and in bright light, where W is partly full.
+
+Figure 3: one exposure gives a noisy colour image and a cleaner W image, and from both a result. Figure 5: at
+200 cd/m^2, 66 ms and 3 um W is partly full, and the result is whole; early fusion loses there.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.colour.highlights import saturated_nearby
+from isp.planes import bilinear
+from isp.processors.catalogue import PROCESSORS
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
+from sensor.cfa import channels, mask
+from sensor.raw import RawImage
+from studies.metrics.truth import neutral_electrons
+from studies.pages.plots import picture_rows
+from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_least, at_most, beside
+from studies.paper.setup import (
+    CAMERAS,
+    DEFAULT,
+    PAPER,
+    READINGS,
+    Camera,
+    Image,
+    Setup,
+    View,
+    develop,
+    exposures,
+    noise,
+    quality_db,
+    view,
+)
+from studies.photograph.camera import colour_fit
+
+LOW_CD_M2, LOW_S = 2.5, 0.020  # low light: a tenth of Table 1's, at Figure 6's longest time
+BRIGHT_CD_M2, PITCH_UM = 200.0, 3
+PARTLY = (0.02, 0.98)  # share of W's pixels that may be full for "partly"
+WHOLE = 0.95  # correlation with the truth where W is full, for "whole": nine tenths of the variance
+# Early fusion: W enters before anything else (Sato 1983, Kijima 2007), or behind a neutral density (Yamagami 1994).
+EARLY = ("rgbw_sato", "rgbw_kijima", "rgbw_yamagami")
+GAIN_DB = 1.0  # a decibel is easily seen
+RESULT = {PAPER: "result", DEFAULT: "by the default"}  # above the pictures
+
+
+def grey(plane: NDArray[np.floating], white: float) -> Image:
+    """Plane (h, w) as linear grey (h, w, 3), in which `white` is 1."""
+    return np.repeat(np.asarray(plane, dtype=np.float64)[..., None] / white, 3, axis=-1)
+
+
+@dataclass(frozen=True)
+class Stages:
+    """How good the three images of Figure 3 are: noise (share of white) and PSNR [dB]."""
+
+    colour_noise: float
+    white_noise: float
+    colour_db: float
+    result_db: float
+
+
+def colour_and_white(raw: RawImage, seen: View, camera: Camera) -> tuple[Image, Image]:
+    """Figure 3's linear sRGB from R, G and B alone, balanced by calibration, through the plain matrix, and its W."""
+    planes, neutral = bilinear(raw), neutral_electrons(camera.sensor, seen.light, raw.exposure_s)
+    matrix = colour_fit(camera.sensor, PROCESSORS[DEFAULT], seen.light).matrix()
+    colour = planes[..., :3] / (neutral[:3] * seen.white_cd_m2) @ matrix.T
+    index = channels(raw.cfa).index("W")
+    return np.asarray(colour), grey(planes[..., index], neutral[index] * seen.white_cd_m2)
+
+
+def claims_3(stages: Mapping[str, Stages]) -> tuple[Claim, ...]:
+    """In low light colour is noisy, W is cleaner, and the result better than the colour image."""
+    note = (
+        f"still_life at {LOW_CD_M2:g} cd/m² and {LOW_S * 1e3:g} ms: the paper says low light. Noise is the "
+        "scatter of luminance over exposures."
+    )
+    return (
+        Claim(
+            "Figure 3",
+            "In the dark the colour image is noisy and the monochrome one clean",
+            tuple(
+                at_most(f"{name}, W's noise over the colours'", one.white_noise / one.colour_noise, 0.5, "×")
+                for name, one in stages.items()
+            ),
+            note,
+        ),
+        Claim(
+            "Figure 3",
+            "The result of both is better than the colour image",
+            tuple(
+                at_least(f"{name}, PSNR gained", one.result_db - one.colour_db, GAIN_DB, "dB")
+                for name, one in stages.items()
+            ),
+            note,
+        ),
+    )
+
+
+def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
+    """Colour image, W image and result under both readings."""
+    seen = view(setup, "still_life", LOW_CD_M2)
+    stages, rows = {name: dict[str, Stages]() for name in CAMERAS}, []
+    for reading in READINGS:
+        raws = exposures(Camera(reading), seen, "20ms", setup.seeds)
+        colour, white = zip(*(colour_and_white(raw, seen, Camera(reading)) for raw in raws), strict=True)
+        pictures = {f"{reading}: colour": colour[0], "W": white[0]}
+        for name in CAMERAS:
+            result = [develop(Camera(reading, name), raw, seen)[0] for raw in raws]
+            stages[name][reading] = Stages(
+                noise(colour), noise(white), quality_db(colour, seen.truth), quality_db(result, seen.truth)
+            )
+            pictures[RESULT[name]] = result[0]
+        rows.append([(words, encode_srgb(picture)) for words, picture in pictures.items()])
+    caption = (
+        f"One exposure at {LOW_CD_M2:g} cd/m² and {LOW_S * 1e3:g} ms: R, G and B filled in bilinearly, W "
+        "filled in, and the interleaved reconstruction with luminance substitution, the paper's and the default."
+    )
+    return PaperFigure("3", caption, picture_rows(rows)), beside(claims_3(stages[PAPER]), claims_3(stages[DEFAULT]))
+
+
+@dataclass(frozen=True)
+class Bright:
+    """What Figure 5 measures under one reading.
+
+    Attributes
+    ----------
+    white_full, colours_full : float
+        Share of W's pixels that are full, and of the colours'.
+    result_likeness, white_likeness : float
+        Correlation of luminance with the truth where W is full and no colour is: of the result, and of W itself.
+    full_likeness : float
+        Of the result where a colour is full as well.
+    """
+
+    white_full: float
+    colours_full: float
+    result_likeness: float
+    white_likeness: float
+    full_likeness: float
+
+
+def likeness(plane: Image, truth: Image, where: NDArray[np.bool_]) -> float:
+    """Correlation of two planes (h, w) over some pixels; 0 where either is constant or there are none."""
+    if where.sum() < 2 or np.ptp(plane[where]) == 0 or np.ptp(truth[where]) == 0:
+        return 0.0
+    return float(np.corrcoef(plane[where], truth[where])[0, 1])
+
+
+def measure_bright(raw: RawImage, result: Image, seen: View) -> Bright:
+    """Measure one exposure and its result (h, w, 3), linear sRGB."""
+    truth, luminance = luminance_of_srgb(seen.truth), luminance_of_srgb(result)
+    white, colours = saturated_nearby(raw, "W"), saturated_nearby(raw, "RGB")
+    is_white = mask(raw.cfa, "W", raw.shape)
+    return Bright(
+        float(raw.saturated[is_white].mean()),
+        float(raw.saturated[~is_white].mean()),
+        likeness(luminance, truth, white & ~colours),
+        likeness(bilinear(raw)[..., channels(raw.cfa).index("W")], truth, white & ~colours),
+        likeness(luminance, truth, white & colours),
+    )
+
+
+def claims_5(bright: Mapping[str, Bright], gains_db: Mapping[str, float]) -> tuple[Claim, ...]:
+    """W partly full, the result whole, early fusion worse.
+
+    Parameters
+    ----------
+    bright : mapping
+        By reading.
+    gains_db : mapping
+        PSNR of the interleaved camera over each opponent's, by opponent and reading.
+    """
+    return (
+        Claim(
+            "Figure 5",
+            "At 200 cd/m², 66 ms and 3 µm W is partly saturated",
+            tuple(ClaimCheck(name, one.white_full, *PARTLY, "of its pixels") for name, one in bright.items()),
+            "still_life, f/2.8; the well in proportion to area.",
+        ),
+        Claim(
+            "Figure 5",
+            "The result is whole where W is saturated",
+            (
+                *(at_least(f"{name}, colours not full", one.result_likeness, WHOLE) for name, one in bright.items()),
+                *(at_least(f"{name}, a colour full too", one.full_likeness, WHOLE) for name, one in bright.items()),
+            ),
+            "Correlation of the result's luminance with the truth's over those pixels. W's own is "
+            + " and ".join(f"{one.white_likeness:.2f} ({name})" for name, one in bright.items())
+            + ". Of the colours' pixels "
+            + " and ".join(f"{one.colours_full:.0%}" for one in bright.values())
+            + " are full too.",
+        ),
+        Claim(
+            "Section 2",
+            "Early fusion gives away the dynamic range between the two mosaics",
+            tuple(at_least(name, gain, GAIN_DB, "dB") for name, gain in gains_db.items()),
+            "PSNR of the interleaved camera over the opponent's, Figure 5's conditions.",
+        ),
+    )
+
+
+def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
+    """R image, W image and result under both readings, with the opponents' PSNR."""
+    seen = view(setup, "still_life", BRIGHT_CD_M2)
+    bright = {name: dict[str, Bright]() for name in CAMERAS}
+    gains_db, rows = {name: dict[str, float]() for name in CAMERAS}, []
+    for reading in READINGS:
+        psnr_db, pictures = {}, {}
+        for name in (*EARLY, *CAMERAS):
+            camera = Camera(reading, name, PITCH_UM)
+            raws = exposures(camera, seen, "66ms", setup.seeds)
+            results = [develop(camera, raw, seen)[0] for raw in raws]
+            psnr_db[name] = quality_db(results, seen.truth)
+            if name in CAMERAS:
+                bright[name][reading] = measure_bright(raws[0], results[0], seen)
+                gains_db[name] |= {f"{other}, {reading}": psnr_db[name] - psnr_db[other] for other in EARLY}
+                pictures[RESULT[name]] = encode_srgb(results[0])
+        planes, full_e = bilinear(raws[0]), camera.sensor.pixel.full_well_e
+        recorded = {"R": planes[..., 0], "W": planes[..., 3]}
+        shown = {f"{name}, white is full": encode_srgb(grey(plane, full_e)) for name, plane in recorded.items()}
+        (first, picture), *others = (shown | pictures).items()
+        rows.append([(f"{reading}: {first}", picture), *others])
+    caption = "R as recorded, W as recorded with much of it full, and the result, at 200 cd/m², 66 ms and 3 µm."
+    claims = beside(*(claims_5(bright[name], gains_db[name]) for name in (PAPER, DEFAULT)))
+    return PaperFigure("5", caption, picture_rows(rows)), claims
