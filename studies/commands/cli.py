@@ -33,7 +33,7 @@ app.command("studies.commands.bench:bench", name="bench", help="Measure speed ag
 app.command("studies.commands.develop:capture", name="capture", help="Photograph a scene into raw files.")
 app.command("studies.commands.characterise:characterise", name="characterise", help="Measure a chip after EMVA 1288.")
 app.command("studies.commands.demo:demo", name="demo", help="Photograph a scene from moonlight to daylight.")
-app.command("studies.commands.develop:develop", name="develop", help="Develop a raw file into a PNG.")
+app.command("studies.commands.develop:develop", name="develop", help="Develop a raw file into a picture.")
 app.command("studies.commands.doctor:doctor", name="doctor", help="Print versions, and what is wrong.")
 app.command("studies.commands.explore:explore", name="explore", help="Play with a camera on a page of this machine.")
 app.command("studies.commands.list:list_names", name="list", help="Print what the commands know by name.")

@@ -42,7 +42,8 @@ def demo(
         Folder for report.html, results.json and overview.png, with the sweep's ledger and pictures.
     scene
         Scene by name, such as still_life (the default), still_life_outdoor, night_street or cornell_box. Or a file: a
-        Mitsuba scene (.xml), or spectral radiance as OpenEXR (.exr) or an ISETCam scene (.mat).
+        Mitsuba scene (.xml), spectral radiance (.exr, or .mat of ISETCam), a cube described by a .toml beside it
+        (.npy, ENVI's .hdr, .mat), or a photograph (.jpg, .png).
     size
         Longer side of the picture in pixels, 256 by default; a picture file has its own.
     sensor
@@ -70,17 +71,15 @@ def demo(
         Run even where more memory is needed than is free.
     """
     clock, study = Clock(), read_study(STUDY)
-    changed: dict[str, Any] = {"size": size, "spp": spp, "max_seconds": max_seconds, "seed": seed}
-    changed["denoise"] = denoise
+    changes: dict[str, Any] = {"sensors": sensor, "levels": level, "processors": processor}
+    changes["longest_exposure_s"] = longest_exposure
+    limits: dict[str, Any] = {"size": size, "spp": spp, "max_seconds": max_seconds, "seed": seed, "denoise": denoise}
     study = replace(
         study,
         scenes=(SceneChoice(scene or study.scenes[0].source, light),),
-        sensors=study.sensors if sensor is None else tuple(sensor),
-        levels=study.levels if level is None else tuple(level),
-        longest_exposure_s=study.longest_exposure_s if longest_exposure is None else longest_exposure,
-        processors=study.processors if processor is None else tuple(processor),
         seeds=tuple(seed + number for number in study.seeds),
-        render=replace(study.render, **{name: value for name, value in changed.items() if value is not None}),
+        render=replace(study.render, **{name: value for name, value in limits.items() if value is not None}),
+        **{name: values for name, values in changes.items() if values is not None},
     )
     check_memory(study, out, reference=False, workers=cores(), force=force)
     runner = partial(run_in_processes, workers=cores())

@@ -30,8 +30,9 @@ def explore(
     Parameters
     ----------
     source
-        Scene by name such as still_life, a Mitsuba scene (.xml), a file of spectral radiance (.exr, .mat), or a study
-        (.toml), whose first scene and camera the page begins with.
+        Scene by name such as still_life, a Mitsuba scene (.xml), a file of spectral radiance (.exr, .mat), a cube
+        described by a .toml beside it (.npy, ENVI's .hdr, .mat), a photograph (.jpg, .png), or a study (.toml), whose
+        first scene and camera the page begins with.
     size
         Longer side of the rendered picture in pixels; 256 by default, a .xml scene's film has its own.
     spp
@@ -41,9 +42,9 @@ def explore(
     seed
         Seed of the render.
     port
-        Of the page's address; a free one by default.
+        Port of the page's address; a free one by default.
     no_browser
-        Print the address alone.
+        Print the address, and open no browser.
     trust_scene
         Let a .xml scene load plug-ins of its own, which are native code, and files from anywhere.
     force

@@ -46,8 +46,8 @@ def preset(
 ) -> None:
     """Write a sensor as a TOML file to change: pixel, lens, mosaic, responses, every number with its source.
 
-    Without --camera and --noise, a copy of a preset. With them, a camera that exists; what no source tells is left out
-    with a word, or taken from the preset, if one is named, and said so.
+    Without --camera and --noise the file is a copy of a preset. With them it is a camera that exists: numbers that no
+    source states come from the preset, where one is named; the others are left out. A comment in the file says which.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def preset(
     iso
         Exposure index of a profile in noiseprofiles.json; the lowest by default.
     white_e
-        Electrons at which the camera reads white there, which such a profile doesn't tell.
+        Electrons at which the camera reads white at that exposure index; such a profile doesn't state them.
     """
     if camera is None and noise is None:
         if name is None:
@@ -81,7 +81,7 @@ def preset(
     require_new(curves_file, ".csv")
     lender = None if name is None else read_preset(name)
     # what the sources tell
-    measured = None if camera is None else measured_camera(camera) if _wants_curves(noise) else _if_measured(camera)
+    measured = None if camera is None else _measured(camera, noise)
     numbers = _numbers(noise, camera, iso, white_e)
     if anchor is not None:
         numbers = replace(numbers, efficiency=_anchor(anchor), source=f"{numbers.source}; anchor {anchor} as given")
@@ -186,14 +186,10 @@ def _named(study_file: Path) -> list[str]:
     return list(dict.fromkeys(files))
 
 
-def _wants_curves(noise: Path | None) -> bool:
-    """Whether --camera names a measured response; beside darktable's file it may name that file's camera alone."""
-    return noise is None or noise.suffix.lower() != ".json"
-
-
-def _if_measured(camera: str) -> MeasuredCamera | None:
-    """Measured response where one of that name is at hand."""
-    return measured_camera(camera) if camera.lower() in {name.lower() for name in measured_cameras()} else None
+def _measured(camera: str, noise: Path | None) -> MeasuredCamera | None:
+    """Measured response of a camera; None where it is known to darktable's file of noise alone."""
+    known = camera.lower() in {name.lower() for name in measured_cameras()}
+    return measured_camera(camera) if known or noise is None or noise.suffix.lower() != ".json" else None
 
 
 def _numbers(noise: Path | None, camera: str | None, iso: float | None, white_e: float | None) -> PixelNumbers:

@@ -104,7 +104,7 @@ def render(
     opened = open_scene(source, trust_scene, extend, chart=chart)
     scene, size = opened.scene, asked_size(opened.size, height, width)
     spectra = asked_spectra(scene, light or ())
-    luminance_cd_m2, illuminance_lux = asked_level(scene, level)
+    lit_at: dict[str, Any] = asked_level(scene, level)
     count = DEFAULT_WAVELENGTH_NM.size if wavelength_nm is None else wavelength_nm.size
     require_memory(memory(size[0] * size[1], count, len(scene.groups), denoised=denoise), force)
     check_place(out)
@@ -125,10 +125,7 @@ def render(
             progress=lambda share, error: step(render_words(error), share),
             denoise=denoise,
         )
-    level_asked: dict[str, Any] = {"luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
-    radiance = (
-        relight_denoised(transport, spectra, **level_asked)[0] if denoise else transport.relight(spectra, **level_asked)
-    )
+    radiance = relight_denoised(transport, spectra, **lit_at)[0] if denoise else transport.relight(spectra, **lit_at)
     write_exr(radiance, out, scene=scene.name)
     # Say what was done
     say(*opened.notes)

@@ -41,7 +41,7 @@ def snr(
     Parameters
     ----------
     sensors
-        Sensor presets by name, or preset files.
+        One or more sensor presets by name, or preset files.
     at
         Signal over noise of a pixel; 10 is 20 dB.
     light
@@ -49,7 +49,7 @@ def snr(
     exposure
         Exposure time, such as 33ms, the default, or 1/30.
     f_number
-        Of the lens; the preset's own by default.
+        F-number of the lens; the preset's own by default.
     out
         Plot of the SNR over light (.svg).
     json

@@ -55,7 +55,7 @@ def sweep(
     force: bool = False,
     json: bool = False,
 ) -> int:
-    """Make every picture of a study, note each in a ledger and write a report; prints the ledger's path.
+    """Make every picture of a study, write each one's figures into a ledger and make a report; prints the ledger's path.
 
     Whatever ends it (Ctrl-C, a kill, a full disk), the same command goes on with the cells that are missing.
 
@@ -72,12 +72,12 @@ def sweep(
     cluster
         Address of a dask scheduler whose workers do it instead, such as tcp://127.0.0.1:8786.
     reference
-        Model everything, instead of what the sensor's noise doesn't hide.
+        Model everything, also what the sensor's noise hides.
     as_stated
-        Render and image as study and sensors state, without a plan.
+        Use bands, samples and lenses as the study and its sensors state them; make no plan.
     keep_old
-        Keep cells that other versions, another variant or other engines made as rows of their own, for rodcone export
-        --all; by default they are removed when they are made anew.
+        Keep the rows that other versions or engines made, for rodcone export --all; by default they are replaced when
+        their cells are made anew.
     dry_run
         Print cells, renders, and an estimate of time and memory; compute nothing.
     trust_code

@@ -192,7 +192,7 @@ def filter_claims(differences: Mapping[int, Mapping[str, float]]) -> tuple[Claim
             "Section 3.1",
             names[patch],
             tuple(at_most(f"{name}, {patch} × {patch}", value, SAME_PPM, "ppm") for name, value in found.items()),
-            f"Largest difference on a noisy edge, {FRAME_SIDE} × {FRAME_SIDE} pixels of W alone, distances in electrons.",
+            f"Largest difference on a noisy edge of {FRAME_SIDE} × {FRAME_SIDE} pixels of W, distances in electrons.",
         )
         for patch, found in differences.items()
     )

@@ -11,6 +11,8 @@ from rodcone.errors import InputError
 from sensor.capture import capture as frame_of
 from sensor.config import SensorConfig
 from sensor.device import Device
+from sensor.exposure import AUTO_INFORMATION, exposure_by_rule_s
+from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.raw import RawImage
 from studies.photograph.calibrate import calibrate, iso_speed
@@ -35,7 +37,7 @@ def capture(
     sensor : SensorConfig, optional
         Left out, the preset ``low_noise``.
     exposure_s : float, optional
-        0 or more [s]; left out, by `sensor.exposure.auto_exposure_s`.
+        0 or more [s]; left out, by the rule ``auto:information`` of `sensor.exposure.exposure_by_rule_s`.
     device, rng, exact, samples_per_pixel
         As `sensor.capture.capture` takes them.
     light : Spectrum, optional
@@ -53,6 +55,8 @@ def capture(
         For a frame that is nearly all full or all dark, and as `sensor.capture.capture`.
     """
     sensor = preset("low_noise") if sensor is None else sensor
+    if exposure_s is None:
+        exposure_s = exposure_by_rule_s(AUTO_INFORMATION, form_image(radiance, sensor, samples_per_pixel), sensor)
     raw = frame_of(radiance, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
     try:
         colour = calibrate(sensor, light or illuminant("D65"))

@@ -148,7 +148,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         known = light_name or (None if balance is None or is_reflectance(order.source) else order.white_balance)
         transport, light, notes = open_radiance_file(order.source, known)
         spectra: dict[str, Spectrum] = {}
-        level: tuple[float | None, float | None] = (parse_level(order.level)[0] if order.level else None), None
+        level: dict[str, Any] = {"luminance_cd_m2": parse_level(order.level)[0]} if order.level else {}
     else:
         spectra = asked_spectra(opened.scene, order.light)
         light, notes = _first_light(opened.scene, spectra)
@@ -170,8 +170,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
     # The exposure.
     if step:
         step("exposure", 0.9)
-    level_terms: dict[str, Any] = dict(zip(("luminance_cd_m2", "illuminance_lux"), level, strict=True))
-    radiance = transport.relight(spectra, **level_terms)
+    radiance = transport.relight(spectra, **level)
     if exposure_s is None:
         exposure_s = exposure_by_rule_s(order.exposure, form_image(radiance, sensor), sensor)
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
@@ -181,8 +180,9 @@ def take(order: Order, step: Step | None = None) -> Taken:
     raws = [replace(frame, camera=name, f_number=lens.f_number, iso=iso, colour=colour) for frame in taken]
     raw = raws[0]
     if opened is not None:
-        even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **level_terms))
-        frame = (even - odd) / 2, (even + odd) / 2, sensor, exposure_s
+        even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **level))
+        # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
+        frame = (even - odd) / 2, np.maximum((even + odd) / 2, 0.0), sensor, exposure_s
         notes += filter(None, [noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))])
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:

@@ -145,15 +145,15 @@ def noise_note(share: float, spp: float, speckles: NDArray[np.float64] | None = 
     """
     if share >= 1:
         times = f"{share:.2g}" if share < 10 else f"{share:.0f}"
-        what = f"variance is {times} times the sensor's: it shows in the pictures and in the reference"
+        what = f"the render's noise has {times} times the sensor's variance: it shows in pictures and reference"
         factor = share
     elif speckles is not None and speckles.size:
-        what = f"{speckles.size} pixels are speckles, single samples more than {SPECKLE:g} times the sensor's noise"
+        what = f"{speckles.size} pixels are speckles: the render's noise there is over {SPECKLE:g} times the sensor's"
         factor = float(speckles.max()) / SPECKLE  # a sample's part of a pixel falls as their number grows
     else:
         return ""
     remedy = f"; {2 ** ceil(log2(spp * factor))} samples a pixel would do" if spp else ""
-    return f"the render's noise: {what}{remedy}"
+    return f"{what}{remedy}"
 
 
 def render_quietly(

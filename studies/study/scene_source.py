@@ -61,8 +61,8 @@ def asked_size(own: tuple[int, int], height: int | None, width: int | None) -> t
     return (max(1, round(width * own[0] / own[1])), width) if width is not None else own
 
 
-def asked_level(scene: Scene, text: str | None) -> tuple[float | None, float | None]:
-    """Level as mean luminance [cd m^-2] or as illuminance [lux]; neither for the scene's own lights.
+def asked_level(scene: Scene, text: str | None) -> dict[str, float]:
+    """Level as `render.transport.Transport.relight` takes it: luminance_cd_m2, illuminance_lux, or the lights' own.
 
     Raises
     ------
@@ -70,11 +70,11 @@ def asked_level(scene: Scene, text: str | None) -> tuple[float | None, float | N
         For what is no light level, or lux in a scene without a reference plane.
     """
     if text is None:
-        return None, None
+        return {}
     value, unit = parse_level(text)
     if unit == "lux" and scene.reference_plane is None:
         raise InputError(
             f"level: {text!r} needs a reference plane, which scene {scene.name} doesn't state; give it in cd/m2, "
             "or put an irradiancemeter on a shape"
         )
-    return (None, value) if unit == "lux" else (value, None)
+    return {"illuminance_lux" if unit == "lux" else "luminance_cd_m2": value}

@@ -269,7 +269,6 @@ def _check_cameras(study: Study) -> None:
 
 def _check_numbers(study: Study) -> None:
     limits, lens, budget = study.render, study.lens, study.budget
-    require_range("longest_exposure_s", study.longest_exposure_s, 1e-9, 1e6, "give seconds above 0")
     if study.sensor_side_um is not None:
         require_range("sensor_side_um", study.sensor_side_um, 1.0, 1e6, "give micrometres, or leave it out")
         for name in study.sensors:
@@ -279,19 +278,18 @@ def _check_numbers(study: Study) -> None:
             require_whole(f"sensor_side_um: pixels across {label(name)}", across, 16, 8192, fix)
     if limits.size is not None:
         require_whole("render.size", limits.size, 16, 8192, "give the picture's longer side in pixels")
-    require_range("render.band_nm", limits.band_nm, 1.0, 100.0, "give nanometres")
     require_whole("render.spp", limits.spp, 1, 1 << 16, "give samples per pixel")
     require_whole("render.seed", limits.seed, 0, 2**31, "give a whole number")
-    if limits.max_seconds is not None:
-        require_range("render.max_seconds", limits.max_seconds, 1e-3, 1e7, "give seconds")
-    if limits.noise_share is not None:
-        require_range("render.noise_share", limits.noise_share, 1e-6, 1e3, "give a share of the noise variance: 0.03")
-    for name, highest, hint in (
-        ("diffraction", 100.0, "give 1 for an ideal lens, 0 for none"),
-        ("veiling_glare", 1.0, "give a fraction, 0 for none"),
-        ("horizontal_view_deg", 175.0, "give degrees, 0 for none"),
+    for name, value, low, high, fix in (
+        ("longest_exposure_s", study.longest_exposure_s, 1e-9, 1e6, "give seconds above 0"),
+        ("render.band_nm", limits.band_nm, 1.0, 100.0, "give nanometres"),
+        ("render.max_seconds", limits.max_seconds, 1e-3, 1e7, "give seconds"),
+        ("render.noise_share", limits.noise_share, 1e-6, 1e3, "give a share of the noise variance: 0.03"),
+        ("lens.diffraction", lens.diffraction, 0.0, 100.0, "give 1 for an ideal lens, 0 for none"),
+        ("lens.veiling_glare", lens.veiling_glare, 0.0, 1.0, "give a fraction, 0 for none"),
+        ("lens.horizontal_view_deg", lens.horizontal_view_deg, 0.0, 175.0, "give degrees, 0 for none"),
+        ("budget.total", budget.total, 1e-6, 1e3, "give a share of the noise variance: 10 % is 0.1"),
+        ("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total"),
     ):
-        if (term := getattr(lens, name)) is not None:
-            require_range(f"lens.{name}", term, 0.0, highest, hint)
-    require_range("budget.total", budget.total, 1e-6, 1e3, "give a share of the noise variance: 10 % is 0.1")
-    require_range("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total")
+        if value is not None:
+            require_range(name, value, low, high, fix)

@@ -17,6 +17,7 @@ import tifffile
 import rodcone as public
 from render.loader import mitsuba_module
 from rodcone.doors import door
+from sensor.exposure import exposure_by_rule_s
 from studies.sweep.workers import InThisProcess
 
 NM = np.arange(385.0, 780.0, 10.0)
@@ -274,6 +275,14 @@ def test_a_frame_that_is_all_full_or_all_dark_is_told(luminance_cd_m2: float, ex
         warnings.simplefilter("always")
         public.capture(public.SpectralRadiance(values, NM), "low_noise", exposure)
     assert [words in str(one.message) for one in caught] == [True] * bool(words)
+
+
+def test_an_exposure_that_is_left_out_is_by_the_rule_of_the_demo() -> None:
+    bright = public.SpectralRadiance(RADIANCE.values * np.float32(100 / RADIANCE.luminance().mean()), NM)
+    image = public.form_image(bright, "low_noise")
+    time_s = exposure_by_rule_s("auto:information", image, public.low_noise())
+    assert public.auto_exposure_s(image, "low_noise") != time_s, "the two rules agree here"
+    assert public.capture(bright).exposure_s == time_s
 
 
 def test_names_stand_for_values_and_a_frame_for_its_picture() -> None:

@@ -77,7 +77,7 @@ def test_a_scene_becomes_two_negatives_whose_paths_alone_are_printed(
 @pytest.mark.parametrize(
     ("scene", "level", "told"),
     [
-        ("cornell_box", "100cd/m2", "rodcone: the render's noise: variance is "),
+        ("cornell_box", "100cd/m2", "rodcone: the render's noise has "),
         ("cornell_box", "0.001cd/m2", ""),
         ("flat_field", "100cd/m2", ""),
     ],
@@ -89,6 +89,17 @@ def test_a_render_with_more_noise_than_the_sensor_is_told(
     code, _, err = call([*arguments, "-o", str(tmp_path / "shot.dng")], capsys)
     assert (code, err.count("\n")) == (0, bool(told))
     assert err.startswith(told)
+
+
+@pytest.mark.thorough
+def test_lamps_beside_which_the_lens_undershoots_are_photographed_without_a_warning(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Warnings are errors here: the root of a negative variance was one."""
+    arguments = ["capture", "night_street", "--size", "96", "--spp", "16", "--cfa", "bayer", "--level", "50cd/m2"]
+    code, _, err = call([*arguments, "-o", str(tmp_path / "shot.dng")], capsys)
+    assert code == 0
+    assert "invalid value" not in err
 
 
 @pytest.mark.parametrize(

@@ -131,7 +131,7 @@ def test_the_report_names_a_level_and_its_source_and_a_noisy_render_is_told(
     small = ["--size", "16", "--spp", "2", "--level", "moonlight", "--level", "sunlit day"]
     assert call([*small, "-o", str(tmp_path)]) == 0
     told = capsys.readouterr().err
-    assert re.search(r"^rodcone: still_life, sunlit day, low_noise, \w+: the render's noise: variance is", told, re.M)
+    assert re.search(r"^rodcone: still_life, sunlit day, low_noise, \w+: the render's noise has", told, re.M)
     assert re.search(r"; \d+ samples a pixel would do$", told, re.M)
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "moonlight" in page

@@ -142,7 +142,7 @@ def test_a_render_with_more_noise_than_the_sensor_is_told_on_the_page_and_once_o
         page.wait("histogram", number)
     session.close()
     notes = [header["noise_note"] for header in page.headers]
-    assert [note.startswith("the render's noise: variance is ") for note in notes] == [True, True, False]
+    assert [note.startswith("the render's noise has ") for note in notes] == [True, True, False]
     assert capsys.readouterr().err == f"rodcone: {notes[0]}\n"
 
 

@@ -120,7 +120,7 @@ def test_the_note_tells_what_shows_and_the_samples_that_would_do():
     assert noise_note(0.99, 64) == ""
     assert "3.2 times the sensor's" in noise_note(3.2, 64)
     assert noise_note(3.2, 64).endswith("; 256 samples a pixel would do")  # 64 x 3.2 = 205, in powers of two
-    assert noise_note(3.2, 0).endswith("in the reference")  # of a file
+    assert noise_note(3.2, 0).endswith("in pictures and reference")  # of a file
     bright = noise_note(0.2, 64, np.array([5.5, 12.0]))
     assert "2 pixels are speckles" in bright
     assert bright.endswith("; 256 samples a pixel would do")  # 64 x 12 / 5 = 154
