@@ -55,7 +55,7 @@ def sweep(
     force: bool = False,
     json: bool = False,
 ) -> int:
-    """Make every picture of a study, write each one's figures into a ledger and make a report; prints the ledger's path.
+    """Make every picture of a study, write its figures into a ledger, and make a report; prints the ledger's path.
 
     Whatever ends it (Ctrl-C, a kill, a full disk), the same command goes on with the cells that are missing.
 
