@@ -13,10 +13,11 @@ from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.substitution import COLOUR_ERROR
 from rodcone.brief import brief
 from rodcone.colour_spaces import white_of
-from rodcone.errors import InputError, require_range
+from rodcone.errors import InputError, require_fields, require_range
 from rodcone.jit import Backend
 from rodcone.notebook import html_of, preview_png
 from rodcone.plots import Axes, draw_line
+from rodcone.types import real_array
 from sensor.cfa import channels
 from sensor.raw import RawImage
 
@@ -48,6 +49,11 @@ class Picture:
     substitution: float | None = None
 
     __repr__ = brief
+
+    def __post_init__(self) -> None:
+        require_fields(self)
+        if real_array("rgb", self.rgb).shape[2:] != (3,):
+            raise InputError(f"rgb: shape {np.shape(self.rgb)} is not allowed; give linear sRGB, (h, w, 3)")
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -18,7 +18,7 @@ from render.scene import LightGroup
 from render.scene_range import warn_of_dark_ends
 from render.spectrum import Spectrum
 from rodcone.brief import brief
-from rodcone.errors import InputError, require_keys, require_range
+from rodcone.errors import InputError, require_keys, require_kind, require_range
 from rodcone.notebook import html_of
 from rodcone.types import Floats, Planes
 
@@ -135,7 +135,7 @@ class Transport:
             Where a light's spectrum ends within the bands at a value other than 0: it gives no light beyond.
         """
         if isinstance(spectra, float | int):
-            powers = dict.fromkeys(self.groups, float(spectra))
+            powers = dict.fromkeys(self.groups, spectra)
             spectra = None
         emitted = self._emission(spectra, powers)
         coefficients, level_error = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
@@ -245,17 +245,20 @@ class Transport:
         self, spectra: Mapping[str, Spectrum | str] | None, powers: Mapping[str, float] | None
     ) -> dict[str, LightGroup]:
         """Light groups as asked for."""
-        require_keys("spectra: light group", spectra or {}, self.groups)
-        require_keys("powers: light group", powers or {}, self.groups)
+        for what, given in (("spectra", spectra), ("powers", powers)):
+            if given is not None:
+                require_kind(what, given, Mapping, "give a dict by light group")
+                require_keys(f"{what}: light group", given, self.groups)
         lights = {}
         for name, group in self.groups.items():
             own = (spectra or {}).get(name, group.spectrum)
-            power = float((powers or {}).get(name, group.power))
-            require_range(f"powers[{name!r}]", power, 0.0, 1e30, "give a factor of 0 or more")
             spectrum = illuminant(own) if isinstance(own, str) else own
+            require_kind(f"spectra[{name!r}]", spectrum, Spectrum, "give rodcone.illuminant(name)")
+            power = (powers or {}).get(name, group.power)
+            require_range(f"powers[{name!r}]", power, 0.0, 1e30, "give a factor of 0 or more")
             if power > 0:
                 warn_of_dark_ends(f"light group {name!r}", spectrum, self.wavelength_nm, self.width_nm)
-            lights[name] = replace(group, spectrum=spectrum, power=power)
+            lights[name] = replace(group, spectrum=spectrum, power=float(power))
         return lights
 
     def _emission(

@@ -54,7 +54,8 @@ def _plain(kind: Any, words: str) -> Check:
     """Check for an object of one of Python's own classes; True and False are no numbers."""
 
     def check(name: str, value: Any) -> Any:
-        if not isinstance(value, kind) or (kind is Integral and isinstance(value, bool)) or value == "":
+        wrong = not isinstance(value, kind) or (kind is Integral and isinstance(value, bool))
+        if wrong or value == "" or (isinstance(value, str | PathLike) and "\0" in str(value)):
             raise InputError(f"{name}: {_shown(value)} is not allowed; give {words}")
         return value
 

@@ -6,7 +6,7 @@ from functools import cache
 from math import isfinite, nan
 from numbers import Integral, Real
 from types import UnionType
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 MOST_TOLD = 2000  # characters; a quoted file may fill megabytes
 
@@ -104,6 +104,8 @@ def _fits(value: Any, kind: Any) -> bool:
         return any(_fits(value, part) for part in parts)
     if kind in (float, int):
         return not isinstance(value, bool) and isinstance(value, Real if kind is float else Integral)
+    if get_origin(kind) is Literal:
+        return isinstance(value, str) and value in parts
     if get_origin(kind) is tuple:
         kinds = parts[:1] * len(value) if parts[-1] is ... and isinstance(value, tuple) else parts
         return isinstance(value, tuple) and len(value) == len(kinds) and all(map(_fits, value, kinds))

@@ -105,6 +105,7 @@ WRONG: tuple[Any, ...] = (
         "x",
         "",
         "a\nb",
+        "a\0b.png",
         "1e9s",
         b"x",
         [],
@@ -198,6 +199,7 @@ VALUES = (
     public.load("flat_field"),
     public.SceneChoice("flat_field"),
     RIGHT["study"],
+    public.Picture(np.ones((4, 4, 3)), {}),
 )
 
 
@@ -213,6 +215,20 @@ def test_a_wrong_field_of_a_value_is_refused_in_one_line_or_means_something(valu
             else:
                 if not refused.isprintable() or (not refused and any(wrong is never for never in NEVER)):
                     faults.append(f"{field.name}={wrong!r}: {refused or 'goes through'}")
+    assert not faults, "\n".join(faults)
+
+
+@pytest.mark.parametrize("name", ["spectra", "powers"])
+def test_a_wrong_light_is_refused_in_one_line_or_is_the_power_of_all(name: str) -> None:
+    faults = []
+    for wrong in (*WRONG, *({group: value} for group in TRANSPORT.groups for value in WRONG)):
+        try:
+            refused = said(partial(TRANSPORT.relight, **{name: wrong}))
+        except Exception as error:
+            faults.append(f"{wrong!r}: {type(error).__name__}: {error}"[:150])
+        else:
+            if not refused.isprintable() or (not refused and any(wrong is never for never in (*NEVER, True))):
+                faults.append(f"{wrong!r}: {refused or 'goes through'}")
     assert not faults, "\n".join(faults)
 
 
