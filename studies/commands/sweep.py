@@ -29,7 +29,7 @@ from studies.study.study_file import read_study
 from studies.sweep.cluster import on_cluster
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows, write_table
-from studies.sweep.folder import claim
+from studies.sweep.folder import at_work
 from studies.sweep.prepare import PILOTS
 from studies.sweep.run_sweep import Runner, Swept
 from studies.sweep.run_sweep import sweep as run_sweep
@@ -133,8 +133,8 @@ def make_all(
     Swept, Path
         What was made, and the report.
     """
-    claim(out)  # a folder that can't be written fails before anything is rendered
-    with _saying_what_is_kept(out), progress(sys.stderr) as step:
+    # the folder first: one that can't be written fails before anything is rendered
+    with at_work(out), _saying_what_is_kept(out), progress(sys.stderr) as step:
         with clock.stage("plan"):
             plan = planned(step)
         swept = run_sweep(study, out, plan, runner, step, keep_old=keep_old, clock=clock)

@@ -14,8 +14,11 @@ from studies.sweep.prepare import FRAMES, PICTURES, PILOTS, RENDERS
 MARKER = ".rodcone-sweep"  # locked by each sweep at work: the lock ends with its process, however that ends
 
 
-def claim(out: Path) -> None:
-    """Make a folder that of sweeps: mark a new or an empty one; hidden files don't count.
+@contextmanager
+def at_work(out: Path) -> Iterator[None]:
+    """Make a folder that of sweeps, and hold its lock; where no other does, remove what killed ones left half written.
+
+    A new or an empty folder is marked; hidden files don't count.
 
     Raises
     ------
@@ -33,11 +36,6 @@ def claim(out: Path) -> None:
                 f"a sweep; write --out {out / 'sweep'}"
             )
     (out / MARKER).touch()
-
-
-@contextmanager
-def at_work(out: Path) -> Iterator[None]:
-    """Hold the lock of a folder of sweeps; where no other sweep does, remove what killed ones left half written."""
     with (out / MARKER).open("rb") as marker:
         with suppress(OSError):  # another sweep is at work, or this file system has no locks
             fcntl.flock(marker, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -48,8 +46,9 @@ def at_work(out: Path) -> Iterator[None]:
 
 
 def _remove_half_written(out: Path) -> None:
-    for name in (RENDERS, FRAMES, PICTURES, PILOTS):
-        for folder, _, files in os.walk(out / name):
+    for top in (out / name for name in (RENDERS, FRAMES, PICTURES, PILOTS)):
+        # of a linked folder, which others may share, no lock of this one tells who is at work in it
+        for folder, _, files in os.walk(top) if not top.is_symlink() else ():
             for file in files:
                 path = Path(folder) / file
                 if is_half_written(path):

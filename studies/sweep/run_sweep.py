@@ -20,7 +20,7 @@ from studies.study.render_noise import noise_note
 from studies.study.study import Study, conditions, label
 from studies.sweep.cells import Cell
 from studies.sweep.database import add, done, forget_old, note_run, note_stages, open_results, rows, want
-from studies.sweep.folder import at_work, claim
+from studies.sweep.folder import at_work
 from studies.sweep.prepare import PICTURES, PILOTS, Job, known_cells, scene_cells
 from studies.sweep.row import Row
 from studies.sweep.workers import InThisProcess, run
@@ -97,10 +97,9 @@ def sweep(
     for name in study.processors:
         require_libraries(name)
     scenes = open_all(study)
-    claim(out)
-    plan = plan or plan_of(study, cache=out / PILOTS, step=step)
     runner = runner or (lambda cells: run(cells, InThisProcess()))
-    with told(step) as show, open_results(out) as base, at_work(out):
+    with at_work(out), told(step) as show, open_results(out) as base:
+        plan = plan or plan_of(study, cache=out / PILOTS, step=step)
         job = Job(study, plan, out, base, clock)
         now = datetime.now(UTC).isoformat(timespec="seconds")
         number = note_run(base, now, platform.node(), json.dumps(_noted(study)))

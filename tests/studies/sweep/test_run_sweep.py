@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import random
+import shutil
 import signal
 import struct
 import subprocess
@@ -13,9 +14,11 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext, suppress
 from dataclasses import replace
+from datetime import datetime
 from functools import partial
 from multiprocessing import active_children
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -32,8 +35,9 @@ from sensor.response import expected_electrons
 from studies.study.render_noise import charged_share, monte_carlo_share
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import run_cell as cell_run
+from studies.sweep import run_sweep as sweep_run
 from studies.sweep.cells import Cell
-from studies.sweep.database import open_results, rows
+from studies.sweep.database import last_run, open_results, rows
 from studies.sweep.folder import at_work
 from studies.sweep.row import Row
 from studies.sweep.workers import run, run_in_processes
@@ -212,6 +216,9 @@ def test_what_a_killed_run_left_is_cleared_and_nothing_else(tmp_path: Path) -> N
         os.utime(path, (0, 0))
     (out / "renders").mkdir(exist_ok=True)
     (out / "renders" / name).symlink_to(out / kept[0])
+    shutil.move(out / "pilots", tmp_path / "shared")  # where others may be at work
+    (out / "pilots").symlink_to(tmp_path / "shared")
+    left.pop()
     before = content(out)
     with at_work(out):
         for path in left:
@@ -222,7 +229,30 @@ def test_what_a_killed_run_left_is_cleared_and_nothing_else(tmp_path: Path) -> N
     assert not any(path.exists() for path in left)
     assert all((out / place).read_bytes() == b"half" for place in kept)
     assert (out / "renders" / name).is_symlink()
+    assert (tmp_path / "shared" / f"{name}.npz").exists()
     assert content(out) == before
+
+
+@pytest.mark.parametrize("year", [1970, 2106])
+def test_a_clock_that_jumps_makes_no_cell_anew_and_the_last_run_stays_the_last(
+    year: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, out = small_study(tmp_path), tmp_path / "out"
+    swept(study, out)
+    before = content(out)
+    clock = SimpleNamespace(now=lambda zone: datetime(year, 1, 2, tzinfo=zone))
+    for module in (sweep_run, cell_run):
+        monkeypatch.setattr(module, "datetime", clock)
+    for path in out.rglob("*"):
+        os.utime(path, (4e9, 4e9))
+    assert swept(replace(study, seeds=(1,)), out).made == 0
+    assert last_run(out).study["seeds"] == [1]
+    assert swept(replace(study, seeds=(0, 1, 2)), out).made == 2
+    assert len(last_run(out).rows) == 6
+    assert last_run(out).stages.keys() >= {"captures", "metrics"}
+    assert min(last_run(out).stages.values()) >= 0
+    assert swept(study, out).made == 0
+    assert [row for row in content(out) if row in before] == before
 
 
 def test_a_folder_with_other_files_is_refused_and_left_as_it_was(tmp_path: Path) -> None:
