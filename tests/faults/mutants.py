@@ -40,7 +40,7 @@ TESTS = {  # below tests/, the likeliest first
             "sensor/test_readout_crosstalk",
             "sensor/test_capture",
         ),
-        *("studies/photograph/test_snr", "sensor/test_binning", "sensor/readings/test_noise"),
+        *("studies/photograph/test_snr", "sensor/test_photodiodes", "sensor/readings/test_noise"),
     ],
     "isp/reference.py": ["isp/kernel/test_kernel", "isp/test_interleaved"],
     "render/transport.py": [
