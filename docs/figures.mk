@@ -16,7 +16,7 @@ RAN := $(PAGES:docs/%.md=$(FIGURES)/%/ran)
 
 .DELETE_ON_ERROR:
 .PHONY: figures pages
-figures: pages $(FIGURES)/demo/report.html $(FIGURES)/paper/paper.html $(FIGURES)/photon_transfer.svg
+figures: pages $(FIGURES)/demo/report.html $(FIGURES)/paper/paper.html
 pages: $(RAN)
 
 $(FIGURES)/demo/report.html: $(CODE)
@@ -24,10 +24,6 @@ $(FIGURES)/demo/report.html: $(CODE)
 
 $(FIGURES)/paper/paper.html: $(CODE)
 	$(BIN)/rodcone paper $(PAPER) -o $(@D)
-
-$(FIGURES)/photon_transfer.svg: $(CODE)
-	@mkdir -p $(@D)
-	$(BIN)/rodcone characterise low_noise -o $@
 
 $(RAN): $(FIGURES)/%/ran: docs/%.md docs/run_page.py $(CODE)
 	rm -rf $(@D)

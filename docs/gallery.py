@@ -1,8 +1,7 @@
 """Make the galleries, docs/gallery: `python docs/gallery.py [SCENE ...]` writes pages, drawings and pictures.
 
 A picture is made by the very commands that stand beneath it, in a folder that is thrown away. Scenes that are named are
-photographed anew, and ``demo`` makes the first page's picture anew; without a name all are. Pages and drawings are
-always written.
+photographed anew; without a name all are. Pages and drawings are always written.
 """
 
 import inspect
@@ -13,12 +12,11 @@ import tempfile
 from importlib import import_module
 from pathlib import Path
 
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
 from scenes import catalog
 from sensor import cfa, presets
 from studies.commands.list import first_line, lights, sensors
-from studies.sweep.results import GAP
 
 FOLDER = Path(__file__).resolve().parent / "gallery"
 QUALITY = 80  # of the pictures, as WebP counts it
@@ -182,13 +180,6 @@ DRAWINGS = (
 )
 
 
-# The first page's picture: some of the demo's levels, and its cameras in their order.
-DEMO = "rodcone demo --level moonlight --level street --level 'overcast day' -o demo"
-LEVELS = ("moonlight", "street light", "overcast day")
-LETTERS, HEAD = 16, 28  # height of the letters, and of the line of names above the pictures [pixels]
-CAMERAS = ("RGBW, interleaved", "Bayer, bilinear", "RGBW, piecewise linear", "Bayer, piecewise linear")
-
-
 def run(command: str, folder: Path) -> None:
     """Run a command of the page's in a folder."""
     call = [sys.executable, "-c", "from studies.commands.cli import main; main()", *shlex.split(command)[1:]]
@@ -204,33 +195,10 @@ def photograph(scene: str, folder: Path) -> None:
             picture.convert("RGB").save(folder / f"{scene}.webp", quality=QUALITY, method=6)
 
 
-def first_picture(overview: Path) -> None:
-    """Write docs/images/demo.webp from the demo's overview, a column a level and a row a camera: here a row a level."""
-    font = ImageFont.load_default(LETTERS)
-    with Image.open(overview) as sheet:
-        width, height = (sheet.width + GAP) // len(LEVELS), (sheet.height + GAP) // len(CAMERAS)
-        turned = Image.new("RGB", (len(CAMERAS) * width - GAP, len(LEVELS) * height - GAP + HEAD), "white")
-        draw = ImageDraw.Draw(turned)
-        for x, camera in enumerate(CAMERAS):
-            draw.text((x * width + width // 2, HEAD // 2), camera, "black", font, "mm")
-            for y, level in enumerate(LEVELS):
-                picture = sheet.crop((y * width, x * height, (y + 1) * width - GAP, (x + 1) * height - GAP))
-                turned.paste(picture, (x * width, y * height + HEAD))
-                if x == 0:
-                    place = (8, y * height + HEAD + 8)
-                    draw.text(place, level, "black", font, stroke_width=3, stroke_fill="white")
-    turned.save(FOLDER.parent / "images" / "demo.webp", quality=QUALITY, method=6)
-
-
 if __name__ == "__main__":
     for name, page in PAGES.items():
         (FOLDER / name).write_text(page(), "utf-8")
     for command in DRAWINGS:
         run(command, FOLDER)
-    for asked in sys.argv[1:] or (*catalog.names(), "demo"):
-        if asked == "demo":
-            with tempfile.TemporaryDirectory() as scratch:
-                run(DEMO, Path(scratch))
-                first_picture(Path(scratch) / "demo" / "overview.png")
-        else:
-            photograph(asked, FOLDER)
+    for scene in sys.argv[1:] or catalog.names():
+        photograph(scene, FOLDER)

@@ -27,6 +27,7 @@ SHOWN = (".html", ".png", ".svg")
 # how-tos come first, then what can be named; why it is so and the functions within come last.
 BOOSTS = {"how_to": 4.0, "tutorial": 4.0, "gallery": 2.0, "decisions": 0.25, "results": 0.25, "api": 0.5}
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
+MADE = re.compile(r"`out/(demo/report|paper/paper)\.html`")  # in words where no figures are, a link on the site
 CSV_LINK = re.compile(r"\(results/(\w+)\.csv\)")  # a file in the repository, a page of the site
 NAME = re.compile(rf"(<a\b[^>]*>)?<code>((?:{'|'.join(PACKAGES)})(?:\.\w+)+)</code>")  # a link in front: left alone
 
@@ -70,6 +71,8 @@ def on_files(files: Files, config: Any) -> Files:
 def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> str:
     """Show beneath each block that docs/run_page.py ran what it printed; weigh the page for the search."""
     page.meta["search"] = {"boost": BOOSTS.get(page.file.src_uri.partition("/")[0], 1.0)}
+    up = "../" * page.file.src_uri.count("/")
+    markdown = MADE.sub(rf"[`out/\1.html`]({up}figures/\1.html)", markdown)
     if not page.file.src_uri.startswith("results/"):
         markdown = CSV_LINK.sub(r"(results/\1.md)", markdown)
     outputs = ROOT / config.extra["figures"] / page.file.src_uri.removesuffix(".md") / "output.json"

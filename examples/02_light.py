@@ -2,7 +2,7 @@
 
     python examples/02_light.py [SIZE]
 
-Writes moonlight.png, day.png and tungsten.png.
+Writes moonlight.png, day.png, tungsten.png and sodium.png.
 """
 
 import sys
@@ -13,6 +13,7 @@ import rodcone
 
 size = int(sys.argv[1]) if sys.argv[1:] else 256
 
+print("scenes:", ", ".join(rodcone.scenes()))
 transport = rodcone.render("still_life", (size, size), spp=64)
 (softbox,) = transport.groups
 print("the scene's light:", softbox, "; lights by name:", ", ".join(rodcone.illuminants()[:6]), "...")
@@ -35,3 +36,9 @@ for name, radiance in lit.items():
     print(
         f"{name:9}  {radiance.luminance().mean():8.3f} cd/m2  {1000 * time_s:6.2f} ms  {raw.electrons.mean():6.0f} e-"
     )
+
+# The lines of a lamp are narrower than the bands of 10 nm: render each in a band of its own.
+centre_nm, width_nm = rodcone.line_bands(rodcone.lines_nm("sodium_low"))
+lines = rodcone.render(rodcone.load("still_life"), (size, size), wavelength_nm=centre_nm, width_nm=width_nm, spp=16)
+orange = lines.relight({softbox: "sodium_low"}, luminance_cd_m2=10.0)
+rodcone.write_picture(rodcone.develop(rodcone.capture(orange, "low_noise", "20ms", light="sodium_low")), "sodium.png")

@@ -14,6 +14,12 @@ import rodcone
 
 size = int(sys.argv[1]) if sys.argv[1:] else 256
 
+print("presets:", ", ".join(rodcone.sensors()))
+try:
+    rodcone.preset("low_nois")
+except rodcone.InputError as error:  # one line: the name, its value, what is allowed
+    print(error)
+
 pixel = rodcone.PixelConfig(
     pitch_um=3.0,
     fill_factor=0.95,

@@ -13,6 +13,7 @@ import rodcone
 
 size = int(sys.argv[1]) if sys.argv[1:] else 256
 
+print("mosaics:", ", ".join(rodcone.mosaics()))
 transport = rodcone.render("still_life", (size, size), spp=256)
 rows = []
 for level_cd_m2 in (0.05, 25.0):

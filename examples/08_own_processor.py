@@ -31,6 +31,7 @@ develop = rodcone.Processor("bayer", picture_by_cells, "cells of a Bayer mosaic"
 
 def main(size: int) -> None:
     """Photograph a star, then compare with the conventional camera over two light levels."""
+    print("processors by name:", ", ".join(rodcone.processors()[:4]), "...")
     radiance = rodcone.render("siemens_star", (size, size), spp=64).relight(luminance_cd_m2=25.0)
     raw = rodcone.capture(radiance, rodcone.low_noise(cfa="bayer"), "10ms")
     # A Python file may do all that you may, so rodcone runs one only with your consent.

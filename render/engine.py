@@ -104,7 +104,7 @@ def render(
     Warns
     -----
     UserWarning
-        Where data of a coloured light end within the bands: it gives no light beyond.
+        Where data of a coloured light end within the bands: outside it is dark.
     """
     # What is asked for
     film = _checked_film(scene, size, wavelength_nm, width_nm, scene.max_depth if max_depth is None else max_depth)

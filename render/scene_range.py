@@ -57,7 +57,7 @@ def warn_of_dark_ends(light: str, spectrum: Spectrum, wavelength_nm: Floats, wid
     if below or (longest > high + _SLACK_NM and spectrum.values[-1] > 0):
         warnings.warn(
             f"{light} is known over {low:g}-{high:g} nm, and bands reach {shortest:g}-{longest:g} nm: "
-            "it gives no light beyond what is known",
+            "outside its table it is taken as dark",
             UserWarning,
             stacklevel=4,
         )

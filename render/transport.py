@@ -132,7 +132,7 @@ class Transport:
         Warns
         -----
         UserWarning
-            Where a light's spectrum ends within the bands at a value other than 0: it gives no light beyond.
+            Where a light's spectrum ends within the bands at a value other than 0: outside it is dark.
         """
         if isinstance(spectra, float | int):
             powers = dict.fromkeys(self.groups, spectra)

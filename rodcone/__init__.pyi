@@ -11,7 +11,6 @@ from isp.picture import Picture as Picture
 from isp.picture import finish as finish
 from isp.processors.catalogue import Processor as Processor
 from isp.processors.catalogue import names as processors
-from render.denoised.relight import measured_error as measured_error
 from render.denoised.relight import relight_denoised as relight_denoised
 from render.geometry import look_at as look_at
 from render.geometry import to_world as to_world
@@ -48,8 +47,6 @@ from sensor.optics import SpectralIrradiance
 from sensor.presets import low_noise as low_noise
 from sensor.presets import names as sensors
 from sensor.presets import preset as preset
-from sensor.presets import table1_output as table1_output
-from sensor.presets import table1_pixel as table1_pixel
 from sensor.raw import RawImage as RawImage
 from sensor.raw_files.raw_file import read_raw as read_raw
 from sensor.raw_files.raw_file import write_raw as write_raw
@@ -70,7 +67,6 @@ from studies.study.study_file import read_study as read_study
 from studies.sweep.export import read_rows as read_rows
 from studies.sweep.export import to_pandas as to_pandas
 from studies.sweep.run_sweep import Runner, Swept
-from studies.sweep.workers import run as run
 from studies.sweep.workers import run_in_processes as run_in_processes
 
 __all__ = [
@@ -116,7 +112,6 @@ __all__ = [
     "low_noise",
     "mask",
     "matte",
-    "measured_error",
     "merged_raw",
     "mosaics",
     "panel",
@@ -130,14 +125,11 @@ __all__ = [
     "relight_denoised",
     "render",
     "report",
-    "run",
     "run_in_processes",
     "scenes",
     "sensors",
     "snr",
     "sweep",
-    "table1_output",
-    "table1_pixel",
     "take",
     "to_pandas",
     "to_world",

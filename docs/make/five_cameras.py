@@ -1,4 +1,4 @@
-"""Cameras that exist beside the paper's pixel, on sensors of one size: `docs/make/five_cameras.py SWEEP PAGE`."""
+"""Cameras that exist beside the paper's pixel, on sensors of one size: `docs/make/five_cameras.py SWEEP`."""
 
 import json
 import sys
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from page_parts import RESULTS, csv_text, fill
 from real_cameras import REPORTS
 
 from rodcone.errors import InputError
@@ -25,7 +26,6 @@ from studies.metrics.confidence import mean_with_confidence
 from studies.metrics.truth import Light, light_in_bands
 from studies.pages import report_text
 from studies.pages.plots import CHART, COLOURS, INK, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
-from studies.pages.report_markdown import code, lead_cells
 from studies.pages.report_text import (
     DELTA_E,
     FLIP,
@@ -35,13 +35,14 @@ from studies.pages.report_text import (
     Metric,
     duration,
     fixed,
+    lead_text,
     level_text,
     percent,
     plain_name,
     significant,
     table,
 )
-from studies.pages.verdict import OUTCOMES, Floats, Leads, leads
+from studies.pages.verdict import Floats, Leads, leads
 from studies.photograph.snr import FIELD_SIDE, even_field
 from studies.study.equal_area import EqualArea
 from studies.study.study import label
@@ -49,10 +50,10 @@ from studies.sweep.database import LastRun, last_run
 from studies.sweep.provenance import require_alike
 from studies.sweep.row import Row
 
+PAGE = Path(__file__).resolve().parents[1] / "five_cameras.md"
 RGBW, BAYER = "ple_rgbw", "ple_bayer"
 SHOWN = tuple(metric for metric in report_text.METRICS if metric not in ON_TARGETS)
 LINES = dict(zip((*COLOURS, SOFT, "#9a7d0a", INK), ("-", "-", "-", "-", "-", "--", ":"), strict=True))  # a sensor each
-TEXT = Path(__file__).with_name("five_cameras_page.md")
 AT_NM = 530.0  # where the quantum efficiency of a sensor without a report is told
 
 
@@ -87,17 +88,19 @@ class Entry:
         return f"{self.name}, {'RGBW' if self.processor == RGBW else 'Bayer'}"
 
 
-def write_page(run: LastRun, folder: Path, out: Path) -> None:
-    """Write the page and its figure, both or neither.
+def write_page(run: LastRun, folder: Path, out: Path, table_out: Path) -> None:
+    """Write the page's parts, its figure and its table, all or none.
 
     Parameters
     ----------
     run : LastRun
         Of a study of one scene, spectrum, exposure and white balance, with `BAYER` and `RGBW`.
     folder : Path
-        For the page's own command.
+        That the study was swept into.
     out : Path
-        Ends in ``.md``; the figure goes beside it, ending in ``.svg``.
+        The page, which is there; the figure goes beside it, ending in ``.svg``.
+    table_out : Path
+        For every figure, as CSV.
 
     Raises
     ------
@@ -119,11 +122,12 @@ def write_page(run: LastRun, folder: Path, out: Path) -> None:
     stops = {entry.name: entry.sensor.lens.f_number for entry in entries}
     if len(set(stops.values())) > 1:
         raise InputError(f"f_number: {stops} are not one; allowed: one aperture for all; correct the sensors' files")
-    page = page_of(run.study, entries, conditions, folder, out)
+    parts, figures = results(run.study, entries, conditions)
     figure = figure_of(beside_each_other(conditions, entries))
-    with replacing(out, out.with_suffix(".svg")) as (to_page, to_figure):
-        to_page.write_text(page, "utf-8")
+    with replacing(out, out.with_suffix(".svg"), table_out) as (to_page, to_figure, to_table):
+        to_page.write_text(fill(out.read_text("utf-8"), parts), "utf-8")
         to_figure.write_text(svg_text(figure), "utf-8")
+        to_table.write_text(figures, "utf-8")
 
 
 def _entry(given: str) -> Entry:
@@ -176,10 +180,18 @@ def leads_of(metric: Metric, conditions: Sequence[Condition], ours: str, theirs:
     return leads(metric, *(np.array([x.figures(name, metric) for x in conditions]) for name in (ours, theirs)))
 
 
-def lead_table(metric: Metric, rows: Mapping[str, Leads], levels: Sequence[str]) -> str:
-    """Return a table of leads: a line each, light across."""
-    cells = [[code(name), *lead_cells(metric, lead)] for name, lead in rows.items()]
-    return table([f"lead in {_with_unit(metric)}", *levels], cells)
+def lead_rows(metric: Metric, found: Mapping[str, Leads]) -> list[list[str]]:
+    """Return leads with half their intervals: a line each, light across."""
+    return [
+        [
+            name,
+            *(
+                f"{lead_text(metric, mean)} ± {fixed(half, metric.digits)}"
+                for mean, half in zip(x.mean, x.half, strict=True)
+            ),
+        ]
+        for name, x in found.items()
+    ]
 
 
 def _light(scene: str) -> Light:
@@ -188,14 +200,10 @@ def _light(scene: str) -> Light:
     return light_in_bands(next(iter(load(scene).groups.values())).spectrum, nm, np.ones_like(nm))
 
 
-def page_of(
-    study: Mapping[str, Any],
-    entries: Sequence[Entry],
-    conditions: Mapping[str, Sequence[Condition]],
-    folder: Path,
-    out: Path,
-) -> str:
-    """Return the page's Markdown; parameters as `write_page`."""
+def results(
+    study: Mapping[str, Any], entries: Sequence[Entry], conditions: Mapping[str, Sequence[Condition]]
+) -> tuple[dict[str, str], str]:
+    """Return the page's generated parts, and every figure as CSV; parameters as `write_page`."""
     beside = beside_each_other(conditions, entries)
     levels = [level_text(x.level) for x in beside]
     own = next(entry for entry in entries if entry.processor == RGBW)
@@ -204,38 +212,32 @@ def page_of(
     at_peak = np.interp(green.wavelength_nm[green.values.argmax()], white.wavelength_nm, white.values)
     scene = study["scenes"][0]["source"]
     worst = max(row.mc_share for x in beside for rows in x.rows.values() for row in rows)
-    tables = {
-        "sensors": [sensors_table(entries, area)],
-        "summary": [summary_table(beside, own.words)],
-        "light": light_tables(entries, beside, _light(scene), area.coarsest_um),
-        "metrics": [metric_table(metric, beside) for metric in SHOWN],
-        "outcomes": [outcome_table(beside, own.words)],
-        "leads": [
-            lead_table(
-                metric, {x.words: leads_of(metric, beside, own.words, x.words) for x in entries if x != own}, levels
-            )
-            for metric in (PSNR, DELTA_E, FLIP)
-        ],
-        "white_pixel": [
-            lead_table(metric, {name: leads_of(metric, at, RGBW, BAYER) for name, at in conditions.items()}, levels)
-            for metric in (PSNR, DELTA_E, FLIP)
-        ],
+    paper = {
+        metric: lead_rows(metric, {x.words: leads_of(metric, beside, own.words, x.words) for x in entries if x != own})
+        for metric in (PSNR, DELTA_E, FLIP)
     }
-    return TEXT.read_text("utf-8").format(
-        folder=folder,
-        page=out.name,
-        figure=out.with_suffix(".svg").name,
-        scene=f"`{scene}`",
-        side=f"{area.side_um:g}",
-        f_number=f"{own.sensor.lens.f_number:g}",
-        longest=duration(study["longest_exposure_s"]),
-        coarsest=f"{area.coarsest_um:g}",
-        green_share=percent(float(green.values.max() / at_peak)),
-        field=FIELD_SIDE,
-        worst=percent(worst),
-        own=own.name,
-        **{name: "\n\n".join(parts) for name, parts in tables.items()},
-    )
+    white_pixel = {
+        metric: lead_rows(metric, {name: leads_of(metric, at, RGBW, BAYER) for name, at in conditions.items()})
+        for metric in (PSNR, DELTA_E, FLIP)
+    }
+    tables = {
+        **light_rows(entries, beside, _light(scene), area.coarsest_um),
+        **{_with_unit(metric): metric_rows(metric, beside) for metric in SHOWN},
+        **{f"lead of {own.words}: {_with_unit(metric)}": rows for metric, rows in paper.items()},
+        **{f"lead of {RGBW} over {BAYER}: {_with_unit(metric)}": rows for metric, rows in white_pixel.items()},
+    }
+    parts = {
+        "set-up": f"Here: scene `{scene}`, {area.side_um:g} µm, f/{own.sensor.lens.f_number:g}, at most "
+        f"{duration(study['longest_exposure_s'])}, compared at {area.coarsest_um:g} µm. Green's filter passes "
+        f"{percent(float(green.values.max() / at_peak))}. The render's own noise, which counts as texture, has at most "
+        f"{percent(worst)} of the sensor's variance.",
+        "sensors": sensors_table(entries, area),
+        "summary": summary_table(beside, own.words),
+        "paper's pixel": table([f"lead in {_with_unit(PSNR)} over", *levels], paper[PSNR]),
+        "white pixel": table([f"lead in {_with_unit(PSNR)}", *levels], white_pixel[PSNR]),
+    }
+    rows = [[name, *cells] for name, of_table in tables.items() for cells in of_table]
+    return parts, csv_text(["table", "camera", *levels], rows)
 
 
 def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
@@ -273,49 +275,44 @@ def _efficiency(sensor: SensorConfig, told: Mapping[str, float]) -> str:
     return f"{value:.1f} % at {at_nm:g} nm{published}"
 
 
-def light_tables(entries: Sequence[Entry], beside: Sequence[Condition], light: Light, coarsest_um: float) -> list[str]:
-    """Return tables over light: exposure time, electrons, SNR of a pixel and per area."""
-    levels = [level_text(condition.level) for condition in beside]
-    rows: dict[str, list[list[str]]] = {"exposure": [], "electrons": [], "snr": [], "area": []}
+def light_rows(
+    entries: Sequence[Entry], beside: Sequence[Condition], light: Light, coarsest_um: float
+) -> dict[str, list[list[str]]]:
+    """Return rows over light: exposure time, electrons, SNR of a pixel and per area."""
+    times, electrons, snr, area = (
+        "exposure time",
+        f"electrons a pixel: even field of {FIELD_SIDE} x {FIELD_SIDE}, mean of the picture",
+        "SNR of a pixel [dB]: closed form, simulated",
+        f"SNR of {coarsest_um:g} µm squared [dB]",
+    )
+    rows: dict[str, list[list[str]]] = {times: [], electrons: [], snr: [], area: []}
     for entry in entries:
-        shown = [each for each in channels(entry.sensor.cfa) if each in "GW"]
-        rows["exposure"].append([entry.words, *(duration(each.rows[entry.words][0].exposure_s) for each in beside)])
-        for channel in shown:
-            cells: dict[str, list[str]] = {"electrons": [], "snr": [], "area": []}
+        rows[times].append([entry.words, *(duration(each.rows[entry.words][0].exposure_s) for each in beside)])
+        gain_db = 20 * log10(coarsest_um / entry.sensor.pixel.pitch_um)
+        for channel in (each for each in channels(entry.sensor.cfa) if each in "GW"):
+            for name in (electrons, snr, area):
+                rows[name].append([f"{entry.words}, {channel}"])
             for condition in beside:
                 row = condition.rows[entry.words][0]
                 field = even_field(entry.sensor, channel, light, row.luminance_cd_m2, row.exposure_s)
                 in_picture = json.loads(row.mean_electrons)[channel]
-                cells["electrons"].append(f"{significant(field.electrons)}, {significant(in_picture)}")
                 full = field.electrons >= entry.sensor.pixel.full_well_e
-                cells["snr"].append(MISSING if full else f"{fixed(field.snr_db, 1)}, {fixed(field.simulated_db, 1)}")
-                gain_db = 20 * log10(coarsest_um / entry.sensor.pixel.pitch_um)
-                cells["area"].append(MISSING if full else fixed(field.snr_db + gain_db, 1))
-            for key, values in cells.items():
-                rows[key].append([f"{entry.words}, {channel}", *values])
-    heads = {
-        "exposure": "exposure time",
-        "electrons": "electrons a pixel: even field, mean of the picture",
-        "snr": "SNR of a pixel [dB]: closed form, simulated",
-        "area": f"SNR of {coarsest_um:g} µm squared [dB]",
-    }
-    return [table([heads[key], *levels], of_key) for key, of_key in rows.items()]
+                rows[electrons][-1].append(f"{significant(field.electrons)}, {significant(in_picture)}")
+                rows[snr][-1].append(MISSING if full else f"{fixed(field.snr_db, 1)}, {fixed(field.simulated_db, 1)}")
+                rows[area][-1].append(MISSING if full else fixed(field.snr_db + gain_db, 1))
+    return rows
 
 
-def metric_table(metric: Metric, beside: Sequence[Condition]) -> str:
-    """Return a table of one metric: sensors down, light across; the best of each column in bold."""
-    sign = 1 if metric.higher else -1
-    best = [sign * max(sign * condition.mean(name, metric) for name in condition.rows) for condition in beside]
+def metric_rows(metric: Metric, beside: Sequence[Condition]) -> list[list[str]]:
+    """Return means over seeds of one metric with half their intervals: sensors down, light across."""
     rows = []
     for name in beside[0].rows:
-        cells = []
-        for condition, most in zip(beside, best, strict=True):
-            found = mean_with_confidence([getattr(row, metric.key) for row in condition.rows[name]])
-            shown = fixed(found.mean, metric.digits)
-            shown = f"**{shown}**" if shown == fixed(most, metric.digits) else shown
-            cells.append(f"{shown} ± {fixed((found.high - found.low) / 2, metric.digits)}")
-        rows.append([name, *cells])
-    return table([_with_unit(metric), *(level_text(condition.level) for condition in beside)], rows)
+        found = [
+            mean_with_confidence([getattr(row, metric.key) for row in condition.rows[name]]) for condition in beside
+        ]
+        halves = [fixed((x.high - x.low) / 2, metric.digits) for x in found]
+        rows.append([name, *(f"{fixed(x.mean, metric.digits)} ± {y}" for x, y in zip(found, halves, strict=True))])
+    return rows
 
 
 def summary_table(beside: Sequence[Condition], own: str) -> str:
@@ -331,15 +328,6 @@ def summary_table(beside: Sequence[Condition], own: str) -> str:
 
 def _with_unit(metric: Metric) -> str:
     return f"{metric.name} [{metric.unit}]" if metric.unit else metric.name
-
-
-def outcome_table(beside: Sequence[Condition], own: str) -> str:
-    """Return at how many levels a sensor is ahead, level and behind each other one, by metric."""
-    rows = []
-    for other in (name for name in beside[0].rows if name != own):
-        found = [leads_of(metric, beside, own, other).outcome.tolist() for metric in SHOWN]
-        rows.append([other, *(" / ".join(str(outcomes.count(outcome)) for outcome in OUTCOMES) for outcomes in found)])
-    return table(["beside", *(metric.name for metric in SHOWN)], rows)
 
 
 @rc_context(STYLE)
@@ -360,10 +348,10 @@ def figure_of(beside: Sequence[Condition]) -> Figure:
 def main(arguments: Sequence[str]) -> None:
     """Write the page of a sweep's folder, from where the sweep ran: its sensors' files are told as it was told them."""
     try:
-        if len(arguments) != 2 or not arguments[1].endswith(".md"):
-            raise InputError(f"arguments: {list(arguments)} are not allowed; give the sweep's folder and a page.md")
-        folder, out = map(Path, arguments)
-        write_page(last_run(folder), folder, out)
+        if len(arguments) != 1:
+            raise InputError(f"arguments: {list(arguments)} are not allowed; give the sweep's folder")
+        folder = Path(arguments[0])
+        write_page(last_run(folder), folder, PAGE, RESULTS / "five_cameras.csv")
     except InputError as error:
         raise SystemExit(f"five_cameras: {error}") from error
 

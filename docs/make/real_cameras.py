@@ -1,11 +1,12 @@
-"""Published EMVA 1288 figures beside those of the simulated chip: `python docs/make/real_cameras.py PAGE`."""
+"""Published EMVA 1288 figures beside those of the simulated chip: `python docs/make/real_cameras.py`."""
 
-import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot, log10, sqrt
 from pathlib import Path
 
 import numpy as np
+from page_parts import RESULTS, csv_text, fill
 
 from rodcone.files import replacing
 from sensor.cameras.emva_report import EmvaReport, numbers_of, read_report
@@ -15,6 +16,8 @@ from sensor.config import LensConfig, SensorConfig
 from sensor.emva1288.characterise import Characterisation, characterise
 from studies.pages.report_text import MISSING, table
 
+PAGE = Path(__file__).resolve().parents[1] / "real_cameras.md"
+FIGURES = RESULTS / "real_cameras.csv"
 REPORTS = Path(__file__).parent.parent.parent / "sensor" / "cameras" / "reports"
 SHAPE, EXPOSURE_S = (256, 320), 0.01
 MOST_OFF = 0.035  # of a figure, 0.3 dB: what Basler states of its own calibration, as the guide quotes it
@@ -30,33 +33,6 @@ REASONS = {  # of what lies beyond, by file and symbol
     ("alvium_1800_c_507", "DR_dB"): "no, but it is printed to 1 dB",
     ("phantom_miro_c211", "DR_dB"): "no: it is 6972 over 9.08 e⁻, the half electron of the threshold left out",
 }
-TEXT = """\
-# Cameras that exist: published, configured, recovered
-
-Made by `python docs/make/real_cameras.py docs/real_cameras.md`. For each report of `sensor/cameras/reports` a
-preset is made from its inputs, as `rodcone new preset --noise REPORT.toml` does, and `rodcone characterise` measures
-the simulated chip of it ({height} x {width} pixels). Published numbers are the report's; configured ones follow from
-the preset in closed form; recovered ones are measured in the chip's frames, which know neither.
-
-**Where the numbers come from.** The makers' own files could not be opened when this page was made. Each number was
-read in a public copy or quotation of the maker's document, which its section names; what no copy holds is left out, and
-nothing is filled in from memory. Where a report lacks DSNU1288 or PRNU1288 it is switched off, with no effect on the
-other rows. Photo-electrons are set on the bench, so a quantum efficiency goes into the preset and is not tested here.
-
-**What a maker's own pages say.** MATRIX VISION (Balluff) prints two EMVA figures a sensor, which make no preset:
-SNR_max 40.3 dB and DR 71.2 dB for an IMX250 (mvBlueFOX3-2051, 3.45 µm), 45.1 and 73 dB for an IMX249 (mvBlueFOX3-2024a,
-5.86 µm, in a copy of its manual). The copies below of other makers' figures, for sensors of these pitches, agree within
-0.7 dB: Teledyne FLIR's IMX264 (40.3 by its saturation, 71.8) and Basler's IMX174 (45.1, 73.4).
-
-**What is an input.** K with bits and black level gives the clip; then the saturation capacity, which is where the
-temporal variance is greatest, is recovered and no input. Where K or the black level isn't told, the clip is solved from
-the published saturation capacity (`sensor.cameras.emva_report.clip_over_saturation`), and K is only the simulated
-camera's. SNR_max, dynamic range, threshold and the SNR at half of saturation are never inputs; no copy holds the last,
-which stands beside its closed form. The light of greatest variance is found on a grid of 2 % of the well.
-
-**How near is near.** Within 3.5 %, or 0.3 dB, which the guide that quotes Basler's figures gives as Basler's own
-uncertainty of the light's calibration; what is beyond has its reason beside it.
-"""
 
 
 @dataclass(frozen=True)
@@ -132,47 +108,50 @@ def _snr_db(found: Characterisation, light_e: float) -> float:
     return 20 * log10(float(np.interp(light_e, found.transfer.light_e, found.snr)))
 
 
-def page(reports: dict[str, EmvaReport]) -> str:
-    """Markdown of the page.
+def results(reports: Mapping[str, EmvaReport]) -> tuple[dict[str, str], str]:
+    """Return the page's generated parts, and all figures as CSV.
 
     Raises
     ------
     KeyError
         For a figure beyond the limit of which `REASONS` gives no reason.
     """
-    found = {name: rows_of(report) for name, report in reports.items()}
+    rows = {name: rows_of(report) for name, report in reports.items()}
+    cells = [[reports[name].camera, *_cells(name, row)] for name in reports for row in rows[name]]
     overview = [
         (
             report.camera,
-            f"{sum(row.off is not None for row in rows)}",
-            f"{sum(row.off is not None and not row.is_input for row in rows)}",
-            f"{sum(not row.within for row in rows)}",
+            f"{sum(row.off is not None for row in rows[name])}",
+            f"{sum(row.off is not None and not row.is_input for row in rows[name])}",
+            f"{sum(not row.within for row in rows[name])}",
         )
-        for report, rows in zip(reports.values(), found.values(), strict=True)
+        for name, report in reports.items()
     ]
-    parts = [TEXT.format(height=SHAPE[0], width=SHAPE[1])]
-    parts.append(table(("camera", "figures published", "of them no input", "beyond 3.5 % or 0.3 dB"), overview))
-    for name, report in reports.items():
-        parts.append(f"## {report.camera}\n\n{report.source}. Date: {report.date}.")
-        parts.append(table(HEAD, [_cells(name, row) for row in found[name]]))
-    return "\n\n".join(parts) + "\n"
+    beyond = [[line[0], line[1], line[3], *line[5:]] for line in cells if line[-1].startswith("no")]
+    parts = {
+        "cameras": table(("camera", "figures published", "of them no input", "beyond 3.5 % or 0.3 dB"), overview),
+        "beyond": table(("camera", "figure", "published", "recovered", "off", "within?"), beyond),
+        "sources": "\n".join(f"- **{x.camera}:** {x.source}. Date: {x.date}." for x in reports.values()),
+    }
+    return parts, csv_text(("camera", *HEAD), cells)
 
 
 def _cells(name: str, row: PublishedFigure) -> list[str]:
     digits = ".2f" if row.unit == "dB" else ".5g"
     published, configured = (MISSING if x is None else format(x, digits) for x in (row.published, row.configured))
     off = MISSING if row.off is None else f"{row.off:+.2f} dB" if row.unit == "dB" else f"{100 * row.off:+.1f} %"
-    told = MISSING if row.off is None else "yes" if row.within else REASONS[name, row.symbol]
+    reason = MISSING if row.off is None else "yes" if row.within else REASONS[name, row.symbol]
     symbol = f"{row.symbol} (input)" if row.is_input and row.published is not None else row.symbol
-    return [symbol, row.unit, published, configured, format(row.recovered, digits), off, told]
+    return [symbol, row.unit, published, configured, format(row.recovered, digits), off, reason]
 
 
-def main(out: Path) -> None:
-    """Write the page."""
-    text = page({path.stem: read_report(path) for path in sorted(REPORTS.glob("*.toml"))})
-    with replacing(out) as (place,):
-        place.write_text(text, "utf-8")
+def main() -> None:
+    """Write the page's parts and the table."""
+    parts, figures = results({path.stem: read_report(path) for path in sorted(REPORTS.glob("*.toml"))})
+    with replacing(PAGE, FIGURES) as (to_page, to_figures):
+        to_page.write_text(fill(PAGE.read_text("utf-8"), parts), "utf-8")
+        to_figures.write_text(figures, "utf-8")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

@@ -1,13 +1,13 @@
 """The page of published reports: each figure beyond the limit has a reason, and the page in docs is of these."""
 
-from pathlib import Path
+import csv
 
 import pytest
-from real_cameras import REASONS, REPORTS, page, rows_of
+from page_parts import fill
+from real_cameras import FIGURES, PAGE, REASONS, REPORTS, results, rows_of
 
 from sensor.cameras.emva_report import EmvaReport, read_report
 
-PAGE = Path(__file__).parents[2] / "docs" / "real_cameras.md"
 FOUND = {path.stem: read_report(path) for path in sorted(REPORTS.glob("*.toml"))}
 
 
@@ -33,16 +33,24 @@ def test_the_two_whole_reports_are_recovered_in_figures_that_are_no_input():
             assert rows[symbol].within
 
 
-def test_the_page_in_docs_holds_every_report_and_its_numbers():
+def test_the_page_in_docs_holds_every_report_and_the_table_its_numbers():
     text = PAGE.read_text("utf-8")
+    rows = list(csv.DictReader(FIGURES.read_text("utf-8").splitlines()))
     for report in FOUND.values():
-        assert f"## {report.camera}\n\n{report.source}. Date: {report.date}." in text
-        section = text.split(f"## {report.camera}\n", 1)[1].split("\n## ", 1)[0]
-        for symbol in set(report.figures) - {"pixel_pitch_um", "eta", "lambda_nm"}:
-            assert f"| {symbol} " in section, symbol
+        assert f"- **{report.camera}:** {report.source}. Date: {report.date}." in text
+        symbols = {row["figure"].partition(" ")[0] for row in rows if row["camera"] == report.camera}
+        assert set(report.figures) - {"pixel_pitch_um", "eta", "lambda_nm"} <= symbols
 
 
 def test_a_figure_beyond_the_limit_without_a_reason_stops_the_page():
     figures = {"sigma_d": 3.0, "mu_e_sat": 5000.0, "DR_dB": 20.0}
     with pytest.raises(KeyError):
-        page({"x": EmvaReport("X", "M", "s", "d", 12, None, figures)})
+        results({"x": EmvaReport("X", "M", "s", "d", 12, None, figures)})
+
+
+def test_a_part_is_filled_between_its_marks_alone_and_one_that_is_missing_is_told():
+    text = "before\n\n<!-- a -->\nold\n<!-- end -->\n\n<!-- b -->\n<!-- end -->\nafter\n"
+    filled = fill(text, {"a": "new \\1"})
+    assert filled == "before\n\n<!-- a -->\n\nnew \\1\n\n<!-- end -->\n\n<!-- b -->\n<!-- end -->\nafter\n"
+    with pytest.raises(KeyError, match="c"):
+        fill(text, {"c": ""})

@@ -222,8 +222,8 @@ def test_a_light_is_dark_outside_its_table_and_a_warning_tells() -> None:
     scene = wall(matte(uniform_node(0.5)), SHORT)
     with pytest.warns(
         UserWarning,
-        match=r"^light group 'sun' is known over 400-700 nm, and bands reach 380-780 nm: it gives no light "
-        "beyond what is known$",
+        match=r"^light group 'sun' is known over 400-700 nm, and bands reach 380-780 nm: outside its "
+        "table it is taken as dark$",
     ):
         found = radiance(scene)
     assert found[[0, 3]].tolist() == [0.0, 0.0]

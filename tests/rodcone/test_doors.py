@@ -18,7 +18,6 @@ import rodcone as public
 from render.loader import mitsuba_module
 from rodcone.doors import door
 from sensor.exposure import exposure_by_rule_s
-from studies.sweep.workers import InThisProcess
 
 NM = np.arange(385.0, 780.0, 10.0)
 RADIANCE = public.SpectralRadiance(np.full((16, 16, 40), 1e-3), NM)
@@ -73,12 +72,8 @@ RIGHT: dict[str, Any] = {
     "study": public.Study((public.SceneChoice("flat_field"),), ("1cd/m2",)),
     "order": public.Order("flat_field", "a.dng"),
     "cells": [],
-    "executor": InThisProcess(),
     "workers": 1,
     "out": "none",
-    "one": np.ones((32, 32)),
-    "other": np.ones((32, 32)),
-    "weight": np.ones((32, 32)),
     "table": [],
 }
 NEVER: tuple[Any, ...] = (

@@ -126,7 +126,7 @@ def test_a_light_that_ends_within_the_bands_is_told_once(
     scene.write_text(scene.read_text().replace('"irradiance" value="2"', '"irradiance" value="450:2, 700:2"'))
     code, _, err = call([str(scene), "-o", str(tmp_path / "o.exr"), *QUICK], capsys)
     known = "light group 'sun' is known over 450-700 nm, and bands reach 400-720 nm"
-    assert (code, err) == (0, f"rodcone: {known}: it gives no light beyond what is known\n")
+    assert (code, err) == (0, f"rodcone: {known}: outside its table it is taken as dark\n")
 
 
 BAD = {

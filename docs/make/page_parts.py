@@ -1,0 +1,34 @@
+"""Parts of a page that a program writes, between comments in the page's own text; full tables go beside it as CSV."""
+
+import csv
+import io
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+RESULTS = Path(__file__).resolve().parents[1] / "results"
+
+
+def fill(text: str, parts: Mapping[str, str]) -> str:
+    """Return a page's text with new content between ``<!-- NAME -->`` and ``<!-- end -->`` of each part.
+
+    Raises
+    ------
+    KeyError
+        For a page that lacks one of them.
+    """
+    for name, content in parts.items():
+        place = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+        text, count = place.subn(lambda found, new=content: f"{found[1]}\n{new}\n\n{found[2]}", text)
+        if count != 1:
+            raise KeyError(name)
+    return text
+
+
+def csv_text(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table as CSV."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows(rows)
+    return out.getvalue()

@@ -1,0 +1,137 @@
+"""The Markdown: whole links, a README for strangers, programs on `rodcone` alone, an example of every public name."""
+
+import ast
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from rodcone import __all__ as PUBLIC
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+README = (ROOT / "README.md").read_text("utf-8")
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted(DOCS.rglob("*.md"))]
+CODE = re.compile(r"^```.*?^```|`[^`\n]*`|^ {4}.*?$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"!?\]\(([^)\s#]*)(?:#([\w-]*))?\)")
+PYTHON = re.compile(r"^```python[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
+MOST_WORDS = 52_000
+
+
+def anchors(text: str) -> set[str]:
+    """Anchors of a page's headings, as forges and MkDocs make them."""
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    plain = (re.sub(r"[^\w\s-]", "", heading.lower()) for heading in headings)
+    return {re.sub(r"\s+", "-", heading.strip()) for heading in plain}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_every_link_and_picture_of_a_page_leads_somewhere(page: Path) -> None:
+    text = page.read_text("utf-8")
+    for target, anchor in LINK.findall(CODE.sub("", text)):
+        if re.match(r"https?:|mailto:", target):
+            continue
+        place = (page.parent / target).resolve() if target else page
+        assert place.is_file(), target
+        assert not anchor or anchor in anchors(place.read_text("utf-8")), f"{target}#{anchor}"
+
+
+def test_the_first_screen_of_the_readme_answers_a_stranger_in_this_order() -> None:
+    marks = ("rodcone is for people who", "**What does a white pixel bring?**", "images/light_rising.webp", "make demo",
+             "import rodcone\n", "images/chain.svg", "## Without make")  # fmt: skip
+    places = [README.index(mark) for mark in marks]
+    assert places == sorted(places)
+    assert len(README[: places[4]].split()) < 200
+
+
+def test_the_readme_has_no_long_table_and_no_cell_of_many_links() -> None:
+    rows = [line for line in README.splitlines() if line.startswith("|")]
+    assert len(rows) < 10
+    assert all(cell.count("](") < 5 for row in rows for cell in row.split("|"))
+
+
+def test_the_numbers_of_the_readmes_result_are_those_of_its_page() -> None:
+    numbers = re.search(
+        r"by moonlight RGBW leads Bayer by ([\d.]+) dB\s+of PSNR and ([\d.]+) of FLIP; "
+        r"at 100 cd/m² it leads by ([\d.]+) dB and trails by ([\d.]+) of FLIP",
+        README,
+    )
+    assert numbers
+    tables = (DOCS / "opponents.md").read_text("utf-8").split("## What the white pixel brings\n")[1]
+    row = r"\| `low_noise` \| `as-shot` \|.*\n"
+    psnr, flip = (
+        [float(cell.split()[0].replace("−", "-").strip("(")) for cell in re.search(row, table)[0].split("|")[4:-1]]  # type: ignore[index]
+        for table in (tables.split("| PSNR [dB] |")[1], tables.split("| FLIP, mean |")[1])
+    )
+    assert [float(number) for number in numbers.groups()] == [psnr[0], flip[0], psnr[-1], -flip[-1]]
+    assert max(psnr[-1], -flip[-1] * 25) < 0.5, "less than a person sees: 0.5 dB, 0.02 of FLIP"
+
+
+def test_animation_and_pictures_are_small() -> None:
+    animation = DOCS / "images" / "light_rising.webp"
+    assert animation.stat().st_size < 1_000_000
+    with Image.open(animation) as frames:
+        assert frames.n_frames > 10  # type: ignore[attr-defined]
+    assert sum(path.stat().st_size for path in (DOCS / "pictures").rglob("*") if path.is_file()) < 1_500_000
+
+
+def test_markdown_has_at_most_fifty_thousand_words_and_a_decision_forty_lines() -> None:
+    assert sum(len(page.read_text("utf-8").split()) for page in PAGES) <= MOST_WORDS
+    assert [page.name for page in DOCS.glob("decisions/*.md") if page.read_text("utf-8").count("\n") > 40] == []
+
+
+def programs() -> Iterator[tuple[str, str]]:
+    """Name and text of each piece of Python that a reader is shown: pages, notebooks, numbered scripts."""
+    for page in PAGES:
+        for number, block in enumerate(PYTHON.findall(page.read_text("utf-8"))):
+            yield f"{page.name}:{number}", block
+    for path in sorted(DOCS.glob("notebooks/*.ipynb")):
+        cells = [cell for cell in json.loads(path.read_text("utf-8"))["cells"] if cell["cell_type"] == "code"]
+        yield path.name, "\n".join("".join(cell["source"]) for cell in cells)
+    for path in sorted((ROOT / "examples").glob("*.py")):
+        yield path.name, path.read_text("utf-8")
+
+
+PROGRAMS = dict(programs())
+# What runs in tests: scripts, notebooks, and the pages that docs/run_page.py runs.
+RUN = {path.name for path in (*DOCS.glob("tutorial/*.md"), *DOCS.glob("how_to/*.md"))}
+EXTRA = {"explore": "explore.md", "relight_denoised": "render.md"}
+INSIDE = {"render", "scenes", "sensor", "isp", "studies"}
+
+
+def test_programs_that_a_reader_is_shown_import_rodcone_alone() -> None:
+    inside = []
+    for name, text in PROGRAMS.items():
+        for node in ast.walk(ast.parse(re.sub(r"^%.*$", "", text, flags=re.MULTILINE))):
+            modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            modules += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            inside += [
+                f"{name}: {module}"
+                for module in modules
+                if module.split(".")[0] in INSIDE or module.startswith("rodcone.")
+            ]
+    assert inside == []
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_a_public_name_has_an_example_that_runs(name: str) -> None:
+    examples = [
+        place
+        for place, text in PROGRAMS.items()
+        if not place.partition(":")[0].endswith(".md") or place.partition(":")[0] in RUN
+        if re.search(rf"\brodcone\.{name}\b", text)
+    ]
+    if name in EXTRA:  # needs an extra that tests go without
+        examples.append(EXTRA[name]) if f"rodcone.{name}(" in (DOCS / EXTRA[name]).read_text("utf-8") else None
+    assert examples, f"{name}: show it in examples/ or on a page, or take it out of the public names"
+
+
+@pytest.mark.thorough
+def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (block,) = PYTHON.findall(README)
+    exec(block.replace("(256, 256), spp=64", "(32, 32), spp=16"), {})
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bayer.png", "rgbw.dng", "rgbw.png"]
