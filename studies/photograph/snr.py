@@ -114,6 +114,8 @@ def even_field(
     rng = np.random.default_rng(0)
     device = draw_device(alone, shape, rng)
     raw = expose(np.full(shape, electrons / alone.chip.sites**2), alone, exposure_s, device, rng)
-    mean_e = float(raw.electrons.mean()) - alone.pixel.dark_current_e_per_s * raw.exposure_s
+    pixel = alone.pixel
+    dark_e_per_s = pixel.dark_current_e_per_s + pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s
+    mean_e = float(raw.electrons.mean()) - dark_e_per_s * raw.exposure_s
     simulated_db = 20 * log10(mean_e / float(raw.electrons.std())) if mean_e > 0 else float("nan")
     return EvenField(electrons, 20 * log10(float(snr(np.array(electrons), alone, exposure_s))), simulated_db)

@@ -8,7 +8,7 @@ import pytest
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
-from sensor.readout import noise_variance, read_out, spread_charge
+from sensor.readout import noise_sources, noise_variance, read_out, spread_charge
 
 QUIET = PixelConfig(2.2, 0.9, full_well_e=60_000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
 
@@ -19,7 +19,9 @@ def camera(**pixel):
 
 def variance(light_e, exposure_s=0.1, **pixel):
     sensor = camera(**pixel)
-    return noise_variance(np.full((2, 2), light_e), sensor, exposure_s)[0, 0] - sensor.gain_e_per_dn**2 / 12
+    total = noise_variance(np.full((2, 2), light_e), sensor, exposure_s)[0, 0]
+    assert sum(sigma**2 for sigma in noise_sources(light_e, sensor, exposure_s).values()) == pytest.approx(total, 1e-12)
+    return total - sensor.gain_e_per_dn**2 / 12
 
 
 @pytest.mark.parametrize(
@@ -37,6 +39,11 @@ def variance(light_e, exposure_s=0.1, **pixel):
         ({"crosstalk": 0.1}, 100.0),
         ({"hot_pixel_share": 0.1}, 100.0),
         ({"hot_pixel_dark_current_e_per_s": 70.0}, 100.0),
+        (
+            {"dark_current_e_per_s": 70.0, "column_gain_spread": 0.03}
+            | {"hot_pixel_share": 0.1, "hot_pixel_dark_current_e_per_s": 50.0},
+            107.5 + 0.09 * 25 + 0.0009 * (107.5 + 0.09 * 25 + 107.5**2),
+        ),
     ],
 )
 def test_each_term_alone_in_closed_form(pixel, expected):

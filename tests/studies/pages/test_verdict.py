@@ -176,15 +176,17 @@ def test_the_same_method_on_both_mosaics_is_compared_first_else_what_varies() ->
 
 def test_means_over_scenes_are_of_named_and_of_drawn_ones_and_paired_by_seed() -> None:
     names = "desk", "street", "generated-1", "generated-2"
-    report = noisy(scenes=tuple(ReportScene(name, 8, 8) for name in names), levels=2, sensors=SAMPLE.SENSORS[:1])
+    kinds = ("named", names[:2]), ("drawn", names[2:])
+    report = noisy(scenes=tuple(ReportScene(name, 8, 8) for name in names), levels=2)
     means = means_over_scenes(report, groups_of(report, CAMERA, 0, 1))
-    assert [mean.title for mean in means] == ["mean of 2 named scenes", "mean of 2 drawn scenes"]
-    for mean, scenes in zip(means, (names[:2], names[2:]), strict=True):
+    parts = [(words, scenes, one.name) for words, scenes in kinds for one in SAMPLE.SENSORS]
+    assert [mean.title for mean in means] == [f"mean of 2 {words} scenes, {sensor}" for words, _, sensor in parts]
+    for mean, (_, scenes, sensor) in zip(means, parts, strict=True):
         for level in range(2):
             rows = {
                 (cell.first.scene, cell.camera): cell.by_seed["flip_mean"]
                 for cell in report.cells
-                if cell.first and cell.first.scene in scenes and cell.level == level
+                if cell.first and (cell.first.sensor, cell.level) == (sensor, level) and cell.first.scene in scenes
             }
             gains = [
                 np.mean([rows[scene, "bayer"][seed] - rows[scene, "interleaved"][seed] for scene in scenes])

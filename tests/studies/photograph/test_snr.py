@@ -101,9 +101,11 @@ def test_light_and_electrons_belong_together() -> None:
 
 
 @pytest.mark.parametrize("luminance_cd_m2", [1.0, 30.0])
-def test_an_even_field_is_simulated_as_the_closed_form_has_it(luminance_cd_m2: float) -> None:
+@pytest.mark.parametrize("dark", ["", "dark current", "hot pixels"])
+def test_an_even_field_is_simulated_as_the_closed_form_has_it(dark: str, luminance_cd_m2: float) -> None:
     """262 144 pixels: the standard error of the SNR is under 0.02 dB, and columns are alike in this preset."""
     sensor = table1_output()
+    sensor = replace(sensor, pixel=replace(sensor.pixel, **TERMS.get(dark, {})))
     found = even_field(sensor, "W", light_of("D65"), luminance_cd_m2, EXPOSURE_S)
     alone = replace(sensor, cfa=("W",))
     assert found.electrons == pytest.approx(float(channel_e(alone, light_of("D65"), luminance_cd_m2, EXPOSURE_S)[0]))
