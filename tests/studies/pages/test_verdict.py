@@ -90,6 +90,8 @@ def test_a_verdict_takes_the_interval_and_a_size_that_is_seen(ours: list[float],
     found = leads(text.PSNR, np.array(ours), np.full(len(ours), 20.0))
     assert str(found.outcome) == outcome
     assert float(found.half) == pytest.approx(half, abs=1e-4, nan_ok=True)
+    levels = leads(text.PSNR, np.array([ours, ours]), np.full((2, len(ours)), 20.0))
+    assert (levels.outcome.tolist(), levels.half.shape) == ([outcome] * 2, (2,))
 
 
 def test_seeds_are_compared_as_pairs() -> None:
@@ -171,7 +173,7 @@ def test_the_same_method_on_both_mosaics_is_compared_first_else_what_varies() ->
     times = noisy(cameras=("bayer",), sensors=SAMPLE.SENSORS[:1], exposures=("auto", "10ms"), levels=1)
     assert first_comparison(times).compared == EXPOSURE
     alone = first_comparison(noisy(cameras=("bayer",), sensors=SAMPLE.SENSORS[:1], levels=1))
-    assert (alone.a, alone.b) == (0, 0)
+    assert alone == Comparison(CAMERA, BRIGHTNESS, SENSOR, 0, 0)
 
 
 def test_means_over_scenes_are_of_named_and_of_drawn_ones_and_paired_by_seed() -> None:
