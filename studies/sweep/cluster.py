@@ -4,7 +4,6 @@ import logging
 import os
 import sys
 import warnings
-from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import closing, contextmanager
@@ -149,30 +148,28 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
         if count != 1:
             raise InputError(f"cluster: {worker} has {count} threads; allowed: 1; start dask worker with --nthreads 1")
     try:
-        theirs, cores_of = client.run(_what_computes), client.run(cores)
+        workers = client.run(_facts)
     except ImportError as error:
         raise InputError(f"cluster: a worker lacks rodcone ({one_line(error)}); install it there") from error
-    for worker, its in theirs.items():
-        other = [name for name, version in _what_computes().items() if its.get(name) != version]
+    here, (theirs, cores_of, safe_paths) = _facts()[0], zip(*workers.values(), strict=True)
+    for worker, its in zip(workers, theirs, strict=True):
+        other = [name for name, version in here.items() if its.get(name) != version]
         if other:
             raise InputError(
-                f"cluster: {worker} runs {other[0]} {its.get(other[0])}, this is {_what_computes()[other[0]]}; "
+                f"cluster: {worker} runs {other[0]} {its.get(other[0])}, this is {here[other[0]]}; "
                 "install the same, start it again"
             )
-    unsafe = [worker for worker, safe in client.run(_has_safe_path).items() if not safe]
-    if unsafe:
+    if not all(safe_paths):
         warnings.warn(
-            f"{unsafe[0]} imports Python files of the folder in which it started; start dask worker with "
-            "PYTHONSAFEPATH=1",
+            f"{list(workers)[safe_paths.index(False)]} imports Python files of the folder in which it started; start "
+            "dask worker with PYTHONSAFEPATH=1",
             stacklevel=2,
         )
-    on_host = Counter(urlsplit(worker).hostname for worker in cores_of)
-    return len(cores_of), max(1, min(count // on_host[urlsplit(worker).hostname] for worker, count in cores_of.items()))
+    hosts = [urlsplit(worker).hostname for worker in workers]
+    return len(hosts), max(1, min(count // hosts.count(host) for host, count in zip(hosts, cores_of, strict=True)))
 
 
-def _has_safe_path() -> bool:
-    return sys.flags.safe_path or bool(os.environ.get("PYTHONSAFEPATH"))
-
-
-def _what_computes() -> dict[str, str]:
-    return {**versions(), "engine": backend()}
+def _facts() -> tuple[dict[str, str], int, bool]:
+    """What computes in this process, its machine's cores, and whether it imports nothing of its working directory."""
+    safe = sys.flags.safe_path or bool(os.environ.get("PYTHONSAFEPATH"))
+    return {**versions(), "engine": backend()}, cores(), safe

@@ -33,7 +33,7 @@ from studies.study.lit_scene import (
     white_spectrum,
 )
 from studies.study.render_noise import render_share
-from studies.study.study import Condition, Study, conditions, label, mosaics
+from studies.study.study import Study, conditions, label, mosaics
 from studies.sweep.cells import Cell, RenderRecord, cell_key
 from studies.sweep.database import note_render, render_record
 from studies.sweep.frames import UnitFrame, colours_under, exposure_s_of, frame_key, make_frames, read_frame
@@ -169,55 +169,40 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
         if frame is None:
             return None
         frames[imaged] = frame
-        for name in job.study.processors:
-            if job.software[name].mosaic == imaged[-1]:
-                light = white_spectrum(opened, imaged[0])
-                colours[imaged, name] = colours_under(frame.sensor, job.software[name], light)
+        light = white_spectrum(opened, imaged[0])
+        for name, software in job.software.items():
+            if software.mosaic == imaged[-1]:
+                colours[imaged, name] = colours_under(frame.sensor, software, light)
     cells = []
     for condition in conditions(job.study, opened.choice):
-        lens = job.plan.images[condition].lens
-        for name in job.study.processors:
-            imaged = condition.spectrum, condition.sensor, lens, job.software[name].mosaic
+        image = job.plan.images[condition]
+        for name, software in job.software.items():
+            imaged = condition.spectrum, condition.sensor, image.lens, software.mosaic
             frame = frames[imaged]
             luminance = level_luminance(condition.level, frame.lux_per_cd_m2)
-            longest_s = job.study.longest_exposure_s
-            shown = luminance, exposure_s_of(frame, condition.exposure, luminance, longest_s)
-            for seed in job.study.seeds:
-                cells.append(_cell(job, condition, name, seed, record, frame, colours[imaged, name], shown))
+            exposure_s = exposure_s_of(frame, condition.exposure, luminance, job.study.longest_exposure_s)
+            made_by = provenance(record.facts.variant, name, software.on_backend, job.own[name], image.exact)
+            cells += [
+                Cell(
+                    key=cell_key(condition, label(name), seed, frame.key, luminance, exposure_s, made_by),
+                    condition=condition,
+                    processor=str(Path(name).resolve()) if user_file(name) else name,
+                    seed=seed,
+                    luminance_cd_m2=luminance,
+                    illuminance_lux=None if frame.lux_per_cd_m2 is None else luminance * frame.lux_per_cd_m2,
+                    exposure_s=exposure_s,
+                    sensor=frame.sensor,
+                    made_by=made_by,
+                    colours=colours[imaged, name],
+                    light=frame.light,
+                    white_cd_m2=frame.white_cd_m2 * luminance,
+                    electrons=frame.electrons.resolve(),
+                    errors=frame.errors.resolve(),
+                    truth=frame.truth.resolve(),
+                    pictures=(job.out / PICTURES).resolve(),
+                    render=record,
+                    budget_share=job.plan.shares.get(condition),
+                )
+                for seed in job.study.seeds
+            ]
     return cells
-
-
-def _cell(
-    job: Job,
-    condition: Condition,
-    processor: str,
-    seed: int,
-    record: RenderRecord,
-    frame: UnitFrame,
-    colours: ColourFit,
-    light: tuple[float, float],
-) -> Cell:
-    """One cell; `light` is the mean luminance [cd/m^2] and the exposure time [s]."""
-    luminance, exposure_s = light
-    software, exact = job.software[processor], job.plan.images[condition].exact
-    made_by = provenance(record.facts.variant, processor, software.on_backend, job.own[processor], exact)
-    return Cell(
-        key=cell_key(condition, label(processor), seed, frame.key, luminance, exposure_s, made_by),
-        condition=condition,
-        processor=str(Path(processor).resolve()) if user_file(processor) else processor,
-        seed=seed,
-        luminance_cd_m2=luminance,
-        illuminance_lux=None if frame.lux_per_cd_m2 is None else luminance * frame.lux_per_cd_m2,
-        exposure_s=exposure_s,
-        sensor=frame.sensor,
-        made_by=made_by,
-        colours=colours,
-        light=frame.light,
-        white_cd_m2=frame.white_cd_m2 * luminance,
-        electrons=frame.electrons.resolve(),
-        errors=frame.errors.resolve(),
-        truth=frame.truth.resolve(),
-        pictures=(job.out / PICTURES).resolve(),
-        render=record,
-        budget_share=job.plan.shares.get(condition),
-    )

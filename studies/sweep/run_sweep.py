@@ -2,7 +2,8 @@
 
 import json
 import platform
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -144,31 +145,24 @@ def _noted(study: Study) -> dict[str, Any]:
 
 def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step) -> int:
     """Make cells, store each as it comes with the time taken so far; returns their number."""
-    count = 0
-    seconds, workers = dict[str, float](), set[tuple[str, int]]()
+    count, workers = 0, set[tuple[str, int]]()
+    seconds, on_the_clock = defaultdict[str, float](float), dict[str, float]()
     with closing(runner(missing)) as coming:
-        for row in coming:
+        for count, row in enumerate(coming, start=1):
             add(job.base, row)
-            count += 1
             workers.add((row.host, row.worker))
-            for name, value in _steps(row).items():
-                seconds[name] = seconds.get(name, 0.0) + value
-            note_stages(job.base, run, job.clock.stages(_on_the_clock(seconds, len(workers))))
+            seconds["captures"] += row.capture_s
+            seconds[f"develop {row.processor}"] += row.develop_s
+            seconds["metrics"] += row.measure_s
+            seconds[FIRST] += row.first_s
+            # as wall time: the workers work at the same time
+            on_the_clock = {name: value / len(workers) for name, value in seconds.items()}
+            note_stages(job.base, run, job.clock.stages(on_the_clock))
             share = RENDER_SHARE + (1 - RENDER_SHARE) * count / len(missing)
             part(f"cell {count} of {len(missing)}", share)
-    for name, value in _on_the_clock(seconds, len(workers)).items():
+    for name, value in on_the_clock.items():
         job.clock.add(name, value)
     return count
-
-
-def _steps(row: Row) -> dict[str, float]:
-    developed = f"develop {row.processor}"
-    return {"captures": row.capture_s, developed: row.develop_s, "metrics": row.measure_s, FIRST: row.first_s}
-
-
-def _on_the_clock(seconds: Mapping[str, float], workers: int) -> dict[str, float]:
-    """Seconds of work as wall time: the workers work at the same time."""
-    return {name: value / workers for name, value in seconds.items()}
 
 
 def _part(step: Step, index: int, count: int) -> Step:
