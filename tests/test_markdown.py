@@ -18,7 +18,7 @@ PAGES = [*sorted(ROOT.glob("*.md")), *sorted(DOCS.rglob("*.md"))]
 CODE = re.compile(r"^```.*?^```|`[^`\n]*`|^ {4}.*?$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"!?\]\(([^)\s#]*)(?:#([\w-]*))?\)")
 PYTHON = re.compile(r"^```python[^\n]*\n(.*?)^```", re.MULTILINE | re.DOTALL)
-MOST_WORDS = 52_000
+MOST_WORDS = 50_000
 
 
 def anchors(text: str) -> set[str]:

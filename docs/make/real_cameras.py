@@ -131,7 +131,6 @@ def results(reports: Mapping[str, EmvaReport]) -> tuple[dict[str, str], str]:
     parts = {
         "cameras": table(("camera", "figures published", "of them no input", "beyond 3.5 % or 0.3 dB"), overview),
         "beyond": table(("camera", "figure", "published", "recovered", "off", "within?"), beyond),
-        "sources": "\n".join(f"- **{x.camera}:** {x.source}. Date: {x.date}." for x in reports.values()),
     }
     return parts, csv_text(("camera", *HEAD), cells)
 
