@@ -33,6 +33,17 @@ def test_a_fault_changes_the_code_and_what_it_leaves_is_still_python(fault: Faul
     assert [test for test in fault.tests if not (ROOT / test).is_file()] == []
 
 
+def test_the_files_and_the_tests_of_the_mutants_are_there() -> None:
+    tree = ast.parse((ROOT / "tests" / "faults" / "mutants.py").read_text())
+    table = next(
+        node.value for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node).startswith("TESTS")
+    )
+    named = [node.value for node in ast.walk(table) if isinstance(node, ast.Constant)]
+    paths = [ROOT / name if name.endswith(".py") else ROOT / "tests" / f"{name}.py" for name in named]
+    assert len(paths) > 20
+    assert [path for path in paths if not path.is_file()] == []
+
+
 def test_a_fault_whose_text_is_gone_is_told() -> None:
     gone = Fault("gone", "sensor/readout.py", "", (("not + there", "at + all"),), ())
     with pytest.raises(SystemExit, match="stands 0 times"):
