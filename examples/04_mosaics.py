@@ -14,6 +14,10 @@ import rodcone
 size = int(sys.argv[1]) if sys.argv[1:] else 256
 
 print("mosaics:", ", ".join(rodcone.mosaics()))
+# What to expect of each before anything is rendered, in closed form.
+for mosaic in ("bayer", "rgbw"):
+    dark, light = rodcone.expect(rodcone.low_noise(cfa=mosaic), [0.05, 25.0])
+    print(f"{mosaic:5}  {dark.psnr_db:.1f} dB to expect at 0.05 cd/m2, {light.psnr_db:.1f} at 25")
 transport = rodcone.render("still_life", (size, size), spp=256)
 rows = []
 for level_cd_m2 in (0.05, 25.0):

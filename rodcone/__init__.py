@@ -57,6 +57,7 @@ _PUBLIC = {
     "read_raw": ("sensor.raw_files.raw_file", "read_raw"),
     "write_raw": ("sensor.raw_files.raw_file", "write_raw"),
     "snr": ("studies.photograph.snr", "snr"),
+    "expect": ("studies.design.expect", "expect"),
     "light_for_snr": ("studies.photograph.snr", "light_for_snr"),
     "characterise": ("sensor.emva1288.characterise", "characterise"),
     # picture

@@ -52,6 +52,7 @@ from sensor.raw_files.raw_file import read_raw as read_raw
 from sensor.raw_files.raw_file import write_raw as write_raw
 from studies.budget.ledger import Plan
 from studies.commands.report import write_report as report
+from studies.design.expect import ExpectedError
 from studies.explore.widget import explore as explore
 from studies.photograph.clock import Clock
 from studies.photograph.develop import develop as develop
@@ -94,6 +95,7 @@ __all__ = [
     "develop_file",
     "draw_device",
     "encode_srgb",
+    "expect",
     "expected_electrons",
     "explore",
     "expose",
@@ -184,6 +186,9 @@ def expose(
     exact: bool = False,
 ) -> RawImage: ...
 def form_image(radiance: SpectralRadiance, sensor: _Sensor, samples_per_pixel: int = 1) -> SpectralIrradiance: ...
+def expect(
+    sensor: _Sensor, levels_cd_m2: ArrayLike, light: str = "D65", exposure: str | float = ..., prior: str = "drawn"
+) -> list[ExpectedError]: ...
 def light_for_snr(ratio: float, sensor: _Sensor, light: str, exposure_s: _Seconds) -> list[LightForSnr]: ...
 def plan(study: _Study, *, cache: str | Path | None = None, step: Step | None = None) -> Plan: ...
 def reference_plan(study: _Study) -> Plan: ...

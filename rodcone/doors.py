@@ -68,6 +68,10 @@ def _seconds(name: str, value: Any) -> Any:
     return time_s
 
 
+def _exposure(name: str, value: Any) -> Any:
+    return value if isinstance(value, str) and value in at("sensor.exposure:RULES") else _seconds(name, value)
+
+
 def _array(*shape: int, or_kind: str = "", least: float = -inf) -> Check:
     """Check for an array of finite real numbers from `least` on, of a shape where one is given; or for an `or_kind`."""
 
@@ -138,7 +142,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "device": _value("sensor.device:Device", "give draw_device(sensor, radiance.shape, rng)"),
         "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),
         "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", "render.illuminants:illuminant"),
-        **dict.fromkeys(("load_radiance.light", "light_for_snr.light"), _TEXT),
+        **dict.fromkeys(("load_radiance.light", "light_for_snr.light", "expect.light", "prior"), _TEXT),
         "reflectance": _value("render.spectrum:Spectrum", "give rodcone.grey(0.5) or rodcone.Spectrum(...)"),
         "grey.reflectance": _range(0.0, 1.0, "give a share of the light"),
         "raw": _RAW,
@@ -163,6 +167,8 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "dark_current_e_per_s": _range(0.0, 1e12, "give electrons a second, 0 for none"),
         **dict.fromkeys(("ev", "noise", "max_seconds", "longest_s", "percentile", "well_share"), _NUMBER),
         "electrons": _array(least=0.0),
+        "levels_cd_m2": lambda name, value: _array(least=1e-9)(name, value).ravel(),
+        "exposure": _exposure,
         "exposure_s": _seconds,
         **dict.fromkeys(("spp", "max_spp", "max_depth", "seed", "samples_per_pixel", "bits", "height"), _WHOLE),
         **dict.fromkeys(("width", "workers", "pictures"), _WHOLE),

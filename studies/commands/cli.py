@@ -35,6 +35,7 @@ app.command("studies.commands.characterise:characterise", name="characterise", h
 app.command("studies.commands.demo:demo", name="demo", help="Photograph a scene from moonlight to daylight.")
 app.command("studies.commands.develop:develop", name="develop", help="Develop a raw file into a picture.")
 app.command("studies.commands.doctor:doctor", name="doctor", help="Print versions, and what is wrong.")
+app.command("studies.commands.expect:expect", name="expect", help="Compute the error to expect of a mosaic by light.")
 app.command("studies.commands.explore:explore", name="explore", help="Play with a camera on a page of this machine.")
 app.command("studies.commands.list:list_names", name="list", help="Print what the commands know by name.")
 app.command("studies.commands.new:app", name="new", help="Write files to start from: preset, study, cluster.")

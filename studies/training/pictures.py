@@ -5,7 +5,7 @@ Generated ones (dead leaves, after A. B. Lee, D. Mumford, J. Huang, "Occlusion m
 None of the project's scenes is among them: what is judged is never trained on.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 
@@ -43,22 +43,22 @@ LIGHTS = (
     "sodium_high",
     "sodium_low",
 )
-LEAVES, GRATINGS = 20, 10  # pictures of each kind
+KINDS = ("leaves",) * 20 + ("gratings",) * 10 + PHOTOGRAPHS
 UNKNOWN = 6  # of so many pictures one whose light the camera doesn't know
 SIDE = 256  # pixels of a generated picture
-_NM = np.arange(385.0, 780.0, 10.0)
+NM = np.arange(385.0, 780.0, 10.0)
 _FINE = 3  # samples a pixel and direction, which pixels then average
 _DARKEST = 2e-3  # of white
 
 
 @dataclass(frozen=True)
 class KnownLight:
-    """What a camera's channels collect from each band, over what they do from white, shape (4, band)."""
+    """What channels collect from each band, over what they do from white, shape (channel, band)."""
 
     weights: Floats
 
     def signals(self, reflectance: Floats) -> Floats:
-        """Signals (..., 4) of reflectances (..., band); what the camera takes for white reads 1 in every channel."""
+        """Signals (..., channel) of reflectances (..., band); what is taken for white reads 1 in every channel."""
         return np.asarray(reflectance @ self.weights.T)
 
 
@@ -69,10 +69,14 @@ def neutral_electrons(sensor: SensorConfig, lights: Sequence[str]) -> Floats:
 
 
 def draw_light(rng: np.random.Generator, sensor: SensorConfig) -> KnownLight:
-    """Draw a light: daylight more than half of the time, then bulbs, LEDs, fluorescent lamps and sodium.
+    """Draw a light. The camera knows what white is under it, but for one in `UNKNOWN`, where it takes D65's."""
+    collected = _collected(sensor, name := draw_illuminant(rng))
+    white = _collected(sensor, "D65" if rng.random() < 1 / UNKNOWN else name).sum(axis=1, keepdims=True)
+    return KnownLight(collected / white * white[3] / collected[3].sum())
 
-    The camera knows what white is under it, but for one picture in `UNKNOWN`, where it takes D65's.
-    """
+
+def draw_illuminant(rng: np.random.Generator) -> str:
+    """Draw a light's name: daylight more than half of the time, then bulbs, LEDs, fluorescent lamps and sodium."""
     kinds = {
         "D65": 0.4,
         f"D{rng.uniform(4000, 9000):.0f}K": 0.2,
@@ -83,22 +87,19 @@ def draw_light(rng: np.random.Generator, sensor: SensorConfig) -> KnownLight:
         "sodium_high": 0.02,
         "sodium_low": 0.02,
     }
-    name = str(rng.choice(list(kinds), p=list(kinds.values())))
-    collected = _collected(sensor, name)
-    white = _collected(sensor, "D65" if rng.random() < 1 / UNKNOWN else name).sum(axis=1, keepdims=True)
-    return KnownLight(collected / white * white[3] / collected[3].sum())
+    return str(rng.choice(list(kinds), p=list(kinds.values())))
 
 
 def _collected(sensor: SensorConfig, light: str) -> Floats:
     """Electrons from a white surface in each band, any scale, shape (4, band)."""
-    width = band_widths(_NM)
-    photons = illuminant(light).band_average(_NM, width) * photons_per_joule(_NM) * width
-    return np.asarray(sensor.responses.band_average(CHANNELS, _NM, width) * photons)
+    width = band_widths(NM)
+    photons = illuminant(light).band_average(NM, width) * photons_per_joule(NM) * width
+    return np.asarray(sensor.responses.band_average(CHANNELS, NM, width) * photons)
 
 
 def draw_surface(rng: np.random.Generator) -> Floats:
     """Draw a smooth reflectance, shape (band,): grey, an edge, a bump, or seven random points joined."""
-    kind, width = rng.random(), band_widths(_NM)
+    kind, width = rng.random(), band_widths(NM)
     low, high = np.sort(rng.uniform(0.03, 0.85, 2))
     if kind < 0.35:
         curve = grey(rng.uniform(0.03, 0.9))
@@ -107,14 +108,14 @@ def draw_surface(rng: np.random.Generator) -> Floats:
     elif kind < 0.9:
         curve = band(rng.uniform(420, 640), rng.uniform(20, 60), low, high)
     else:
-        return np.asarray(np.interp(_NM, np.linspace(380, 780, 7), rng.uniform(0.03, 0.85, 7)))
-    return np.asarray(curve.band_average(_NM, width))
+        return np.asarray(np.interp(NM, np.linspace(380, 780, 7), rng.uniform(0.03, 0.85, 7)))
+    return np.asarray(curve.band_average(NM, width))
 
 
 def dead_leaves(rng: np.random.Generator, light: KnownLight, shapes: int = 900) -> Floats:
-    """Draw shapes that cover one another, sizes as the power law of natural pictures, shape (SIDE, SIDE, 4)."""
+    """Draw shapes that cover one another, sizes as the power law of natural pictures, shape (SIDE, SIDE, channel)."""
     side = SIDE * _FINE
-    picture = np.empty((side, side, 4))
+    picture = np.empty((side, side, len(light.weights)))
     picture[:] = light.signals(draw_surface(rng))
     least, most = 2.0 * _FINE, 70.0 * _FINE
     for _ in range(shapes):
@@ -139,7 +140,7 @@ def _shape(rng: np.random.Generator, at: Floats, radius: float, side: int) -> Pl
 
 
 def _painted(rng: np.random.Generator, light: KnownLight, at: Places, radius: float) -> Floats:
-    """Signals of a shape's pixels: even, shaded, speckled, or striped in two colours; shape (pixel, 4)."""
+    """Signals of a shape's pixels: even, shaded, speckled, or striped in two colours; shape (pixel, channel)."""
     (y, x), colour, kind = at, light.signals(draw_surface(rng)), rng.random()
     if kind < 0.25:
         slope = rng.normal(0, 0.5, 2)
@@ -157,7 +158,7 @@ def _painted(rng: np.random.Generator, light: KnownLight, at: Places, radius: fl
 
 
 def gratings(rng: np.random.Generator, light: KnownLight) -> Floats:
-    """Draw straight bars of three surfaces whose width grows across the picture, shape (SIDE, SIDE, 4)."""
+    """Draw straight bars of three surfaces whose width grows across the picture, shape (SIDE, SIDE, channel)."""
     y, x = np.mgrid[: SIDE * _FINE, : SIDE * _FINE] / _FINE
     angle = rng.uniform(0, np.pi)
     across, along = np.cos(angle) * x + np.sin(angle) * y, np.sin(angle) * x - np.cos(angle) * y
@@ -170,34 +171,35 @@ def gratings(rng: np.random.Generator, light: KnownLight) -> Floats:
 
 def _finished(rng: np.random.Generator, fine: Floats) -> Floats:
     """Average samples to pixels, and light the picture unevenly."""
-    picture = fine.reshape(SIDE, _FINE, SIDE, _FINE, 4).mean(axis=(1, 3))
+    picture = fine.reshape(SIDE, _FINE, SIDE, _FINE, -1).mean(axis=(1, 3))
     y, x = np.mgrid[:SIDE, :SIDE] / SIDE - 0.5
     slope = rng.normal(0, 0.6, 2)
     return np.asarray(picture * np.exp(slope[0] * y + slope[1] * x)[..., None])
 
 
 def photograph(rng: np.random.Generator, light: KnownLight, name: str) -> Floats:
-    """Photograph of `PHOTOGRAPHS` at half its size, as signals under the light, shape (h, w, 4).
+    """Photograph of `PHOTOGRAPHS` at half its size, as signals under the light, shape (h, w, channel).
 
     The basis gives each colour one spectrum; a factor a channel stands for the others that look the same.
     """
-    spectra = srgb_basis(_NM)
+    spectra = srgb_basis(NM)
     encoded = getattr(data, name)() / 255.0
     encoded = encoded if encoded.ndim == 3 else np.repeat(encoded[..., None], 3, axis=2)
     linear = decode_srgb(encoded)
     height, width = (size // 2 for size in linear.shape[:2])
     linear = linear[: 2 * height, : 2 * width].reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
-    return np.asarray(linear @ light.signals(spectra) * np.exp(rng.normal(0, 0.04, 4)))
+    return np.asarray(linear @ light.signals(spectra) * np.exp(rng.normal(0, 0.04, len(light.weights))))
 
 
-def draw_pictures(sensor: SensorConfig, seed: int) -> Iterator[tuple[str, Planes]]:
-    """Draw the training pictures of a sensor's curves one by one, with the name of each; (h, w, 4) float32.
+def draw_pictures(
+    light_of: Callable[[np.random.Generator], KnownLight], seed: int, kinds: Sequence[str] = KINDS
+) -> Iterator[Planes]:
+    """Draw training pictures one by one, each under a light of its own, (h, w, channel) float32.
 
     Every second one gets grain, as a render's own noise and fine texture do.
     """
-    kinds = ["leaves"] * LEAVES + ["gratings"] * GRATINGS + list(PHOTOGRAPHS)
     for kind, rng in zip(kinds, np.random.default_rng(seed).spawn(len(kinds)), strict=True):
-        light = draw_light(rng, sensor)
+        light = light_of(rng)
         if kind == "leaves":
             picture = dead_leaves(rng, light)
         elif kind == "gratings":
@@ -206,7 +208,7 @@ def draw_pictures(sensor: SensorConfig, seed: int) -> Iterator[tuple[str, Planes
             picture = photograph(rng, light, kind)
         if rng.random() < 0.5:
             picture = picture * np.exp(rng.normal(0, rng.uniform(0.005, 0.03), picture.shape[:2]))[..., None]
-        yield kind, np.maximum(picture, _DARKEST).astype(np.float32)
+        yield np.maximum(picture, _DARKEST).astype(np.float32)
 
 
 def photograph_hashes() -> dict[str, str]:

@@ -5,6 +5,7 @@ A mixture of Gaussians over patches, by expectation and maximisation (Dempster, 
 
 import json
 from collections.abc import Iterable
+from functools import partial
 from hashlib import sha256
 from importlib import metadata
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from isp.ple.prior import PATCH, Prior
 from sensor.config import SensorConfig
-from studies.training.pictures import LIGHTS, Planes, draw_pictures, neutral_electrons, photograph_hashes
+from studies.training.pictures import LIGHTS, Planes, draw_light, draw_pictures, neutral_electrons, photograph_hashes
 
 Matrix = NDArray[np.float32]
 
@@ -28,13 +29,7 @@ def draw_patches(pictures: Iterable[Planes], rng: np.random.Generator) -> Matrix
     """Random patches, turned and mirrored, in roots of signal over the patch's mean W; shape (patch, 8 * 8 * 4)."""
     rows = []
     for picture in pictures:
-        count = max(200, PATCHES * picture[..., 0].size // 65536)
-        ys, xs = (rng.integers(0, size - PATCH + 1, count) for size in picture.shape[:2])
-        patches = np.stack([picture[y : y + PATCH, x : x + PATCH] for y, x in zip(ys, xs, strict=True)])
-        turns = rng.integers(0, 8, count)
-        for turn in range(8):
-            turned = np.rot90(patches[turns == turn], turn % 4, axes=(1, 2))
-            patches[turns == turn] = turned[:, ::-1] if turn > 3 else turned
+        patches = cut_patches(picture, rng)
         light = patches[..., 3].mean(axis=(1, 2))
         bright = light > _LEAST_LIGHT
         rows.append(np.sqrt(patches[bright] / light[bright, None, None, None]).reshape(bright.sum(), -1))
@@ -43,24 +38,42 @@ def draw_patches(pictures: Iterable[Planes], rng: np.random.Generator) -> Matrix
     return result
 
 
-def fit_prior(patches: Matrix, neutrals_e: NDArray[np.float64], rng: np.random.Generator, source: str) -> Prior:
-    """Fit `COMPONENTS` Gaussians in the patches' `DIRECTIONS` principal directions.
+def cut_patches(picture: Planes, rng: np.random.Generator) -> Planes:
+    """Random patches of a picture, turned and mirrored, shape (patch, 8, 8, channel)."""
+    count = max(200, PATCHES * picture[..., 0].size // 65536)
+    ys, xs = (rng.integers(0, size - PATCH + 1, count) for size in picture.shape[:2])
+    patches = np.stack([picture[y : y + PATCH, x : x + PATCH] for y, x in zip(ys, xs, strict=True)])
+    turns = rng.integers(0, 8, count)
+    for turn in range(8):
+        turned = np.rot90(patches[turns == turn], turn % 4, axes=(1, 2))
+        patches[turns == turn] = turned[:, ::-1] if turn > 3 else turned
+    return patches
+
+
+def fit_prior(
+    patches: Matrix,
+    neutrals_e: NDArray[np.float64],
+    rng: np.random.Generator,
+    source: str,
+    directions: int = DIRECTIONS,
+) -> Prior:
+    """Fit `COMPONENTS` Gaussians in the patches' principal directions.
 
     Parameters
     ----------
-    patches : (patch, 256) float32
-        Of `draw_patches`.
+    patches : (patch, number) float32
+        Of `draw_patches`, or of coefficients of reflectance (`studies.training.spectral`).
     neutrals_e, source
         As `isp.ple.prior.Prior`.
     """
     mean = patches.mean(axis=0)
     centred = patches - mean
     _, vectors = np.linalg.eigh((centred.T @ centred / len(centred)).astype(np.float64))
-    basis = np.ascontiguousarray(vectors[:, ::-1][:, :DIRECTIONS], dtype=np.float32)
+    basis = np.ascontiguousarray(vectors[:, ::-1][:, :directions], dtype=np.float32)
     reduced = centred @ basis
     weights, centres, factors, parts = _expect_and_maximise(reduced, _first_parts(reduced, rng))
     outside = np.maximum((centred**2).sum(axis=1) - (reduced**2).sum(axis=1), 0.0)
-    rest = np.maximum(parts.T @ outside / (weights * len(patches)) / (patches.shape[1] - DIRECTIONS), 1e-7)
+    rest = np.maximum(parts.T @ outside / (weights * len(patches)) / (patches.shape[1] - directions), 1e-7)
     return Prior(neutrals_e, mean, basis, weights, centres, factors, rest, source)
 
 
@@ -120,18 +133,23 @@ def train_prior(sensor: SensorConfig, name: str, seed: int) -> Prior:
         Of the pictures, their patches and the fit's start.
     """
     digest, pictures = sha256(), []
-    for _, picture in draw_pictures(sensor, seed):
+    for picture in draw_pictures(partial(draw_light, sensor=sensor), seed):
         digest.update(picture.tobytes())
         pictures.append(picture)
     rng = np.random.default_rng([seed, 1])
     patches = draw_patches(pictures, rng)
+    source = provenance(f"rodcone train --sensor {name} --seed {seed}", seed, digest.hexdigest(), len(patches))
+    return fit_prior(patches, neutral_electrons(sensor, LIGHTS), rng, source)
+
+
+def provenance(command: str, seed: int, pictures_sha256: str, patches: int) -> str:
+    """What a prior was trained from, as JSON."""
     source = {
-        "command": f"rodcone train --sensor {name} --seed {seed}",
+        "command": command,
         "versions": {library: metadata.version(library) for library in _LIBRARIES},
         "seed": seed,
-        "pictures": len(pictures),
-        "pictures_sha256": digest.hexdigest(),
+        "pictures_sha256": pictures_sha256,
         "photographs_sha256": photograph_hashes(),
-        "patches": len(patches),
+        "patches": patches,
     }
-    return fit_prior(patches, neutral_electrons(sensor, LIGHTS), rng, json.dumps(source))
+    return json.dumps(source)

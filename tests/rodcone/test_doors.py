@@ -75,6 +75,9 @@ RIGHT: dict[str, Any] = {
     "workers": 1,
     "out": "none",
     "table": [],
+    "levels_cd_m2": [1.0],
+    "exposure": "10ms",
+    "prior": "drawn",
 }
 NEVER: tuple[Any, ...] = (
     1j,

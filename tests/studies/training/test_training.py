@@ -1,20 +1,23 @@
 """Training: signals of known surfaces, pictures that can be drawn again, and a mixture that is found again."""
 
 import ast
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from isp.design import spectral_prior
 from isp.ple.prior import mixture, own_prior
 from isp.ple.pyramid import reconstruct
 from render.engine import render
+from render.photometry import luminous_efficiency
 from scenes.catalog import load
 from sensor.capture import capture
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import channel_electrons
-from studies.training import pictures, train
+from studies.training import pictures, spectral, train
 from studies.training.pictures import PHOTOGRAPHS, draw_light, draw_surface, neutral_electrons, photograph
 from studies.training.train import draw_patches, fit_prior, train_prior
 
@@ -98,3 +101,19 @@ def test_a_prior_trained_anew_is_as_good_as_the_one_that_ships():
             for prior in (ours, anew)
         ]
         assert abs(psnr_db[1] - psnr_db[0]) < 0.05
+
+
+@pytest.mark.thorough
+def test_a_spectral_prior_trained_on_little_is_read_back_and_says_from_what(tmp_path, monkeypatch):
+    monkeypatch.setattr(spectral, "KINDS_OF", {"drawn": ("gratings", "coins")})
+    monkeypatch.setattr(spectral_prior, "PRIORS", {"drawn": tmp_path / "a.npz"})
+    monkeypatch.setattr(spectral, "DIRECTIONS", 24)
+    source = spectral.train_spectral_prior("drawn", 3, tmp_path / "a.npz")
+    prior = spectral_prior.load_prior.__wrapped__("drawn")
+    assert json.loads(prior.source) == json.loads(source)
+    assert json.loads(source)["command"] == "rodcone train --spectral drawn --seed 3"
+    # Patches were divided by their mean luminous reflectance: the mixture's is 1.
+    luminous = luminous_efficiency((prior.edges_nm[1:] + prior.edges_nm[:-1]) / 2, np.diff(prior.edges_nm))
+    mean = np.einsum("k,kpc->c", prior.patches.weights, prior.patches.means) / prior.patches.means.shape[1]
+    assert (prior.spectra @ mean) @ luminous / luminous.sum() == pytest.approx(1.0, abs=0.01)
+    assert np.all(np.diff(prior.reflectances) > 0)

@@ -1,0 +1,164 @@
+"""Expected error of the best estimate of a picture from a mosaic's samples, under a prior over patches.
+
+A patch x of coefficients is one of several Gaussians, x ~ N(mu_k, C_k) with probability pi_k. Its samples are
+y = H x + n, n of variance N, which shot noise makes depend on the component's own mean. Where the component is known,
+the estimate of the least squared error is linear, and its error has the covariance
+
+    P_k = C_k - C_k H' (H C_k H' + N_k)^-1 H C_k                                                    (textbook LMMSE)
+
+so that the expected error is sum_k pi_k tr(W_k P_k), W_k the metric about the component's mean. No estimator knows the
+component, so a real one does worse. One that uses mean and covariance of all patches together, and so is linear in the
+samples, does better than nothing: its error, by the same formula for one Gaussian, is the other end. Both are
+expectations over the prior: an easy scene lies under them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+Doubles = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Gaussians:
+    """A mixture of Gaussians over patches of size x size pixels of `coefficient` numbers each.
+
+    Attributes
+    ----------
+    weights : (component,) float64
+        Sum 1.
+    means : (component, pixel, coefficient) float64
+    factors : (component, pixel, coefficient, direction) float64
+        F, as (pixel * coefficient, direction).
+    rest : (component,) float64
+        r: a component's covariance is C = F F' + r I.
+    """
+
+    weights: Doubles
+    means: Doubles
+    factors: Doubles
+    rest: Doubles
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What a sample's noise is made of.
+
+    Attributes
+    ----------
+    dark_e : float
+        Standard deviation of what doesn't depend on light [e-]: read noise, fixed offsets, dark current, rounding.
+    prnu : float
+        Relative standard deviation of the pixels' gain.
+    full_e : float
+        Electrons at which a sample is full; inf for none.
+    """
+
+    dark_e: float
+    prnu: float
+    full_e: float
+
+
+def pooled(prior: Gaussians) -> Gaussians:
+    """One Gaussian with the mean and covariance of the whole mixture."""
+    components, pixels, coefficients = prior.means.shape
+    mean = np.tensordot(prior.weights, prior.means, 1)
+    root = np.sqrt(prior.weights)[:, None, None]
+    spread = (prior.means - mean).reshape(components, -1) * root[:, :, 0]
+    inside = (prior.factors.reshape(components, pixels * coefficients, -1) * root).swapaxes(0, 1)
+    factors = np.concatenate([inside.reshape(pixels * coefficients, -1), spread.T], axis=1)
+    values, vectors = np.linalg.eigh(factors @ factors.T)
+    kept = values > values[-1] * 1e-12
+    factor = vectors[:, kept] * np.sqrt(values[kept])
+    rest = prior.weights @ prior.rest
+    return Gaussians(np.ones(1), mean[None], factor.reshape(1, pixels, coefficients, -1), rest[None])
+
+
+def sample_variance(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> Doubles:
+    """Variance of samples' noise over the share that isn't full [e-^2].
+
+    A full sample is only a lower bound. It enters as none: a sample that is full with probability q tells (1 - q) times
+    as much, so its variance is over 1 - q. That leaves out what the bound itself tells.
+
+    Parameters
+    ----------
+    mean_e, spread_e2 : arrays of one shape
+        Mean of the expected electrons, and their variance over the prior.
+    """
+    mean_e = np.maximum(mean_e, 0.0)
+    variance = mean_e + noise.dark_e**2 + (noise.prnu * mean_e) ** 2
+    if np.isinf(noise.full_e):
+        return variance
+    open_share = ndtr((noise.full_e - mean_e) / np.sqrt(variance + spread_e2))
+    return np.asarray(variance / np.maximum(open_share, 1e-8))
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A prior's patches as samples of a mosaic in unit light, with what the estimate of the middle pixels needs.
+
+    Attributes
+    ----------
+    means : (component, sample) float64
+        H mu_k.
+    signal : (component, sample, sample) float64
+        H C_k H'.
+    cross : (component, sample, pixel, coefficient) float64
+        H C_k at the middle pixels.
+    within : (component, pixel, coefficient, coefficient) float64
+        C_k of each middle pixel's coefficients.
+    """
+
+    means: Doubles
+    signal: Doubles
+    cross: Doubles
+    within: Doubles
+
+
+def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp]) -> Samples:
+    """Sample a prior's patches.
+
+    Parameters
+    ----------
+    prior : Gaussians
+    sampling : (sample, pixel, coefficient) float64
+        H: electrons of each sample from each pixel's coefficients.
+    middle : (pixel,) intp
+        Pixels whose error counts: the others lack neighbours.
+    """
+    loadings = np.einsum("spc,kpcd->ksd", sampling, prior.factors, optimize=True)
+    factors, rest = prior.factors[:, middle], prior.rest
+    plain = sampling.reshape(len(sampling), -1)
+    return Samples(
+        means=np.einsum("spc,kpc->ks", sampling, prior.means, optimize=True),
+        signal=loadings @ loadings.swapaxes(1, 2) + rest[:, None, None] * (plain @ plain.T),
+        cross=np.einsum("ksd,kpcd->kspc", loadings, factors, optimize=True)
+        + rest[:, None, None, None] * sampling[:, middle],
+        within=np.einsum("kpcd,kped->kpce", factors, factors, optimize=True)
+        + rest[:, None, None, None] * np.eye(sampling.shape[2]),
+    )
+
+
+def expected_error(weights: Doubles, samples: Samples, scale: Doubles, noise: Noise, forms: Doubles) -> Doubles:
+    """Expected squared error of a middle pixel's best estimate where the component is known, shape (metric,).
+
+    Parameters
+    ----------
+    weights : (component,) float64
+        Of the mixture.
+    samples : Samples
+    scale : (sample,) float64
+        Light times exposure of each sample, over the unit of `samples`.
+    noise : Noise
+    forms : (metric, component, pixel, coefficient, coefficient) float64
+        W: the squared error of a pixel is e' W e, e that of its coefficients.
+    """
+    signal = samples.signal * scale[:, None] * scale
+    spread = np.diagonal(signal, axis1=1, axis2=2)
+    total = signal + np.eye(len(scale)) * sample_variance(samples.means * scale, spread, noise)[:, None]
+    cross = samples.cross * scale[:, None, None]
+    gain = np.linalg.solve(total, cross.reshape(*cross.shape[:2], -1)).reshape(cross.shape)
+    left = samples.within - np.einsum("kspc,kspe->kpce", cross, gain, optimize=True)
+    return np.asarray(np.einsum("k,mkpce,kpce->m", weights, forms, left, optimize=True) / left.shape[1])

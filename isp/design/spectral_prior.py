@@ -1,0 +1,61 @@
+"""The prior over patches of spectral reflectance, which serves any curves: its file, and the mixture in it."""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from isp.design.expected_error import Doubles, Gaussians
+
+PATCH = 8  # pixels a side
+PRIORS = {"drawn": Path(__file__).with_name("drawn.npz"), "photographs": Path(__file__).with_name("photographs.npz")}
+
+
+@dataclass(frozen=True, eq=False)
+class SpectralPrior:
+    """A mixture of Gaussians over patches of 8x8 pixels, each of some coefficients of a basis of reflectances.
+
+    Attributes
+    ----------
+    edges_nm : (band + 1,) float64
+        Of the basis's bands.
+    spectra : (band, coefficient) float64
+        Reflectance of a coefficient of 1 in each band.
+    patches : Gaussians
+        Of patches whose mean luminous reflectance is 1.
+    reflectances : (quantile,) float64
+        Mean luminous reflectances of patches, equally likely.
+    source : str
+        Command, versions, seed and hashes of what it was trained from, as JSON.
+    """
+
+    edges_nm: Doubles
+    spectra: Doubles
+    patches: Gaussians
+    reflectances: Doubles
+    source: str
+
+
+@cache
+def load_prior(name: str) -> SpectralPrior:
+    """Prior of `PRIORS` by name."""
+    with np.load(PRIORS[name], allow_pickle=False) as file:
+        held = {key: np.asarray(file[key], dtype=np.float64) for key in file.files if key != "source"}
+        source = str(file["source"])
+    shape = (len(held["weights"]), PATCH**2, held["spectra"].shape[1])
+    directions = held["basis"].shape[1]
+    factors = np.zeros((shape[0], directions, directions))
+    factors[:, *np.tril_indices(directions)] = held["factors"]
+    return SpectralPrior(
+        edges_nm=held["edges_nm"],
+        spectra=held["spectra"],
+        patches=Gaussians(
+            weights=held["weights"] / held["weights"].sum(),
+            means=(held["mean"] + held["centres"] @ held["basis"].T).reshape(shape),
+            factors=(held["basis"] @ factors).reshape(*shape, directions),
+            rest=held["rest"],
+        ),
+        reflectances=held["reflectances"],
+        source=source,
+    )

@@ -1,0 +1,122 @@
+"""The command `rodcone expect`."""
+
+import json as notation
+from csv import DictWriter
+from dataclasses import asdict, fields
+from io import StringIO
+from math import pi
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from rodcone.errors import InputError
+from rodcone.files import check_place, replacing
+from scenes.levels import AVERAGE_REFLECTANCE, DEMO_LEVELS
+from sensor.exposure import AUTO_INFORMATION
+from sensor.presets import preset
+from studies.commands.console import print_table
+from studies.design.expect import ExpectedError
+from studies.design.expect import expect as expect_errors
+from studies.pages.expect_chart import gain_svg
+from studies.study.levels import NAMED, UNITS, parse_exposure, parse_level
+
+
+def expect(
+    sensors: Annotated[list[str], Parameter(negative_iterable=())],
+    /,
+    *,
+    mosaic: list[str] | None = None,
+    level: list[str] | None = None,
+    over: str = f"{DEMO_LEVELS[0].name}:{DEMO_LEVELS[-1].name}",
+    light: str = "D65",
+    exposure: str = AUTO_INFORMATION,
+    prior: str = "drawn",
+    out: Path | None = None,
+    json: bool = False,
+) -> None:
+    """Print the error to expect of a sensor's pictures by level of light, in closed form, without rendering.
+
+    The error is that of the best estimate under a prior over patches of 8x8 pixels, with every noise source of the
+    sensor. A number of decibels is an expectation over the prior, no limit: compare mosaics by their differences.
+
+    Parameters
+    ----------
+    sensors
+        Sensor presets by name, or preset files.
+    mosaic
+        Mosaics by name, or rows such as RG/BW; the sensor's own by default.
+    level
+        Levels of light, such as 25cd/m2, 500lux or moonlight.
+    over
+        Named levels from one to another.
+    light
+        Illuminant; the camera knows it.
+    exposure
+        Rule of exposure, or a time such as 20ms.
+    prior
+        Prior over patches: drawn (shapes and photographs) or photographs (alone).
+    out
+        Table with every figure (.csv), or plot of the gain over the first camera (.svg).
+    json
+        Print one JSON object: a list of errors by level for each camera.
+    """
+    if out is not None and out.suffix.lower() not in (".csv", ".svg"):
+        raise InputError(f"out: {str(out)!r} ends neither in .csv nor in .svg; write {out.stem}.csv")
+    if out is not None:
+        check_place(out)
+    levels = {text: _luminance(text) for text in level} if level else _levels_between(over)
+    time_s = parse_exposure(exposure, "exposure")
+    by_camera = {
+        f"{name} {tile}".strip(): expect_errors(
+            preset(name, tile.split("/") if "/" in tile else tile or None),
+            list(levels.values()),
+            light,
+            exposure if time_s is None else time_s,
+            prior,
+        )
+        for name in sensors
+        for tile in mosaic or [""]
+    }
+    if out is not None:
+        with replacing(out) as (place,):
+            place.write_text(_csv(by_camera) if out.suffix.lower() == ".csv" else gain_svg(by_camera), "utf-8")
+    if json:
+        print(notation.dumps({name: [asdict(row) for row in rows] for name, rows in by_camera.items()}))
+        return
+    reference, *others = by_camera.items()
+    print_table(
+        ("PSNR in dB, then gains over it", *levels),
+        [(reference[0], *(f"{row.psnr_db:.2f}" for row in reference[1]))]
+        + [
+            (name, *(f"{row.psnr_db - beside.psnr_db:+.2f}" for row, beside in zip(held, reference[1], strict=True)))
+            for name, held in others
+        ],
+    )
+    print_table(
+        ("error of a*, b*", *levels),
+        [(name, *(f"{row.colour:.2f}" for row in held)) for name, held in by_camera.items()],
+    )
+
+
+def _luminance(text: str) -> float:
+    value, unit = parse_level(text)
+    return value if unit == UNITS[0] else value * AVERAGE_REFLECTANCE / pi
+
+
+def _levels_between(over: str) -> dict[str, float]:
+    """Named levels from one to another, such as street:classroom."""
+    names = list(NAMED)
+    first, colon, last = over.partition(":")
+    if not colon or first not in names or last not in names or names.index(first) > names.index(last):
+        raise InputError(f"over: {over!r} is not a range of levels; allowed: two of {', '.join(names)}, the darker "
+                         f"first; write {names[0]}:{names[-1]}")  # fmt: skip
+    return {name: NAMED[name].luminance_cd_m2 for name in names[names.index(first) : names.index(last) + 1]}
+
+
+def _csv(by_camera: dict[str, list[ExpectedError]]) -> str:
+    text = StringIO()
+    table = DictWriter(text, ["camera", *(key.name for key in fields(ExpectedError))])
+    table.writeheader()
+    table.writerows({"camera": name} | asdict(row) for name, rows in by_camera.items() for row in rows)
+    return text.getvalue()

@@ -1,0 +1,1 @@
+"""Which mosaic for which light: a sensor's expected error under a prior over patches, in closed form."""

@@ -1,0 +1,230 @@
+"""Expected error of a sensor under a prior over patches, at a level of light: closed form, no render, no pictures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from math import hypot, log10, sqrt
+
+import numpy as np
+
+from isp.design.expected_error import Gaussians, Noise, Samples, expected_error, pooled, sampled
+from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
+from render.illuminants import illuminant
+from render.photometry import tristimulus
+from render.spectrum import VISIBLE_NM, Floats
+from rodcone.colour_spaces import D65_XY, adapt_to_d65, luminance_of_srgb, xyz_from_xy, xyz_to_srgb
+from rodcone.errors import unknown
+from sensor.cfa import channels, mask
+from sensor.config import SensorConfig
+from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
+from sensor.optics import camera_equation
+from sensor.readout import spread_charge
+from sensor.response import electrons_per_irradiance
+from studies.metrics.truth import Light, light_in_bands
+
+MIDDLE = PATCH // 4  # pixels at a patch's sides whose error doesn't count: they lack neighbours
+METERED = 64  # side of the frame, drawn from the prior, that the exposure looks at
+_LAB_LINEAR = 216 / 24389  # CIE 15: where the cube root of Lab becomes a line
+_LEAST_SRGB = 0.0031308  # IEC 61966-2-1: where the curve of sRGB becomes a line
+
+
+@dataclass(frozen=True)
+class ExpectedError:
+    """Expected error under the prior of the best estimate: where the patch's component is known, and a linear one.
+
+    Attributes
+    ----------
+    luminance_cd_m2 : float
+        Mean of the scene.
+    exposure_s : float
+    psnr_db, linear_psnr_db : float
+        Of encoded sRGB, as PSNR is, by the curve's slope; component known, and linear estimate.
+    luminance_db : float
+        Of encoded luminance alone; component known.
+    lightness, colour : float
+        Root mean square of the error of L*, and of (a*, b*) together, in Lab, linearised; component known.
+    """
+
+    luminance_cd_m2: float
+    exposure_s: float
+    psnr_db: float
+    linear_psnr_db: float
+    luminance_db: float
+    lightness: float
+    colour: float
+
+
+@dataclass(frozen=True, eq=False)
+class LitPrior:
+    """A prior's coefficients under a light.
+
+    Attributes
+    ----------
+    light : Light
+    basis : (band, coefficient) float64
+        Reflectance of a coefficient of 1 in the light's bands.
+    xyz : (3, coefficient) float64
+        Adapted to D65; reflectance 1 has Y = 1.
+    """
+
+    light: Light
+    basis: Floats
+    xyz: Floats
+
+
+@cache
+def view_of(prior_name: str, light_name: str) -> LitPrior:
+    """The prior's coefficients under an illuminant, in bands of 1 nm."""
+    prior, nm = load_prior(prior_name), np.arange(VISIBLE_NM[0] + 0.5, VISIBLE_NM[1])
+    light = light_in_bands(illuminant(light_name), nm, np.ones_like(nm))
+    basis = prior.spectra[np.clip(np.searchsorted(prior.edges_nm, nm) - 1, 0, len(prior.spectra) - 1)]
+    white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm)
+    xyz = tristimulus(light.spectrum * basis.T, light.wavelength_nm, light.width_nm)
+    return LitPrior(light, basis, adapt_to_d65(xyz, white).T)
+
+
+def responses_e(sensor: SensorConfig, view: LitPrior) -> Floats:
+    """Electrons of each channel's pixel in a second from a coefficient of 1, reflectance 1 having 1 cd/m^2."""
+    light = view.light
+    weights = electrons_per_irradiance(sensor.undivided, light.wavelength_nm, light.width_nm, 1.0)
+    return np.asarray(weights * light.spectrum @ view.basis * camera_equation(sensor.lens))
+
+
+def metric_forms(prior: SpectralPrior, view: LitPrior, reflectance: float) -> Floats:
+    """W of encoded sRGB, encoded luminance, L* and (a*, b*) for errors of a patch of mean luminous reflectance 1.
+
+    Shape (metric, component, pixel, coefficient, coefficient), at the middle pixels. Reflectance 1 is shown as white.
+    """
+    means, to_xyz = prior.patches.means[:, middle_pixels()], view.xyz * reflectance
+    to_srgb = xyz_to_srgb(to_xyz.T).T
+    # Slopes about the component's mean: of the curve of sRGB, and of the cube root of Lab.
+    linear, xyz = means @ to_srgb.T, means @ to_xyz.T
+    srgb = _curve_slope(linear)[..., None] * to_srgb
+    luminance = _curve_slope(xyz[..., 1:2])[..., None] * luminance_of_srgb(to_srgb.T)
+    white = xyz_from_xy(D65_XY)
+    relative = np.maximum(xyz / white, _LAB_LINEAR)
+    root = (relative ** (-2 / 3) / 3)[..., None] * (to_xyz / white[:, None])
+    lab = np.stack([116 * root[..., 1, :], 500 * (root[..., 0, :] - root[..., 1, :]),
+                    200 * (root[..., 1, :] - root[..., 2, :])], axis=-2)  # fmt: skip
+    rows = (srgb / sqrt(3), luminance, lab[..., :1, :], lab[..., 1:, :])
+    return np.stack([each.swapaxes(-1, -2) @ each for each in rows])
+
+
+def _curve_slope(linear: Floats) -> Floats:
+    return np.asarray(1.055 / 2.4 * np.clip(linear, _LEAST_SRGB, 1.0) ** (1 / 2.4 - 1))
+
+
+def middle_pixels() -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """Numbers of a patch's middle pixels, row by row."""
+    inside = np.zeros((PATCH, PATCH), dtype=bool)
+    inside[MIDDLE:-MIDDLE, MIDDLE:-MIDDLE] = True
+    return np.flatnonzero(inside)
+
+
+def sampling_of(sensor: SensorConfig, responses: Floats) -> Floats:
+    """H of a patch: electrons of each sample from each pixel's coefficients, crosstalk included."""
+    shape, pixels = (PATCH, PATCH), PATCH**2
+    site = sum(index * mask(sensor.cfa, name, shape) for index, name in enumerate(channels(sensor.cfa)))
+    spread = np.stack([spread_charge(one.reshape(shape), sensor.pixel.crosstalk).ravel() for one in np.eye(pixels)])
+    # What a filter passes at a pixel goes to its neighbours: the channel is that of the pixel that the light fell on.
+    return np.asarray(spread.T[:, :, None] * responses[np.ravel(site)][None])
+
+
+def expect(
+    sensor: SensorConfig,
+    levels_cd_m2: Sequence[float] | Floats,
+    light: str = "D65",
+    exposure: str | float = AUTO_INFORMATION,
+    prior: str = "drawn",
+) -> list[ExpectedError]:
+    """Expected error of a sensor's pictures at each level, in closed form.
+
+    Parameters
+    ----------
+    sensor : SensorConfig
+    levels_cd_m2 : sequence of float
+        Mean luminances of scenes.
+    light : str
+        Illuminant; the camera knows it.
+    exposure : str or float
+        A rule of `sensor.exposure.RULES`, or a time [s].
+    prior : str
+        One of `isp.design.spectral_prior.PRIORS`.
+
+    Raises
+    ------
+    InputError
+        For an unknown light, prior or rule of exposure.
+    """
+    if prior not in PRIORS:
+        raise unknown("prior", prior, PRIORS)
+    held, seen, forms = load_prior(prior), view_of(prior, light), _forms(prior, light)
+    pooled_forms = np.einsum("k,rmkpce->rmpce", held.patches.weights, forms)[:, :, None]
+    responses = responses_e(sensor, seen)
+    sampling, drawn = sampling_of(sensor, responses), _drawn_pixels(prior) @ responses.T
+    known, linear = (sampled(patches, sampling, middle_pixels()) for patches in (held.patches, pooled_patches(prior)))
+    result = []
+    for level_cd_m2 in levels_cd_m2:
+        white_cd_m2 = float(level_cd_m2) / held.reflectances.mean()
+        time_s = (
+            exposure_of_electrons_s(exposure, np.maximum(drawn, 0.0) * white_cd_m2, sensor)
+            if isinstance(exposure, str)
+            else exposure
+        )
+        noise, scales = noise_of(sensor, time_s), held.reflectances * white_cd_m2 * time_s
+        errors = _mean_error(held.patches.weights, known, scales, noise, forms)
+        linear_error = _mean_error(np.ones(1), linear, scales, noise, pooled_forms)[0]
+        result.append(
+            ExpectedError(
+                luminance_cd_m2=float(level_cd_m2),
+                exposure_s=time_s,
+                psnr_db=-10 * log10(errors[0]),
+                linear_psnr_db=-10 * log10(linear_error),
+                luminance_db=-10 * log10(errors[1]),
+                lightness=sqrt(errors[2]),
+                colour=sqrt(errors[3]),
+            )
+        )
+    return result
+
+
+@cache
+def _forms(prior: str, light: str) -> Floats:
+    """`metric_forms` at each reflectance, shape (reflectance, metric, component, pixel, coefficient, coefficient)."""
+    held, seen = load_prior(prior), view_of(prior, light)
+    return np.stack([metric_forms(held, seen, reflectance) for reflectance in held.reflectances])
+
+
+@cache
+def pooled_patches(prior: str) -> Gaussians:
+    """One Gaussian with mean and covariance of the prior's patches."""
+    return pooled(load_prior(prior).patches)
+
+
+@cache
+def _drawn_pixels(prior: str) -> Floats:
+    """Coefficients of `METERED` x `METERED` pixels drawn from the prior, which the exposure looks at."""
+    held, rng, count = load_prior(prior), np.random.default_rng(0), METERED**2
+    component, pixel = rng.choice(len(held.patches.weights), count, p=held.patches.weights), middle_pixels()[0]
+    factors = held.patches.factors[component, pixel]
+    coefficients = held.patches.means[component, pixel] + np.einsum(
+        "ncd,nd->nc", factors, rng.standard_normal((count, factors.shape[-1]))
+    )
+    reflectances = held.reflectances[rng.integers(len(held.reflectances), size=count)]
+    return np.asarray((coefficients * reflectances[:, None]).reshape(METERED, METERED, -1))
+
+
+def _mean_error(weights: Floats, samples: Samples, scales: Floats, noise: Noise, forms: Floats) -> list[float]:
+    """Mean over equally likely reflectances of a patch, shape (metric,)."""
+    ones = np.ones(samples.means.shape[1])
+    errors = [expected_error(weights, samples, s * ones, noise, form) for s, form in zip(scales, forms, strict=True)]
+    return [float(error) for error in np.mean(errors, axis=0)]
+
+
+def noise_of(sensor: SensorConfig, exposure_s: float) -> Noise:
+    """Noise of a sample, every source of the sensor in it."""
+    pixel = sensor.pixel
+    dark_current_e = pixel.dark_current_e_per_s * exposure_s
+    rounding_e = sensor.gain_e_per_dn / sqrt(12)
+    dark_e = hypot(pixel.read_noise_e, pixel.fixed_dark_e, rounding_e, sqrt(dark_current_e))
+    return Noise(dark_e=dark_e, prnu=pixel.fixed_gain, full_e=pixel.full_well_e - dark_current_e)

@@ -1,0 +1,133 @@
+"""The closed form against textbook LMMSE, against signals drawn from the prior, and in its limits."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from isp.design.expected_error import Gaussians, Noise, expected_error, pooled, sample_variance, sampled
+
+PIXELS, COEFFICIENTS, DIRECTIONS = 6, 3, 5
+MIDDLE = np.array([2, 3])
+
+
+def mixture(components: int, seed: int = 1) -> Gaussians:
+    rng = np.random.default_rng(seed)
+    return Gaussians(
+        weights=rng.dirichlet(np.ones(components)),
+        means=rng.uniform(1.0, 2.0, (components, PIXELS, COEFFICIENTS)),
+        factors=0.2 * rng.standard_normal((components, PIXELS, COEFFICIENTS, DIRECTIONS)),
+        rest=rng.uniform(0.001, 0.01, components),
+    )
+
+
+def mosaic(seed: int = 2) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return np.eye(PIXELS)[:, :, None] * rng.uniform(0.5, 1.0, (PIXELS, 1, COEFFICIENTS))
+
+
+def unit_forms(components: int) -> np.ndarray:
+    return np.broadcast_to(np.eye(COEFFICIENTS), (1, components, len(MIDDLE), COEFFICIENTS, COEFFICIENTS))
+
+
+def covariance(prior: Gaussians, k: int) -> np.ndarray:
+    factor = prior.factors[k].reshape(PIXELS * COEFFICIENTS, -1)
+    return factor @ factor.T + prior.rest[k] * np.eye(len(factor))
+
+
+def error(prior: Gaussians, scale: float, noise: Noise) -> float:
+    samples = sampled(prior, mosaic(), MIDDLE)
+    forms = unit_forms(len(prior.weights))
+    return float(expected_error(prior.weights, samples, np.full(PIXELS, scale), noise, forms)[0])
+
+
+def test_one_component_gives_textbook_lmmse() -> None:
+    prior, noise, scale = mixture(1), Noise(dark_e=2.0, prnu=0.01, full_e=np.inf), 50.0
+    c = covariance(prior, 0)
+    h = scale * mosaic().reshape(PIXELS, -1)
+    mean_e = h @ prior.means[0].ravel()
+    n = np.diag(mean_e + 2.0**2 + (0.01 * mean_e) ** 2)
+    left = c - c @ h.T @ np.linalg.inv(h @ c @ h.T + n) @ h @ c
+    by_pixel = np.trace(left.reshape(PIXELS, COEFFICIENTS, PIXELS, COEFFICIENTS), axis1=1, axis2=3)
+    assert_allclose(error(prior, scale, noise), np.diag(by_pixel)[MIDDLE].mean(), rtol=1e-9)
+
+
+def test_signals_drawn_from_a_component_are_estimated_with_the_predicted_error() -> None:
+    prior, noise, scale, draws = mixture(1), Noise(dark_e=1.0, prnu=0.0, full_e=np.inf), 20.0, 20_000
+    rng = np.random.default_rng(3)
+    c, h = covariance(prior, 0), scale * mosaic().reshape(PIXELS, -1)
+    variance = h @ prior.means[0].ravel() + 1.0
+    x = rng.multivariate_normal(np.zeros(len(c)), c, draws)
+    y = x @ h.T + np.sqrt(variance) * rng.standard_normal((draws, PIXELS))
+    gain = np.linalg.solve(h @ c @ h.T + np.diag(variance), h @ c)
+    squares = ((x - y @ gain) ** 2).reshape(draws, PIXELS, COEFFICIENTS).sum(axis=2)[:, MIDDLE].mean(axis=1)
+    # 4.5 standard errors of the mean: a false alarm in 150 000 runs
+    assert abs(squares.mean() - error(prior, scale, noise)) < 4.5 * squares.std() / np.sqrt(draws)
+
+
+def test_no_estimator_of_draws_from_the_mixture_is_better_than_with_the_component_known() -> None:
+    prior, noise, scale, draws = mixture(4), Noise(dark_e=3.0, prnu=0.0, full_e=np.inf), 5.0, 4000
+    rng = np.random.default_rng(4)
+    h = scale * mosaic().reshape(PIXELS, -1)
+    covariances = [covariance(prior, j) for j in range(4)]
+    means = prior.means.reshape(4, -1)
+    variance = means @ h.T + 9.0
+    k = rng.choice(4, draws, p=prior.weights)
+    roots = np.linalg.cholesky(covariances)
+    x = means[k] + np.einsum("nij,nj->ni", roots[k], rng.standard_normal((draws, means.shape[1])))
+    y = x @ h.T + np.sqrt(variance[k]) * rng.standard_normal((draws, PIXELS))
+    # The posterior mean, which has the least squared error of all estimators.
+    logs, estimates = [], []
+    for j in range(4):
+        total = h @ covariances[j] @ h.T + np.diag(variance[j])
+        off = y - means[j] @ h.T
+        solved = np.linalg.solve(total, off.T).T
+        logs.append(np.log(prior.weights[j]) - 0.5 * ((off * solved).sum(axis=1) + np.linalg.slogdet(total)[1]))
+        estimates.append(means[j] + solved @ h @ covariances[j])
+    parts = np.exp(np.array(logs) - np.max(logs, axis=0))
+    parts /= parts.sum(axis=0)
+    squares = ((np.einsum("jn,jni->ni", parts, estimates) - x) ** 2).reshape(draws, PIXELS, -1).sum(axis=2)[:, MIDDLE]
+    one_sided = 4.0 * squares.mean(axis=1).std() / np.sqrt(draws)  # a false alarm in 30 000 runs
+    known = error(prior, scale, noise)
+    together = pooled(prior)
+    samples = sampled(together, mosaic(), MIDDLE)
+    linear = float(expected_error(np.ones(1), samples, np.full(PIXELS, scale), noise, unit_forms(1))[0])
+    assert squares.mean() > known - one_sided
+    assert squares.mean() < linear + one_sided
+
+
+def test_pooling_keeps_mean_and_covariance() -> None:
+    prior, means = mixture(3), mixture(3).means.reshape(3, -1)
+    mean = prior.weights @ means
+    second = sum(
+        w * (covariance(prior, k) + np.outer(m, m)) for k, (w, m) in enumerate(zip(prior.weights, means, strict=True))
+    )
+    assert_allclose(pooled(prior).means.ravel(), mean, rtol=1e-12)
+    assert_allclose(covariance(pooled(prior), 0), second - np.outer(mean, mean), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("scale", "noise"),
+    [
+        (11.0, Noise(dark_e=2.0, prnu=0.01, full_e=100.0)),  # more light
+        (10.0, Noise(dark_e=1.0, prnu=0.01, full_e=100.0)),  # less dark noise
+        (10.0, Noise(dark_e=2.0, prnu=0.0, full_e=100.0)),  # pixels that are alike
+        (10.0, Noise(dark_e=2.0, prnu=0.01, full_e=np.inf)),  # an endless well
+    ],
+)
+def test_error_falls_with_light_and_a_larger_well_and_rises_with_noise(scale: float, noise: Noise) -> None:
+    assert error(mixture(3), scale, noise) < error(mixture(3), 10.0, Noise(dark_e=2.0, prnu=0.01, full_e=100.0))
+
+
+def test_without_samples_the_error_is_that_of_the_prior() -> None:
+    prior = mixture(2)
+    blind = Noise(dark_e=1e9, prnu=0.0, full_e=np.inf)
+    alone = np.einsum("k,kpcd->p", prior.weights, prior.factors**2)[MIDDLE].mean()
+    alone += COEFFICIENTS * prior.weights @ prior.rest
+    assert_allclose(error(prior, 1.0, blind), alone, rtol=1e-9)
+
+
+def test_a_full_sample_tells_nothing_and_one_at_the_well_half() -> None:
+    noise = Noise(dark_e=0.0, prnu=0.0, full_e=100.0)
+    assert_allclose(sample_variance(np.array([100.0]), np.array([50.0]), noise), 200.0)
+    assert sample_variance(np.array([1000.0]), np.array([0.0]), noise)[0] > 1e10
+    assert_allclose(sample_variance(np.array([10.0]), np.array([0.0]), noise), 10.0)
