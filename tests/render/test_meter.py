@@ -14,6 +14,7 @@ from scipy.stats import t as student
 from render import meter
 from render.engine import render
 from render.geometry import look_at, to_world
+from render.loader import mitsuba_module
 from render.scene import LightGroup, Scene
 from render.spectrum import flat
 from rodcone.jit import backend
@@ -218,3 +219,16 @@ def test_sun_and_sky_light_the_garden_table_as_the_scene_states():
     open_sky = 1 - hidden_by((-6.0, 6.0, 0.0002, 2.46, -0.52), card)
     assert 0.6 < open_sky < 0.8
     assert lux["sky"] == pytest.approx(np.full(4, still_life_outdoor.SKY_LUX * open_sky), rel=3e-3)
+
+
+def test_light_is_metered_in_this_programs_variant_and_the_users_own_stays():
+    sky = {"light": {"type": "constant"}}
+    expected, transport = metered(sky), render(metered_scene(sky), (1, 1), wavelength_nm=BANDS_NM, spp=1)
+    mi = mitsuba_module()
+    before = mi.variant()
+    try:
+        mi.set_variant("scalar_rgb")
+        np.testing.assert_array_equal(transport.irradiance[0], expected)
+        assert mi.variant() == "scalar_rgb"
+    finally:
+        mi.set_variant(before)
