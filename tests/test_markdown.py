@@ -3,6 +3,7 @@
 import ast
 import json
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +14,10 @@ from rodcone import __all__ as PUBLIC
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
+sys.path.insert(0, str(DOCS))
+
+import pictures  # noqa: E402
+
 README = (ROOT / "README.md").read_text("utf-8")
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted(DOCS.rglob("*.md"))]
 CODE = re.compile(r"^```.*?^```|`[^`\n]*`|^ {4}.*?$", re.MULTILINE | re.DOTALL)
@@ -76,6 +81,16 @@ def test_animation_and_pictures_are_small() -> None:
     with Image.open(animation) as frames:
         assert frames.n_frames > 10  # type: ignore[attr-defined]
     assert sum(path.stat().st_size for path in (DOCS / "pictures").rglob("*") if path.is_file()) < 1_500_000
+
+
+def test_kept_pictures_are_those_of_their_pages_commands() -> None:
+    pages = [page for page in PAGES if pictures.shown(page.read_text("utf-8"))]
+    assert len(pages) > 7
+    for page in pages:
+        made = DOCS / "pictures" / page.stem / pictures.MADE
+        assert made.read_text("utf-8").strip() == pictures.digest(page.read_text("utf-8")), (
+            f"{page.stem}: see figures.mk"
+        )
 
 
 def test_markdown_has_at_most_fifty_thousand_words_and_a_decision_forty_lines() -> None:

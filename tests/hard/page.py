@@ -97,6 +97,7 @@ def summary(results: Sequence[Result]) -> str:
 
 def limits(results: Sequence[Result]) -> str:
     """Table of what isn't kept: by how much, and why."""
+    first_case: dict[str, str] = {}
     rows = []
     for result in results:
         for name in result.broken:
@@ -104,7 +105,10 @@ def limits(results: Sequence[Result]) -> str:
             what = result.case.promise if name == OWN else name
             reason = LIMITS.get((result.case.name, name), "**unknown: a fault**")
             worst = f"{margin.worst:.3g} {margin.unit}"
-            rows.append([f"`{result.case.name}`", what, worst, f"{margin.allowed:.3g}", reason])
+            place = f"`{result.case.name}`, {what}"
+            first = first_case.setdefault(reason, place)  # a reason stands at its first case alone
+            why = reason if first == place else f"as {first}"
+            rows.append([f"`{result.case.name}`", what, worst, f"{margin.allowed:.3g}", why])
     return table(["case", "not kept", "worst", "allowed there", "why"], rows)
 
 
