@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from render.error_estimates import Halves, group_errors, relative_error, shared_paths
 from render.integrator.allocation import rates_of
@@ -129,9 +130,10 @@ def scene_means_of(means: Means) -> SceneMeans:
         errors.append((light.difference - seen.difference).reshape(bands, -1))
     error = np.concatenate([*errors, -means.coverage.difference.reshape(1, -1)])
     covariance = np.zeros((len(error),) * 2)
-    for first in range(0, error.shape[1], BLOCK):
-        part = error[:, first : first + BLOCK].astype(np.float64)
-        covariance += part @ part.T
+    with ThreadpoolController().limit(limits=1, user_api="blas"):  # its threads would wait for Dr.Jit's
+        for first in range(0, error.shape[1], BLOCK):
+            part = error[:, first : first + BLOCK].astype(np.float64)
+            covariance += part @ part.T
     uncovered = 1 - float(means.coverage.mean.mean(dtype=np.float64))
     return SceneMeans(scattered, uncovered, covariance / (size[0] * size[1]) ** 2)
 
