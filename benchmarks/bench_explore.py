@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from environment import print_environment
 
-import studies.explore.session as SESSION
+import studies.explore.answers as ANSWERS
 from rodcone.jit import backend, dr
 from studies.explore.source import RenderOptions, open_source
 
@@ -64,8 +64,8 @@ class CompiledKernels:
     """Counts what the session's thread compiles; Dr.Jit notes it for each thread apart."""
 
     def __init__(self) -> None:
-        self.count, self._facts, self._lock = 0, SESSION.facts, threading.Lock()
-        SESSION.facts = self._facts_counted  # called once for each picture shown
+        self.count, self._facts, self._lock = 0, ANSWERS.facts, threading.Lock()
+        ANSWERS.facts = self._facts_counted  # called once for each picture shown
 
     def _facts_counted(self, shot: Any) -> dict[str, Any]:
         if backend() != "numpy":

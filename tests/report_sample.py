@@ -4,20 +4,16 @@ import json
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from io import BytesIO
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 from sweep_sample import row
 
 from sensor.presets import preset
-from studies.pages.report_data import ReportData, ReportLevel, ReportRender, ReportScene, ReportSensor
-from studies.pages.report_pictures import ReportPictures, flip_map, opened
-from studies.pages.report_sweep import over_seeds
-from studies.pages.report_text import group_names, view_names
+from studies.pages.report_data import ReportCell, ReportData, ReportLevel, ReportRender, ReportScene, ReportSensor
+from studies.pages.report_pictures import LOSSLESS, ReportPictures, as_webp, flip_map, opened
 from studies.sweep.row import Row
 
 LEVELS = (
@@ -89,15 +85,9 @@ def sample_report(change: Change = lambda made: made, levels: int = len(LEVELS),
         "seeds": (0,),
     } | given
     names = [scene.name for scene in axes["scenes"]], [sensor.name for sensor in axes["sensors"]]
-    views = view_names(names[0], axes["spectra"])
-    titles = [
-        name + (f", {view}" if view else "")
-        for view in views
-        for name in group_names(names[1], axes["exposures"], axes["balances"])
-    ]
     groups = product(names[0], axes["spectra"], axes["sensors"], axes["exposures"], axes["balances"])
     cells = []
-    for title, (scene, spectrum, sensor, exposure, balance) in zip(titles, groups, strict=True):
+    for scene, spectrum, sensor, exposure, balance in groups:
         for level, camera in product(range(levels), axes["cameras"]):
             made = [
                 sample_row(
@@ -112,8 +102,9 @@ def sample_report(change: Change = lambda made: made, levels: int = len(LEVELS),
                 )
                 for seed in axes["seeds"]
             ]
-            rows = [change(one) for one in made]
-            cells.append(over_seeds(rows, title, level, camera, (LEVELS[level][1], LEVELS[level][2])))
+            rows = tuple(change(one) for one in made)
+            picture = rows[0].picture if rows[0] else None
+            cells.append(ReportCell(level, camera, LEVELS[level][1], LEVELS[level][2], rows, picture))
     report = ReportData(
         rodcone="0.1.0",
         name="sample",
@@ -179,11 +170,7 @@ def sample_views() -> ReportData:
 
 
 def _encode(linear: np.ndarray) -> bytes:
-    file = BytesIO()
-    Image.fromarray((255 * np.clip(linear, 0, 1) ** (1 / 2.2)).round().astype(np.uint8)).save(
-        file, "PNG", compress_level=1
-    )
-    return file.getvalue()
+    return as_webp((255 * np.clip(linear, 0, 1) ** (1 / 2.2)).round().astype(np.uint8), **LOSSLESS)
 
 
 def sample_pictures(report: ReportData) -> ReportPictures:
@@ -206,7 +193,7 @@ def sample_pictures(report: ReportData) -> ReportPictures:
         if cell.picture and cell.first:
             rows, columns = sizes[cell.first.scene]
             of_size = np.tile(scene, (1, 2, 1))[:rows, :columns]
-            noise = rng.standard_normal(of_size.shape) * 10 ** (-(cell.figures["psnr_db"] or 0) / 20)
+            noise = rng.standard_normal(of_size.shape) * 10 ** (-(np.nan_to_num(cell.mean("psnr_db"))) / 20)
             pictures[cell.picture] = _encode(of_size + noise)
     truth = {
         cell.picture: opened(pictures[name])
@@ -216,7 +203,7 @@ def sample_pictures(report: ReportData) -> ReportPictures:
         if cell.picture
     }
     maps = {
-        name: flip_map(opened(pictures[name]), truth[name])
+        name: as_webp(flip_map(opened(pictures[name]), truth[name]), **LOSSLESS)
         for name in truth
         if name in pictures and opened(pictures[name]).shape == truth[name].shape
     }

@@ -12,7 +12,7 @@ from rodcone.progress import progress
 from scenes.catalog import load
 from sensor.presets import preset
 from studies.commands.console import print_table
-from studies.pages.environment import environment
+from studies.pages.report_facts import environment
 from studies.pages.speed_page import bench_page
 from studies.photograph.clock import processor_facts
 from studies.speed.points import stage_json

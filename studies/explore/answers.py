@@ -1,7 +1,7 @@
 """Answers: pictures of one or two cameras; figures, text and files of one."""
 
 import sys
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,16 +24,13 @@ from studies.photograph.calibrate import calibrate, iso_speed
 from studies.study.render_noise import noise_note
 
 Answer: TypeAlias = tuple[Header, Sequence[bytes]]
-Dropped: TypeAlias = Mapping[str, TemporaryDirectory[str]]  # folders of the sensors that were dropped, by their file
 
 
-def written(
-    message: Header, controls: Controls, rendered: Rendered, source: Source, memo: Memo, dropped: Dropped
-) -> Answer:
+def written(message: Header, controls: Controls, rendered: Rendered, source: Source, memo: Memo, drops: Path) -> Answer:
     """Figures and files of one camera."""
     kind = message["kind"]
     if kind == "study":
-        return {"files": _study(controls, rendered, source, dropped)}, ()
+        return {"files": _study(controls, rendered, source, drops)}, ()
     if kind == "dng":
         return {"name": "explored.dng"}, (_dng(rendered, controls, memo),)
     exposed = expose_scene(rendered.transport, controls, memo)
@@ -42,15 +39,15 @@ def written(
         if note and memo.kept("noise note", "") is None:
             memo.keep("noise note", "", note)
             print(f"rodcone: {note}", file=sys.stderr)  # once for each render
-        python = python_text(rendered, controls, kind, dropped)
+        python = python_text(rendered, controls, kind, drops)
         return {"histogram": histogram(exposed.raw), "python": python, "noise_note": note}, ()
     row, column = message["row"], message["column"]
     found = pixel(exposed, row, column)
-    return {"pixel": found, "python": python_text(rendered, controls, f"pixel {row} {column}", dropped)}, ()
+    return {"pixel": found, "python": python_text(rendered, controls, f"pixel {row} {column}", drops)}, ()
 
 
 def shown(
-    cameras: Sequence[Controls], views: Sequence[tuple[int, str]], rendered: Rendered, memo: Memo, dropped: Dropped
+    cameras: Sequence[Controls], views: Sequence[tuple[int, str]], rendered: Rendered, memo: Memo, drops: Path
 ) -> tuple[Header, list[Bytes], bool]:
     """Header and pictures of each view, and whether a slow processor is left for later."""
     shots, used = [], []
@@ -72,7 +69,7 @@ def shown(
             for taken, controls in zip(used, cameras, strict=True)
         ],
         "views": [list(view) for view in views],
-        "python": [python_text(rendered, used[camera], view, dropped) for camera, view in views],
+        "python": [python_text(rendered, used[camera], view, drops) for camera, view in views],
         "facts": [facts(shot) for shot in shots],
         "size": list(pictures[0].shape[:2]),
         "spp": rendered.transport.spp,
@@ -97,21 +94,15 @@ def _shot(controls: Controls, exposed: Exposed, memo: Memo) -> Shot | None:
     return Shot(exposed, linear, *true_picture_of(exposed, controls, memo), picture)
 
 
-def python_text(rendered: Rendered, controls: Controls, view: str, dropped: Dropped) -> str:
+def python_text(rendered: Rendered, controls: Controls, view: str, drops: Path) -> str:
     """Python of a view or a figure; a file that was dropped has its name alone, as it lies where that runs."""
-    text = python_of(rendered.code, controls, view)
-    return text.replace(controls.sensor, Path(controls.sensor).name) if controls.sensor in dropped else text
+    text, path = python_of(rendered.code, controls, view), Path(controls.sensor)
+    return text.replace(str(path), path.name) if drops in path.parents else text
 
 
-def take_sensor(files: Any, dropped: MutableMapping[str, TemporaryDirectory[str]]) -> Header:
+def take_sensor(files: Any, drops: Path) -> Header:
     """Keep a sensor that was dropped; what the page's sliders begin with."""
-    folder = TemporaryDirectory(prefix="rodcone-")
-    try:
-        path, sensor = write_dropped(files, folder)
-    except InputError:
-        folder.cleanup()
-        raise
-    dropped[str(path)] = folder
+    path, sensor = write_dropped(files, drops)
     return {"sensor": str(path), "terms": sensor_terms(sensor)}
 
 
@@ -135,14 +126,13 @@ def _dng(rendered: Rendered, controls: Controls, memo: Memo) -> bytes:
         return path.read_bytes()
 
 
-def _study(controls: Controls, rendered: Rendered, source: Source, dropped: Dropped) -> dict[str, str]:
+def _study(controls: Controls, rendered: Rendered, source: Source, drops: Path) -> dict[str, str]:
     if source.scene is None:
         raise InputError("study: a transport has no name that a study could say; allowed: rodcone explore SCENE")
     judged = next(iter(rendered.transport.groups.values())).coloured
     lamps = {name: controls.lamps.get(name, Lamp()) for name in rendered.transport.groups}
-    files = study_of(source.scene, source.render, replace(controls, lamps=lamps), judged)
-    if folder := dropped.get(controls.sensor):
-        path = Path(controls.sensor)
+    files, path = study_of(source.scene, source.render, replace(controls, lamps=lamps), judged), Path(controls.sensor)
+    if drops in path.parents:
         files = {name: text.replace(str(path), path.name) for name, text in files.items()}
-        files |= {each.name: each.read_text("utf-8") for each in Path(folder.name).iterdir()}
+        files |= {each.name: each.read_text("utf-8") for each in path.parent.iterdir()}
     return files

@@ -1,9 +1,8 @@
-"""A sensor's file that was dropped on the page, with the tables that it names, in a folder of its own."""
+"""Sensors' files that were dropped on the page, each with the tables that it names in a folder of its own."""
 
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from rodcone.errors import InputError
@@ -11,17 +10,17 @@ from rodcone.toml_file import parse_toml
 from sensor.config import SensorConfig
 from sensor.presets import preset
 
-MOST_FILES = 8
+MOST_FILES, MOST_DROPS = 8, 100
 _NAME = re.compile(r"\w[\w .+-]{0,99}\.(toml|csv)", re.IGNORECASE)
 
 
-def write_dropped(files: Any, folder: TemporaryDirectory[str]) -> tuple[Path, SensorConfig]:
-    """Write a sensor's ``.toml`` and its ``.csv`` files, by name, into a folder; give the sensor's path and content.
+def write_dropped(files: Any, drops: Path) -> tuple[Path, SensorConfig]:
+    """Write a sensor's ``.toml`` and its ``.csv`` files, by name, below `drops`; give the sensor's path and content.
 
     Raises
     ------
     InputError
-        For other files, a table that was not dropped with the sensor, or a file that describes no camera.
+        For other files, a table that was not dropped with the sensor, a file that describes no camera, or too many.
     """
     if not isinstance(files, dict) or not 1 <= len(files) <= MOST_FILES:
         raise InputError(f"sensor: no files by name; allowed: a .toml and the .csv files that it names, {MOST_FILES}")
@@ -32,9 +31,13 @@ def write_dropped(files: Any, folder: TemporaryDirectory[str]) -> tuple[Path, Se
     if len(sensors) != 1:
         raise InputError(f"sensor: {len(sensors)} .toml files; allowed: one, with the .csv files that it names")
     _check_tables(sensors[0], files)
+    if (number := len(list(drops.iterdir()))) >= MOST_DROPS:
+        raise InputError(f"sensor: {number} were dropped; allowed: {MOST_DROPS}; start rodcone explore again")
+    folder = drops / str(number)
+    folder.mkdir()
     for name, text in files.items():
-        (Path(folder.name) / name).write_text(text, "utf-8")
-    path = Path(folder.name) / sensors[0]
+        (folder / name).write_text(text, "utf-8")
+    path = folder / sensors[0]
     try:
         return path, preset(path)
     except InputError as error:

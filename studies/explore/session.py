@@ -12,6 +12,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any, TypeAlias
@@ -19,14 +20,13 @@ from typing import Any, TypeAlias
 from isp.picture import Picture
 from rodcone.errors import InputError, cut, one_line, unknown
 from studies.explore.answers import Answer, shown, take_sensor, written
-from studies.explore.chain import Image, development_of, expose_scene, photograph
+from studies.explore.chain import Image, development_of, expose_scene
 from studies.explore.controls import Controls, controls_from
 from studies.explore.memo import Memo, Overtaken, give_memory_back, go_on
 from studies.explore.messages import KINDS, Header, gives_way, hello, read_message, read_views, unsent
 from studies.explore.slow import begin, stand_in
 from studies.explore.source import Rendered, Source
 from studies.explore.views import Bytes
-from studies.explore.warm import WARM
 
 Send: TypeAlias = Callable[[Header, Sequence[bytes]], None]
 
@@ -47,8 +47,10 @@ class Session:
     """
 
     def __init__(self, source: Source, scenes: Mapping[str, Callable[[], Source]] = MappingProxyType({})) -> None:
-        self._scenes, self._cold = scenes, list(WARM)
-        self._dropped: dict[str, TemporaryDirectory[str]] = {}  # folders of sensors' files, by the file
+        self._scenes = scenes
+        self._folder = TemporaryDirectory(prefix="rodcone-")
+        self._drops = Path(self._folder.name)  # sensors' files that were dropped
+        self._dropped: list[str] = []  # the sensors among them
         self._pending: dict[str, Header] = {}
         self._message: Header | None = None  # that is being answered
         self._slow: dict[str, Callable[[], None]] = {}  # what ends each job at work, by its camera
@@ -106,8 +108,7 @@ class Session:
             self._end_slow()
             self._changed.notify()
         self._thread.join()
-        for folder in self._dropped.values():
-            folder.cleanup()
+        self._folder.cleanup()
 
     def _begin_source(self, source: Source) -> None:
         self._source, self._states, self._memo = source, source.states(self._between_runs), Memo(self._check)
@@ -187,12 +188,10 @@ class Session:
                 raise Overtaken
 
     def _left_to_do(self) -> Callable[[], None] | None:
-        """What waits for the sliders to rest: a finer render, slow processors, kernels to compile."""
+        """What waits for the sliders to rest: a finer render, slow processors."""
         if self._rendering:
             return self._render_on
-        if self._slow_wanted:
-            return self._begin_slow
-        return self._warm_up if self._cold and self._rendered is not None else None
+        return self._begin_slow if self._slow_wanted else None
 
     def _fail(self, message: Header | None, words: str) -> None:
         whose = {"number": None} if message is None else _whose(message) | {"of": message["kind"]}
@@ -220,15 +219,6 @@ class Session:
         if self._closed or self._source is not source:
             raise Overtaken
 
-    def _warm_up(self) -> None:
-        """Compile the kernels of one of `WARM`."""
-        assert self._rendered is not None
-        controls = self._cold.pop()
-        try:
-            photograph(self._rendered.transport, controls, Memo(self._check))
-        except Overtaken:
-            self._cold.append(controls)
-
     def _answer(self, message: Header) -> Answer:
         kind, rendered = message["kind"], self._rendered
         if kind == "scene":
@@ -236,14 +226,16 @@ class Session:
         if kind in ("hello", "scene"):
             return hello(self._source, self._scenes, self._dropped), ()
         if kind == "sensor":
-            return take_sensor(message["files"], self._dropped), ()
+            header = take_sensor(message["files"], self._drops)
+            self._dropped.append(header["sensor"])
+            return header, ()
         if kind == "cancel":
             return {}, ()
         if rendered is None:
             raise InputError(f"scene: {self._failure}; nothing can be shown; mend the scene and start again")
         if kind == "show":
             return self._show(message, self._cameras(message), rendered)
-        return written(message, self._cameras(message)[0], rendered, self._source, self._memo, self._dropped)
+        return written(message, self._cameras(message)[0], rendered, self._source, self._memo, self._drops)
 
     def _cameras(self, message: Header) -> list[Controls]:
         return [controls_from(each, self._source.controls, self._dropped) for each in message["cameras"]]
@@ -263,7 +255,7 @@ class Session:
             sent: list[Bytes] = []
             if message.get("page", "") == self._page:
                 self._shown, sent = message, self._sent
-        header, pictures, waiting = shown(cameras, views, rendered, self._memo, self._dropped)
+        header, pictures, waiting = shown(cameras, views, rendered, self._memo, self._drops)
         self._slow_wanted |= waiting
         return header | {"last": not self._rendering}, unsent(pictures, sent)
 

@@ -128,21 +128,10 @@ def _bytes(encoded: Image) -> Bytes:
 
 
 def facts(shot: Shot) -> dict[str, Any]:
-    """What the page says of a shot in words and numbers."""
-    exposed, raw, picture = shot.exposed, shot.exposed.raw, shot.developed
-    return {
-        "exposure_s": exposed.exposure_s,
-        "white_cd_m2": exposed.white_cd_m2,
-        "saturated": float(raw.saturated.mean()),
-        "snr_db": picture.snr_db,
-        "substitution": picture.substitution,
-        "engine": picture.engine,
-        "mean_e": {
-            channel: float(exposed.expected_e[mask(raw.cfa, channel, raw.shape)].mean())
-            for channel in channels(raw.cfa)
-        },
-        "noise_e": noise_scale_e(exposed),
-    }
+    """What the page says of a shot: time of an exposure, share of full pixels, green's SNR where it is measured."""
+    exposed = shot.exposed
+    saturated = float(exposed.raw.saturated.mean())
+    return {"exposure_s": exposed.exposure_s, "saturated": saturated, "snr_db": shot.developed.snr_db}
 
 
 def histogram(raw: RawImage) -> dict[str, Any]:
@@ -152,7 +141,7 @@ def histogram(raw: RawImage) -> dict[str, Any]:
     -------
     dict
         ``edges_e`` (n + 1,); ``counts`` by channel, (n,), what lies under the first edge or over the last in the first
-        and the last bin; ``well_e``, ``saturation_e`` and ``floor_e``, the dark noise of a pixel.
+        and the last bin; ``well_e``; and ``floor_e``, the dark noise of a pixel.
     """
     edges = np.geomspace(LEAST_E, 1.05 * raw.full_well_e, BINS + 1)
     electrons = np.clip(raw.electrons, edges[0], edges[-1])
@@ -160,13 +149,7 @@ def histogram(raw: RawImage) -> dict[str, Any]:
         channel: np.histogram(electrons[mask(raw.cfa, channel, raw.shape)], edges)[0].tolist()
         for channel in channels(raw.cfa)
     }
-    return {
-        "edges_e": edges.tolist(),
-        "counts": counts,
-        "well_e": raw.full_well_e,
-        "saturation_e": raw.saturation_e,
-        "floor_e": raw.dark_noise_e,
-    }
+    return {"edges_e": edges.tolist(), "counts": counts, "well_e": raw.full_well_e, "floor_e": raw.dark_noise_e}
 
 
 def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:

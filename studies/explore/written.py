@@ -1,9 +1,9 @@
 """What a shot is written as: Python that makes it again to the bit, and a study that asks the same question."""
 
 import json
+import re
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
 
 from isp.processors.catalogue import PROCESSORS
 from render.radiance_files.radiance_source import is_radiance_file
@@ -136,26 +136,15 @@ def _sensor_file(controls: Controls, own: SensorConfig, sensor: SensorConfig) ->
         raise InputError(
             f"study: {controls.sensor} with other terms is no preset; allowed: a preset; change the file itself"
         )
-    lines = preset_file(controls.sensor).read_text("utf-8").splitlines()
-    found: list[str] = []
-    wanted: dict[str, Any] = {}
+    text = re.sub(r"(?m)^bits\s*=.*$", f"bits = {sensor.bits}", preset_file(controls.sensor).read_text("utf-8"))
     for part, kind in (("pixel", PixelConfig), ("lens", LensConfig)):
         for each in fields(kind):
             before, now = (getattr(getattr(x, part), each.name) for x in (own, sensor))
             if before != now:
-                wanted[each.name] = (part, now)
-    for line in lines:
-        key = line.partition("=")[0].strip()
-        if key in wanted:
-            found.append(f"{key} = {wanted.pop(key)[1]!r}")
-        elif key == "bits":
-            found.append(f"bits = {sensor.bits}")
-        else:
-            found.append(line)
-        for name in [name for name, (part, _) in wanted.items() if line.strip() == f"[{part}]"]:
-            if not any(each.partition("=")[0].strip() == name for each in lines):
-                found.append(f"{name} = {wanted.pop(name)[1]!r}")
-    return "\n".join(found) + "\n"
+                line = f"{each.name} = {now!r}"
+                text, found = re.subn(rf"(?m)^{each.name}\s*=.*$", line, text)
+                text = text if found else text.replace(f"[{part}]\n", f"[{part}]\n{line}\n")
+    return text
 
 
 def _scene(scene: SceneChoice) -> str:

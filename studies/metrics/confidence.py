@@ -9,6 +9,8 @@ from scipy.stats import t as student
 
 from rodcone.errors import InputError, require_range
 
+Floats = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class SeedMean:
@@ -51,6 +53,14 @@ def mean_with_confidence(values: Sequence[float] | NDArray[np.floating], confide
         raise InputError(f"values: shape {sample.shape} is not allowed; give two seeds or more, one figure each")
     if not np.isfinite(sample).all():
         raise InputError(f"values: {sample[~np.isfinite(sample)][0]} is not allowed; give finite figures")
-    half = float(student.isf((1 - confidence) / 2, sample.size - 1)) * float(sample.std(ddof=1)) / sample.size**0.5
-    mean = float(sample.mean())
+    half, mean = float(half_width(sample, confidence)), float(sample.mean())
     return SeedMean(mean, mean - half, mean + half, sample.size)
+
+
+def half_width(samples: Floats, confidence: float = 0.95) -> Floats:
+    """Half the width of the mean's interval (Student's t) over the last axis, the seeds; NaN for one seed."""
+    count = samples.shape[-1]
+    if count == 1:
+        return np.full(samples.shape[:-1], np.nan)
+    quantile = float(student.isf((1 - confidence) / 2, count - 1))
+    return np.asarray(quantile * samples.std(axis=-1, ddof=1) / np.sqrt(count))

@@ -29,15 +29,13 @@ from studies.pages.report_text import (
     lead_text,
     significant,
 )
-from studies.pages.verdict import AHEAD, BEHIND, UNKNOWN, Figures, Leads, leads, light_ratio
+from studies.pages.verdict import AHEAD, BEHIND, LEVEL, UNKNOWN, Figures, Leads, leads, light_ratio
 from studies.study.study import GRAY_WORLD
 
 # Metrics that say much the same: the largest of each family is named, and none is a vote.
 FAMILIES = ((PSNR, PU21, PATCHES), (SSIM, MTF50), (DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, CHART), (FLIP,))
 DECIDING = (PSNR, SSIM, DELTA_E, FLIP)  # known on every scene: one that is undecided leaves the level so
 CLEARLY = 2.0  # times what a person sees
-LIGHT_SEEN = 1.1  # times the light: shot noise then changes by 0.4 dB, less than is seen
-THIRD_STOP = 2 ** (1 / 3)  # times the light: the smallest step of a camera's dials
 SAME_TIME = 1.01  # exposure times whose ratio is below count as one
 # The same method on both mosaics, the one with a white pixel first; and what the paper compares.
 WHITE_PIXEL = ("ple_rgbw", "ple_bayer")
@@ -88,24 +86,20 @@ def answer(pair: Pair) -> str:
     return " ".join(sentence[0].upper() + sentence[1:] for sentence in sentences)
 
 
-def _word(found: dict[str, tuple[str, float]]) -> tuple[str, frozenset[int], frozenset[int]]:
+def _word(found: dict[str, tuple[str, float]]) -> tuple[str, tuple[int, ...], tuple[int, ...]]:
     """Verdict of one level from each metric's outcome and lead; where it is mixed, with families gained and lost."""
     gained, lost = (
-        frozenset(i for i, family in enumerate(FAMILIES) if any(found[metric.key][0] == outcome for metric in family))
+        tuple(i for i, family in enumerate(FAMILIES) if any(found[metric.key][0] == outcome for metric in family))
         for outcome in (AHEAD, BEHIND)
     )
     if gained and lost:
         return "mixed", gained, lost
     if not gained and not lost:
         undecided = any(found[metric.key][0] == UNKNOWN for metric in DECIDING)
-        return "undecided" if undecided else "level", gained, lost
-    largest = max(abs(lead) / metric.seen for metric in METRICS for outcome, lead in [found[metric.key]]
-                  if outcome in (AHEAD, BEHIND))  # fmt: skip
-    return (
-        f"{'clearly' if largest >= CLEARLY else 'a little'} {'better' if gained else 'worse'}",
-        frozenset(),
-        frozenset(),
-    )
+        return "undecided" if undecided else "level", (), ()
+    cases = [(metric, *found[metric.key]) for metric in METRICS]
+    largest = max(abs(lead) / metric.seen for metric, outcome, lead in cases if outcome in (AHEAD, BEHIND))
+    return f"{'clearly' if largest >= CLEARLY else 'a little'} {'better' if gained else 'worse'}", (), ()
 
 
 def _seen(run: dict[str, Leads], outcome: str) -> str:
@@ -168,30 +162,33 @@ def _where(levels: Sequence[str], first: int, last: int) -> str:
 
 
 def in_light(pair: Pair) -> str:
-    """Say how much more light the worse one needs for the other's PSNR.
+    """Say with how much less light the better one gives the other's PSNR, and in which light with as much.
 
-    Nothing is said of a level where the sweep can't tell, nor where levels don't rise or one isn't known.
+    Nothing is said where nothing is seen at any level, nor where the sweep can't tell, its levels don't rise or one
+    isn't known.
     """
     known = [light for light in pair.light_cd_m2 if light]
     if len(known) < max(2, len(pair.levels)) or known != sorted(set(known)):
         return ""
-    (a, b), psnr = pair.names, (pair.ours[PSNR.key], pair.theirs[PSNR.key])
-    needed = {b: light_ratio(known, *psnr), a: light_ratio(known, *psnr[::-1])}
-    ahead = psnr[0].mean(axis=1) >= psnr[1].mean(axis=1)
-    more: dict[str, list[str]] = {}
-    alike = []
-    for level, name in enumerate(pair.levels):
-        worse = b if ahead[level] else a
-        ratio = needed[worse][level]
-        if ratio is not None and ratio.low > 1 and ratio.mean >= LIGHT_SEEN:
-            mean, *ends = (significant(value, digits=2) for value in (ratio.mean, ratio.low, ratio.high))
-            interval = f" ({' to '.join(ends)})" if len(set(ends)) > 1 else ""
-            more.setdefault(worse, []).append(f"{mean} times at {name}{interval}")
-        elif ratio is not None and ratio.high < THIRD_STOP:
-            alike.append(name)
-    parts = [f"{worse} needs more light for the same PSNR: {', '.join(times)}" for worse, times in more.items()]
-    parts += [f"as much light gives the same PSNR: {', '.join(alike)}"] if alike else []
-    return "".join(f"{part[0].upper()}{part[1:]}. " for part in parts).strip()
+    outcomes = pair.leads[PSNR.key].outcome.tolist()
+    ours, theirs = pair.ours[PSNR.key], pair.theirs[PSNR.key]
+    parts = []
+    for outcome, (better, worse), curves in (
+        (AHEAD, pair.names, (ours, theirs)),
+        (BEHIND, pair.names[::-1], (theirs, ours)),
+    ):
+        times = []
+        for name, here, ratio in zip(pair.levels, outcomes, light_ratio(known, *curves).tolist(), strict=True):
+            if here == outcome and ratio[0] > 1:
+                mean, *ends = (significant(value, digits=2) for value in ratio)
+                interval = f" ({' to '.join(ends)})" if len(set(ends)) > 1 else ""
+                times.append(f"{mean} times at {name}{interval}")
+        if times:
+            parts.append(f"{better} gives the PSNR of {worse} with less light: {', '.join(times)}")
+    if not parts:
+        return ""
+    alike = [_where(pair.levels, *run) for run in _runs(outcomes) if outcomes[run[0]] == LEVEL]
+    return "; ".join([*parts, *([f"with as much: {', '.join(alike)}"] if alike else [])]) + "."
 
 
 # Words of pairs in their places
@@ -239,8 +236,8 @@ def balance_words(group: Group) -> str:
     """
     lead, cases = group.pair.leads[DELTA_E.key].mean, []
     for level, cells in enumerate(zip(group.ours, group.theirs, strict=True)):
-        misses = [cell.figures["balance_delta_e"] or 0.0 if _balances(cell) == {GRAY_WORLD} else 0.0 for cell in cells]
-        miss, cell = max(misses), cells[int(np.argmax(misses))]
+        misses = [cell.mean("balance_delta_e") if _balances(cell) == {GRAY_WORLD} else 0.0 for cell in cells]
+        miss, cell = np.nanmax([0.0, *misses]), cells[int(np.argmax(np.nan_to_num(misses)))]
         if miss >= DELTA_E.seen and miss > abs(lead[level]):
             cases.append((miss, camera_name(cell.camera), group.pair.levels[level], float(lead[level])))
     if not cases:
@@ -253,23 +250,22 @@ def balance_words(group: Group) -> str:
 
 
 def over_groups(groups: Sequence[Group]) -> str:
-    """Say of several groups in how many one is better and worse somewhere, with the largest of each; else empty."""
-    if len(groups) < 2:
+    """Say in how many of several conditions one is better and worse in some light, with the largest of each."""
+    if len(groups) < 2 or groups[0].pair.ours[PSNR.key].shape[-1] == 1:
         return ""
     parts = []
     for outcome, word in ((AHEAD, "better"), (BEHIND, "worse")):
-        sizes = []
-        for group in groups:
-            cases = [
-                (abs(lead.mean[level]) / metric.seen, metric, float(lead.mean[level]), group.pair.levels[level])
-                for metric in METRICS
-                for lead in [group.pair.leads[metric.key]]
-                for level in np.flatnonzero(lead.outcome == outcome).tolist()
-            ]
-            if cases:
-                sizes.append((*max(cases, key=lambda case: case[0]), group.title))
-        if sizes:
-            _, metric, lead, level, title = max(sizes, key=lambda case: case[0])
-            size = lead_text(metric, lead) + (f"{NBSP}{metric.unit}" if metric.unit else "")
-            parts.append(f"{word} somewhere in {len(sizes)} (most: {metric.name} {size}, {title}, {level})")
-    return f"Of {len(groups)} places: {'; '.join(parts) or 'in none a difference that is seen'}."
+        cases = [
+            (abs(size) / metric.seen, metric, float(size), group.title, level)
+            for group in groups
+            for metric in METRICS
+            for lead in [group.pair.leads[metric.key]]
+            for size, here, level in zip(lead.mean, lead.outcome, group.pair.levels, strict=True)
+            if here == outcome
+        ]
+        if cases:
+            _, metric, size, title, level = max(cases, key=lambda case: case[0])
+            written = lead_text(metric, size) + (f"{NBSP}{metric.unit}" if metric.unit else "")
+            places = len({title for *_, title, _ in cases})
+            parts.append(f"{word} in some light in {places} (most: {metric.name} {written}, {title}, {level})")
+    return f"Of {len(groups)} conditions: {'; '.join(parts) or 'in none a difference that is seen'}."

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -11,14 +12,13 @@ from numpy.typing import NDArray
 from studies.pages import report_text as text
 from studies.pages.headline import WHITE_PIXEL, Group, Pair, answer, balance_words, in_light, over_groups, pair_words
 from studies.pages.report_data import ReportCell, ReportData
-from studies.pages.verdict import AHEAD, OUTCOMES, Leads, counts, leads
+from studies.pages.verdict import OUTCOMES, Leads, counts, leads
 
 # Axes by their place in `ReportData.cells`, and in which order one is taken to compare or to part the charts by.
 SCENE, LIGHT, SENSOR, EXPOSURE, BALANCE, BRIGHTNESS, CAMERA = range(7)
-COMPARED_FIRST = (CAMERA, SENSOR, EXPOSURE, BALANCE, LIGHT, SCENE, BRIGHTNESS)
 ALONG_FIRST = (BRIGHTNESS, EXPOSURE, SENSOR, LIGHT, SCENE, BALANCE, CAMERA)
 ROWS_FIRST = (SENSOR, EXPOSURE, SCENE, LIGHT, BALANCE, CAMERA, BRIGHTNESS)
-RIVALS = (SENSOR, EXPOSURE, BALANCE, CAMERA)  # what a person chooses; scenes and lights are what it is chosen for
+RIVALS = (CAMERA, SENSOR, EXPOSURE, BALANCE)  # what a person chooses; scenes and lights are what it is chosen for
 DRAWN = "generated"  # how the names of scenes begin that are drawn from a number
 
 
@@ -39,7 +39,7 @@ class Comparison:
     compared, along, rows : int
         Axes by their place. `along` may be of one value, and `rows` too: then there is one row.
     a, b : int
-        Values by their place; equal where nothing varies.
+        Values by their place; equal where nothing competes.
     """
 
     compared: int
@@ -63,9 +63,9 @@ def axes_of(report: ReportData) -> tuple[Axis, ...]:
 
 
 def first_comparison(report: ReportData) -> Comparison:
-    """Choose what is compared before the reader does: cameras where there are several, else the next axis that varies.
+    """Choose what is compared before the reader does: cameras where there are several, else the next of `RIVALS`.
 
-    The same method on both mosaics comes first where the study holds it.
+    The same method on both mosaics comes first where the study holds it. Where nothing competes it is the one camera.
     """
     several = [index for index, axis in enumerate(axes_of(report)) if len(axis.values) > 1]
 
@@ -73,7 +73,7 @@ def first_comparison(report: ReportData) -> Comparison:
         free = [index for index in order if index not in taken]
         return next((index for index in free if index in several), free[0])
 
-    compared = chosen(COMPARED_FIRST)
+    compared = chosen(RIVALS)
     along = chosen(ALONG_FIRST, compared)
     a, b = 0, min(1, len(axes_of(report)[compared].values) - 1)
     if compared == CAMERA and set(WHITE_PIXEL) <= set(report.cameras):
@@ -97,8 +97,8 @@ def groups_of(report: ReportData, axis: int, a: int, b: int) -> list[Group]:
         sides = tuple(both[0]), tuple(both[1])
         pair = Pair(
             names=(axes[axis].values[a], axes[axis].values[b]),
-            ours=_figures(sides[0], len(report.seeds)),
-            theirs=_figures(sides[1], len(report.seeds)),
+            ours=_figures(sides[0]),
+            theirs=_figures(sides[1]),
             levels=levels,
             light_cd_m2=[cell.luminance_cd_m2 for cell in sides[0]],
         )
@@ -125,13 +125,9 @@ def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group
     return found
 
 
-def _figures(cells: Sequence[ReportCell], seeds: int) -> dict[str, NDArray[np.float64]]:
+def _figures(cells: Sequence[ReportCell]) -> dict[str, NDArray[np.float64]]:
     """Return (level, seed) by metric, NaN where a figure is unknown."""
-    unknown = (np.nan,) * seeds
-    return {
-        metric.key: np.array([cell.by_seed.get(metric.key) or unknown for cell in cells], dtype=np.float64)
-        for metric in text.METRICS
-    }
+    return {metric.key: np.array([cell.samples(metric.key) for cell in cells]) for metric in text.METRICS}
 
 
 def group_titles(report: ReportData, axis: int) -> list[str]:
@@ -141,16 +137,6 @@ def group_titles(report: ReportData, axis: int) -> list[str]:
         ", ".join(value for value, values in zip(place, others, strict=True) if len(values) > 1)
         for place in product(*others)
     ]
-
-
-def verdicts(report: ReportData, of: Comparison, metric: text.Metric) -> Leads:
-    """Return the leads of A over B (row, along), of the first value of every other axis."""
-    cells = np.moveaxis(grid(report), (of.compared, of.rows, of.along), (0, 1, 2))
-    figures = [
-        np.array([_figures(tuple(row), len(report.seeds))[metric.key] for row in side])
-        for side in (cells[value].reshape((*cells.shape[1:3], -1))[..., 0] for value in (of.a, of.b))
-    ]
-    return leads(metric, *figures)
 
 
 def comparisons(report: ReportData) -> list[dict[str, Any]]:
@@ -168,7 +154,7 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
     found = []
     for axis, length in enumerate(cells.shape):
         across: dict[str, Any] = {"leads": {}, "counts": {}, "means": {}, "answers": {}, "over": {}}
-        sides = [_figures(tuple(part.ravel()), len(report.seeds)) for part in np.moveaxis(cells, axis, 0)]
+        sides = [_figures(tuple(part.ravel())) for part in np.moveaxis(cells, axis, 0)]
         for i, j in combinations(range(length), 2):
             across["leads"][f"{i} {j}"] = {
                 metric.key: _flat(leads(metric, sides[i][metric.key], sides[j][metric.key])) for metric in metrics
@@ -210,18 +196,4 @@ def _flat(lead: Leads) -> list[Any]:
 
 def shown_metrics(cells: Sequence[ReportCell]) -> list[text.Metric]:
     """Return the metrics that are known for some cell: those of targets are so on their own scene alone."""
-    return [metric for metric in text.METRICS if any(cell.figures[metric.key] is not None for cell in cells)]
-
-
-def best(report: ReportData, metric: text.Metric) -> set[int]:
-    """Return the cells, by place, that are ahead of every other camera in their condition."""
-    seeds, found = len(report.seeds), set()
-    for start, cells in zip(range(0, len(report.cells), len(report.cameras)), report.conditions, strict=True):
-        values = _figures(cells, seeds)[metric.key]
-        outcome = leads(metric, values[:, None], values[None]).outcome == AHEAD
-        found |= (
-            {start + int(at) for at in np.flatnonzero(outcome.sum(axis=1) == len(cells) - 1)}
-            if len(cells) > 1
-            else set()
-        )
-    return found
+    return [metric for metric in text.METRICS if any(isfinite(cell.mean(metric.key)) for cell in cells)]

@@ -1,9 +1,13 @@
 """What a report shows, as values: made from a sweep's rows by `report_sweep`, shown by `report`."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from sensor.config import SensorConfig
+from studies.metrics.confidence import Floats, half_width
 from studies.sweep.row import Row
 
 
@@ -61,41 +65,54 @@ class ReportCell:
 
     Attributes
     ----------
-    group : str
-        Title of its sensor and whatever else varies.
     level : int
         Index of the light level.
     camera : str
     luminance_cd_m2, illuminance_lux : float or None
         The level in both units.
-    first : Row or None
-        The first seed's row: exposure, electrons, engines and times are its.
-    figures : mapping of str to float
-        Means over the seeds; None where a figure is unknown for a seed.
-    intervals : mapping of str to (float, float)
-        The means' 95 % intervals, with two seeds or more.
-    by_seed : mapping of str to tuple of float
-        The figures of each seed, in the study's order; without those that are unknown or not finite for one of them.
-    substitution : float or None
-        Share of the seeds in which W stood for luminance.
-    balance : mapping of str to str
-        How each channel was balanced; ``calibrated`` if it fell back for any seed.
+    rows : tuple of Row or None
+        One for each seed, in the study's order; None for one that isn't made yet.
     picture : str or None
         Among the page's pictures; None where the page leaves it out.
     """
 
-    group: str
     level: int
     camera: str
     luminance_cd_m2: float | None
     illuminance_lux: float | None
-    first: Row | None
-    figures: Mapping[str, float | None]
-    intervals: Mapping[str, tuple[float, float]]
-    by_seed: Mapping[str, tuple[float, ...]]
-    substitution: float | None
-    balance: Mapping[str, str]
+    rows: tuple[Row | None, ...]
     picture: str | None
+
+    @property
+    def first(self) -> Row | None:
+        """The first seed's row: exposure, electrons, engines, times and the picture are its."""
+        return self.rows[0]
+
+    def samples(self, key: str) -> Floats:
+        """Return a row's figure by seed, (seed,); all NaN where one is unknown or not finite."""
+        values = np.array([getattr(row, key, None) for row in self.rows], dtype=np.float64)
+        return values if np.isfinite(values).all() else np.full_like(values, np.nan)
+
+    def mean(self, key: str) -> float:
+        """Mean of a figure over the seeds; NaN where it is unknown for one of them."""
+        return float(self.samples(key).mean())
+
+    def half(self, key: str) -> float:
+        """Half the width of the mean's 95 % interval; NaN for one seed too."""
+        return float(half_width(self.samples(key)))
+
+    @property
+    def substitution(self) -> float | None:
+        """Share of the seeds in which W stood for luminance; None where that isn't known of all."""
+        states = [row.substitution for row in self.rows if row and row.substitution is not None]
+        return sum(states) / len(states) if len(states) == len(self.rows) else None
+
+    @property
+    def balance(self) -> dict[str, str]:
+        """How each channel was balanced; ``calibrated`` if it fell back for any seed."""
+        balances = [json.loads(row.balance) for row in self.rows if row]
+        fallen = {channel: how for balance in balances for channel, how in balance.items() if how == "calibrated"}
+        return (balances[0] if self.first else {}) | fallen
 
 
 @dataclass(frozen=True)
@@ -153,20 +170,7 @@ class ReportData:
     denoised: bool = False
 
     @property
-    def conditions(self) -> list[tuple[ReportCell, ...]]:
-        """The cells by condition: one of each camera."""
-        return _parted(self.cells, len(self.cameras))
-
-    @property
     def by_group(self) -> list[tuple[ReportCell, ...]]:
         """The cells by group: all levels and cameras of one scene, spectrum, sensor, exposure and balance."""
-        return _parted(self.cells, len(self.cameras) * len(self.levels))
-
-    @property
-    def by_scene(self) -> list[tuple[ReportCell, ...]]:
-        """The cells by scene."""
-        return _parted(self.cells, len(self.cells) // len(self.scenes))
-
-
-def _parted(cells: tuple[ReportCell, ...], count: int) -> list[tuple[ReportCell, ...]]:
-    return [cells[start : start + count] for start in range(0, len(cells), count)]
+        count = len(self.cameras) * len(self.levels)
+        return [self.cells[start : start + count] for start in range(0, len(self.cells), count)]

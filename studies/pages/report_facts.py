@@ -5,15 +5,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
+from render.loader import variant
 from rodcone.errors import InputError
+from rodcone.jit import backend
 from scenes.levels import DEMO_LEVELS
 from sensor.config import LensConfig
 from sensor.optics import left_out
 from sensor.presets import preset
 from studies.pages.report_data import ReportLevel, ReportRender, ReportSensor
 from studies.pages.report_text import level_text, with_signs
+from studies.photograph.clock import machine
 from studies.study.study import label
-from studies.sweep.provenance import in_words, made_by
+from studies.sweep.provenance import in_words, made_by, threads, versions
 from studies.sweep.row import Row
 
 NAMED = {level.name: ReportLevel(level.name, with_signs(level.source)) for level in DEMO_LEVELS}
@@ -51,6 +54,11 @@ def sensor_of(name: str) -> ReportSensor:
         return ReportSensor(label(name), preset(name))
     except InputError:
         return ReportSensor(label(name), None)
+
+
+def environment() -> dict[str, Any]:
+    """What makes numbers in this process, as JSON holds it: versions, engines and machine."""
+    return {**versions(), "variant": variant(), "engine": backend(), "threads": threads(), "machine": machine()}
 
 
 def environment_of(rows: Sequence[Row]) -> dict[str, str]:

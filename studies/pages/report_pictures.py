@@ -16,8 +16,7 @@ from studies.pages.report_compare import Comparison
 from studies.sweep.prepare import PICTURES
 from studies.sweep.stored import read_whole
 
-AS_MADE, AS_MADE_BYTES = 28, 24e6  # up to so many pictures and bytes, all of them go into the page as they were made
-SHOWN_BYTES = 6.5e6  # of pictures and maps otherwise: a page of 300 cells stays under 10 MB
+SHOWN_BYTES = 6.5e6  # of pictures and maps: a page of 300 cells stays under 10 MB
 # Pictures stay lossless: WebP with a loss halves the resolution of colours, which is what mosaics are judged by.
 LOSSLESS = {"lossless": True, "method": 1, "quality": 20}
 OF_MAPS = {"quality": 85, "method": 2}
@@ -31,9 +30,9 @@ class ReportPictures:
     Attributes
     ----------
     files : mapping of str to bytes
-        PNG, or lossless WebP where there are many.
+        Lossless WebP.
     flip_maps : mapping of str to bytes
-        LDR-FLIP of each pixel, 255 times, grey: PNG, or WebP with a loss where there are many.
+        LDR-FLIP of each pixel, 255 times, grey: WebP with a loss.
     """
 
     files: Mapping[str, bytes]
@@ -41,7 +40,7 @@ class ReportPictures:
 
 
 def read_pictures(
-    folder: Path, pairs: Sequence[tuple[str, str]], truths: Sequence[str], most: int | None
+    folder: Path, pairs: Sequence[tuple[str, str]], true: Mapping[str, NDArray[np.uint8]], most: int | None
 ) -> tuple[ReportPictures, str]:
     """Read pictures into a page until it is full.
 
@@ -51,38 +50,32 @@ def read_pictures(
         Of the sweep.
     pairs : sequence of (str, str)
         Each picture and its truth, by their names; those that the page shows at first come first.
-    truths : sequence of str
-        All of them are in the page.
+    true : mapping of str to (h, w, 3) uint8
+        The truths; all of them are in the page.
     most : int, optional
-        Pictures beside the truths; left out, as many as `SHOWN_BYTES` hold.
+        Pictures beside the truths; left out, as many as `SHOWN_BYTES` hold, and the first two in any case.
 
     Returns
     -------
     ReportPictures, str
         And what the page has to say of those that it leaves out.
     """
-    made = {name: read_whole(folder / PICTURES, name) for name in truths}
-    shown = pairs if most is None else pairs[:most]
-    sizes = [(folder / PICTURES / name).stat().st_size for name, _ in pairs if (folder / PICTURES / name).is_file()]
-    as_made = len(pairs) <= AS_MADE and sum(sizes) <= AS_MADE_BYTES
-    files = {name: content if as_made else as_webp(opened(content), **LOSSLESS) for name, content in made.items()}
+    files = {name: as_webp(truth, **LOSSLESS) for name, truth in true.items()}
     maps: dict[str, bytes] = {}
     held = sum(map(len, files.values()))
-    for name, truth in shown:
-        content = read_whole(folder / PICTURES, name)
-        errors = flip_map(opened(content), opened(made[truth]))
-        if not as_made:
-            content, errors = as_webp(opened(content), **LOSSLESS), as_webp(opened(errors), **OF_MAPS)
-            if most is None and held + len(content) + len(errors) > SHOWN_BYTES:
-                break
-        files[name], maps[name] = content, errors
+    for name, truth in pairs if most is None else pairs[:most]:
+        picture = opened(read_whole(folder / PICTURES, name))
+        content, errors = as_webp(picture, **LOSSLESS), as_webp(flip_map(picture, true[truth]), **OF_MAPS)
         held += len(content) + len(errors)
+        if most is None and held > SHOWN_BYTES and len(maps) >= 2:
+            break
+        files[name], maps[name] = content, errors
     left_out = sum(name not in maps for name, _ in pairs)
-    told = (
+    note = (
         f"To keep the page small, {left_out} of {len(pairs)} pictures aren't in it: it shows them from the folder "
         "pictures beside it, and rodcone report --pictures N puts more into it."
     )
-    return ReportPictures(files, maps), told if left_out else ""
+    return ReportPictures(files, maps), note if left_out else ""
 
 
 def view_order(shape: Sequence[int], of: Comparison) -> list[int]:
@@ -118,12 +111,9 @@ def as_webp(values: NDArray[np.uint8], **options: Any) -> bytes:
     return file.getvalue()
 
 
-def flip_map(picture: NDArray[np.uint8], truth: NDArray[np.uint8]) -> bytes:
-    """Return LDR-FLIP of each pixel between pictures (h, w, 3), 255 times and rounded, as a grey PNG (h, w)."""
-    file = BytesIO()
-    errors = flip(picture / 255.0, truth / 255.0)
-    Image.fromarray(np.rint(255 * np.clip(errors, 0.0, 1.0)).astype(np.uint8)).save(file, "PNG", compress_level=3)
-    return file.getvalue()
+def flip_map(picture: NDArray[np.uint8], truth: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return LDR-FLIP of each pixel (h, w) between pictures (h, w, 3), 255 times and rounded."""
+    return np.rint(255 * np.clip(flip(picture / 255.0, truth / 255.0), 0.0, 1.0)).astype(np.uint8)
 
 
 def busiest(truth: NDArray[np.uint8]) -> tuple[int, int]:

@@ -1,11 +1,9 @@
 """The report of a sweep: its rows as the values that `report` shows, and the pictures."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import metadata
 from itertools import product
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensor.exposure import AUTO_INFORMATION, RULES
-from studies.metrics.confidence import mean_with_confidence
 from studies.pages.report_compare import axes_of, first_comparison
 from studies.pages.report_data import ReportCell, ReportData, ReportScene
 from studies.pages.report_facts import (
@@ -26,16 +23,13 @@ from studies.pages.report_facts import (
     sensor_of,
 )
 from studies.pages.report_pictures import ReportPictures, busiest, opened, read_pictures, view_order
-from studies.pages.report_text import METRICS, exposure_name, group_names, view_names, way_name
+from studies.pages.report_text import exposure_name, way_name
 from studies.study.study import label
 from studies.sweep.database import last_run
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import require_alike
 from studies.sweep.row import Row
 from studies.sweep.stored import read_whole
-
-# What seeds scatter: every figure of a row but its exposure and its electrons, which noise doesn't touch.
-SCATTERED = (*(metric.key for metric in METRICS), "snr_db", "saturated", "mc_share", "balance_delta_e")
 
 
 def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[ReportData, ReportPictures]:
@@ -93,29 +87,27 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
     order = view_order([len(axis.values) for axis in axes_of(data)], first_comparison(data))
     per_truth = len(cells) // len(truths)
     pairs = [(name, truth) for at in order if (name := cells[at].picture) and (truth := truths[at // per_truth])]
-    pictures, left_out = read_pictures(folder, pairs, list(true), most_pictures)
+    pictures, left_out = read_pictures(folder, pairs, true, most_pictures)
     shown = [cell if cell.picture in pictures.files else replace(cell, picture=None) for cell in cells]
     return replace(data, cells=tuple(shown), pictures_left_out=left_out), pictures
 
 
-def _cells(study: Mapping[str, Any], made: Sequence[Row], names: Sequence[str]) -> list[ReportCell]:
-    """Return a cell for each combination that was asked for; one that isn't made yet has no figure."""
-    sensors = [label(name) for name in study["sensors"]]
+def _cells(study: Mapping[str, Any], made: Sequence[Row], scenes: Sequence[str]) -> list[ReportCell]:
+    """Return a cell for each combination that was asked for; one that isn't made yet has no row."""
     found = {
         (r.scene, r.spectrum, r.sensor, (r.exposure, r.frames), r.white_balance, r.level, r.processor, r.seed): r
         for r in made
     }
     light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in made}
-    views = view_names(names, study["spectra"])
-    in_view = group_names(sensors, [way_name(*way) for way in _ways(study)], study["white_balances"])
-    titles = [name + (f", {view}" if view else "") for view in views for name in in_view]
-    groups = product(names, study["spectra"], sensors, _ways(study), study["white_balances"])
+    levels, sensors = study["levels"], [label(name) for name in study["sensors"]]
+    axes = (study["spectra"], sensors, _ways(study), study["white_balances"], levels, study["processors"])
     cells = []
-    for title, group in zip(titles, groups, strict=True):
-        for level, camera in product(study["levels"], study["processors"]):
-            of_seeds = [found.get((*group, level, camera, seed)) for seed in study["seeds"]]
-            in_both_units = light.get((*group[:2], level), (None, None))
-            cells.append(over_seeds(of_seeds, title, study["levels"].index(level), camera, in_both_units))
+    for place in product(scenes, *axes):
+        scene, spectrum, *_, level, camera = place
+        rows = tuple(found.get((*place, seed)) for seed in study["seeds"])
+        picture = rows[0].picture if rows[0] else None
+        luminance_cd_m2, illuminance_lux = light.get((scene, spectrum, level), (None, None))
+        cells.append(ReportCell(levels.index(level), camera, luminance_cd_m2, illuminance_lux, rows, picture))
     return cells
 
 
@@ -128,54 +120,6 @@ def _exposure_rules(study: Mapping[str, Any]) -> str:
     rules = [rule for rule in study["exposures"] if rule in RULES] or [AUTO_INFORMATION]
     words = "; ".join((f"{exposure_name(rule)}: " if len(rules) > 1 else "") + RULES[rule] for rule in rules)
     return f"{words}, never longer than {study['longest_exposure_s'] * 1e3:g} ms"
-
-
-def over_seeds(
-    rows: Sequence[Row | None], group: str, level: int, camera: str, light: tuple[float | None, float | None]
-) -> ReportCell:
-    """Return the cell of one picture under several seeds.
-
-    With several seeds a figure that is unknown or not finite for one of them is unknown; with one it stays as it is.
-
-    Parameters
-    ----------
-    rows : sequence of Row or None
-        One for each seed; None for one that isn't made yet.
-    group, level, camera
-        As `ReportCell`.
-    light : (float or None, float or None)
-        The level in cd/m^2 and in lux.
-    """
-    figures: dict[str, float | None] = {}
-    intervals: dict[str, tuple[float, float]] = {}
-    by_seed: dict[str, tuple[float, ...]] = {}
-    for key in SCATTERED:
-        values = [value for row in rows if row and (value := getattr(row, key)) is not None]
-        figures[key] = values[0] if len(rows) == len(values) == 1 else None
-        if len(values) != len(rows) or not all(map(isfinite, values)):
-            continue
-        by_seed[key] = tuple(values)
-        if len(rows) > 1:
-            estimate = mean_with_confidence(values)
-            figures[key], intervals[key] = estimate.mean, (estimate.low, estimate.high)
-    states = [row.substitution for row in rows if row is not None and row.substitution is not None]
-    balances = [json.loads(row.balance) for row in rows if row is not None]
-    fallen = {channel: how for balance in balances for channel, how in balance.items() if how == "calibrated"}
-    first = rows[0]
-    return ReportCell(
-        group=group,
-        level=level,
-        camera=camera,
-        luminance_cd_m2=light[0],
-        illuminance_lux=light[1],
-        first=first,
-        figures=figures,
-        intervals=intervals,
-        by_seed=by_seed,
-        substitution=sum(states) / len(states) if len(states) == len(rows) else None,
-        balance=(balances[0] if first else {}) | fallen,
-        picture=first.picture if first else None,
-    )
 
 
 def _size(truth: NDArray[np.uint8] | None) -> tuple[int, int]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 from math import floor, isfinite, isinf, isnan, log10
 
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W
@@ -21,8 +20,6 @@ CAMERA_NAMES = {
 }
 BALANCE_NAMES = {AS_SHOT: "balanced as shot", GRAY_WORLD: "balanced by Gray World"}
 BALANCE_MEANINGS = {AS_SHOT: "the scene's light is known", GRAY_WORLD: "the picture's mean is taken for grey"}
-# As the title writes them; elsewhere the short names stand beside their pictures.
-CAMERA_TITLES = {"interleaved": "Interleaved RGBW"}
 
 
 @dataclass(frozen=True)
@@ -107,18 +104,9 @@ def significant(value: float | None, unit: str = "", digits: int = 3) -> str:
     return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "\N{MINUS SIGN}") + (NBSP + unit if unit else "")
 
 
-def lead_text(metric: Metric, lead: float, *, clear: bool = False) -> str:
-    """Write a lead with its sign; one that is written as 0 has none.
-
-    Parameters
-    ----------
-    metric : Metric
-    lead : float
-    clear : bool
-        Whether its interval is clear of 0: then it has as many decimals, up to three more, as show that it isn't 0.
-    """
-    decimals = range(metric.digits, metric.digits + (4 if clear else 1))
-    shown = next((text for count in decimals if float(text := fixed(abs(lead), count))), fixed(0.0, decimals[-1]))
+def lead_text(metric: Metric, lead: float) -> str:
+    """Write a lead with its sign, without its unit; one that is written as 0 has no sign."""
+    shown = fixed(abs(lead), metric.digits)
     return shown if not float(shown) else ("+" if lead > 0 else "\N{MINUS SIGN}") + shown
 
 
@@ -140,17 +128,12 @@ def duration(seconds: float | None) -> str:
     return significant(seconds, "s", 3)
 
 
-def metric_text(metric: Metric, cell: ReportCell) -> str:
-    """Write a cell's value of `metric`, with the half of its confidence interval where there is one."""
-    return interval_text(cell, metric.key, metric.digits, metric.unit)
-
-
-def interval_text(cell: ReportCell, key: str, digits: int, unit: str = "") -> str:
+def figure_text(cell: ReportCell, key: str, digits: int, unit: str = "") -> str:
     """Write a cell's figure as "20.1 ± 0.3 dB" where seeds give an interval, else as "20.1 dB"."""
-    interval = cell.intervals.get(key)
-    if interval is None:
-        return fixed(cell.figures[key], digits, unit)
-    return f"{fixed(cell.figures[key], digits)}{NBSP}±{NBSP}{fixed((interval[1] - interval[0]) / 2, digits, unit)}"
+    mean, half = cell.mean(key), cell.half(key)
+    if isnan(half):
+        return fixed(mean, digits, unit)
+    return f"{fixed(mean, digits)}{NBSP}±{NBSP}{fixed(half, digits, unit)}"
 
 
 def substitution_text(share: float | None) -> str:
@@ -175,20 +158,6 @@ def with_signs(words: str) -> str:
     for plain, sign in (("um^2", "µm²"), ("cos^4", "cos⁴"), ("cd/m^2", "cd/m²"), ("m2", "m²")):
         words = words.replace(plain, sign)
     return words
-
-
-def view_names(scenes: Sequence[str], spectra: Sequence[str]) -> list[str]:
-    """Return a title for each scene under each spectrum, of what varies; all are empty where there is one alone."""
-    scene_parts = [[scene] if len(scenes) > 1 else [] for scene in scenes]
-    spectrum_parts = [[spectrum_name(spectrum)] if len(spectra) > 1 else [] for spectrum in spectra]
-    return [", ".join(scene + spectrum) for scene, spectrum in product(scene_parts, spectrum_parts)]
-
-
-def group_names(sensors: Sequence[str], exposures: Sequence[str], balances: Sequence[str]) -> list[str]:
-    """Return a title for each sensor, exposure and balance; of the latter two where there are several."""
-    times = [f", exposure {exposure_name(time)}" if len(exposures) > 1 else "" for time in exposures]
-    named = [f", {BALANCE_NAMES.get(balance, balance)}" if len(balances) > 1 else "" for balance in balances]
-    return ["".join(parts) for parts in product(sensors, times, named)]
 
 
 def exposure_name(exposure: str) -> str:

@@ -5,16 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
+from studies.metrics.confidence import Floats, half_width
 from studies.pages.report_text import DELTA_E, FLIP, METRICS, PSNR, SSIM, Metric
 
 AHEAD, LEVEL, BEHIND, UNKNOWN = "ahead", "level", "behind", "unknown"
 OUTCOMES = (AHEAD, LEVEL, BEHIND)
-CONFIDENCE = 0.95
 SAME_BY = (PSNR, SSIM, DELTA_E, FLIP)  # by which two light levels give one picture; PU21 weighs errors by the light
 
-Floats = NDArray[np.float64]
 Figures = Mapping[str, Floats]  # by a metric's key, (level, seed); NaN where a figure is unknown
 
 
@@ -48,15 +46,6 @@ def leads(metric: Metric, ours: Floats, theirs: Floats) -> Leads:
     return Leads(mean, half, np.select(cases, [UNKNOWN, AHEAD, BEHIND, LEVEL], UNKNOWN))
 
 
-def half_width(samples: Floats) -> Floats:
-    """Half the width of the mean's 95 % interval over the last axis, the seeds; NaN for one seed."""
-    count = samples.shape[-1]
-    if count == 1:
-        return np.full(samples.shape[:-1], np.nan)
-    quantile = float(student.isf((1 - CONFIDENCE) / 2, count - 1))
-    return np.asarray(quantile * samples.std(axis=-1, ddof=1) / np.sqrt(count))
-
-
 def same_light(ours: Figures, theirs: Figures) -> list[list[int]]:
     """Part neighbouring light levels into runs in which neither side's picture changes by what a person sees.
 
@@ -84,16 +73,7 @@ def counts(ours: Figures, theirs: Figures) -> dict[str, dict[str, int]]:
     return counted
 
 
-@dataclass(frozen=True)
-class LightRatio:
-    """Times the light that one side needs at a level for the other's picture, and its 95 % interval over seeds."""
-
-    mean: float
-    low: float
-    high: float
-
-
-def light_ratio(light_cd_m2: Sequence[float], better: Floats, worse: Floats) -> list[LightRatio | None]:
+def light_ratio(light_cd_m2: Sequence[float], better: Floats, worse: Floats) -> Floats:
     """Light that `worse` needs for the PSNR that `better` has, over the level's own, by interpolation between levels.
 
     Parameters
@@ -105,9 +85,10 @@ def light_ratio(light_cd_m2: Sequence[float], better: Floats, worse: Floats) -> 
 
     Returns
     -------
-    list of LightRatio or None
-        One a level. None for one seed, where some seed's PSNR is reached at no level of the sweep, and where light no
-        longer improves the picture: there `worse` gains less than is seen from one level to the next.
+    (level, 3) float64
+        The factor and the ends of its 95 % interval over seeds. NaN for one seed, where some seed's PSNR is reached at
+        no level of the sweep, and where light no longer improves the picture: there `worse` gains less than is seen
+        from one level to the next.
 
     Notes
     -----
@@ -116,16 +97,15 @@ def light_ratio(light_cd_m2: Sequence[float], better: Floats, worse: Floats) -> 
     """
     x = np.log(np.asarray(light_cd_m2, dtype=np.float64))
     rises = np.diff(worse.mean(axis=1)) >= PSNR.seen
-    found: list[LightRatio | None] = []
-    for level in range(len(x)):
-        logs = np.array(
-            [_offset(x, worse[:, seed], better[level, seed], level, rises) for seed in range(worse.shape[1])]
-        )
-        half = float(half_width(logs))
-        mean = float(logs.mean())
-        known = np.isfinite(half)
-        found.append(LightRatio(*(float(np.exp(mean + step)) for step in (0.0, -half, half))) if known else None)
-    return found
+    logs = np.array(
+        [
+            [_offset(x, curve, wanted, level, rises) for curve, wanted in zip(worse.T, better[level], strict=True)]
+            for level in range(len(x))
+        ]
+    )
+    half = half_width(logs)
+    mean = np.where(np.isnan(half), np.nan, logs.mean(axis=1))
+    return np.asarray(np.exp(np.stack([mean, mean - half, mean + half], axis=1)))
 
 
 def _offset(x: Floats, curve: Floats, wanted: float, level: int, rises: NDArray[np.bool_]) -> float:

@@ -51,7 +51,7 @@ TESTS = {  # below tests/, the likeliest first
     "studies/pages/report_compare.py": [
         *("studies/pages/test_verdict", "studies/pages/test_headline", "studies/pages/test_report_sweep")
     ],
-    "studies/photograph/snr.py": ["studies/photograph/test_snr", "studies/pages/test_snr_chart"],
+    "studies/photograph/snr.py": ["studies/photograph/test_snr"],
     "studies/sweep/database.py": [
         "studies/sweep/test_database",
         "studies/sweep/test_stored",

@@ -91,12 +91,14 @@ function render({ model, el }) {
     model.send({ kind, number, page, ...make(number) });
   }
   // What waits is sent though an older one is under way, which ends there: no answer to it comes, or none that is painted.
+  // Of two in a row one is answered, so that pictures come while a slider is moved slowly, too.
   function overtake(kind) {
     const next = waiting[kind];
-    if (!next) return;
+    if (!next || underWay[kind].overtook) return;
     delete waiting[kind];
     delete underWay[kind];
     ask(kind, ...next);
+    underWay[kind].overtook = true;
   }
   model.on("msg:custom", (header, buffers) => {
     if ("page" in header && (header.page === page) === (header.kind === "taken over")) return;

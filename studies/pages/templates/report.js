@@ -7,7 +7,7 @@ function fillChoices() {
     byId(id).replaceChildren(...options.map(([value, name]) => make("option", { value }, name)));
     byId(id).value = of[id];
   }
-  for (const id of ["rows", "along"]) {
+  for (const id of ["rows", "along"].filter(byId)) { // where two things are compared
     const other = id === "rows" ? of.along : of.rows;
     const free = range(lengths.length).filter((axis) => axis !== of.compared && (axis === of[id] || axis !== other));
     const options = free.filter((axis) => lengths[axis] > 1 || axis === of[id]);

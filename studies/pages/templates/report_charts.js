@@ -15,7 +15,7 @@ function verdictCell(metric, { outcome, lead }) {
   if (lead === null) cell.append("—");
   else {
     const mark = make("i", { "aria-hidden": "true" }, MARKS[outcome]);
-    cell.append(make("span", { class: "sr" }, `${outcome}, `), mark, ` ${leadText(metric, { outcome, lead })}`);
+    cell.append(make("span", { class: "sr" }, `${outcome}, `), mark, ` ${leadText(metric, lead)}`);
   }
   return cell;
 }
@@ -80,7 +80,7 @@ function drawLead(of, place, metric) {
   const bounds = [Math.min(...ends, -1.5 * metric.seen), Math.max(...ends, 1.5 * metric.seen)];
   const { chart, xs, up } = frameOf(`Lead in ${metric.name}`, of, place, bounds);
   const band = { class: "unseen", x: LEFT, width: RIGHT - LEFT, y: up(metric.seen), height: up(-metric.seen) - up(metric.seen) };
-  const words = (step) => `${data.axes[of.along].values[step]}: ${found[step].outcome}, ${leadText(metric, found[step])}`;
+  const words = (step) => `${data.axes[of.along].values[step]}: ${found[step].outcome}, ${leadText(metric, found[step].lead)}`;
   chart.prepend(make("rect", band));
   chart.append(make("line", { class: "axis", x1: LEFT, x2: RIGHT, y1: up(0), y2: up(0) }),
     make("text", { class: "tick", x: RIGHT, y: up(metric.seen) - 4, "text-anchor": "end" }, "A better"),

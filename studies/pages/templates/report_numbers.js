@@ -43,13 +43,7 @@ function fixed(value, digits, plus = false) {
   return sign + text;
 }
 
-// A lead that is clear of 0 has as many decimals, up to three more, as show that it isn't 0.
-function leadText(metric, { outcome, lead }) {
-  let { digits } = metric;
-  const clear = outcome === "ahead" || outcome === "behind";
-  while (clear && digits < metric.digits + 3 && Number(Math.abs(lead).toFixed(digits)) === 0) digits += 1;
-  return fixed(lead, digits, true);
-}
+const leadText = (metric, lead) => fixed(lead, metric.digits, true);
 
 function figureText(metric, cell) {
   const found = figureOf(metric, cell);

@@ -7,6 +7,7 @@ const TRUTH = "truth";
 const KEPT = 24; // pictures that stay decoded
 const { level: firstLevel, look, ...firstComparison } = data.first;
 const of = firstComparison; // which axes are compared, along and rows, and the two values a and b
+if (of.a === of.b) of.b = TRUTH; // nothing competes
 const state = { place: moved(lengths.map(() => 0), LEVEL_AXIS, firstLevel), view: "wipe", show: "picture", wipe: 50 };
 let drawing = Promise.resolve(); // the last drawing of the viewer, for who waits for it
 
@@ -204,7 +205,7 @@ function show() {
 
 function showComparison() {
   const pair = of.b !== TRUTH && of.a !== of.b;
-  byId("verdicts").replaceChildren(...(pair ? drawTables(of, state.place) : []));
+  byId("verdicts")?.replaceChildren(...(pair ? drawTables(of, state.place) : []));
   const metricOf = (id) => data.metrics.find((metric) => metric.key === byId(id)?.value);
   const rivals = of.a !== TRUTH && Object.keys(data.comparisons[of.compared].counts).length;
   byId("beside")?.replaceChildren(...(rivals ? [drawBeside(of, metricOf("beside-metric"))] : []));
@@ -222,7 +223,7 @@ function showAnswer() {
   const { answers, over } = data.comparisons[of.compared];
   const answer = answers[`${of.a} ${of.b}`]?.[group];
   byId("place").textContent = data.groups[of.compared][group] ?? "";
-  byId("said").textContent = answer?.said ?? data.alone;
+  byId("said").textContent = answer?.said ?? "";
   byId("light").textContent = answer?.light ?? "";
   byId("balance").textContent = answer?.balance ?? "";
   byId("times").textContent = answer?.times ?? "";

@@ -11,7 +11,7 @@ import pytest
 from sensor.emva1288.characterise import characterise, configured
 from sensor.presets import low_noise, preset_file
 from studies.commands.cli import main
-from studies.pages.transfer_chart import transfer_svg
+from studies.pages.charts import transfer_svg
 
 SPACE = "{http://www.w3.org/2000/svg}"
 SMALL = ["--height", "32", "--width", "48"]

@@ -194,6 +194,23 @@ def test_one_picture_is_asked_at_a_time_the_next_with_the_newest_values_and_no_o
     assert painted == [0, 0, 3, 3, 3, 6, 6, 6, 9, 9]
 
 
+def test_a_slider_that_moves_slowly_ends_no_two_pictures_in_a_row(browser, address):
+    """A change each 200 ms, and a program that takes longer: the first picture ends, the second one is waited for."""
+    asked = answered(
+        CHROME.open_page(browser, address),
+        [[0, "picture"]],
+        """
+          for (let moved = 1; moved <= 4; moved++) {
+            level.value = moved;
+            level.dispatchEvent(new Event("input"));
+            await new Promise(done => setTimeout(done, 200));
+          }
+          return asked.filter(each => each.kind === "show").map(each => each.cameras[0].level_cd_m2);
+        """,
+    )
+    assert asked == [25.0, float(f"{1e-4 * 1e9**0.001:.4g}")]
+
+
 def test_pictures_are_painted_while_a_slider_is_dragged(browser, address):
     """A mouse's events, one each 16 ms, for 2 s: without them a picture waited until the slider came to rest."""
     page = CHROME.open_page(browser, address)

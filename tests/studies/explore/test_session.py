@@ -208,7 +208,6 @@ def interrupted(session, monkeypatch):
         monkeypatch.setattr(chain, "expose", counted)
         return frames
 
-    monkeypatch.setattr(session, "_cold", [])
     return at_third
 
 

@@ -78,19 +78,23 @@ def test_the_other_way_round_every_better_is_a_worse(name: str) -> None:
         assert mirrored == other
 
 
-def test_in_light_the_worse_one_needs_more() -> None:
-    """10 dB a decade: 3 dB are a factor of 2.0; in the day more light gives nothing, and nothing is said."""
+def test_in_light_the_better_one_needs_less() -> None:
+    """10 dB a decade: 3 dB are a factor of 2.0."""
     words = in_light(pair(psnr_db=[3, 0, 0, 0], scatter=0.01))
-    assert (
-        words
-        == "B needs more light for the same PSNR: 2 times at moonlight. As much light gives the same PSNR: street."
-    )
+    assert words == "A gives the PSNR of B with less light: 2 times at moonlight; with as much: from street on."
     # a deviation of 0.5 sqrt(3/2) dB: half the interval is 4.303 x 0.612 / sqrt(3) = 1.52 dB, a factor of 1.42
     assert "2 times at moonlight (1.4 to 2.8)" in in_light(pair(psnr_db=[3, 3, 0, 0], scatter=0.5))
     # A's curve is 5, 15, 30: it has 10 dB after half a decade, and 20 after a third
     lost = in_light(pair(psnr_db=[-5, -5, 0, 0], scatter=0.001))
-    assert lost == "A needs more light for the same PSNR: 3.2 times at moonlight, 2.2 times at street."
-    for silent in (pair(1, psnr_db=[3, 0, 0, 0]), pair(levels=1), replace(pair(), light_cd_m2=(0.1, None, 1.0, 2.0))):
+    assert (
+        lost == "B gives the PSNR of A with less light: 3.2 times at moonlight, 2.2 times at street; with as much: "
+        "from office on."
+    )
+    turned = in_light(pair(psnr_db=[3, 0, -2, 0], scatter=0.01))
+    assert turned.startswith("A gives the PSNR of B with less light: 2 times at moonlight; B gives the PSNR of A")
+    assert turned.endswith("with as much: street, day.")
+    unknown = replace(pair(psnr_db=[3, 0, 0, 0]), light_cd_m2=(0.1, None, 1.0, 2.0))
+    for silent in (pair(1, psnr_db=[3, 0, 0, 0]), pair(levels=1), pair(psnr_db=[0.4, 0, 0, 0]), unknown):
         assert in_light(silent) == ""
 
 
@@ -125,11 +129,13 @@ def test_every_place_has_its_answer_and_a_loss_elsewhere_is_told() -> None:
     )
     over = found["over"]["0 1"].replace("\N{NO-BREAK SPACE}", " ")
     assert over == (
-        "Of 2 places: better somewhere in 1 (most: PSNR +2.0 dB, table1_output, moonlight); "
-        "worse somewhere in 1 (most: PSNR −1.0 dB, low_noise, street light)."
+        "Of 2 conditions: better in some light in 1 (most: PSNR +2.0 dB, table1_output, moonlight); "
+        "worse in some light in 1 (most: PSNR −1.0 dB, low_noise, street light)."
     )
     assert found["counts"]["0 1"]["psnr_db"] == [1, 2, 1]
     assert over_groups(groups_of(two_sensors(sensors=SAMPLE.SENSORS[:1]), CAMERA, 0, 1)) == ""
+    one_seed = SAMPLE.sample_report(led, levels=2, cameras=("ple_rgbw", "ple_bayer"))
+    assert over_groups(groups_of(one_seed, CAMERA, 0, 1)) == "", "one seed can't say that nothing is seen"
 
 
 def test_by_the_mosaic_alone_is_said_only_where_the_times_agree() -> None:

@@ -3,21 +3,11 @@
 import pytest
 
 from studies.pages import report_text as text
-from studies.pages.report_data import ReportCell
-
-
-def test_a_figure_is_written_with_its_interval() -> None:
-    cell = ReportCell("s", 0, "a", None, None, None, {"psnr_db": 20.0}, {"psnr_db": (19.7, 20.3)}, {}, None, {}, None)
-    assert text.metric_text(text.PSNR, cell).replace("\N{NO-BREAK SPACE}", " ") == "20.0 ± 0.3 dB"
 
 
 @pytest.mark.parametrize(("lead", "words"), [(0.04, "0.0"), (-0.04, "0.0"), (0.06, "+0.1"), (-11.94, "−11.9")])
 def test_a_lead_that_is_written_as_0_has_no_sign(lead: float, words: str) -> None:
     assert text.lead_text(text.PSNR, lead) == words
-
-
-def test_a_lead_that_is_clear_of_0_is_never_written_as_0() -> None:
-    assert [text.lead_text(text.PSNR, lead, clear=True) for lead in (0.04, -0.0021, 3.0)] == ["+0.04", "−0.002", "+3.0"]
 
 
 def test_powers_have_their_signs() -> None:
@@ -61,11 +51,6 @@ def test_times_choose_their_unit() -> None:
     assert said == ["66 ms", "0.12 ms", "41.2 s", "0 s"]
 
 
-def test_exposures_and_white_balances_are_named_where_there_are_several() -> None:
-    ways = [text.way_name("auto"), text.way_name("2ms", 4)]
-    assert text.group_names(["s"], ways, ["as-shot"]) == [
-        "s, exposure automatic",
-        "s, exposure 2\N{NO-BREAK SPACE}ms, 4 frames",
-    ]
-    balances = ["as-shot", "gray-world"]
-    assert text.group_names(["s"], ["auto"], balances) == ["s, balanced as shot", "s, balanced by Gray World"]
+def test_exposures_are_written_as_prose_does() -> None:
+    said = [text.exposure_name(way) for way in (text.way_name("auto"), text.way_name("2ms", 4))]
+    assert said == ["automatic", "2\N{NO-BREAK SPACE}ms, 4 frames"]
