@@ -9,7 +9,7 @@ const TITLES = {
   "colour error": "Error of colour, CIEDE2000", flip: "Error as seen, FLIP", snr: "SNR map",
 };
 const SCALES = {
-  truth: "in the scene's light, without the sensor's noise", raw: "white: full well",
+  truth: "without the sensor's noise", raw: "white: full well",
   noise: "grey: none; black and white: 4 standard deviations", "luminance error": "grey: none; white: +25 % of white",
   "colour error": "dark: 0; yellow: 10 and more", flip: "dark: 0; yellow: 1", snr: "dark: 0 dB; yellow: 40 dB and more",
 };
