@@ -37,15 +37,15 @@ def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
         header, *rows = [row for row in csv.reader(StringIO(content.decode("utf-8-sig"), newline="")) if row]
         table = np.array([[float(cell) for cell in row] for row in rows], dtype=np.float64)
     except (OSError, ValueError, csv.Error) as error:
-        told = f"{str(path)!r} can't be read ({error})"
-        raise InputError(f"{what}: {told}; give a CSV of numbers with a header") from error
+        fault = f"{str(path)!r} can't be read ({error})"
+        raise InputError(f"{what}: {fault}; give a CSV of numbers with a header") from error
     names = [name.strip() for name in header]
     if _NOT_LETTERS.sub("", names[0].lower()) in _WAVELENGTH:
         names[0] = NM
     fits = table.ndim == 2 and table.shape[1] == len(names) == len(set(names))
     if not fits or names[0] != NM or len(names) < 2:
-        told = f"{str(path)!r} has header {names}"
-        raise InputError(f"{what}: {told}; allowed: {NM} (or wavelength, lambda, nm) and one channel a column; add it")
+        fault = f"{str(path)!r} has header {names}"
+        raise InputError(f"{what}: {fault}; allowed: {NM} (or wavelength, lambda, nm) and one channel a column; add it")
     if table[:, 0].max() < LEAST_NM:
         raise InputError(
             f"{what}: {str(path)!r} has wavelengths up to {table[:, 0].max():g}; allowed: nm; convert them"

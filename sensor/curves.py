@@ -125,8 +125,8 @@ def complementary(responses: Responses) -> Responses:
         Where R, G or B is missing, or two of them add up to more than one electron a photon.
     """
     _require_channels(responses, "RGB")
-    own = responses.curves
-    curves = {channel: _sum(*(own[primary] for primary in pair)) for channel, pair in _COMPLEMENTS.items()}
+    primaries = responses.curves
+    curves = {channel: _sum(*(primaries[primary] for primary in pair)) for channel, pair in _COMPLEMENTS.items()}
     if "W" in responses.curves:
         curves["W"] = responses.curves["W"]
     return Responses(curves, responses.relative)

@@ -53,8 +53,8 @@ def preset(name: str | Path, cfa: str | Sequence[str] | None = None) -> SensorCo
     InputError
         For an unknown name or mosaic, or a file that doesn't describe a camera.
     """
-    own = isinstance(name, Path) or name.endswith(".toml")
-    return read_sensor(name if own else preset_file(str(name)), cfa)
+    is_path = isinstance(name, Path) or name.endswith(".toml")
+    return read_sensor(name if is_path else preset_file(str(name)), cfa)
 
 
 def table1_pixel(cfa: str = "rgbw") -> SensorConfig:

@@ -62,7 +62,7 @@ class EmvaReport:
     figures: Mapping[str, float]
 
     @property
-    def told(self) -> str:
+    def source_note(self) -> str:
         """The source with its date, on one line."""
         return " ".join(f"{self.source}, {self.date}".split())
 
@@ -98,29 +98,30 @@ def numbers_of(report: EmvaReport) -> PixelNumbers:
     The well clips where the converter does: at (2^bits - 1 - black) / K. Where a report lacks one of the three, the
     clip follows from its saturation capacity (`clip_over_saturation`).
     """
-    told, figures = report.told, report.figures
+    source_note, figures = report.source_note, report.figures
     pixel: dict[str, Sourced] = {}
     settings: dict[str, Sourced] = {}
     left_out: dict[str, str] = {}
     # settings
     for key, whole in (("bits", report.bits), ("black_level_dn", report.black_level_dn)):
         if whole is not None:
-            settings[key] = Sourced(whole, told)
+            settings[key] = Sourced(whole, source_note)
     # pixel
     if "pixel_pitch_um" in figures:
-        pixel["pitch_um"] = Sourced(figures["pixel_pitch_um"], f"pixel pitch; {told}")
+        pixel["pitch_um"] = Sourced(figures["pixel_pitch_um"], f"pixel pitch; {source_note}")
     pixel["fill_factor"] = Sourced(1.0, "an EMVA quantum efficiency is the whole pixel's, its fill factor included")
     if "K" in figures and report.bits is not None and report.black_level_dn is not None:
         top_dn = 2**report.bits - 1 - report.black_level_dn
         pixel["full_well_e"] = Sourced(
             top_dn / figures["K"],
-            f"where the converter ends: {top_dn} DN above black over K = {figures['K']:g} DN/e- (eq. 50); {told}",
+            f"where the converter ends: {top_dn} DN above black over K = {figures['K']:g} DN/e- (eq. 50); "
+            f"{source_note}",
         )
     elif "mu_e_sat" in figures:
         value = figures["mu_e_sat"]
         clip_e = clip_over_saturation(value, figures.get("sigma_d", 0.0), figures.get("PRNU1288", 0.0) / 100)
         words = f"the clip whose variance is greatest at the saturation capacity, mu_e.sat = {value:g} e-"
-        pixel["full_well_e"] = Sourced(clip_e, f"{words}; {told}")
+        pixel["full_well_e"] = Sourced(clip_e, f"{words}; {source_note}")
     if "K" in figures and "K =" not in str(pixel.get("full_well_e")):
         lacking = [name for name in _WHOLE if name not in settings]
         left_out["K"] = (
@@ -128,19 +129,21 @@ def numbers_of(report: EmvaReport) -> PixelNumbers:
             "ends"
         )
     if "sigma_d" in figures:
-        pixel["read_noise_e"], note = _read_noise(figures, told)
+        pixel["read_noise_e"], note = _read_noise(figures, source_note)
         left_out |= note
     if "DSNU1288" in figures:
-        pixel["dsnu_e"] = Sourced(figures["DSNU1288"], f"DSNU1288 (eq. 66); {told}")
+        pixel["dsnu_e"] = Sourced(figures["DSNU1288"], f"DSNU1288 (eq. 66); {source_note}")
     if "PRNU1288" in figures:
         value = figures["PRNU1288"]
-        pixel["prnu"] = Sourced(value / 100, f"PRNU1288 (eq. 67), {value:g} per cent; {told}")
+        pixel["prnu"] = Sourced(value / 100, f"PRNU1288 (eq. 67), {value:g} per cent; {source_note}")
     if "mu_I" in figures:
-        pixel["dark_current_e_per_s"] = Sourced(figures["mu_I"], f"mu_I (eq. 29), at the report's temperature; {told}")
+        pixel["dark_current_e_per_s"] = Sourced(
+            figures["mu_I"], f"mu_I (eq. 29), at the report's temperature; {source_note}"
+        )
     efficiency = None
     if "eta" in figures:
         efficiency = (figures["eta"] / 100, figures["lambda_nm"])
-    return PixelNumbers(f"{report.camera}: {told}", pixel, settings, left_out, efficiency)
+    return PixelNumbers(f"{report.camera}: {source_note}", pixel, settings, left_out, efficiency)
 
 
 def clip_over_saturation(saturation_e: float, sigma_d: float, prnu: float) -> float:
@@ -152,29 +155,29 @@ def clip_over_saturation(saturation_e: float, sigma_d: float, prnu: float) -> fl
     nodes, weights = np.polynomial.hermite_e.hermegauss(15)
     light_e = saturation_e * np.linspace(0.5, 1.5, 2001)  # a step is 0.05 %
     mean_e = light_e[:, None] * (1 + prnu * nodes)
-    own = np.maximum(mean_e, 0.0) + sigma_d**2
+    variance_e2 = np.maximum(mean_e, 0.0) + sigma_d**2
     clip_e = saturation_e
     for _ in range(8):  # the correction is a few per cent at first, and then what the last one missed
-        z = (clip_e - mean_e) / np.sqrt(own)
+        z = (clip_e - mean_e) / np.sqrt(variance_e2)
         above, density = scipy.special.ndtr(-z), np.exp(-(z**2) / 2) / sqrt(2 * pi)
         first, second = z * above - density, 1 - above - z * density + z**2 * above
-        variance = (own * (second - first**2)) @ weights
+        variance = (variance_e2 * (second - first**2)) @ weights
         clip_e += saturation_e - light_e[np.argmax(variance)]
     return float(clip_e)
 
 
-def _read_noise(figures: Mapping[str, float], told: str) -> tuple[Sourced, dict[str, str]]:
+def _read_noise(figures: Mapping[str, float], source_note: str) -> tuple[Sourced, dict[str, str]]:
     """Read noise from sigma_d, which holds the dark current's shot noise too, and a word on what isn't told."""
     sigma_d, current, exposure_s = (figures.get(key) for key in ("sigma_d", "mu_I", "exposure_s"))
     sigma_d = float(sigma_d or 0.0)
     if current is None:
         why = "not told; its shot noise at the report's exposure is in read_noise_e"
-        return Sourced(sigma_d, f"temporal dark noise sigma_d; {told}"), {"dark_current_e_per_s": why}
+        return Sourced(sigma_d, f"temporal dark noise sigma_d; {source_note}"), {"dark_current_e_per_s": why}
     if exposure_s is None or sigma_d**2 <= current * exposure_s:
-        return Sourced(sigma_d, f"temporal dark noise sigma_d, mu_I's shot noise in it; {told}"), {}
+        return Sourced(sigma_d, f"temporal dark noise sigma_d, mu_I's shot noise in it; {source_note}"), {}
     value = float((sigma_d**2 - current * exposure_s) ** 0.5)
     return Sourced(
-        value, f"root of sigma_d^2 = {sigma_d:g}^2 less mu_I t = {current * exposure_s:g} (eq. 30); {told}"
+        value, f"root of sigma_d^2 = {sigma_d:g}^2 less mu_I t = {current * exposure_s:g} (eq. 30); {source_note}"
     ), {}
 
 

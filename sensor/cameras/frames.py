@@ -60,27 +60,30 @@ def measure_files(flats: Sequence[Path], darks: Sequence[Path], window: int | No
 def frame_numbers(figures: FrameFigures, files: Sequence[Path]) -> PixelNumbers:
     """Pixel that frames tell, every number with its 95 % interval."""
     *flats, darks = figures.frames
-    told = f"measured on {sum(flats)} flat and {darks} dark frames, {files[0].name} and others"
+    source_note = f"measured on {sum(flats)} flat and {darks} dark frames, {files[0].name} and others"
     gain = figures.gain_dn_per_e
     white = figures.white_dn - figures.black_dn
     pixel = {
         "full_well_e": Sourced(
             white / gain.value,
-            f"electrons at white, {white:.6g} DN over K = {_told(gain)} DN/e- (eq. 50); the photodiode may hold more",
+            f"electrons at white, {white:.6g} DN over K = {_interval_text(gain)} DN/e- (eq. 50); "
+            "the photodiode may hold more",
         ),
-        "read_noise_e": Sourced(figures.read_noise_e.value, f"temporal dark noise, {_told(figures.read_noise_e)} e-"),
-        "dsnu_e": Sourced(figures.dsnu_e.value, f"DSNU1288 (eq. 66), {_told(figures.dsnu_e)} e-"),
-        "prnu": Sourced(figures.prnu.value, f"PRNU1288 (eq. 67), {_told(figures.prnu)}"),
+        "read_noise_e": Sourced(
+            figures.read_noise_e.value, f"temporal dark noise, {_interval_text(figures.read_noise_e)} e-"
+        ),
+        "dsnu_e": Sourced(figures.dsnu_e.value, f"DSNU1288 (eq. 66), {_interval_text(figures.dsnu_e)} e-"),
+        "prnu": Sourced(figures.prnu.value, f"PRNU1288 (eq. 67), {_interval_text(figures.prnu)}"),
     }
     settings = {
         "bits": bits_of(figures.white_dn, figures.black_dn, "the frames"),
         "black_level_dn": Sourced(round(figures.black_dn), f"mean of the dark frames, {figures.black_dn:.5g} DN"),
     }
-    return PixelNumbers(told, pixel, settings, _UNTOLD, cfa=figures.cfa)
+    return PixelNumbers(source_note, pixel, settings, _UNTOLD, cfa=figures.cfa)
 
 
-def _told(each: Interval) -> str:
-    return f"{each.value:.4g} ({each.low:.4g} to {each.high:.4g}, 95 %)"
+def _interval_text(interval: Interval) -> str:
+    return f"{interval.value:.4g} ({interval.low:.4g} to {interval.high:.4g}, 95 %)"
 
 
 def _middle(raw: RawImage, window: int | None) -> NDArray[np.uint16]:

@@ -97,8 +97,8 @@ def measured_cameras() -> dict[str, MeasuredCamera]:
         For a file that is damaged.
     """
     path = library_file()
-    found = {} if path is None else read_library(path, path.stat().st_mtime_ns)
-    return found if _NPL in found else {_NPL: _npl_camera(), **found}
+    cameras = {} if path is None else read_library(path, path.stat().st_mtime_ns)
+    return cameras if _NPL in cameras else {_NPL: _npl_camera(), **cameras}
 
 
 def measured_camera(name: str) -> MeasuredCamera:
@@ -109,17 +109,17 @@ def measured_camera(name: str) -> MeasuredCamera:
     InputError
         For an unknown name.
     """
-    found = measured_cameras()
-    names = {" ".join(each.lower().split()): each for each in found}
+    cameras = measured_cameras()
+    names = {" ".join(each.lower().split()): each for each in cameras}
     key = " ".join(name.lower().split())
     if key in names:
-        return found[names[key]]
+        return cameras[names[key]]
     if library_file() is None:
         raise InputError(
-            f"camera: {name!r} is unknown; allowed: {', '.join(found)}, and the names of a copy of rawtoaces-data, "
+            f"camera: {name!r} is unknown; allowed: {', '.join(cameras)}, and the names of a copy of rawtoaces-data, "
             f"which isn't at hand: rodcone new cameras COPY -o FOLDER, then {VARIABLE}=FOLDER"
         )
-    raise unknown("camera", name, found)
+    raise unknown("camera", name, cameras)
 
 
 @cache
@@ -167,16 +167,16 @@ def _cameras(content: Mapping[str, Any]) -> dict[str, MeasuredCamera]:
     if not (100 <= first < last <= 20_000 and (last - first) / 1e4 < step < last - first):
         raise ValueError(f"range_nm {[first, last, step]} is no range")
     nm = np.arange(first, last + step / 2, step)
-    found = {}
-    for each in content["cameras"]:
-        curves = {channel: np.array(values, dtype=np.float64) / STEPS for channel, values in each["curves"].items()}
+    cameras = {}
+    for entry in content["cameras"]:
+        curves = {channel: np.array(values, dtype=np.float64) / STEPS for channel, values in entry["curves"].items()}
         if not curves or any(curve.shape != nm.shape or not np.all(curve >= 0) for curve in curves.values()):
-            raise ValueError(f"curves of {each['model']!r} are not {nm.size} numbers of 0 or more")
+            raise ValueError(f"curves of {entry['model']!r} are not {nm.size} numbers of 0 or more")
         if not max(curve.max() for curve in curves.values()) <= 2:
-            raise ValueError(f"curves of {each['model']!r} are not relative to their greatest value")
-        texts = {name: str(each.get(name, "")) for name in _TEXTS}
+            raise ValueError(f"curves of {entry['model']!r} are not relative to their greatest value")
+        texts = {name: str(entry.get(name, "")) for name in _TEXTS}
         camera = MeasuredCamera(
             **texts, source=str(content["source"]), licence=str(content["licence"]), wavelength_nm=nm, per_power=curves
         )
-        found[f"{camera.maker} {camera.model}"] = camera
-    return found
+        cameras[f"{camera.maker} {camera.model}"] = camera
+    return cameras

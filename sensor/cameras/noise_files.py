@@ -41,20 +41,20 @@ def dng_numbers(path: Path) -> PixelNumbers:
             "rodcone characterise --from FLAT.dng FLAT.dng --dark DARK.dng DARK.dng"
         )
     at = f"at ISO {raw.iso:g}" if raw.iso is not None else "at the photograph's exposure index, which it doesn't tell"
-    told = f"NoiseProfile of {path.name}, {at}"
+    source_note = f"NoiseProfile of {path.name}, {at}"
     white_e = profile.gain_e_per_dn
     rounding_e = white_e / (raw.white_dn - raw.black_dn) / sqrt(12)
     read_e, words = profile.dark_noise_e, "sqrt(O) / S"
     if read_e > rounding_e:
         read_e, words = sqrt(read_e**2 - rounding_e**2), f"sqrt(O) / S, less {rounding_e:.3g} e- of rounding"
     pixel = {
-        "full_well_e": Sourced(white_e, f"electrons at white, 1 / S; {told}; the photodiode may hold more"),
-        "read_noise_e": Sourced(read_e, f"{words}; {told}"),
+        "full_well_e": Sourced(white_e, f"electrons at white, 1 / S; {source_note}; the photodiode may hold more"),
+        "read_noise_e": Sourced(read_e, f"{words}; {source_note}"),
     }
     settings = {"bits": bits_of(raw.white_dn, raw.black_dn, path.name)}
     if raw.black_dn == int(raw.black_dn):
         settings["black_level_dn"] = Sourced(raw.black_dn, f"BlackLevel of {path.name}")
-    return PixelNumbers(told, pixel, settings, _UNTOLD, cfa=raw.cfa)
+    return PixelNumbers(source_note, pixel, settings, _UNTOLD, cfa=raw.cfa)
 
 
 def darktable_numbers(path: Path, camera: str, iso: float | None, white_e: float | None) -> PixelNumbers:
@@ -87,20 +87,20 @@ def darktable_numbers(path: Path, camera: str, iso: float | None, white_e: float
             f"iso: {iso:g} is unknown for {camera}; allowed: {', '.join(f'{x:g}' for x in sorted(profiles))}"
         )
     a, b = profiles[iso]
-    told = f"darktable's noise profile of {camera} at ISO {iso:g}, green: a = {a:.6g}, b = {b:.6g}"
+    source_note = f"darktable's noise profile of {camera} at ISO {iso:g}, green: a = {a:.6g}, b = {b:.6g}"
     scale = f"not told: 1 / a = {1 / a:.4g} is of a demosaicked picture, not of a pixel; give --white-e"
     words = {**_UNTOLD, "full_well_e": scale, "read_noise_e": scale}
     if white_e is None:
-        return PixelNumbers(told, left_out=words)
+        return PixelNumbers(source_note, left_out=words)
     require_range("white-e", white_e, 1.0, 1e12, "give the electrons at which the camera reads white at this ISO")
     pixel = {"full_well_e": Sourced(white_e, f"electrons at white at ISO {iso:g}, as given by --white-e")}
     if b > 0:
         pixel["read_noise_e"] = Sourced(
-            sqrt(b * white_e / a), f"sqrt(b / k) of white, k = a * {white_e:g} = {a * white_e:.3g}; {told}"
+            sqrt(b * white_e / a), f"sqrt(b / k) of white, k = a * {white_e:g} = {a * white_e:.3g}; {source_note}"
         )
     else:
         words["read_noise_e"] = f"not told: b = {b:.3g} is not above 0; needed"
-    return PixelNumbers(told, pixel, left_out=words)
+    return PixelNumbers(source_note, pixel, left_out=words)
 
 
 def _darktable(path: Path) -> dict[str, dict[float, tuple[float, float]]]:
@@ -119,8 +119,8 @@ def _each_camera(held: Mapping[str, Any]) -> Iterator[tuple[str, dict[float, tup
     for maker in held["noiseprofiles"]:
         for model in maker["models"]:
             profiles: dict[float, tuple[float, float]] = {}
-            for each in model["profiles"]:
-                iso, a, b = float(each["iso"]), float(each["a"][1]), float(each["b"][1])
-                if not each.get("skip") and all(map(isfinite, (iso, a, b))) and 1e-12 < a < 1:
+            for entry in model["profiles"]:
+                iso, a, b = float(entry["iso"]), float(entry["a"][1]), float(entry["b"][1])
+                if not entry.get("skip") and all(map(isfinite, (iso, a, b))) and 1e-12 < a < 1:
                     profiles.setdefault(iso, (a, b))  # the first of several measurements
             yield f"{maker['maker']} {model['model']}", profiles

@@ -67,8 +67,10 @@ def expected_electrons_single(
         channel = dr.gather(jit.UInt, tile_channels, tile_cell(pixel, divisor(width), tile_size))
         electrons = dr.zeros(jit.Float, piece.shape[1])
         for first in range(0, bands, BANDS_AT_ONCE):
-            some = np.s_[first : first + BANDS_AT_ONCE]
-            electrons += weighted_sum([jit.Float(plane) for plane in piece[some]], [r[some] for r in scalars], channel)
+            bands_read = np.s_[first : first + BANDS_AT_ONCE]
+            electrons += weighted_sum(
+                [jit.Float(plane) for plane in piece[bands_read]], [r[bands_read] for r in scalars], channel
+            )
             dr.eval(electrons, channel)
         result[start : start + piece.shape[1]] = electrons.numpy()
     return np.minimum(result, LARGEST).reshape(height, width)

@@ -82,8 +82,8 @@ def _fit(level: NDArray[np.float64], variance: NDArray[np.float64]) -> NoiseEsti
     slope = max(float(np.median(variance / level)), 1e-12)
     start = [slope, 0.1 * float(variance.min())]
     bounds = ([1e-15, 1e-15], [np.inf, np.inf])
-    found = least_squares(residuals, start, bounds=bounds, loss="soft_l1", f_scale=0.1, x_scale=start)
-    gain = 1.0 / float(found.x[0])
-    if not found.success or not 1e-3 < gain < 1e4:
+    fit = least_squares(residuals, start, bounds=bounds, loss="soft_l1", f_scale=0.1, x_scale=start)
+    gain = 1.0 / float(fit.x[0])
+    if not fit.success or not 1e-3 < gain < 1e4:
         return None
-    return NoiseEstimate(gain, gain * float(np.sqrt(found.x[1])))
+    return NoiseEstimate(gain, gain * float(np.sqrt(fit.x[1])))

@@ -61,6 +61,6 @@ def _profile(path: Path) -> Floats:
                 return np.array(values)
             form, starts = tags.get(_SUB_DIRECTORIES, ("", ()))
             if form == "I":
-                waiting += [int(each) for each in starts[:_MOST_DIRECTORIES]]
+                waiting += [int(start) for start in starts[:_MOST_DIRECTORIES]]
             waiting.append(following)
     return np.empty(0)

@@ -93,7 +93,11 @@ def _weighted(estimates_e: Floats, weights: Floats, levels_e: Floats) -> Floats:
         return light
     for _ in range(_ROUNDS):
         light = np.asarray(
-            sum(np.interp(light, levels_e, own) * x for own, x in zip(weights.T, estimates_e, strict=True) if own.any())
+            sum(
+                np.interp(light, levels_e, weight) * x
+                for weight, x in zip(weights.T, estimates_e, strict=True)
+                if weight.any()
+            )
         )
     return light
 

@@ -53,7 +53,7 @@ def whole_share(sensor: SensorConfig) -> float:
 def of_reading(sensor: SensorConfig, index: int) -> SensorConfig:
     """Sensor of one reading alone, which takes its share of the light and of the dark current."""
     reading, pixel = sensor.chip.readings[index], sensor.pixel
-    own = replace(
+    pixel_of_one = replace(
         pixel,
         read_noise_e=reading.read_noise_e,
         dsnu_e=reading.dsnu_e,
@@ -61,7 +61,7 @@ def of_reading(sensor: SensorConfig, index: int) -> SensorConfig:
         dark_current_e_per_s=pixel.dark_current_e_per_s * reading.share,
         hot_pixel_dark_current_e_per_s=pixel.hot_pixel_dark_current_e_per_s * reading.share,
     )
-    return replace(sensor, pixel=own, chip=Chip())
+    return replace(sensor, pixel=pixel_of_one, chip=Chip())
 
 
 def switched_to(sensor: SensorConfig, expected_e: Floats) -> int:
@@ -94,29 +94,29 @@ def covariances(expected_e: Floats, sensor: SensorConfig, exposure_s: float) -> 
     pixel, readings = sensor.pixel, sensor.chip.readings
     share = shares(sensor)
     light = np.asarray(expected_e, dtype=np.float64)[:, None, None]
-    own = np.eye(len(readings))
+    identity = np.eye(len(readings))
     charge = np.array([[a.charge == b.charge for b in readings] for a in readings]) / share
     photodiode = np.array([[a.photodiode == b.photodiode for b in readings] for a in readings]) * 1.0
     hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
     spread_e2 = hot_share * (1 - hot_share) * hot_e**2
     gain_e = np.array([of_reading(sensor, i).gain_e_per_dn for i in range(len(readings))])
 
-    found = {
+    by_source = {
         "shot noise": light * charge,
         "dark current": pixel.dark_current_e_per_s * exposure_s * charge,
         "hot pixels": hot_share * hot_e * charge + spread_e2 * photodiode,
         "PRNU": (pixel.prnu * light) ** 2 * photodiode,
     }
-    collected = sum(found.values()) + (light + dark_electrons(sensor, exposure_s)) ** 2
-    found |= {
+    collected = sum(by_source.values()) + (light + dark_electrons(sensor, exposure_s)) ** 2
+    by_source |= {
         "column gains": pixel.column_gain_spread**2 * collected,
-        "DSNU": own * (np.array([x.dsnu_e for x in readings]) / share) ** 2,
+        "DSNU": identity * (np.array([x.dsnu_e for x in readings]) / share) ** 2,
         "column offsets": pixel.column_offset_e**2 / np.outer(share, share),
-        "read noise": own * (np.array([x.read_noise_e for x in readings]) / share) ** 2,
-        "quantisation": own * (gain_e / share) ** 2 / 12,
+        "read noise": identity * (np.array([x.read_noise_e for x in readings]) / share) ** 2,
+        "quantisation": identity * (gain_e / share) ** 2 / 12,
     }
     shape = (len(light), len(readings), len(readings))
-    return {name: np.broadcast_to(value, shape) for name, value in found.items()}
+    return {name: np.broadcast_to(value, shape) for name, value in by_source.items()}
 
 
 def best_weights(covariance: Floats, kept: NDArray[np.intp]) -> Floats:
@@ -148,7 +148,9 @@ def merged_variances(expected_e: Floats, sensor: SensorConfig, exposure_s: float
     light = np.ravel(np.asarray(expected_e, dtype=np.float64))
     by_source = covariances(light, sensor, exposure_s)
     total = np.asarray(sum(by_source.values()))
-    found, left, at = dict.fromkeys(by_source, np.zeros_like(light)), np.ones_like(light), seams(sensor, exposure_s)
+    at = seams(sensor, exposure_s)
+    merged_e2 = dict.fromkeys(by_source, np.zeros_like(light))
+    pixel_share = np.ones_like(light)  # of pixels whose merged light is over the seams so far
     dark_e = dark_electrons(sensor, exposure_s)
     for number, above_e in enumerate(at.above_e):
         weights = best_weights(total, at.order[number:])
@@ -156,9 +158,10 @@ def merged_variances(expected_e: Floats, sensor: SensorConfig, exposure_s: float
         last = number == len(at.order) - 1
         beyond = np.zeros_like(light) if last else scipy.special.ndtr((light + dark_e - above_e) / noise_e)
         for name, covariance in by_source.items():
-            found[name] = found[name] + left * (1 - beyond) * np.einsum("ni,nij,nj->n", weights, covariance, weights)
-        left = left * beyond
-    return {name: value.reshape(np.shape(expected_e)) for name, value in found.items()}
+            variance_e2 = np.einsum("ni,nij,nj->n", weights, covariance, weights)
+            merged_e2[name] = merged_e2[name] + pixel_share * (1 - beyond) * variance_e2
+        pixel_share = pixel_share * beyond
+    return {name: value.reshape(np.shape(expected_e)) for name, value in merged_e2.items()}
 
 
 def merged_variance(expected_e: Floats, sensor: SensorConfig, exposure_s: float) -> Floats:
