@@ -95,6 +95,7 @@ def table_of(path: Path) -> dict[tuple[str, str], list[str]]:
     return {(row[0], row[1]): row[2:] for row in rows}
 
 
+@pytest.mark.thorough
 def test_sensors_stand_beside_each_other_each_with_its_own_mosaic(tmp_path: Path, places: tuple[Path, Path]) -> None:
     write_page(run(), tmp_path, *places)
     text, cells = plain(places[0]), table_of(places[1])
@@ -125,6 +126,7 @@ def test_the_quantum_efficiency_is_the_simulated_one_and_the_published_stands_be
     assert "86.5 % at 536 nm; published: 91.25 %" in rows[-1]
 
 
+@pytest.mark.thorough
 def test_the_closed_form_stands_beside_the_simulated_field(tmp_path: Path, places: tuple[Path, Path]) -> None:
     write_page(run(), tmp_path, *places)
     table = "SNR of a pixel [dB]: closed form, simulated"

@@ -91,7 +91,7 @@ def test_quad_bayer_resolves_grey_well_and_a_colour_by_itself_less():
     assert 0.6 < response("quad_bayer", 8, grey=False) < response("bayer", 8, grey=False) < 0.75
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["quad_rgbw", "rgbw"])
 def test_a_full_w_does_not_tell_the_others_what_they_are(name):
     tile = MOSAICS[name]
@@ -117,6 +117,7 @@ def test_an_even_field_has_no_bias_from_the_dark_on(level_e):
     np.testing.assert_allclose(estimate, level_e, atol=allowed)
 
 
+@pytest.mark.thorough
 def test_a_lamp_that_fills_no_pixel_doesn_t_glow_over_the_window():
     """As one photodiode of four does that bin: far above the dark, and under the sum's well."""
     sensor = preset("low_noise", "quad_bayer")

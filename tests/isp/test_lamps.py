@@ -60,7 +60,7 @@ def planes(name, raw):
     return PROCESSORS[name].develop(raw, np.eye(3), balance=ones, **options).rgb
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("field_e", [0.01, 0.3, 10.0])
 @pytest.mark.parametrize("name", REACH)
 def test_a_lamp_stays_where_it_is(name, field_e):

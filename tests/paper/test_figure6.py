@@ -24,7 +24,7 @@ def radiance(request: pytest.FixtureRequest) -> SpectralRadiance:
     return transport.relight(luminance_cd_m2=25.0)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0, 1])
 def test_table1_output_substitutes_at_5_ms_only(radiance: SpectralRadiance, seed: int) -> None:
     sensor = table1_output()

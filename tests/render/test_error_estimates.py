@@ -90,7 +90,7 @@ def test_a_variance_is_never_negative(seed):
     [
         ("cornell_box", (12, 12), 16, 8),
         *[
-            pytest.param(name, (24, 32), 128, 12, marks=pytest.mark.thorough)
+            pytest.param(name, (24, 32), 128, 12, marks=pytest.mark.slow)
             for name in ("cornell_box", "night_street", "lit_and_shadowed", "still_life_outdoor")
         ],
     ],
@@ -103,7 +103,8 @@ def test_over_all_pixels_the_stated_variance_is_that_over_seeds(name, size, spp,
         lit.append(np.moveaxis(made.relight(luminance_cd_m2=1.0).values, -1, 0).astype(np.float64))
         stated.append(made.relight_variance(luminance_cd_m2=1.0).astype(np.float64))
     mean, scatter = np.mean(lit, axis=0), np.var(lit, axis=0, ddof=1)
-    ratio = (np.mean(stated, axis=0) / mean)[mean > 0].sum() / (scatter / mean)[mean > 0].sum()
+    weight = np.divide(1.0, mean, out=np.zeros_like(mean), where=mean > 0)
+    ratio = (np.mean(stated, axis=0) * weight).sum() / (scatter * weight).sum()
     assert 0.8 < ratio < 1.25
 
 

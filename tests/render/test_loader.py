@@ -87,6 +87,7 @@ print(made.radiance.any(), dr.thread_count())
 """
 
 
+@pytest.mark.thorough
 def test_a_machine_of_one_core_reads_an_environment_map(tmp_path: Path) -> None:
     """Mitsuba reads OpenEXR in Dr.Jit's threads, without the one that asks: with one thread alone it never ended."""
     command = [sys.executable, "-c", ENVIRONMENT]

@@ -150,6 +150,7 @@ def test_a_level_and_its_error_are_those_of_a_ratio_of_means():
     assert made.relight().relative_level_error is None
 
 
+@pytest.mark.thorough
 def test_a_level_in_lux_is_told_with_the_scatter_of_its_meter():
     """Against draws of what the meter may have measured, which know no formula of a sum's variance."""
     rng = np.random.default_rng(6)

@@ -55,6 +55,7 @@ def test_stored_values_count_to_the_last_bit() -> None:
     assert digest(0.3) != digest(0.1 * 3)
 
 
+@pytest.mark.thorough
 def test_the_catalogue_has_the_same_inputs_on_another_processor() -> None:
     """Plain NumPy and BLAS's oldest kernel make most of these values otherwise in their last bits."""
     command = [sys.executable, "-c", CATALOGUE]

@@ -107,6 +107,7 @@ def test_two_exposures_of_one_chip_share_their_pattern_and_two_chips_share_none(
     assert abs(correlation(first, third)) < 4 / np.sqrt(PIXELS)
 
 
+@pytest.mark.thorough
 def test_the_mean_of_many_exposures_is_the_chip_s_pattern():
     shape = (64, 64)
     device = draw_device(SENSOR, shape, np.random.default_rng(8))

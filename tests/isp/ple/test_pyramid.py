@@ -128,7 +128,7 @@ def test_a_patchs_own_light_is_the_frames_up_to_its_border_and_varies_as_stated(
     assert np.var(means[1:], axis=0)[inside].mean() * 40 / 39 == pytest.approx(stated, rel=4.5 * np.sqrt(2 / draws))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("tile", [RGBW, BAYER])
 @pytest.mark.parametrize("times", [(2, 2), (2, 1), (1, 2)])
 def test_a_tile_written_twice_is_the_same_mosaic(tile, times):

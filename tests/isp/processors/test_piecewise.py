@@ -79,7 +79,7 @@ def test_a_flat_grey_field_stays_flat_and_grey_wherever_a_4x4_tile_begins(tile, 
     assert rgb == pytest.approx(np.full(rgb.shape, 1000.0), rel=1.5e-3)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["rgbw_4x4", "quad_bayer", "quad_rgbw"])
 def test_highlights_of_4x4_tiles_stay_grey_and_end_at_greens_full_well(name):
     tile = MOSAICS[name]

@@ -68,6 +68,7 @@ def test_what_the_denoiser_gets_knows_no_texture_and_no_unit(idle) -> None:
         assert (options["albedo"] == 0.5).all()
 
 
+@pytest.mark.thorough
 def test_dark_surfaces_keep_their_light(idle) -> None:
     """Light over an albedo of 0 would have no bound."""
     light = np.full((20, *SIZE), 0.1, np.float32)
@@ -89,6 +90,7 @@ def halves_of(noise, seed=4):
     return (even + odd) / 2, (even - odd) / 2, albedo, normal
 
 
+@pytest.mark.thorough
 def test_noise_goes_and_light_stays() -> None:
     """A fifth of the noise is left at most (what is mixed in), and 1 % of the light moves."""
     real()

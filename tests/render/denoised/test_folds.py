@@ -48,7 +48,7 @@ def test_the_unbiased_light_keeps_its_bits(box, made) -> None:
         assert np.array_equal(getattr(plain, name), getattr(made, name))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize(("first", "spp"), [(16, 32), (96, 192)], ids=["uniform", "after a pilot"])
 def test_stopped_and_resumed_or_cached_gives_the_bits_of_one_go(first, spp, box, tmp_path) -> None:
     made = render(box, SIZE, spp=spp, denoise=True, **ASKED)

@@ -101,6 +101,7 @@ def test_pixels_with_more_samples_are_not_biased(name, monkeypatch):
     assert np.abs(z).max() < t.isf(1e-3 / 2 / z.size, 2 * repeats - 2)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(backend() == "numpy", reason="without Dr.Jit all pixels are alike")
 def test_rates_are_kept_when_a_render_goes_on_from_another(tmp_path):
     """Resumed, and read from a folder: the bits of one go."""

@@ -90,7 +90,7 @@ def test_only_the_sky_shares_paths_and_it_is_told_with_which(both):
     assert made(sky_by_itself(courtyard()), spp=8).shared is None
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_stated_variance_of_both_lights_is_the_scatter_of_renders(several, sign):
     """Where errors rise together, and where one falls as the other rises; half of the renders tell where that is."""

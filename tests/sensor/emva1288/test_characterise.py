@@ -68,6 +68,7 @@ def test_terms_that_are_absent_are_found_absent():
         assert abs(figure.measured) <= 4.5 * figure.error
 
 
+@pytest.mark.thorough
 def test_two_runs_are_equal_and_another_seed_is_another_chip():
     first, again, other = (characterise(SENSOR, (32, 32), seed) for seed in (3, 3, 4))
     assert first.figures == again.figures
@@ -189,6 +190,7 @@ def _read_by_engine(light_e, sensor, device, exposure_s, rng):
     return as_raw(dn, sensor, exposure_s, engine="test")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("binning", ["charge", "digital"])
 def test_every_term_of_a_chip_that_bins_is_found_where_four_pixels_put_it(binning):
     pixel = replace(PIXEL, hot_pixel_share=0.002)  # as few as real: then a sum holds hardly ever two

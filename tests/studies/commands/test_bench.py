@@ -162,6 +162,7 @@ def test_the_page_fetches_nothing_runs_nothing_and_escapes_everything(measured: 
     assert page.tags.count("img") == sum(max(of_stage) >= LEAST_SHARE for of_stage in shares) >= 4
 
 
+@pytest.mark.thorough
 def test_the_command_writes_page_and_json(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, measured: list[Stage]
 ) -> None:

@@ -140,6 +140,7 @@ def test_the_signal_is_that_of_the_level_and_exposure_asked_for(
         assert abs((read_raw(out).electrons - expected).mean()) < 5 * sigma
 
 
+@pytest.mark.thorough
 def test_a_camera_exposes_for_green_for_w_or_for_the_more_informative(
     exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -213,6 +214,7 @@ def test_a_sweep_of_such_a_cube_tells_and_refuses_alike(capsys: pytest.CaptureFi
     assert (code, "allowed: half; give those bands" in err.splitlines()[-1]) == (2, True)
 
 
+@pytest.mark.thorough
 def test_seeds_draw_another_chip_and_another_exposure(
     exr: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -372,6 +374,7 @@ def test_a_scene_is_photographed_in_the_height_and_width_asked_for(
     assert read_raw(out).shape == shape
 
 
+@pytest.mark.thorough
 def test_another_lamp_gives_its_own_colours_and_white_balance_another_neutral(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -708,6 +711,7 @@ def test_other_mosaics_are_captured_and_developed(
     assert (np.ptp(shown, axis=-1).max() == 0) == (cfa in ("rccc", "mono"))
 
 
+@pytest.mark.thorough
 def test_a_burst_is_captured_and_its_merged_frames_are_developed(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

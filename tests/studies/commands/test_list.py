@@ -56,7 +56,7 @@ def test_the_temperatures_are_those_of_the_spectra(name: str) -> None:
     assert found_k == pytest.approx(stated_k, rel=0.01)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "names"), [("lights", [*illuminants.names(), "3000K"]), ("sensors", ["the presets"])])
 def test_curves_are_drawn_with_every_name(
     kind: str, names: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]

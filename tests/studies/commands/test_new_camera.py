@@ -77,6 +77,7 @@ def test_a_fresh_installation_has_a_measured_camera(tmp_path, capsys, monkeypatc
     assert err.count("\n") == 1
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("cameras")
 def test_the_gallery_draws_each_measured_camera(tmp_path, capsys, monkeypatch):
     path = tmp_path / "cameras.svg"

@@ -118,6 +118,7 @@ def test_a_sensor_that_was_dropped_makes_the_pictures_of_its_file(tmp_path, monk
     assert 'sensors = ["chip.toml"]' in study["study.toml"]
 
 
+@pytest.mark.thorough
 def test_the_renders_noise_is_that_of_independent_renders():
     """Beside half the mean squared difference of two renders: both are noisy, within a factor of 1.5."""
     controls = Controls(exposure="time", exposure_s=0.02)
@@ -303,6 +304,7 @@ def test_a_render_looks_up_between_its_runs():
         next(states)
 
 
+@pytest.mark.thorough
 def test_a_render_that_answered_between_its_runs_has_the_bits_of_one_go():
     source = open_source("still_life_outdoor", RenderOptions(size=32, spp=64, band_nm=100.0))
 

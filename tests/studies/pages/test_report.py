@@ -158,6 +158,7 @@ def test_every_cell_stands_in_the_table() -> None:
             assert row[4] == f"{cell.mean('ssim'):.3f}"
 
 
+@pytest.mark.thorough
 def test_every_picture_is_there() -> None:
     of = SAMPLE.sample_report()
     page = page_of(of)
@@ -184,6 +185,7 @@ def test_unknown_numbers_become_dashes() -> None:
         assert re.search(rf"\b{fault}\b", unescape(re.sub(r"base64,[^\"]*", "", page_of(of)))) is None
 
 
+@pytest.mark.thorough
 def test_error_budget_holds_each_picture_s_share_and_what_is_left_out() -> None:
     of = SAMPLE.sample_report(left_out=("veiling glare: each per cent adds 1 %", "aberrations"))
     page = unescape(page_of(of))
@@ -226,6 +228,7 @@ def test_every_number_of_a_row_stands_in_the_table_with_its_factor_and_unit() ->
     ]  # fmt: skip
 
 
+@pytest.mark.thorough
 def test_the_set_up_has_the_numbers_of_sensor_light_scene_and_time() -> None:
     low_noise = SAMPLE.SENSORS[1].config
     assert low_noise is not None
@@ -321,11 +324,13 @@ def test_the_same_method_on_both_mosaics_leads_the_page_under_the_studys_own_tit
     assert read_study(CONFIGS / "demo.toml").title == "What does the white pixel bring?"
 
 
+@pytest.mark.thorough
 def test_a_study_of_sensors_is_answered() -> None:
     page = page_of(SAMPLE.sample_report(cameras=("interleaved",), exposures=("auto", "10ms"), seeds=(0, 1)))
     assert '<b data-name="A">table1_output</b> beside <b data-name="B">low_noise</b>' in page
 
 
+@pytest.mark.thorough
 def test_a_study_of_one_thing_says_so() -> None:
     page = page_of(SAMPLE.sample_report(cameras=("bayer",), sensors=SAMPLE.SENSORS[:1]))
     assert (
@@ -337,6 +342,7 @@ def test_a_study_of_one_thing_says_so() -> None:
     assert "moonlight to" not in alone, "one level is no span"
 
 
+@pytest.mark.thorough
 def test_what_did_not_happen_is_not_explained() -> None:
     page = page_of(SAMPLE.sample_report())
     for words in ("denoised", "above the sensor's", "Held fixed</legend>\n\n</fieldset>"):
@@ -354,6 +360,7 @@ def test_what_did_not_happen_is_not_explained() -> None:
     )
 
 
+@pytest.mark.thorough
 def test_every_metric_is_explained() -> None:
     assert set(text.MEANINGS) == {metric.key for metric in text.METRICS}
     page = unescape(page_of(SAMPLE.sample_report()))

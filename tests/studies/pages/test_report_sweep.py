@@ -113,6 +113,7 @@ def test_the_page_holds_the_names_as_text_and_the_means_over_seeds(out: Path) ->
     assert "band_nm = 20.0" in page
 
 
+@pytest.mark.thorough
 def test_pictures_that_are_left_out_are_those_that_the_page_shows_last(out: Path) -> None:
     results, pictures = sweep_report(out, 6)
     shown = [cell.first for cell in results.cells if cell.picture]
@@ -259,6 +260,7 @@ def test_paths_may_be_texts_wherever_a_public_function_takes_one(out: Path, tmp_
     assert {path.name for path in tmp_path.iterdir()} == {"r.html", "rows.csv", "black.png"}
 
 
+@pytest.mark.thorough
 def test_white_balances_stand_beside_each_other_and_the_rules_of_exposure_are_told(tmp_path: Path) -> None:
     study = SAMPLE.small_study(
         tmp_path, levels=("1cd/m2",), seeds=(0,), exposures=("auto", "auto:W"), white_balances=("gray-world", "as-shot")

@@ -116,7 +116,7 @@ print(json.dumps([row.threads, threads() - others, backend()]))
 """
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.skipif(backend() != "llvm", reason="Dr.Jit's threads are LLVM's")
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted in /proc")
 @pytest.mark.parametrize("count", [1, 3])

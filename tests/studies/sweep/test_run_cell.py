@@ -181,6 +181,7 @@ def test_seeds_share_no_noise_and_processors_of_a_mosaic_share_all(tmp_path: Pat
     assert first.psnr_db == pytest.approx(second.psnr_db, abs=2.0)  # 320 pixels: 3 standard errors of the mean square
 
 
+@pytest.mark.thorough
 def test_single_precision_readout_draws_a_frame_of_the_same_statistics(tmp_path: Path) -> None:
     study = SAMPLE.small_study(tmp_path)
     plan = SAMPLE.stated(study)

@@ -74,6 +74,7 @@ def test_order_and_executor_change_nothing(tmp_path: Path) -> None:
     assert content(tmp_path / "one") == content(tmp_path / "turned") == content(tmp_path / "threads")
 
 
+@pytest.mark.thorough
 def test_sensors_of_one_size_get_the_same_light_and_are_compared_at_the_coarsest_pixels(tmp_path: Path) -> None:
     SAMPLE.picture(tmp_path / "scene.exr", (48, 64))
     coarse_file = tmp_path / "coarse.toml"
@@ -126,6 +127,7 @@ def png_size(path: Path) -> tuple[int, int]:
     return struct.unpack(">II", path.read_bytes()[16:24])
 
 
+@pytest.mark.thorough
 def test_a_wider_study_leaves_the_cells_it_shares_as_they_are(tmp_path: Path) -> None:
     study = small_study(tmp_path)
     swept(study, tmp_path / "out")
@@ -291,6 +293,7 @@ def test_a_scene_that_cannot_be_read_is_told_before_the_first_is_rendered(tmp_pa
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.thorough
 def test_one_render_serves_all_spectra_and_a_finer_one_goes_on_from_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -316,6 +319,7 @@ def test_one_render_serves_all_spectra_and_a_finer_one_goes_on_from_it(
     assert asked == [16, 32]
 
 
+@pytest.mark.thorough
 def test_a_denoised_study_photographs_denoised_light_and_is_charged_its_measured_error(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba_oidn", reason="rodcone[denoise] is not installed")
     limits = RenderLimits(size=32, spp=32, band_nm=100.0)
@@ -338,6 +342,7 @@ def test_a_denoised_study_photographs_denoised_light_and_is_charged_its_measured
     assert json.loads(row.render)["relative_mc_error"] > transport.relative_mc_error  # of all pixels, and their limit
 
 
+@pytest.mark.thorough
 def test_a_finer_request_goes_on_from_the_coarser_render_and_makes_its_cells_anew(tmp_path: Path) -> None:
     limits = RenderLimits(size=16, spp=16, band_nm=100.0)
     study = Study((SceneChoice("slanted_edge"),), ("1cd/m2",), processors=("bayer",), render=limits)

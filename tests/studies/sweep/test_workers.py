@@ -78,6 +78,7 @@ def test_every_cell_comes_back_once(at_once: int, cells: list[Cell]) -> None:
     assert list(run([], InThisProcess())) == []
 
 
+@pytest.mark.thorough
 def test_a_worker_makes_all_seeds_of_a_condition(cells: list[Cell]) -> None:
     """What it prepares for the first serves the others; the other worker is at another condition."""
     executor = Alternating()
