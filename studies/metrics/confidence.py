@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from rodcone.errors import InputError, require_range
 
@@ -62,5 +62,5 @@ def half_width(samples: Floats, confidence: float = 0.95) -> Floats:
     count = samples.shape[-1]
     if count == 1:
         return np.full(samples.shape[:-1], np.nan)
-    quantile = float(student.isf((1 - confidence) / 2, count - 1))
+    quantile = float(scipy.stats.t.isf((1 - confidence) / 2, count - 1))
     return np.asarray(quantile * samples.std(axis=-1, ddof=1) / np.sqrt(count))
