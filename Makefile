@@ -44,7 +44,7 @@ test-all: $(VENV)/installed-dev
 CPU := all
 TESTS := not slow
 test-any-cpu: $(VENV)/installed-dev
-	@$(BIN)/python tests/any_cpu/any_cpu.py --cpu "$(CPU)" -q -n auto --maxprocesses 8 --dist worksteal -m "$(TESTS)"
+	@$(BIN)/python tests/any_cpu/configurations.py --cpu "$(CPU)" -q -n auto --maxprocesses 8 --dist worksteal -m "$(TESTS)"
 
 verify: $(VENV)/installed-dev
 	@$(BIN)/python tests/verification/verify.py

@@ -12,8 +12,8 @@ from rodcone.jit import backend, dr
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Give each worker of pytest-xdist one thread of Dr.Jit."""
-    if "PYTEST_XDIST_WORKER" in os.environ and backend() == "llvm":
+    """Give each worker of pytest-xdist one thread of Dr.Jit, where `make test-any-cpu` asks for no other number."""
+    if "PYTEST_XDIST_WORKER" in os.environ and "ANY_CPU_DRJIT_THREADS" not in os.environ and backend() == "llvm":
         dr.set_thread_count(1)
 
 

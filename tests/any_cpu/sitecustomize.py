@@ -1,4 +1,4 @@
-"""What Python runs first where this folder is on PYTHONPATH: Dr.Jit gets the target and threads of `any_cpu.py`.
+"""What Python runs first where this folder is on PYTHONPATH: Dr.Jit gets the target and threads of `configurations.py`.
 
 Tests start processes of their own, so the choice travels in the environment. Dr.Jit 1.5 lets a program choose LLVM's
 target in C++ alone (`jit_llvm_set_target` of drjit-core/jit.h; `drjit.detail` has no more than `llvm_version`): it is

@@ -149,8 +149,9 @@ def plant(fault: Fault, copy: Path, markers: str = ALL) -> dict[str, Any]:
 
 def digest(fault: Fault) -> str:
     """Changes with the fault, the project's code and the tests that should notice."""
-    code = [path for part in PARTS[:5] for path in sorted((ROOT / part).rglob("*.py"))]
-    content = b"".join(path.read_bytes() for path in (*code, *(ROOT / test for test in fault.tests)))
+    code = [path for part in PARTS[:6] for path in sorted((ROOT / part).rglob("*.py"))]
+    shared = sorted((ROOT / "tests").glob("*.py"))  # conftest, which chooses the cases, and the helpers
+    content = b"".join(path.read_bytes() for path in (*code, *shared, *(ROOT / test for test in fault.tests)))
     return hashlib.sha256(repr(fault).encode() + content).hexdigest()[:16]
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from any_cpu.any_cpu import environment
+from any_cpu.configurations import environment
 
 from rodcone.digests import digest, digest_inputs
 

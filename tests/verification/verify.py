@@ -58,7 +58,7 @@ def tried() -> dict[str, int]:
 
 
 def any_cpu() -> Found:
-    code, said = command("tests/any_cpu/any_cpu.py", "-q", "-n", "auto", "-m", "not slow")
+    code, said = command("tests/any_cpu/configurations.py", "-q", "-n", "auto", "-m", "not slow")
     rows = (re.split(r" *\| *", line) for line in said.splitlines() if line.startswith("| "))
     return code == 0, "; ".join(f"{row[1]}: {row[4]}" for row in rows if row[1] != "configuration")
 

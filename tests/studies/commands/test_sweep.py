@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 import sweep_sample as SAMPLE
-from any_cpu.any_cpu import environment
+from any_cpu.configurations import environment
 
 from studies.commands.cli import app, main
 from studies.study.study_file import read_study

@@ -1,4 +1,4 @@
-"""Pytest as on other processors: ``python tests/any_cpu/any_cpu.py [--cpu NAME | --cpu by-date] [pytest's arguments]``.
+"""Pytest as on other processors: ``python tests/any_cpu/configurations.py [--cpu NAME | --cpu by-date] [arguments]``.
 
 BLAS, NumPy and LLVM pick their loops by the processor that they find and add in those loops' order, so last bits hang
 on the machine. Each configuration holds one of them to what another processor would make it pick, in pytest and in all
