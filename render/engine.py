@@ -155,7 +155,13 @@ def _checked_film(
     nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)
     widths = band_widths(nm, width_nm)
     check_range(scene, float((nm - widths / 2).min()), float((nm + widths / 2).max()))
-    return Film(size=(int(size[0]), int(size[1])), wavelength_nm=nm, width_nm=widths, max_depth=int(max_depth))
+    return Film(
+        size=(int(size[0]), int(size[1])),
+        wavelength_nm=nm,
+        width_nm=widths,
+        max_depth=int(max_depth),
+        rr_depth=scene.rr_depth,
+    )
 
 
 def _require_denoiser() -> None:

@@ -91,12 +91,15 @@ class Film:
     wavelength_nm, width_nm : (band,) float64
     max_depth : int
         Longest path in segments; 2 is direct light.
+    rr_depth : int
+        As of `Scene`.
     """
 
     size: tuple[int, int]
     wavelength_nm: Floats
     width_nm: Floats
     max_depth: int
+    rr_depth: int = Scene.rr_depth
 
 
 @dataclass(frozen=True)
@@ -278,4 +281,4 @@ def _recorder(film: Film, size: tuple[int, int]) -> Node:
 
 def stock_integrator(plug_in: str, film: Film) -> Any:
     """Integrator of Mitsuba's own, for renders without Dr.Jit."""
-    return mitsuba_module().load_dict({"type": plug_in, "max_depth": film.max_depth})
+    return mitsuba_module().load_dict({"type": plug_in, "max_depth": film.max_depth, "rr_depth": film.rr_depth})

@@ -81,6 +81,8 @@ class Scene:
         end values, None refuses bands beyond them.
     max_depth : int
         Longest path in segments, 2 being direct light, where a render isn't asked for another.
+    rr_depth : int
+        Russian roulette ends paths from this depth on; 5 as in Mitsuba's `path`.
 
     Raises
     ------
@@ -96,6 +98,7 @@ class Scene:
     reference_plane: str | None = None
     extend: str | None = None
     max_depth: int = 8
+    rr_depth: int = 5
 
     __repr__ = brief
 

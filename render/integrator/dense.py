@@ -16,7 +16,6 @@ from render.integrator.reflectance_table import TableReader, band_offsets, refle
 from rodcone.jit import dr
 
 SPECTRUM_SIZE = 4  # wavelengths of a spectral variant's `Spectrum`
-RR_DEPTH = 5  # Russian roulette from this depth on, as Mitsuba's `path`
 # Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
 # lobes by wavelength and one path can't serve all bands. Under the horizon `measured` gives densities below 0.
 PDF_TOLERANCE = 1e-3
@@ -35,7 +34,8 @@ class Tracer:
         sampled with `sample_lights`; with a second group the light of a constant environment, which isn't in the
         scene, is carried by the paths that escape.
     film : Film
-        Bands, and the longest path. Their number is filled up to a multiple of four by repeating the last.
+        Bands, the longest path and where roulette begins. The number of bands is filled up to a multiple of four by
+        repeating the last.
     seed : int
         Decides where in the bands the paths' wavelengths lie, for a scene whose reflectances are read from a table.
     apart : bool
@@ -44,7 +44,8 @@ class Tracer:
 
     def __init__(self, mi: Any, loaded: Any, film: Any, seed: int, *, apart: bool = False) -> None:
         self.mi, self.scene, self.apart = mi, loaded.mi_scene, apart
-        self.max_depth, self.coloured, self.sample_lights = film.max_depth, loaded.coloured, loaded.sample_lights
+        self.max_depth, self.rr_depth = film.max_depth, film.rr_depth
+        self.coloured, self.sample_lights = loaded.coloured, loaded.sample_lights
         self.environment = len(loaded.groups) > 1
         filled = np.append(np.arange(film.wavelength_nm.size), [film.wavelength_nm.size - 1] * 3)
         filled = filled[: -(-film.wavelength_nm.size // SPECTRUM_SIZE) * SPECTRUM_SIZE]
@@ -227,7 +228,7 @@ class Tracer:
             direct = dr.select(si.is_valid(), unscattered, direct)
             unscattered &= previous_delta
             depth[si.is_valid()] += 1
-            scattered, survives = _roulette(scattered, eta, depth, points.roulette(depth))
+            scattered, survives = _roulette(scattered, eta, depth >= self.rr_depth, points.roulette(depth))
             throughput = _either(escaped & self.environment, throughput, scattered)
             active = go_on & survives
         dark = [mi.Spectrum(0.0) for _ in wavelengths]
@@ -374,12 +375,11 @@ def _plus(result: list[Any], throughput: list[Any], light: list[Any], factor: An
     return [r + t * (x * factor) for r, t, x in zip(result, throughput, light, strict=True)]
 
 
-def _roulette(throughput: list[Any], eta: Any, depth: Any, sample: Any) -> tuple[list[Any], Any]:
+def _roulette(throughput: list[Any], eta: Any, plays: Any, sample: Any) -> tuple[list[Any], Any]:
     """Russian roulette by the brightest wavelength, so that one decision serves all; gives the survivors."""
     brightest = dr.max(throughput[0])
     for group in throughput[1:]:
         brightest = dr.maximum(brightest, dr.max(group))
     survival = dr.minimum(brightest * dr.square(eta), 0.95)
-    plays = depth >= RR_DEPTH
     factor = dr.select(plays, dr.rcp(survival), 1.0)
     return [group * factor for group in throughput], (~plays | (sample < survival)) & (brightest != 0)

@@ -4,7 +4,7 @@ from typing import Any
 
 
 def scattered_path(mi: Any) -> Any:
-    """Build the integrator class for a scalar variant; register it as ``scatteredpath`` (property: ``max_depth``).
+    """Build the integrator class for a scalar variant; register it as ``scatteredpath`` (``max_depth``, ``rr_depth``).
 
     The light that is left out is taken from the same samples, and so leaves no noise of its own behind.
     """
@@ -12,7 +12,8 @@ def scattered_path(mi: Any) -> Any:
     class ScatteredPath(mi.SamplingIntegrator):  # type: ignore[misc]
         def __init__(self, props: Any) -> None:
             super().__init__(props)
-            self.path = mi.load_dict({"type": "path", "max_depth": int(props["max_depth"])})
+            depths = {name: int(props[name]) for name in ("max_depth", "rr_depth")}
+            self.path = mi.load_dict({"type": "path", **depths})
 
         def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> Any:
             light, _, _ = self.path.sample(scene, sampler, ray, medium, active)

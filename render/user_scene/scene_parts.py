@@ -61,10 +61,11 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
     """
     kinds = {key: _kind(mi, child) for key, child in description.items()}
     integrators = [description[key] for key, kind in kinds.items() if kind == "integrator"]
-    depth, notes = _deepest(integrators), []
+    (depth, rr_depth), notes = _depths(name, integrators), []
     for integrator in integrators:
         limit = "of any length" if depth == DEEPEST else f"up to {depth} segments"
-        notes.append(f"integrator {integrator['type']!r}: the engine brings its own, with paths {limit}")
+        engine = f"the engine brings its own, with paths {limit}, roulette from {rr_depth}"
+        notes.append(f"integrator {integrator['type']!r}: {engine}")
     camera, size = _camera(mi, name, description, notes)
     geometry: Node = {"type": "scene", "sensor": camera}
     planes = []
@@ -88,17 +89,27 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
     if not groups:
         raise InputError(f"scene {name}: it has no light; allowed: one emitter or more; add one")
     plane = planes[0] if planes else None
-    scene = Scene(name=name, geometry=geometry, groups=groups, reference_plane=plane, extend=extend, max_depth=depth)
+    scene = Scene(
+        name=name,
+        geometry=geometry,
+        groups=groups,
+        reference_plane=plane,
+        extend=extend,
+        max_depth=depth,
+        rr_depth=rr_depth,
+    )
     return SceneFile(scene, size, tuple(notes))
 
 
-def _deepest(integrators: list[Node]) -> int:
-    """Longest path of the first integrator that states one, alone or inside another; without any the engine's."""
+def _depths(name: str, integrators: list[Node]) -> tuple[int, int]:
+    """Longest path and first depth of Russian roulette, of the first integrator that has paths, alone or in another."""
     stated = [node for integrator in integrators for _, node in walk({"": integrator}) if node["type"] in _PATHS]
     if not stated:
-        return 2 if any(node["type"] == "direct" for node in integrators) else Scene.max_depth
-    depth = int(stated[0].get("max_depth", -1))
-    return DEEPEST if depth < 0 else max(2, depth)
+        direct = any(node["type"] == "direct" for node in integrators)
+        return 2 if direct else Scene.max_depth, Scene.rr_depth
+    depth, rr_depth = stated[0].get("max_depth", -1), stated[0].get("rr_depth", Scene.rr_depth)
+    require_whole(f"scene {name}: rr_depth", rr_depth, 1, 1 << 31, "roulette begins after the first surface")
+    return DEEPEST if depth < 0 else max(2, int(depth)), min(int(rr_depth), DEEPEST)
 
 
 def _kind(mi: Any, part: Any) -> str:

@@ -94,6 +94,7 @@ def test_the_folder_is_made_and_holds_one_whole_file_an_entry(tmp_path, renders)
         {"scene": load("flat_field", reflectance=0.25)},
         {"scene": replace(load("flat_field"), name="other")},
         {"scene": replace(load("flat_field"), reference_plane=None)},
+        {"scene": replace(load("flat_field"), rr_depth=6)},
     ],
     ids="-".join,
 )

@@ -229,17 +229,36 @@ def test_color_checker_patches_are_reflectance_times_sky_in_every_band():
 
 @pytest.mark.parametrize("max_depth", [2, 3, 16, 1 << 16])
 def test_a_glowing_cavity_is_the_geometric_series_of_its_reflectance(max_depth):
-    camera = {"type": "perspective", "fov": 60.0, "to_world": to_world(look_at((0.3, 0, 0), (0, 0, 1)))}
-    # A cube: Mitsuba samples a sphere from inside with a bias of 5e-4, in its own integrator too.
-    cavity = {"type": "cube", "flip_normals": True, "bsdf": matte(grey(0.8)), "emitter": {"type": "area"}}
-    groups = {"glow": LightGroup(("cavity/emitter",), flat())}
-    scene = Scene("furnace", {"type": "scene", "sensor": camera, "cavity": cavity}, groups)
-    made = render(replace(scene, max_depth=max_depth), (8, 8), wavelength_nm=BANDS_NM, spp=512)
+    made = render(replace(cavity(), max_depth=max_depth), (8, 8), wavelength_nm=BANDS_NM, spp=512)
     truth = (1 - 0.8**max_depth) / (1 - 0.8)
     error = np.sqrt(made.variance[0, 0].sum(dtype=np.float64)) / 64
     assert error < 0.01 * truth
     assert np.abs(made.radiance[0].mean(axis=(1, 2), dtype=np.float64) - truth).max() < bound(1) * error
     assert (made.coverage.mean == 1).all()
+
+
+@pytest.mark.thorough
+def test_roulette_adds_its_noise_from_the_depth_that_the_scene_states():
+    """Light over 16 segments of a cavity of 0.8: from the first surface on their number is 1 to 16, geometric."""
+    variances = []
+    for rr_depth in (1, 5, 1 << 16):
+        asked = replace(cavity(), rr_depth=rr_depth, max_depth=16)
+        made = render(asked, (8, 8), wavelength_nm=BANDS_NM, spp=64)
+        variances.append(64 * made.variance[0, 0].mean(dtype=np.float64))
+    beyond = 0.8 ** np.arange(16)  # chance of more than 0, 1, ... segments
+    geometric = ((2 * np.arange(16) + 1) * beyond).sum() - beyond.sum() ** 2
+    # 64 pixels' variances from two halves each scatter by 18 %. Later roulette thins darker paths, none leaves only the
+    # choice between lamp and surface.
+    assert variances[0] == pytest.approx(geometric, rel=0.7)
+    assert variances[0] > variances[1] > 5 * variances[2]
+
+
+def cavity():
+    camera = {"type": "perspective", "fov": 60.0, "to_world": to_world(look_at((0.3, 0, 0), (0, 0, 1)))}
+    # A cube: Mitsuba samples a sphere from inside with a bias of 5e-4, in its own integrator too.
+    cavity = {"type": "cube", "flip_normals": True, "bsdf": matte(grey(0.8)), "emitter": {"type": "area"}}
+    groups = {"glow": LightGroup(("cavity/emitter",), flat())}
+    return Scene("furnace", {"type": "scene", "sensor": camera, "cavity": cavity}, groups)
 
 
 def stock(scene, spp, seed):

@@ -143,7 +143,8 @@ LIGHTS = {
 SCENES = {camera: (CAMERAS[camera], "") for camera in CAMERAS} | {
     light: (PERSPECTIVE, LIGHTS[light]) for light in LIGHTS
 }
-COMPARISONS = (len(PAINTS) * len(LAMPS) + len(SURFACES) + len(SCENES)) * BANDS_NM.size
+ROULETTE = 1, 2, 1 << 30
+COMPARISONS = (len(PAINTS) * len(LAMPS) + len(SURFACES) + len(SCENES) + len(ROULETTE)) * BANDS_NM.size
 
 
 def bands() -> str:
@@ -259,6 +260,15 @@ def test_each_kind_of_camera_and_slide_renders_as_in_stock_mitsuba(scene: str, t
     camera, lights = SCENES[scene]
     lights = lights or "".join(lamp(index, 3) for index in range(2))
     compare(write_scene(tmp_path, PAINTS["points"], lights, camera), rows=scene in CAMERAS)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("rr_depth", ROULETTE)
+def test_roulette_from_the_depth_that_a_file_states_renders_as_in_stock_mitsuba(rr_depth: int, tmp_path: Path) -> None:
+    path = write_scene(tmp_path, PAINTS["points"], "".join(lamp(index, 3) for index in range(2)))
+    depth = f'<integer name="max_depth" value="{DEPTH}"/>'
+    path.write_text(path.read_text().replace(depth, f'{depth}<integer name="rr_depth" value="{rr_depth}"/>'))
+    compare(path, rows=True)
 
 
 def compare(path: Path, rows: bool) -> None:

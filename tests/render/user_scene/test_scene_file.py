@@ -298,6 +298,19 @@ def test_paths_are_as_long_as_the_file_states(integrator: str, depth: int, tmp_p
     assert load_scene_file(write(tmp_path, integrator, CAMERA, SUN)).scene.max_depth == depth
 
 
+@pytest.mark.parametrize(("stated", "first"), [("", 5), ("2", 2), ("1000000000", 65536)])
+def test_roulette_begins_where_the_file_states(stated: str, first: int, tmp_path: Path) -> None:
+    value = f'<integer name="rr_depth" value="{stated}"/>' if stated else ""
+    opened = load_scene_file(write(tmp_path, f'<integrator type="volpath">{value}</integrator>', CAMERA, SUN))
+    assert opened.scene.rr_depth == first
+    assert f"roulette from {first}" in opened.notes[0]
+
+
+def test_roulette_from_the_camera_is_refused(tmp_path: Path) -> None:
+    integrator = '<integrator type="path"><integer name="rr_depth" value="0"/></integrator>'
+    assert "rr_depth: 0 is outside 1 to" in refusal(write(tmp_path, integrator, CAMERA, SUN))
+
+
 def test_a_scene_without_a_shape_is_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="it has no shape, so nothing is lit; add one"):
         render(load_scene_file(write(tmp_path, CAMERA, SUN)).scene, (4, 4), spp=4)
