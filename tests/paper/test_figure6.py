@@ -38,6 +38,7 @@ def test_table1_output_substitutes_at_5_ms_only(radiance: SpectralRadiance, seed
     assert decided == EXPECTED
 
 
+@pytest.mark.thorough
 def test_table1_pixel_has_a_threshold_of_its_own(
     radiance: SpectralRadiance, request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -336,6 +336,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
     assert not (one.radiance == other.radiance).any()
 
 
+@pytest.mark.thorough
 def test_lamps_of_one_group_keep_their_order():
     """Paths choose a lamp by its number: in another order of the lamps the same seed gives other bits."""
     scene = load("lit_and_shadowed")

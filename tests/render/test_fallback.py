@@ -90,6 +90,7 @@ def test_a_flat_field_reconstructed_without_llvm_stays_flat(fallback):
     assert fallback["flat"] < 1e-6
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "before", ["import mitsuba", "import drjit", "import mitsuba; mitsuba.set_variant('scalar_rgb')"]
 )

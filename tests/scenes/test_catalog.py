@@ -200,7 +200,7 @@ def test_a_scene_knows_its_proportions(name: str) -> None:
     assert film_size(load(name).size, 64) == ((42, 64) if name in ("color_checker", "metamers") else (64, 64))
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["color_checker", "metamers"])
 def test_a_chart_in_its_own_proportions_is_whole_and_in_a_square_is_not(name: str) -> None:
     scene = load(name)

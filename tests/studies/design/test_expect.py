@@ -60,6 +60,7 @@ def test_forms_are_the_squares_of_the_slopes_of_srgb_and_lab() -> None:
     assert_allclose(squares[2:], [slopes[3] ** 2, (slopes[4:] ** 2).sum()], rtol=2e-3)
 
 
+@pytest.mark.thorough
 def test_a_turned_or_mirrored_tile_has_the_same_error() -> None:
     tiles = (("RG", "BW"), ("GW", "RB"), ("WB", "GR"), ("GR", "WB"))
     db = [psnr_db(preset("low_noise", tile)) for tile in tiles]
@@ -134,6 +135,7 @@ def test_gain_agrees_with_that_under_the_prior_that_ple_ships() -> None:
         assert abs(gains[0] - gains[1]) < 0.25
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("prior", PRIORS)
 def test_quads_lose_and_white_wins_in_the_dark(prior: str) -> None:
     assert (gain_db(quad(("RG", "GB")), prior) < 0).all()

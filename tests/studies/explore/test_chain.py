@@ -70,6 +70,7 @@ def test_without_shot_noise_read_noise_is_all_that_moves():
     assert np.array_equal(steady.raw.dn, expected.raw.dn)
 
 
+@pytest.mark.thorough
 def test_the_memory_is_bounded():
     transport, memo = small_transport(), Memo()
     for seed in range(30):

@@ -120,6 +120,7 @@ def offered() -> Iterator[str]:
         yield address
 
 
+@pytest.mark.thorough
 def test_level_by_name_a_dropped_sensor_another_scene_and_back(browser, offered, one_render, tmp_path, monkeypatch):
     """Each is in the copied Python; a scene keeps the cameras; *Reset* brings all back."""
     monkeypatch.chdir(tmp_path)
@@ -292,6 +293,7 @@ def test_two_views_over_one_connection_take_no_answers_of_each_other(browser, ad
     assert status == [True, False]
 
 
+@pytest.mark.thorough
 def test_keys_move_the_measured_pixel_and_take_another_exposure(browser, address):
     page = CHROME.open_page(browser, address)
     EXPLORE.settle(page, figures=True)

@@ -275,6 +275,7 @@ def four(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.mark.thorough
 def test_the_tables_hold_the_leads_and_signs_turn_with_a_and_b(browser: Any, four: Path) -> None:
     """Outcomes and leads as they were found; with A and B swapped every lead has the other sign."""
     read = "[...document.querySelectorAll('#verdicts tr')].map((row) => [...row.children].map((cell) => [cell.className, cell.textContent.trim()]))"  # noqa: E501
@@ -396,6 +397,7 @@ def test_marks_and_bands_of_the_charts_lie_where_the_rows_say(browser: Any, four
     assert said.endswith(f": {mean:.1f} ± {half:.1f} dB")
 
 
+@pytest.mark.thorough
 def test_all_three_details_are_drawn_before_the_error_maps(browser: Any, report: Path) -> None:
     page = CHROME.open_page(browser, report)
     page.evaluate("drawing")
@@ -409,6 +411,7 @@ def test_all_three_details_are_drawn_before_the_error_maps(browser: Any, report:
     assert page.evaluate(drawn) == [512, 512, 512]
 
 
+@pytest.mark.thorough
 def test_a_study_in_which_nothing_competes_shows_its_camera_beside_the_reference(browser: Any, tmp_path: Path) -> None:
     for levels in (3, 1):
         results = SAMPLE.sample_report(levels=levels, cameras=("bayer",), sensors=SAMPLE.SENSORS[:1])

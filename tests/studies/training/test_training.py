@@ -68,6 +68,7 @@ def test_patches_are_in_roots_of_signal_over_their_mean_w():
     assert (patches[..., 3] ** 2).mean(axis=1) == pytest.approx(np.ones(len(patches)), rel=1e-5)
 
 
+@pytest.mark.thorough
 def test_the_mixtures_mean_and_covariance_are_the_patches(monkeypatch):
     monkeypatch.setattr(train, "COMPONENTS", 6)
     monkeypatch.setattr(train, "DIRECTIONS", 10)
