@@ -1,5 +1,6 @@
 """Means of paths over spans of their points: by Dr.Jit, or pass by pass by Mitsuba's own integrators."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,8 @@ from render.loader import Film, mitsuba_module, mitsuba_words
 from rodcone.errors import InputError
 from rodcone.jit import dr
 from rodcone.types import Planes
+
+_COLOUR_FOR_NUMBER = re.compile(r'BitmapTexture "([^"]*)" was queried for a monochromatic value')
 
 
 @dataclass(frozen=True)
@@ -87,8 +90,19 @@ def _launched(
         cause = _root_cause(error)
         if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
             raise
-        raise InputError(f"scene: Mitsuba can't render it: {mitsuba_words(cause)}; correct the description") from None
+        raise _refusal(cause) from None
     return channels
+
+
+def _refusal(error: RuntimeError) -> InputError:
+    """What Mitsuba can't render: a plain line for the case that is met in good scenes, else its own words."""
+    words = mitsuba_words(error)
+    if colour := _COLOUR_FOR_NUMBER.search(words):
+        return InputError(
+            f"scene: bitmap {colour[1]!r} has colours where one number is asked for, such as a mask's opacity; "
+            'allowed: a grey bitmap, or its luminance as stored: add <boolean name="raw" value="true"/> to it'
+        )
+    return InputError(f"scene: Mitsuba can't render it: {words}; correct the description")
 
 
 def bands_apart(image: Planes, groups: int, bands: int) -> tuple[Planes, Planes]:
@@ -114,7 +128,7 @@ def by_stock(mi_scene: Any, sensor: Any, integrator: Any, *, spp: int, seed: int
     try:
         image = mitsuba_module().render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
     except RuntimeError as error:
-        raise InputError(f"scene: Mitsuba can't render it: {mitsuba_words(error)}; correct the description") from None
+        raise _refusal(error) from None
     return np.ascontiguousarray(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
 
 
