@@ -2,7 +2,7 @@
 
     python examples/05_scene.py [SIZE]
 
-Writes evening.png, night.png and night.exr, the night's radiance as spectral OpenEXR.
+Writes evening.png, night.png, explorer.png and night.exr, the night's radiance as spectral OpenEXR.
 """
 
 import sys
@@ -41,3 +41,7 @@ for name, sky_cd_m2, balance in (("evening", 1.0, "D65"), ("night", 0.002, "3000
 rodcone.write_exr(radiance, "night.exr", scene="ball")  # `rodcone capture night.exr` photographs it again
 again = rodcone.load_radiance("night.exr")
 print("read back as written:", np.allclose(again.values, radiance.values, rtol=1e-6))
+
+# What the explorer shows of the file at these settings: its *Copy Python* writes this call.
+picture = rodcone.explorer_view(rodcone.load_transport("night.exr"), level_cd_m2=0.05, frames=4)
+rodcone.write_picture(picture / 255, "explorer.png")

@@ -34,6 +34,7 @@ _PUBLIC = {
     "panel": ("scenes.materials", "panel"),
     "relight_denoised": ("render.denoised.relight", "relight_denoised"),
     "load_scene_file": ("render.user_scene.scene_file", "load_scene_file"),
+    "load_transport": ("studies.explore.source", "load_transport"),
     "load_radiance": ("render.radiance_files.radiance_source", "load_radiance"),
     "write_exr": ("render.radiance_files.exr", "write_exr"),
     # sensor
@@ -86,6 +87,7 @@ _PUBLIC = {
     "to_pandas": ("studies.sweep.export", "to_pandas"),
     "report": ("studies.commands.report", "write_report"),
     "explore": ("studies.explore.widget", "explore"),
+    "explorer_view": ("studies.explore.views", "explorer_view"),
 }
 
 __all__ = sorted(_PUBLIC)  # noqa: PLE0605

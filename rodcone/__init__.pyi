@@ -53,6 +53,8 @@ from sensor.raw_files.raw_file import write_raw as write_raw
 from studies.budget.ledger import Plan
 from studies.commands.report import write_report as report
 from studies.design.expect import ExpectedError
+from studies.explore.source import load_transport as load_transport
+from studies.explore.views import explorer_view as explorer_view
 from studies.explore.widget import explore as explore
 from studies.photograph.clock import Clock
 from studies.photograph.develop import develop as develop
@@ -98,6 +100,7 @@ __all__ = [
     "expect",
     "expected_electrons",
     "explore",
+    "explorer_view",
     "expose",
     "finish",
     "form_image",
@@ -110,6 +113,7 @@ __all__ = [
     "load",
     "load_radiance",
     "load_scene_file",
+    "load_transport",
     "look_at",
     "low_noise",
     "mask",

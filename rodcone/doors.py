@@ -142,7 +142,8 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "device": _value("sensor.device:Device", "give draw_device(sensor, radiance.shape, rng)"),
         "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),
         "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", "render.illuminants:illuminant"),
-        **dict.fromkeys(("load_radiance.light", "light_for_snr.light", "expect.light", "prior"), _TEXT),
+        **dict.fromkeys(("load_radiance.light", "load_transport.light", "light_for_snr.light"), _TEXT),
+        **dict.fromkeys(("expect.light", "prior", "view"), _TEXT),
         "reflectance": _value("render.spectrum:Spectrum", "give rodcone.grey(0.5) or rodcone.Spectrum(...)"),
         "grey.reflectance": _range(0.0, 1.0, "give a share of the light"),
         "raw": _RAW,
@@ -188,7 +189,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         **dict.fromkeys(("spectra", "powers"), _plain(Mapping, "a dict by light group")),
         **dict.fromkeys(("luminance_cd_m2", "illuminance_lux"), _NUMBER),
         "bsdf": _plain(dict, "a Mitsuba node such as rodcone.matte(...)"),
-        **dict.fromkeys(("options", "more"), lambda _, value: value),
+        **dict.fromkeys(("options", "more", "controls"), lambda _, value: value),
     }
 )
 # Functions that look at the result, and warn.

@@ -195,13 +195,24 @@ def controls_from(content: Any, own: Controls = Controls(), dropped: Iterable[st
                 f"light: {light!r} is a file that the command didn't name; allowed: an illuminant's name; load the "
                 "file on the page, as a table"
             )
-    controls = structured(content, Controls, _CONVERTER, "send what the page is told first")
+    controls = controls_of(content, "send what the page is told first")
     if controls.sensor not in (known := {*names(), own.sensor, *dropped}):
         raise unknown("sensor", controls.sensor, known)
     for name, lamp in controls.lamps.items():
         if len(lamp.table) > MOST_POINTS:
             raise InputError(f"lamps[{name!r}].table: {len(lamp.table)} points; allowed: {MOST_POINTS}; thin it out")
     return controls
+
+
+def controls_of(content: Mapping[str, Any], fix: str) -> Controls:
+    """Controls of plain values, lists and dicts by the fields' names, checked; those left out have their defaults.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a value of another kind, or one that `Controls` refuses.
+    """
+    return structured(content, Controls, _CONVERTER, fix)
 
 
 def light_files(controls: Controls) -> tuple[str, ...]:

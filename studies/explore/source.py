@@ -9,7 +9,8 @@ import numpy as np
 
 from isp.processors.catalogue import PROCESSORS
 from render.engine import render
-from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reflectance
+from render.illuminants import illuminant
+from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reflectance, load_picture
 from render.scene import LightGroup, Scene, film_size
 from render.spectrum import VISIBLE_NM, Floats
 from render.transport import Transport
@@ -102,29 +103,38 @@ def open_source(source: str, limits: RenderOptions) -> Source:
     if source.lower().endswith(".toml"):
         study = read_study(source)
         return _of_study(study, replace(limits, size=study.render.size, band_nm=study.render.band_nm), source)
-    return _of_choice(SceneChoice(source), limits)
+    return of_choice(SceneChoice(source), limits)
 
 
-def file_transport(path: str, light: str | None = None) -> tuple[Transport, tuple[str, ...]]:
-    """Transport of a picture file, and what had to be assumed; radiance has its light in it, which is marked so.
+def load_transport(path: str | Path, light: str = LIGHT) -> Transport:
+    """Light transport of a picture file (`rodcone.load_radiance`), which `relight` and the explorer take.
 
     Parameters
     ----------
-    path : str
-    light : str, optional
-        That lights reflectances, at first.
+    path : str or Path
+    light : str
+        Illuminant of reflectances, which other lamps may replace; radiance has its light in it.
+
+    Raises
+    ------
+    InputError
+        As `rodcone.load_radiance`.
     """
-    transport, _, notes = open_radiance_file(path, light)
+    return _with_its_light(load_picture(path, illuminant(light)), path)
+
+
+def _with_its_light(transport: Transport, path: str | Path) -> Transport:
+    """A file's transport, of which radiance's light group is marked to have colours of its own."""
     if is_reflectance(path):
-        return transport, tuple(notes)
+        return transport
     groups = {name: replace(group, coloured=True) for name, group in transport.groups.items()}
-    return replace(transport, groups=groups), tuple(notes)
+    return replace(transport, groups=groups)
 
 
 def _of_study(study: Study, limits: RenderOptions, source: str) -> Source:
     """The study's first scene and condition; the page goes on from there."""
     limits = replace(limits, seed=study.render.seed, spp=study.render.spp, range_nm=study.render.range_nm)
-    opened = _of_choice(study.scenes[0], limits)
+    opened = of_choice(study.scenes[0], limits)
     notes = list(opened.notes)
     levels = [parse_level(level) for level in study.levels]
     level = next((value for value, unit in levels if unit == "cd/m2"), None)
@@ -155,16 +165,14 @@ def _of_study(study: Study, limits: RenderOptions, source: str) -> Source:
     return replace(opened, title=f"{study.name}: {opened.title}", controls=controls, notes=tuple(notes))
 
 
-def _of_choice(choice: SceneChoice, limits: RenderOptions) -> Source:
+def of_choice(choice: SceneChoice, limits: RenderOptions) -> Source:
+    """A scene or picture file as a study names it."""
     if is_radiance_file(choice.source):
         check_radiance_file(choice.source, ())
         require_memory(memory(*extent_of(choice.source)), limits.force)
-        transport, notes = file_transport(choice.source, choice.light)
-        lit_by = f", {choice.light!r}" if choice.light else ""
-        code = (
-            "from studies.explore.source import file_transport\n\n"
-            f"transport, _ = file_transport({choice.source!r}{lit_by})\n"
-        )
+        opened_file, _, notes = open_radiance_file(choice.source, choice.light)
+        transport = _with_its_light(opened_file, choice.source)
+        code = f"transport = rodcone.load_transport({choice.source!r}{_named({'light': choice.light})})\n"
         return Source(
             Path(choice.source).name,
             lambda _: iter((Rendered(transport, code, True),)),
@@ -172,21 +180,15 @@ def _of_choice(choice: SceneChoice, limits: RenderOptions) -> Source:
             Controls(reference_light=choice.light or LIGHT),
             scene=choice,
             render=RenderLimits(size=max(transport.coverage.mean.shape)),
-            notes=notes,
+            notes=tuple(notes),
         )
     opened = open_scene(choice.source, limits.trust, choice.extend, choice.light, choice.chart)
     size = film_size(opened.size, limits.size)
     bands = _bands(limits)
     require_memory(memory(size[0] * size[1], bands[0].size, len(opened.scene.groups)), limits.force)
-    named = "".join(
-        f", {name}={value!r}"
-        for name, value in {"trust": limits.trust, **vars(choice)}.items()
-        if value and name != "source"
-    )
     first, last = limits.range_nm
     code = (
-        "import numpy as np\n\nfrom studies.study.scene_source import open_scene\n\n"
-        f"scene = open_scene({choice.source!r}{named}).scene\n"
+        f"import numpy as np\n\n{_scene_code(choice, limits.trust)}"
         f"edges_nm = np.linspace({first!r}, {last!r}, {bands[0].size + 1})\n"
         "bands = {'wavelength_nm': (edges_nm[1:] + edges_nm[:-1]) / 2, 'width_nm': np.diff(edges_nm)}\n"
     )
@@ -198,6 +200,22 @@ def _of_choice(choice: SceneChoice, limits: RenderOptions) -> Source:
         render=RenderLimits(max(size), limits.band_nm, limits.spp, seed=limits.seed, range_nm=limits.range_nm),
         notes=tuple(opened.notes),
     )
+
+
+def _scene_code(choice: SceneChoice, trust: bool) -> str:
+    """Python that opens a scene as `open_scene` does."""
+    options = {"trust": trust, "extend": choice.extend, "light": choice.light, "chart": choice.chart}
+    if Path(choice.source).suffix.lower() == ".xml":
+        return f"scene = rodcone.load_scene_file({choice.source!r}{_named(options)}).scene\n"
+    extend = options.pop("extend")  # of the builders none takes it
+    scene = f"scene = rodcone.load({choice.source!r}{_named(options)})\n"
+    if extend is None:
+        return scene
+    return f"from dataclasses import replace\n{scene}scene = replace(scene, extend={extend!r})\n"
+
+
+def _named(options: Mapping[str, Any]) -> str:
+    return "".join(f", {name}={value!r}" for name, value in options.items() if value)
 
 
 def _states(

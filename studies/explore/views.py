@@ -1,5 +1,6 @@
 """What a shot is shown as: pictures of 8 bits, and figures as plain numbers."""
 
+import re
 from collections.abc import Callable, Mapping
 from math import hypot
 from types import MappingProxyType
@@ -10,13 +11,16 @@ from numpy.typing import NDArray
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from render.photometry import photons_per_joule
+from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
-from rodcone.errors import require_whole
+from rodcone.errors import require_whole, unknown
 from sensor.cfa import channel_map, channels, mask
 from sensor.raw import RawImage
 from sensor.readout import as_switched, noise_sources, noise_variance, spread_charge
 from sensor.response import electrons_per_irradiance
-from studies.explore.chain import Exposed, GroupFrame, Shot
+from studies.explore.chain import Exposed, GroupFrame, Shot, expose_scene, photograph
+from studies.explore.controls import controls_of
+from studies.explore.memo import Memo
 from studies.metrics.appearance import flip
 
 Bytes = NDArray[np.uint8]
@@ -88,6 +92,40 @@ VIEWS: Mapping[str, Callable[[Shot], Bytes]] = MappingProxyType(
         "snr": snr_picture,
     }
 )
+
+
+def explorer_view(transport: Transport, view: str = "picture", **controls: Any) -> Any:
+    """A picture or figure of the explorer's page, as *Copy Python* writes it.
+
+    Parameters
+    ----------
+    transport : Transport
+        As `rodcone.render` or `rodcone.load_transport` gives it.
+    view : str
+        ``picture``, ``truth``, ``raw``, ``noise``, ``luminance error``, ``colour error``, ``flip``, ``snr``;
+        ``histogram`` or ``pixel ROW COLUMN``.
+    **controls
+        Fields of `studies.explore.controls.Controls` that differ from the page's defaults, such as
+        ``level_cd_m2=0.05``, ``lens={"f_number": 4.0}`` or ``lamps={"softbox": {"spectrum": "A"}}``.
+
+    Returns
+    -------
+    (h, w, 3) uint8, or dict
+        Picture in sRGB; what `histogram` or `pixel` gives.
+
+    Raises
+    ------
+    InputError
+        For an unknown view or control, or a value that the chain refuses.
+    """
+    place = re.fullmatch(r"pixel (\d{1,9}) (\d{1,9})", view)
+    if not place and view not in (known := (*VIEWS, "histogram", "pixel ROW COLUMN")):
+        raise unknown("view", view, known)
+    settings = controls_of(controls, "see help(rodcone.explorer_view)")
+    if view in VIEWS:
+        return VIEWS[view](photograph(transport, settings))
+    exposed = expose_scene(transport, settings, Memo())
+    return pixel(exposed, int(place[1]), int(place[2])) if place else histogram(exposed.raw)
 
 
 def noise_scale_e(exposed: Exposed) -> float:

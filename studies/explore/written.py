@@ -11,8 +11,9 @@ from rodcone.errors import InputError
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.presets import preset, preset_file
-from studies.explore.controls import TIME, Controls, Lamp
+from studies.explore.controls import TIME, Controls, Lamp, to_json
 from studies.explore.equipment import camera_of
+from studies.explore.views import VIEWS
 from studies.study.radiance_file import LIGHT
 from studies.study.study import FILES, OWN, RenderLimits, SceneChoice
 
@@ -25,39 +26,24 @@ def python_of(render: str, controls: Controls, view: str = "picture") -> str:
     Parameters
     ----------
     render : str
-        Lines that make `transport` (`studies.explore.source.Source`), or `GIVEN`.
+        Lines that make `transport` (`studies.explore.source.Rendered`), or `GIVEN`.
     controls : Controls
     view : str
         Of `studies.explore.views.VIEWS`, ``histogram``, or ``pixel ROW COLUMN``.
     """
-    changed = {
-        each.name: getattr(controls, each.name)
-        for each in fields(controls)
-        if getattr(controls, each.name) != getattr(Controls(), each.name)
+    settings, own, own_lamp = to_json(controls), to_json(Controls()), vars(Lamp())
+    settings["lamps"] = {
+        group: {name: value for name, value in lamp.items() if value != own_lamp[name] and value != []}
+        for group, lamp in settings["lamps"].items()
     }
-    written = "".join(f"    {name}={value!r},\n" for name, value in changed.items())
-    lamp = ", Lamp" if "lamps" in changed else ""
-    name, *place = view.split(" ") if view.startswith("pixel ") else (view,)
-    if name == "pixel":
-        row, column = map(int, place)
-        taken, last = "pixel", f"figure = pixel(shot.exposed, {row}, {column})\n"
-    elif name == "histogram":
-        taken, last = "histogram", "figure = histogram(shot.exposed.raw)\n"
-    else:
-        taken, last = "VIEWS", f"picture = VIEWS[{view!r}](shot)  # (h, w, 3) uint8\n"
-    lines = (
-        f"{render}controls = Controls({f'{chr(10)}{written}' if written else ''})\n"
-        f"shot = photograph(transport, controls)\n{last}"
-    ).splitlines()
-    own = (
-        "from studies.explore.chain import photograph",
-        f"from studies.explore.controls import Controls{lamp}",
-        f"from studies.explore.views import {taken}",
-    )
-    imports = sorted(line for line in (*own, *lines) if line.startswith("from "))
-    numpy = ["import numpy as np"] if "import numpy as np" in lines else []
-    code = [line for line in lines if line and not line.startswith(("from ", "import "))]
-    return "\n".join([*numpy, "import rodcone", *imports, "", *code, ""])
+    changed = {name: value for name, value in settings.items() if value != own[name]}
+    given = "".join(f"    {name}={value!r},\n" for name, value in changed.items())
+    made, comment = ("picture", "  # (h, w, 3) uint8") if view in VIEWS else ("figure", "")
+    arguments = f"\n    transport,\n    {view!r},\n{given}" if given else f"transport, {view!r}"
+    lines = f"{render}{made} = rodcone.explorer_view({arguments}){comment}".splitlines()
+    imports = [line for line in lines if line.startswith(("from ", "import "))]
+    code = [line for line in lines if line and line not in imports]
+    return "\n".join([*imports, "import rodcone", "", *code, ""])
 
 
 def study_of(scene: SceneChoice, render: RenderLimits, controls: Controls, coloured: bool = False) -> dict[str, str]:

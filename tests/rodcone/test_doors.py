@@ -125,9 +125,12 @@ WRONG: tuple[Any, ...] = (
 # Rendering or studies behind the door: what it lets through is checked with the commands.
 SLOW = {
     *("characterise", "explore", "plan", "reference_plan", "relight_denoised", "render", "report", "run"),
-    *("run_in_processes", "sweep", "take"),
+    *("explorer_view", "run_in_processes", "sweep", "take"),
 }
-READING = {"develop_file", "load_radiance", "load_scene_file", "read_raw", "read_rows", "read_study"}  # no file there
+# No file is there.
+READING = {
+    *("develop_file", "load_radiance", "load_scene_file", "load_transport", "read_raw", "read_rows", "read_study")
+}
 FUNCTIONS = {name: getattr(public, name) for name in public.__all__ if not isinstance(getattr(public, name), type)}
 
 

@@ -139,7 +139,7 @@ def test_level_by_name_a_dropped_sensor_another_scene_and_back(browser, offered,
     assert np.array_equal(EXPLORE.picture(page), EXPLORE.ran(code))
     page.evaluate("[...document.querySelectorAll('header button')].find(each => each.textContent === 'Reset').click()")
     EXPLORE.settle(page)
-    assert "controls = Controls()" in EXPLORE.copied_python(page)
+    assert "explorer_view(transport, 'picture')" in EXPLORE.copied_python(page)
     reference = page.evaluate("document.querySelectorAll('figcaption')[1].textContent")
     assert "Reference, 4 samples, render noise" in reference
 
@@ -241,7 +241,7 @@ def test_a_lamp_from_a_csv_file_is_in_the_copied_python(browser, address, one_re
     page.evaluate(LOAD % "nm;value;remark\r\n380;0.25;blue\r\n# measured\r\n650;1e0\r\n780;2\r\n")
     EXPLORE.settle(page)
     code = EXPLORE.copied_python(page)
-    assert "table=((380.0, 0.25), (650.0, 1.0), (780.0, 2.0))" in code
+    assert "'table': [[380.0, 0.25], [650.0, 1.0], [780.0, 2.0]]" in code
     assert np.array_equal(EXPLORE.picture(page), EXPLORE.ran(code))
     assert not np.array_equal(EXPLORE.picture(page), before)
 

@@ -11,7 +11,7 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM
 from rodcone.memory import memory
 from studies.commands.cli import main
 from studies.explore.chain import photograph
-from studies.explore.controls import Lamp
+from studies.explore.controls import Controls, Lamp
 from studies.explore.memo import go_on
 from studies.explore.source import FIRST_SIDE, RenderOptions, open_source
 from studies.explore.written import python_of
@@ -85,7 +85,7 @@ def test_the_chart_of_a_scene_is_opened_and_copied(tmp_path: Path):
     assert source.controls.frames == 4
     assert source.scene == SceneChoice("color_checker", chart=str(chart))
     names: dict[str, object] = {}
-    exec(state.code.replace("import numpy", "import rodcone\nimport numpy"), names)
+    exec(python_of(state.code, Controls()), names)
     assert np.array_equal(names["transport"].radiance, state.transport.radiance)  # type: ignore[attr-defined]
     (colours,) = open_source("color_checker", RenderOptions(size=24, spp=2, band_nm=100.0)).states(go_on)
     assert not np.array_equal(colours.transport.radiance, state.transport.radiance)

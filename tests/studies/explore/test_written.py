@@ -1,28 +1,41 @@
 """Python and studies that the explorer writes: the Python makes the same bits, the study is read and asks the same."""
 
+import ast
 import random
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from explore_sample import RENDER, random_controls, small_transport
+from explore_sample import GAUSSIAN, RENDER, random_controls, small_transport
 
+import rodcone as public
 from rodcone.errors import InputError
 from sensor.presets import preset
 from studies.explore.chain import photograph
 from studies.explore.controls import Controls, Lamp
 from studies.explore.equipment import camera_of
 from studies.explore.memo import go_on
-from studies.explore.source import RenderOptions, of_transport, open_source
+from studies.explore.source import RenderOptions, of_choice, of_transport, open_source
 from studies.explore.views import VIEWS, histogram, pixel
 from studies.explore.written import GIVEN, python_of, study_of
 from studies.study.study import RenderLimits, SceneChoice
 from studies.study.study_file import read_study
 
+ROOM = """<scene version="3.0.0">
+  <sensor type="perspective"/><shape type="sphere"><transform name="to_world"><translate z="4"/></transform></shape>
+  <emitter type="constant"><spectrum name="radiance" filename="../lamp.spd"/></emitter>
+</scene>
+"""
+
 
 def ran(code: str) -> dict[str, object]:
+    """Names that copied Python makes, which imports what a user has: rodcone, NumPy, the standard library."""
     names: dict[str, object] = {}
+    nodes = list(ast.walk(ast.parse(code)))
+    modules = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    modules |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    assert modules <= {"rodcone", "numpy", "dataclasses"}, code
     exec(code, names)
     return names
 
@@ -37,7 +50,8 @@ def test_the_python_of_a_view_makes_its_bits(view):
 
 @pytest.mark.thorough
 def test_the_python_of_figures_makes_their_numbers():
-    controls = random_controls(random.Random(7))
+    lamps = {"sun": Lamp("A", 3.0), "sky": Lamp(table=GAUSSIAN)}
+    controls = replace(random_controls(random.Random(7)), lamps=lamps)
     exposed = photograph(small_transport(), controls).exposed
     assert ran(python_of(RENDER, controls, "histogram"))["figure"] == histogram(exposed.raw)
     assert ran(python_of(RENDER, controls, "pixel 3 5"))["figure"] == pixel(exposed, 3, 5)
@@ -51,8 +65,39 @@ def test_the_python_of_a_source_makes_its_transport():
     for state in states:
         names = ran(python_of(state.code, Controls()))
         assert np.array_equal(names["transport"].radiance, state.transport.radiance)  # type: ignore[attr-defined]
-        code = python_of(state.code, Controls())
-        assert code.index("import rodcone") < code.index("from studies") < code.index("transport =")
+
+
+@pytest.mark.parametrize("extend", [None, "hold"])
+@pytest.mark.parametrize("own", [False, True])
+def test_the_python_of_a_scene_opens_it_with_its_options(own: bool, extend: str | None, tmp_path: Path):
+    """A scene of a file with what it names anywhere, one of the catalogue in another light; both may hold ends."""
+    path = tmp_path / "room" / "room.xml"
+    path.parent.mkdir()
+    path.write_text(ROOM, "utf-8")
+    (tmp_path / "lamp.spd").write_text("300 1\n900 2\n", "utf-8")
+    choice = SceneChoice(str(path), extend=extend) if own else SceneChoice("color_checker", "A", extend)
+    (state,) = of_choice(choice, RenderOptions(size=16, spp=1, band_nm=100.0, trust=own)).states(go_on)
+    names = ran(python_of(state.code, Controls()))
+    assert names["scene"].extend == extend  # type: ignore[attr-defined]
+    lit, wanted = (each.relight().values for each in (names["transport"], state.transport))  # type: ignore[attr-defined]
+    assert np.array_equal(lit, wanted)
+
+
+@pytest.mark.parametrize(
+    ("view", "controls", "words"),
+    [
+        ("pictures", {}, "did you mean 'picture'"),
+        ("pixel 3", {}, "pixel ROW COLUMN"),
+        ("pixel 3 500", {}, "column: 500"),
+        ("raw", {"level_cd_m": 3.0}, "level_cd_m2"),
+        ("raw", {"lamps": {"sun": {"spectrum": 3}}}, "lamps"),
+        ("raw", {"lens": 1j}, "lens"),
+    ],
+)
+def test_a_wrong_view_or_control_is_refused_in_one_line(view, controls, words):
+    with pytest.raises(InputError, match=words) as caught:
+        public.explorer_view(small_transport(), view, **controls)
+    assert "\n" not in str(caught.value)
 
 
 def test_a_transports_python_says_that_it_was_given():
