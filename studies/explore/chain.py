@@ -169,7 +169,8 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     """Light the scene, image it and read the chip out."""
     require_keys("lamps: light group", controls.lamps, transport.groups)
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in transport.groups)
-    camera = (controls.sensor, controls.mosaic, _items(controls.lens), _items(controls.pixel), controls.bits)
+    terms = (_items(controls.lens), _items(controls.pixel), controls.bits, controls.shot_noise)
+    camera = (controls.sensor, controls.mosaic, *terms)
     optics = (controls.sensor, controls.mosaic, _items(controls.lens))
     spectra = tuple((name, lamp.spectrum, lamp.table) for name, lamp in lamps)
 

@@ -180,3 +180,10 @@ def test_each_slow_processor_has_a_quick_one_of_its_mosaic():
         quick = stand_in(Controls(processor=name, mosaic=PROCESSORS[name].mosaic), 1000).processor
         assert not is_slow(quick)
         assert PROCESSORS[quick].mosaic == PROCESSORS[name].mosaic
+
+
+def test_a_camera_that_was_kept_is_refused_without_shot_noise_as_a_new_one_is():
+    memo, controls = Memo(), Controls(sensor="staggered")
+    photograph(small_transport(), controls, memo)
+    with pytest.raises(InputError, match="shot_noise: False with 'staggered'"):
+        photograph(small_transport(), replace(controls, shot_noise=False), memo)
