@@ -82,7 +82,6 @@ def test_stages_and_other_are_the_seconds_since_the_clock_was_made(work: Work) -
     assert of.stages({"cells": 0.5, "more": 0.25}) == {"render": 6.0, "cells": 1.5, "more": 0.25, OTHER: 1.25}
 
 
-@pytest.mark.thorough
 def test_a_rows_seconds_are_each_of_its_own_step(work: Work, tmp_path: Path) -> None:
     SAMPLE.swept(SAMPLE.small_study(tmp_path), tmp_path / "out")
     found = read_rows(tmp_path / "out")
