@@ -16,7 +16,7 @@ DEMO_OUT ?= out/demo
 help:
 	@echo "make demo    set up $(VENV), render the still life from moonlight to daylight, write $(DEMO_OUT)/report.html"
 	@echo "make test    set up $(VENV), lint, types, import contracts, and the tests of two minutes on two cores"
-	@echo "make test-all  every test that is not slow: ten minutes on two cores"
+	@echo "make test-all  every test that is not slow: eleven minutes on two cores"
 	@echo "make test-any-cpu  the same as other processors add up; CPU=NAME one of them, CPU=by-date today's"
 	@echo "make verify  slow tests, hard cases, planted faults, damaged files, soak: hours; goes on where it was ended"
 	@echo "make hard-cases  a hundred hard cases with the margin by which each invariant is kept, as docs/hard_cases.md"
