@@ -31,7 +31,7 @@ from training_pictures import TRAINING, TRAINING_SEED, training_pictures
 
 from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
-from isp.processors.catalogue import FAIR, PROCESSORS
+from isp.processors.catalogue import NAMED, PROCESSORS
 from isp.settings import NEIGHBOURHOOD, Settings
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL, substitution_weight
 from render.engine import render
@@ -122,9 +122,9 @@ class SceneAndSensor:
 
     def camera(self, name: str, seed: int) -> ProcessorCamera:
         """ProcessorCamera with the chip of a seed."""
-        sensor = vary(preset(self.sensor), PROCESSORS[name].mosaic)
+        sensor = vary(preset(self.sensor), NAMED[name].mosaic)
         device = draw_device(sensor, self.stage.truth.shape[:2], np.random.default_rng([seed, 0]))
-        return ProcessorCamera(name, sensor, device, colour_fit(sensor, PROCESSORS[name], self.stage.light))
+        return ProcessorCamera(name, sensor, device, colour_fit(sensor, NAMED[name], self.stage.light))
 
     def exposed(
         self, camera: ProcessorCamera, level: float, exposure: float | str
@@ -142,7 +142,7 @@ class SceneAndSensor:
         self, camera: ProcessorCamera, level: float, exposure: float | str, seed: int, **options: Any
     ) -> MeasuredShot:
         """One photograph, developed and measured; `options` are the processor's."""
-        stage, processor = self.stage, PROCESSORS[camera.name]
+        stage, processor = self.stage, NAMED[camera.name]
         electrons, seconds = self.exposed(camera, level, exposure)
         raw = expose(electrons, camera.sensor, seconds, camera.device, np.random.default_rng([seed, 1]), exact=True)
         white = stage.white_cd_m2 * level
@@ -209,7 +209,7 @@ def ranking(bench: SceneAndSensor, conditions: Iterable[tuple[float, float]], na
             try:
                 shots = [
                     bench.shot(bench.camera(name, s), level, seconds, s).quality
-                    for s in range(SEEDS.get(name.removesuffix(FAIR), 5))
+                    for s in range(SEEDS.get(name.removesuffix("_published"), 5))
                 ]
             except InputError as error:
                 print(f"  {name}: {error}")
@@ -352,7 +352,7 @@ def main() -> None:
     parser.add_argument("--sensor", nargs="+", default=["low_noise", "table1_output"])
     parser.add_argument("--level", nargs="+", type=float, default=[0.0625, 0.25, 1.0, 4.0, 16.0, 64.0, 256.0])
     parser.add_argument("--snr", nargs="+", type=float, default=SNR_DB)
-    parser.add_argument("--opponent", nargs="*", choices=list(PROCESSORS), default=list(PROCESSORS)[2:])
+    parser.add_argument("--opponent", nargs="*", choices=list(NAMED), default=list(PROCESSORS)[2:])
     parser.add_argument("--seeds", type=int, default=3)
     options = parser.parse_args()
     print_environment()

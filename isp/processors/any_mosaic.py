@@ -1,20 +1,22 @@
-"""Mosaics of any channels, RCCB, RCCC, RYYB, quads, a camera without colours, one's own: interleaved, or linear."""
+"""Mosaics of any channels, RCCB, RCCC, RYYB, quads, a camera without colours, one's own: interleaved."""
 
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
-from isp.kriging import Plane, reconstruct_linear
 from isp.picture import Picture, require_letters
 from isp.settings import DEFAULTS, Reconstruction, Settings
 from isp.substitution import COLOUR_ERROR
 from render.spectrum import Floats
 from sensor.cfa import channels, tile_of, unit_channel
 from sensor.raw import RawImage
+
+Plane = NDArray[np.float64]
 
 
 def picture_any_mosaic(
@@ -46,16 +48,8 @@ def picture_any_mosaic(
     """
     if mosaic is not None:
         require_letters(raw, channels(tile_of(mosaic)))
-    return _coloured(raw, _guided(raw, settings), colours, balance)
 
-
-def picture_kriging(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop a raw image of any mosaic by the best linear estimate (`isp.kriging`); else as `picture_any_mosaic`."""
-    return _coloured(raw, reconstruct_linear(raw), colours, balance)
-
-
-def _coloured(raw: RawImage, result: Reconstruction, colours: ColourFit, balance: WhiteBalance) -> Picture:
-    """Balance reconstructed planes, and take them to linear sRGB by a matrix that knows their noise."""
+    result = _guided(raw, settings)
     planes = np.asarray(result.estimate, dtype=np.float64)
     gains, sources = balance.gains(raw, planes)
     balanced = clip_highlights(raw, planes * gains)

@@ -15,7 +15,7 @@ from isp.colour.white_balance import WhiteBalance
 from isp.defects import mend
 from isp.picture import Picture
 from isp.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
-from isp.processors.any_mosaic import picture_any_mosaic, picture_kriging
+from isp.processors.any_mosaic import picture_any_mosaic
 from isp.processors.bayer_denoised import picture_bayer_nlm, picture_demosaicked_first, picture_denoised_first
 from isp.processors.demosaic import EXTRA as DEMOSAICKING
 from isp.processors.demosaic import malvar, menon, picture_demosaicked
@@ -103,16 +103,16 @@ _PARK = partial(picture_denoised_first, mix=principal_components, demosaic=resid
 _RESIDUAL_BM3D = partial(picture_demosaicked_first, demosaic=residual_interpolation)
 _EARLY = "W as luminance by early fusion"
 _PIECEWISE = "piecewise linear: Yu, Sapiro & Mallat 2012 with a fixed prior, Zoran & Weiss 2011"
-_LINEAR = "any mosaic's best linear estimate: universal kriging, Matheron 1969"
 _ANY = "interleaved reconstruction, a matrix over all channels; one or two give a grey picture"
-# As published; the first two are the paper's.
-_PUBLISHED: Mapping[str, Processor] = MappingProxyType(
+# With the matrix as published; the first two are the paper's.
+_PLAIN: Mapping[str, Processor] = MappingProxyType(
     {
         "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)", on_backend=True),
         "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
         "interleaved_paper": Processor(
             "rgbw", picture_interleaved_paper, "the same to the letter, its own matrix and switch", on_backend=True
         ),
+        "bayer_bilinear": Processor("bayer", picture_bayer, "bilinear, with a colour matrix that knows its noise"),
         "bayer_malvar": Processor("bayer", _MALVAR, "Malvar, He & Cutler 2004", extra=DEMOSAICKING),
         "bayer_menon": Processor("bayer", _MENON, "Menon, Andriani & Calvagno 2007", extra=DEMOSAICKING),
         "bayer_residual": Processor("bayer", _RESIDUAL, "residual interpolation, Kiku et al. 2016"),
@@ -137,15 +137,18 @@ _PUBLISHED: Mapping[str, Processor] = MappingProxyType(
             for name in ("rccb", "rccc", "ryyb", "mono")
         },
         "any_mosaic": Processor(OWN, picture_any_mosaic, _ANY, on_backend=True, colours=(), unit=""),
-        "kriging": Processor(OWN, picture_kriging, _LINEAR, colours=(), unit=""),
         "ple_rgbw": Processor("rgbw", picture_ple_rgbw, _PIECEWISE),
         "ple_bayer": Processor("bayer", picture_ple_bayer, _PIECEWISE),
         "ple": Processor(OWN, picture_ple, f"any mosaic of R, G, B, W, {_PIECEWISE}", colours=(), unit=""),
     }
 )
-FAIR = "_fair"  # ending of a processor's form whose colour matrix knows the noise; the others' does of itself
+_GAINS = measured()
 PROCESSORS: Mapping[str, Processor] = MappingProxyType(
-    {**_PUBLISHED, **{name + FAIR: replace(_PUBLISHED[name], noise_gains=gains) for name, gains in measured().items()}}
+    {name: replace(processor, noise_gains=_GAINS.get(name)) for name, processor in _PLAIN.items()}
+)
+# What a study may name: of a processor with measured gains also NAME_published, with the plain matrix of its source.
+NAMED: Mapping[str, Processor] = MappingProxyType(
+    {**PROCESSORS, **{f"{name}_published": _PLAIN[name] for name in _GAINS if name != "bayer_bilinear"}}
 )
 
 
@@ -155,16 +158,16 @@ def names() -> tuple[str, ...]:
 
 
 def libraries(name: str) -> tuple[str, ...]:
-    """Libraries that a processor of `PROCESSORS` needs beside rodcone's own; a user's own file tells none."""
-    extra = PROCESSORS[name].extra if name in PROCESSORS else None
+    """Libraries that a processor of `NAMED` needs beside rodcone's own; a user's own file tells none."""
+    extra = NAMED[name].extra if name in NAMED else None
     return () if extra is None else _LIBRARIES[extra]
 
 
 def require_libraries(name: str) -> None:
-    """Raise `InputError` where the extra of a processor of `PROCESSORS` is not installed."""
+    """Raise `InputError` where the extra of a processor of `NAMED` is not installed."""
     for library in libraries(name):
         if find_spec(library) is None:
             raise InputError(
                 f"processors: {name!r} needs {library}, which is not installed; allowed without it: other processors; "
-                f"leave {name} out, or pip install 'rodcone[{PROCESSORS[name].extra}]'"
+                f"leave {name} out, or pip install 'rodcone[{NAMED[name].extra}]'"
             )

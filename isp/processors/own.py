@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from isp.picture import Picture
-from isp.processors.catalogue import PROCESSORS, Processor
+from isp.processors.catalogue import NAMED, PROCESSORS, Processor
 from rodcone.digests import digest_bytes
 from rodcone.errors import InputError, one_line, unknown
 from rodcone.files import read_bounded
@@ -26,6 +26,7 @@ from sensor.raw import RawImage
 
 MOST_BYTES = 1 << 20  # of a file; a processor takes some thousand
 _NAME = re.compile(r"(.+\.py):([A-Za-z_]\w*)")
+_RENAMED = {"bayer_fair": "bayer_bilinear", "kriging": "ple or any_mosaic"}  # others resemble their new names
 
 
 def user_file(name: str) -> tuple[Path, str] | None:
@@ -37,7 +38,11 @@ def user_file(name: str) -> tuple[Path, str] | None:
 def require_consent(what: str, name: str, trust_code: bool) -> None:
     """Raise `InputError` for an unknown processor, or one of the user's own without consent to run it."""
     own = user_file(name)
-    if own is None and name not in PROCESSORS:
+    if own is None and name in _RENAMED:
+        raise InputError(
+            f"{what}: {name!r} of rodcone 0.1.0 is gone; allowed: rodcone list processors; use {_RENAMED[name]}"
+        )
+    if own is None and name not in NAMED:
         raise unknown(what, name, PROCESSORS)
     if own is not None and not trust_code:
         raise InputError(
@@ -64,7 +69,7 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
     Parameters
     ----------
     name : str
-        Of `PROCESSORS`, or ``FILE.py:NAME`` with a function ``develop(raw, matrix, *, balance)`` that gives a `Picture`
+        Of `NAMED`, or ``FILE.py:NAME`` with a function ``develop(raw, matrix, *, balance)`` that gives a `Picture`
         or linear sRGB (h, w, 3), or with a `Processor`, which states more. A function develops the sensor's own mosaic.
         The file's folder is not searched for what it imports.
     expected : mapping of str to str, optional
@@ -77,7 +82,7 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
     """
     own = user_file(name)
     if own is None:
-        return PROCESSORS[name]
+        return NAMED[name]
     path, attribute = own
     content = _read(path)
     if expected is not None and expected.get(path.name) != digest_bytes(content):

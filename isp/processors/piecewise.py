@@ -76,7 +76,7 @@ def picture_ple(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, pri
     if not sides <= set(SIDES) or not set(channels(raw.cfa)) <= set(LETTERS) or min(raw.shape) < STRIDE:
         raise InputError(
             f"raw: mosaic {raw.cfa} of {raw.shape} pixels; allowed here: R, G, B and W in a tile of 1, 2 or 4 pixels a "
-            "side, on 2x2 pixels or more; use kriging or any_mosaic"
+            "side, on 2x2 pixels or more; use any_mosaic"
         )
     return _developed(raw, colours, balance, prior or own_prior())
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.catalogue import NAMED
 from render.engine import render
 from render.illuminants import illuminant
 from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reflectance, load_picture
@@ -155,7 +155,7 @@ def _of_study(study: Study, limits: RenderOptions, source: str) -> Source:
         exposure=exposure if exposure in RULES else TIME,
         exposure_s=study.longest_exposure_s if time_s is None else time_s,
         sensor=study.sensors[0],
-        mosaic=PROCESSORS[study.processors[0]].mosaic,
+        mosaic=NAMED[study.processors[0]].mosaic,
         lens={name: value for name in LENS if (value := getattr(lens, name)) != getattr(own, name)},
         processor=study.processors[0],
         white_balance=study.white_balances[0],

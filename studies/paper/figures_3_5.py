@@ -41,7 +41,7 @@ BRIGHT_CD_M2, PITCH_UM = 200.0, 3
 PARTLY = (0.02, 0.98)  # share of W's pixels that may be full for "partly"
 WHOLE = 0.95  # correlation with the truth where W is full, for "whole": nine tenths of the variance
 # Early fusion: W enters before anything else (Sato 1983, Kijima 2007), or behind a neutral density (Yamagami 1994).
-EARLY = ("rgbw_sato", "rgbw_kijima", "rgbw_yamagami")
+EARLY = ("rgbw_sato_published", "rgbw_kijima_published", "rgbw_yamagami_published")
 GAIN_DB = 1.0  # a decibel is easily seen
 RESULT = {PAPER: "result", DEFAULT: "by the default"}  # above the pictures
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.picture import Picture
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.catalogue import NAMED
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
@@ -138,7 +138,7 @@ class Camera:
     @property
     def sensor(self) -> SensorConfig:
         """Its sensor, with the processor's mosaic."""
-        return sensor_of(self.reading, PROCESSORS[self.processor].mosaic, self.pitch_um)
+        return sensor_of(self.reading, NAMED[self.processor].mosaic, self.pitch_um)
 
 
 def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | None = None) -> View:
@@ -173,7 +173,7 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
 def exposures(camera: Camera, seen: View, exposure: str, count: int = 1) -> list[RawImage]:
     """Exposures by as many chips, drawn as a sweep draws its cells; `exposure` as studies write it: ``20ms``."""
     sensor, exposure_s = camera.sensor, parse_exposure(exposure) or 0.0
-    mosaic = PROCESSORS[camera.processor].mosaic
+    mosaic = NAMED[camera.processor].mosaic
     expected_e = expected_electrons(form_image(seen.radiance, sensor), sensor, exposure_s)
     name = camera.reading if camera.pitch_um is None else f"{camera.reading}_{camera.pitch_um}um"
     condition = Condition(scene=SceneChoice(seen.scene), spectrum=OWN, level=seen.level, exposure=exposure, sensor=name)
@@ -193,7 +193,7 @@ def develop(camera: Camera, raw: RawImage, seen: View, substitution_snr: float |
     substitution_snr : float, optional
         SNR under which W replaces the luminance, for `CAMERAS`; the reading's own of `READINGS` where left out.
     """
-    sensor, processor = camera.sensor, PROCESSORS[camera.processor]
+    sensor, processor = camera.sensor, NAMED[camera.processor]
     options = {}
     if camera.processor in CAMERAS:
         options["substitution_snr"] = READINGS[camera.reading] if substitution_snr is None else substitution_snr

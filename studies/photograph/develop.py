@@ -42,11 +42,11 @@ class Developed:
 
 
 def mosaic_processor(raw: RawImage) -> str:
-    """Processor that the paper has for a raw image's mosaic; ``any_mosaic`` for others, ``kriging`` for a quad one."""
+    """Processor that the paper has for a raw image's mosaic; for others ``any_mosaic``, or ``ple`` for a known quad."""
     if is_bayer(raw.cfa):
         return "bayer"
-    if plain(raw.cfa) != raw.cfa:
-        return "kriging"
+    if plain(raw.cfa) != raw.cfa and set(channels(raw.cfa)) <= set("RGBW"):
+        return "ple"
     return "interleaved" if channels(raw.cfa) == ("R", "G", "B", "W") else "any_mosaic"
 
 
@@ -67,7 +67,7 @@ def develop(
         Colours of the camera, as `studies.photograph.calibrate.calibrate` fits them; the raw image's own by default.
     processor : str, optional
         Of `isp.processors.catalogue.PROCESSORS`, or ``mine.py:develop`` (`isp.processors.own.processor_of`); ``bayer``,
-        ``interleaved``, ``kriging`` or ``any_mosaic``, by the mosaic, where left out.
+        ``interleaved``, ``ple`` or ``any_mosaic``, by the mosaic, where left out.
     white_balance : str, optional
         ``as-shot``: the calibration's neutral; an illuminant such as ``D65``: its neutral, from the calibration's
         matrices; or ``gray-world`` as in the paper, with the as-shot neutral where the picture is too dark for that.

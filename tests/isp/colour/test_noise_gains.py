@@ -7,7 +7,7 @@ from builders import raw_image
 from isp.colour.colour_fit import LEAST_SIGNAL, ColourFit, fit_colours
 from isp.colour.noise_gains import TABLE, NoiseGains, colours_in_noise, mean_snr, measured
 from isp.colour.white_balance import WhiteBalance
-from isp.processors.catalogue import FAIR, PROCESSORS
+from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM
 from rodcone.toml_file import read_toml
@@ -89,25 +89,25 @@ def test_other_channels_are_taken_by_name() -> None:
 def test_the_table_holds_what_bilinear_interpolation_leaves_of_noise_in_the_dark() -> None:
     # R and B: of four sites one keeps its sample's variance, two halve it, one quarters it. G: half of the sites keep
     # it, half quarter it. In the dark blur is nothing beside noise; PRNU and the device's patterns stay within 5 %.
-    errors = read_toml(TABLE)["processors"]["bayer"]["errors"][0]
+    errors = read_toml(TABLE)["processors"]["bayer_bilinear"]["errors"][0]
     assert errors == pytest.approx([0.5625, 0.625, 0.5625], rel=0.05)
 
 
 def test_the_table_is_in_order_and_of_processors_that_are_there() -> None:
     for name, gains in measured().items():
-        assert PROCESSORS[name + FAIR].picture is PROCESSORS[name].picture
+        assert PROCESSORS[name].noise_gains is not None
         assert gains.gains.shape == (len(gains.snr_db), 3)
         assert (np.diff(gains.snr_db) > 0).all()
         assert (gains.gains >= 0).all()
 
 
-def test_the_fair_form_alone_takes_the_gains(fit: ColourFit) -> None:
+def test_the_processor_takes_the_gains_and_the_papers_reference_does_not(fit: ColourFit) -> None:
     rng = np.random.default_rng(3)
     raw = raw_image(rng.poisson(20.0, (32, 32)) + 100, BAYER)
     plain, fair = (
-        PROCESSORS[name].develop(raw, fit, neutral=NEUTRAL, balance=NEUTRAL) for name in ("bayer", "bayer_fair")
+        PROCESSORS[name].develop(raw, fit, neutral=NEUTRAL, balance=NEUTRAL) for name in ("bayer", "bayer_bilinear")
     )
-    colours = colours_in_noise(raw, fit, WhiteBalance(NEUTRAL, NEUTRAL), "G", measured()["bayer"])
+    colours = colours_in_noise(raw, fit, WhiteBalance(NEUTRAL, NEUTRAL), "G", measured()["bayer_bilinear"])
     # the matrix is the last step: back through one and on through the other
     expected = plain.rgb @ np.linalg.inv(fit.matrix()).T @ colours.matrix().T
     assert fair.rgb == pytest.approx(expected, abs=1e-9)

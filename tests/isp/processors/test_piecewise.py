@@ -122,7 +122,7 @@ def test_one_or_two_channels_make_a_grey_picture(tile):
     ],
 )
 def test_what_the_prior_cant_develop_is_refused_in_one_line(tile, shape):
-    with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: R, G, B and W .*use kriging") as error:
+    with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: R, G, B and W .*use any_mosaic") as error:
         PROCESSORS["ple"].develop(raw_image(np.full(shape, 500), tile), np.eye(3))
     assert "\n" not in str(error.value)
 

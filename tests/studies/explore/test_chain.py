@@ -174,7 +174,7 @@ def test_every_view_is_a_picture_of_the_frames_size():
 
 def test_each_slow_processor_has_a_quick_one_of_its_mosaic():
     slow = [name for name in PROCESSORS if is_slow(name)]
-    assert {"ple", "ple_rgbw", "ple_bayer", "bayer_bm3d", "rgbw_park_fair"} <= set(slow)
+    assert {"ple", "ple_rgbw", "ple_bayer", "bayer_bm3d", "rgbw_park"} <= set(slow)
     assert "interleaved" not in slow
     for name in slow:
         quick = stand_in(Controls(processor=name, mosaic=PROCESSORS[name].mosaic), 1000).processor

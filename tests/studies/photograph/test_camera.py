@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from isp.colour.colour_fit import ColourFit
-from isp.processors.catalogue import FAIR, PROCESSORS
+from isp.processors.catalogue import NAMED
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
@@ -26,7 +26,7 @@ NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
 LIGHT = light_in_bands(illuminant("D65"), NM, WIDTH)
 # Mosaics without R, G and B tell other colours, or none: tests/isp/processors/test_any_mosaic.py
-QUICK = [name for name, processor in PROCESSORS.items() if processor.extra != "bm3d" and processor.colours]
+QUICK = [name for name, processor in NAMED.items() if processor.extra != "bm3d" and processor.colours]
 SIDE = 16  # pixels of a patch
 
 
@@ -41,7 +41,7 @@ def chart(reflectances: np.ndarray) -> SpectralRadiance:
 
 def patches(name: str, radiance: SpectralRadiance, view_deg: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Mean colour of each patch as the camera shows it, and the right one, (4, 6, 3), encoded."""
-    processor = PROCESSORS[name]
+    processor = NAMED[name]
     sensor = vary(low_noise(), processor.mosaic)
     if view_deg:
         sensor = replace(sensor, lens=replace(sensor.lens, horizontal_view_deg=view_deg))
@@ -62,8 +62,8 @@ def patches(name: str, radiance: SpectralRadiance, view_deg: float = 0.0) -> tup
 
 
 def require_library(name: str) -> None:
-    if PROCESSORS[name].extra is not None:
-        pytest.importorskip("colour_demosaicing", reason=f"rodcone[{PROCESSORS[name].extra}] is not installed")
+    if NAMED[name].extra is not None:
+        pytest.importorskip("colour_demosaicing", reason=f"rodcone[{NAMED[name].extra}] is not installed")
 
 
 @pytest.mark.sample(8)
@@ -88,9 +88,9 @@ def test_the_falloff_that_a_lens_is_known_to_have_is_corrected(name: str) -> Non
     assert np.abs(shown / right - 1).mean() < 0.02
 
 
-# Forms that know their noise show them paler where the planes' error is large, by intent.
+# A matrix that knows its noise shows them paler where the planes' error is large, by intent.
 @pytest.mark.sample(11)
-@pytest.mark.parametrize("name", [name for name in QUICK if not name.endswith(FAIR)])
+@pytest.mark.parametrize("name", [name for name in QUICK if NAMED[name].noise_gains is None])
 def test_every_camera_shows_the_colour_checkers_colours(name: str) -> None:
     require_library(name)
     surfaces = np.array([reflectance.band_average(NM, WIDTH) for _, reflectance in color_checker()])

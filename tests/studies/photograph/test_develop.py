@@ -15,7 +15,7 @@ from sensor.presets import low_noise
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import write_raw
 from studies.photograph.calibrate import calibrate
-from studies.photograph.develop import develop, develop_file
+from studies.photograph.develop import develop, develop_file, mosaic_processor
 
 
 def raw_of(cfa: str) -> RawImage:
@@ -39,11 +39,18 @@ def test_the_mosaic_chooses_the_processor_and_a_grey_wall_is_grey(cfa: str, proc
     assert mean == pytest.approx(np.full(3, mean[1]), rel=0.02)
 
 
+def test_a_quad_of_known_colours_goes_to_the_prior_over_patches() -> None:
+    quads = {"quad_rgbw": "ple", "quad_bayer": "ple", "rgbw_4x4": "interleaved"}
+    assert {cfa: mosaic_processor(raw_of(cfa)) for cfa in quads} == quads
+
+
 def test_what_is_missing_or_unknown_is_said_in_one_line() -> None:
     raw = raw_of("bayer")
     for arguments, told in (
         ({"raw": replace(raw, colour=None)}, r"no colour calibration; .* calibrate\(sensor, illuminant\('D65'\)\)"),
         ({"raw": raw, "processor": "bayerr"}, "'bayerr' is unknown; .*did you mean 'bayer'"),
+        ({"raw": raw, "processor": "bayer_menon_fair"}, "did you mean 'bayer_menon'"),
+        ({"raw": raw, "processor": "bayer_fair"}, "is gone; .*; use bayer_bilinear"),
         ({"raw": raw, "white_balance": "none"}, "white_balance: 'none' is unknown"),
     ):
         with pytest.raises(InputError, match=told):
