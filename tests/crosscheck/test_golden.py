@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from loop import loop
 from outside_truth import (
     ELECTRONS,
     IRRADIANCE,
@@ -46,7 +47,7 @@ def camera(f_number, magnification=0.0, pitch_um=2.2, fill_factor=0.9, responses
     return SensorConfig(pixel, lens, responses=responses or rgbw(), window_nm=window_nm)
 
 
-@pytest.mark.parametrize("light", PHOTON_RADIANCE)
+@loop("light", PHOTON_RADIANCE)
 def test_photon_radiance_of_a_scene(light):
     expected, radiance = PHOTON_RADIANCE[light], scene(light, 100.0)
     photons = radiance.values[0, 0] * photons_per_joule(NM)
@@ -56,7 +57,7 @@ def test_photon_radiance_of_a_scene(light):
     assert photons.mean() == pytest.approx(expected["mean"], rel=TOLERANCE)
 
 
-@pytest.mark.parametrize(("f_number", "magnification"), IRRADIANCE)
+@loop(("f_number", "magnification"), IRRADIANCE)
 def test_irradiance_on_the_sensor(f_number, magnification):
     lux_per_cd_m2, photons_per_um2_s = IRRADIANCE[f_number, magnification]
     sensor = camera(f_number, magnification)
@@ -67,8 +68,8 @@ def test_irradiance_on_the_sensor(f_number, magnification):
     assert image.photons()[0, 0] == pytest.approx(photons_per_um2_s, rel=TOLERANCE)
 
 
-@pytest.mark.parametrize("channel", "RGBW")
-@pytest.mark.parametrize(("curves", "case"), list(product(CURVES, ELECTRONS)))
+@loop("channel", "RGBW")
+@loop(("curves", "case"), list(product(CURVES, ELECTRONS)))
 def test_electrons(curves, case, channel):
     responses, tolerance = CURVES[curves]
     luminance_cd_m2, f_number, pitch_um, fill_factor = case
@@ -78,7 +79,7 @@ def test_electrons(curves, case, channel):
     assert electrons[channel] == pytest.approx(ELECTRONS[case][channel], rel=tolerance)
 
 
-@pytest.mark.parametrize(("curves", "light"), list(product(CURVES, W_RATIOS)))
+@loop(("curves", "light"), list(product(CURVES, W_RATIOS)))
 def test_w_s_electron_ratios_over_380_to_780_nm(curves, light):
     # rectangle sums at 1 nm from 380 to 780 nm: bands of 1 nm, the outermost half a nanometre wider than the window
     responses, tolerance = CURVES[curves]

@@ -8,6 +8,7 @@ from builders import raw_image
 from hard.case import Margin, worse, worst_of
 from hard.invariants_raw import allowed_errors, bias
 from hard.invariants_symmetry import cut, mirrored
+from loop import loop
 
 from isp.planes import bilinear
 from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map
@@ -29,9 +30,9 @@ def test_the_margin_is_taken_where_error_over_allowed_is_largest():
     assert worse(Margin(2.0, 4.0, "a"), Margin(1.0, 1.0, "b")).unit == "b"
 
 
-@pytest.mark.parametrize("tile", [RGBW, BAYER, MOSAICS["rgbw_4x4"], ("RGB",)])
-@pytest.mark.parametrize("shape", [(8, 12), (5, 7), (4, 9)])
-@pytest.mark.parametrize("axis", [0, 1])
+@loop("tile", [RGBW, BAYER, MOSAICS["rgbw_4x4"], ("RGB",)])
+@loop("shape", [(8, 12), (5, 7), (4, 9)])
+@loop("axis", [0, 1])
 def test_a_mirrored_frame_holds_each_sample_under_its_own_letter_and_each_defect_at_its_place(tile, shape, axis):
     raw = exposure(shape, tile)
     turned = mirrored(raw, axis)

@@ -96,7 +96,6 @@ def test_the_folder_is_made_and_holds_one_whole_file_an_entry(tmp_path, renders)
         {"scene": replace(load("flat_field"), reference_plane=None)},
         {"scene": replace(load("flat_field"), rr_depth=6)},
     ],
-    ids="-".join,
 )
 def test_anything_else_asked_for_is_another_entry(change, tmp_path, renders):
     small(tmp_path)

@@ -16,6 +16,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy.stats import chi2, norm
 from scipy.stats import t as student
 
@@ -510,7 +511,7 @@ def test_progress_rises_to_one_with_the_error_so_far():
     assert errors[-1] == pytest.approx(made.relight().relative_mc_error, rel=1e-4)
 
 
-@pytest.mark.parametrize("size", [(1, 1), (1, 7), (7, 1)])
+@loop("size", [(1, 1), (1, 7), (7, 1)])
 def test_images_of_one_pixel_or_one_row_are_rendered(size):
     made = render(noisy_wall(), size, wavelength_nm=BANDS_NM, spp=64, seed=9)
     assert made.radiance.shape == (1, 8, *size)
@@ -541,13 +542,13 @@ def complaint(call, *args, **options):
     return text
 
 
-@pytest.mark.parametrize("size", [(0, 5), (5, -1), (5,), (5, 5, 3), (2.0, 3.0), (40_000, 2), 5])
+@loop("size", [(0, 5), (5, -1), (5,), (5, 5, 3), (2.0, 3.0), (40_000, 2), 5])
 def test_a_bad_size_is_refused_with_its_value(size):
     text = complaint(render, load("flat_field"), size)
     assert text == f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768"
 
 
-@pytest.mark.parametrize(
+@loop(
     ("name", "value", "allowed"),
     [
         ("spp", 0, "1 to 65536"),
@@ -566,12 +567,12 @@ def test_a_bad_limit_is_refused_with_its_value_and_what_is_allowed(name, value, 
     assert complaint(small, **{name: value}).startswith(f"{name}: {value!r} is outside {allowed}")
 
 
-@pytest.mark.parametrize(("name", "value"), [("spp", 2.5), ("seed", 1.5), ("max_depth", 2.5)])
+@loop(("name", "value"), [("spp", 2.5), ("seed", 1.5), ("max_depth", 2.5)])
 def test_a_count_that_is_not_whole_is_refused_with_its_value(name, value):
     assert complaint(small, **{name: value}).startswith(f"{name}: {value!r} ")
 
 
-@pytest.mark.parametrize("bands", [{"wavelength_nm": [500.0, 400.0]}, {"wavelength_nm": [550.0]}, {"width_nm": -1.0}])
+@loop("bands", [{"wavelength_nm": [500.0, 400.0]}, {"wavelength_nm": [550.0]}, {"width_nm": -1.0}])
 def test_bad_bands_are_refused(bands):
     assert "_nm" in complaint(small, **bands)
 
@@ -628,14 +629,14 @@ def test_a_material_that_chooses_by_wavelength_is_refused(freed, monkeypatch):
     assert "allowed: materials whose sampling doesn't depend on wavelength; replace it" in text
 
 
-@pytest.mark.parametrize("bsdf", [{"type": "dielectric", "int_ior": 1.5}, {"type": "dielectric", "int_ior": "bk7"}])
+@loop("bsdf", [{"type": "dielectric", "int_ior": 1.5}, {"type": "dielectric", "int_ior": "bk7"}])
 def test_clear_glass_is_as_bright_as_the_constant_environment_around_it(bsdf):
     made = render(ball_under_the_sky(bsdf), (6, 6), wavelength_nm=BANDS_NM, spp=64, max_depth=32)
     assert made.radiance == pytest.approx(np.ones((1, 8, 6, 6)), abs=0.02)  # paths end after 32 segments
     assert made.radiance.mean() == pytest.approx(1.0, abs=2e-3)
 
 
-@pytest.mark.parametrize(
+@loop(
     "bsdf",
     [
         {"type": "roughplastic", "diffuse_reflectance": RAMP, "alpha": 0.2},

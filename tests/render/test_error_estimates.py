@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loop import loop
 
 from render.engine import render
 from render.error_estimates import SAMPLE_PIXELS, Halves, SharedPaths, group_errors, relative_error, within_band_error
@@ -121,7 +122,7 @@ def test_of_several_lights_values_add_and_variances_add_with_the_squared_emissio
     assert relative_error(emitted, values, variance) == pytest.approx(0.1 * np.sqrt(10.0) / 4.0, rel=1e-6)
 
 
-@pytest.mark.parametrize("correlation", [-1.0, -0.3, 0.0, 1.0])
+@loop("correlation", [-1.0, -0.3, 0.0, 1.0])
 def test_errors_of_groups_that_share_paths_add_with_their_correlation(correlation):
     emitted = np.array([[3.0], [0.5], [1.0]])
     values, variance = np.ones((3, 1, 5, 4), np.float32), np.full((3, 1, 5, 4), 0.01, np.float32)
@@ -133,7 +134,7 @@ def test_errors_of_groups_that_share_paths_add_with_their_correlation(correlatio
     assert relative_error(emitted, values, variance, shared) == pytest.approx(0.1 * 10**0.5 / 4.5, rel=1e-6)
 
 
-@pytest.mark.parametrize("size", [(1, 1), (1, 3000), (3000, 1), (90, 70), (257, 301)])
+@loop("size", [(1, 1), (1, 3000), (3000, 1), (90, 70), (257, 301)])
 def test_pixels_are_judged_all_over_a_picture_of_any_size(size):
     rng = np.random.default_rng(1)
     values = rng.uniform(1.0, 2.0, (1, 1, *size)).astype(np.float32)
@@ -154,8 +155,8 @@ def test_light_that_is_even_within_each_band_misses_nothing():
     assert missed(np.linspace(0.1, 0.9, NM.size), flat(3.0)) == pytest.approx(np.zeros(NM.size), abs=1e-6)
 
 
-@pytest.mark.parametrize("power", [1.0, 50.0])
-@pytest.mark.parametrize("offset_nm", [-3.0, 0.5, 4.0])
+@loop("power", [1.0, 50.0])
+@loop("offset_nm", [-3.0, 0.5, 4.0])
 def test_a_line_beside_the_centre_of_a_band_misses_slope_times_distance(offset_nm, power):
     transport = 0.1 + 0.01 * (NM - 500.0)
     line = missed(transport, line_spectrum([545.0 + offset_nm], [2.0]), power)
@@ -186,7 +187,7 @@ def test_a_parabola_is_never_missed_by_more_than_is_said(seed):
     assert np.all(np.abs(truth / (transport * emission) - 1) <= missed(transport, light) * 1.01 + 1e-4)
 
 
-@pytest.mark.parametrize("bands", [1, 2, 3])
+@loop("bands", [1, 2, 3])
 def test_a_few_bands_are_enough_for_an_estimate(bands):
     nm, width = 500.0 + 100.0 * np.arange(bands), np.full(bands, 100.0)
     planes = (1.0 + np.arange(bands, dtype=np.float32))[None, :, None, None] * np.ones((1, 1, 1, 1), np.float32)

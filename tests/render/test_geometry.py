@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.geometry import look_at, rotate, scale, to_world, translate
 from render.loader import mitsuba_module
@@ -26,7 +27,7 @@ def test_scale_stretches_each_axis():
     assert np.array_equal(scale(2, 3, 4) @ [1, 1, 1, 1], [2, 3, 4, 1])
 
 
-@pytest.mark.parametrize(
+@loop(
     ("axis", "start", "end"),
     [((0, 0, 5), (1, 0, 0), (0, 1, 0)), ((1, 0, 0), (0, 1, 0), (0, 0, 1)), ((0, 2, 0), (0, 0, 1), (1, 0, 0))],
 )

@@ -10,6 +10,7 @@ import sys
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy.stats import norm
 
 from render.engine import render
@@ -34,7 +35,7 @@ def scene_of(camera, light, **things):
     return Scene("hard", geometry, {"lamp": LightGroup(("lamp/emitter",), flat())})
 
 
-@pytest.mark.parametrize(
+@loop(
     ("kind", "ior"), [("dielectric", 1.5), ("dielectric", 2.4), ("thindielectric", 1.5)]
 )  # thin: one surface that stands for a pane
 def test_a_light_seen_through_a_pane_is_dimmed_by_all_its_reflections(kind, ior):
@@ -123,7 +124,7 @@ def two_rooms():
     return Scene("two_rooms", geometry, groups)
 
 
-@pytest.mark.parametrize("dim", [1.0, 1e-6])
+@loop("dim", [1.0, 1e-6])
 def test_both_ends_of_a_range_of_1e8_in_one_picture_are_right_in_relative_terms(dim):
     size = 16
     made = render(two_rooms(), (size, size), wavelength_nm=BANDS_NM, spp=256, max_depth=2, seed=9)
@@ -154,7 +155,7 @@ def wall():
     return render(load("flat_field", light="E"), (2, 3), wavelength_nm=BANDS_NM, spp=8)
 
 
-@pytest.mark.parametrize("power", [1e-40, 1e-42, 5e-324])
+@loop("power", [1e-40, 1e-42, 5e-324])
 def test_a_subnormal_power_gives_its_radiance_or_nothing(wall, power):
     lit = wall.relight({"sky": flat()}, powers={"sky": power})
     truth = power * np.moveaxis(wall.radiance[0].astype(np.float64), 0, -1)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from loop import loop
 from outside_truth import LIGHT_NM, LIGHTS, colour_science
 
 from render.illuminants import MOON_SLOPE_PER_NM, daylight, illuminant, lines_nm, names, unit_luminance
@@ -12,7 +13,7 @@ from rodcone.errors import InputError
 NM, WIDTH_NM = np.arange(360.5, 830.0), np.ones(470)
 
 
-@pytest.mark.parametrize("name", [*names(), "2700K", "D12000K"])
+@loop("name", [*names(), "2700K", "D12000K"])
 def test_every_light_has_a_luminance_of_one(name):
     light, v = illuminant(name), colour_matching_functions()[1]
     fine = np.arange(360.0, 830.0, 0.05) + 0.025  # another quadrature: a point every 0.05 nm
@@ -21,7 +22,7 @@ def test_every_light_has_a_luminance_of_one(name):
     assert luminance_cd_m2 == pytest.approx(1.0, rel=2e-4)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("name", "x", "y"),
     [  # CIE 15, 1931 observer
         ("A", 0.44758, 0.40745),
@@ -108,13 +109,13 @@ def test_the_low_sun_and_the_moon_under_it_are_warm():
     assert 4300 < mccamy_k("moonlight") < 4700  # Kieffer & Stone's reddening takes 600 to 800 K off
 
 
-@pytest.mark.parametrize("kelvin", [2000.0, 3000.0, 6500.0])
+@loop("kelvin", [2000.0, 3000.0, 6500.0])
 def test_a_temperature_is_a_black_body(kelvin):
     made, planck = illuminant(f"{kelvin:g}K"), black_body(kelvin)
     assert made.values / made.values.max() == pytest.approx(planck.values / planck.values.max(), rel=1e-14)
 
 
-@pytest.mark.parametrize(("name", "kelvin"), [("D50", 5003.0), ("D55", 5503.0), ("D65", 6504.0), ("D75", 7504.0)])
+@loop(("name", "kelvin"), [("D50", 5003.0), ("D55", 5503.0), ("D65", 6504.0), ("D75", 7504.0)])
 def test_the_daylight_formula_gives_the_tabulated_illuminants(name, kelvin):
     nm = np.arange(400.0, 751.0, 10.0)
     ratio = daylight(kelvin).band_average(nm, 1e-3) / illuminant(name).band_average(nm, 1e-3)
@@ -122,7 +123,7 @@ def test_the_daylight_formula_gives_the_tabulated_illuminants(name, kelvin):
     assert illuminant(f"D{kelvin:g}K").values == pytest.approx(daylight(kelvin).values)
 
 
-@pytest.mark.parametrize("name", ["100K", "D3000K", "D30000K", "2000000K"])
+@loop("name", ["100K", "D3000K", "D30000K", "2000000K"])
 def test_a_temperature_out_of_range_is_refused_with_its_value(name):
     with pytest.raises(InputError, match=rf"^illuminant: .* \[K\]: {float(name.strip('DK')):.1f} is outside "):
         illuminant(name)
@@ -149,7 +150,7 @@ def test_equal_energy_is_flat():
     assert np.ptp(illuminant("E").values) == 0.0
 
 
-@pytest.mark.parametrize("name", LIGHTS)
+@loop("name", LIGHTS)
 def test_a_light_has_the_shape_of_isetcams_table(name):
     ratio = illuminant(name).band_average(LIGHT_NM, 1e-3) / LIGHTS[name]
     assert ratio / np.median(ratio) == pytest.approx(np.ones(ratio.size), rel=2e-3)  # both tables: 3 or 4 digits
@@ -161,7 +162,7 @@ def test_scaling_to_unit_luminance_takes_out_any_factor():
     assert luminance(unit_luminance(spectrum).band_average(NM, WIDTH_NM), NM, WIDTH_NM) == pytest.approx(1.0, rel=1e-13)
 
 
-@pytest.mark.parametrize(("name", "nearest"), [("d65", "D65"), ("D66", "D6|D65"), ("moonligt", "moonlight")])
+@loop(("name", "nearest"), [("d65", "D65"), ("D66", "D6|D65"), ("moonligt", "moonlight")])
 def test_an_unknown_light_is_refused_and_the_nearest_named(name, nearest):
     with pytest.raises(InputError) as caught:
         illuminant(name)
@@ -192,7 +193,7 @@ def test_a_lamp_of_a_file_has_a_luminance_of_one_in_any_unit_and_is_read_anew(tm
     assert changed.wavelength_nm.tolist() == [400.0, 700.0]
 
 
-@pytest.mark.parametrize(
+@loop(
     ("text", "words"),
     [
         ("wavelength_nm,a,b\n400,1,1\n700,1,1\n", "has 2 columns beside wavelength_nm; allowed: 1"),

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy.stats import chi2, norm
 from scipy.stats import t as student
 
@@ -60,7 +61,7 @@ def assert_is(truth, light, finest):
     assert abs(mean - truth) < student.isf(FALSE_ALARM / 2, count - 1) * error + 1e-6 * truth
 
 
-@pytest.mark.parametrize("degrees", [0.0, 35.0, 60.0, 89.0])
+@loop("degrees", [0.0, 35.0, 60.0, 89.0])
 def test_a_beam_gives_the_cosine_of_its_angle(degrees):
     down = [np.sin(np.radians(degrees)), -np.cos(np.radians(degrees)), 0.0]
     seen = metered({"beam": {"type": "directional", "direction": down}})
@@ -100,7 +101,7 @@ def under_a_disk(centre, facing, radius_m):
     return np.pi * radius_m**2 * np.mean(way[..., 1] * -(way @ facing) / distance**4)
 
 
-@pytest.mark.parametrize("degrees", [70.0])
+@loop("degrees", [70.0])
 def test_a_small_sun_gives_its_solid_angle_times_the_cosine(degrees):
     distance_m, radius_m = 100.0, 0.4653  # the sun's own radius, 0.2666 degrees
     towards = np.array([np.sin(np.radians(degrees)), np.cos(np.radians(degrees)), 0.0])

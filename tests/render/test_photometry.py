@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from loop import loop
 from outside_truth import PHOTON_RADIANCE, V_NM, V
 
 from render.illuminants import illuminant
@@ -89,7 +90,7 @@ def test_one_lux_of_d65_is_11140_photons_per_square_micrometre_and_second():
     assert photons(spectral / lux, ISET_NM, ISET_WIDTH_NM) * 1e-12 == pytest.approx(1.114e4, rel=1e-3)
 
 
-@pytest.mark.parametrize(("light", "expected"), list(PHOTON_RADIANCE.items()))
+@loop(("light", "expected"), list(PHOTON_RADIANCE.items()))
 def test_photons_of_a_scene_of_100_candela_match_the_independent_numbers(light, expected):
     spectral = 100 * illuminant(light).band_average(ISET_NM, ISET_WIDTH_NM)
     at_550_nm = 100 * illuminant(light).band_average([550.0], [1e-3]) * photons_per_joule([550.0])

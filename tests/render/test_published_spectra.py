@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 import numpy as np
-import pytest
+from loop import loop
 from outside_truth import colour_science
 
 from render.illuminants import daylight, unit_luminance
@@ -50,7 +50,7 @@ def test_the_tables_are_those_of_colour_science() -> None:
             assert np.array_equal(ours[name][1], values), name
 
 
-@pytest.mark.parametrize("cct_k", [4000.0, 6504.0, 7000.0, 7000.1, 8300.0, 25_000.0])
+@loop("cct_k", [4000.0, 6504.0, 7000.0, 7000.1, 8300.0, 25_000.0])
 def test_daylight_is_that_of_colour_science(cct_k: float) -> None:
     colour = colour_science()
     theirs = colour.sd_CIE_illuminant_D_series(colour.temperature.CCT_to_xy_CIE_D(cct_k), M1_M2_rounding=False)

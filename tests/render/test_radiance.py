@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
@@ -18,9 +19,9 @@ def complaint(*args, **options):
     return text
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize(("bad", "written"), [(np.nan, "nan"), (-0.5, "-0.5"), (np.inf, "inf"), (-np.inf, "-inf")])
-@pytest.mark.parametrize("place", [(0, 0, 0), (1, 2, 1), (3, 4, 2)])
+@loop("dtype", [np.float32, np.float64])
+@loop(("bad", "written"), [(np.nan, "nan"), (-0.5, "-0.5"), (np.inf, "inf"), (-np.inf, "-inf")])
+@loop("place", [(0, 0, 0), (1, 2, 1), (3, 4, 2)])
 def test_a_value_that_is_no_radiance_is_refused_with_its_place(bad, written, place, dtype):
     values = np.ones((4, 5, 3), dtype=dtype)
     values[place] = bad
@@ -46,7 +47,7 @@ def test_zero_and_the_largest_float_are_radiances():
     assert np.array_equal(SpectralRadiance(values, NM).values, values)
 
 
-@pytest.mark.parametrize("shape", [(4, 5), (4, 5, 2), (4, 5, 4), (0, 5, 3), (4, 0, 3), (1, 4, 5, 3)])
+@loop("shape", [(4, 5), (4, 5, 2), (4, 5, 4), (0, 5, 3), (4, 0, 3), (1, 4, 5, 3)])
 def test_a_wrong_shape_is_refused_with_the_shape_that_fits(shape):
     assert complaint(np.ones(shape), NM).startswith(f"radiance: shape {shape} is not (h, w, 3)")
 
@@ -63,7 +64,7 @@ def test_one_band_without_a_width_is_refused_and_with_one_accepted():
     assert SpectralRadiance(np.ones((2, 2, 1)), np.array([550.0]), width_nm=[7.0]).widths_nm == [7.0]
 
 
-@pytest.mark.parametrize("error", [-1e-9, np.nan, np.inf])
+@loop("error", [-1e-9, np.nan, np.inf])
 def test_an_error_that_is_no_standard_error_is_refused(error):
     assert complaint(np.ones((2, 2, 3)), NM, error).startswith(f"relative_mc_error: {error!r} is outside 0")
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.geometry import look_at, to_world
 from render.loader import mitsuba_module, variant
@@ -53,7 +54,7 @@ def kinds(node):
     return {type(node)}
 
 
-@pytest.mark.parametrize("name", names())
+@loop("name", names())
 def test_a_description_holds_plain_values_alone(name):
     assert kinds(load(name).description) <= {str, int, float, bool, list, Matrix4}
 
@@ -78,7 +79,7 @@ def test_a_description_has_every_light_at_its_spectrum_times_power():
     assert description["lamp"]["emitter"]["radiance"]["values"] == "5.0,5.0"
 
 
-@pytest.mark.parametrize(
+@loop(
     ("kind", "parameter"),
     [("point", "intensity"), ("spot", "intensity"), ("directional", "irradiance"), ("constant", "radiance")],
 )
@@ -99,21 +100,21 @@ def test_an_emitter_in_no_group_is_refused():
     assert "emitter 'lamp/emitter' is in 0 light groups; put it in one" in complaint({"sky": SKY})
 
 
-@pytest.mark.parametrize(
+@loop(
     "groups", [{"a": LightGroup(("sky", "sky", "lamp/emitter"), flat())}, BOTH | {"more": LightGroup(("sky",), flat())}]
 )
 def test_an_emitter_in_two_groups_is_refused(groups):
     assert "emitter 'sky' is in 2 light groups; put it in one" in complaint(groups)
 
 
-@pytest.mark.parametrize("kind", ["timed_sunsky", "projector", "directionalarea"])
-@pytest.mark.parametrize("grouped", [True, False])
+@loop("kind", ["timed_sunsky", "projector", "directionalarea"])
+@loop("grouped", [True, False])
 def test_a_light_that_cannot_be_relit_is_refused_with_what_can(kind, grouped):
     text = complaint({"sky": SKY, "lamp": LAMP} if grouped else {"lamp": LAMP}, sky={"type": kind})
     assert f"emitter 'sky' of type {kind!r} can't be relit; allowed: area, constant, point" in text
 
 
-@pytest.mark.parametrize("kind", ["envmap", "sunsky"])
+@loop("kind", ["envmap", "sunsky"])
 def test_a_light_with_colours_of_its_own_needs_a_group_that_says_so(kind):
     text = complaint({"sky": SKY, "lamp": LAMP}, sky={"type": kind})
     assert f"emitter 'sky' of type {kind!r} has colours of its own; allowed: a light group with coloured=True" in text
@@ -128,7 +129,7 @@ def test_a_light_of_its_own_colour_keeps_it_and_goes_out_with_its_group():
     assert "sky" not in tinted.lit({"lamp": uniform_node(1.0)})
 
 
-@pytest.mark.parametrize("kind", ["point", "spot", "directional"])
+@loop("kind", ["point", "spot", "directional"])
 def test_a_light_without_size_beside_a_plane_is_refused_where_the_meter_would_miss_it(kind):
     lamp = {"lamp": {"type": kind}}
     small = Scene("test", GEOMETRY | {"sky": lamp["lamp"]}, BOTH, reference_plane="ball")
@@ -164,7 +165,7 @@ def test_lit_leaves_the_scene_as_it_was():
     assert written(one.description) == written(scene().description)
 
 
-@pytest.mark.parametrize("name", names())
+@loop("name", names())
 def test_changing_the_lights_of_a_description_does_not_change_the_scene(name):
     one = load(name)
     before, taken = written(one.description), one.description
@@ -192,7 +193,7 @@ def test_several_lights_of_one_shape_keep_their_own_groups():
     assert values == ["1.0,1.0", "2.0,2.0"]
 
 
-@pytest.mark.parametrize("nm", [[400.0, 500.0, 600.0], [400.0, 410.0, 600.0], [380.0, 380.5, 780.0]])
+@loop("nm", [[400.0, 500.0, 600.0], [400.0, 410.0, 600.0], [380.0, 380.5, 780.0]])
 def test_a_spectrum_node_is_the_same_function_in_mitsuba(nm):
     spectrum = Spectrum(np.array(nm), np.array([0.2, 0.9, 0.4]))
     mi, at = mitsuba_module(), np.linspace(nm[0] + 1e-3, nm[-1] - 1e-3, 24)

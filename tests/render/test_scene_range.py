@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loop import loop
 from PIL import Image
 
 from render.engine import render
@@ -72,7 +73,7 @@ ENDING = {
 }
 
 
-@pytest.mark.parametrize(("bsdf", "path", "low", "high"), ENDING.values(), ids=ENDING)
+@loop(("bsdf", "path", "low", "high"), ENDING.values())
 def test_bands_beyond_a_surfaces_data_are_refused_and_it_is_named(
     bsdf: Node, path: str, low: float, high: float
 ) -> None:
@@ -100,7 +101,7 @@ def test_mitsubas_own_lights_as_reflectance_are_known_over_the_cie_range() -> No
         check_range(wall(matte(D65)), 380.0, 831.0)
 
 
-@pytest.mark.parametrize(
+@loop(
     "bsdf",
     [
         matte(uniform_node(0.5)),
@@ -123,8 +124,8 @@ def test_a_table_that_only_a_light_refers_to_is_no_surface() -> None:
 
 
 @EXACT
-@pytest.mark.parametrize("reflectance", [EVEN, UNEVEN], ids=["even", "uneven"])
-@pytest.mark.parametrize("rows", [True, False])
+@loop("reflectance", [EVEN, UNEVEN])
+@loop("rows", [True, False])
 def test_held_ends_go_on_in_the_picture(reflectance: Node, rows: bool) -> None:
     """Diffuse under collimated irradiance E at normal incidence: L = rho E / pi, rho averaged over each band."""
     scene = wall(matte(reflectance))
@@ -186,7 +187,7 @@ def test_a_scene_file_is_refused_or_held(tmp_path: Path) -> None:
         load_scene_file(path, extend="zero")
 
 
-@pytest.mark.parametrize(
+@loop(
     ("table", "words"),
     [
         ({"type": "irregular", "wavelengths": "400, blue", "values": "1, 2"}, "'blue'"),
@@ -267,7 +268,7 @@ def test_a_light_exchanged_after_the_render_tells_too() -> None:
 # --- what the project ships
 
 
-@pytest.mark.parametrize("name", scenes())
+@loop("name", scenes())
 def test_every_scene_of_the_catalogue_covers_the_default_bands_exactly(name: str) -> None:
     """Its tables reach from 380 nm to 780 nm, or further; so do its lights, as far as they shine."""
     scene = load(name)

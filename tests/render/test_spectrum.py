@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loop import loop
 
 from render.photometry import LIGHT_M_S, PLANCK_J_S
 from render.radiance import SpectralRadiance
@@ -24,7 +25,7 @@ def complaint(call, *args):
     return text
 
 
-@pytest.mark.parametrize(
+@loop(
     ("centre", "width", "mean"),
     [
         (450.0, 100.0, 0.5),  # the rising side alone
@@ -90,13 +91,13 @@ def test_a_spectrum_holds_its_own_copy_of_the_points():
     assert spectrum.band_average(450.0, 10.0) == 1.0
 
 
-@pytest.mark.parametrize("nm", [[500.0], [500.0, 500.0], [500.0, 400.0], [[400.0, 500.0]], [400.0, np.nan], []])
+@loop("nm", [[500.0], [500.0, 500.0], [500.0, 400.0], [[400.0, 500.0]], [400.0, np.nan], []])
 def test_wavelengths_that_do_not_increase_are_refused_with_their_values(nm):
     text = complaint(Spectrum, np.array(nm), np.ones_like(np.array(nm)))
     assert text.startswith(f"wavelength_nm: {nm!r} is not allowed; give two or more strictly increasing")
 
 
-@pytest.mark.parametrize("values", [[1.0], [1.0, -0.1], [1.0, np.nan], [np.inf, 1.0], [1.0, 1.0, 1.0]])
+@loop("values", [[1.0], [1.0, -0.1], [1.0, np.nan], [np.inf, 1.0], [1.0, 1.0, 1.0]])
 def test_values_that_are_not_finite_positive_or_one_a_wavelength_are_refused(values):
     text = complaint(Spectrum, np.array([400.0, 500.0]), np.array(values))
     assert "spectrum values" in text
@@ -113,19 +114,19 @@ def test_band_widths_given_are_kept_and_one_width_serves_all():
     assert np.array_equal(band_widths([400.0, 500.0, 650.0], 5.0), [5.0, 5.0, 5.0])
 
 
-@pytest.mark.parametrize("nm", [[500.0], [400.0, 410.0, 425.0]])
+@loop("nm", [[500.0], [400.0, 410.0, 425.0]])
 def test_bands_without_even_spacing_need_a_width(nm):
     text = complaint(band_widths, nm, None)
     assert f"{len(nm)} bands" in text
     assert "give width_nm as well" in text
 
 
-@pytest.mark.parametrize("nm", [[], [500.0, 400.0], [500.0, 500.0], [-10.0, 10.0], [0.0, 10.0], [400.0, np.inf]])
+@loop("nm", [[], [500.0, 400.0], [500.0, 500.0], [-10.0, 10.0], [0.0, 10.0], [400.0, np.inf]])
 def test_centres_that_do_not_increase_from_above_zero_are_refused_with_their_values(nm):
     assert complaint(band_widths, nm, 10.0).startswith(f"wavelength_nm: {nm!r} is not allowed; give increasing")
 
 
-@pytest.mark.parametrize("width", [0.0, -1.0, np.nan, np.inf])
+@loop("width", [0.0, -1.0, np.nan, np.inf])
 def test_widths_that_are_not_positive_are_refused_with_their_values(width):
     assert complaint(band_widths, [400.0, 500.0], [10.0, width]).startswith(f"width_nm: {[10.0, width]!r} is not")
 
@@ -138,12 +139,12 @@ NOT_NM = [
 ]
 
 
-@pytest.mark.parametrize(("nm", "words"), NOT_NM)
+@loop(("nm", "words"), NOT_NM)
 def test_a_spectrum_over_what_is_no_nanometres_is_refused_and_the_unit_named(nm, words):
     assert words in complaint(Spectrum, nm, np.ones(3))
 
 
-@pytest.mark.parametrize(("factor", "unit"), [(1e-3, "micrometres"), (1e-9, "metres")])
+@loop(("factor", "unit"), [(1e-3, "micrometres"), (1e-9, "metres")])
 def test_bands_and_pictures_in_other_units_are_refused_and_the_unit_named(factor, unit):
     nm = np.arange(385.0, 780.0, 10.0) * factor
     for refuse in (
@@ -163,7 +164,7 @@ def test_the_ends_of_what_counts_as_nanometres_are_taken():
     assert Spectrum(np.array([100.0, 20_000.0]), np.ones(2)).band_average(550.0, 10.0) == 1.0
 
 
-@pytest.mark.parametrize("width", [20.0, [10.0, 10.3, 10.0], [10.0, 10.0, 10.3]])
+@loop("width", [20.0, [10.0, 10.3, 10.0], [10.0, 10.0, 10.3]])
 def test_bands_that_overlap_by_over_a_hundredth_are_refused(width):
     text = complaint(band_widths, [400.0, 410.0, 420.0], width)
     assert "overlap, and the light of both would count twice; give widths that don't" in text
@@ -182,7 +183,7 @@ def test_bands_that_touch_or_overlap_by_rounding_are_taken():
     assert band_widths((edges[1:] + edges[:-1]) / 2, np.diff(edges)).size == 30
 
 
-@pytest.mark.parametrize("temperature_k", [2856.0, 4200.0, 6504.0])
+@loop("temperature_k", [2856.0, 4200.0, 6504.0])
 def test_a_black_body_follows_plancks_law_with_si_constants(temperature_k):
     spectrum = black_body(temperature_k)
     metres = spectrum.wavelength_nm * 1e-9
@@ -191,7 +192,7 @@ def test_a_black_body_follows_plancks_law_with_si_constants(temperature_k):
     assert spectrum.values[spectrum.wavelength_nm == 560.0] == pytest.approx(1.0, rel=1e-14)
 
 
-@pytest.mark.parametrize("temperature_k", [3000.0, 4200.0, 6504.0, 9000.0])
+@loop("temperature_k", [3000.0, 4200.0, 6504.0, 9000.0])
 def test_a_black_body_peaks_where_wiens_law_says(temperature_k):
     spectrum = black_body(temperature_k)
     peak_nm = spectrum.wavelength_nm[spectrum.values.argmax()]
@@ -204,7 +205,7 @@ def test_a_line_holds_its_power_and_stays_within_a_twentieth_of_a_nanometre():
     assert doublet.band_average([588.9, 589.3, 589.7], [0.1, 0.5, 0.1]) == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
 
 
-@pytest.mark.parametrize("lines", [[589.6, 589.0], [589.0, 589.05]])
+@loop("lines", [[589.6, 589.0], [589.0, 589.05]])
 def test_lines_that_are_not_apart_are_refused(lines):
     assert complaint(line_spectrum, lines, [1.0, 1.0]).startswith(f"lines_nm: {lines!r} is not allowed")
 
@@ -242,6 +243,6 @@ def test_every_line_has_a_band_whose_edges_are_half_a_nanometre_from_a_line(line
             assert min(abs(abs(edge - other) - 0.5) for other in lines) < 1e-9
 
 
-@pytest.mark.parametrize("line", [380.2, 790.0])
+@loop("line", [380.2, 790.0])
 def test_a_line_outside_the_range_is_refused(line):
     assert f"lines_nm: {[line]!r} is not inside 380 to 780" in complaint(line_bands, [line])

@@ -7,6 +7,7 @@ import pytest
 from builders import transport_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loop import loop
 
 from render.error_estimates import Halves, SharedPaths
 from render.illuminants import illuminant
@@ -55,14 +56,14 @@ def ulps(a, b):
 POWERS_OF_TWO = [2.0**-20, 0.5, 2.0, 2.0**15]
 
 
-@pytest.mark.parametrize("factor", POWERS_OF_TWO)
+@loop("factor", POWERS_OF_TWO)
 def test_lights_brighter_by_a_power_of_two_give_bit_equal_radiance(factor):
     made = transport()
     powers = {"sky": 100.0 * factor, "lamp": 0.3 * factor}
     assert np.array_equal(made.relight(powers=powers).values, made.relight().values * np.float32(factor))
 
 
-@pytest.mark.parametrize("factor", POWERS_OF_TWO)
+@loop("factor", POWERS_OF_TWO)
 def test_a_level_higher_by_a_power_of_two_gives_bit_equal_radiance(factor):
     made = transport()
     one = made.relight(luminance_cd_m2=3.7).values
@@ -112,7 +113,7 @@ def test_a_spectrum_given_replaces_the_groups_own_and_a_name_stands_for_a_light(
     assert ratio == pytest.approx(np.broadcast_to(expected, ratio.shape), rel=1e-6)
 
 
-@pytest.mark.parametrize("level", [0.036, 25.0, 1e5])
+@loop("level", [0.036, 25.0, 1e5])
 def test_the_mean_luminance_asked_for_is_that_of_what_is_no_light(level):
     """A lamp fills two pixels and an eighth of a third, in which the wall goes on: the wall's light over its area."""
     seen = np.zeros((2, *SIZE), np.float32)
@@ -208,7 +209,7 @@ def test_a_level_of_a_scene_without_light_is_refused():
     assert text.startswith("level: 2.0 can't be reached, the scene gives no light")
 
 
-@pytest.mark.parametrize("given", [{"spectra": {"ski": "D65"}}, {"powers": {"ski": 1.0}}])
+@loop("given", [{"spectra": {"ski": "D65"}}, {"powers": {"ski": 1.0}}])
 def test_an_unknown_group_is_refused_and_the_nearest_named(given):
     text = complaint(transport().relight, **given)
     assert text.startswith(f"{next(iter(given))}: light group: 'ski' is unknown; allowed: lamp, sky")
@@ -219,15 +220,15 @@ def test_an_unknown_illuminant_is_refused():
     assert "illuminant: 'D66' is unknown" in complaint(transport().relight, spectra={"sky": "D66"})
 
 
-@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
-@pytest.mark.parametrize("name", ["powers", "luminance_cd_m2", "illuminance_lux"])
+@loop("value", [-1.0, np.nan, np.inf])
+@loop("name", ["powers", "luminance_cd_m2", "illuminance_lux"])
 def test_a_negative_or_infinite_level_or_power_is_refused_with_its_value(name, value):
     text = complaint(transport().relight, **{name: {"lamp": value} if name == "powers" else value})
     assert text.startswith(name)
     assert f"{value!r} is outside 0 to" in text
 
 
-@pytest.mark.parametrize("level", [{}, {"luminance_cd_m2": 7.0}, {"illuminance_lux": 9.0}])
+@loop("level", [{}, {"luminance_cd_m2": 7.0}, {"illuminance_lux": 9.0}])
 def test_halves_average_to_the_relit_radiance(level):
     made = transport()
     options = {"spectra": {"lamp": flat(3.0)}, "powers": {"sky": 2.0}, **level}
@@ -263,7 +264,7 @@ def test_the_error_of_a_relit_scene_adds_the_groups_variances():
     assert lit.relative_mc_error == pytest.approx(0.1 * np.sqrt(3.0**2 + 1.0) / 4.0, rel=1e-5)
 
 
-@pytest.mark.parametrize("correlation", [-1.0, -0.4, 0.7])
+@loop("correlation", [-1.0, -0.4, 0.7])
 def test_the_variance_of_groups_that_share_paths_holds_their_covariance(correlation):
     made = transport()
     made = replace(made, shared=SharedPaths((0, 1), np.full(made.variance.shape[1:], correlation, np.float32)))

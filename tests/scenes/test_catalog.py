@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.engine import render
 from render.scene import Scene, film_size
@@ -40,7 +41,7 @@ def nodes(node):
             yield from nodes(value)
 
 
-@pytest.mark.parametrize("name", names())
+@loop("name", names())
 def test_every_scene_keeps_compiling_quick_by_one_grid_and_few_kinds_of_material(name):
     spectra = [node for node in nodes(load(name).geometry) if node.get("type") in ("regular", "irregular", "uniform")]
     grids = {
@@ -54,7 +55,7 @@ def test_every_scene_keeps_compiling_quick_by_one_grid_and_few_kinds_of_material
     assert kinds <= plugins | shapes | {"scene", "perspective", "hdrfilm", "regular", "area", "constant"}
 
 
-@pytest.mark.parametrize("name", names())
+@loop("name", names())
 def test_every_scene_loads_under_its_own_name_with_a_light_and_a_reference_plane(name):
     scene = load(name)
     assert isinstance(scene, Scene)
@@ -65,7 +66,7 @@ def test_every_scene_loads_under_its_own_name_with_a_light_and_a_reference_plane
     assert scene.geometry["sensor"]["type"] == "perspective"
 
 
-@pytest.mark.parametrize("name", LIT_BY_NAME)
+@loop("name", LIT_BY_NAME)
 def test_every_scene_of_one_light_takes_it_by_name(name):
     (warm,), (cold,) = load(name, light="A").groups.values(), load(name, light="D65").groups.values()
     red, blue = (warm.spectrum.band_average(nm, 20.0) / cold.spectrum.band_average(nm, 20.0) for nm in (650.0, 450.0))
@@ -91,7 +92,7 @@ def test_options_reach_the_builder():
     assert set(values.split(",")) == {"0.5"}
 
 
-@pytest.mark.parametrize(("name", "nearest"), [("still_live", "still_life"), ("flatfield", "flat_field")])
+@loop(("name", "nearest"), [("still_live", "still_life"), ("flatfield", "flat_field")])
 def test_an_unknown_scene_is_refused_and_the_nearest_named(name, nearest):
     text = complaint(name)
     assert text.startswith(f"scene: {name!r} is unknown; allowed: {', '.join(names())}")
@@ -108,13 +109,13 @@ def test_an_unknown_light_is_refused():
     assert complaint("still_life", light="D66").startswith("illuminant: 'D66' is unknown")
 
 
-@pytest.mark.parametrize("value", [-0.1, 1.01, np.nan, np.inf])
-@pytest.mark.parametrize(("name", "option"), [("flat_field", "reflectance"), ("color_checker", "surround")])
+@loop("value", [-0.1, 1.01, np.nan, np.inf])
+@loop(("name", "option"), [("flat_field", "reflectance"), ("color_checker", "surround")])
 def test_a_reflectance_outside_zero_to_one_is_refused_with_its_value(name, option, value):
     assert complaint(name, **{option: value}).startswith(f"{option}: {value!r} is outside 0 to 1")
 
 
-@pytest.mark.parametrize(
+@loop(
     ("name", "options", "start"),
     [
         ("slanted_edge", {"contrast": 0.5}, "contrast: 0.5 is outside 1 to 1e+06"),
@@ -183,7 +184,7 @@ def test_every_scene_renders_in_every_band_with_light_from_each_of_its_groups(na
     assert made.relight().luminance().max() > 0
 
 
-@pytest.mark.parametrize(
+@loop(
     ("material", "nm", "reflectance"),
     [("Cu", 450.0, 0.55), ("Cu", 650.0, 0.93), ("Au", 450.0, 0.39), ("Au", 650.0, 0.96), ("Al", 550.0, 0.92)],
 )  # at normal incidence: CRC Handbook of Chemistry and Physics, optical properties of selected elements
@@ -194,7 +195,7 @@ def test_a_metal_reflects_as_its_handbook_says(material, nm, reflectance):
     assert abs((index - 1) / (index + 1)) ** 2 == pytest.approx(reflectance, abs=0.05)  # Fresnel; samples differ
 
 
-@pytest.mark.parametrize("name", names())
+@loop("name", names())
 def test_a_scene_knows_its_proportions(name: str) -> None:
     assert load(name).size == ((170, 256) if name in ("color_checker", "metamers") else (256, 256))
     assert film_size(load(name).size, 64) == ((42, 64) if name in ("color_checker", "metamers") else (64, 64))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from loop import loop
 from skimage.color import deltaE_ciede2000, xyz2lab
 
 from render.illuminants import illuminant
@@ -41,7 +42,7 @@ def electrons(surface: Spectrum, responses: Responses, light: str) -> Floats:
     )
 
 
-@pytest.mark.parametrize("width_nm", [1.0, 10.0])
+@loop("width_nm", [1.0, 10.0])
 def test_a_pair_has_one_xyz_under_d65_and_two_under_other_lights(width_nm: float) -> None:
     assert len(pairs()) == PAIRS
     for one, other in pairs():

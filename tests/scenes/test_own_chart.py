@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.engine import render
 from render.scene_range import check_range
@@ -39,7 +40,7 @@ def test_two_reflectances_fill_the_first_two_patches_and_are_unknown_beyond_thei
         check_range(scene, 380.0, 780.0)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("columns", "nm", "words"),
     [
         (

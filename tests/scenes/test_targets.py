@@ -5,6 +5,7 @@ By chance each statistical test may fail at most `FALSE_ALARM` of the time, over
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy.stats import norm
 from scipy.stats import t as student
 
@@ -35,7 +36,7 @@ def test_every_pixel_and_band_of_the_furnace_is_one_within_its_error():
     assert made.irradiance / np.pi == pytest.approx(np.ones((1, 4)), abs=5e-3)
 
 
-@pytest.mark.parametrize(("contrast", "angle_deg"), [(4.0, 5.0), (20.0, -8.0)])
+@loop(("contrast", "angle_deg"), [(4.0, 5.0), (20.0, -8.0)])
 def test_the_edge_has_its_contrast_and_leans_by_its_angle(contrast, angle_deg):
     scene = load("slanted_edge", contrast=contrast, angle_deg=angle_deg)
     made = render(scene, (40, 40), wavelength_nm=BANDS_NM, spp=256, seed=2)
@@ -54,7 +55,7 @@ def test_the_edge_has_its_contrast_and_leans_by_its_angle(contrast, angle_deg):
     assert bound * row_error / np.sqrt((rows**2).sum()) < np.tan(np.radians(0.5))  # sees half a degree
 
 
-@pytest.mark.parametrize("spokes", [9, 24])
+@loop("spokes", [9, 24])
 def test_the_star_has_its_spokes_black_on_white(spokes):
     pixels = 96
     made = render(load("siemens_star", spokes=spokes), (pixels, pixels), wavelength_nm=BANDS_NM, spp=16, seed=3)

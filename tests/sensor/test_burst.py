@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders import raw_image
+from loop import loop
 
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
@@ -106,9 +107,7 @@ def theory(rate, times, read_noise_e, sensor):
     return 1 / sum(t**2 / (rate * t + temporal) for t in times)
 
 
-@pytest.mark.parametrize(
-    ("rate", "clear"), [(100.0, TIMES), (2e5, TIMES), (1e6, TIMES[:2]), (2e6, TIMES[:2]), (5e6, TIMES[:1])]
-)
+@loop(("rate", "clear"), [(100.0, TIMES), (2e5, TIMES), (1e6, TIMES[:2]), (2e6, TIMES[:2]), (5e6, TIMES[:1])])
 def test_the_variance_is_the_best_that_the_unsaturated_frames_allow(rate, clear):
     sensor = camera(read_noise_e=10.0)
     merged = merge(shoot(sensor, rate, TIMES))
@@ -186,7 +185,7 @@ def test_a_bracket_of_photographs_gives_back_the_scene_from_shadow_to_light():
         np.testing.assert_array_equal(one.dn, two.dn)
 
 
-@pytest.mark.parametrize("full_well_e", [1.0, 50.0])
+@loop("full_well_e", [1.0, 50.0])
 def test_a_well_of_a_few_electrons_still_counts_until_half(full_well_e):
     merged = merge(shoot(camera(full_well_e=full_well_e), 0.2 * full_well_e / 0.01, [0.01] * 3))
     assert merged.saturated.mean() < 0.3

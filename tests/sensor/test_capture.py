@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy import stats
 
 from render.radiance import SpectralRadiance
@@ -45,7 +46,7 @@ def test_an_exact_capture_is_the_chain_of_its_parts_bit_for_bit(name, cfa, dtype
     assert 0.001 < np.mean(expected_e / sensor.pixel.full_well_e) < 0.9  # a picture, neither black nor white
 
 
-@pytest.mark.parametrize("exact", [False, True])
+@loop("exact", [False, True])
 def test_expected_electrons_are_read_out_as_a_capture_reads_them(exact):
     """Exact: to the bit; Dr.Jit forms its electrons in single precision."""
     sensor = preset("low_noise")
@@ -61,8 +62,8 @@ def test_expected_electrons_are_read_out_as_a_capture_reads_them(exact):
         assert np.mean(raw.dn != whole.dn) < 0.01
 
 
-@pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
+@loop("exact", [False, True])
+@loop("value", [-1.0, np.nan, np.inf])
 def test_electrons_that_no_light_makes_are_refused_at_their_place(exact, value):
     sensor = preset("low_noise")
     device = draw_device(sensor, (8, 8), np.random.default_rng(2))
@@ -72,7 +73,7 @@ def test_electrons_that_no_light_makes_are_refused_at_their_place(exact, value):
         expose(expected_e, sensor, 0.02, device, np.random.default_rng(3), exact=exact)
 
 
-@pytest.mark.parametrize("exact", [False, True])
+@loop("exact", [False, True])
 def test_one_capture_takes_one_key_from_the_generator(exact):
     radiance, sensor = scene(), preset("low_noise")
     rng, twin = np.random.default_rng(4), np.random.default_rng(4)
@@ -81,7 +82,7 @@ def test_one_capture_takes_one_key_from_the_generator(exact):
     assert rng.bit_generator.state == twin.bit_generator.state
 
 
-@pytest.mark.parametrize(
+@loop(
     ("exposure_s", "chip", "seed", "message"),
     [
         (-0.02, (33, 48), 0, r"exposure_s: -0\.02 is outside 0 to"),
@@ -89,7 +90,7 @@ def test_one_capture_takes_one_key_from_the_generator(exact):
         (0.02, (33, 48), None, r"rng: 0 is not a NumPy Generator"),
     ],
 )
-@pytest.mark.parametrize("exact", [False, True])
+@loop("exact", [False, True])
 def test_bad_input_is_refused_in_one_line_before_anything_is_taken(exact, exposure_s, chip, seed, message):
     sensor = preset("low_noise")
     device = draw_device(sensor, chip, np.random.default_rng(2))
@@ -141,8 +142,8 @@ def test_both_forms_see_the_light_that_the_lens_gives(samples, lens):
         assert stats.chi2.ppf(1e-5, z.size) < np.sum(z**2) < stats.chi2.isf(1e-5, z.size)
 
 
-@pytest.mark.parametrize("exact", [False, True])
-@pytest.mark.parametrize("scale", [0.0, 1e-38, 1e8])
+@loop("exact", [False, True])
+@loop("scale", [0.0, 1e-38, 1e8])
 def test_no_light_and_1e8_full_wells_give_frames_without_warnings(scale, exact):
     sensor = preset("table1_pixel")
     raw = shoot(SpectralRadiance(scene().values * np.float32(scale), NM), sensor, exact=exact)
@@ -152,7 +153,7 @@ def test_no_light_and_1e8_full_wells_give_frames_without_warnings(scale, exact):
         assert abs(raw.electrons.mean()) < 5 * 252 / np.sqrt(33 * 48)
 
 
-@pytest.mark.parametrize("exact", [False, True])
+@loop("exact", [False, True])
 def test_exposure_0_and_a_camera_that_does_not_answer_are_dark(exact):
     sensor = preset("low_noise")
     device = draw_device(sensor, (33, 48), np.random.default_rng(2))
@@ -163,7 +164,7 @@ def test_exposure_0_and_a_camera_that_does_not_answer_are_dark(exact):
     assert abs(dark.electrons.mean()) < 5 * np.hypot(1.5, 1.0) / np.sqrt(dark.dn.size)
 
 
-@pytest.mark.parametrize("exact", [False, True])
+@loop("exact", [False, True])
 def test_a_frame_of_one_pixel_is_taken(exact):
     sensor = preset("low_noise", "mono")
     device = draw_device(sensor, (1, 1), np.random.default_rng(2))

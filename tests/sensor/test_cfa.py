@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from builders import RGBW_4X4
+from loop import loop
 
 from rodcone.errors import InputError
 from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map, channels, check_covers, check_tile, mask, tile_of
@@ -13,8 +14,8 @@ def test_the_paper_s_tile_is_r_g_over_b_w_with_its_first_row_on_top():
     assert channel_map(BAYER, (2, 3)).tolist() == [list("RGR"), list("GBG")]
 
 
-@pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4, ("W",), ("RGB",)])
-@pytest.mark.parametrize("shape", [(4, 4), (7, 9), (5, 4)])
+@loop("tile", [RGBW, BAYER, RGBW_4X4, ("W",), ("RGB",)])
+@loop("shape", [(4, 4), (7, 9), (5, 4)])
 def test_each_pixel_carries_the_tile_s_letter_modulo_its_size(tile, shape):
     names = channel_map(tile, shape)
     assert names.shape == shape
@@ -22,7 +23,7 @@ def test_each_pixel_carries_the_tile_s_letter_modulo_its_size(tile, shape):
         assert names[row, column] == tile[row % len(tile)][column % len(tile[0])]
 
 
-@pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4])
+@loop("tile", [RGBW, BAYER, RGBW_4X4])
 def test_masks_of_all_letters_cover_each_pixel_once(tile):
     count = sum(mask(tile, channel, (7, 9)).astype(int) for channel in channels(tile))
     np.testing.assert_array_equal(count, 1)
@@ -39,7 +40,7 @@ def test_a_list_of_rows_becomes_a_tuple():
     assert check_tile(["RG", "BW"]) == RGBW
 
 
-@pytest.mark.parametrize("tile", ["RGBW", (), ("",), ("R1",), ("RG", 3), ("R G",)])
+@loop("tile", ["RGBW", (), ("",), ("R1",), ("RG", 3), ("R G",)])
 def test_what_is_no_tile_of_letters_is_refused_with_an_example(tile):
     with pytest.raises(InputError, match=r"not a tile.*allowed") as error:
         check_tile(tile)
@@ -52,12 +53,12 @@ def test_rows_that_differ_in_length_are_refused():
         check_tile(("RG", "B"))
 
 
-@pytest.mark.parametrize("shape", [(2, 2), (3, 2), (100, 100)])
+@loop("shape", [(2, 2), (3, 2), (100, 100)])
 def test_a_frame_that_holds_a_tile_is_accepted(shape):
     check_covers(RGBW, shape)
 
 
-@pytest.mark.parametrize("shape", [(1, 8), (8, 1), (8,), (8, 8, 3), (0, 0)])
+@loop("shape", [(1, 8), (8, 1), (8,), (8, 8, 3), (0, 0)])
 def test_a_frame_that_does_not_hold_a_tile_is_refused_with_its_shape(shape):
     with pytest.raises(InputError) as error:
         check_covers(RGBW, shape)

@@ -4,6 +4,7 @@ from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.radiance import SpectralRadiance
 from render.spectrum import flat
@@ -27,7 +28,7 @@ def one_line(error, *parts):
         assert part in message, message
 
 
-@pytest.mark.parametrize(("bits", "black_dn"), [(8, 1), (14, 28), (16, 110)])  # 0.42, 27.3 and 109.04 rounded up
+@loop(("bits", "black_dn"), [(8, 1), (14, 28), (16, 110)])  # 0.42, 27.3 and 109.04 rounded up
 def test_default_black_level_is_the_whole_dn_from_five_sigmas_of_the_dark_and_the_well_ends_at_the_top(bits, black_dn):
     sensor = SensorConfig(PIXEL, LENS, bits=bits)
     assert sensor.white_dn == 2**bits - 1
@@ -53,7 +54,7 @@ def test_a_converter_too_coarse_for_its_dark_keeps_a_step_for_light():
     assert (sensor.black_dn, sensor.gain_e_per_dn) == (2, 15_000.0)
 
 
-@pytest.mark.parametrize("black_level_dn", [0, 64, 99.0])
+@loop("black_level_dn", [0, 64, 99.0])
 def test_explicit_black_level_stays_where_it_is_put_and_the_well_still_ends_at_the_top(black_level_dn):
     sensor = SensorConfig(PIXEL, LENS, bits=10, black_level_dn=black_level_dn)
     assert sensor.black_dn == pytest.approx(black_level_dn, rel=1e-15)
@@ -67,7 +68,7 @@ def test_a_camera_without_dark_noise_has_black_at_0():
     assert sensor.gain_e_per_dn == 15_000 / 16_383
 
 
-@pytest.mark.parametrize(
+@loop(
     ("camera", "read_noise_e", "dsnu_e", "prnu"),
     [
         (table1_pixel, 4580 / 30, 6000 / 30, 0.017),  # 152.7 e- and 200 e-
@@ -75,7 +76,7 @@ def test_a_camera_without_dark_noise_has_black_at_0():
         (low_noise, 1.5, 1.0, 0.01),
     ],
 )
-@pytest.mark.parametrize(("cfa", "tile"), [("rgbw", RGBW), ("bayer", BAYER)])
+@loop(("cfa", "tile"), [("rgbw", RGBW), ("bayer", BAYER)])
 def test_presets_hold_table_1_and_differ_in_its_noise_alone(camera, read_noise_e, dsnu_e, prnu, cfa, tile):
     sensor = camera(cfa)
     pixel = sensor.pixel
@@ -108,12 +109,12 @@ def test_cameras_are_frozen():
         sensor.pixel.prnu = 0.5
 
 
-@pytest.mark.parametrize("field", ["read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s", "fill_factor"])
+@loop("field", ["read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s", "fill_factor"])
 def test_zero_is_allowed_wherever_it_switches_a_term_off(field):
     assert getattr(replace(PIXEL, **{field: 0.0}), field) == 0.0
 
 
-@pytest.mark.parametrize(
+@loop(
     ("field", "value"),
     [
         ("pitch_um", 0.0),
@@ -145,16 +146,14 @@ def test_prnu_in_per_cent_is_told_how_to_write_it():
     one_line(error, "prnu: 1.7", "0 to 1", "1.7 % is 0.017")
 
 
-@pytest.mark.parametrize(
-    ("field", "value"), [("f_number", 0.0), ("transmittance", 1.5), ("magnification", -0.5), ("f_number", np.nan)]
-)
+@loop(("field", "value"), [("f_number", 0.0), ("transmittance", 1.5), ("magnification", -0.5), ("f_number", np.nan)])
 def test_a_lens_out_of_range_is_refused_by_name_and_value(field, value):
     with pytest.raises(InputError) as error:
         replace(LENS, **{field: value})
     one_line(error, f"{field}: {value!r}", "outside", "give ")
 
 
-@pytest.mark.parametrize(
+@loop(
     ("changes", "parts"),
     [
         ({"bits": 0}, ("bits: 0", "1 to 16")),
@@ -196,19 +195,19 @@ def bands(first_nm, last_nm, width_nm=10.0):
     return centres, np.full(centres.size, width_nm)
 
 
-@pytest.mark.parametrize("window_nm", [(380.0, 780.0), (400.0, 700.0), (300.0, 780.0), (380.0, 1068.0), (800.0, 900.0)])
+@loop("window_nm", [(380.0, 780.0), (400.0, 700.0), (300.0, 780.0), (380.0, 1068.0), (800.0, 900.0)])
 def test_bands_that_reach_the_window_s_ends_are_accepted(window_nm):
     check_window(window_nm, *bands(300.0, 1070.0))
     check_window(window_nm, *bands(300.0, 1060.0))  # 8 nm less: no further band of 10 nm would fit
 
 
-@pytest.mark.parametrize("window_nm", [(380.0, 780.0), (400.0, 700.0), (500.0, 600.0)])
+@loop("window_nm", [(380.0, 780.0), (400.0, 700.0), (500.0, 600.0)])
 def test_inside_380_to_780_nm_absent_bands_are_the_scene_s_choice(window_nm):
     check_window(window_nm, *bands(450.0, 650.0))
     check_window(window_nm, np.array([589.0]), np.array([1.0]))
 
 
-@pytest.mark.parametrize(
+@loop(
     ("window_nm", "parts"),
     [
         ((380.0, 1068.0), ("(380.0, 1068.0)", "780 to 1068 nm", "380 to 780 nm, hold 0 nm", "narrow the window")),

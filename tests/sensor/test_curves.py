@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.illuminants import illuminant
 from render.spectrum import Spectrum
@@ -23,7 +24,7 @@ def electrons(channel, light, first_nm, last_nm):
     return np.sum(energy * nm * np.interp(nm, curve.wavelength_nm, curve.values))
 
 
-@pytest.mark.parametrize("channel", PEAKS)
+@loop("channel", PEAKS)
 def test_each_curve_peaks_where_the_published_one_does(channel):
     peak, nm = PEAKS[channel]
     curve = rgbw().curves[channel]
@@ -31,7 +32,7 @@ def test_each_curve_peaks_where_the_published_one_does(channel):
     assert curve.wavelength_nm[curve.values.argmax()] == nm
 
 
-@pytest.mark.parametrize("channel", PEAKS)
+@loop("channel", PEAKS)
 def test_each_curve_rises_to_its_peak_and_falls_behind_it_inside_0_to_1(channel):
     curve = rgbw().curves[channel]
     assert (curve.wavelength_nm[0], curve.wavelength_nm[-1]) == (380.0, 1068.0)
@@ -41,7 +42,7 @@ def test_each_curve_rises_to_its_peak_and_falls_behind_it_inside_0_to_1(channel)
     assert np.all((curve.values >= 0) & (curve.values <= 1))
 
 
-@pytest.mark.parametrize(
+@loop(
     ("light", "first_nm", "last_nm", "ratios"),
     [
         ("E", 380, 780, (10.16, 5.85, 13.81)),
@@ -78,7 +79,7 @@ def write(folder, text):
     return path
 
 
-@pytest.mark.parametrize("name", ["wavelength_nm", "nm", "Wavelength (nm)", "lambda", "λ [nm]"])
+@loop("name", ["wavelength_nm", "nm", "Wavelength (nm)", "lambda", "λ [nm]"])
 def test_a_csv_gives_the_curves_that_it_holds(tmp_path, name):
     path = write(tmp_path, f"{name}, R,W\n400,0.1,0.5\n\n500,0.3,1.0\n610,0,0.75\n")
     responses = read_csv(path)
@@ -89,7 +90,7 @@ def test_a_csv_gives_the_curves_that_it_holds(tmp_path, name):
     assert read_csv(str(path)).curves.keys() == responses.curves.keys()
 
 
-@pytest.mark.parametrize(
+@loop(
     ("text", "parts"),
     [
         ("x,R\n400,0.1\n500,0.2\n", ("['x', 'R']", "(or wavelength, lambda, nm) and one channel a column")),
@@ -140,7 +141,7 @@ def test_a_range_cuts_the_curves_with_a_point_at_each_end(tmp_path):
     assert responses.band_average(("W",), [700.0], [20.0])[0, 0] == pytest.approx(0.45, rel=1e-12)
 
 
-@pytest.mark.parametrize("range_nm", [(399.0, 700.0), (400.0, 801.0), (700.0, 500.0), (500.0, np.nan)])
+@loop("range_nm", [(399.0, 700.0), (400.0, 801.0), (700.0, 500.0), (500.0, np.nan)])
 def test_a_range_that_the_file_does_not_reach_is_refused(tmp_path, range_nm):
     with pytest.raises(InputError, match=r"range_nm: .*400 to 800 nm; give a range that the file reaches"):
         read_csv(write(tmp_path, FILTERS), range_nm=range_nm)
@@ -180,7 +181,7 @@ def test_a_quantum_efficiency_multiplies_filters_without_a_word(tmp_path):
     np.testing.assert_allclose(values, [0.0, 0.48, 0.24, 0.18, 0.08], rtol=1e-14)
 
 
-@pytest.mark.parametrize("efficiency", [-0.1, 1.1, np.nan])
+@loop("efficiency", [-0.1, 1.1, np.nan])
 def test_a_quantum_efficiency_out_of_range_is_refused(tmp_path, efficiency):
     with pytest.raises(InputError, match="quantum_efficiency"):
         read_csv(write(tmp_path, FILTERS), quantum_efficiency=efficiency)
@@ -191,7 +192,7 @@ def test_filters_in_per_cent_are_told_so_although_the_product_would_fit(tmp_path
         read_csv(write(tmp_path, "wavelength_nm,G\n400,20\n500,80\n"), quantum_efficiency=0.005)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("text", "reason"),
     [
         ("wavelength_nm,R,G\n400,0,0.1\n550,0.1,0.6\n650,0.55,0\n", "no curve exceeds 0.60"),

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 
 from rodcone.errors import InputError
 from sensor.cfa import RGBW
@@ -73,7 +74,7 @@ def test_a_smaller_chip_of_the_same_seed_is_the_larger_one_s_corner():
     assert small.shape == (6, 11)
 
 
-@pytest.mark.parametrize("shape", [(1, 8), (8,), (8, 8, 3)])
+@loop("shape", [(1, 8), (8,), (8, 8, 3)])
 def test_a_chip_that_does_not_hold_a_tile_is_refused(shape):
     with pytest.raises(InputError, match=r"mosaic: shape .*at least 2x2") as error:
         draw_device(camera(), shape, np.random.default_rng(0))
@@ -127,7 +128,7 @@ def test_a_wild_column_gain_is_no_negative_amplifier():
     assert chip((2, 4096), column_gain_spread=1.0).column_gain.min() == 0.0
 
 
-@pytest.mark.parametrize("share", [0.001, 0.02, 0.7])
+@loop("share", [0.001, 0.02, 0.7])
 def test_the_stated_share_of_pixels_is_hot(share):
     hot = chip(hot_pixel_share=share).hot
     assert hot.dtype == np.bool_

@@ -5,6 +5,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy.integrate import quad
 from scipy.special import j0, j1
 
@@ -66,7 +67,7 @@ def test_defocus_is_the_transform_of_an_even_disc():
     np.testing.assert_array_equal(defocus_otf(np.array([0.0, 0.3]), 0.0), 1.0)
 
 
-@pytest.mark.parametrize("f_number", [1.05, 1.4])
+@loop("f_number", [1.05, 1.4])
 def test_folded_copies_are_the_transform_of_the_airy_pattern_at_the_samples(f_number):
     lens, step_um, size = replace(IDEAL, f_number=f_number), 0.55, 96
     assert limit_per_um(550.0, lens) > 0.5 / step_um
@@ -85,8 +86,8 @@ def test_folded_copies_are_the_transform_of_the_airy_pattern_at_the_samples(f_nu
 # Light
 
 
-@pytest.mark.parametrize("samples", [1, 4])
-@pytest.mark.parametrize(
+@loop("samples", [1, 4])
+@loop(
     "lens", [{"diffraction": 1.0}, {"defocus_um": 9.0}, {"veiling_glare": 0.2}, {"diffraction": 2.0, "defocus_um": 4.0}]
 )
 def test_light_is_kept_and_a_uniform_picture_stays_uniform_up_to_its_border(lens, samples):
@@ -100,7 +101,7 @@ def test_light_is_kept_and_a_uniform_picture_stays_uniform_up_to_its_border(lens
     assert spread.min() >= 0
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@loop("dtype", [np.float32, np.float64])
 def test_light_is_kept_to_1e_6_in_every_band_in_single_precision_too(dtype):
     nm = np.arange(385.0, 780.0, 10.0)
     values = np.random.default_rng(2).random((24, 40, nm.size)).astype(dtype)

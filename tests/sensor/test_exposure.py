@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders import any_order
+from loop import loop
 
 from rodcone.errors import InputError
 from sensor.exposure import (
@@ -29,9 +30,9 @@ def ramp(peak=1.0):
     return SpectralIrradiance(values, NM, 2.2)
 
 
-@pytest.mark.parametrize("channel", ["R", "G", "B", "W"])
-@pytest.mark.parametrize("percentile", [50.0, 99.0, 100.0])
-@pytest.mark.parametrize("well_share", [0.25, 1.0])
+@loop("channel", ["R", "G", "B", "W"])
+@loop("percentile", [50.0, 99.0, 100.0])
+@loop("well_share", [0.25, 1.0])
 def test_the_stated_percentile_of_the_stated_channel_is_put_at_the_stated_share(channel, percentile, well_share):
     sensor = preset("low_noise")
     exposure_s = auto_exposure_s(ramp(), sensor, 1e6, channel=channel, percentile=percentile, well_share=well_share)
@@ -56,7 +57,7 @@ def test_twice_the_light_halves_the_time():
     assert auto_exposure_s(ramp(2.0), sensor, 1e6) == pytest.approx(auto_exposure_s(ramp(), sensor, 1e6) / 2, rel=1e-12)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("arguments", "words"),
     [
         ({"longest_s": 0.0}, "longest_s: 0.0"),
@@ -88,7 +89,7 @@ def test_a_stop_is_twice_the_time_and_a_burst_a_bracket_of_none():
     assert bracket_s(0.01, [0.5])[0] == pytest.approx(0.01 * np.sqrt(2), rel=1e-15)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("middle_s", "stops", "words"),
     [(0.0, (0,), "middle_s: 0.0"), (0.01, (), "stops: () is empty"), (0.01, (99,), "stops: 99")],
 )
@@ -116,7 +117,7 @@ def bits(*electrons, dark_e2=0.0):
     return sum(0.5 * np.log2(1 + e * e / (e + dark_e2)) for e in electrons)
 
 
-@pytest.mark.parametrize("read_noise_e", [0.0, 30.0])
+@loop("read_noise_e", [0.0, 30.0])
 def test_information_of_a_flat_tile_in_closed_form(read_noise_e):
     sensor = ideal(read_noise_e)
     rounding = sensor.gain_e_per_dn**2 / 12
@@ -137,7 +138,7 @@ def test_where_nothing_is_full_the_longer_time_wins_and_where_only_w_counts_the_
     assert most_informative_s(tiles(3500.0), sensor, (1.0, 1.0)) == 1.0
 
 
-@pytest.mark.parametrize("read_noise_e", [0.0, 10.0, 30.0])
+@loop("read_noise_e", [0.0, 10.0, 30.0])
 def test_the_share_of_full_w_at_which_the_times_are_equal_is_the_closed_forms(read_noise_e):
     # Two levels: tiles of G 6000 a second, whose W is full at 1 s, and of 60, whose W never is.
     sensor = ideal(read_noise_e)
@@ -172,7 +173,7 @@ def test_rules_by_name():
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("rule", ["auto", "auto:W", "auto:information"])
+@loop("rule", ["auto", "auto:W", "auto:information"])
 def test_electrons_that_are_there_already_give_the_rules_time(rule):
     from sensor.exposure import exposure_by_rule_s, exposure_of_electrons_s
     from sensor.optics import SpectralIrradiance

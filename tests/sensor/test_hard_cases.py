@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.radiance import SpectralRadiance
 from render.spectrum import flat
@@ -29,7 +30,7 @@ REAL = {
     "hot_pixel_dark_current_e_per_s": 1e4,
     "crosstalk": 0.05,
 }
-EXACT = pytest.mark.parametrize("exact", [False, True], ids=["engine", "exact"])
+EXACT = loop("exact", [False, True])
 
 
 def scene(value, shape):
@@ -57,7 +58,7 @@ def shoot(sensor, value, shape, exact, exposure_s=0.01, seed=0):
 
 
 @EXACT
-@pytest.mark.parametrize("name", names())
+@loop("name", names())
 def test_without_light_a_frame_reads_black_and_half_lies_on_either_side(name, exact):
     raw = shoot(preset(name), 0.0, (128, 128), exact)
     sigma = raw.dark_noise_e
@@ -87,7 +88,7 @@ def test_one_photon_in_a_megapixel_is_found_in_as_many_frames_as_poisson_says(ex
 
 
 @EXACT
-@pytest.mark.parametrize("name", ["low_noise", "table1_pixel"])
+@loop("name", ["low_noise", "table1_pixel"])
 def test_1e8_full_wells_saturate_every_pixel_and_nothing_wraps(name, exact):
     sensor = preset(name)
     per_radiance = expected_electrons(form_image(scene(1.0, (2, 2)), sensor), sensor, 0.01).min()
@@ -99,7 +100,7 @@ def test_1e8_full_wells_saturate_every_pixel_and_nothing_wraps(name, exact):
 
 
 @EXACT
-@pytest.mark.parametrize("value", [0.0, 1.0, 1e9])
+@loop("value", [0.0, 1.0, 1e9])
 def test_an_exposure_of_0_s_collects_nothing(value, exact):
     raw = shoot(real(preset("low_noise")), value, (64, 64), exact, exposure_s=0.0)
     assert abs(raw.electrons.mean()) < 4 * raw.dark_noise_e / np.sqrt(64)  # columns share an offset
@@ -113,8 +114,8 @@ def test_a_frame_of_one_pixel_needs_a_tile_of_one(exact):
 
 
 @EXACT
-@pytest.mark.parametrize("shape", [(5, 7), (4, 9), (33, 5)])
-@pytest.mark.parametrize("cfa", ["rgbw", "bayer_gbrg", "rgbw_4x4", "rccc", "mono"])
+@loop("shape", [(5, 7), (4, 9), (33, 5)])
+@loop("cfa", ["rgbw", "bayer_gbrg", "rgbw_4x4", "rccc", "mono"])
 def test_odd_sizes_read_the_mosaic_that_they_hold(cfa, shape, exact):
     sensor = preset("low_noise", cfa)
     sensor = replace(sensor, pixel=replace(sensor.pixel, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0))
@@ -129,7 +130,7 @@ def test_odd_sizes_read_the_mosaic_that_they_hold(cfa, shape, exact):
 
 
 @EXACT
-@pytest.mark.parametrize("bits", [1, 16])
+@loop("bits", [1, 16])
 def test_1_bit_and_16_bits_use_their_whole_range_and_no_more(bits, exact):
     sensor = replace(preset("low_noise"), bits=bits)
     dark, bright = (shoot(sensor, value, (64, 64), exact) for value in (0.0, 1e6))
@@ -159,7 +160,7 @@ def test_a_response_of_zero_everywhere_reads_as_darkness_under_any_light(exact):
 
 
 @EXACT
-@pytest.mark.parametrize("term", [*REAL, "read_noise_e", "dsnu_e", "prnu"])
+@loop("term", [*REAL, "read_noise_e", "dsnu_e", "prnu"])
 def test_each_term_at_the_top_of_its_range_reads_in_range(term, exact):
     tops = {"column_gain_spread": 1.0, "hot_pixel_share": 1.0, "crosstalk": 0.25, "prnu": 1.0, "column_offset_e": 1e9}
     top = tops.get(term, 1e9)

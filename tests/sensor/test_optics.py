@@ -4,6 +4,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
@@ -27,9 +28,9 @@ def d65(luminance_cd_m2):
     return SpectralRadiance(values * luminance_cd_m2 / unit, ISET_NM)
 
 
-@pytest.mark.parametrize("f_number", [0.5, 1.4, 2.8, 16.0])
-@pytest.mark.parametrize("magnification", [0.0, 0.00323, 1.0])
-@pytest.mark.parametrize("transmittance", [0.0, 0.8, 1.0])
+@loop("f_number", [0.5, 1.4, 2.8, 16.0])
+@loop("magnification", [0.0, 0.00323, 1.0])
+@loop("transmittance", [0.0, 0.8, 1.0])
 def test_irradiance_is_pi_t_l_over_1_plus_4_n_squared_1_plus_m_squared(f_number, magnification, transmittance):
     lens = LensConfig(f_number, transmittance, magnification)
     cone = 1 / (2 * f_number * (1 + magnification))  # tangent of the exit pupil's half angle
@@ -76,13 +77,13 @@ def test_widths_that_are_not_the_spacing_go_through():
     np.testing.assert_array_equal(form_image(radiance, camera(f_number=4.0)).widths_nm, [5.0, 30.0])
 
 
-@pytest.mark.parametrize("shape", [(2, 2, 30), (2, 31)])
+@loop("shape", [(2, 2, 30), (2, 31)])
 def test_an_irradiance_without_one_value_a_band_is_refused(shape):
     with pytest.raises(InputError, match=r"irradiance: shape .* is not \(h, w, 31\); give one value a band"):
         SpectralIrradiance(np.ones(shape), ISET_NM, 2.2)
 
 
-@pytest.mark.parametrize("value", [np.nan, -1e-9, np.inf])
+@loop("value", [np.nan, -1e-9, np.inf])
 def test_an_irradiance_that_cannot_be_is_refused_where_it_stands(value):
     values = np.ones((3, 4, 31))
     values[1, 2, 5] = value

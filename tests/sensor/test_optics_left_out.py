@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.radiance import SpectralRadiance
 from sensor.optics import camera_equation, falloff, form_image, left_out, negative_lobe_share
@@ -28,7 +29,7 @@ def numbers(text):
     return [float(x) for x in re.findall(r"\d+\.\d+", text)]
 
 
-@pytest.mark.parametrize("name", names())
+@loop("name", names())
 def test_every_preset_says_in_one_line_each_what_it_leaves_out(name):
     lines = left_out(preset(name))
     starts = [text.split(":")[0] for text in lines]
@@ -62,7 +63,7 @@ def test_the_falloff_stated_is_that_of_a_picture_s_corners():
     assert lost == pytest.approx(100 * (1 - corner), abs=0.6)
 
 
-@pytest.mark.parametrize("f_number", [1.4, 2.8])
+@loop("f_number", [1.4, 2.8])
 def test_the_light_taken_from_around_a_point_is_what_form_image_takes(f_number):
     sensor = camera(diffraction=1.0, f_number=f_number)
     stated = float(re.search(r"([\d.]+)%", line(sensor, "detail finer than a pixel"))[1]) / 100

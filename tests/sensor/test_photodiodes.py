@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 
 from rodcone.errors import InputError
 from rodcone.jit import backend
@@ -19,7 +20,7 @@ from sensor.readout import electrons_at_snr, noise_sources, noise_variance
 from sensor.variations import vary
 
 QUIET = PixelConfig(1.0, 0.9, full_well_e=8000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
-BOTH = pytest.mark.parametrize("binning", ["charge", "digital"])
+BOTH = loop("binning", ["charge", "digital"])
 
 
 def camera(binning, cfa="quad_bayer", bits=14, black_level_dn=64, **pixel):
@@ -44,7 +45,7 @@ def test_quad_mosaics_are_the_plain_ones_with_2x2_pixels_for_each():
     assert MOSAICS["quad_rgbw"] == ("RRGG", "RRGG", "BBWW", "BBWW")
 
 
-@pytest.mark.parametrize("tile", [BAYER, RGBW, ("W",), ("RC", "CB"), MOSAICS["rgbw_4x4"]])
+@loop("tile", [BAYER, RGBW, ("W",), ("RC", "CB"), MOSAICS["rgbw_4x4"]])
 def test_binning_undoes_quad(tile):
     assert binned_tile(quad(tile)) == tile
 
@@ -54,7 +55,7 @@ def test_mono_of_one_pixel_bins_to_itself():
     assert even_frame(camera("charge", "mono"), 10).cfa == ("W",)
 
 
-@pytest.mark.parametrize("cfa", ["bayer", "rgbw", "rgbw_4x4", "rccb"])
+@loop("cfa", ["bayer", "rgbw", "rgbw_4x4", "rccb"])
 def test_a_mosaic_whose_2x2_pixels_differ_is_refused_in_one_line(cfa):
     with pytest.raises(
         InputError, match=r"binning: 2x2 pixels of the mosaic .* aren't of one channel; allowed"
@@ -79,7 +80,7 @@ def test_a_processor_s_mosaic_is_the_raw_image_s(binning):
 
 
 @BOTH
-@pytest.mark.parametrize("exact", [True, False])
+@loop("exact", [True, False])
 def test_the_raw_image_has_half_the_size_the_plain_mosaic_and_its_levels(binning, exact):
     if not exact and backend() == "numpy":
         pytest.skip("Dr.Jit has no backend here")
@@ -166,7 +167,7 @@ def test_all_full_reads_white(binning):
 # Noise
 
 
-@pytest.mark.parametrize(
+@loop(
     ("pixel", "charge", "digital"),
     [
         ({}, 0.0, 0.0),
@@ -235,7 +236,7 @@ def test_chips_drawn_at_random_have_the_stated_snr(binning, exact, photo_e):
     assert abs(raw.electrons.mean() - mean_e) < 4 * raw.electrons.mean(axis=0).std() / np.sqrt(squares.size)
 
 
-@pytest.mark.parametrize(("binning", "bits"), [("charge", 12), ("digital", 10)])  # roundings of 6 % and 19 % of it
+@loop(("binning", "bits"), [("charge", 12), ("digital", 10)])  # roundings of 6 % and 19 % of it
 def test_the_raw_image_states_its_own_dark_noise(binning, bits):
     """Read noise, DSNU and all roundings: what weighs frames, finds saturation and goes into a negative's profile."""
     raw = even_frame(camera(binning, read_noise_e=3.0, dsnu_e=4.0, bits=bits), 0.0, (512, 512))
@@ -263,7 +264,7 @@ def test_photodiodes_by_themselves_are_what_was_binned(binning):
 
 
 @BOTH
-@pytest.mark.parametrize("change", [{"prnu": 0.3}, {"read_noise_e": 9.0}])
+@loop("change", [{"prnu": 0.3}, {"read_noise_e": 9.0}])
 def test_a_pixel_changed_without_its_photodiodes_is_no_chip(binning, change):
     sensor = camera(binning)
     with pytest.raises(InputError, match=r"pixel: it isn't four of the chip's photodiodes; allowed"):
@@ -274,7 +275,7 @@ def test_a_pixel_changed_without_its_photodiodes_is_no_chip(binning, change):
 
 
 @BOTH
-@pytest.mark.parametrize("shape", [(33, 40), (40, 33), (5, 5)])
+@loop("shape", [(33, 40), (40, 33), (5, 5)])
 def test_an_odd_size_is_refused_in_one_line(binning, shape):
     with pytest.raises(
         InputError, match=r"size: \d+ x \d+ pixels with binning .* even height and width; give "
@@ -283,7 +284,7 @@ def test_an_odd_size_is_refused_in_one_line(binning, shape):
     assert "\n" not in str(found.value)
 
 
-@pytest.mark.parametrize("binning", ["", "analog", "Charge", 2, None, False, ["charge"]])
+@loop("binning", ["", "analog", "Charge", 2, None, False, ["charge"]])
 def test_another_binning_is_refused(binning):
     with pytest.raises(InputError, match=r"binning: .*allowed: charge, digital"):
         binned(camera(""), binning)
@@ -295,7 +296,7 @@ def test_a_sum_beyond_16_bits_is_refused():
     assert camera("charge", bits=16).chip.in_charge
 
 
-@pytest.mark.parametrize("binned_well_e", [-1.0, 7999.0, np.nan, 1e13])
+@loop("binned_well_e", [-1.0, 7999.0, np.nan, 1e13])
 def test_a_floating_diffusion_under_one_well_is_refused(binned_well_e):
     with pytest.raises(InputError, match="binned_well_e"):
         camera("charge", binned_well_e=binned_well_e)
@@ -324,7 +325,7 @@ def test_a_sensor_file_names_binning_and_its_well(tmp_path):
     assert (sensor.chip.in_charge, sensor.pixel.full_well_e, sensor.cfa) == (True, 20_000.0, RGBW)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("cfa", "binning"),
     [("quad_bayer", '"analog"'), ("quad_bayer", "true"), ("quad_bayer", "false"), ("bayer", '"charge"')],
 )

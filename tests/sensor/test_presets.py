@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.spectrum import Spectrum
 from rodcone.errors import InputError
@@ -34,7 +35,7 @@ def refusal(path, *parts):
         assert part in message, message
 
 
-@pytest.mark.parametrize("name", names())
+@loop("name", names())
 def test_every_preset_is_a_file_that_says_what_it_is_and_names_every_pixel_term(name):
     text = preset_file(name).read_text("utf-8")
     assert text.startswith("# ")
@@ -50,7 +51,7 @@ def test_no_other_file_lies_beside_the_presets():
     assert {path.name for path in preset_file("low_noise").parent.iterdir()} == {f"{name}.toml" for name in names()}
 
 
-@pytest.mark.parametrize(
+@loop(
     ("camera", "read_noise_e", "dsnu_e", "prnu", "diffraction"),
     [
         (table1_pixel, 4580.0 / 30.0, 6000.0 / 30.0, 0.017, 0.0),  # the paper has no blur
@@ -58,7 +59,7 @@ def test_no_other_file_lies_beside_the_presets():
         (low_noise, 1.5, 1.0, 0.01, 1.0),
     ],
 )
-@pytest.mark.parametrize("cfa", ["rgbw", "bayer"])
+@loop("cfa", ["rgbw", "bayer"])
 def test_the_files_hold_the_last_bit_of_table_1_s_quotients(camera, read_noise_e, dsnu_e, prnu, diffraction, cfa):
     pixel = PixelConfig(2.2, 0.9, 15_000.0, read_noise_e, dsnu_e, prnu, analog_gain=7.98)
     expected = SensorConfig(pixel, LensConfig(2.8, diffraction=diffraction), cfa=MOSAICS[cfa])
@@ -66,7 +67,7 @@ def test_the_files_hold_the_last_bit_of_table_1_s_quotients(camera, read_noise_e
     assert camera(cfa).gain_e_per_dn == expected.gain_e_per_dn
 
 
-@pytest.mark.parametrize(("pitch_um", "f_number"), [(6.0, 4.0), (3.0, 2.8), (2.0, 4.0)])
+@loop(("pitch_um", "f_number"), [(6.0, 4.0), (3.0, 2.8), (2.0, 4.0)])
 def test_variants_for_figures_1_and_5_change_pitch_well_and_f_number_alone(pitch_um, f_number):
     sensor, base = preset(f"table1_output_{pitch_um:g}um"), table1_output()
     well_e = 15_000.0 * (pitch_um / 2.2) ** 2
@@ -94,7 +95,7 @@ def test_the_least_file_leaves_the_rest_at_its_defaults(tmp_path):
     assert read_sensor(write(tmp_path, more + LEAST + LENS)) == changed
 
 
-@pytest.mark.parametrize(
+@loop(
     ("text", "parts"),
     [
         ("", ("pixel is missing", "add it")),
@@ -163,7 +164,7 @@ def test_measured_responses_are_read_beside_the_file_with_all_that_it_states(tmp
     assert numbers.responses.curves["W"].values.max() == 0.45
 
 
-@pytest.mark.parametrize(
+@loop(
     ("text", "parts"),
     [
         (STATED, ("responses: quantum_efficiency is missing", '"included"')),
@@ -194,7 +195,7 @@ def test_without_responses_the_project_s_own_are_used_and_c_is_w_s_curve():
     assert clear.curves["R"] is rgbw().curves["R"]
 
 
-@pytest.mark.parametrize("cfa", MOSAICS)
+@loop("cfa", MOSAICS)
 def test_every_named_mosaic_makes_a_camera(cfa):
     assert preset("low_noise", cfa).cfa == MOSAICS[cfa]
 

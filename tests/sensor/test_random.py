@@ -5,6 +5,7 @@ Statistical tests run with fixed keys. With fresh ones each comparison would fai
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy import stats
 
 from rodcone.errors import InputError
@@ -14,7 +15,7 @@ KEY = 0x0123456789ABCDEF
 ALL_ONES = 0xFFFFFFFF
 
 
-@pytest.mark.parametrize(
+@loop(
     ("counter", "key_words", "answer"),  # known answers of Random123 for philox4x32 with 10 rounds
     [
         ((0, 0, 0, 0), (0, 0), (0x6627E8D5, 0xE169C58D, 0xBC57AC4C, 0x9B00DBD8)),
@@ -49,8 +50,8 @@ def test_normals_have_the_moments_of_a_standard_normal():
         assert abs(np.mean(draws**power) - moment) < 4 * np.sqrt(spread / draws.size), power
 
 
-@pytest.mark.parametrize("term", [NoiseTerm.PRNU, NoiseTerm.DSNU, NoiseTerm.READ])
-@pytest.mark.parametrize("key", [0, KEY, 2**64 - 1])
+@loop("term", [NoiseTerm.PRNU, NoiseTerm.DSNU, NoiseTerm.READ])
+@loop("key", [0, KEY, 2**64 - 1])
 def test_normals_pass_kolmogorov_and_smirnov(term, key):
     # false-alarm rate 1e-4 each, 9e-4 together
     assert stats.kstest(normals(key, term, (256, 256)).ravel(), "norm").pvalue > 1e-4
@@ -89,7 +90,7 @@ def test_terms_keys_rows_and_columns_are_uncorrelated():
             assert abs(correlation(base**2, other**2)) < 4.5, name
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (2, 3), (17, 9), (40, 2)])
+@loop("shape", [(1, 1), (2, 3), (17, 9), (40, 2)])
 def test_a_crop_s_draws_are_the_full_frame_s(shape):
     crop = np.s_[: shape[0], : shape[1]]
     np.testing.assert_array_equal(normals(KEY, NoiseTerm.DSNU, shape), normals(KEY, NoiseTerm.DSNU, (40, 40))[crop])
@@ -106,7 +107,7 @@ def test_a_row_s_poisson_draws_do_not_depend_on_the_other_rows():
     assert not np.array_equal(first[2], first[4])
 
 
-@pytest.mark.parametrize("mean", [0.3, 1.0, 9.9, 10.1, 24.0, 26.0, 1000.0])
+@loop("mean", [0.3, 1.0, 9.9, 10.1, 24.0, 26.0, 1000.0])
 def test_poisson_draws_follow_the_exact_probabilities(mean):
     draws = poisson(KEY, NoiseTerm.SHOT, np.full((256, 512), mean)).ravel()
     low, high = int(stats.poisson.ppf(1e-4, mean)), int(stats.poisson.isf(1e-4, mean))
@@ -129,7 +130,7 @@ def test_neighbouring_keys_and_rows_give_unrelated_poisson_draws():
         assert abs(correlation(first, other)) < 4.5
 
 
-@pytest.mark.parametrize("key", [5, 2**53, 2**63, 2**64 - 4096])
+@loop("key", [5, 2**53, 2**63, 2**64 - 4096])
 def test_every_bit_of_the_key_counts(key):
     mean = np.full((8, 64), 1e6)  # equal draws are rare: 500 pixels agree by chance with a probability under 1e-1000
     assert not np.array_equal(poisson(key, NoiseTerm.SHOT, mean), poisson(key + 1, NoiseTerm.SHOT, mean))
@@ -144,7 +145,7 @@ def test_one_draw_from_the_generator_gives_a_key_of_64_bits():
     assert any(key >= 2**63 for key in keys)
 
 
-@pytest.mark.parametrize("rng", [0, None, np.random.RandomState(0)])
+@loop("rng", [0, None, np.random.RandomState(0)])
 def test_what_is_no_generator_is_refused_with_the_fix(rng):
     with pytest.raises(InputError, match=r"rng: .* is not a NumPy Generator; allowed: numpy\.random\.default_rng"):
         draw_key(rng)

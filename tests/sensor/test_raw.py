@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy import stats
 
 from rodcone.errors import InputError
@@ -39,7 +40,7 @@ def test_saturation_begins_four_sigmas_of_the_dark_and_half_a_dn_under_the_well(
     np.testing.assert_array_equal(replace(RAW, dn=dn).saturated, [[False, True], [True, True]])
 
 
-@pytest.mark.parametrize("sigma_dn", np.geomspace(0.05, 200, 60))
+@loop("sigma_dn", np.geomspace(0.05, 200, 60))
 def test_a_saturated_pixel_is_missed_with_at_most_the_stated_probability(sigma_dn):
     raw = replace(RAW, gain_e_per_dn=1.0, read_noise_e=sigma_dn, dsnu_e=0.0)
     first_flagged = np.ceil(raw.saturation_e - 1000.0)  # DN under the top
@@ -69,7 +70,7 @@ def test_half_a_well_is_not_saturated():
     assert not raw.saturated.any()  # the threshold lies 40 standard deviations above
 
 
-@pytest.mark.parametrize("shape", [(1, 4), (4, 1), (4,), (4, 4, 1)])
+@loop("shape", [(1, 4), (4, 1), (4,), (4, 4, 1)])
 def test_a_frame_that_does_not_hold_a_tile_is_refused(shape):
     with pytest.raises(InputError, match=r"mosaic: shape .* doesn't fit the tile .*at least 2x2") as error:
         replace(RAW, dn=np.zeros(shape, np.uint16))
@@ -77,14 +78,14 @@ def test_a_frame_that_does_not_hold_a_tile_is_refused(shape):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint16, np.int64, np.float32, np.float64, list])
+@loop("dtype", [np.uint8, np.int16, np.uint16, np.int64, np.float32, np.float64, list])
 def test_whole_numbers_and_finite_floats_are_taken_as_they_are(dtype):
     dn = np.array([[101, 102], [103, 104]], np.int64)
     given = dn.tolist() if dtype is list else dn.astype(dtype)
     np.testing.assert_array_equal(replace(RAW, dn=given).electrons, [[2.0, 4.0], [6.0, 8.0]])
 
 
-@pytest.mark.parametrize(
+@loop(
     ("changes", "message"),
     [
         ({"black_dn": 1100.0}, r"black_dn: 1100\.0 is not under white_dn 1100\.0; swap or correct"),

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy import stats
 
 from rodcone.errors import InputError
@@ -38,8 +39,8 @@ def expose(sensor, light_e, shape=(64, 64), device=None, exposure_s=0.01, seed=0
 # Each term alone, and zero
 
 
-@pytest.mark.parametrize("bits", [1, 8, 14, 16])
-@pytest.mark.parametrize("black_level_dn", [None, 0])
+@loop("bits", [1, 8, 14, 16])
+@loop("black_level_dn", [None, 0])
 def test_no_light_and_no_noise_read_black_in_every_pixel(bits, black_level_dn):
     sensor = camera(bits, black_level_dn)
     raw = expose(sensor, 0.0)
@@ -149,7 +150,7 @@ def test_without_dark_noise_a_saturated_pixel_reads_the_well_exactly():
     np.testing.assert_allclose(raw.electrons, 1000.0, rtol=1e-12)
 
 
-@pytest.mark.parametrize("full_well_e", [1.0, 1000.0, 1e12])
+@loop("full_well_e", [1.0, 1000.0, 1e12])
 def test_light_of_1e8_full_wells_saturates_and_nothing_more(full_well_e):
     raw = expose(camera(full_well_e=full_well_e, prnu=0.01), 1e8 * full_well_e, (4, 4))
     np.testing.assert_array_equal(raw.dn, raw.white_dn)
@@ -163,7 +164,7 @@ def test_a_dark_current_that_fills_the_well_saturates_without_light():
 # The converter
 
 
-@pytest.mark.parametrize("bits", [1, 2, 10, 16])
+@loop("bits", [1, 2, 10, 16])
 def test_a_converter_gives_whole_numbers_from_0_to_its_top(bits):
     sensor = camera(bits, black_level_dn=0.0, full_well_e=4e4, read_noise_e=1e3)
     ramp = np.linspace(0, 8e4, 256 * 256).reshape(256, 256)
@@ -214,7 +215,7 @@ def test_two_runs_are_equal_and_two_exposures_differ():
     assert np.mean(frames[0].dn == frames[1].dn) < 0.1
 
 
-@pytest.mark.parametrize("shape", [(2, 64), (10, 64), (10, 20), (63, 3)])
+@loop("shape", [(2, 64), (10, 64), (10, 20), (63, 3)])
 def test_a_crop_reads_as_the_full_frame_does_there(shape):
     sensor = camera(**NOISY)
     device = draw_device(sensor, (64, 64), rng(1))
@@ -359,14 +360,14 @@ def refusal(*arguments):
     return message
 
 
-@pytest.mark.parametrize("exposure_s", [-0.01, np.nan, np.inf])
+@loop("exposure_s", [-0.01, np.nan, np.inf])
 def test_an_exposure_that_cannot_be_is_refused(exposure_s):
     message = refusal(np.ones((4, 4)), camera(), even((4, 4)), exposure_s, rng())
     assert message.startswith(f"exposure_s: {exposure_s!r} is outside 0 to")
     assert "give seconds, 0 or more" in message
 
 
-@pytest.mark.parametrize("value", [np.nan, -1e-6, np.inf])
+@loop("value", [np.nan, -1e-6, np.inf])
 def test_electrons_that_cannot_be_are_refused_where_they_stand(value):
     light_e = np.ones((4, 6))
     light_e[2, 5] = value
@@ -381,7 +382,7 @@ def test_a_frame_of_another_size_than_the_chip_s_is_refused():
     assert "draw the device with the frame's shape" in message
 
 
-@pytest.mark.parametrize("generator", [0, None, np.random.RandomState(0)])
+@loop("generator", [0, None, np.random.RandomState(0)])
 def test_what_is_no_generator_is_refused(generator):
     message = refusal(np.ones((4, 4)), camera(), even((4, 4)), 0.01, generator)
     assert message.startswith("rng: ")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from loop import loop
 
 from sensor.readout import spread_charge
 
@@ -35,7 +36,7 @@ def test_the_total_is_kept_and_nothing_becomes_negative(height, width, crosstalk
     assert spread.sum() == pytest.approx(light.sum(), rel=1e-13)
 
 
-@pytest.mark.parametrize("crosstalk", [0.0, 0.05, 0.25])
+@loop("crosstalk", [0.0, 0.05, 0.25])
 def test_a_flat_field_stays_flat(crosstalk):
     np.testing.assert_allclose(spread_charge(np.full((4, 5), 7.0), crosstalk), 7.0, rtol=1e-15)
 

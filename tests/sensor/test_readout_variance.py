@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
@@ -24,7 +25,7 @@ def variance(light_e, exposure_s=0.1, **pixel):
     return total - sensor.gain_e_per_dn**2 / 12
 
 
-@pytest.mark.parametrize(
+@loop(
     ("pixel", "expected"),
     [
         ({}, 100.0),
@@ -64,7 +65,7 @@ def test_crosstalk_spreads_the_shot_noise_as_it_spreads_the_charge():
     np.testing.assert_allclose(noise_variance(light, sensor, 0.1), expected, rtol=1e-14)
 
 
-@pytest.mark.parametrize("light_e", [0.0, 400.0, 20_000.0])
+@loop("light_e", [0.0, 400.0, 20_000.0])
 def test_pixels_of_chips_drawn_at_random_have_the_stated_variance(light_e):
     sensor = camera(
         read_noise_e=3.0,

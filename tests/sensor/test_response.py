@@ -5,6 +5,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.radiance import SpectralRadiance
 from render.spectrum import flat
@@ -40,7 +41,7 @@ def expected(radiance, sensor, exposure_s):
     return expected_electrons(form_image(radiance, sensor), sensor, exposure_s)
 
 
-@pytest.mark.parametrize("tile", [RGBW, BAYER])
+@loop("tile", [RGBW, BAYER])
 def test_a_uniform_scene_gives_each_letter_its_closed_form(tile):
     sensor = camera(cfa=tile)
     electrons = expected(uniform(2e-3, 550.0, width_nm=10.0), sensor, 0.02)
@@ -66,7 +67,7 @@ def test_the_prnu_and_the_dark_current_of_the_camera_do_not_enter():
     np.testing.assert_array_equal(expected(scene, noisy, 0.1), expected(scene, camera(), 0.1))
 
 
-@pytest.mark.parametrize("factor", [0.0, 0.25, 1.0, 64.0])
+@loop("factor", [0.0, 0.25, 1.0, 64.0])
 def test_electrons_are_linear_in_exposure(factor):
     scene = uniform(1e-3, np.arange(405.0, 700.0, 10.0))
     np.testing.assert_allclose(
@@ -74,7 +75,7 @@ def test_electrons_are_linear_in_exposure(factor):
     )
 
 
-@pytest.mark.parametrize("factor", [0.5, 2.0, 3.0])
+@loop("factor", [0.5, 2.0, 3.0])
 def test_electrons_are_quadratic_in_pitch_and_linear_in_fill_factor(factor):
     scene, plain = uniform(1e-3, [500.0, 510.0]), camera()
     wider = camera(pixel=replace(PIXEL, pitch_um=3.0 * factor))
@@ -83,7 +84,7 @@ def test_electrons_are_quadratic_in_pitch_and_linear_in_fill_factor(factor):
     np.testing.assert_allclose(expected(scene, fuller, 0.1), factor / 2 * expected(scene, plain, 0.1), rtol=1e-13)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("centre_nm", "width_nm", "inside"),
     [
         (550.0, 10.0, 1.0),
@@ -142,7 +143,7 @@ def test_memory_order_of_the_bands_does_not_matter():
     np.testing.assert_allclose(first, second, rtol=1e-13)
 
 
-@pytest.mark.parametrize("exposure_s", [-1e-3, np.nan, np.inf])
+@loop("exposure_s", [-1e-3, np.nan, np.inf])
 def test_an_exposure_that_cannot_be_is_refused(exposure_s):
     with pytest.raises(InputError, match=r"exposure_s: .* is outside 0 to .*; give seconds, 0 or more") as error:
         expected(uniform(1e-3, [500.0, 510.0]), camera(), exposure_s)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.radiance import SpectralRadiance
 from render.spectrum import flat
@@ -41,7 +42,7 @@ def test_an_even_response_loses_the_photons_of_what_is_left_out():
         assert lost_shares(even, *bands(radiance)) == pytest.approx(dict.fromkeys("RGBW", expected), abs=1e-6)
 
 
-@pytest.mark.parametrize(("low_nm", "high_nm"), [(380, 650), (450, 650), (400, 700)])
+@loop(("low_nm", "high_nm"), [(380, 650), (450, 650), (400, 700)])
 @pytest.mark.filterwarnings("ignore:radiance")
 def test_the_shares_are_what_the_electrons_of_equal_energy_light_lose(low_nm, high_nm):
     whole, cut = (
@@ -65,7 +66,7 @@ DOORS = {
 }
 
 
-@pytest.mark.parametrize("door", DOORS)
+@loop("door", DOORS)
 def test_each_door_tells_what_every_channel_loses(door):
     told = (
         r"^radiance: its bands, 450 to 650 nm, don't fill the camera's window, 380 to 780 nm; of light of equal energy "
@@ -76,13 +77,13 @@ def test_each_door_tells_what_every_channel_loses(door):
         DOORS[door](equal_energy(450, 650))
 
 
-@pytest.mark.parametrize("door", DOORS)
+@loop("door", DOORS)
 def test_more_than_half_of_a_channel_is_refused(door):
     with pytest.raises(InputError, match=r"540 to 780 nm, don't fill .* 9\d\.\d% of B, .*; allowed: half; give those"):
         DOORS[door](equal_energy(540, 780))
 
 
-@pytest.mark.parametrize("radiance", [equal_energy(380, 780), equal_energy(385, 785), equal_energy(300, 1100, 50.0)])
+@loop("radiance", [equal_energy(380, 780), equal_energy(385, 785), equal_energy(300, 1100, 50.0)])
 def test_a_picture_that_fills_the_window_but_for_half_a_per_cent_is_taken_silently(radiance):
     for door in DOORS.values():
         door(radiance)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loop import loop
 
 from isp.colour.colour_fit import fit_matrix
 from isp.colour.white_balance import neutral_response
@@ -57,7 +58,7 @@ def test_a_matched_density_gives_w_greens_electrons() -> None:
         assert neutral_density(rgbw()).curves[channel] is rgbw().curves[channel]
 
 
-@pytest.mark.parametrize("name", [*MOSAICS, *VARIATIONS])
+@loop("name", [*MOSAICS, *VARIATIONS])
 def test_a_varied_camera_keeps_everything_but_mosaic_and_filters(name: str) -> None:
     camera = preset("low_noise")
     other = vary(camera, name)
@@ -77,7 +78,7 @@ def test_variations_are_named_by_what_they_change() -> None:
     assert vary(preset("low_noise"), "rccc").responses.curves["C"] is rgbw().curves["W"]
 
 
-@pytest.mark.parametrize("binning", ["charge", "digital"])
+@loop("binning", ["charge", "digital"])
 def test_a_camera_that_bins_shows_no_quad(binning: str) -> None:
     camera = binned(preset("low_noise", "quad_bayer"), binning)
     assert vary(camera, "rgbw").cfa == MOSAICS["rgbw"]
@@ -104,7 +105,7 @@ def test_what_cannot_be_made_is_refused() -> None:
 SENSORS = Path(new_command.__file__).parents[1] / "configs" / "sensors"
 
 
-@pytest.mark.parametrize(("name", "factor"), [("narrow", 0.5), ("wide", 2.0)])
+@loop(("name", "factor"), [("narrow", 0.5), ("wide", 2.0)])
 def test_narrow_and_wide_curves_keep_their_peaks_and_gather_by_the_factor(name: str, factor: float) -> None:
     fine = np.arange(385.5, 780.0)
     own, other = (

@@ -11,6 +11,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from loop import loop
 
 from sensor.burst import merge, merged_raw, merged_sensor
 from sensor.cfa import MOSAICS
@@ -127,8 +128,8 @@ def test_a_bracket_and_a_burst_have_the_variance_that_their_merge_says(names):
         assert_variance(burst.electrons, whole, (names, "merged_sensor"))
 
 
-@pytest.mark.parametrize("kind", ["one reading", "charge", "digital", "gains"])
-@pytest.mark.parametrize("share", [0.2, 0.6])
+@loop("kind", ["one reading", "charge", "digital", "gains"])
+@loop("share", [0.2, 0.6])
 def test_light_for_an_snr_leaves_dark_current_its_room_in_the_well(kind, share):
     """Dark current fills a share of the well: an SNR has its light just where a frame of that light isn't full."""
     per_site = share * WELL_E / TIME_S / camera(kind).chip.sites ** 2

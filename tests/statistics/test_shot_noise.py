@@ -7,6 +7,7 @@ keys. The keys are fixed.
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy import stats
 
 from sensor.chip import PixelConfig
@@ -83,14 +84,14 @@ def test_dns_have_the_exact_mean_and_variance(mean_e, gain_e_per_dn, read_noise_
     assert_moments(frame(mean_e, sensor, seed), exact_probabilities(mean_e, sensor))
 
 
-@pytest.mark.parametrize("mean_e", [0.3, 1.0, 10.0, 24.0])
+@loop("mean_e", [0.3, 1.0, 10.0, 24.0])
 def test_clipping_at_0_without_a_pedestal_has_its_exact_moments_too(mean_e):
     sensor = camera(1.7, 3.0, black_level_dn=0.0)
     assert_moments(frame(mean_e, sensor, 11), exact_probabilities(mean_e, sensor))
 
 
-@pytest.mark.parametrize("read_noise_e", [0.0, 3.0])
-@pytest.mark.parametrize("mean_e", [90.0, 100.0, 110.0])
+@loop("read_noise_e", [0.0, 3.0])
+@loop("mean_e", [90.0, 100.0, 110.0])
 def test_a_well_that_clips_in_the_midst_of_the_distribution_has_its_exact_moments(mean_e, read_noise_e):
     pixel = PixelConfig(2.2, 0.9, 100.0, read_noise_e, dsnu_e=0.0, prnu=0.0)
     sensor = SensorConfig(pixel, LensConfig(2.8), bits=10, black_level_dn=60)
@@ -107,7 +108,7 @@ def test_one_bit_and_sixteen_bits_have_their_exact_moments(mean_e, read_noise_e,
     assert_moments(frame(mean_e, sensor, 13), exact_probabilities(mean_e, sensor))
 
 
-@pytest.mark.parametrize("mean_e", MEANS_E)
+@loop("mean_e", MEANS_E)
 def test_without_read_noise_dns_lie_on_the_lattice_of_whole_electrons(mean_e):
     sensor = camera(0.31, 0.0)
     dn = frame(mean_e, sensor, 14)

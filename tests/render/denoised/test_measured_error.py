@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.denoised.relight import measured_error
 
@@ -44,7 +45,7 @@ def test_a_single_pixel_has_no_limit() -> None:
     assert measured_error(*np.ones((3, 1, 1))).upper == np.inf
 
 
-@pytest.mark.parametrize("bias", [0.0, 0.3])
+@loop("bias", [0.0, 0.3])
 def test_known_bias_and_noise_are_recovered(bias: float) -> None:
     """A picture with a smooth bias and its own noise, folds of four times its variance; 400 frames.
 

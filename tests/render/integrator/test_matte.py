@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.integrator.matte import with_matte_surfaces
 from render.integrator.reflectance_table import TableReader, reflectance_table, with_rows
@@ -29,7 +30,7 @@ def situation():
     return si, mi.Vector3f(*directions[1].astype(np.float32)), mi.Point2f(*rng.random((2, COUNT)).astype(np.float32))
 
 
-@pytest.mark.parametrize("stock", [DIFFUSE, TWOSIDED], ids=["one side", "two sides"])
+@loop("stock", [DIFFUSE, TWOSIDED])
 def test_value_density_and_sample_are_those_of_mitsuba(stock, situation):
     mi, (si, wo, numbers) = mitsuba_module(), situation
     own, other = mi.load_dict(with_matte_surfaces({"bsdf": stock})["bsdf"]), mi.load_dict(stock)
@@ -49,7 +50,7 @@ def test_value_density_and_sample_are_those_of_mitsuba(stock, situation):
         assert np.array_equal(own_part, other_part), part
 
 
-@pytest.mark.parametrize("stock", [DIFFUSE, TWOSIDED], ids=["one side", "two sides"])
+@loop("stock", [DIFFUSE, TWOSIDED])
 def test_all_bands_at_once_are_the_bands_one_by_one(stock, situation):
     mi, (si, wo, numbers) = mitsuba_module(), situation
     own, context = mi.load_dict(with_matte_surfaces({"bsdf": stock})["bsdf"]), mi.BSDFContext()
@@ -101,7 +102,7 @@ def test_lambertian_surfaces_become_it_wherever_they_stand():
     assert scene["ball"]["skin"] is DIFFUSE
 
 
-@pytest.mark.parametrize(
+@loop(
     "node",
     [
         {"type": "diffuse"},  # Mitsuba's default reflectance

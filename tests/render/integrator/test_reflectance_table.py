@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy.stats import norm
 
 from render import loader
@@ -24,7 +25,7 @@ def matte(reflectance):
     return {"type": "matte", "reflectance": reflectance, "twosided": True}
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2**32 - 1])
+@loop("seed", [0, 1, 2**32 - 1])
 def test_each_step_has_a_place_in_its_own_part_of_the_band_and_their_mean_is_the_centre(seed):
     offsets = band_offsets(seed)
     assert offsets.shape == (STEPS,)
@@ -85,7 +86,7 @@ def test_uneven_tables_get_rows_as_even_ones_do():
     assert other.wavelength_nm.size == 81
 
 
-@pytest.mark.parametrize(
+@loop(
     "reflectance",
     [
         uniform_node(0.0),

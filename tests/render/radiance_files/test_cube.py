@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy.io import savemat
 
 from render.illuminants import illuminant
@@ -77,8 +78,8 @@ def test_a_mat_file_is_read_by_the_names_that_its_description_gives(tmp_path: Pa
     assert "an ISETCam scene" in told(lambda: load_radiance(tmp_path / "desk.mat"))
 
 
-@pytest.mark.parametrize("order", ["bsq", "bil", "bip"])
-@pytest.mark.parametrize(("kind", "dtype", "big"), [(4, "<f4", 0), (5, ">f8", 1), (12, ">u2", 1), (2, "<i2", 0)])
+@loop("order", ["bsq", "bil", "bip"])
+@loop(("kind", "dtype", "big"), [(4, "<f4", 0), (5, ">f8", 1), (12, ">u2", 1), (2, "<i2", 0)])
 def test_envis_interleaves_types_and_byte_orders(order: str, kind: int, dtype: str, big: int, tmp_path: Path) -> None:
     axes = {"bsq": (2, 0, 1), "bil": (0, 2, 1), "bip": (0, 1, 2)}[order]
     whole = dtype[1] in "iu"
@@ -110,7 +111,7 @@ def test_reflectances_are_lit_by_any_light_and_white_has_100_cd_m2(tmp_path: Pat
     assert extent_of(path)[0] > 0
 
 
-@pytest.mark.parametrize(
+@loop(
     ("cube", "text", "words"),
     [
         (CUBE, "", "holds is missing; add it, or give holds and wavelength_nm"),
@@ -158,7 +159,7 @@ def test_files_that_are_none_are_refused_in_one_line(tmp_path: Path) -> None:
     assert "nothing says what it holds; allowed: desk.toml beside it" in told(lambda: load_radiance(path))
 
 
-@pytest.mark.parametrize(
+@loop(
     ("changes", "words"),
     [
         ({"kind": 6}, "data type 6"),

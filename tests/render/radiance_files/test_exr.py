@@ -10,6 +10,7 @@ import OpenEXR
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loop import loop
 
 from render.loader import mitsuba_module
 from render.radiance import SpectralRadiance
@@ -48,7 +49,7 @@ def layout_of(path: Path) -> tuple[list[str], dict[str, Any], dict[str, np.ndarr
     return names, part.header, {name: channel.pixels for name, channel in part.channels.items()}
 
 
-@pytest.mark.parametrize(("height", "width", "bands"), [(5, 7, 4), (1, 1, 1), (1, 33, 2), (37, 1, 3), (6, 5, 401)])
+@loop(("height", "width", "bands"), [(5, 7, 4), (1, 1, 1), (1, 33, 2), (37, 1, 3), (6, 5, 401)])
 def test_float32_radiance_reads_back_bit_by_bit(tmp_path: Path, height: int, width: int, bands: int) -> None:
     path, radiance = tmp_path / "a.exr", picture(height, width, bands)
     write_exr(radiance, path)
@@ -103,7 +104,7 @@ def test_preview_is_linear_srgb_over_the_luminance_that_the_header_states(tmp_pa
     assert rgb == pytest.approx([0.9 * 1.2048, 0.9 * 0.9484, 0.9 * 0.9087], rel=1e-3)
 
 
-@pytest.mark.parametrize("value", [0.0, 1e-44, 1e34])
+@loop("value", [0.0, 1e-44, 1e34])
 def test_preview_stays_finite_at_both_ends_of_float32(tmp_path: Path, value: float) -> None:
     values = np.full((20, 20, 40), value)
     values[0, :2] = [[0.0], [1e36]]
@@ -113,7 +114,7 @@ def test_preview_stays_finite_at_both_ends_of_float32(tmp_path: Path, value: flo
     assert all(np.isfinite(pixels[name]).all() and (pixels[name] >= 0).all() for name in "RGB")
 
 
-@pytest.mark.parametrize(
+@loop(
     ("values", "nm", "told"),
     [
         (np.full((1, 1, 1), 1e39), [500.0], "float32"),
@@ -204,7 +205,7 @@ def test_the_authors_own_file_of_d65_is_read(samples: Path) -> None:
     assert read.luminance()[0, 0] == pytest.approx(683 * 10567, rel=5e-4)
 
 
-@pytest.mark.parametrize("name", ["Ohta1997.exr", "BiSpectral.exr"])
+@loop("name", ["Ohta1997.exr", "BiSpectral.exr"])
 def test_reflectances_of_the_authors_and_colour_science_are_refused(samples: Path, name: str) -> None:
     with pytest.raises(InputError, match="reflectances"):
         read_exr(samples / name)
@@ -221,7 +222,7 @@ def test_channels_in_any_order_and_unit_are_put_in_the_order_of_wavelength(tmp_p
     assert read.relative_mc_error == 0
 
 
-@pytest.mark.parametrize(
+@loop(
     ("name", "nm"),
     [
         ("S0.550nm", 550.0),
@@ -240,10 +241,8 @@ def test_wavelength_of_a_channel_name(name: str, nm: float) -> None:
     assert list(radiance_channels([name]).values()) == [pytest.approx(nm, rel=1e-12)]
 
 
-@pytest.mark.parametrize(
-    "compression", ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "DWAA"], ids=lambda name: f"{name}_COMPRESSION"
-)
-@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+@loop("compression", ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "DWAA"])
+@loop("dtype", [np.float16, np.float32])
 def test_half_and_float_are_read_in_every_compression(tmp_path: Path, compression: str, dtype: Any) -> None:
     channels = {f"S0.{400 + 10 * k}nm": plane(k / 4, (20, 18), dtype) for k in range(5)}
     kind = getattr(OpenEXR, f"{compression}_COMPRESSION")
@@ -266,7 +265,7 @@ def test_tiled_files_and_windows_off_the_origin_are_read(tmp_path: Path) -> None
     assert np.array_equal(read.values[:, :, 1], values + 1)
 
 
-@pytest.mark.parametrize(("tile", "read"), [((4096, 2048), True), ((4096, 2049), False), ((1, 1 << 23 | 1), False)])
+@loop(("tile", "read"), [((4096, 2048), True), ((4096, 2049), False), ((1, 1 << 23 | 1), False)])
 def test_a_tile_far_larger_than_the_picture_is_refused(tmp_path: Path, tile: tuple[int, int], read: bool) -> None:
     path = write_by_hand(
         tmp_path / "a.exr",
@@ -306,7 +305,7 @@ def test_a_camera_that_the_file_describes_is_told_to_be_left_in(tmp_path: Path) 
         read_exr(write_by_hand(tmp_path / "a.exr", channels, lensTransmission="400nm:0.9;700nm:0.9"))
 
 
-@pytest.mark.parametrize("bands", ["400.0:10.0", "400.0:10.0;410.0:-1", "400:10;411:10", "nonsense", ""])
+@loop("bands", ["400.0:10.0", "400.0:10.0;410.0:-1", "400:10;411:10", "nonsense", ""])
 def test_band_attribute_that_does_not_fit_is_left_aside_and_told(tmp_path: Path, bands: str) -> None:
     channels = {channel_name(nm): plane(1) for nm in (400, 410)}
     path = write_by_hand(tmp_path / "a.exr", channels, rodconeBands_nm=bands)
@@ -321,7 +320,7 @@ def test_one_band_of_unknown_width_is_refused(tmp_path: Path) -> None:
     assert read_bands({channel_name(550): 550.0}, {"rodconeBands_nm": "550.0:25.0"})[1].tolist() == [25]
 
 
-@pytest.mark.parametrize(
+@loop(
     ("channels", "attributes", "told"),
     [
         ({"T.500nm": 1, "T.510nm": 1}, {}, "reflectance"),
@@ -388,7 +387,7 @@ def test_deep_data_is_refused(tmp_path: Path) -> None:
         read_exr(path)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("content", "told"),
     [
         (b"", "no OpenEXR file"),
@@ -404,7 +403,7 @@ def test_what_is_no_openexr_file_is_refused(tmp_path: Path, content: bytes, told
         read_exr(path)
 
 
-@pytest.mark.parametrize("name", ["missing.exr", "."])
+@loop("name", ["missing.exr", "."])
 def test_missing_file_and_folder_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match="no such file"):
         read_exr(tmp_path / name)
@@ -457,7 +456,7 @@ def with_window(content: bytes, right: int, bottom: int) -> bytes:
     return content
 
 
-@pytest.mark.parametrize(
+@loop(
     ("right", "bottom", "told"),
     [(32768, 8, "32769 pixels"), (39, 1 << 20, "1048577 x 40"), (32767, 32767, "bytes"), (1999, 1999, "can't hold")],
 )
@@ -507,7 +506,7 @@ def test_true_units_are_per_nanometre(tmp_path: Path) -> None:
     assert read_exr(tmp_path / "a.exr").luminance()[0, 0] == pytest.approx(68.3, rel=2e-3)
 
 
-@pytest.mark.parametrize(("count", "read"), [(4096, True), (4097, False)])
+@loop(("count", "read"), [(4096, True), (4097, False)])
 def test_channels_are_read_up_to_a_number_that_takes_no_time(count: int, read: bool, tmp_path: Path) -> None:
     """OpenEXR takes 0.6 s for the header of 16 000 channels and 2.8 s for that of 30 000, longer for their pixels."""
     header = {"compression": OpenEXR.NO_COMPRESSION, "type": OpenEXR.scanlineimage, "emissiveUnits": "W.m^-2.sr^-1"}

@@ -9,6 +9,7 @@ import pytest
 import scipy.io
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from loop import loop
 
 from render.radiance_files.iset import read_iset_scene
 from rodcone.errors import InputError
@@ -127,7 +128,7 @@ def test_a_few_photons_below_zero_become_zero_and_are_told_in_every_form(
     assert read.values == pytest.approx(np.maximum(photons, 0) * JOULE, rel=6e-7)
 
 
-@pytest.mark.parametrize("form", ["struct", "photons"])
+@loop("form", ["struct", "photons"])
 def test_stored_photons_of_which_over_a_hundredth_is_below_zero_are_refused(form: str, tmp_path: Path) -> None:
     photons = PHOTONS.copy()
     photons.flat[100:110] = -1e9  # 10 of 930 are 1.08 %

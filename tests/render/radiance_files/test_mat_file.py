@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.io
+from loop import loop
 
 from render.radiance_files import mat_file, mat_reader
 from render.radiance_files.mat_file import read_numbers
@@ -45,7 +46,7 @@ def file_of(path: Path, *elements: bytes, order: str = "<") -> Path:
     return path
 
 
-@pytest.mark.parametrize("compressed", [False, True])
+@loop("compressed", [False, True])
 def test_numbers_are_read_as_they_were_written_and_nothing_else(tmp_path: Path, compressed: bool) -> None:
     path = tmp_path / "a.mat"
     scipy.io.savemat(path, VARIABLES, do_compression=compressed)
@@ -59,13 +60,12 @@ def test_numbers_are_read_as_they_were_written_and_nothing_else(tmp_path: Path, 
     assert read["scene/spectrum/wave"].ravel().tolist() == [0, 1, 2]
 
 
-@pytest.mark.parametrize(
+@loop(
     ("order", "content", "numbers"),
     [
         ("<", matrix(6, (2, 2), 2, bytes([1, 2, 3, 4])), [[1.0, 3.0], [2.0, 4.0]]),  # columns first
         (">", matrix(6, (1, 2), 9, np.array([1.5, -2.0], ">f8").tobytes(), ">"), [[1.5, -2.0]]),
     ],
-    ids=["doubles stored as bytes", "big endian"],
 )
 def test_every_form_of_a_double_is_read(tmp_path: Path, order: str, content: bytes, numbers: list[Any]) -> None:
     """MATLAB stores whole doubles in the smallest type that holds them."""
@@ -91,7 +91,7 @@ def test_damaged_files_are_refused_in_one_line(tmp_path: Path, content: bytes) -
     assert str(refused.value).startswith(f"{path}: ")
 
 
-@pytest.mark.parametrize(
+@loop(
     ("end", "told"),
     [
         ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "it ended the reader by signal 11"),

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
+from loop import loop
 
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
@@ -48,7 +49,7 @@ def test_spectrum_of_the_group_is_a_factor() -> None:
     assert relit.values == pytest.approx(VALUES * light.band_average(NM, WIDTHS), rel=1e-6)
 
 
-@pytest.mark.parametrize("error", [0.0, 0.02])
+@loop("error", [0.0, 0.02])
 def test_error_of_an_even_picture_is_what_the_file_states(error: float) -> None:
     picture = SpectralRadiance(np.full((6, 5, 4), 3e-5), NM, error, WIDTHS)
     assert as_transport(picture).relight().relative_mc_error == pytest.approx(error, rel=1e-5)

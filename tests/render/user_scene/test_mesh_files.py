@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.user_scene.mesh_files import check_mesh_file
 from render.user_scene.scene_file import load_scene_file
@@ -46,7 +47,7 @@ def serialized(folder: Path, version: int, *faces: tuple[int, ...], flags: int =
     return path
 
 
-@pytest.mark.parametrize("layout", ["ascii", "binary_little_endian", "binary_big_endian"])
+@loop("layout", ["ascii", "binary_little_endian", "binary_big_endian"])
 def test_a_ply_face_names_vertices_that_are_there(layout: str, tmp_path: Path) -> None:
     check_mesh_file("ply", ply(tmp_path, layout, (0, 1, 2), (2, 1, 0)))
     for index in (3, 99_999_999, -5):
@@ -56,14 +57,14 @@ def test_a_ply_face_names_vertices_that_are_there(layout: str, tmp_path: Path) -
         check_mesh_file("ply", ply(tmp_path, layout, (0, 1, 2, 0)))
 
 
-@pytest.mark.parametrize(("version", "flags"), [(4, 0x1000), (4, 0x2001), (3, 0x1000)])
+@loop(("version", "flags"), [(4, 0x1000), (4, 0x2001), (3, 0x1000)])
 def test_a_serialized_face_names_vertices_that_are_there(version: int, flags: int, tmp_path: Path) -> None:
     check_mesh_file("serialized", serialized(tmp_path, version, (0, 1, 2), flags=flags))
     with pytest.raises(InputError, match="face 1 names vertex 3; allowed: 0 to 2"):
         check_mesh_file("serialized", serialized(tmp_path, version, (0, 1, 2), (0, 1, 3), flags=flags))
 
 
-@pytest.mark.parametrize("kind", ["ply", "serialized"])
+@loop("kind", ["ply", "serialized"])
 def test_a_file_cut_anywhere_is_refused_or_passes(kind: str, tmp_path: Path) -> None:
     path = ply(tmp_path, "ascii", (0, 1, 2)) if kind == "ply" else serialized(tmp_path, 4, (0, 1, 2))
     content = path.read_bytes()

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from loop import loop
 from PIL import Image
 
 from render.engine import render
@@ -116,7 +117,7 @@ FORMS = {
 }
 
 
-@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+@loop("form", FORMS.values())
 def test_spectrum_of_a_light_is_what_stock_mitsuba_emits(form: str, tmp_path: Path) -> None:
     lamp = f'<shape type="rectangle"><emitter type="area" id="lamp">{form.format("radiance")}</emitter></shape>'
     path = write(tmp_path, CAMERA, lamp)
@@ -282,7 +283,7 @@ def test_what_the_engine_brings_itself_is_left_out_and_told(tmp_path: Path) -> N
 PATH_OF_3 = '<integrator type="path"><integer name="max_depth" value="3"/></integrator>'
 
 
-@pytest.mark.parametrize(
+@loop(
     ("integrator", "depth"),
     [
         ("", 8),
@@ -292,13 +293,12 @@ PATH_OF_3 = '<integrator type="path"><integer name="max_depth" value="3"/></inte
         ('<integrator type="direct"/>', 2),
         (f'<integrator type="aov">{PATH_OF_3}</integrator>', 3),
     ],
-    ids=["none", "path", "infinite", "stated", "direct", "inside another"],
 )
 def test_paths_are_as_long_as_the_file_states(integrator: str, depth: int, tmp_path: Path) -> None:
     assert load_scene_file(write(tmp_path, integrator, CAMERA, SUN)).scene.max_depth == depth
 
 
-@pytest.mark.parametrize(("stated", "first"), [("", 5), ("2", 2), ("1000000000", 65536)])
+@loop(("stated", "first"), [("", 5), ("2", 2), ("1000000000", 65536)])
 def test_roulette_begins_where_the_file_states(stated: str, first: int, tmp_path: Path) -> None:
     value = f'<integer name="rr_depth" value="{stated}"/>' if stated else ""
     opened = load_scene_file(write(tmp_path, f'<integrator type="volpath">{value}</integrator>', CAMERA, SUN))
@@ -348,7 +348,7 @@ def test_a_cameras_film_and_sampler_may_stand_beside_it(tmp_path: Path) -> None:
     assert set(opened.scene.geometry["sensor"]) == {"type", "id", "fov", "to_world"}
 
 
-@pytest.mark.parametrize("kind", ["distant", "radiancemeter", "batch", "irradiancemeter"])
+@loop("kind", ["distant", "radiancemeter", "batch", "irradiancemeter"])
 def test_the_first_camera_that_can_be_rendered_is_taken(kind: str, tmp_path: Path) -> None:
     other = CAMERA.replace("perspective", kind).replace('id="camera"', 'id="other"').replace('value="8"', 'value="80"')
     opened = load_scene_file(write(tmp_path, other, CAMERA.replace("perspective", "orthographic"), SUN))
@@ -499,7 +499,7 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("parts", "words"), REFUSED.values(), ids=REFUSED)
+@loop(("parts", "words"), REFUSED.values())
 def test_what_cannot_be_rendered_is_refused_with_place_and_fix(
     parts: list[str], words: list[str], tmp_path: Path
 ) -> None:
@@ -523,7 +523,7 @@ SIGNED = {
 }
 
 
-@pytest.mark.parametrize(("name", "part"), [*NUMBERS.items(), *SIGNED.items()])
+@loop(("name", "part"), [*NUMBERS.items(), *SIGNED.items()])
 def test_numbers_that_are_none_or_below_0_are_refused_by_name(name: str, part: str, tmp_path: Path) -> None:
     wrong = ("nan", "inf") if name in SIGNED else ("nan", "inf", "-1")
     for number in wrong:
@@ -629,7 +629,7 @@ def test_a_stock_name_never_loads_a_file_beside_the_scene(tmp_path: Path, monkey
 
 
 @pytest.mark.usefixtures("nothing_is_loaded")
-@pytest.mark.parametrize(
+@loop(
     "part",
     [
         '<shape type="ply"><string name="filename" value="{0}"/></shape>',
@@ -637,7 +637,6 @@ def test_a_stock_name_never_loads_a_file_beside_the_scene(tmp_path: Path, monkey
         '<bsdf type="diffuse"><spectrum name="reflectance" filename="{0}"/></bsdf>',
         '<include filename="{0}"/>',
     ],
-    ids=["mesh", "envmap", "spectrum", "include"],
 )
 def test_files_outside_the_scenes_folder_are_refused_unread(part: str, tmp_path: Path) -> None:
     secret = tmp_path / "secret.spd"

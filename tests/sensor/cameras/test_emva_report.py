@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loop import loop
 
 from rodcone.errors import InputError
 from sensor.cameras.emva_report import clip_over_saturation, numbers_of, read_report
@@ -101,7 +102,7 @@ def test_the_clip_is_where_the_variance_of_clipped_pixels_is_greatest_at_the_sat
     assert clip > saturation
 
 
-@pytest.mark.parametrize("path", REPORTS, ids=lambda path: path.stem)
+@loop("path", REPORTS)
 def test_a_shipped_report_reads_has_source_and_date_and_gives_a_pixel(path):
     report = read_report(path)
     assert len(report.source) > 20
@@ -113,7 +114,7 @@ def test_five_makers_or_more_are_shipped():
     assert len({read_report(path).maker for path in REPORTS}) >= 5
 
 
-@pytest.mark.parametrize(
+@loop(
     ("text", "words"),
     [
         ("", "camera: None"),

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule
@@ -92,7 +93,7 @@ def test_a_camera_whose_channels_were_divided_each_by_its_own_maximum_is_told(li
     assert not measured_camera("Maker Alone").balanced
 
 
-@pytest.mark.parametrize(
+@loop(
     ("camera", "words"),
     [
         ("{", "can't be read"),
@@ -128,7 +129,7 @@ def test_a_folder_that_is_no_copy_and_one_that_holds_cameras_are_refused(tmp_pat
     assert [path.read_text() for path in (tmp_path / "thesis").iterdir()] == ["mine"]
 
 
-@pytest.mark.parametrize(
+@loop(
     "content",
     [
         b"",

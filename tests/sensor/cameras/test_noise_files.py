@@ -6,6 +6,7 @@ from math import sqrt
 import numpy as np
 import pytest
 from builders import raw_image
+from loop import loop
 
 from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
@@ -72,7 +73,7 @@ def test_a_profile_without_dark_noise_says_so(tmp_path):
     assert "not above 0" in numbers.left_out["read_noise_e"]
 
 
-@pytest.mark.parametrize(
+@loop(
     "content",
     [
         b"",
@@ -94,7 +95,7 @@ def test_a_hostile_file_is_refused_in_one_line(tmp_path, content):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("camera", "iso", "white", "words"),
     [
         ("Nikon D85", None, None, "did you mean 'Nikon D850'"),

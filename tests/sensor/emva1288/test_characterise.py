@@ -5,6 +5,7 @@ from math import hypot
 
 import numpy as np
 import pytest
+from loop import loop
 
 from rodcone.errors import InputError
 from sensor.cfa import MOSAICS
@@ -92,7 +93,7 @@ def test_under_the_rounding_the_dark_noise_is_told_to_be_hidden():
     assert not any("rounding" in note for note in characterise(SENSOR, (32, 32)).notes)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("arguments", "words"),
     [
         ({"shape": (8, 64)}, "height: 8"),
@@ -106,13 +107,12 @@ def test_what_cannot_be_measured_is_refused(arguments, words):
         characterise(SENSOR, **arguments)
 
 
-@pytest.mark.parametrize(
+@loop(
     "sensor",
     [
         SensorConfig(PixelConfig(2.2, 0.9, 15_000.0, 1.5, 1.0, 0.01), LensConfig(2.8), bits=1),
         SensorConfig(PixelConfig(2.2, 0.9, 10.0, 500.0, 1.0, 0.01), LensConfig(2.8)),
     ],
-    ids=["1 bit", "a well under the read noise"],
 )
 def test_a_camera_that_shows_no_shot_noise_is_refused_in_one_line_and_warns_of_nothing(sensor):
     with pytest.raises(InputError, match="shows no shot noise") as error:
@@ -164,7 +164,7 @@ def test_chips_without_a_fault_are_let_pass_in_20_chips():
     assert [wrong(run(CHIP, seed)) for seed in range(SEEDS)] == [set()] * SEEDS
 
 
-@pytest.mark.parametrize("exact", [False, True], ids=["engine", "exact"])
+@loop("exact", [False, True])
 def test_a_fault_of_5_per_cent_in_crosstalk_is_caught_by_lone_bright_pixels(exact):
     shape, neighbours = (512, 512), ((2, 1), (2, 3), (1, 2), (3, 2))
     light_e = np.zeros(shape)

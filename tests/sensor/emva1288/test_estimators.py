@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from loop import loop
 
 from rodcone.errors import InputError
 from sensor.emva1288 import estimators as emva
@@ -49,7 +50,7 @@ def test_the_gain_s_error_is_the_scatter_of_lines_with_chi_squared_variances():
     assert np.std(gains) == pytest.approx(np.mean(errors), rel=4 / np.sqrt(800))
 
 
-@pytest.mark.parametrize("variance", [4.0, 3.9])
+@loop("variance", [4.0, 3.9])
 def test_a_camera_whose_variance_does_not_grow_is_refused_in_one_line(variance):
     flat = Transfer(line().light_e, line().mean_dn, np.full(22, variance))
     with pytest.raises(InputError, match=r"gain: .*shows no shot noise.*give more bits") as error:
@@ -130,7 +131,7 @@ def test_dark_current_leaves_hot_pixels_out_and_tells_them():
     assert emva.dark_current(rng.normal(0, 1, (50, 50)), GAIN)[1:] == ((0.0, 0.0), (0.0, 0.0))
 
 
-@pytest.mark.parametrize("offset", [0.0, 0.3])
+@loop("offset", [0.0, 0.3])
 def test_what_is_absent_is_told_with_an_error_that_covers_it(offset):
     rng = np.random.default_rng(6)
     mean = 20 + offset + rng.normal(0, np.sqrt(4.0 / 16), SHAPE)  # what 16 frames leave of the temporal noise

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from loop import loop
 
 from rodcone.errors import InputError
 from sensor.capture import expose
@@ -104,7 +105,7 @@ def bad_frames():
     }
 
 
-@pytest.mark.parametrize("name", bad_frames())
+@loop("name", bad_frames())
 def test_frames_that_are_not_flat_or_not_frames_of_a_bench_are_refused_in_one_line(name):
     flats, darks, words = bad_frames()[name]
     with pytest.raises(InputError) as error:

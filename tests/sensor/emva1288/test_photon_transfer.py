@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 
 from sensor.emva1288.photon_transfer import bench, column_variance, dark_slopes, hot_pixels, take_stack, take_transfer
 from sensor.presets import preset
@@ -93,7 +94,7 @@ def test_a_bench_holds_one_chip_and_two_benches_of_one_seed_give_equal_frames():
     assert np.mean(frames[0] == frames[4]) < 0.2
 
 
-@pytest.mark.parametrize("exact", [False, True], ids=["engine", "exact"])
+@loop("exact", [False, True])
 def test_a_bench_of_another_seed_holds_another_chip(exact):
     still = replace(preset("low_noise").pixel, read_noise_e=0.0, dsnu_e=20.0)  # in the dark the pattern alone is read
     sensor = replace(preset("low_noise"), pixel=still)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy import stats
 
 from rodcone.device_arrays import divisor, tile_cell
@@ -16,7 +17,7 @@ def words(values):
     return arrays().UInt(np.ascontiguousarray(values, dtype=np.uint32))
 
 
-@pytest.mark.parametrize("key", [0, 0x0123456789ABCDEF, 2**64 - 1, 2**32, 2**31])
+@loop("key", [0, 0x0123456789ABCDEF, 2**64 - 1, 2**32, 2**31])
 def test_philox_is_the_numpy_form_s_word_for_word(key):
     counter = np.random.default_rng(key % 1000).integers(0, 2**32, (4, 257), dtype=np.uint64)
     counter[:, :2] = [[0, 2**32 - 1]] * 4
@@ -46,7 +47,7 @@ def test_both_normals_of_a_pair_are_standard_and_independent():
         assert abs(np.corrcoef(one, other)[0, 1]) < 4.5 / np.sqrt(1 << 18)
 
 
-@pytest.mark.parametrize(("width", "first"), [(1, 0), (7, 0), (7, 21), (4099, 4099 * 100_000)])
+@loop(("width", "first"), [(1, 0), (7, 0), (7, 21), (4099, 4099 * 100_000)])
 def test_each_pixel_takes_the_weights_of_its_own_cell(width, first):
     jit, count, tile_width = arrays(), 4200, 3
     cells = np.array([0, 1, 2, 1, 3, 0], dtype=np.uint32)  # two rows of three

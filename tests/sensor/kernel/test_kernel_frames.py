@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy import stats
 
 from rodcone.jit import backend, dr
@@ -57,9 +58,9 @@ def irradiance(shape, order="planar", dtype=np.float32, bands=NM.size):
     return values if order == "planar" else np.ascontiguousarray(values)
 
 
-@pytest.mark.parametrize("order", ["planar", "interleaved"])
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("mosaic", sorted(MOSAICS))
+@loop("order", ["planar", "interleaved"])
+@loop("dtype", [np.float32, np.float64])
+@loop("mosaic", sorted(MOSAICS))
 def test_expected_electrons_are_the_double_precision_ones_to_single_precision(mosaic, dtype, order):
     sensor = preset("low_noise", mosaic)
     image = SpectralIrradiance(irradiance((33, 50), order, dtype), NM, 2.2)
@@ -70,8 +71,8 @@ def test_expected_electrons_are_the_double_precision_ones_to_single_precision(mo
     np.testing.assert_allclose(made, exact, rtol=2e-6)
 
 
-@pytest.mark.parametrize("shape", [(2, 2), (3, 5), (16, 16), (64, 64), (61, 47)])
-@pytest.mark.parametrize("shift", [0, 1, 3, 4, 16])
+@loop("shape", [(2, 2), (3, 5), (16, 16), (64, 64), (61, 47)])
+@loop("shift", [0, 1, 3, 4, 16])
 def test_memory_of_any_alignment_gives_the_same_bits(shape, shift):
     memory = np.zeros(NM.size * shape[0] * shape[1] + 32, dtype=np.float32)
     planes = memory[shift : shift + NM.size * shape[0] * shape[1]].reshape(NM.size, *shape)
@@ -94,7 +95,7 @@ def test_read_only_memory_is_read_and_left_alone():
 # Shot noise
 
 
-@pytest.mark.parametrize("mean_e", [0.05, 0.3, 1.0, 10.0, 29.0, 31.0])
+@loop("mean_e", [0.05, 0.3, 1.0, 10.0, 29.0, 31.0])
 def test_counts_follow_the_exact_law(mean_e):
     counts = read(mean_e).ravel()
     low, high = int(stats.poisson.ppf(1e-5, mean_e)), int(stats.poisson.isf(1e-5, mean_e))
@@ -105,8 +106,8 @@ def test_counts_follow_the_exact_law(mean_e):
     assert stats.chisquare(inner, share / share.sum() * counts.size).pvalue > 1e-4
 
 
-@pytest.mark.parametrize("mean_e", [0.01, 0.05, 0.3, 1.0, 3.0, 10.0, 29.0, 31.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4])
-@pytest.mark.parametrize("gain_e_per_dn", [1.0, 1.7])
+@loop("mean_e", [0.01, 0.05, 0.3, 1.0, 3.0, 10.0, 29.0, 31.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4])
+@loop("gain_e_per_dn", [1.0, 1.7])
 def test_totals_and_variances_of_a_megapixel_are_the_exact_law_s_after_rounding(mean_e, gain_e_per_dn):
     sensor = COUNTS
     if gain_e_per_dn != 1:
@@ -206,7 +207,7 @@ def test_one_key_gives_one_frame_and_every_bit_of_a_key_another():
         assert np.mean(frames[0] == other) < 0.1
 
 
-@pytest.mark.parametrize("shape", [(1, 2), (10, 64), (10, 20), (63, 3)])
+@loop("shape", [(1, 2), (10, 64), (10, 20), (63, 3)])
 def test_a_crop_reads_as_the_full_frame_does_there(shape):
     sensor = replace(EVERY_TERM, pixel=replace(NOISY, crosstalk=0.0))  # crosstalk knows the frame's border
     device = draw_device(sensor, (64, 64), np.random.default_rng(1))
@@ -248,8 +249,8 @@ def test_inputs_are_left_as_they_were():
 # Ends of the range
 
 
-@pytest.mark.parametrize("full_well_e", [1.0, 1000.0, 1e12])
-@pytest.mark.parametrize("times", [1e8, np.inf])
+@loop("full_well_e", [1.0, 1000.0, 1e12])
+@loop("times", [1e8, np.inf])
 def test_light_of_1e8_full_wells_and_more_saturates_and_nothing_more(full_well_e, times):
     sensor = replace(COUNTS, pixel=replace(PIXEL, full_well_e=full_well_e, prnu=0.5))
     device = draw_device(sensor, (64, 64), np.random.default_rng(1))
@@ -259,8 +260,8 @@ def test_light_of_1e8_full_wells_and_more_saturates_and_nothing_more(full_well_e
     np.testing.assert_array_equal(dn[device.photo_response == 0], 0)  # and no infinity times nothing
 
 
-@pytest.mark.parametrize("crosstalk", [0.0, 0.1, 0.25])
-@pytest.mark.parametrize("light", [1e30, 1e300])
+@loop("crosstalk", [0.0, 0.1, 0.25])
+@loop("light", [1e30, 1e300])
 def test_light_beyond_single_precision_saturates_without_a_warning(light, crosstalk):
     sensor = replace(COUNTS, pixel=replace(COUNTS.pixel, crosstalk=crosstalk))
     weights = np.full((4, 3), 1e20)
@@ -273,7 +274,7 @@ def test_light_beyond_single_precision_saturates_without_a_warning(light, crosst
         np.testing.assert_array_equal(dn[::2, ::2], 0)
 
 
-@pytest.mark.parametrize("mean_e", [0.0, 1e-45, 1e-38, 1e-20])
+@loop("mean_e", [0.0, 1e-45, 1e-38, 1e-20])
 def test_no_light_and_the_smallest_numbers_read_black(mean_e):
     np.testing.assert_array_equal(read(mean_e, shape=(64, 64)), 0)
 
@@ -283,7 +284,7 @@ def test_a_dark_current_that_fills_the_well_saturates_without_light():
     np.testing.assert_array_equal(read(0.0, sensor, (4, 4), exposure_s=1e7), sensor.white_dn)
 
 
-@pytest.mark.parametrize("bits", [1, 2, 16])
+@loop("bits", [1, 2, 16])
 def test_a_converter_gives_whole_numbers_from_0_to_its_top_and_never_wraps(bits):
     sensor = SensorConfig(
         replace(PIXEL, full_well_e=4e4, read_noise_e=1e5), LensConfig(2.8), bits=bits, black_level_dn=0.0
@@ -292,7 +293,7 @@ def test_a_converter_gives_whole_numbers_from_0_to_its_top_and_never_wraps(bits)
     assert (dn.min(), dn.max()) == (0, 2**bits - 1)
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (5, 3)])
+@loop("shape", [(1, 1), (1, 7), (5, 3)])
 def test_one_pixel_and_odd_frames_are_read(shape):
     assert read(100.0, shape=shape).shape == shape
 

@@ -6,6 +6,7 @@ errors measured here are errors, not chance.
 
 import numpy as np
 import pytest
+from loop import loop
 from scipy import stats
 from scipy.special import ndtri
 
@@ -54,14 +55,14 @@ def test_the_tables_hold_the_exact_probabilities_of_every_whole_mean():
     assert 1e-11 < worst < TABLE_ERROR  # 25-bit shares are neither perfect nor worse than stated
 
 
-@pytest.mark.parametrize("mean_e", [1.0, 7.0, 12.0, 29.0])
+@loop("mean_e", [1.0, 7.0, 12.0, 29.0])
 def test_draws_of_whole_means_are_the_table_s(mean_e):
     words = (np.arange(STRATA, dtype=np.uint64) << 11).astype(np.uint32)
     # the second word is the fraction's: with none, it draws 0 whatever it is. Each of 128 bins ends within one step.
     assert distribution_error(draws(mean_e, words=(words, 123456789)), mean_e) < 128 / STRATA
 
 
-@pytest.mark.parametrize("mean_e", [1e-30, 1e-3, 0.05, 0.3, 0.999])
+@loop("mean_e", [1e-30, 1e-3, 0.05, 0.3, 0.999])
 def test_draws_of_means_under_one_invert_the_distribution_function(mean_e):
     words = (np.arange(STRATA, dtype=np.uint64) << 11).astype(np.uint32)
     assert distribution_error(draws(mean_e, words=(0, words)), np.float32(mean_e)) < 1.5 / STRATA
@@ -85,7 +86,7 @@ def test_a_mean_between_whole_ones_adds_both_parts():
     assert abs(counts.var() - 10.6) < 4 * np.sqrt((2 * 10.6**2 + 10.6) / n)
 
 
-@pytest.mark.parametrize("mean_e", [30.0, 31.7, 50.0, 100.0, 1e3, 3e4, 1e6])
+@loop("mean_e", [30.0, 31.7, 50.0, 100.0, 1e3, 3e4, 1e6])
 def test_from_30_electrons_on_the_largest_error_is_the_stated_one_at_the_foot(mean_e):
     error = distribution_error(draws(mean_e, normal=even_normals()), np.float32(mean_e))
     print(mean_e, error)
@@ -95,7 +96,7 @@ def test_from_30_electrons_on_the_largest_error_is_the_stated_one_at_the_foot(me
     assert LARGEST_ERROR < 1e-5
 
 
-@pytest.mark.parametrize("mean_e", [30.0, 47.5, 1e3, 3e4, 1e7])
+@loop("mean_e", [30.0, 47.5, 1e3, 3e4, 1e7])
 def test_mean_and_variance_of_large_draws_are_the_mean(mean_e):
     counts = draws(mean_e, normal=even_normals())
     # a tenth of the standard errors of a megapixel's mean and variance

@@ -13,6 +13,7 @@ import tifffile
 from builders import BAYER_PHASES, RGBW_PHASES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from loop import loop
 
 from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
@@ -74,8 +75,8 @@ def same(one: RawImage, other: RawImage) -> bool:
     return True
 
 
-@pytest.mark.parametrize("name", ["quad_bayer", "quad_rgbw"])
-@pytest.mark.parametrize("shape", [(24, 24), (31, 46)])
+@loop("name", ["quad_bayer", "quad_rgbw"])
+@loop("shape", [(24, 24), (31, 46)])
 def test_a_quad_mosaic_comes_back_bit_for_bit_and_its_tags_say_4x4(
     name: str, shape: tuple[int, int], tmp_path: Path
 ) -> None:
@@ -89,8 +90,8 @@ def test_a_quad_mosaic_comes_back_bit_for_bit_and_its_tags_say_4x4(
     assert pattern == bytes({"R": 0, "G": 1, "B": 2, "W": 6}[x] for row in MOSAICS[name] for x in row)
 
 
-@pytest.mark.parametrize("shape", [(22, 22), (31, 64), (64, 45)])
-@pytest.mark.parametrize("cfa", BAYER_PHASES + RGBW_PHASES)
+@loop("shape", [(22, 22), (31, 64), (64, 45)])
+@loop("cfa", BAYER_PHASES + RGBW_PHASES)
 def test_libraw_reads_every_phase_bit_for_bit(cfa: Tile, shape: tuple[int, int], tmp_path: Path) -> None:
     raw = exposure(cfa, shape)
     write_dng(raw, tmp_path / "shot.dng")
@@ -113,7 +114,7 @@ def test_libraw_reads_the_exposure(tmp_path: Path) -> None:
     assert same(read_dng(write_dng(bare, tmp_path / "shot.dng")), bare)
 
 
-@pytest.mark.parametrize("bits", [1, 8, 16])
+@loop("bits", [1, 8, 16])
 def test_libraw_reads_every_depth_bit_for_bit(bits: int, tmp_path: Path) -> None:
     raw = exposure(bits=bits)
     write_dng(raw, tmp_path / "shot.dng")
@@ -122,7 +123,7 @@ def test_libraw_reads_every_depth_bit_for_bit(bits: int, tmp_path: Path) -> None
         assert theirs.white_level == 2**bits - 1
 
 
-@pytest.mark.parametrize("cfa", [*BAYER_PHASES, *RGBW_PHASES])
+@loop("cfa", [*BAYER_PHASES, *RGBW_PHASES])
 def test_the_way_back_is_exact(cfa: Tile, tmp_path: Path) -> None:
     raw = exposure(cfa)
     assert same(read_dng(write_dng(raw, tmp_path / "shot.dng")), raw)
@@ -213,7 +214,7 @@ def test_rationals_are_the_nearest_that_fit(value: float) -> None:
     assert abs(Fraction(numerator, denominator) - Fraction(value)) <= max(abs(value), 1.0) / (2**31 - 2)
 
 
-@pytest.mark.parametrize(("cfa", "bayer", "rgbw"), [
+@loop(("cfa", "bayer", "rgbw"), [
     *[(phase, True, False) for phase in BAYER_PHASES],
     *[(phase, False, True) for phase in RGBW_PHASES],
     (("RG", "BG"), False, False),
@@ -226,7 +227,7 @@ def test_tiles_are_told_apart(cfa: Tile, bayer: bool, rgbw: bool) -> None:
     assert (is_bayer(cfa), is_rgbw(cfa)) == (bayer, rgbw)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("changes", "message"),
     [
         (
@@ -272,7 +273,7 @@ def patched(content: bytes, code: int, entry: bytes) -> bytes:
     raise AssertionError(f"no tag {code}")
 
 
-@pytest.mark.parametrize(
+@loop(
     ("code", "entry", "message"),
     [
         (256, struct.pack("<HII", 4, 1, 1 << 17), r"131072 x 30 pixels of 2 bytes don't fit its \d+ bytes"),
@@ -314,7 +315,7 @@ def rewritten(content: bytes, **changes: object) -> bytes:
     return content[:start] + new.encode().ljust(length) + content[start + length :]
 
 
-@pytest.mark.parametrize(
+@loop(
     ("changes", "message"),
     [
         ({"gain_e_per_dn": 0}, r"gain_e_per_dn: 0 is outside"),
@@ -409,7 +410,7 @@ def test_strips_that_all_claim_the_same_bytes_are_refused(tmp_path: Path) -> Non
         read_dng(tmp_path / "shot.dng")
 
 
-@pytest.mark.parametrize("content", [b"", b"II*\0", b"MM\0*" + bytes(40), b"II*\0\xff\xff\xff\xff", bytes(100)])
+@loop("content", [b"", b"II*\0", b"MM\0*" + bytes(40), b"II*\0\xff\xff\xff\xff", bytes(100)])
 def test_what_is_no_dng_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "shot.dng").write_bytes(content)
     with pytest.raises(InputError, match=r"not a little-endian TIFF or DNG|cut off"):

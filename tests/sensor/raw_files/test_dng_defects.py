@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from loop import loop
 
 from render.illuminants import illuminant
 from rodcone.errors import InputError
@@ -25,7 +26,7 @@ def negative(cfa: str) -> RawImage:
     return replace(raw, colour=calibrate(sensor, illuminant("D65")), defects=PLACES)
 
 
-@pytest.mark.parametrize(("cfa", "phase"), [("bayer_rggb", 0), ("bayer_grbg", 1), ("bayer_gbrg", 2), ("bayer_bggr", 3)])
+@loop(("cfa", "phase"), [("bayer_rggb", 0), ("bayer_grbg", 1), ("bayer_gbrg", 2), ("bayer_bggr", 3)])
 def test_a_bayer_negative_tells_every_program(cfa: str, phase: int, tmp_path: Path) -> None:
     # DNG 1.4, chapter 7: FixBadPixelsList is opcode 5, from DNG 1.3, here optional, always big-endian; its parameters
     # are the phase of the pattern, the number of points and of rectangles, then row and column of each point

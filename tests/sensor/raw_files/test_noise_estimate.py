@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from loop import loop
 
 from sensor.raw_files.noise_estimate import estimate_noise
 
@@ -15,7 +16,7 @@ def frame(gain_e_per_dn: float, dark_e: float, texture: float, seed: int = 0) ->
     return np.rint(electrons / gain_e_per_dn)
 
 
-@pytest.mark.parametrize(("gain", "dark"), [(0.25, 3.0), (1.0, 12.0), (0.5, 20.0)])
+@loop(("gain", "dark"), [(0.25, 3.0), (1.0, 12.0), (0.5, 20.0)])
 def test_gain_and_dark_noise_come_back(gain: float, dark: float) -> None:
     # 24 bins of some 400 used blocks each: a variance to 12 %, so the slope to about 4 % (one sigma), and the dark
     # variance, which the darkest bins alone tell, to about 15 %; five sigma
@@ -42,7 +43,7 @@ def test_clipped_highlights_do_not_pass_for_quiet_ones() -> None:
     assert found.gain_e_per_dn == pytest.approx(0.5, rel=0.1)
 
 
-@pytest.mark.parametrize(
+@loop(
     "above_black_dn",
     [
         np.full((400, 400), 100.0),
@@ -51,7 +52,6 @@ def test_clipped_highlights_do_not_pass_for_quiet_ones() -> None:
         np.full((400, 400), 990.0) + np.random.default_rng(2).normal(0.0, 3.0, (400, 400)),
         np.full((2, 2), 3.0),
     ],
-    ids=["no noise", "one level", "too small", "clipped", "one tile"],
 )
 def test_a_frame_that_tells_nothing_gives_nothing(above_black_dn: np.ndarray) -> None:
     assert estimate_noise(above_black_dn, 1000.0) is None

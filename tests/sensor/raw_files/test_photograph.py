@@ -9,6 +9,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 import tifffile
+from loop import loop
 
 from rodcone.errors import InputError
 from sensor.raw_files.dng import rational
@@ -82,7 +83,7 @@ def test_a_full_sample_is_full_whatever_its_black_was(tmp_path: Path) -> None:
     np.testing.assert_array_equal(raw.dn, np.full(SHAPE, WHITE))
 
 
-@pytest.mark.parametrize("orientation", range(1, 9))
+@loop("orientation", range(1, 9))
 def test_frames_are_turned_upright_as_libraw_turns_its_own_pictures(orientation: int, tmp_path: Path) -> None:
     above = np.full(SHAPE, 2000.0)
     above[:20, :20] = 12_000.0  # a bright corner: its place and the frame's proportions tell all eight apart
@@ -140,7 +141,7 @@ def test_noise_comes_from_the_files_profile(tmp_path: Path) -> None:
     assert raw.read_noise_e == pytest.approx(dark)
 
 
-@pytest.mark.parametrize("pair", [(0.0, 0.0), (float("nan"), 1.0), (-1e-4, 1e-9), (2.0, 1e-9), (1e-4, 2.0), (1e-4,)])
+@loop("pair", [(0.0, 0.0), (float("nan"), 1.0), (-1e-4, 1e-9), (2.0, 1e-9), (1e-4, 2.0), (1e-4,)])
 def test_a_profile_that_says_nothing_is_not_believed(pair: tuple[float, ...], tmp_path: Path) -> None:
     path = other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)), noise=pair)
     assert read_noise_profile(path, 15_000.0) is None
@@ -214,8 +215,8 @@ def test_without_rawpy_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.Mo
         read_raw(path)
 
 
-@pytest.mark.parametrize("content", [b"", b"no raw file", b"II*\0" + bytes(40), b"MM\0*" + bytes(40)])
-@pytest.mark.parametrize("name", ["shot.nef", "shot.dng", "shot"])
+@loop("content", [b"", b"no raw file", b"II*\0" + bytes(40), b"MM\0*" + bytes(40)])
+@loop("name", ["shot.nef", "shot.dng", "shot"])
 def test_what_libraw_cannot_read_is_one_line(name: str, content: bytes, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=r"shot.*: LibRaw can't read it \(.+\); allowed: raw files") as error:
@@ -224,7 +225,7 @@ def test_what_libraw_cannot_read_is_one_line(name: str, content: bytes, tmp_path
     assert "b'" not in str(error.value)
 
 
-@pytest.mark.parametrize("side", [20_000, 60_000])
+@loop("side", [20_000, 60_000])
 def test_pixels_that_a_file_can_not_hold_are_refused_before_memory_is_taken(side: int, tmp_path: Path) -> None:
     """LibRaw itself takes 0.8 GB for 20 000 pixels a side, whatever the file holds."""
     content = other_camera(tmp_path / "shot.dng", levels(np.zeros(SHAPE))).read_bytes()
@@ -237,7 +238,7 @@ def test_pixels_that_a_file_can_not_hold_are_refused_before_memory_is_taken(side
         read_photograph(tmp_path / "shot.dng")
 
 
-@pytest.mark.parametrize("error", [NotImplementedError("filters: 148"), ValueError("a\nb"), np.linalg.LinAlgError("c")])
+@loop("error", [NotImplementedError("filters: 148"), ValueError("a\nb"), np.linalg.LinAlgError("c")])
 def test_what_comes_of_a_damaged_file_by_chance_is_one_line(
     error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -248,8 +249,8 @@ def test_what_comes_of_a_damaged_file_by_chance_is_one_line(
         read_photograph(path)
 
 
-@pytest.mark.parametrize("order", ["<", ">"])
-@pytest.mark.parametrize("below", [False, True])
+@loop("order", ["<", ">"])
+@loop("below", [False, True])
 def test_a_profile_is_found_in_either_byte_order_and_below_the_first_picture(
     order: str, below: bool, tmp_path: Path
 ) -> None:

@@ -11,6 +11,7 @@ import pytest
 import tifffile
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from loop import loop
 
 from rodcone.errors import InputError
 from rodcone.files import replacing
@@ -44,8 +45,8 @@ def exposure(cfa: Tile, shape: tuple[int, int] = (9, 11)) -> RawImage:
     )
 
 
-@pytest.mark.parametrize("ending", [".tif", ".TIFF"])
-@pytest.mark.parametrize("cfa", [*MOSAICS.values(), ("QZ", "ZQ"), ("RGBCY",)])
+@loop("ending", [".tif", ".TIFF"])
+@loop("cfa", [*MOSAICS.values(), ("QZ", "ZQ"), ("RGBCY",)])
 def test_every_mosaic_comes_back_exactly_from_tiff_and_sidecar(cfa: Tile, ending: str, tmp_path: Path) -> None:
     raw = exposure(cfa)
     paths = write_raw(raw, tmp_path / f"shot{ending}")
@@ -82,7 +83,7 @@ def test_a_sidecar_without_every_field_of_a_raw_image_cannot_be_written() -> Non
     assert {*KEYS, "dn"} == {field.name for field in fields(RawImage)}
 
 
-@pytest.mark.parametrize(
+@loop(
     ("name", "cfa", "message"),
     [
         ("shot.png", "bayer", r"raw file: .*shot\.png' has another ending; allowed: \.dng, \.tif, \.tiff; rename it"),
@@ -97,7 +98,7 @@ def test_a_name_that_does_not_fit_is_refused(name: str, cfa: str, message: str, 
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["shot.cr2", "shot.dng", "shot.tif"])
+@loop("name", ["shot.cr2", "shot.dng", "shot.tif"])
 def test_a_missing_file_is_named(name: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=rf"{name}: there is no such file; give the path of a raw file"):
         read_raw(tmp_path / name)
@@ -123,7 +124,7 @@ def test_a_list_too_long_for_a_file_is_refused(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("places", [[[9, 0]], [[0]], "all", [[0, 1.5]]])
+@loop("places", [[[9, 0]], [[0]], "all", [[0, 1.5]]])
 def test_a_list_of_defects_that_cannot_be_is_refused(places: object, tmp_path: Path) -> None:
     write_raw(exposure(("RC", "CC")), tmp_path / "shot.tif")
     held = json.loads((tmp_path / "shot.json").read_text()) | {"defects": places}
@@ -135,7 +136,7 @@ def test_a_list_of_defects_that_cannot_be_is_refused(places: object, tmp_path: P
 STEP = {"from_e": 10.0, "shot": 2.0, "read_noise_e": 1.0, "dsnu_e": 0.0, "prnu": 0.01}
 
 
-@pytest.mark.parametrize(
+@loop(
     ("steps", "message"),
     [
         (3, "noise_steps: allowed is a list of objects"),
@@ -188,7 +189,7 @@ def test_a_sidecar_of_another_exposure_is_refused(tmp_path: Path) -> None:
         read_raw(tmp_path / "one.tif")
 
 
-@pytest.mark.parametrize(
+@loop(
     ("text", "message"),
     [
         (b"", r"its calibration is not that of a raw image"),
@@ -208,7 +209,7 @@ def test_a_sidecar_that_is_none_is_refused_in_one_line(text: bytes, message: str
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize(
+@loop(
     ("key", "value"),
     [
         ("neutral", [1.0, 1.0]),

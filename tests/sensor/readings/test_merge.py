@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 
 from render.illuminants import illuminant
 from rodcone.errors import InputError
@@ -52,9 +53,9 @@ def test_the_merge_has_the_mean_of_the_light_and_the_noise_of_the_closed_form(na
         assert abs(10 * np.log10(merged.var() / variance)) < 0.15, light
 
 
-@pytest.mark.parametrize("light", [3.0, 900.0])  # read noise that were shared would show in the dark
-@pytest.mark.parametrize("draw", [draw_frame, read_frame])
-@pytest.mark.parametrize("name", HDR)
+@loop("light", [3.0, 900.0])  # read noise that were shared would show in the dark
+@loop("draw", [draw_frame, read_frame])
+@loop("name", HDR)
 def test_readings_covary_as_their_charges_and_photodiodes_say(name, draw, light):
     sensor = preset(name)
     chips, rng = np.random.default_rng(3), np.random.default_rng(4)
@@ -157,8 +158,8 @@ def test_a_burst_is_merged_as_frames_of_one_reading_are():
             merged_raw([frames[0], replace(frames[1], exposure_s=1.0)])
 
 
-@pytest.mark.parametrize("ending", [".dng", ".tif"])
-@pytest.mark.parametrize("name", HDR)
+@loop("ending", [".dng", ".tif"])
+@loop("name", HDR)
 def test_a_raw_file_holds_merged_samples_and_their_noise_bit_for_bit(name, ending, tmp_path):
     sensor = preset(name, "bayer")
     device = draw_device(sensor, (32, 40), np.random.default_rng(1))

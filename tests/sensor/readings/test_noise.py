@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loop import loop
 
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
@@ -50,7 +51,7 @@ def dual(high=2.0, low=6.0, **pixel):
     )
 
 
-@pytest.mark.parametrize("name", HDR)
+@loop("name", HDR)
 def test_each_reading_s_own_variance_is_that_of_a_chip_that_is_read_once(name):
     sensor = preset(name)
     sensor = replace(sensor, pixel=replace(sensor.pixel, **REAL))
@@ -93,7 +94,7 @@ def test_prnu_of_two_photodiodes_averages_and_of_one_doesn_t():
     assert noise_sources(light, twice, 0.01)["PRNU"] == pytest.approx(0.02 * light, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", HDR)
+@loop("name", HDR)
 def test_sources_sum_to_the_variance_and_frames_are_interpolated_within_a_thousandth(name):
     sensor = preset(name)
     for light in (0.1, 30.0, 5000.0, 40_000.0):
@@ -126,8 +127,8 @@ def test_a_camera_that_switches_takes_the_quietest_gain_that_holds_the_bright_en
     np.testing.assert_allclose(snr(levels, sensor, 0.01), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("readout", ["merged", "switched"])
-@pytest.mark.parametrize("ratio", [1.0, 10.0, 40.0])
+@loop("readout", ["merged", "switched"])
+@loop("ratio", [1.0, 10.0, 40.0])
 def test_the_light_for_an_snr_gives_back_the_snr(ratio, readout):
     sensor = preset("dual_gain")
     sensor = replace(sensor, chip=replace(sensor.chip, readout=readout))
@@ -136,7 +137,7 @@ def test_the_light_for_an_snr_gives_back_the_snr(ratio, readout):
     assert electrons_at_snr(1e4, sensor, 0.01) == np.inf
 
 
-@pytest.mark.parametrize("name", HDR)
+@loop("name", HDR)
 def test_noise_steps_are_within_a_third_of_a_decibel_of_the_closed_form(name):
     sensor = preset(name)
     whole, at = whole_share(sensor), seams(sensor, 0.02).above_e
@@ -149,7 +150,7 @@ def test_noise_steps_are_within_a_third_of_a_decibel_of_the_closed_form(name):
         assert np.abs(10 * np.log10(told / found)).max() < 1 / 3
 
 
-@pytest.mark.parametrize("name", HDR)
+@loop("name", HDR)
 def test_a_sensor_for_a_burst_holds_the_variance_of_its_merged_frames(name):
     one, fixed = preset(name), ("PRNU", "DSNU", "column offsets", "column gains")
     four = merged_sensor(one, 4)

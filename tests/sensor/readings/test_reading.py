@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from loop import loop
 
 from rodcone.errors import InputError
 from sensor.chip import Reading
@@ -43,7 +44,7 @@ def test_switching_and_merging_are_a_word_of_the_file(tmp_path):
     assert read(tmp_path, text.replace('readout = "merged"', 'readout = "switched"')).chip.readout == "switched"
 
 
-@pytest.mark.parametrize(
+@loop(
     ("text", "parts"),
     [
         (PIXEL + ONE + LENS, ("readings: 1 is outside 2 to 8",)),
