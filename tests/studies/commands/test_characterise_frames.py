@@ -5,21 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_line import call, check_refusals
 
 from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.presets import low_noise
 from sensor.raw_files.raw_file import write_raw
-from studies.commands.cli import main
 
 SENSOR = replace(low_noise("bayer"), pixel=replace(low_noise().pixel, read_noise_e=3.0, dsnu_e=2.0))
-
-
-def call(capsys, *arguments):
-    with pytest.raises(SystemExit) as stopped:
-        main(["characterise", *(str(each) for each in arguments)])
-    captured = capsys.readouterr()
-    return int(stopped.value.code or 0), captured.out, captured.err
 
 
 @pytest.fixture
@@ -32,37 +25,34 @@ def frames(tmp_path):
     return paths[:2], paths[2:]
 
 
-def test_it_prints_intervals_and_writes_a_preset(frames, tmp_path, capsys):
+def test_it_prints_intervals_and_writes_a_preset(frames, tmp_path):
     flats, darks = frames
     out = tmp_path / "mine.toml"
-    code, printed, err = call(capsys, "--from", *flats, "--dark", *darks, "-o", out)
+    code, printed, err = call(["characterise", "--from", *flats, "--dark", *darks, "-o", out])
     assert code == 0
     assert [line.split()[0] for line in printed.splitlines()] == ["figure", "gain", "read", "DSNU", "PRNU"]
     assert "pitch_um and fill_factor are yours to add" in err
     assert out.read_text("utf-8").startswith("# A camera measured from flat1.tif and others.")
-    found = json.loads(call(capsys, "--from", *flats, "--dark", *darks, "--json")[1])
+    found = json.loads(call(["characterise", "--from", *flats, "--dark", *darks, "--json"])[1])
     assert found["gain_dn_per_e"]["low"] < 1 / SENSOR.gain_e_per_dn < found["gain_dn_per_e"]["high"]
 
 
-def test_what_is_not_allowed_is_told_in_one_line(frames, tmp_path, capsys):
+def test_what_is_not_allowed_is_told_in_one_line(frames, tmp_path):
     pytest.importorskip("rawpy", reason="rodcone[photographs] (LibRaw) is not installed")
     flats, darks = frames
     (tmp_path / "taken.toml").write_text("mine", "utf-8")
     (tmp_path / "broken.dng").write_bytes(b"II*\0" + b"\xff" * 60)
-    for arguments, words in (
-        ([], "preset: none is given"),
-        (["low_noise", "--from", *flats, "--dark", *darks], "beside raw files"),
-        (["--from", *flats], "dark frames: 0 given"),
-        (["--dark", *darks], "flat frames: 0 given"),
-        (["--from", *flats, "--dark", *darks, "-o", "a.svg"], ".toml"),
-        (["--from", *flats, "--dark", *darks, "-o", tmp_path / "taken.toml"], "exists"),
-        (["--from", *flats, "--dark", darks[0], tmp_path / "absent.dng"], "there is no such file"),
-        (["--from", *flats, "--dark", darks[0], tmp_path / "broken.dng"], "broken.dng"),
-        (["--from", *flats, "--dark", *darks, "--window", "0"], "window: 0 pixels"),
-        (["low_noise", "--window", "20"], "window: 20"),
-    ):
-        code, out, err = call(capsys, *arguments)
-        assert (code, out) == (2, ""), arguments
-        assert len(err.splitlines()) == 1
-        assert words in err
-    assert (tmp_path / "taken.toml").read_text("utf-8") == "mine"
+    flat, dark = (" ".join(map(str, paths)) for paths in (flats, darks))
+    rows = (
+        ("", "preset: none is given"),
+        (f"low_noise --from {flat} --dark {dark}", "beside raw files"),
+        (f"--from {flat}", "dark frames: 0 given"),
+        (f"--dark {dark}", "flat frames: 0 given"),
+        (f"--from {flat} --dark {dark} -o a.svg", ".toml"),
+        (f"--from {flat} --dark {dark} -o {tmp_path / 'taken.toml'}", "exists"),
+        (f"--from {flat} --dark {darks[0]} {tmp_path / 'absent.dng'}", "there is no such file"),
+        (f"--from {flat} --dark {darks[0]} {tmp_path / 'broken.dng'}", "broken.dng"),
+        (f"--from {flat} --dark {dark} --window 0", "window: 0 pixels"),
+        ("low_noise --window 20", "window: 20"),
+    )
+    check_refusals("characterise", rows, tmp_path)

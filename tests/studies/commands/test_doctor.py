@@ -2,22 +2,23 @@
 
 import os
 import re
-import subprocess
-import sys
 import tomllib
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 
 import pytest
+from command_line import call, in_new_python
 
 from rodcone import jit, llvm
 from studies.commands import doctor
-from studies.commands.cli import main
 
 HOME = Path(doctor.__file__).resolve().parents[2]
 
 
 def test_every_row_is_there_and_this_environment_is_sound() -> None:
+    code, out, _ = call(["doctor"])
+    assert code == 0
+    assert "all is well" in out
     found = doctor.findings()
     rows = {each.name: each for each in found}
     wanted = {"rodcone", "Python", "platform", "CPU threads", "LLVM", "backend", "Mitsuba variant", "Dr.Jit threads"}
@@ -30,14 +31,13 @@ def test_every_row_is_there_and_this_environment_is_sound() -> None:
     assert int(rows["Dr.Jit threads"].value) >= 1
 
 
-def test_one_fault_makes_the_exit_code_1(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_fault_makes_the_exit_code_1(monkeypatch: pytest.MonkeyPatch) -> None:
     good, bad = doctor.Finding("a", "1"), doctor.Finding("b", "[2]", False)
     for found, code in (((good, good), 0), ((good, bad, good), 1)):
         monkeypatch.setattr(doctor, "findings", lambda found=found: found)
-        with pytest.raises(SystemExit) as ended:
-            main(["doctor"])
-        assert ended.value.code == code
-        *rows, verdict = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
+        ended, out, _ = call(["doctor"])
+        assert ended == code
+        *rows, verdict = [line.split(maxsplit=1) for line in out.splitlines()]
         assert [[name, value.strip()] for name, value in rows] == [[each.name, each.value] for each in found]
         words = "wrong: b; mend what stands beside" if code else "all is well"
         assert [text.strip() for text in verdict] == ["verdict", words]
@@ -61,41 +61,32 @@ def test_an_engine_that_cannot_be_imported_is_a_row_and_no_traceback(tmp_path: P
         "except ImportError:\n"
         "    missing.name\n"  # what Dr.Jit 1.5 does
     )
-    done = in_new_python(tmp_path, "from studies.commands.doctor import engine_findings\nprint(engine_findings())")
+    done = in_folder(tmp_path, "from studies.commands.doctor import engine_findings\nprint(engine_findings())")
     assert "libatomic.so.1: cannot open" in done
     assert "apt install libatomic1" in done
     assert "ok=False" in done
 
 
-@pytest.mark.parametrize(
-    ("name", "version", "ok"),
-    [("libLLVM-16.so", 16, False), ("libLLVM-17.so", 17, True), ("libLLVM.so", None, True), ("gone.so", None, False)],
-)
-def test_llvm_finding_names_the_library_and_the_fix(tmp_path: Path, name: str, version: int | None, ok: bool) -> None:
-    library = tmp_path / name
-    if name != "gone.so":
-        library.touch()
-    found = doctor.llvm_finding(library, version, 17)
-    assert found.ok is ok
-    assert str(library) in found.value
-    assert ("unset DRJIT_LIBLLVM_PATH" in found.value) is not ok
-    assert "DRJIT_LIBLLVM_PATH" in found.value, "a library outside the wheel is the user's or the system's"
+def test_llvm_finding_names_the_library_and_the_fix(tmp_path: Path) -> None:
+    for name, version, ok in (
+        ("libLLVM-16.so", 16, False),
+        ("libLLVM-17.so", 17, True),
+        ("libLLVM.so", None, True),
+        ("gone.so", None, False),
+    ):
+        library = tmp_path / name
+        if name != "gone.so":
+            library.touch()
+        found = doctor.llvm_finding(library, version, 17)
+        assert found.ok is ok, name
+        assert str(library) in found.value
+        assert ("unset DRJIT_LIBLLVM_PATH" in found.value) is not ok, name
+        assert "DRJIT_LIBLLVM_PATH" in found.value, "a library outside the wheel is the user's or the system's"
 
 
-def in_new_python(folder: Path, code: str) -> str:
+def in_folder(folder: Path, code: str) -> str:
     """What `code` prints in a Python of its own that looks into `folder` first."""
-    path = os.pathsep.join([str(folder), str(HOME)])
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=os.environ | {"PYTHONPATH": path},
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
+    return in_new_python(f"import os; os.chdir({str(folder)!r})\n{code}", PYTHONPATH=f"{folder}{os.pathsep}{HOME}")
 
 
 def test_a_package_is_own_foreign_missing_or_shared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -152,7 +143,7 @@ def test_a_foreign_render_is_named_in_a_new_python(tmp_path: Path) -> None:
     code = (
         "from studies.commands.doctor import findings\nprint(*[each for each in findings() if not each.ok], sep='\\n')"
     )
-    engine, render = in_new_python(tmp_path, code).splitlines()
+    engine, render = in_folder(tmp_path, code).splitlines()
     assert "engine" in engine
     assert "package render" in render
     assert str(tmp_path / "render") in render

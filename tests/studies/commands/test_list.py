@@ -9,6 +9,7 @@ from pathlib import Path
 import colour
 import numpy as np
 import pytest
+from command_line import call, check_refusals
 
 from isp.processors.catalogue import PROCESSORS
 from render import illuminants
@@ -17,19 +18,17 @@ from render.photometry import tristimulus
 from scenes import catalog
 from sensor import cfa, presets
 from sensor.cameras.library import measured_cameras
-from studies.commands.cli import main
 from studies.commands.list import LIGHTS
 
 
-def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    with pytest.raises(SystemExit) as end:
-        main(["list", *arguments])
-    assert end.value.code == 0
-    return capsys.readouterr().out
+def printed(*arguments: object) -> str:
+    code, out, _ = call(["list", *arguments])
+    assert code == 0
+    return out
 
 
-def test_every_name_of_every_catalogue_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    found = json.loads(printed(capsys, "--json"))
+def test_every_name_of_every_catalogue_is_listed() -> None:
+    found = json.loads(printed("--json"))
     assert tuple(found["scenes"]) == catalog.names()
     assert set(illuminants.names()) < set(found["lights"])
     assert tuple(found["sensors"]) == (*presets.names(), *measured_cameras())
@@ -41,55 +40,34 @@ def test_every_name_of_every_catalogue_is_listed(capsys: pytest.CaptureFixture[s
         illuminant(name)
 
 
-def test_one_kind_is_listed_alone_with_a_line_a_name(capsys: pytest.CaptureFixture[str]) -> None:
-    lines = printed(capsys, "mosaics").splitlines()
+def test_one_kind_is_listed_alone_with_a_line_a_name() -> None:
+    lines = printed("mosaics").splitlines()
     assert lines[0] == "mosaics"
     assert [line.split() for line in lines[1:3]] == [["rgbw", "RG/BW"], ["bayer", "RG/GB"]]
 
 
-@pytest.mark.parametrize("name", [name for name, text in LIGHTS.items() if re.search(r"\d K$", text)])
-def test_the_temperatures_are_those_of_the_spectra(name: str) -> None:
-    stated_k = float(re.search(r"(\d+) K$", LIGHTS[name])[1])
+def test_the_temperatures_are_those_of_the_spectra() -> None:
     nm = np.arange(380.0, 781.0, 1.0)
-    xyz = tristimulus(illuminant(name).band_average(nm, 1.0), nm, np.ones(nm.size))
-    found_k = colour.temperature.xy_to_CCT(xyz[:2] / xyz.sum(), method="McCamy 1992")
-    assert found_k == pytest.approx(stated_k, rel=0.01)
+    stated_k = {name: float(found[1]) for name, text in LIGHTS.items() if (found := re.search(r"(\d+) K$", text))}
+    assert len(stated_k) > 10
+    for name, temperature_k in stated_k.items():
+        xyz = tristimulus(illuminant(name).band_average(nm, 1.0), nm, np.ones(nm.size))
+        found_k = colour.temperature.xy_to_CCT(xyz[:2] / xyz.sum(), method="McCamy 1992")
+        assert found_k == pytest.approx(temperature_k, rel=0.01), name
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("kind", "names"), [("lights", [*illuminants.names(), "3000K"]), ("sensors", ["the presets"])])
-def test_curves_are_drawn_with_every_name(
-    kind: str, names: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    printed(capsys, kind, "-o", str(tmp_path / "curves.svg"))
-    drawn = (tmp_path / "curves.svg").read_text("utf-8")
-    assert [name for name in names if f">{name}</text>" not in drawn] == []
+def test_curves_are_drawn_with_every_name(tmp_path: Path) -> None:
+    for kind, names in (("lights", [*illuminants.names(), "3000K"]), ("sensors", ["the presets"])):
+        printed(kind, "-o", tmp_path / "curves.svg")
+        drawn = (tmp_path / "curves.svg").read_text("utf-8")
+        assert [name for name in names if f">{name}</text>" not in drawn] == []
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("lights", "-o", "a.png"), ".svg"),
-        (("scenes", "-o", "a.svg"), "no curves to show"),
-        (("-o", "a.svg"), "no curves to show"),
-    ],
-)
-def test_what_has_no_curves_or_no_place_is_refused_in_one_line(
-    arguments: tuple[str, ...],
-    words: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_has_no_curves_or_no_place_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as end:
-        main(["list", *arguments])
-    told = capsys.readouterr()
-    assert end.value.code == 2
-    assert told.out == ""
-    assert words in told.err
-    assert len(told.err.splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []
+    rows = (("lights -o a.png", ".svg"), ("scenes -o a.svg", "no curves to show"), ("-o a.svg", "no curves to show"))
+    check_refusals("list", rows, tmp_path)
 
 
 def test_lists_import_no_renderer() -> None:

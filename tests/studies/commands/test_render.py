@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import call, check_refusals
 
 from render.illuminants import illuminant
 from render.radiance_files.exr import read_exr
 from studies.commands import render as render_command
-from studies.commands.cli import main
 
 BANDS = ["--bands", "400:720:80"]
 QUICK = ["--spp", "8", *BANDS]
@@ -36,18 +36,9 @@ def scene(tmp_path: Path) -> Path:
     return path
 
 
-def call(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as stopped:
-        main(["render", *arguments])
-    captured = capsys.readouterr()
-    return int(stopped.value.code or 0), captured.out, captured.err
-
-
-def test_a_users_scene_becomes_a_spectral_exr_of_absolute_radiance(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_users_scene_becomes_a_spectral_exr_of_absolute_radiance(scene: Path, tmp_path: Path) -> None:
     out = tmp_path / "made" / "out.exr"
-    assert call([str(scene), "-o", str(out), *QUICK], capsys) == (0, f"{out}\n", "")
+    assert call(["render", str(scene), "-o", str(out), *QUICK]) == (0, f"{out}\n", "")
     radiance = read_exr(out)
     assert radiance.shape == (6, 8)
     np.testing.assert_allclose(radiance.wavelength_nm, [440.0, 520.0, 600.0, 680.0])
@@ -56,10 +47,10 @@ def test_a_users_scene_becomes_a_spectral_exr_of_absolute_radiance(
     assert list(out.parent.iterdir()) == [out]
 
 
-def test_facts_are_one_json_object(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_facts_are_one_json_object(scene: Path, tmp_path: Path) -> None:
     scene.write_text(scene.read_text().replace("<sensor", '<integrator type="path"/><sensor'))
     arguments = [str(scene), "-o", str(tmp_path / "o.exr"), "--width", "4", "--level", "25cd/m2", "--json"]
-    code, out, err = call([*arguments, *QUICK], capsys)
+    code, out, err = call(["render", *arguments, *QUICK])
     facts = json.loads(out)
     assert (code, facts["path"], facts["scene"], facts["size"]) == (0, str(tmp_path / "o.exr"), "room", [3, 4])
     assert (facts["spp"], facts["stopped_by"], facts["bands"]) == (8, "samples", 4)
@@ -70,12 +61,10 @@ def test_facts_are_one_json_object(scene: Path, tmp_path: Path, capsys: pytest.C
     assert "integrator 'path': the engine brings its own, with paths of any length" in err
 
 
-def test_another_illuminant_comes_at_the_same_luminance(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_another_illuminant_comes_at_the_same_luminance(scene: Path, tmp_path: Path) -> None:
     fine = ["--spp", "8", "--bands", "380:780:25", "-o"]
-    call([str(scene), *fine, str(tmp_path / "own.exr")], capsys)
-    call([str(scene), *fine, str(tmp_path / "a.exr"), "--light", "sun=A"], capsys)
+    call(["render", str(scene), *fine, str(tmp_path / "own.exr")])
+    call(["render", str(scene), *fine, str(tmp_path / "a.exr"), "--light", "sun=A"])
     own, a = read_exr(tmp_path / "own.exr"), read_exr(tmp_path / "a.exr")
     expected = illuminant("A").band_average(a.wavelength_nm, a.widths_nm)
     np.testing.assert_allclose(a.values[2, 3] / a.values[2, 3, 0], expected / expected[0], rtol=1e-5)
@@ -83,15 +72,15 @@ def test_another_illuminant_comes_at_the_same_luminance(
     np.testing.assert_allclose(a.luminance().mean(), own.luminance().mean(), rtol=0.01)
 
 
-def test_a_catalogue_scene_is_rendered_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_catalogue_scene_is_rendered_by_name(tmp_path: Path) -> None:
     out = tmp_path / "f.exr"
     arguments = ["flat_field", "-o", str(out), "--height", "2", "--width", "3", "--level", "500lux", *QUICK]
-    assert call(arguments, capsys)[:2] == (0, f"{out}\n")
+    assert call(["render", *arguments])[:2] == (0, f"{out}\n")
     assert read_exr(out).shape == (2, 3)
 
 
 def test_what_an_interrupt_left_is_written_and_told(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = render_command.render_transport
 
@@ -100,94 +89,75 @@ def test_what_an_interrupt_left_is_written_and_told(
 
     monkeypatch.setattr(render_command, "render_transport", interrupted)
     out = tmp_path / "o.exr"
-    code, printed, err = call([str(scene), "-o", str(out), *QUICK], capsys)
+    code, printed, err = call(["render", str(scene), "-o", str(out), *QUICK])
     assert (code, printed) == (130, f"{out}\n")
     assert f"rodcone: stopped; 8 samples a pixel are kept in {out}" in err
     assert read_exr(out).shape == (6, 8)
 
 
-def test_surfaces_go_on_at_their_ends_where_it_is_asked_for(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_surfaces_go_on_at_their_ends_where_it_is_asked_for(scene: Path, tmp_path: Path) -> None:
     scene.write_text(scene.read_text().replace('"reflectance" value="0.5"', '"reflectance" value="450:0.5, 700:0.5"'))
     out = tmp_path / "o.exr"
-    code, _, err = call([str(scene), "-o", str(out), *QUICK], capsys)
+    code, _, err = call(["render", str(scene), "-o", str(out), *QUICK])
     assert (code, err.count("\n")) == (2, 1)
     assert "bands reach 400-720 nm, and grey/reflectance is known over 450-700 nm alone; give bands within" in err
     assert "--extend hold" in err
-    assert call([str(scene), "-o", str(out), *QUICK, "--extend", "hold"], capsys) == (0, f"{out}\n", "")
+    assert call(["render", str(scene), "-o", str(out), *QUICK, "--extend", "hold"]) == (0, f"{out}\n", "")
     np.testing.assert_allclose(read_exr(out).values, 0.5 * 2 / np.pi, rtol=1e-5)
 
 
 def test_a_light_that_ends_within_the_bands_is_told_once(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(warnings, "filters", [("always", None, Warning, None, 0)])  # not as errors, as in these tests
     scene.write_text(scene.read_text().replace('"irradiance" value="2"', '"irradiance" value="450:2, 700:2"'))
-    code, _, err = call([str(scene), "-o", str(tmp_path / "o.exr"), *QUICK], capsys)
+    code, _, err = call(["render", str(scene), "-o", str(tmp_path / "o.exr"), *QUICK])
     known = "light group 'sun' is known over 450-700 nm, and bands reach 400-720 nm"
     assert (code, err) == (0, f"rodcone: {known}: outside its table it is taken as dark\n")
 
 
-BAD = {
-    "unknown scene": (["stil_life"], ["scene", "'stil_life'", "did you mean 'still_life'?"]),
-    "missing file": (["none.xml"], ["'none.xml' is missing"]),
-    "no exr": (["{scene}", "-o", "o.png"], ["'o.png'", ".exr"]),
-    "unknown group": (["{scene}", "--light", "sum=A"], ["light group: 'sum'", "did you mean 'sun'?"]),
-    "unknown illuminant": (["{scene}", "--light", "sun=D56"], ["illuminant: 'D56'"]),
-    "light without group": (["{scene}", "--light", "=A"], ["'=A'", "GROUP=ILLUMINANT"]),
-    "light with own colour": (["{sky}", "--light", "sky=A"], ["'sky'", "colours of its own"]),
-    "unit": (["{scene}", "--level", "3nits"], ["'nits'", "cd/m2, lux"]),
-    "lux without plane": (["{scene}", "--level", "3lux"], ["'3lux' needs a reference plane", "irradiancemeter"]),
-    "no pixels": (["{scene}", "--height", "0"], ["height: 0", "give pixels"]),
-    "half a band": (["{scene}", "--bands", "400:705:10"], ["'400:705:10'", "380:780:10"]),
-    "bands without width": (["{scene}", "--bands", "400:700"], ["'400:700'", "380:780:10"]),
-    "bands of nothing": (["{scene}", "--bands", "700:400:-10"], ["'700:400:-10'"]),
-    "endless bands": (["{scene}", "--bands", "400:inf:10"], ["'400:inf:10'"]),
-    "noise": (["{scene}", "--noise", "-1"], ["noise: -1", "0.02"]),
-    "trust without file": (["still_life", "--trust-scene"], ["trust-scene: True for 'still_life'"]),
-    "no way to extend": (["{scene}", "--extend", "hol"], ["extend: 'hol'", "did you mean 'hold'?"]),
-    "hostile": (["{hostile}"], ["(line 2, col 1)", "<path> lets a scene load native code", "--trust-scene"]),
-}
+REFUSED = (
+    ("stil_life", "scene: 'stil_life' ... did you mean 'still_life'?"),
+    ("none.xml", "'none.xml' is missing"),
+    ("scene/room.xml -o o.png", "'o.png' ... .exr"),
+    ("scene/room.xml --light sum=A", "light group: 'sum' ... did you mean 'sun'?"),
+    ("scene/room.xml --light sun=D56", "illuminant: 'D56'"),
+    ("scene/room.xml --light =A", "'=A' ... GROUP=ILLUMINANT"),
+    ("scene/sky.xml --light sky=A", "'sky' ... colours of its own"),
+    ("scene/room.xml --level 3nits", "'nits' ... cd/m2, lux"),
+    ("scene/room.xml --level 3lux", "'3lux' needs a reference plane ... irradiancemeter"),
+    ("scene/room.xml --height 0", "height: 0 ... give pixels"),
+    ("scene/room.xml --bands 400:705:10", "'400:705:10' ... 380:780:10"),
+    ("scene/room.xml --bands 400:700", "'400:700' ... 380:780:10"),
+    ("scene/room.xml --bands 700:400:-10", "'700:400:-10'"),
+    ("scene/room.xml --bands 400:inf:10", "'400:inf:10'"),
+    ("scene/room.xml --noise -1", "noise: -1 ... 0.02"),
+    ("still_life --trust-scene", "trust-scene: True for 'still_life'"),
+    ("scene/room.xml --extend hol", "extend: 'hol' ... did you mean 'hold'?"),
+    ("scene/hostile.xml", "(line 2, col 1) ... <path> lets a scene load native code ... --trust-scene"),
+)
 
 
-@pytest.mark.parametrize(("arguments", "words"), BAD.values(), ids=BAD)
-def test_bad_input_is_one_line_and_exit_code_2_and_leaves_nothing(
-    arguments: list[str],
-    words: list[str],
-    scene: Path,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+def test_bad_input_is_refused_and_a_bad_place_is_told_before_the_render(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (scene.parent / "sky.xml").write_text(SCENE.format("sunsky"))
     (scene.parent / "hostile.xml").write_text(SCENE.replace("<sensor", '<path value="."/><sensor', 1))
-    files = {name: str(scene.parent / f"{name}.xml") for name in ("sky", "hostile")} | {"scene": str(scene)}
-    monkeypatch.chdir(tmp_path)
-    code, out, err = call([argument.format(**files) for argument in arguments], capsys)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert [word for word in words if word not in err] == []
-    assert list(tmp_path.iterdir()) == [scene.parent]
-
-
-def test_place_that_cannot_be_written_is_told_before_the_render(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(render_command, "render_transport", lambda *_, **__: pytest.fail("rendered"))
     (tmp_path / "taken.exr").mkdir()
-    (tmp_path / "file").write_text("")
-    for place in (tmp_path / "taken.exr", tmp_path / "file" / "o.exr"):
-        code, out, err = call([str(scene), "-o", str(place)], capsys)
-        assert (code, out, err.count("\n")) == (1, "", 1)
-        assert "choose another place with --out" in err
+    monkeypatch.chdir(tmp_path)
+    check_refusals("render", REFUSED, tmp_path)
+    monkeypatch.setattr(render_command, "render_transport", lambda *_, **__: pytest.fail("rendered"))
+    for place in ("taken.exr", "scene/room.xml/o.exr"):
+        rows = [(f"scene/room.xml -o {place}", "choose another place with --out")]
+        check_refusals("render", rows, tmp_path, code=1)
 
 
-def test_denoised_light_is_written_with_its_measured_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_denoised_light_is_written_with_its_measured_error(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba_oidn", reason="rodcone[denoise] is not installed")
     made, asked = [], ["cornell_box", "--height", "32", "--width", "32", *QUICK, "--json"]
     for name, more in (("plain", []), ("denoised", ["--denoise"])):
         out = tmp_path / f"{name}.exr"
-        code, told, _ = call([*asked, "-o", str(out), *more], capsys)
+        code, told, _ = call(["render", *asked, "-o", str(out), *more])
         made.append((code, read_exr(out).values, json.loads(told)["relative_mc_error"]))
     (_, plain, _), (code, denoised, error) = made
     assert code == 0

@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import signal
 import sqlite3
 import subprocess
@@ -10,15 +9,13 @@ import sys
 import time
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import pytest
 import sweep_sample as SAMPLE
 from any_cpu.configurations import environment
+from command_line import call, check_refusals
 
-from studies.commands.cli import app, main
-from studies.study.study_file import read_study
-from studies.sweep.database import VERSION
+from studies.commands.cli import app
 from studies.sweep.export import read_rows
 
 REPORT = Path(__file__).parents[3] / "sensor" / "cameras" / "reports" / "flir_bfs_u3_50s5m.toml"
@@ -38,29 +35,18 @@ def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
-def call(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as stopped:
-        main(arguments)
-    captured = capsys.readouterr()
-    # a line of progress each 5 s of a busy machine is no answer
-    err = "".join(line for line in captured.err.splitlines(keepends=True) if not re.match(r"rodcone: \d+%, ", line))
-    return int(stopped.value.code or 0), captured.out, err
-
-
-def test_sweep_prints_the_ledger_alone_and_the_table_follows(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_sweep_prints_the_ledger_alone_and_the_table_follows(study: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = ["sweep", str(study), "-o", str(out), "--workers", "1", "--as-stated"]
     told = f"rodcone: its report is {out / 'report.html'}\n"
-    assert call(command, capsys) == (0, f"{out / 'ledger.sqlite'}\n", told)
+    assert call(command) == (0, f"{out / 'ledger.sqlite'}\n", told)
     assert (out / "report.html").read_text("utf-8").lstrip().startswith("<!doctype html>")
-    code, text, err = call([*command, "--json"], capsys)
+    code, text, err = call([*command, "--json"])
     assert (code, err) == (0, told)
     facts = json.loads(text)
     assert (facts["cells"], facts["made"], facts["ledger"]) == (2, 0, str(out / "ledger.sqlite"))
     assert facts["report"] == str(out / "report.html")
-    assert call(["export", str(out), "-o", str(tmp_path / "t.csv")], capsys) == (0, f"{tmp_path / 't.csv'}\n", "")
+    assert call(["export", str(out), "-o", str(tmp_path / "t.csv")]) == (0, f"{tmp_path / 't.csv'}\n", "")
     header, *table = (tmp_path / "t.csv").read_text("utf-8").splitlines()
     assert header.startswith(
         "key,scene,spectrum,level,exposure,sensor,white_balance,frames,processor,seed,luminance_cd_m2,illuminance"
@@ -68,27 +54,11 @@ def test_sweep_prints_the_ledger_alone_and_the_table_follows(
     assert [line.split(",")[3] for line in table] == ["1cd/m2", "25cd/m2"]
 
 
-@pytest.mark.parametrize(("level", "told"), [("100cd/m2", True), ("0.001cd/m2", False)])
-def test_a_render_with_more_noise_than_the_sensor_is_told(
-    level: str, told: bool, study: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    study.write_text(f'scenes = ["cornell_box"]\nlevels = ["{level}"]\nprocessors = ["bayer"]\n', "utf-8")
-    small = ["--set", "render.size=16", "--set", "render.spp=4", "--set", "render.band_nm=50.0"]
-    code, _, err = call(
-        ["sweep", str(study), "-o", str(study.with_suffix("")), "--workers", "1", "--as-stated", *small], capsys
-    )
-    assert code == 0
-    line = f"rodcone: cornell_box, {level}, low_noise, bayer: the render's noise has"
-    assert [line in each for each in err.splitlines()] == [True, False] if told else [False]
-
-
 @pytest.mark.thorough
-def test_a_sweep_follows_the_plan_and_reference_models_everything(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_sweep_follows_the_plan_and_reference_models_everything(study: Path, tmp_path: Path) -> None:
     command = ["sweep", str(study), "-o", str(tmp_path / "out"), "--workers", "1"]
     for option in ([], ["--reference"], ["--as-stated"]):
-        code, _, err = call([*command, *option], capsys)
+        code, _, err = call([*command, *option])
         assert (code, err) == (0, f"rodcone: its report is {tmp_path / 'out' / 'report.html'}\n")
     with closing(sqlite3.connect(tmp_path / "out" / "ledger.sqlite")) as base:
         table = base.execute("SELECT lens, budget_share FROM cells").fetchall()
@@ -102,13 +72,11 @@ def test_a_sweep_follows_the_plan_and_reference_models_everything(
 
 
 @pytest.mark.thorough
-def test_a_template_untouched_but_for_two_sensors_ranks_them_as_shot(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_template_untouched_but_for_two_sensors_ranks_them_as_shot(tmp_path: Path) -> None:
     """By night, where Gray World takes a sodium lamp for a grey wall and turns the answer round."""
     mine, chip, out = tmp_path / "mine.toml", tmp_path / "chip.toml", tmp_path / "out"
-    assert call(["new", "study", "-o", str(mine)], capsys)[0] == 0
-    assert call(["new", "preset", "low_noise", "--noise", str(REPORT), "-o", str(chip)], capsys)[0] == 0
+    assert call(["new", "study", "-o", str(mine)])[0] == 0
+    assert call(["new", "preset", "low_noise", "--noise", str(REPORT), "-o", str(chip)])[0] == 0
     quick = (
         *("scenes=['night_street']", "levels=['1cd/m2']", f"sensors=['low_noise', '{chip}']"),
         *("processors=['interleaved']", "seeds=1", "render.size=64", "render.spp=64"),
@@ -116,14 +84,14 @@ def test_a_template_untouched_but_for_two_sensors_ranks_them_as_shot(
     ranks = {}
     for balance in ((), ("white_balances=['as-shot']",), ("white_balances=['gray-world']",)):
         asked = [part for change in (*quick, *balance) for part in ("--set", change)]
-        assert call(["sweep", str(mine), "-o", str(out), "--workers", "1", "--as-stated", *asked], capsys)[0] == 0
+        assert call(["sweep", str(mine), "-o", str(out), "--workers", "1", "--as-stated", *asked])[0] == 0
         ranks[balance] = [row.sensor for row in sorted(read_rows(out), key=lambda row: row.psnr_db)]
     default, as_shot, gray_world = ranks.values()
     assert default == as_shot == gray_world[::-1] == ["low_noise", "chip.toml"]
 
 
 @pytest.mark.thorough
-def test_what_one_processor_made_another_finds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_one_processor_made_another_finds(tmp_path: Path) -> None:
     """A sweep goes on on another machine: neither the render nor a picture is made again."""
     path = tmp_path / "study.toml"
     path.write_text(
@@ -132,7 +100,7 @@ def test_what_one_processor_made_another_finds(tmp_path: Path, capsys: pytest.Ca
         "utf-8",
     )
     command = ["sweep", str(path), "-o", str(tmp_path / "out"), "--workers", "1", "--as-stated", "--json"]
-    code, text, _ = call(command, capsys)
+    code, text, _ = call(command)
     assert (code, json.loads(text)["made"]) == (0, 4)
     renders = sorted((tmp_path / "out" / "renders").iterdir())
     again = [sys.executable, "-c", "from studies.commands.cli import main; main()", *command]
@@ -141,74 +109,50 @@ def test_what_one_processor_made_another_finds(tmp_path: Path, capsys: pytest.Ca
     assert sorted((tmp_path / "out" / "renders").iterdir()) == renders
 
 
-def test_dry_run_counts_and_computes_nothing(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_dry_run_counts_and_computes_nothing(study: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = ["sweep", str(study), "-o", str(out), "--dry-run", "--set", "seeds=[0, 1, 2]"]
-    code, text, err = call(command, capsys)
+    code, text, err = call(command)
     assert (code, err) == (0, "")
     assert text.startswith("6 cells, 0 in the ledger from the last run; 0 to render\nabout ")
     assert not out.exists()
     still = ["--set", 'scenes=["still_life"]', "--set", "render.spp=64", "--json", "--workers", "2"]
-    code, text, _ = call([*command, *still], capsys)
+    code, text, _ = call([*command, *still])
     facts = json.loads(text)
     assert (code, facts["cells"], facts["renders"], facts["workers"]) == (0, 6, 1, 2)
-    more = json.loads(call([*command, *still, "--set", "render.spp=512"], capsys)[1])
+    more = json.loads(call([*command, *still, "--set", "render.spp=512"])[1])
     assert more["seconds"] > 4 * facts["seconds"]
-    larger = json.loads(call([*command, *still, "--set", "render.size=1024"], capsys)[1])
+    larger = json.loads(call([*command, *still, "--set", "render.size=1024"])[1])
     fixed = 3 * 350e6 + 2**27  # this process and two workers, and a run of one light; the rest goes with the pixels
     assert larger["bytes"] - fixed == pytest.approx(16 * (facts["bytes"] - fixed), rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "words"),
-    [
-        (["--set", "lvels=3"], 2, "did you mean 'levels'?"),
-        (["--set", "scenes=absent.exr"], 2, "absent.exr"),
-        (["--set", "scenes=stil_life"], 2, "did you mean 'still_life'?"),
-        (["--set", "levels=10lux"], 2, "needs a reference plane"),
-        (["--workers", "0"], 2, "workers: 0 is outside 1 to 1024"),
-        (["--workers", "2", "--cluster", "tcp://127.0.0.1:1"], 2, "workers: 2 beside --cluster"),
-        (["--reference", "--as-stated"], 2, "as-stated: True beside --reference"),
-        (["--cluster", "127.0.0.1"], 2, "is not an address"),
-        (["--cluster", "tcp://127.0.0.1:x"], 2, "is not an address"),
-        (["-o", "study.toml/out", "--as-stated"], 1, "choose another place with --out"),
-    ],
-)
-def test_faults_are_one_line(
-    arguments: list[str],
-    code: int,
-    words: str,
-    study: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_faults_are_one_line_and_nothing_is_begun(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(study.parent)
-    found, out, err = call(["sweep", "study.toml", *arguments], capsys)
-    assert (found, out, err.count("\n")) == (code, "", 1)
-    assert words in err
-    assert not (study.parent / "out" / "sweep" / "ledger.sqlite").exists()
-
-
-def test_an_old_ledger_is_one_line_and_left_as_it_is(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    command = ["sweep", str(study), "-o", str(tmp_path / "out"), "--workers", "1", "--as-stated"]
-    assert call(command, capsys)[0] == 0
-    with closing(sqlite3.connect(tmp_path / "out" / "ledger.sqlite")) as base:
-        base.execute("PRAGMA user_version = 0")
-    code, out, err = call(command, capsys)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert f"it has version 0, this rodcone reads {VERSION}; allowed: that version; sweep again into" in err
+    rows = (
+        ("--set lvels=3", "did you mean 'levels'?"),
+        ("--set scenes=absent.exr", "absent.exr"),
+        ("--set scenes=stil_life", "did you mean 'still_life'?"),
+        ("--set levels=10lux", "needs a reference plane"),
+        ("--workers 0", "workers: 0 is outside 1 to 1024"),
+        ("--workers 2 --cluster tcp://127.0.0.1:1", "workers: 2 beside --cluster"),
+        ("--reference --as-stated", "as-stated: True beside --reference"),
+        ("--cluster 127.0.0.1", "is not an address"),
+        ("--cluster tcp://127.0.0.1:x", "is not an address"),
+    )
+    check_refusals("sweep study.toml", rows, study.parent)
+    bad_place = [("-o study.toml/out --as-stated", "choose another place with --out")]
+    check_refusals("sweep study.toml", bad_place, study.parent, code=1)
 
 
 def test_a_full_disk_is_one_line_that_says_what_is_kept(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device", str(tmp_path / "out" / "pictures"))
 
     monkeypatch.setattr("studies.sweep.run_cell.keep", full)
-    code, out, err = call(["sweep", str(study), "-o", str(tmp_path / "out"), "--workers", "1", "--as-stated"], capsys)
+    code, out, err = call(["sweep", str(study), "-o", str(tmp_path / "out"), "--workers", "1", "--as-stated"])
     assert (code, out, err.count("\n")) == (1, "", 1)
     assert "pictures: No space left on device; make room: " in err
     assert "keeps what is done" in err
@@ -237,26 +181,15 @@ def test_ctrl_c_says_what_is_kept_and_exits_with_130(study: Path, tmp_path: Path
         assert 0 < base.execute("SELECT count(*) FROM cells").fetchone()[0] < 800
 
 
-@pytest.mark.parametrize("name", ["light_levels", "spectra", "exposures"])
-def test_new_study_copies_an_example_that_reads(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "mine.toml"
-    assert call(["new", "study", name, "-o", str(path)], capsys) == (0, f"{path}\n", "")
-    assert read_study(path).name == name.replace("_", " ")
-    code, _, err = call(["new", "study", name, "-o", str(path)], capsys)
-    assert (code, "exists; allowed: a new file" in err) == (2, True)
-
-
-def test_new_study_and_cluster_refuse_what_they_cannot_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, _, err = call(["new", "study", "spectrum", "-o", str(tmp_path / "s.toml")], capsys)
-    assert (code, "did you mean 'spectra'?" in err) == (2, True)
-    assert call(["new", "cluster", "-o", str(tmp_path / "dask.yaml")], capsys)[0] == 0
+def test_new_cluster_writes_settings_and_both_refuse_what_they_cannot_do(tmp_path: Path) -> None:
+    assert call(["new", "cluster", "-o", tmp_path / "dask.yaml"])[0] == 0
     assert "MALLOC_TRIM_THRESHOLD_: null" in (tmp_path / "dask.yaml").read_text("utf-8")
-    code, _, err = call(["new", "cluster", "-o", str(tmp_path / "dask.toml")], capsys)
-    assert (code, "write dask.yaml" in err) == (2, True)
+    rows = (("study spectrum -o s.toml", "did you mean 'spectra'?"), ("cluster -o dask.toml", "write dask.yaml"))
+    check_refusals("new", rows, tmp_path)
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_shells_complete_the_sweeps_options(shell: Any) -> None:
-    text = app.generate_completion(prog_name="rodcone", shell=shell)
-    assert "dry-run" in text
-    assert "cluster" in text
+def test_shells_complete_the_sweeps_options() -> None:
+    for shell in ("bash", "zsh", "fish"):
+        text = app.generate_completion(prog_name="rodcone", shell=shell)
+        assert "dry-run" in text, shell
+        assert "cluster" in text, shell
