@@ -1,12 +1,13 @@
 """The reconstruction: closed forms, a transcription of eqs. (1)-(6), and the kernel against the reference."""
 
 import math
+import re
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
-from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, raw_image
+from builders import RGBW_4X4, raw_image
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.kernel.schedule import list_threads, make_pattern
@@ -36,15 +37,6 @@ def scene(shape, level, tile=RGBW, seed=0):
     response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(channel_map(tile, shape))
     electrons = np.minimum(rng.poisson(level * base * response), FULL)
     return exposure(electrons + rng.normal(0.0, 2.0, shape), tile)
-
-
-@pytest.mark.sample(4)
-@pytest.mark.parametrize("function", [reconstruct, reconstruct_reference])
-@pytest.mark.parametrize("tile", RGBW_PHASES + BAYER_PHASES)
-def test_flat_field_stays_flat_to_the_border(tile, function):
-    result = function(exposure(np.full((11, 14), 900.0), tile))
-    assert result.shape == (11, 14, len(channels(tile)))
-    assert np.abs(result / 900.0 - 1.0).max() < 1e-6
 
 
 @pytest.mark.sample(2)
@@ -285,34 +277,6 @@ def test_the_result_does_not_depend_on_the_number_of_threads():
         assert np.array_equal(first.noise_gain, second.noise_gain)
 
 
-EXTREME_FRAMES = {
-    "zeros": np.full((9, 11), -BLACK),
-    "one bright pixel": np.where(np.indices((9, 11)).sum(0) == 0, 60000.0, 0.0),
-    "bright and dark": np.random.default_rng(1).choice([-BLACK, FULL, 60000.0], (9, 11)),
-}
-
-
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("function", [reconstruct_with_noise, "reference"])
-@pytest.mark.parametrize("sigma", [1e-3, 1e6, math.inf])
-@pytest.mark.parametrize("name", EXTREME_FRAMES)
-def test_extreme_input_gives_finite_results_within_the_range_of_the_samples(name, sigma, function):
-    raw = exposure(EXTREME_FRAMES[name])
-    for sigma_d, sigma_s in ((sigma, 4.0), (6.0, sigma), (sigma, sigma)):
-        if function == "reference":
-            result = reference_with_noise(raw, Settings(patch=5, sigma_d=sigma_d, sigma_s=sigma_s))
-        else:
-            result = function(raw, Settings(patch=5, sigma_d=sigma_d, sigma_s=sigma_s))
-        letters, electrons = channel_map(RGBW, raw.shape), raw.electrons
-        for i, letter in enumerate(channels(RGBW)):
-            samples = electrons[letters == letter]
-            slack = 1e-5 * np.abs(samples).max()  # a weighted mean in single precision
-            assert (result.estimate[..., i] >= samples.min() - slack).all()
-            assert (result.estimate[..., i] <= samples.max() + slack).all()
-        assert (result.noise_gain > 0.0).all()
-        assert (result.noise_gain <= 1.0 + 1e-5).all()
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize("sigma_s", [1e-3, 1e-2])
 def test_with_a_tiny_sigma_the_result_lies_among_the_samples_that_tie_for_the_best(sigma_s):
@@ -330,32 +294,24 @@ def test_with_a_tiny_sigma_the_result_lies_among_the_samples_that_tie_for_the_be
 
 
 @pytest.mark.parametrize("function", [reconstruct, reconstruct_reference])
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        ({"neighbourhood": 20}, r"neighbourhood: 20 isn't allowed"),
-        ({"neighbourhood": -3}, r"neighbourhood: -3 isn't allowed"),
-        ({"neighbourhood": 1}, r"neighbourhood: 1 may miss a channel"),
-        ({"patch": 4}, r"patch: 4 isn't allowed"),
-        ({"patch": 0}, r"patch: 0 isn't allowed"),
-        ({"patch": 5.0}, r"patch: 5.0 isn't allowed"),
-        ({"sigma_d": 0.0}, r"sigma_d: 0.0 isn't allowed"),
-        ({"sigma_d": math.nan}, r"sigma_d: nan isn't allowed"),
-        ({"sigma_s": -1.0}, r"sigma_s: -1.0 isn't allowed"),
-        ({"sigma_s": 1e-9}, r"sigma_s: 1e-09 isn't allowed"),
-    ],
-)
-def test_bad_parameters_are_one_line_of_advice(wrong, message, function):
-    with pytest.raises(InputError, match=message) as caught:
-        function(exposure(np.zeros((6, 6))), Settings(**wrong))
-    assert "\n" not in str(caught.value)
-
-
-def test_a_wide_tile_needs_a_wide_neighbourhood():
-    raw = exposure(np.full((4, 4), 300.0), RGBW_4X4)
+def test_bad_parameters_are_one_line_of_advice(function):
+    for wrong, message in (
+        ({"neighbourhood": 20}, "neighbourhood: 20 isn't allowed"),
+        ({"neighbourhood": -3}, "neighbourhood: -3 isn't allowed"),
+        ({"neighbourhood": 1}, "neighbourhood: 1 may miss a channel"),
+        ({"patch": 4}, "patch: 4 isn't allowed"),
+        ({"patch": 0}, "patch: 0 isn't allowed"),
+        ({"patch": 5.0}, "patch: 5.0 isn't allowed"),
+        ({"sigma_d": 0.0}, "sigma_d: 0.0 isn't allowed"),
+        ({"sigma_d": math.nan}, "sigma_d: nan isn't allowed"),
+        ({"sigma_s": -1.0}, "sigma_s: -1.0 isn't allowed"),
+        ({"sigma_s": 1e-9}, "sigma_s: 1e-09 isn't allowed"),
+        ({"distance": "noisy"}, "distance: 'noisy' is unknown; allowed: noise, raw; did you mean 'noise'"),
+    ):
+        with pytest.raises(InputError, match=rf"\A.*{re.escape(message)}.*\Z"):
+            function(exposure(np.zeros((6, 6))), Settings(**wrong))
     with pytest.raises(InputError, match="odd numbers from 7"):
-        reconstruct(raw, Settings(neighbourhood=5))
-    assert np.abs(reconstruct(raw, Settings(neighbourhood=7)) / 300.0 - 1.0).max() < 1e-6
+        function(exposure(np.full((4, 4), 300.0), RGBW_4X4), Settings(neighbourhood=5))
 
 
 def test_without_dr_jit_the_reference_runs_and_the_result_says_so(monkeypatch):

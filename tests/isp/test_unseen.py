@@ -11,6 +11,7 @@ from isp.unseen import draw_unseen, without_unseen
 from sensor.cfa import RGBW, channels, mask, quad
 
 NEUTRAL = np.array([0.1, 0.2, 0.1, 1.0])
+TILES = [*RGBW_PHASES, RGBW_4X4, quad(RGBW)]
 DARK_E = np.sqrt(2.0 + 1.0 / 12.0)  # of `raw_image`
 
 
@@ -18,7 +19,7 @@ def exposure(electrons, tile=RGBW, **changes):
     return raw_image(np.rint(np.asarray(electrons) + 100), tile, **changes)
 
 
-@pytest.mark.parametrize("tile", [*RGBW_PHASES, RGBW_4X4, quad(RGBW)])
+@pytest.mark.parametrize("tile", TILES)
 def test_a_colour_is_unseen_from_the_closed_form_on(tile):
     """At S = a W + 4 sqrt(S + s^2) and W = 200 e-, a = 1: 268.74 e-; S = 4 sqrt(S + s^2) where W is dark: 17.9 e-."""
     for white_e, name in product((0.0, 200.0), "RGB"):
@@ -35,9 +36,8 @@ def test_a_colour_is_unseen_from_the_closed_form_on(tile):
             assert unseen.sum() == found
 
 
-@pytest.mark.parametrize("tile", [*RGBW_PHASES, RGBW_4X4, quad(RGBW)])
-def test_at_the_border_what_is_even_is_seen(tile):
-    for shape in ((16, 16), (17, 19), (18, 18), (4, 4)):
+def test_at_the_border_what_is_even_is_seen():
+    for tile, shape in product(TILES, ((16, 16), (17, 19), (18, 18), (4, 4))):
         electrons = np.where(mask(tile, "W", shape), 1000.0, np.where(mask(tile, "B", shape), 0.0, 300.0))
         assert not without_unseen(exposure(electrons, tile), NEUTRAL)[1].any()
 
@@ -68,7 +68,7 @@ def test_a_lamp_that_w_sees_and_one_beside_full_w_are_seen():
     assert kept is raw
 
 
-@pytest.mark.parametrize("tile", [*RGBW_PHASES, RGBW_4X4, quad(RGBW)])
+@pytest.mark.parametrize("tile", TILES)
 def test_what_is_even_is_seen_whatever_w_tells_and_a_line_isnt(tile):
     """A field in the colours alone, as where charge leaves its pixel, up to the border; a line has two of the eight."""
     shape = 4 * len(tile), 4 * len(tile[0])
@@ -88,8 +88,7 @@ def test_a_w_of_less_light_explains_as_much_as_a_neutral_asks():
         assert unseen.sum() == found
 
 
-@pytest.mark.parametrize("level_e", [0.01, 0.3, 10.0, 1000.0])
-@pytest.mark.parametrize("dark_e", [0.3, 1.5, 31.0])
+@pytest.mark.parametrize(("level_e", "dark_e"), [(0.01, 0.3), (0.3, 1.5), (10.0, 1.5), (1000.0, 31.0)])
 def test_in_flat_fields_nothing_is_unseen_that_counts(level_e, dark_e):
     """Colours as bright as W, the least favourable: beyond 4 standard deviations lie 3.2e-5 of 196 608 normal samples.
 

@@ -45,10 +45,9 @@ CASES = {  # a value, the same as another processor may have it, and one that is
 }
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_inputs_count_as_far_as_processors_agree(name: str) -> None:
-    value, same, other = CASES[name]
-    assert digest_inputs(value) == digest_inputs(same) != digest_inputs(other)
+def test_inputs_count_as_far_as_processors_agree() -> None:
+    for name, (value, same, other) in CASES.items():
+        assert digest_inputs(value) == digest_inputs(same) != digest_inputs(other), name
 
 
 def test_stored_values_count_to_the_last_bit() -> None:

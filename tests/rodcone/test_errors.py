@@ -8,18 +8,15 @@ import pytest
 from rodcone.errors import MOST_TOLD, InputError, require_range
 
 
-@pytest.mark.parametrize(
-    ("quoted", "told"),
-    [
+def test_a_message_is_one_line_that_a_terminal_only_shows() -> None:
+    for quoted, told in (
         ("two\nlines", r"two\nlines"),
         ("\x1b[2Jwiped", r"\x1b[2Jwiped"),  # a terminal would clear its screen
         ("exe.\u202egnp", r"exe.\u202egnp"),  # and write this one backwards
         ("\udcff", r"\udcff"),  # a file's name that is no UTF-8: print would fail
         ("Grünes Licht, 緑", "Grünes Licht, 緑"),
-    ],
-)
-def test_a_message_is_one_line_that_a_terminal_only_shows(quoted: str, told: str) -> None:
-    assert str(InputError(f"name: {quoted!s} is not allowed")) == f"name: {told} is not allowed"
+    ):
+        assert str(InputError(f"name: {quoted!s} is not allowed")) == f"name: {told} is not allowed"
 
 
 def test_of_a_message_too_long_both_ends_are_told() -> None:
@@ -32,12 +29,9 @@ def test_of_a_message_too_long_both_ends_are_told() -> None:
     assert str(InputError(f"again: {error}")).endswith("; correct it")
 
 
-@pytest.mark.parametrize("value", [True, 10**400, -(10**400), math.nan, math.inf, "3", None, 5.000001, -1e-9])
-def test_what_is_no_number_of_the_range_is_refused(value: object) -> None:
-    with pytest.raises(InputError, match="is outside 0 to 5; give less"):
-        require_range("side", value, 0.0, 5.0, "give less")
-
-
-@pytest.mark.parametrize("value", [0, 5, 2.5])
-def test_numbers_within_the_range_pass(value: float) -> None:
-    require_range("side", value, 0.0, 5.0, "give less")
+def test_what_is_no_number_of_the_range_is_refused_and_numbers_within_it_pass() -> None:
+    for value in (True, 10**400, -(10**400), math.nan, math.inf, "3", None, 5.000001, -1e-9):
+        with pytest.raises(InputError, match="is outside 0 to 5; give less"):
+            require_range("side", value, 0.0, 5.0, "give less")
+    for number in (0, 5, 2.5):
+        require_range("side", number, 0.0, 5.0, "give less")

@@ -48,15 +48,12 @@ def test_a_folder_is_no_place_for_a_file_and_a_file_none_for_a_folder(tmp_path):
         check_place(tmp_path / "file" / "a.txt")
 
 
-@pytest.mark.parametrize("name", ["../a.png", "/a.png", "sub/../../a.png", "link/a.png", "", "a\0b"])
-def test_a_name_that_leads_out_of_its_folder_is_refused(name, tmp_path):
+def test_a_name_that_leads_out_of_its_folder_is_refused_and_one_below_it_is_a_place_in_it(tmp_path):
     folder = tmp_path / "pictures"
     (folder / "sub").mkdir(parents=True)
     (folder / "link").symlink_to(tmp_path)
-    with pytest.raises(InputError, match="does not lie in"):
-        inside(folder, name)
-
-
-@pytest.mark.parametrize("name", ["a.png", "sub/a.png", "sub/../a.png", "..a.png"])
-def test_a_name_below_its_folder_is_a_place_in_it(name, tmp_path):
-    assert inside(tmp_path, name) == tmp_path / name
+    for name in ("../a.png", "/a.png", "sub/../../a.png", "link/a.png", "", "a\0b"):
+        with pytest.raises(InputError, match="does not lie in"):
+            inside(folder, name)
+    for name in ("a.png", "sub/a.png", "sub/../a.png", "..a.png"):
+        assert inside(folder, name) == folder / name

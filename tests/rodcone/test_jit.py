@@ -1,24 +1,12 @@
 """Dr.Jit compiles with the LLVM library that `rodcone.llvm` has chosen."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from command_line import in_new_python
 
 from rodcone import jit
 from rodcone.llvm import OLDEST_LLVM, llvm_version
-
-
-def in_new_python(code: str, **variables: str) -> str:
-    """What `code` prints in a Python of its own, where no Dr.Jit is loaded yet."""
-    kept = {name: value for name, value in os.environ.items() if name != "DRJIT_LIBLLVM_PATH"}
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=kept | variables, capture_output=True, text=True, timeout=60, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
 
 
 def test_a_new_python_keeps_the_users_value_and_goes_without_llvm_where_it_is_wrong(tmp_path: Path) -> None:

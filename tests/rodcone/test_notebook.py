@@ -32,19 +32,13 @@ def test_a_large_picture_is_shown_small() -> None:
     assert max(shown.shape) <= SIDE
 
 
-@pytest.mark.parametrize(("width", "shown"), [(64, "width:384px;image-rendering:pixelated"), (300, ""), (500, "")])
-def test_a_small_picture_is_shown_by_whole_multiples(width: int, shown: str) -> None:
-    assert f"style='{shown}'" in html_of("x", {}, preview_png(np.ones((8, width, 3))))
+def test_a_small_picture_is_shown_by_whole_multiples() -> None:
+    for width, shown in ((64, "width:384px;image-rendering:pixelated"), (300, ""), (500, "")):
+        assert f"style='{shown}'" in html_of("x", {}, preview_png(np.ones((8, width, 3)))), width
 
 
 def test_a_fact_may_have_several_values() -> None:
     assert "</th><td>1</td><td>2</td></tr>" in html_of("x", {"a": ("1", "2")}, None)
-
-
-def test_facts_can_not_break_out_of_the_page() -> None:
-    page = html_of("<b>", {"a": "<script>alert(1)</script>"}, None)
-    assert "<script" not in page
-    assert "&lt;script&gt;" in page
 
 
 def test_radiance_shows_its_colour_and_luminance() -> None:
@@ -113,3 +107,4 @@ def test_names_from_outside_are_shown_and_not_run() -> None:
     shown = html_of(name, {name: [name]}, preview_png(np.ones((4, 4))))
     assert "<script" not in shown
     assert "' onerror" not in shown
+    assert "&lt;script&gt;" in shown

@@ -23,12 +23,12 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("read", [read_sensor, read_study])
-@pytest.mark.parametrize(("text", "told"), HOSTILE.values(), ids=HOSTILE)
-def test_hostile_toml_is_refused_in_one_line(read: Callable[[Path], Any], text: str, told: str, tmp_path: Path) -> None:
+def test_hostile_toml_is_refused_in_one_line(read: Callable[[Path], Any], tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
-    path.write_bytes(text.encode("utf-8", "surrogateescape"))
-    with pytest.raises(InputError, match=told):
-        read(path)
+    for text, told in HOSTILE.values():
+        path.write_bytes(text.encode("utf-8", "surrogateescape"))
+        with pytest.raises(InputError, match=told):
+            read(path)
 
 
 @pytest.mark.timeout(10)

@@ -1,5 +1,6 @@
 """Tables as dataclasses: nothing is converted, and the first fault is named by its keys."""
 
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,9 +35,8 @@ def test_a_table_becomes_the_dataclass_and_a_whole_number_a_number() -> None:
     assert isinstance(found.lens.f_number, float)
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
+def test_the_first_fault_is_named() -> None:
+    rows: tuple[tuple[dict[str, Any], str], ...] = (
         ({}, "lens is missing; add it, or see the manual"),
         ({"lens": {}}, "lens: f_number is missing"),
         ({"lens": 3}, "lens: the value is not a table; allowed: a table of keys; see the manual"),
@@ -48,9 +48,7 @@ def test_a_table_becomes_the_dataclass_and_a_whole_number_a_number() -> None:
         ({"lens": {"f_number": 2}, "range_nm": "4007"}, "range_nm: '4007' is not a list"),
         ({"lens": {"f_number": 2}, "response": [1]}, "response: [1] is not a text in quotes or a number"),
         ({"lens": {"f_number": 2}, "lenses": [{"f_number": 2}, {}]}, "lenses: f_number is missing"),
-    ],
-)
-def test_the_first_fault_is_named(content: dict[str, Any], words: str) -> None:
-    with pytest.raises(InputError) as error:
-        camera(**content)
-    assert str(error.value).startswith(words)
+    )
+    for content, words in rows:
+        with pytest.raises(InputError, match="^" + re.escape(words)):
+            camera(**content)

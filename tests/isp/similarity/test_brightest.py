@@ -64,8 +64,7 @@ def test_of_a_flat_fields_samples_3_in_10_000_are_left_out_or_fewer():
         assert chance @ (left_out @ (count - light_e)) < 0.003 * light_e
 
 
-@pytest.mark.parametrize("dark_e", [0.1, 1.5, 30.0])
-@pytest.mark.parametrize("light_e", [0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10_000.0])
+@pytest.mark.parametrize(("light_e", "dark_e"), [(0.01, 0.1), (0.1, 1.5), (1.0, 0.1), (10.0, 30.0), (1000.0, 1.5)])
 def test_flat_fields_keep_their_mean(light_e, dark_e):
     """Within 0.5 %, or 4 standard errors of the frame's own mean: the noise is the same on both sides."""
     rng, shape = np.random.default_rng(7), (96, 96)
