@@ -13,10 +13,12 @@ import numpy as np
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from studies.budget.ledger import Plan, as_stated
+from studies.study.lit_scene import open_all
 from studies.study.study import SceneChoice, Study
 from studies.sweep.cells import Cell
-from studies.sweep.database import COLUMNS, FILE
+from studies.sweep.database import COLUMNS, FILE, open_results
 from studies.sweep.folder import MARKER
+from studies.sweep.prepare import Job, scene_cells
 from studies.sweep.row import Row
 from studies.sweep.run_sweep import Runner, Swept, sweep
 from studies.sweep.workers import InThisProcess, run
@@ -29,61 +31,6 @@ RENDER = (
 TIME_AND_HOST = (
     "render_s", "capture_s", "develop_s", "measure_s", "first_s", "threads", "finished", "host", "machine", "worker",
 )  # fmt: skip
-ROW = Row(
-    key="00ff",
-    scene="desk, lit.exr",
-    spectrum="own",
-    level="25cd/m2",
-    exposure="auto",
-    sensor="low_noise",
-    white_balance="gray-world",
-    frames=1,
-    processor="bayer",
-    seed=2**40,
-    luminance_cd_m2=25.0,
-    illuminance_lux=None,
-    exposure_s=0.1 + 0.2,
-    spp=0,
-    bands=10,
-    render=RENDER,
-    lens='{"f_number": 2.8}',
-    budget_share=None,
-    psnr_db=float("inf"),
-    ssim=-0.25,
-    delta_e_median=0.0,
-    delta_e_p95=1.5,
-    s_cielab_median=0.5,
-    s_cielab_p95=2.5,
-    flip_mean=0.125,
-    pu21_psnr_db=float("inf"),
-    mtf50_cy_per_px=None,
-    chart_delta_e_mean=None,
-    patch_snr_db=None,
-    mc_share=0.0,
-    snr_db=-3.5,
-    substitution=1,
-    saturated=0.0,
-    balance_delta_e=4.125,
-    balance="{}",
-    mean_electrons="{}",
-    variant="llvm_ad_spectral",
-    readout_engine="numpy",
-    development_engine="llvm",
-    versions='{"numpy": "2.4.6", "rodcone": "0.1.0+abc"}',
-    picture="ab/abcd.png",
-    truth="cd/cdef.png",
-    render_s=1.5,
-    capture_s=0.1,
-    develop_s=0.2,
-    measure_s=0.3,
-    first_s=0.4,
-    threads=2,
-    finished="2026-01-01T00:00:00+00:00",
-    host="here",
-    machine="Linux, Python 3.12.0",
-    worker=1234,
-)
-
 EMPTY: dict[Any, Any] = {str: "", int: 0, float: 0.0}
 
 NM = np.linspace(405.0, 765.0, 10)  # bands of 40 nm
@@ -163,3 +110,33 @@ def row(processor: str, seed: int, **values: Any) -> Row:
         | {"processor": processor, "seed": seed}
         | values
     )
+
+
+def made_cells(folder: Path, study: Study | None = None, plan: Plan | None = None) -> list[Cell]:
+    """Cells of a study, the small one by default, with their shared files made in the folder."""
+    study = study or small_study(folder)
+    with open_results(folder) as base:
+        job = Job(study, plan or stated(study), folder, base)
+        return [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
+
+
+# A number of every kind, and what a spreadsheet or a reader of 32 bits would change.
+ROW = row(
+    "bayer",
+    2**40,
+    key="00ff",
+    scene="desk, lit.exr",
+    level="25cd/m2",
+    sensor="low_noise",
+    luminance_cd_m2=25.0,
+    exposure_s=0.1 + 0.2,
+    psnr_db=float("inf"),
+    ssim=-0.25,
+    snr_db=-3.5,
+    variant="llvm_ad_spectral",
+    readout_engine="numpy",
+    development_engine="llvm",
+    versions='{"numpy": "2.4.6", "rodcone": "0.1.0+abc"}',
+    finished="2026-01-01T00:00:00+00:00",
+    host="here",
+)

@@ -51,19 +51,6 @@ def test_one_component_gives_textbook_lmmse() -> None:
     assert_allclose(error(prior, scale, noise), np.diag(by_pixel)[MIDDLE].mean(), rtol=1e-9)
 
 
-def test_signals_drawn_from_a_component_are_estimated_with_the_predicted_error() -> None:
-    prior, noise, scale, draws = mixture(1), Noise(dark_e=1.0, prnu=0.0, full_e=np.inf), 20.0, 20_000
-    rng = np.random.default_rng(3)
-    c, h = covariance(prior, 0), scale * mosaic().reshape(PIXELS, -1)
-    variance = h @ prior.means[0].ravel() + 1.0
-    x = rng.multivariate_normal(np.zeros(len(c)), c, draws)
-    y = x @ h.T + np.sqrt(variance) * rng.standard_normal((draws, PIXELS))
-    gain = np.linalg.solve(h @ c @ h.T + np.diag(variance), h @ c)
-    squares = ((x - y @ gain) ** 2).reshape(draws, PIXELS, COEFFICIENTS).sum(axis=2)[:, MIDDLE].mean(axis=1)
-    # 4.5 standard errors of the mean: a false alarm in 150 000 runs
-    assert abs(squares.mean() - error(prior, scale, noise)) < 4.5 * squares.std() / np.sqrt(draws)
-
-
 def test_no_estimator_of_draws_from_the_mixture_is_better_than_with_the_component_known() -> None:
     prior, noise, scale, draws = mixture(4), Noise(dark_e=3.0, prnu=0.0, full_e=np.inf), 5.0, 4000
     rng = np.random.default_rng(4)

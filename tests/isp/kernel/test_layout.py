@@ -7,14 +7,10 @@ import sys
 import numpy as np
 import pytest
 from builders import RGBW_4X4, raw_image
-from scipy.ndimage import convolve1d
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
-from isp.kernel.layout import cut_strip, strip_rows
 from isp.kernel.schedule import make_pattern
-from isp.planes import fill
-from isp.settings import WINDOW, Settings
-from isp.similarity.guide import saturated_fraction
+from isp.settings import Settings
 from rodcone.jit import backend
 from sensor.cfa import BAYER, RGBW
 
@@ -45,49 +41,9 @@ def test_the_height_of_strips_changes_no_bit(tile, sigma_s, monkeypatch):
         assert np.array_equal(strips.noise_gain, whole.noise_gain)
 
 
-@pytest.mark.parametrize("tile", [RGBW, RGBW_4X4])
-@pytest.mark.parametrize("place", [(24, 90), (0, 0), (60, 199), (31, 1)])
-def test_alpha_around_full_samples_is_alpha_of_the_frame(place, tile):
-    dn = np.full((64, 200), 500, np.uint16)
-    dn[max(place[0] - 1, 0) : place[0] + 2, max(place[1] - 1, 0) : place[1] + 2] = 4100
-    raw = raw_image(dn, tile, white_dn=4100.0, read_noise_e=2.0, dsnu_e=0.0)
-    strip = cut_strip(raw, (0, 64), make_pattern(tile), Settings(patch=5))
-    saturated = (fill((dn == 4100).astype(np.float32), tile, "W") > 0.0).astype(float)
-    box = np.ones(WINDOW)
-    count, area = (
-        convolve1d(convolve1d(values, box, 0, mode="constant"), box, 1, mode="constant")
-        for values in (saturated, np.ones(dn.shape))
-    )
-    assert count.max() > 0.0
-    assert strip.alpha == pytest.approx(count / area, abs=1e-12)
-    assert np.array_equal(saturated_fraction(raw), strip.alpha)
-
-
 def test_asking_for_the_noise_changes_no_bit_of_the_estimate():
     raw = frame(RGBW)
     assert np.array_equal(reconstruct(raw), reconstruct_with_noise(raw).estimate)
-
-
-def test_strips_are_whole_blocks_and_fewer_rows_the_wider_the_frame():
-    pattern = make_pattern(RGBW)
-    block = pattern.block[0]
-    rows = [strip_rows((100_000, width), pattern, 5) for width in (100, 4000, 12_000, 10**9)]
-    assert all(count % block == 0 for count in rows)
-    assert rows == sorted(rows, reverse=True)
-    assert rows[-1] == block
-    assert 0.6e6 < rows[1] * 4000 < 1.2e6
-
-
-def test_strips_of_a_frame_are_even():
-    """A frame a little higher than a strip isn't a strip and a rest, whose surroundings would cost as much."""
-    pattern = make_pattern(RGBW)
-    block, most = pattern.block[0], strip_rows((10**6, 4000), pattern, 5)
-    for height in (1, block, most, most + 1, most + block + 1, 5 * most // 2):
-        rows = strip_rows((height, 4000), pattern, 5)
-        count = -(-height // rows)
-        assert rows <= most
-        assert count == -(-height // most)
-        assert rows * count - height < block * count
 
 
 MEASURE = """

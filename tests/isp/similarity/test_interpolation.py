@@ -36,13 +36,6 @@ def test_weights_of_a_pixels_pairs_add_up_to_the_share_of_interpolated_letters()
         assert np.broadcast_to(total, has_pairs[0].shape) == pytest.approx(has_pairs.mean(axis=0))
 
 
-def test_pairs_of_the_papers_tile():
-    pairs = opposite_pairs(RGBW)
-    expected = {(0, 1): 1 / 4, (1, 0): 1 / 4, (1, 1): 1 / 8, (1, -1): 1 / 8}
-    assert {p: pytest.approx(weight) for p, weight in expected.items()} == {p: w[0, 0] for p, w in pairs.items()}
-    assert all(np.ptp(weight) == 0.0 for weight in pairs.values())
-
-
 @pytest.mark.parametrize("step", [3.0, 40.0])
 @pytest.mark.parametrize("column", [8, 9])
 def test_a_step_in_closed_form(column, step):
@@ -74,15 +67,6 @@ def test_noise_alone_makes_none_on_average(tile):
     loud = interpolation_variance(1.1 * noise, tile, patch)[60:-60, 60:-60].mean()
     share = float(np.mean(sum(opposite_pairs(tile).values())))
     assert loud == pytest.approx(patch**2 * share * (1.1**2 - 1) / 2, abs=3 * patch * math.sqrt(10))
-
-
-def test_blocks_of_one_channel_have_no_samples_on_opposite_sides():
-    assert not any(weight.any() for weight in opposite_pairs(MOSAICS["quad_rgbw"]).values())
-    for weights in tent_weights(MOSAICS["quad_rgbw"]):  # since each tent fills a pixel from one side of it
-        reach = weights.shape[2] // 2
-        for of_phase in weights.reshape(-1, *weights.shape[2:]):
-            sides = np.argwhere(of_phase) - reach
-            assert not {tuple(side) for side in sides if side.any()} & {tuple(-side) for side in sides if side.any()}
 
 
 def test_pairs_tell_what_all_samples_of_the_planes_would():

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import call, check_refusals
 from numpy.typing import NDArray
 
 from render.transport import Transport
@@ -18,7 +19,6 @@ from studies.budget import plan as planning
 from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger, Plan, as_stated
 from studies.budget.plan import plan, reference_plan
 from studies.budget.plan_text import cost_over_reference
-from studies.commands.cli import main
 from studies.study.lit_scene import level_luminance, lux_per_cd_m2, make_transport, open_all, photographed, under
 from studies.study.model import ImageModel, LensTerms
 from studies.study.study import RenderLimits, SceneChoice, Study, conditions
@@ -146,31 +146,21 @@ def test_a_picture_file_is_planned_in_its_own_bands(tmp_path: Path) -> None:
         assert {term.name: term.share for term in row.terms}["Monte Carlo"] == 0.0
 
 
-def test_the_command_prints_a_ledger_and_why(tmp_path: Path, cache: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    study = tmp_path / "study.toml"
-    study.write_text(FILE)
-    with pytest.raises(SystemExit) as ended:
-        main(["plan", str(study), "--cache", str(cache)])
-    assert ended.value.code == 0
-    out = capsys.readouterr().out
+def test_the_command_prints_a_ledger_and_why_and_refuses_a_bad_key(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("study.toml").write_text(FILE)
+    code, out, _ = call(["plan", "study.toml", "--cache", cache])
+    assert code == 0
     for word in ("Monte Carlo", "diffraction", "veiling glare", "cos^4", "Budget: 10%", "samples a pixel"):
         assert word in out
-    with pytest.raises(SystemExit):
-        main(["plan", str(study), "--cache", str(cache), "--json", "--set", "budget.total=0.2"])
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(call(["plan", "study.toml", "--cache", cache, "--json", "--set", "budget.total=0.2"])[1])
     assert found["budget"]["total"] == 0.2
     assert found["conditions"][0]["terms"][0]["name"] == "Monte Carlo"
     assert found["renders"][0]["spp"] == 32
     assert 0 < found["renders"][0]["cost_over_reference"] < 1
-
-
-def test_a_bad_key_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    study = tmp_path / "study.toml"
-    study.write_text(FILE)
-    with pytest.raises(SystemExit) as ended:
-        main(["plan", str(study), "--set", "budget.totl=0.2"])
-    assert ended.value.code == 2
-    assert capsys.readouterr().err.count("\n") == 1
+    check_refusals("plan study.toml", [("--set budget.totl=0.2", "did you mean 'total'?")], tmp_path)
 
 
 def model_electrons(transport: Transport, row: Ledger, model: ImageModel) -> NDArray[np.float64]:

@@ -11,8 +11,6 @@ import pytest
 from command_line import call, check_refusals
 from PIL import Image
 
-from render.radiance import SpectralRadiance
-from render.radiance_files.exr import write_exr
 from rodcone.errors import InputError
 from scenes.levels import DEMO_LEVELS
 from studies.commands.demo import STUDY
@@ -21,7 +19,6 @@ from studies.study.study_file import read_study
 from studies.sweep.export import read_rows
 
 SMALL = ["--size", "48", "--spp", "16", "--sensor", "low_noise", "--level", "0.5cd/m2", "--level", "500lux"]
-NM = 385.0 + 10 * np.arange(40)
 
 
 @pytest.fixture(scope="module")
@@ -170,50 +167,6 @@ def test_bad_input_is_refused_before_the_render(monkeypatch: pytest.MonkeyPatch,
         ("--max-seconds 0", "render.max_seconds: 0.0 is outside"),
     )
     check_refusals("demo -o out", rows, tmp_path)
-
-
-def ramp(path: Path, height: int = 20, width: int = 26, error: float = 0.0) -> Path:
-    """Picture in equal-energy greys, darker from left to right."""
-    values = np.broadcast_to(np.linspace(1.0, 0.05, width)[None, :, None], (height, width, NM.size))
-    write_exr(SpectralRadiance(values * 1e-3, NM, error), path)
-    return path
-
-
-def of_file(path: Path, out: Path, *more: str) -> tuple[dict[str, Any], str]:
-    """Results and what is told on stderr."""
-    asked = ["demo", "--scene", path, "--sensor", "low_noise", "--level", "25cd/m2", *more, "-o", out]
-    code, _, err = call(asked)
-    assert code == 0
-    return results(out), err
-
-
-@pytest.mark.thorough
-def test_demo_runs_from_a_file_in_the_files_own_size(tmp_path: Path) -> None:
-    found, err = of_file(ramp(tmp_path / "my scene.exr", error=0.25), tmp_path / "out", "--light", "E")
-    assert len(found["rows"]) == 4 * 2 * 3  # cameras, white balances, seeds
-    for row in found["rows"]:
-        assert (row["scene"], row["illuminance_lux"], row["bands"]) == ("my scene.exr", None, 40)
-        assert row["render"]["integrator"] == "file"
-        with Image.open(tmp_path / "out" / "pictures" / row["picture"]) as picture:
-            assert picture.size == (26, 20)
-    told = "rendered with noise of 25.0% of the value"
-    assert told in err
-    page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert "my scene.exr" in page
-    assert told in page
-
-
-@pytest.mark.thorough
-def test_grey_picture_is_grey_under_its_own_light_alone(tmp_path: Path) -> None:
-    """Equal energy is neutral under E; under D65, which is bluer, it is reddish."""
-    path, spread = ramp(tmp_path / "a.exr"), {}
-    for light, more in (("E", ["--light", "E"]), (None, [])):
-        row = of_file(path, tmp_path / str(light), *more)[0]["rows"][0]
-        with Image.open(tmp_path / str(light) / "pictures" / row["truth"]) as truth:
-            pixels = np.asarray(truth, dtype=int)
-        spread[light] = (pixels[:, :, 0] - pixels[:, :, 2]).max()
-    assert spread["E"] <= 1  # 40 bands round the neutral by less than a step of 8 bits
-    assert spread[None] > 10
 
 
 @pytest.mark.slow

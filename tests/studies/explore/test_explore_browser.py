@@ -268,33 +268,6 @@ def test_a_picture_without_bytes_is_the_last_one_sent(browser, address):
     assert seen == [[10, 20], [30, 20]]
 
 
-def test_two_views_over_one_connection_take_no_answers_of_each_other(browser, address):
-    """As a notebook's widget that is shown twice: both are sent all messages, and both count requests from 1."""
-    page = CHROME.open_page(browser, address)
-    EXPLORE.settle(page)
-    said = hello(open_source("still_life_outdoor", RenderOptions(size=48, spp=4)))
-    begun, status = page.evaluate(
-        f"""(async () => {{
-          const {{ default: explorer }} = await import(new URL("explore.js", location.href));
-          const asked = [], listeners = [], views = [0, 1].map(() => document.createElement("div"));
-          const model = {{ send: each => asked.push(each), on: (_, listener) => listeners.push(listener) }};
-          document.body.append(...views);
-          views.forEach(el => explorer.render({{ model, el }}));
-          const [first, second] = asked.map(each => each.page), begun = [];
-          const tell = header => {{
-            listeners.forEach(each => each(header, []));
-            begun.push(views.map(el => el.querySelector("canvas") !== null));
-          }};
-          tell({{ ...{json.dumps({**said, "kind": "hello", "number": 1})}, page: first }});
-          tell({{ ...{json.dumps({**said, "kind": "hello", "number": 1})}, page: second }});
-          tell({{ kind: "taken over", page: second }});
-          return [begun, views.map(el => el.querySelector(".status").textContent.includes("taken over"))];
-        }})()"""
-    )
-    assert begun[:2] == [[True, False], [True, True]]
-    assert status == [True, False]
-
-
 @pytest.mark.thorough
 def test_keys_move_the_measured_pixel_and_take_another_exposure(browser, address):
     page = CHROME.open_page(browser, address)

@@ -17,7 +17,7 @@ import rodcone as public
 from rodcone.errors import MOST_TOLD, InputError
 from sensor.presets import preset_file
 from sensor.readout import noise_variance
-from studies.explore import answers, chain
+from studies.explore import chain
 from studies.explore import session as SESSION
 from studies.explore.chain import expose_scene
 from studies.explore.controls import Controls
@@ -248,22 +248,6 @@ def test_a_file_or_a_figure_lets_a_picture_go_first(session, interrupted, kind):
     assert [each["kind"] for each in page.headers] == ["show", "show", "show", kind]
 
 
-def test_a_dng_is_interrupted_before_it_is_written(session, monkeypatch):
-    page = connected(session)
-    calibrate, made = answers.calibrate, []
-
-    def counted(*arguments: Any) -> Any:
-        made.append(None)
-        if len(made) == 1:
-            session.take(message("show", 2), page.send)
-        return calibrate(*arguments)
-
-    monkeypatch.setattr(answers, "calibrate", counted)
-    session.take(message("dng", 1, cameras=[{}]), page.send)
-    page.wait("dng", 1)
-    assert [each["kind"] for each in page.headers] == ["show", "dng"]
-
-
 @pytest.fixture
 def endless():
     """A render whose second state never comes: it looks up between its runs for ever."""
@@ -290,18 +274,6 @@ def test_a_render_lets_pictures_go_first_and_ends_for_another_scene(endless):
     page.wait("scene", 4)
     endless.take(message("show", 5), page.send)
     assert page.wait("show", 5)["last"] is True
-
-
-def test_a_render_looks_up_between_its_runs():
-    class Enough(Exception):
-        """Of this test."""
-
-    def stop() -> None:
-        raise Enough
-
-    states = open_source("flat_field", RenderOptions(size=16, spp=4, band_nm=100.0)).states(stop)
-    with pytest.raises(Enough):
-        next(states)
 
 
 @pytest.mark.thorough

@@ -83,21 +83,17 @@ def test_the_python_of_a_scene_opens_it_with_its_options(own: bool, extend: str 
     assert np.array_equal(lit, wanted)
 
 
-@pytest.mark.parametrize(
-    ("view", "controls", "words"),
-    [
+def test_a_wrong_view_or_control_is_refused_in_one_line():
+    for view, controls, words in (
         ("pictures", {}, "did you mean 'picture'"),
         ("pixel 3", {}, "pixel ROW COLUMN"),
         ("pixel 3 500", {}, "column: 500"),
         ("raw", {"level_cd_m": 3.0}, "level_cd_m2"),
         ("raw", {"lamps": {"sun": {"spectrum": 3}}}, "lamps"),
         ("raw", {"lens": 1j}, "lens"),
-    ],
-)
-def test_a_wrong_view_or_control_is_refused_in_one_line(view, controls, words):
-    with pytest.raises(InputError, match=words) as caught:
-        public.explorer_view(small_transport(), view, **controls)
-    assert "\n" not in str(caught.value)
+    ):
+        with pytest.raises(InputError, match=rf"\A.*{words}.*\Z"):
+            public.explorer_view(small_transport(), view, **controls)
 
 
 def test_a_transports_python_says_that_it_was_given():
@@ -161,16 +157,13 @@ def test_a_study_names_the_scene_with_its_options_and_files_by_their_whole_path(
     assert study.spectra == (tuple(each.spectrum for each in controls.lamps.values()) or ("own",))
 
 
-@pytest.mark.parametrize(
-    ("controls", "words"),
-    [
+def test_what_a_study_can_not_say_is_refused():
+    for controls, words in (
         (Controls(mosaic="rgbw_4x4"), "mosaic 'rgbw_4x4'"),
         (Controls(reference_light="A"), "reference_light 'A'"),
         (Controls(lamps={"softbox": Lamp(power=2.0)}), "one spectrum for all"),
         (Controls(settings={"sigma_s": 2.0}), "no settings of a processor"),
         (Controls(shot_noise=False), "without shot noise"),
-    ],
-)
-def test_what_a_study_can_not_say_is_refused(controls, words):
-    with pytest.raises(InputError, match=words):
-        study_of(SceneChoice("still_life"), RenderLimits(96), controls, coloured=True)
+    ):
+        with pytest.raises(InputError, match=words):
+            study_of(SceneChoice("still_life"), RenderLimits(96), controls, coloured=True)

@@ -11,10 +11,8 @@ from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, flat
-from rodcone.errors import InputError
-from sensor.exposure import LONGEST_S, auto_exposure_s
 from sensor.optics import form_image
-from sensor.presets import low_noise, table1_output
+from sensor.presets import low_noise
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
 from studies.metrics.quality import measure, psnr_db
@@ -64,16 +62,6 @@ def test_delta_e_agrees_with_colour_science() -> None:
     theirs = colour.delta_E(*labs, method="CIE 2000")
     assert measure(first, second).delta_e_median == pytest.approx(float(np.median(theirs)), rel=2e-3)
     assert measure(first, second).delta_e_p95 == pytest.approx(float(np.percentile(theirs, 95)), rel=2e-3)
-
-
-def test_exposure_puts_green_at_80_percent_of_the_well_or_stops_at_the_longest() -> None:
-    sensor = table1_output()
-    bright = form_image(neutral_scene(5000.0), sensor)
-    exposure_s = auto_exposure_s(bright, sensor)
-    assert channel_electrons(bright, sensor, exposure_s)[0, 0, 1] == pytest.approx(0.8 * 15_000, rel=1e-9)
-    assert auto_exposure_s(form_image(neutral_scene(0.036), sensor), sensor) == LONGEST_S
-    with pytest.raises(InputError, match=r"^longest_s: -1\.0"):
-        auto_exposure_s(bright, sensor, -1.0)
 
 
 def test_monte_carlo_share_is_the_ratio_of_variances() -> None:

@@ -159,14 +159,6 @@ def test_every_cell_stands_in_the_table() -> None:
 
 
 @pytest.mark.thorough
-def test_every_picture_is_there() -> None:
-    of = SAMPLE.sample_report()
-    page = page_of(of)
-    for content in stubs(of).files.values():
-        assert f"data:image/webp;base64,{b64encode(content).decode()}" in page
-
-
-@pytest.mark.thorough
 def test_unknown_numbers_become_dashes() -> None:
     def some_unknown(row: Row) -> Row | None:
         if (row.sensor, row.processor) != ("low_noise", "bayer"):
@@ -280,11 +272,6 @@ def test_one_seed_calls_nothing_ahead_and_says_so() -> None:
     assert "One seed (0)" in page
 
 
-def test_one_camera_and_one_level_make_a_page() -> None:
-    of = SAMPLE.sample_report(levels=1, cameras=("interleaved",))
-    assert len(Outline(page_of(of)).rows) == 2 * (1 + 1)
-
-
 @pytest.mark.thorough
 def test_every_metric_is_compared_by_light_lost_ones_too() -> None:
     """PSNR is won in the dark and lost in the light by 2 dB, FLIP lost everywhere, SSIM level: seeds scatter a bit."""
@@ -322,12 +309,6 @@ def test_the_same_method_on_both_mosaics_leads_the_page_under_the_studys_own_tit
     assert "<h1>What is seen?</h1>" in page
     assert '<b data-name="A">PLE, RGBW</b> beside <b data-name="B">PLE, Bayer</b>' in page
     assert read_study(CONFIGS / "demo.toml").title == "What does the white pixel bring?"
-
-
-@pytest.mark.thorough
-def test_a_study_of_sensors_is_answered() -> None:
-    page = page_of(SAMPLE.sample_report(cameras=("interleaved",), exposures=("auto", "10ms"), seeds=(0, 1)))
-    assert '<b data-name="A">table1_output</b> beside <b data-name="B">low_noise</b>' in page
 
 
 @pytest.mark.thorough

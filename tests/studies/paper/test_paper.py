@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from rodcone.colour_spaces import decode_srgb, encode_srgb
 from studies.commands.cli import main
 from studies.paper.claims import ClaimCheck, at_least, at_most, range_text, value_text
 from studies.paper.figure1 import gain_db
@@ -128,11 +127,6 @@ def test_noise_is_the_standard_deviation_of_luminance_over_exposures() -> None:
     pictures = [np.repeat((field + rng.normal(0.0, 0.05, field.shape))[..., None], 3, axis=2) for _ in range(4)]
     # A variance of 3 degrees of freedom over 4096 pixels: relative error of its root 0.64 %; 5 of them.
     assert noise(pictures) == pytest.approx(0.05, rel=0.032)
-
-
-def test_decoding_undoes_encoding() -> None:
-    values = np.linspace(0.0, 1.0, 101)
-    np.testing.assert_allclose(decode_srgb(encode_srgb(values)), values, atol=1e-7)
 
 
 def test_edge_is_found_at_the_first_bright_column() -> None:

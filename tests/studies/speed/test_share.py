@@ -13,7 +13,7 @@ from studies.speed.share import Yardstick, electrons, mean_error, share_map, yar
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "benchmarks"))
 
-from bench_share import KEPT, Shares, is_known, least_uncertain, own_share_map, shares
+from bench_share import Shares, own_share_map, shares
 
 NM = np.arange(390.0, 780.0, 20.0)
 SIDE, CHANNELS = 96, 4
@@ -85,23 +85,6 @@ def test_a_pixel_outside_counts_for_nothing_not_even_beside_it() -> None:
     assert np.nanmax(np.abs(share - 1.0)) < 1e-12
     assert shares(share, yard.inside) == Shares(*[pytest.approx(1.0)] * 4)
     assert mean_error(image, yard) == pytest.approx((10.0, 1.0))
-
-
-def test_the_kept_pixels_are_the_least_uncertain() -> None:
-    yard, truth = flat(0.0)
-    deviation = np.ones_like(truth)
-    deviation[:, 0, :] = 5.0  # 96 of 9216 pixels, 1.04 %: half a per cent goes, all of it from this row
-    deviation.ravel()[: SIDE - 40] += 1.0
-    kept = least_uncertain(deviation, yard)
-    assert kept[:, 1:].all()
-    assert 1 - kept.mean() <= 1 - KEPT
-    share = share_map(truth, yard)
-    share[~kept] = 1e6
-    assert shares(share, kept).mean_of_kept == 0.0
-
-
-def test_a_figure_is_known_where_the_references_own_is_a_tenth() -> None:
-    assert [is_known(2.0, own) for own in (0.0, 0.2, 0.21)] == [True, True, False]
 
 
 def test_exposure_noise_and_pixels_come_from_the_sensor() -> None:

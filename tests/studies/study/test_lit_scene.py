@@ -12,7 +12,6 @@ from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import as_transport
 from render.scene import LightGroup
 from render.transport import Transport
-from rodcone.digests import digest
 from rodcone.errors import InputError
 from scenes.catalog import load
 from studies.study.lit_scene import (
@@ -119,10 +118,3 @@ def test_files_that_a_scene_names_count_by_their_content(tmp_path: Path) -> None
     assert before == digest_scene(with_mesh)
     mesh.write_bytes(b"two")
     assert digest_scene(with_mesh) != before
-
-
-def test_digests_tell_values_apart_to_the_last_bit_and_not_their_containers() -> None:
-    assert digest([1.0, "a"]) == digest((1.0, "a"))
-    assert digest({"x": 1, "y": 2}) == digest({"y": 2, "x": 1})
-    assert digest(np.array([0.1, 0.2])) == digest([0.1, 0.2])
-    assert len({digest(value) for value in (0.1, np.nextafter(0.1, 1), "0.1", [0.1], None, True)}) == 6

@@ -6,11 +6,9 @@ from pathlib import Path
 import pytest
 
 from rodcone.errors import InputError
-from studies.study import study_file
 from studies.study.study import SceneChoice, Study
 from studies.study.study_file import read_study
 
-EXAMPLES = sorted((Path(study_file.__file__).parents[1] / "configs").glob("*.toml"))
 TEXT = """
 scenes = ["still_life", {source = "desk.exr", light = "A"}]
 levels = ["1cd/m2", "25cd/m2"]
@@ -43,11 +41,6 @@ def test_a_file_becomes_a_study_with_files_beside_it(tmp_path: Path) -> None:
 def test_a_scenes_surfaces_may_be_held_beyond_their_tables(tmp_path: Path) -> None:
     text = TEXT.replace('{source = "desk.exr", light = "A"}', '{source = "room.xml", extend = "hold"}')
     assert read_study(written(tmp_path, text)).scenes[1] == SceneChoice(str(tmp_path / "room.xml"), extend="hold")
-
-
-@pytest.mark.parametrize("path", EXAMPLES, ids=[path.stem for path in EXAMPLES])
-def test_every_example_is_a_study(path: Path) -> None:
-    assert read_study(path).name == path.stem.replace("_", " ")
 
 
 def test_changes_take_toml_values_and_plain_words_and_make_tables(tmp_path: Path) -> None:

@@ -9,9 +9,6 @@ import sweep_sample as SAMPLE
 from rodcone.errors import InputError
 from sensor.presets import preset_file
 from studies.pages.report_pictures import opened
-from studies.study.lit_scene import open_all
-from studies.sweep.database import open_results
-from studies.sweep.prepare import Job, scene_cells
 from studies.sweep.run_cell import run_cell
 
 
@@ -26,12 +23,9 @@ def quad_file(folder: Path, binning: str) -> str:
 @pytest.mark.parametrize("binning", ["charge", "digital"])
 def test_a_binned_cell_is_measured_at_its_own_size(binning: str, tmp_path: Path) -> None:
     study = SAMPLE.small_study(tmp_path, sensors=(quad_file(tmp_path, binning),), processors=("bayer",))
-    with open_results(tmp_path) as base:
-        job = Job(study, SAMPLE.stated(study), tmp_path, base)
-        cells = [cell for scene in open_all(study).values() for cell in scene_cells(job, scene, lambda *_: None)]
-    whole = np.load(cells[0].truth)
-    row = run_cell(cells[0])
-    sizes = [opened((cells[0].pictures / name).read_bytes()).shape[:2] for name in (row.picture, row.truth)]
+    cell = SAMPLE.made_cells(tmp_path, study)[0]
+    whole, row = np.load(cell.truth), run_cell(cell)
+    sizes = [opened((cell.pictures / name).read_bytes()).shape[:2] for name in (row.picture, row.truth)]
     assert sizes == [(whole.shape[0] // 2, whole.shape[1] // 2)] * 2
     assert row.psnr_db > 15.0  # one at a wrong scale, a factor of four, has under 10
 
@@ -45,5 +39,5 @@ def test_a_study_holds_cameras_that_bin_or_none(tmp_path: Path) -> None:
 def test_a_picture_of_odd_size_is_refused_for_a_camera_that_bins(tmp_path: Path) -> None:
     SAMPLE.picture(tmp_path / "scene.exr", (17, 20))
     study = SAMPLE.small_study(tmp_path, sensors=(quad_file(tmp_path, "charge"),))
-    with open_results(tmp_path) as base, pytest.raises(InputError, match=r"size: 17 x 20 pixels with binning"):
-        scene_cells(Job(study, SAMPLE.stated(study), tmp_path, base), next(iter(open_all(study).values())), print)
+    with pytest.raises(InputError, match=r"size: 17 x 20 pixels with binning"):
+        SAMPLE.made_cells(tmp_path, study)

@@ -93,14 +93,9 @@ from rodcone.jit import dr, arrays, backend
 sys.path.insert(0, sys.argv[1])
 import sweep_sample as SAMPLE
 from studies.sweep.run_cell import run_cell
-from studies.sweep.database import open_results
-from studies.study.lit_scene import open_all
-from studies.sweep.prepare import Job, scene_cells
 folder = Path(sys.argv[2])
 study = SAMPLE.small_study(folder, processors=("interleaved",), levels=("1cd/m2",), seeds=(0,))
-with open_results(folder) as base:
-    job = Job(study, SAMPLE.stated(study), folder, base)
-    cells = [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
+cells = SAMPLE.made_cells(folder, study)
 def threads():  # once their number has stood still for half a second: one that ends takes its time
     seen = []
     while len(seen) < 6 or len(set(seen[-6:])) > 1:

@@ -36,22 +36,16 @@ from studies.budget.ledger import Plan
 from studies.metrics.appearance import appearance, true_picture
 from studies.metrics.quality import measure
 from studies.metrics.truth import light_in_bands, neutral_electrons, true_srgb
-from studies.study.lit_scene import open_all
 from studies.study.model import ImageModel
 from studies.study.study import RenderLimits, SceneChoice, conditions
 from studies.sweep.cells import Cell, device_stream, exposure_stream
-from studies.sweep.database import open_results
-from studies.sweep.prepare import Job, scene_cells
 from studies.sweep.run_cell import run_cell
 from studies.sweep.stored import keep
 
 
 def made(folder: Path, plan: Plan | None = None, **changes: Any) -> list[Cell]:
     """Cells of the small study, their shared files made."""
-    study = SAMPLE.small_study(folder, **changes)
-    with open_results(folder) as base:
-        job = Job(study, plan or SAMPLE.stated(study), folder, base)
-        return [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
+    return SAMPLE.made_cells(folder, SAMPLE.small_study(folder, **changes), plan)
 
 
 def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
@@ -129,18 +123,23 @@ def test_a_white_balance_as_shot_is_the_neutral_of_the_scenes_light(tmp_path: Pa
     assert rows[0].mean_electrons == rows[1].mean_electrons
 
 
+def with_light(cell: Cell, expected_e: np.ndarray, error_e: np.ndarray, folder: Path) -> Cell:
+    """The cell with electrons of 10 ms and their error, (h, w), in place of its own."""
+    given = {}
+    for name, array in (("electrons", expected_e), ("errors", error_e[None])):
+        file = BytesIO()
+        np.save(file, array / 0.01)  # at 1 cd/m^2 and 1 s
+        given[name] = folder / keep(folder, file.getvalue(), ".npy")
+    return replace(cell, **given)
+
+
 def test_the_monte_carlo_share_is_of_the_pixels_below_saturation(tmp_path: Path) -> None:
     """Half of the pixels at 400 e- with an error of 3 e- each, half beyond the well with 5000 e-, in numbers."""
     cell = made(tmp_path, levels=("1cd/m2",), exposures=("10ms",), seeds=(0,))[0]
     saturated = np.arange(SAMPLE.SIZE[1]) >= SAMPLE.SIZE[1] // 2
     expected_e = np.broadcast_to(np.where(saturated, 2.0 * cell.sensor.pixel.full_well_e, 400.0), SAMPLE.SIZE)
     error_e = np.broadcast_to(np.where(saturated, 5000.0, 3.0), SAMPLE.SIZE)
-    given = {}
-    for name, array in (("electrons", expected_e), ("errors", error_e[None])):
-        file = BytesIO()
-        np.save(file, array / 0.01)  # at 1 cd/m^2 and 1 s
-        given[name] = tmp_path / keep(tmp_path, file.getvalue(), ".npy")
-    row = run_cell(replace(cell, **given))
+    row = run_cell(with_light(cell, expected_e, error_e, tmp_path))
     pixel, sensor = cell.sensor.pixel, cell.sensor
     dark_e = pixel.dark_current_e_per_s * 0.01
     dark = pixel.read_noise_e**2 + pixel.dsnu_e**2 + sensor.gain_e_per_dn**2 / 12
@@ -151,11 +150,7 @@ def test_the_monte_carlo_share_is_of_the_pixels_below_saturation(tmp_path: Path)
 def test_the_monte_carlo_share_of_a_burst_is_over_the_noise_that_merged_frames_scatter_by(tmp_path: Path) -> None:
     """20 e- in each of four frames, an error of 0.5 e- in the light, which all of them share; the noise by 60 chips."""
     cell = made(tmp_path, levels=("1cd/m2",), exposures=("10ms",), seeds=(0,), frames=(4,))[0]
-    given = {}
-    for name, array in (("electrons", np.full(SAMPLE.SIZE, 20.0)), ("errors", np.full((1, *SAMPLE.SIZE), 0.5))):
-        file = BytesIO()
-        np.save(file, array / 0.01)  # at 1 cd/m^2 and 1 s
-        given[name] = tmp_path / keep(tmp_path, file.getvalue(), ".npy")
+    lit = with_light(cell, np.full(SAMPLE.SIZE, 20.0), np.full(SAMPLE.SIZE, 0.5), tmp_path)
     merged = []
     for chip in range(60):
         device = draw_device(cell.sensor, SAMPLE.SIZE, np.random.default_rng([chip, 0]))
@@ -165,7 +160,7 @@ def test_the_monte_carlo_share_of_a_burst_is_over_the_noise_that_merged_frames_s
     # the merged frames' electrons of the light that one frame's 20 e- are, and its error with them; 19 200 pixels
     # know a variance to 1 %, and columns share offsets
     error_e = 0.5 * np.mean(merged) / 20.0
-    assert run_cell(replace(cell, **given)).mc_share == pytest.approx(error_e**2 / np.var(merged), rel=0.06)
+    assert run_cell(lit).mc_share == pytest.approx(error_e**2 / np.var(merged), rel=0.06)
 
 
 def test_a_cell_gives_the_same_row_and_picture_each_time(tmp_path: Path) -> None:
@@ -179,17 +174,6 @@ def test_seeds_share_no_noise_and_processors_of_a_mosaic_share_all(tmp_path: Pat
     first, second = (run_cell(cell) for cell in made(tmp_path, levels=("1cd/m2",)))
     assert first.picture != second.picture
     assert first.psnr_db == pytest.approx(second.psnr_db, abs=2.0)  # 320 pixels: 3 standard errors of the mean square
-
-
-@pytest.mark.thorough
-def test_single_precision_readout_draws_a_frame_of_the_same_statistics(tmp_path: Path) -> None:
-    study = SAMPLE.small_study(tmp_path)
-    plan = SAMPLE.stated(study)
-    images = {key: replace(model, exact=False) for key, model in plan.images.items()}
-    exact, single = made(tmp_path)[0], made(tmp_path, replace(plan, images=images))[0]
-    assert exact.key != single.key
-    assert run_cell(exact).picture != run_cell(single).picture
-    assert run_cell(exact).psnr_db == pytest.approx(run_cell(single).psnr_db, abs=2.0)
 
 
 def test_the_falloff_that_a_lens_is_known_to_have_is_taken_out_of_the_picture(tmp_path: Path) -> None:

@@ -3,16 +3,11 @@
 import errno
 import json
 import os
-import random
 import shutil
-import signal
 import struct
-import subprocess
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext, suppress
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
@@ -383,93 +378,3 @@ def test_two_processes_one_of_them_killed_give_what_one_gives(tmp_path: Path) ->
     assert killed
     assert content(tmp_path / "serial") == content(tmp_path / "two")
     assert active_children() == []
-
-
-ENDLESS = """
-import sys
-from importlib.util import module_from_spec, spec_from_file_location
-from functools import partial
-from pathlib import Path
-spec = spec_from_file_location("sweep_sample", sys.argv[1])
-sample = module_from_spec(spec)
-spec.loader.exec_module(sample)
-from studies.sweep.workers import run_in_processes
-if __name__ == "__main__":
-    folder = Path(sys.argv[2])
-    study = sample.small_study(folder, seeds=tuple(range(100)))
-    runner = partial(run_in_processes, workers=2) if sys.argv[4] == "2" else sample.here
-    print("ready", flush=True)
-    sample.swept(study, Path(sys.argv[3]), runner)
-"""
-
-
-def started(script: Path, folder: Path, out: Path, workers: int) -> "subprocess.Popen[str]":
-    arguments = [
-        sys.executable,
-        str(script),
-        str(Path(__file__).resolve().parents[2] / "sweep_sample.py"),
-        str(folder),
-        str(out),
-    ]
-    pipe = subprocess.PIPE
-    process = subprocess.Popen([*arguments, str(workers)], stdout=pipe, stderr=pipe, text=True, start_new_session=True)
-    assert process.stdout is not None
-    with process.stdout as told:
-        assert told.readline() == "ready\n"
-    return process
-
-
-def until_more_than(count: int, out: Path) -> None:
-    """Wait until the ledger holds more cells, or has them all."""
-    for _ in range(600):
-        if (out / "ledger.sqlite").exists():
-            with open_results(out) as base:
-                if count == 200 or len(rows(base, everything=True)) > count:
-                    return
-        time.sleep(0.05)
-    raise AssertionError("the run makes no cells")
-
-
-def running_in(session: int) -> list[int]:
-    """Processes of a session that are still there, zombies left out."""
-    found = []
-    for pid in (int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()):
-        with suppress(OSError):  # it has ended since
-            state = Path(f"/proc/{pid}/stat").read_text("utf-8").rpartition(")")[2].split()[0]
-            if os.getsid(pid) == session and state != "Z":
-                found.append(pid)
-    return found
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, 2])
-def test_killed_at_ten_random_moments_and_gone_on_with_is_as_never_killed(workers: int, tmp_path: Path) -> None:
-    """Ten times in one process and ten with a pool of two: twenty kills of the whole run, by SIGKILL."""
-    study = small_study(tmp_path, seeds=tuple(range(100)))
-    swept(study, tmp_path / "whole")
-    script = tmp_path / "run.py"
-    script.write_text(ENDLESS, "utf-8")
-    moments, grew = random.Random(workers), [0]
-    for turn in range(10):
-        process = started(script, tmp_path, tmp_path / "out", workers)
-        if turn % 3:  # a third of the kills fall before the first cell, or soon after: into shared files and start-up
-            until_more_than(grew[-1], tmp_path / "out")
-        time.sleep(moments.uniform(0.0, 0.1))  # 200 cells take a second on quick cores
-        os.kill(process.pid, signal.SIGKILL)
-        process.wait()
-        for _ in range(100):  # workers see that their parent is gone, and end
-            if not running_in(process.pid):
-                break
-            time.sleep(0.1)
-        assert running_in(process.pid) == []
-        with process.stderr or nullcontext("") as errors:
-            assert list(errors) == []  # such as a warning of semaphores, which multiprocessing has removed by now
-        if (tmp_path / "out" / "ledger.sqlite").exists():
-            with open_results(tmp_path / "out") as base:
-                grew.append(len(rows(base, everything=True)))
-    print("cells in the ledger after each kill:", grew)
-    assert half_pictures(tmp_path / "out") == []
-    assert grew == sorted(grew)  # nothing is lost from kill to kill
-    assert len(set(grew) - {0, 200}) >= 4  # kills did fall amid the cells
-    assert swept(study, tmp_path / "out").made == 200 - grew[-1]
-    assert content(tmp_path / "out") == content(tmp_path / "whole")

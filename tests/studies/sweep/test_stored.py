@@ -15,12 +15,10 @@ from rodcone.errors import InputError
 from studies.commands.cli import main
 from studies.pages.report import render_report
 from studies.pages.report_sweep import sweep_report
-from studies.study.lit_scene import open_all
 from studies.study.study import SceneChoice
 from studies.sweep.cells import Cell
-from studies.sweep.database import FILE, open_results
+from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
-from studies.sweep.prepare import Job, scene_cells
 from studies.sweep.row import Row
 from studies.sweep.run_cell import run_cell
 from studies.sweep.stored import is_whole, keep, read_whole
@@ -57,9 +55,7 @@ def test_a_flipped_bit_in_what_cells_share_is_told_and_made_again(name: str, tmp
     study, out = SAMPLE.small_study(tmp_path), tmp_path / "out"
     SAMPLE.swept(study, out)
     before = SAMPLE.content(out)
-    with open_results(out) as base:
-        job = Job(study, SAMPLE.stated(study), out, base)
-        cell = scene_cells(job, next(iter(open_all(study).values())), lambda *_: None)[0]
+    cell = SAMPLE.made_cells(out, study)[0]
     path: Path = getattr(cell, name)
     right = np.load(path).copy()
     flip(path, -1)

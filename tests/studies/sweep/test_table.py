@@ -1,12 +1,12 @@
 """Tables of a sweep's figures: means and intervals by hand, electrons by channel, and what is refused."""
 
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import get_type_hints
 
 import numpy as np
 import pytest
+from sweep_sample import row
 
 from isp.colour.encoding import quantise
 from rodcone.colour_spaces import encode_srgb
@@ -20,16 +20,12 @@ from studies.sweep.row import Row
 from studies.sweep.stored import keep
 from studies.sweep.table import FIGURES, lines, markdown
 
-HINTS = get_type_hints(Row)
-BLANK = Row(**{field.name: "" if HINTS[field.name] is str else 0 for field in fields(Row)} | {"versions": "{}"})
 HERE = Path()
 
 
 def cell(processor: str, seed: int, psnr_db: float, **more: object) -> Row:
     electrons = json.dumps({"G": 10.0, "W": 40.0 + seed} if processor == "interleaved" else {"G": 10.0})
-    return replace(
-        BLANK, processor=processor, level="1lux", seed=seed, psnr_db=psnr_db, mean_electrons=electrons, **more
-    )
+    return row(processor, seed, level="1lux", psnr_db=psnr_db, mean_electrons=electrons, versions="{}", **more)
 
 
 ROWS = [cell("interleaved", 0, 20.0), cell("interleaved", 1, 22.0), cell("bayer", 0, 12.0), cell("bayer", 1, 12.0)]

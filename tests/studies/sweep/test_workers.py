@@ -2,7 +2,7 @@
 
 import os
 import time
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
 from multiprocessing import active_children
 from pathlib import Path
@@ -12,11 +12,8 @@ import pytest
 import sweep_sample as SAMPLE
 
 from rodcone.errors import InputError
-from studies.study.lit_scene import open_all
 from studies.sweep import workers
 from studies.sweep.cells import Cell
-from studies.sweep.database import open_results
-from studies.sweep.prepare import Job, scene_cells
 from studies.sweep.workers import InThisProcess, WorkerLostError, run, run_in_processes
 
 
@@ -62,10 +59,7 @@ class Alternating(Executor):
 
 @pytest.fixture
 def cells(tmp_path: Path) -> list[Cell]:
-    study = SAMPLE.small_study(tmp_path)
-    with open_results(tmp_path) as base:
-        job = Job(study, SAMPLE.stated(study), tmp_path, base)
-        return [cell for opened in open_all(study).values() for cell in scene_cells(job, opened, lambda *_: None)]
+    return SAMPLE.made_cells(tmp_path)
 
 
 @pytest.mark.sample(1)
@@ -117,16 +111,6 @@ def test_a_cell_that_ends_its_worker_is_given_up_and_all_others_are_made(
     assert sorted(made) == sorted(cell.key for cell in (cells[0], *cells[2:]))
     assert "\n" not in str(told.value)
     assert active_children() == []
-
-
-@pytest.mark.thorough
-def test_workers_share_the_cores_and_the_environment_is_left_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", "7")
-    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
-    with workers._pool(1, 3) as pool:
-        assert isinstance(pool, ProcessPoolExecutor)
-        assert [pool.submit(os.getenv, name).result() for name in workers._THREAD_VARIABLES] == ["3"] * 4
-    assert (os.environ["OMP_NUM_THREADS"], os.environ.get("MKL_NUM_THREADS")) == ("7", None)
 
 
 @pytest.mark.thorough
