@@ -27,19 +27,41 @@ def fit() -> ColourFit:
     return fit_colours(CHANNELS, RESPONSES, NM, LIGHT, SURFACES)
 
 
-@pytest.mark.parametrize("names", [("R", "G", "B"), CHANNELS])
-def test_without_noise_it_is_the_least_squares_matrix(fit: ColourFit, names: tuple[str, ...]) -> None:
-    expected = fit_matrix(RESPONSES[: len(names)], NM, LIGHT, SURFACES)
-    assert fit.matrix(names) == pytest.approx(expected, abs=1e-8)
+def test_without_noise_it_is_the_least_squares_matrix(fit: ColourFit) -> None:
     assert fit.matrix() == pytest.approx(fit_matrix(RESPONSES[:3], NM, LIGHT, SURFACES), abs=1e-8)
+    curves = RESPONSES * np.linspace(1.0, 2.0, NM.size)
+    fourth = fit_colours(("R", "G", "B", "E"), curves, NM, LIGHT, SURFACES)
+    assert fourth.matrix("RGBE") == pytest.approx(fit_matrix(curves, NM, LIGHT, SURFACES), abs=1e-8)
+
+
+@pytest.mark.parametrize("light", ["D65", "A", "F11", "sodium_high"])
+def test_without_noise_w_takes_no_part(light: str) -> None:
+    """So RGBW is where RGB is on any scene; W's column of the least-squares matrix had up to 0.34."""
+    spd = illuminant(light).band_average(NM, WIDTH)
+    without_noise = fit_colours(CHANNELS, RESPONSES, NM, spd, SURFACES).matrix(CHANNELS)
+    expected = np.hstack([fit_matrix(RESPONSES[:3], NM, spd, SURFACES), np.zeros((3, 1))])
+    assert without_noise == pytest.approx(expected, abs=1e-7)
+
+
+def test_w_is_the_colours_and_an_independent_rest(fit: ColourFit) -> None:
+    """Surfaces drawn anew: W from the colours by weights of sum 1, and of three times the variance besides."""
+    signals, target = training(RESPONSES, NM, LIGHT, SURFACES)
+    colours, white = signals[:, :3], signals[:, 3]
+    share, *_ = np.linalg.lstsq(colours[:, :2] - colours[:, 2:], white - colours[:, 2], rcond=None)
+    explained = colours @ [*share, 1.0 - share.sum()]
+    rest = np.sqrt(3.0 * np.mean((white - explained) ** 2))
+    both = [np.column_stack([colours, explained + sign * rest]) for sign in (1.0, -1.0)]
+    assert fit.moments == pytest.approx(np.mean([part.T @ part for part in both], axis=0) / len(signals), rel=1e-9)
+    assert fit.cross == pytest.approx(np.mean([part.T @ target for part in both], axis=0) / len(signals), rel=1e-9)
 
 
 @pytest.mark.parametrize("noise", [[1e-6, 1e-6, 1e-6, 1e-8], [1e-2, 4e-3, 2e-2, 1e-4], [3.0, 1.0, 2.0, 0.5]])
 def test_no_matrix_with_rows_of_1_has_a_smaller_expected_error(fit: ColourFit, noise: list[float]) -> None:
-    signals, target = training(RESPONSES, NM, LIGHT, SURFACES)
+    _, target = training(RESPONSES, NM, LIGHT, SURFACES)
 
     def error(matrix: np.ndarray) -> float:  # of surface and white noise together, summed over sRGB
-        return float(np.mean((signals @ matrix.T - target) ** 2) * 3 + (matrix**2 @ noise).sum())
+        squares = matrix @ fit.moments @ matrix.T - 2 * matrix @ fit.cross
+        return float(np.trace(squares) + np.mean(target**2) * 3 + (matrix**2 @ noise).sum())
 
     best = fit.matrix(CHANNELS, noise)
     assert best.sum(axis=1) == pytest.approx(1.0, abs=1e-9)
