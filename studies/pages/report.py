@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from render.spectrum import VISIBLE_NM
 from studies.pages import report_text as text
 from studies.pages.charts import SNR, snr_svg
 from studies.pages.page import address, own_file, write_out
@@ -257,6 +258,13 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
 
 
 def _snr_address(report: ReportData) -> str:
-    """Address of the plot of the sensors' SNR over light under D65 in 33 ms; empty without a sensor."""
-    sensors = {sensor.name: sensor.config for sensor in report.sensors if sensor.config}
+    """Address of the plot of the sensors' SNR over light under D65 in 33 ms; empty without a sensor.
+
+    Sensors with a window beyond 380-780 nm are left out: the light of the plot ends there.
+    """
+    sensors = {
+        sensor.name: sensor.config
+        for sensor in report.sensors
+        if sensor.config and VISIBLE_NM[0] <= sensor.config.window_nm[0] and sensor.config.window_nm[1] <= VISIBLE_NM[1]
+    }
     return address("svg+xml", snr_svg(sensors, "D65", 0.033, SNR).encode()) if sensors else ""

@@ -2,7 +2,7 @@
 
 import json
 import re
-from base64 import b64encode
+from base64 import b64decode, b64encode
 from dataclasses import fields, is_dataclass, replace
 from hashlib import sha256
 from html import unescape
@@ -309,6 +309,16 @@ def test_the_same_method_on_both_mosaics_leads_the_page_under_the_studys_own_tit
     assert "<h1>What is seen?</h1>" in page
     assert '<b data-name="A">PLE, RGBW</b> beside <b data-name="B">PLE, Bayer</b>' in page
     assert read_study(CONFIGS / "demo.toml").title == "What does the white pixel bring?"
+
+
+def test_a_camera_without_an_infrared_filter_has_a_page() -> None:
+    seeing = replace(SAMPLE.SENSORS[1].config, window_nm=(380.0, 1068.0))
+    sensors = (SAMPLE.SENSORS[0], replace(SAMPLE.SENSORS[1], config=seeing))
+    page = page_of(replace(SAMPLE.sample_report(seeds=(0, 1)), sensors=sensors))
+    plots = [b64decode(code).decode() for code in re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)]
+    (snr,) = [plot for plot in plots if "SNR" in plot]
+    assert "table1_output" in snr
+    assert "low_noise" not in snr
 
 
 @pytest.mark.thorough
