@@ -6,7 +6,7 @@ from functools import cache
 from math import isfinite, nan
 from numbers import Integral, Real
 from types import UnionType
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 MOST_TOLD = 2000  # characters; a quoted file may fill megabytes
 
@@ -81,21 +81,26 @@ def require_keys(what: str, given: Iterable[str], allowed: Iterable[str]) -> Non
             raise unknown(what, key, allowed)
 
 
-def require_fields(value: object) -> None:
-    """Raise `InputError` where a field of a dataclass is of another kind than its annotation says.
+def require_fields(value: object, place: str = "") -> None:
+    """Raise `InputError` where a field of a dataclass is of another kind than its annotation says, or out of range.
 
     Numbers, text, flags, classes and tuples of these; arrays and mappings say more than an annotation, and are left.
+    ``Annotated[float, (low, high, fix)]`` is a number from low to high; `place` stands before the field's name.
     """
     owner: Any = type(value)
     for name, kind in _kinds(owner).items():
-        if not _fits(getattr(value, name), kind):
+        given = getattr(value, name)
+        if get_origin(kind) is Annotated:
+            if given is not None or not _fits(None, kind.__origin__):
+                require_range(f"{place}{name}", given, *kind.__metadata__[0])
+        elif not _fits(given, kind):
             words = kind.__name__ if isinstance(kind, type) else str(kind)
-            raise InputError(f"{name}: {str(getattr(value, name))[:80]!r} is not allowed; give {words}")
+            raise InputError(f"{place}{name}: {str(given)[:80]!r} is not allowed; give {words}")
 
 
 @cache
 def _kinds(owner: Any) -> dict[str, Any]:
-    return get_type_hints(owner)
+    return get_type_hints(owner, include_extras=True)
 
 
 def _fits(value: Any, kind: Any) -> bool:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import hypot
+from typing import Annotated
 
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_fields, require_range, require_whole, unknown
@@ -44,45 +45,26 @@ class PixelConfig:
         share holds. 0 for four times the well.
     """
 
-    pitch_um: float
-    fill_factor: float
-    full_well_e: float
-    read_noise_e: float
-    dsnu_e: float
-    prnu: float
-    dark_current_e_per_s: float = 0.0
-    conversion_gain_uv_per_e: float = 30.0
-    voltage_swing_v: float = 1.08
-    analog_gain: float = 1.0
-    column_gain_spread: float = 0.0
-    column_offset_e: float = 0.0
-    hot_pixel_share: float = 0.0
-    hot_pixel_dark_current_e_per_s: float = 0.0
-    crosstalk: float = 0.0
+    pitch_um: Annotated[float, (1e-3, 1e4, "give micrometres")]
+    fill_factor: Annotated[float, (0.0, 1.0, "give a fraction")]
+    full_well_e: Annotated[float, (1.0, 1e12, "give electrons")]
+    read_noise_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")]
+    dsnu_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")]
+    prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]
+    dark_current_e_per_s: Annotated[float, (0.0, 1e12, "give electrons per second, 0 for none")] = 0.0
+    conversion_gain_uv_per_e: Annotated[float, (1e-6, 1e9, "give microvolts per electron")] = 30.0
+    voltage_swing_v: Annotated[float, (1e-6, 1e6, "give volts")] = 1.08
+    analog_gain: Annotated[float, (1e-6, 1e6, "give a factor")] = 1.0
+    column_gain_spread: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
+    column_offset_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")] = 0.0
+    hot_pixel_share: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
+    hot_pixel_dark_current_e_per_s: Annotated[float, (0.0, 1e12, "give electrons per second, 0 for none")] = 0.0
+    crosstalk: Annotated[float, (0.0, 0.25, "give the share that goes to each of four neighbours, 0 for none")] = 0.0
     binned_well_e: float = 0.0
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        limits = {
-            "pitch_um": (1e-3, 1e4, "give micrometres"),
-            "fill_factor": (0.0, 1.0, "give a fraction"),
-            "full_well_e": (1.0, 1e12, "give electrons"),
-            "read_noise_e": (0.0, 1e9, "give electrons, 0 for none"),
-            "dsnu_e": (0.0, 1e9, "give electrons, 0 for none"),
-            "prnu": (0.0, 1.0, "give a fraction: 1.7 % is 0.017"),
-            "dark_current_e_per_s": (0.0, 1e12, "give electrons per second, 0 for none"),
-            "conversion_gain_uv_per_e": (1e-6, 1e9, "give microvolts per electron"),
-            "voltage_swing_v": (1e-6, 1e6, "give volts"),
-            "analog_gain": (1e-6, 1e6, "give a factor"),
-            "column_gain_spread": (0.0, 1.0, "give a fraction, 0 for none"),
-            "column_offset_e": (0.0, 1e9, "give electrons, 0 for none"),
-            "hot_pixel_share": (0.0, 1.0, "give a fraction, 0 for none"),
-            "hot_pixel_dark_current_e_per_s": (0.0, 1e12, "give electrons per second, 0 for none"),
-            "crosstalk": (0.0, 0.25, "give the share that goes to each of four neighbours, 0 for none"),
-        }
-        for name, (low, high, fix) in limits.items():
-            require_range(name, getattr(self, name), low, high, fix)
         require_fields(self)
         if self.binned_well_e:
             fix = "the floating diffusion holds one full well at least; give electrons, 0 for four wells"
@@ -123,27 +105,17 @@ class Reading:
         Which one: readings of another have other shot noise and another PRNU.
     """
 
-    read_noise_e: float
-    dsnu_e: float
-    full_well_e: float
-    light_share: float = 1.0
-    time_share: float = 1.0
+    read_noise_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")]
+    dsnu_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")]
+    full_well_e: Annotated[float, (1.0, 1e12, "give electrons")]
+    light_share: Annotated[float, (1e-6, 1.0, "give the photodiode's share of the pixel's light")] = 1.0
+    time_share: Annotated[float, (1e-6, 1.0, "give a share of the exposure time, the longest's 1")] = 1.0
     photodiode: str = ""
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        limits = {
-            "read_noise_e": (0.0, 1e9, "give electrons, 0 for none"),
-            "dsnu_e": (0.0, 1e9, "give electrons, 0 for none"),
-            "full_well_e": (1.0, 1e12, "give electrons"),
-            "light_share": (1e-6, 1.0, "give the photodiode's share of the pixel's light"),
-            "time_share": (1e-6, 1.0, "give a share of the exposure time, the longest's 1"),
-        }
-        for name, (low, high, fix) in limits.items():
-            require_range(name, getattr(self, name), low, high, fix)
-        if not isinstance(self.photodiode, str):
-            raise InputError(f"photodiode: {self.photodiode!r} is not a name; allowed: a name in quotes; write so")
+        require_fields(self)
 
     @property
     def share(self) -> float:

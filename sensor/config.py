@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, hypot
 from numbers import Real
-from typing import Any
+from typing import Annotated, Any
 
 from numpy.typing import NDArray
 
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from rodcone.brief import brief
-from rodcone.errors import InputError, require_range, require_whole
+from rodcone.errors import InputError, require_fields, require_whole
 from rodcone.notebook import html_of
 from rodcone.plots import png_of
 from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad
@@ -40,28 +40,18 @@ class LensConfig:
         Share of the light that scatters evenly over the picture, about the index of ISO 9358.
     """
 
-    f_number: float
-    transmittance: float = 1.0
-    magnification: float = 0.0
-    horizontal_view_deg: float = 0.0
-    diffraction: float = 0.0
-    defocus_um: float = 0.0
-    veiling_glare: float = 0.0
+    f_number: Annotated[float, (0.1, 1e4, "give focal length over aperture")]
+    transmittance: Annotated[float, (0.0, 1.0, "give a fraction")] = 1.0
+    magnification: Annotated[float, (0.0, 1e4, "give its absolute value, 0 for a far scene")] = 0.0
+    horizontal_view_deg: Annotated[float, (0.0, 175.0, "give degrees, 0 for no falloff")] = 0.0
+    diffraction: Annotated[float, (0.0, 100.0, "give 1 for an ideal lens, 0 for none")] = 0.0
+    defocus_um: Annotated[float, (0.0, 1e6, "give micrometres, 0 for none")] = 0.0
+    veiling_glare: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        limits = {
-            "f_number": (0.1, 1e4, "give focal length over aperture"),
-            "transmittance": (0.0, 1.0, "give a fraction"),
-            "magnification": (0.0, 1e4, "give its absolute value, 0 for a far scene"),
-            "horizontal_view_deg": (0.0, 175.0, "give degrees, 0 for no falloff"),
-            "diffraction": (0.0, 100.0, "give 1 for an ideal lens, 0 for none"),
-            "defocus_um": (0.0, 1e6, "give micrometres, 0 for none"),
-            "veiling_glare": (0.0, 1.0, "give a fraction, 0 for none"),
-        }
-        for name, (low, high, fix) in limits.items():
-            require_range(name, getattr(self, name), low, high, fix)
+        require_fields(self)
 
 
 @dataclass(frozen=True)

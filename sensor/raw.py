@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 from math import hypot
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rodcone.brief import brief
-from rodcone.errors import InputError, require_fields, require_range
+from rodcone.errors import InputError, require_fields
 from rodcone.notebook import html_of, preview_png
 from rodcone.plots import Axes, draw_line
 from sensor.calibration import ColourCalibration
@@ -33,24 +33,16 @@ class NoiseStep:
         As `RawImage` has them.
     """
 
-    from_e: float
-    shot: float
-    read_noise_e: float
-    dsnu_e: float
-    prnu: float
+    from_e: Annotated[float, (0.0, 1e12, "give electrons")]
+    shot: Annotated[float, (1e-6, 1e12, "give a factor")]
+    read_noise_e: Annotated[float, (0.0, 1e12, "give electrons, 0 for none")]
+    dsnu_e: Annotated[float, (0.0, 1e12, "give electrons, 0 for none")]
+    prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        limits = {
-            "from_e": (0.0, 1e12, "give electrons"),
-            "shot": (1e-6, 1e12, "give a factor"),
-            "read_noise_e": (0.0, 1e12, "give electrons, 0 for none"),
-            "dsnu_e": (0.0, 1e12, "give electrons, 0 for none"),
-            "prnu": (0.0, 1.0, "give a fraction: 1.7 % is 0.017"),
-        }
-        for name, (low, high, fix) in limits.items():
-            require_range(f"noise_steps: {name}", getattr(self, name), low, high, fix)
+        require_fields(self, "noise_steps: ")
 
 
 @dataclass(frozen=True)
@@ -99,19 +91,19 @@ class RawImage:
 
     dn: NDArray[np.uint16]
     cfa: Tile
-    black_dn: float
-    white_dn: float
-    gain_e_per_dn: float
-    read_noise_e: float
-    dsnu_e: float
-    prnu: float
-    exposure_s: float
+    black_dn: Annotated[float, (-LARGEST_DN, LARGEST_DN, "give digital numbers of 24 bits")]
+    white_dn: Annotated[float, (-LARGEST_DN, LARGEST_DN, "give digital numbers of 24 bits")]
+    gain_e_per_dn: Annotated[float, (1e-12, 1e12, "give electrons per digital number")]
+    read_noise_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")]
+    dsnu_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")]
+    prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]
+    exposure_s: Annotated[float, (0.0, 1e7, "give seconds, 0 or more")]
     camera: str = "rodcone"
-    f_number: float | None = None
-    iso: float | None = None
+    f_number: Annotated[float | None, (0.1, 1e4, "give focal length over aperture")] = None
+    iso: Annotated[float | None, (1e-6, 1e9, "give a speed above 0")] = None
     colour: ColourCalibration | None = None
     engine: str = ""
-    column_gain_spread: float = 0.0
+    column_gain_spread: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
     defects: NDArray[np.intp] | None = None
     noise_steps: tuple[NoiseStep, ...] = ()
 
@@ -124,22 +116,6 @@ class RawImage:
         require_fields(self)
         if self.defects is not None:
             object.__setattr__(self, "defects", _checked_defects(self.defects, self.shape))
-        limits = {
-            "black_dn": (-LARGEST_DN, LARGEST_DN, "give digital numbers of 24 bits"),
-            "white_dn": (-LARGEST_DN, LARGEST_DN, "give digital numbers of 24 bits"),
-            "gain_e_per_dn": (1e-12, 1e12, "give electrons per digital number"),
-            "read_noise_e": (0.0, 1e9, "give electrons, 0 for none"),
-            "dsnu_e": (0.0, 1e9, "give electrons, 0 for none"),
-            "prnu": (0.0, 1.0, "give a fraction: 1.7 % is 0.017"),
-            "exposure_s": (0.0, 1e7, "give seconds, 0 or more"),
-            "f_number": (0.1, 1e4, "give focal length over aperture"),
-            "iso": (1e-6, 1e9, "give a speed above 0"),
-            "column_gain_spread": (0.0, 1.0, "give a fraction, 0 for none"),
-        }
-        for name, (low, high, fix) in limits.items():
-            value = getattr(self, name)
-            if value is not None or name not in ("f_number", "iso"):
-                require_range(name, value, low, high, fix)
         if not self.black_dn < self.white_dn:
             raise InputError(
                 f"black_dn: {self.black_dn!r} is not under white_dn {self.white_dn!r}; swap or correct them"

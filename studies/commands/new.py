@@ -12,8 +12,8 @@ from rodcone.files import check_place, replacing
 from rodcone.toml_file import read_toml
 from sensor.cameras.convert import convert
 from sensor.cameras.emva_report import numbers_of, read_report
-from sensor.cameras.library import MeasuredCamera, measured_camera, measured_cameras
-from sensor.cameras.noise_files import darktable_numbers, dng_numbers
+from sensor.cameras.library import measured_camera
+from sensor.cameras.noise_files import dng_numbers
 from sensor.cameras.numbers import (
     PixelNumbers,
     completed,
@@ -41,8 +41,6 @@ def preset(
     camera: str | None = None,
     noise: Path | None = None,
     anchor: str | None = None,
-    iso: float | None = None,
-    white_e: float | None = None,
 ) -> None:
     """Write a sensor as a TOML file to change: pixel, lens, mosaic, responses, every number with its source.
 
@@ -60,20 +58,16 @@ def preset(
     camera
         Measured response of a camera by name, such as "Nikon D850": see rodcone list sensors, rodcone new cameras.
     noise
-        Where its noise stands: an EMVA 1288 report as .toml, a .dng with a NoiseProfile, or darktable's
-        noiseprofiles.json with --camera and --iso. For raw frames of your own: rodcone characterise --from.
+        Where its noise stands: an EMVA 1288 report as .toml, or a .dng with a NoiseProfile. For raw frames of
+        your own: rodcone characterise --from.
     anchor
         Published quantum efficiency at a wavelength, such as 0.5@530, which turns a relative response, or the curves of
         the preset that is named, into electrons.
-    iso
-        Exposure index of a profile in noiseprofiles.json; the lowest by default.
-    white_e
-        Electrons at which the camera reads white at that exposure index; such a profile doesn't state them.
     """
     if camera is None and noise is None:
         if name is None:
             raise InputError("name: none is given; allowed: a preset's name, --camera or --noise; give one")
-        require_absent(f"for {name!r}; allowed: with --camera or --noise", anchor=anchor, iso=iso, white_e=white_e)
+        require_absent(f"for {name!r}; allowed: with --camera or --noise", anchor=anchor)
         _copy(preset_file(name), out, ".toml")
         return
     require_new(out, ".toml")
@@ -81,8 +75,8 @@ def preset(
     require_new(curves_file, ".csv")
     lender = None if name is None else read_preset(name)
     # what the sources tell
-    measured = None if camera is None else _measured(camera, noise)
-    numbers = _numbers(noise, camera, iso, white_e)
+    measured = None if camera is None else measured_camera(camera)
+    numbers = _numbers(noise)
     if anchor is not None:
         numbers = replace(numbers, efficiency=_anchor(anchor), source=f"{numbers.source}; anchor {anchor} as given")
     # what a preset lends
@@ -98,7 +92,7 @@ def preset(
         )
     # the files
     curves = curves_csv(numbers, shape)
-    title = f"{measured.maker} {measured.model}" if measured else camera or numbers.source.split(":")[0]
+    title = f"{measured.maker} {measured.model}" if measured else numbers.source.split(":")[0]
     text = preset_text(f"{title}, as its sources tell it.", numbers, shape, curves_file.name if curves else "")
     check_place(out)
     files = {curves_file: curves, out: text} if curves else {out: text}
@@ -186,27 +180,15 @@ def _named(study_file: Path) -> list[str]:
     return list(dict.fromkeys(files))
 
 
-def _measured(camera: str, noise: Path | None) -> MeasuredCamera | None:
-    """Measured response of a camera; None where it is known to darktable's file of noise alone."""
-    known = camera.lower() in {name.lower() for name in measured_cameras()}
-    return measured_camera(camera) if known or noise is None or noise.suffix.lower() != ".json" else None
-
-
-def _numbers(noise: Path | None, camera: str | None, iso: float | None, white_e: float | None) -> PixelNumbers:
-    ending = None if noise is None else noise.suffix.lower()
-    if ending != ".json":
-        require_absent("here; allowed: with a noiseprofiles.json", iso=iso, white_e=white_e)
+def _numbers(noise: Path | None) -> PixelNumbers:
     if noise is None:
         return PixelNumbers("no source of noise is given")
+    ending = noise.suffix.lower()
     if ending == ".toml":
         return numbers_of(read_report(noise))
-    if ending == ".json":
-        if camera is None:
-            raise InputError("camera: none is given; allowed: maker and model as in the file; give --camera")
-        return darktable_numbers(noise, camera, iso, white_e)
     if ending == ".dng":
         return dng_numbers(noise)
-    raise InputError(f"noise: {str(noise)!r} has another ending; allowed: .toml, .dng, .json; rename it")
+    raise InputError(f"noise: {str(noise)!r} has another ending; allowed: .toml, .dng; rename it")
 
 
 def _anchor(text: str) -> tuple[float, float]:

@@ -30,7 +30,6 @@ from scenes.reflectances import read_reflectances
 from sensor.calibration import ColourCalibration
 from sensor.cameras.emva_report import numbers_of, read_report
 from sensor.cameras.library import read_library
-from sensor.cameras.noise_files import darktable_numbers
 from sensor.config_file import read_sensor
 from sensor.curves import read_csv, read_curve
 from sensor.raw import RawImage
@@ -414,10 +413,6 @@ eta = 64
 lambda_nm = 529
 mu_e_sat = 9500
 """
-_PROFILES = b"""{"noiseprofiles": [{"maker": "A", "models": [{"model": "B", "profiles": [
-{"iso": 100, "a": [4e-6, 2e-6, 3e-6], "b": [2e-8, 1e-8, 2e-8]},
-{"iso": 200, "a": [8e-6, 4e-6, 6e-6], "b": [3e-8, 2e-8, 3e-8], "skip": true}]}]}]}
-"""
 
 
 def _library_samples() -> list[Sample]:
@@ -442,11 +437,6 @@ TARGETS: dict[str, Target] = {
     "sensor": Target(_sensor_samples, {".toml": any_text, ".csv": any_text}, read_sensor),
     "report": Target(
         lambda: [{"report.toml": _REPORT}], {".toml": any_text}, lambda path: numbers_of(read_report(path))
-    ),
-    "darktable": Target(
-        lambda: [{"noiseprofiles.json": _PROFILES}],
-        {".json": any_text},
-        lambda path: darktable_numbers(path, "A B", 100.0, 5e4),
     ),
     "library": Target(_library_samples, {".json": json_values}, _read_library),
     "cube": Target(

@@ -18,7 +18,7 @@ FUZZ = Path(__file__).parent
 FINDINGS = sorted((FUZZ / "findings").iterdir())
 QUICK = 20  # inputs of each target in `make test`
 NAMES = (
-    *("exr", "mat", "dng", "tiff", "photograph", "noise_profile", "study", "sensor", "report", "darktable", "library"),
+    *("exr", "mat", "dng", "tiff", "photograph", "noise_profile", "study", "sensor", "report", "library"),
     *("cube", "photo", "lamp", "curves", "scene", "cache", "prior", "ledger"),
 )
 

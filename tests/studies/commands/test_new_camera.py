@@ -102,17 +102,6 @@ def test_a_report_gives_a_camera_of_its_own_or_the_noise_and_the_anchor_of_a_mea
     assert sensor.responses.band_average(("G",), [536.0], [0.1])[0, 0] == pytest.approx(0.9125, rel=2e-3)
 
 
-def test_a_profile_of_darktable_tells_the_noise_of_its_camera(tmp_path):
-    profiles = tmp_path / "noiseprofiles.json"
-    held = [{"iso": 100, "a": [1e-5, 3e-6, 1e-5], "b": [1e-8, 1e-8, 1e-8]}]
-    content = {"noiseprofiles": [{"maker": "A", "models": [{"model": "B", "profiles": held}]}]}
-    profiles.write_text(json.dumps(content), "utf-8")
-    path = tmp_path / "b.toml"
-    code, _, err = call(["new", "preset", "--camera", "A B", "--noise", profiles, "--white-e", "5e4", "-o", path])
-    assert code == 0, err
-    assert tomllib.loads(path.read_text("utf-8"))["pixel"]["full_well_e"] == 5e4
-
-
 def test_a_reports_gain_that_is_set_aside_is_told(tmp_path):
     report = tmp_path / "report.toml"
     lines = REPORT.read_text("utf-8").splitlines()
@@ -160,9 +149,7 @@ def test_what_is_not_allowed_is_refused_and_nothing_is_written(tmp_path, monkeyp
         ("--camera 'Maker Model One' --anchor 50@530", "anchor: 50.0"),
         ("--camera 'Maker Model One' --anchor 0.5@nan", "anchor: nan"),
         ("--camera 'Maker Model One' --anchor 0.5@@530", "such as 0.5@530"),
-        ("--camera 'Maker Model One' --iso 100", "allowed: with a noiseprofiles.json"),
         ("--noise absent.toml", "can't be read"),
-        ("--noise absent.json", "give --camera"),
         ("--noise absent.dng", "there is no such file"),
         ("--noise noise.xml", "another ending"),
     )
