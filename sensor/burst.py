@@ -1,4 +1,4 @@
-"""Several exposures of one scene, and their merge into one picture of the light."""
+"""Several exposures of one scene: their merge into one picture of the light."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,13 +8,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from render.radiance import SpectralRadiance
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_range
-from sensor.capture import capture
 from sensor.chip import Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.config import SensorConfig
-from sensor.device import Device
 from sensor.raw import RawImage
 from sensor.readings.noise import CLEAR_SIGMAS
 
@@ -59,17 +56,6 @@ class _Group:
     exposure_s: float
     count: int
     rate: NDArray[np.float64]
-
-
-def burst(
-    radiance: SpectralRadiance,
-    sensor: SensorConfig,
-    exposures_s: Sequence[float],
-    device: Device,
-    rng: np.random.Generator,
-) -> tuple[RawImage, ...]:
-    """Take one frame for each exposure time (`sensor.exposure.bracket_s`), one after the other with one chip."""
-    return tuple(capture(radiance, sensor, exposure_s, device, rng) for exposure_s in exposures_s)
 
 
 def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merged:

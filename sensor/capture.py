@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
-from rodcone.errors import InputError
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
@@ -73,11 +72,6 @@ def capture(
     if exposure_s is None:
         image = light if isinstance(light, SpectralIrradiance) else form_image(radiance, sensor)
         exposure_s = auto_exposure_s(image, sensor)
-    if light.values.shape[:2] != device.shape:
-        raise InputError(
-            f"radiance: a frame of {light.values.shape[:2]} is not the device's {device.shape}; "
-            "draw the device with the frame's shape"
-        )
     expected_e: NDArray[np.floating]
     if isinstance(light, SpectralIrradiance) and numpy_runs:
         expected_e = expected_electrons(light, sensor, exposure_s)
@@ -87,7 +81,7 @@ def capture(
         weights = weights * camera_equation(sensor.lens) if scaled else weights
         expected_e = expected_electrons_single(light.values, weights, sensor)
         if scaled and sensor.lens.horizontal_view_deg:
-            expected_e *= falloff(sensor.lens, device.shape).astype(expected_e.dtype)
+            expected_e *= falloff(sensor.lens, (expected_e.shape[0], expected_e.shape[1])).astype(expected_e.dtype)
     return expose(expected_e, sensor, exposure_s, device, rng, exact=exact)
 
 

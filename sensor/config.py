@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_fields, require_whole
-from rodcone.notebook import html_of
-from rodcone.plots import png_of
 from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad
 from sensor.chip import MERGED, Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.curves import Responses, rgbw
@@ -111,21 +109,6 @@ class SensorConfig:
                 "pixel: its full_well_e, read_noise_e or dsnu_e is not that of its readings; allowed: "
                 "with_readings(sensor, readings); change the readings instead"
             )
-
-    def _repr_html_(self) -> str:
-        converter = f"{len(self.chip.readings)} readings" if self.chip.readings else f"{self.gain_e_per_dn:.3g} e⁻/DN"
-        facts = {
-            "mosaic": " / ".join(self.cfa),
-            "pixel": f"{self.pixel.pitch_um:g} µm, full well {self.pixel.full_well_e:g} e⁻",
-            "lens": f"f/{self.lens.f_number:g}",
-            "converter": f"{self.bits} bits, {converter}, black at {self.black_dn} DN",
-            "read noise": f"{self.pixel.read_noise_e:g} e⁻",
-            "DSNU": f"{self.pixel.dsnu_e:g} e⁻",
-            "PRNU": f"{100 * self.pixel.prnu:g} %",
-            "dark current": f"{self.pixel.dark_current_e_per_s:g} e⁻/s",
-        }
-        curves = {name: self.responses.curves[name] for name in channels(self.cfa)}
-        return html_of("SensorConfig", facts, png_of(Responses(curves).plot))
 
     @property
     def metered_well_e(self) -> float:

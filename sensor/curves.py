@@ -1,6 +1,5 @@
 """Spectral responses of colour channels, in electrons per photon: the built-in ones, other filters, CSV files."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -166,10 +165,6 @@ def _require_channels(responses: Responses, channels: str) -> None:
         raise InputError(f"responses: no curve of {', '.join(missing)}; allowed: R, G, B and W; add it")
 
 
-class QuantumEfficiencyWarning(UserWarning):
-    """The curves to be multiplied by a quantum efficiency seem to hold one already."""
-
-
 class RelativeResponsesWarning(UserWarning):
     """A camera whose responses are known up to a factor: so are its electrons, and all that follows from them."""
 
@@ -199,11 +194,6 @@ def read_csv(
     InputError
         For a missing file, a header without ``wavelength_nm``, a cell that is no number, a response outside 0..1, or a
         range that the file doesn't reach.
-
-    Warns
-    -----
-    QuantumEfficiencyWarning
-        Where a quantum efficiency is given for curves that seem to hold one.
     """
     curves = _table(path)
     nm = next(iter(curves.values())).wavelength_nm
@@ -211,14 +201,6 @@ def read_csv(
         curves = {channel: _within(curve, range_nm, str(path)) for channel, curve in curves.items()}
     if quantum_efficiency is not None:
         Responses(curves)  # refuses a transmittance over 1 before the product hides it
-        reason = _holds_quantum_efficiency(curves)
-        if reason:
-            warnings.warn(
-                f"responses: {str(path)!r} seems to hold the quantum efficiency already ({reason}), and is multiplied "
-                "by one again; leave quantum_efficiency out if the file gives electrons per photon",
-                QuantumEfficiencyWarning,
-                stacklevel=2,
-            )
     for factor in (ir_cut if isinstance(ir_cut, Spectrum) else None, quantum_efficiency):
         if factor is not None:
             curves = {channel: _times(curve, factor) for channel, curve in curves.items()}
@@ -279,22 +261,3 @@ def _times(curve: Spectrum, factor: float | Spectrum) -> Spectrum:
         )
     values = [np.interp(nm, one.wavelength_nm, one.values) for one in (curve, factor)]
     return Spectrum(nm, values[0] * values[1])
-
-
-def _holds_quantum_efficiency(curves: Mapping[str, Spectrum]) -> str:
-    """Why curves look as if a quantum efficiency were in them; an empty text where they don't.
-
-    Colour filters pass 0.8 or more at their peaks and clear ones the same everywhere, while front-lit silicon with its
-    filters stays under 0.7, and a clear pixel (W, C) follows silicon's rise from blue to red (so do ISETCam's sensors).
-    Back-lit pixels without a clear one, whose R, G or B exceeds 0.7, are taken for filters: no curve tells them apart.
-    """
-    most = max(float(curve.values.max()) for curve in curves.values())
-    if most < 0.7:
-        return f"no curve exceeds {most:.2f}, where filters alone pass 0.8 or more at their peak"
-    nm = np.arange(450.0, 651.0, 5.0)
-    for channel in [name for name in ("W", "C") if name in curves]:
-        values = np.interp(nm, curves[channel].wavelength_nm, curves[channel].values, left=0.0, right=0.0)
-        low = float(values.min() / values.max()) if values.max() else 0.0
-        if 0.3 < low < 0.8:  # passes all of 450-650 nm, and not evenly
-            return f"{channel} passes all of 450-650 nm but falls to {low:.2f} of its peak there, as silicon does"
-    return ""

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import InputError, require_range, unknown
+from rodcone.errors import require_range, unknown
 from sensor.cfa import channels, unit_channel
 from sensor.config import METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.optics import SpectralIrradiance
@@ -151,22 +151,6 @@ def information_bits(expected_e: NDArray[np.float64], sensor: SensorConfig, expo
     variance = noise_variance(expected_e, sensor, exposure_s)
     bits = 0.5 * np.log2(1.0 + expected_e**2 / variance)
     return float(np.where(expected_e < sensor.pixel.full_well_e, bits, 0.0).mean())
-
-
-def bracket_s(middle_s: float, stops: Sequence[float] = (-2.0, 0.0, 2.0)) -> tuple[float, ...]:
-    """Exposure times around one: a stop more is twice the time [s]. A burst of n is ``bracket_s(t, [0] * n)``.
-
-    Raises
-    ------
-    InputError
-        For no stops at all, a time that isn't positive, or stops beyond 20 either way.
-    """
-    require_range("middle_s", middle_s, 1e-9, 1e7, "give seconds above 0")
-    if len(stops) == 0:
-        raise InputError(f"stops: {stops!r} is empty; allowed: one number a frame; give some, such as (-2, 0, 2)")
-    for stop in stops:
-        require_range("stops", stop, -20.0, 20.0, "give powers of two of the time")
-    return tuple(middle_s * 2.0**stop for stop in stops)
 
 
 def warn_if_full(raw: RawImage) -> None:

@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import InputError, require_range
+from rodcone.errors import InputError
 from sensor.cfa import block_sums
 from sensor.config import SensorConfig
 from sensor.device import Device
@@ -120,20 +120,13 @@ def read_out(
     Raises
     ------
     InputError
-        For a frame that isn't the device's size, negative or non-finite electrons, or a negative exposure.
+        For a frame that isn't the device's size.
     """
-    require_range("exposure_s", exposure_s, 0.0, 1e7, "give seconds, 0 or more")
     expected = np.asarray(expected_e)
     if expected.shape != device.shape:
         raise InputError(
             f"expected_e: shape {expected.shape} is not the device's {device.shape}; "
             "draw the device with the frame's shape"
-        )
-    if not (expected.min() >= 0 and expected.max() < np.inf):  # false for NaN too
-        row, column = (int(i) for i in np.argwhere(~(np.isfinite(expected) & (expected >= 0)))[0])
-        raise InputError(
-            f"expected_e: {expected[row, column]} at row {row}, column {column}; "
-            "allowed: finite numbers >= 0; repair the radiance"
         )
     if not sensor.chip.readings:
         dn = draw(expected, sensor, device, exposure_s, draw_key(rng), 0)

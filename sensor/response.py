@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from render.photometry import photons_per_joule
 from render.spectrum import VISIBLE_NM, Floats
-from rodcone.errors import InputError, require_range
+from rodcone.errors import InputError
 from sensor.cfa import channels, check_covers, mask
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
@@ -35,7 +35,6 @@ def electrons_per_irradiance(
     UserWarning
         Where the bands don't fill the camera's window: what each channel loses.
     """
-    require_range("exposure_s", exposure_s, 0.0, 1e7, "give seconds, 0 or more")
     check_window(sensor.window_nm, wavelength_nm, width_nm)
     _check_covered(sensor, wavelength_nm, width_nm)
     seen_nm = _inside_nm(sensor.window_nm, wavelength_nm, width_nm)

@@ -113,10 +113,6 @@ def dng_tags(raw: RawImage) -> Tags:
     InputError
         For another mosaic, a camera without colour calibration, or levels that DNG can't hold.
     """
-    if not is_in_dng(raw.cfa):
-        raise InputError(
-            f"cfa: {raw.cfa} is not written as DNG; allowed: Bayer, 2x2 RGBW, quads of both; write a .tif instead"
-        )
     if raw.colour is None:
         raise InputError("colour: the raw image holds no colour calibration, which a DNG needs; write a .tif instead")
     if raw.black_dn < 0 or raw.white_dn != int(raw.white_dn):

@@ -82,28 +82,10 @@ def raw_image(held: dict[str, Any], dn: NDArray[np.uint16], name: str) -> RawIma
         For a value of the wrong type or out of its range; `name` stands in front.
     """
     try:
-        for key, value in held.items():
-            if isinstance(value, bool):  # which Python takes for a number
-                raise InputError(f"{key}: {value!r} is not a number; correct it")
-        colour = held["colour"]
-        if colour is not None:
-            names = {field.name for field in fields(ColourCalibration)}
-            if not isinstance(colour, dict) or set(colour) != names:
-                raise InputError(f"colour: allowed is null, or an object of {', '.join(sorted(names))}; correct it")
-            colour = ColourCalibration(**colour)
-        steps = _noise_steps(held.get("noise_steps", []))
-        return RawImage(
-            dn, **{key: held[key] for key in KEYS if key in held} | {"colour": colour, "noise_steps": steps}
-        )
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from None
-
-
-def _noise_steps(held: Any) -> tuple[NoiseStep, ...]:
-    names = {field.name for field in fields(NoiseStep)}
-    if not isinstance(held, list) or not all(isinstance(each, dict) and set(each) == names for each in held):
-        raise InputError(f"noise_steps: allowed is a list of objects of {', '.join(sorted(names))}; correct it")
-    for key, value in (pair for each in held for pair in each.items()):
-        if isinstance(value, bool):  # which Python takes for a number
-            raise InputError(f"noise_steps: {key}: {value!r} is not a number; correct it")
-    return tuple(NoiseStep(**each) for each in held)
+        structured = {
+            "colour": None if held["colour"] is None else ColourCalibration(**held["colour"]),
+            "noise_steps": tuple(NoiseStep(**step) for step in held.get("noise_steps", ())),
+        }
+        return RawImage(dn, **{key: held[key] for key in KEYS if key in held} | structured)
+    except (InputError, TypeError) as error:  # TypeError: keys of a part that it lacks or doesn't know
+        raise InputError(f"{name}: {error}; give what rodcone wrote") from None

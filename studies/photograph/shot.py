@@ -20,7 +20,7 @@ from rodcone.errors import InputError, require_absent, require_fields, require_w
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
-from sensor.burst import burst
+from sensor.capture import capture
 from sensor.cfa import channels, is_bayer
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -174,7 +174,8 @@ def take(order: Order, step: Step | None = None) -> Taken:
     if exposure_s is None:
         exposure_s = exposure_by_rule_s(order.exposure, form_image(radiance, sensor), sensor)
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
-    taken = burst(radiance, sensor, [exposure_s] * order.frames, device, np.random.default_rng([order.seed, _FRAME]))
+    rng = np.random.default_rng([order.seed, _FRAME])
+    taken = [capture(radiance, sensor, exposure_s, device, rng) for _ in range(order.frames)]
     name = Path(order.sensor).stem.encode("ascii", "replace").decode()
     lens, iso = sensor.lens, iso_speed(sensor)
     raws = [replace(frame, camera=name, f_number=lens.f_number, iso=iso, colour=colour) for frame in taken]

@@ -1,7 +1,6 @@
 """Responses of R, G, B, W: peaks and electron ratios of the published sensor, and curves from a file."""
 
 import os
-import warnings
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from render.illuminants import illuminant
 from render.spectrum import Spectrum
 from rodcone.csv_file import MOST_BYTES
 from rodcone.errors import InputError
-from sensor.curves import QuantumEfficiencyWarning, Responses, read_csv, read_curve, rgbw
+from sensor.curves import Responses, read_csv, read_curve, rgbw
 
 PEAKS = {"R": (0.560, 592.0), "G": (0.678, 540.0), "B": (0.415, 476.0), "W": (1.0, 620.0)}
 
@@ -190,38 +189,6 @@ def test_a_quantum_efficiency_out_of_range_is_refused(tmp_path, efficiency):
 def test_filters_in_per_cent_are_told_so_although_the_product_would_fit(tmp_path):
     with pytest.raises(InputError, match="divide per cent by 100"):
         read_csv(write(tmp_path, "wavelength_nm,G\n400,20\n500,80\n"), quantum_efficiency=0.005)
-
-
-@loop(
-    ("text", "reason"),
-    [
-        ("wavelength_nm,R,G\n400,0,0.1\n550,0.1,0.6\n650,0.55,0\n", "no curve exceeds 0.60"),
-        ("wavelength_nm,G,W\n400,0,0.4\n550,0.8,0.8\n650,0,1.0\n", "W passes all of 450-650 nm but falls to 0.53"),
-        ("wavelength_nm,C\n400,0.2\n450,0.31\n650,0.93\n", "C passes all of 450-650 nm but falls to 0.33"),
-    ],
-)
-def test_a_quantum_efficiency_that_would_be_applied_twice_is_warned_of_in_one_line(tmp_path, text, reason):
-    path = write(tmp_path, text)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        read_csv(path)  # nothing is multiplied: no warning
-    with pytest.warns(QuantumEfficiencyWarning) as caught:
-        read_csv(path, quantum_efficiency=0.5)
-    (one,) = caught
-    assert one.filename == __file__
-    message = str(one.message)
-    assert "\n" not in message
-    for part in (reason, "curves.csv", "electrons per photon"):
-        assert part in message
-
-
-def test_the_project_s_own_curves_would_be_recognised_as_holding_it(tmp_path):
-    nm = np.arange(380.0, 781.0, 5.0)
-    columns = [np.interp(nm, one.wavelength_nm, one.values) for one in rgbw().curves.values()]
-    rows = [",".join(map(repr, map(float, row))) for row in zip(nm, *columns, strict=True)]
-    path = write(tmp_path, "\n".join(["wavelength_nm,R,G,B,W", *rows]))
-    with pytest.warns(QuantumEfficiencyWarning, match="W passes all"):
-        read_csv(path, quantum_efficiency=0.5)
 
 
 def test_a_single_curve_is_read_and_a_second_column_or_per_cent_refused(tmp_path):

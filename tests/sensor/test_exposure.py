@@ -8,15 +8,7 @@ from builders import any_order
 from loop import loop
 
 from rodcone.errors import InputError
-from sensor.exposure import (
-    LONGEST_S,
-    RULES,
-    auto_exposure_s,
-    bracket_s,
-    exposure_by_rule_s,
-    information_bits,
-    most_informative_s,
-)
+from sensor.exposure import LONGEST_S, RULES, auto_exposure_s, exposure_by_rule_s, information_bits, most_informative_s
 from sensor.optics import SpectralIrradiance
 from sensor.presets import preset
 from sensor.response import channel_electrons
@@ -81,22 +73,6 @@ def test_a_mosaic_without_green_is_exposed_for_its_unit():
         auto_exposure_s(ramp(), sensor, channel="G")
     assert auto_exposure_s(ramp(), sensor) == auto_exposure_s(ramp(), sensor, channel="C") > 0
     assert auto_exposure_s(ramp(), sensor) != auto_exposure_s(ramp(), sensor, channel="R")
-
-
-def test_a_stop_is_twice_the_time_and_a_burst_a_bracket_of_none():
-    assert bracket_s(0.01) == (0.0025, 0.01, 0.04)
-    assert bracket_s(0.01, [0] * 3) == (0.01, 0.01, 0.01)
-    assert bracket_s(0.01, [0.5])[0] == pytest.approx(0.01 * np.sqrt(2), rel=1e-15)
-
-
-@loop(
-    ("middle_s", "stops", "words"),
-    [(0.0, (0,), "middle_s: 0.0"), (0.01, (), "stops: () is empty"), (0.01, (99,), "stops: 99")],
-)
-def test_a_bracket_that_cannot_be_is_refused(middle_s, stops, words):
-    with pytest.raises(InputError) as error:
-        bracket_s(middle_s, stops)
-    assert words in str(error.value)
 
 
 def ideal(read_noise_e=0.0):

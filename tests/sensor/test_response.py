@@ -143,13 +143,6 @@ def test_memory_order_of_the_bands_does_not_matter():
     np.testing.assert_allclose(first, second, rtol=1e-13)
 
 
-@loop("exposure_s", [-1e-3, np.nan, np.inf])
-def test_an_exposure_that_cannot_be_is_refused(exposure_s):
-    with pytest.raises(InputError, match=r"exposure_s: .* is outside 0 to .*; give seconds, 0 or more") as error:
-        expected(uniform(1e-3, [500.0, 510.0]), camera(), exposure_s)
-    assert repr(exposure_s) in str(error.value)
-
-
 def test_an_image_smaller_than_the_tile_is_refused():
     with pytest.raises(InputError, match=r"mosaic: shape \(1, 6\).*at least 2x2"):
         expected(uniform(1e-3, [500.0, 510.0], shape=(1, 6)), camera(), 0.01)

