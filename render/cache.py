@@ -18,7 +18,7 @@ from render.combine import emission
 from render.denoised.denoise import Denoised
 from render.error_estimates import Halves, SharedPaths, relative_error
 from render.level import Irradiance, SceneMeans
-from render.loader import Film, integrator_name, variant
+from render.loader import INTEGRATOR, Film, variant
 from render.scene import Node, Scene, walk
 from render.transport import Transport
 from rodcone.digests import digest_file, digest_inputs
@@ -131,7 +131,7 @@ def _write(path: Path, arrays: Mapping[str, Any]) -> None:
 def _path(folder: Path, scene: Scene, film: Film, seed: int, kind: str = "render") -> Path:
     key = digest_inputs(
         [
-            *(ENGINE_VERSION, kind, integrator_name(), variant(), compiler_version()),
+            *(ENGINE_VERSION, kind, INTEGRATOR, variant(), compiler_version()),
             *map(metadata.version, ("mitsuba", "drjit")),
             *(scene.name, scene.geometry, scene.reference_plane, file_digests(scene.geometry)),
             [[name, group.emitters, group.coloured] for name, group in scene.groups.items()],

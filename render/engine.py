@@ -18,7 +18,7 @@ from render.denoised.denoise import denoiser
 from render.denoised.folds import FOLD_SHARE, denoise_means
 from render.level import Irradiance
 from render.limits import LEAST_POINTS, PILOT_FROM, Limits
-from render.loader import Film, as_guest, integrator_name, load_groups, variant
+from render.loader import INTEGRATOR, Film, as_guest, load_groups, variant
 from render.meter import Meter
 from render.runs import add_run, errors_of, let_go, means_of, no_means, pilot_rates, scene_means_of
 from render.scene import Scene
@@ -26,7 +26,6 @@ from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from render.transport import Transport
 from rodcone.errors import InputError, require_whole
-from rodcone.jit import backend
 from rodcone.progress import Step, render_words, told
 
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
@@ -99,7 +98,7 @@ def render(
     InputError
         For a bad size, band or limit, a scene without light, a material that picks lobes by wavelength, a surface
         or sunsky whose data end within the bands, or an earlier result of another size, bands or lights; for `denoise`
-        without the extra of that name, or without Dr.Jit.
+        without the extra of that name; without LLVM and CUDA.
 
     Warns
     -----
@@ -110,7 +109,7 @@ def render(
     film = _checked_film(scene, size, wavelength_nm, width_nm, scene.max_depth if max_depth is None else max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
     if denoise:
-        _require_denoiser()
+        denoiser()
     if denoise and max_seconds is not None:
         max_seconds /= 1 + 2 * FOLD_SHARE
     limits = Limits(spp=spp, max_spp=max_spp, noise=noise, max_seconds=max_seconds, seed=seed)
@@ -164,12 +163,6 @@ def _checked_film(
     )
 
 
-def _require_denoiser() -> None:
-    if backend() == "numpy":
-        raise InputError("denoise: Dr.Jit has neither LLVM nor CUDA here; allowed: False; see rodcone doctor")
-    denoiser()
-
-
 def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film, denoise: bool) -> Transport | None:
     """Return the result to continue; refuse another scene's."""
     if earlier is None:
@@ -194,7 +187,7 @@ def _render(
 ) -> Transport:
     start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
     own_share, denoised = (1 / (1 + 2 * FOLD_SHARE) if denoise else 1.0), None
-    piloted = limits.most_samples > PILOT_FROM and backend() != "numpy"
+    piloted = limits.most_samples > PILOT_FROM
     loaded = load_groups(scene, film)
     lights, stopped_by = emission(scene.groups, film.wavelength_nm, film.width_nm), None
     # Go on from the earlier means, or begin
@@ -238,7 +231,7 @@ def _render(
         counts=2 * means.count * means.rates,
         stopped_by=stopped_by,
         seconds=time.perf_counter() - start,
-        integrator=integrator_name(),
+        integrator=INTEGRATOR,
         variant=variant(),
         denoised=denoised,
     )

@@ -4,51 +4,56 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cache, reduce
-from operator import getitem
+from functools import cache
 from typing import Any
 
 from render.integrator.dense import SPECTRUM_SIZE
 from render.integrator.matte import matte_surface, with_matte_surfaces
 from render.integrator.reflectance_table import with_rows
-from render.integrator.scattered_path import scattered_path
-from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER, Node, Scene, uniform_node, walk
+from render.scene import Node, Scene, uniform_node, walk
 from render.spectrum import Spectrum
 from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError, one_line
 from rodcone.jit import at_least_two_threads, backend
 from rodcone.types import Floats
 
+INTEGRATOR = "dense path (all bands along each path)"
 METER_PIXELS = 64  # film of the irradiance meter, each side
 
 # Bands traced together. More share the work of tracing, but a kernel's first compilation grows faster than their
 # number: 40 bands of `still_life_outdoor`, 96x96, 16 samples, take 0.89 s of processor time in two parts and 0.69 s in
 # one, and compile in 5 and 12 s.
 PART_BANDS = 40
-# Without Dr.Jit, whose paths have points of their own: the samples of a pass are drawn independently, as many as asked.
-_SAMPLER = {"type": "independent"}
 _search_path: list[Any] = []  # this program's file resolver, between two of its calls
-_VARIANTS = {"cuda": "cuda_ad_spectral", "llvm": "llvm_ad_spectral", "numpy": "scalar_spectral"}
+_VARIANTS = {"cuda": "cuda_ad_spectral", "llvm": "llvm_ad_spectral", "numpy": "none"}
 
 
 def variant() -> str:
-    """Mitsuba variant in use: CUDA where a device answers, else LLVM, else scalar."""
+    """Mitsuba variant in use: CUDA where a device answers, else LLVM, else none."""
     return _VARIANTS[backend()]
 
 
 @cache
 def mitsuba_module() -> Any:
-    """Mitsuba with its variant set and the dense integrator registered."""
+    """Mitsuba with its variant set and the dense integrator registered.
+
+    Raises
+    ------
+    InputError
+        Without Dr.Jit, which alone traces paths.
+    """
+    if backend() == "numpy":
+        raise InputError(
+            "render: Dr.Jit has neither LLVM nor CUDA here, and nothing else traces paths; allowed: stored radiance, "
+            "captures and development; install LLVM 17 or newer, see `rodcone doctor`"
+        )
     import mitsuba  # only now: its import loads Dr.Jit, which must find the LLVM that `rodcone.jit` has chosen
 
     mi: Any = mitsuba
     mi.set_variant(variant())
     mi.set_log_level(mi.LogLevel.Error)
     mi.set_file_resolver(search_path(mi))
-    if backend() == "numpy":
-        mi.register_integrator("scatteredpath", scattered_path(mi))
-    else:
-        mi.register_bsdf("matte", matte_surface(mi))
+    mi.register_bsdf("matte", matte_surface(mi))
     return mi
 
 
@@ -119,9 +124,6 @@ class Loaded:
     curves : tuple of Spectrum
         Reflectances that are read from a table, row by row. None for coloured lights: a line in them
         would be met at few of the table's wavelengths.
-    covering : mitsuba.Scene or None
-        The same scene with a film of one band and lights of 1 whatever their colours: it shows what they cover. None
-        with Dr.Jit, whose camera paths record it.
     """
 
     mi_scene: Any
@@ -129,26 +131,10 @@ class Loaded:
     coloured: bool
     sample_lights: bool
     curves: tuple[Spectrum, ...] = ()
-    covering: Any = None
 
     def channels(self, bands: int, *, apart: bool = False) -> int:
         """Channels of a path in so many bands (`render.integrator.dense.Tracer.camera`), about."""
         return (bands + 4) * (len(self.groups) * (1 + apart) + self.coloured)
-
-    @property
-    def camera(self) -> Any:
-        """Mitsuba's sensor."""
-        return self.mi_scene.sensors()[0]
-
-    @property
-    def meter(self) -> Any | None:
-        """Mitsuba's irradiance meter on the reference plane, if the scene states one."""
-        return next(iter(self.mi_scene.sensors()[1:]), None)
-
-
-def integrator_name() -> str:
-    """Integrator in use, in words."""
-    return "path + specfilm" if backend() == "numpy" else "dense path (all bands along each path)"
 
 
 def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Loaded]:
@@ -157,19 +143,17 @@ def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Load
     With `metered` the reference plane carries an irradiance meter.
     """
     hair = ["/".join(path) for path, node in walk(scene.geometry) if node.get("type") == "hair"]
-    if hair and backend() != "numpy" and film.wavelength_nm.size > SPECTRUM_SIZE:
+    if hair and film.wavelength_nm.size > SPECTRUM_SIZE:
         raise InputError(
             f"scene {scene.name}: {', '.join(hair)} of type 'hair' chooses where light goes by wavelength; allowed: "
             f"{SPECTRUM_SIZE} bands a render; replace it, nearest: principled or roughplastic"
         )
     names = list(scene.groups)
-    carried = [] if backend() == "numpy" or len(names) == 1 else [x for x in names if scene.is_environment(x)][:1]
+    carried = [] if len(names) == 1 else [x for x in names if scene.is_environment(x)][:1]
     apart = [name for name in names if name not in carried]
-    curves: tuple[Spectrum, ...] = ()
-    if backend() != "numpy":
-        geometry, curves = with_rows(with_matte_surfaces(scene.geometry))
-        scene = replace(scene, geometry=geometry, extend=None)  # held ends are in the geometry by now
-        scene = _with_common_shapes(scene) if len(apart) > 1 else scene
+    geometry, curves = with_rows(with_matte_surfaces(scene.geometry))
+    scene = replace(scene, geometry=geometry, extend=None)  # held ends are in the geometry by now
+    scene = _with_common_shapes(scene) if len(apart) > 1 else scene
     loaded = [_load_group(scene, name, film, curves, metered) for name in apart]
     if carried:
         loaded[0] = replace(loaded[0], groups=(*loaded[0].groups, names.index(carried[0])))
@@ -211,18 +195,11 @@ def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ..
     `curves` are those of the table that the scene's matte surfaces name the rows of.
     """
     description = scene.lit({group: uniform_node(1.0)})
-    description["sensor"] = {**description["sensor"], "film": _recorder(film, film.size), "sampler": _SAMPLER}
+    description["sensor"] = {**description["sensor"], "film": _recorder(film.size)}
     if metered and scene.reference_plane:
-        if backend() == "numpy":
-            scene.check_meter()
-        recorder = _recorder(film, (METER_PIXELS, METER_PIXELS))
-        meter = {"type": "irradiancemeter", "film": recorder, "sampler": _SAMPLER | {"seed": 1}}
+        meter = {"type": "irradiancemeter", "film": _recorder((METER_PIXELS, METER_PIXELS))}
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
     index, coloured = (list(scene.groups).index(group),), scene.groups[group].coloured
-    if backend() == "numpy":
-        covering = _load(scene, _covering(scene, group, film))
-        mi_scene = _load(scene, description)
-        return Loaded(mi_scene=mi_scene, groups=index, coloured=coloured, sample_lights=True, covering=covering)
     # Merging meshes orders a scene's shapes anew at each load, and its lights with them. A path chooses a light by its
     # number, so several keep their order only without.
     mi_scene = _load(scene, description, merge_meshes=len(scene.groups[group].emitters) == 1)
@@ -240,19 +217,6 @@ def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ..
     )
 
 
-def _covering(scene: Scene, group: str, film: Film) -> Node:
-    """Describe the scene with the group's lights at 1, on a film of one band."""
-    description = scene.lit({group: uniform_node(1.0)})
-    one_band = replace(film, wavelength_nm=film.wavelength_nm[:1], width_nm=film.width_nm[:1])
-    description["sensor"] = {**description["sensor"], "film": _recorder(one_band, film.size), "sampler": _SAMPLER}
-    for path in scene.groups[group].emitters if scene.groups[group].coloured else ():
-        *way, key = path.split("/")
-        holder = reduce(getitem, way, description)
-        kind = "constant" if holder[key]["type"] in COLOURED_EMITTERS else holder[key]["type"]
-        holder[key] = {"type": kind, EMISSION_PARAMETER[kind]: uniform_node(1.0)}
-    return description
-
-
 def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> Any:
     mi = mitsuba_module()
     config = mi.parser.ParserConfig(variant())
@@ -267,18 +231,6 @@ def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> Any
         raise InputError(f"scene {scene.name}: Mitsuba can't load it: {words}; correct the description") from error
 
 
-def _recorder(film: Film, size: tuple[int, int]) -> Node:
-    """Film node; float32, since specfilm's default of half floats loses the night."""
-    node: Node = {"width": size[1], "height": size[0], "component_format": "float32", "rfilter": {"type": "box"}}
-    if backend() != "numpy":
-        return {"type": "hdrfilm", "pixel_format": "luminance", **node}
-    node["type"] = "specfilm"
-    for index, (centre, width) in enumerate(zip(film.wavelength_nm, film.width_nm, strict=True)):
-        edges = {"wavelength_min": float(centre - width / 2), "wavelength_max": float(centre + width / 2)}
-        node[f"band{index:04d}"] = {"type": "regular", **edges, "values": "1,1"}
-    return node
-
-
-def stock_integrator(plug_in: str, film: Film) -> Any:
-    """Integrator of Mitsuba's own, for renders without Dr.Jit."""
-    return mitsuba_module().load_dict({"type": plug_in, "max_depth": film.max_depth, "rr_depth": film.rr_depth})
+def _recorder(size: tuple[int, int]) -> Node:
+    """Film node. Only its size counts: paths are summed by `render.integrator.wavefront`."""
+    return {"type": "hdrfilm", "width": size[1], "height": size[0], "pixel_format": "luminance"}

@@ -8,13 +8,12 @@ import numpy as np
 
 from render.cache import load_irradiance, save_irradiance
 from render.integrator.dense import Tracer
-from render.integrator.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
+from render.integrator.wavefront import Span, bands_apart, seed_of, traced
 from render.level import Irradiance
-from render.loader import METER_PIXELS, Film, Loaded, as_guest, load_groups, mitsuba_module, stock_integrator
+from render.loader import METER_PIXELS, Film, Loaded, as_guest, load_groups, mitsuba_module
 from render.runs import let_go
 from render.scene import Scene
 from rodcone.errors import InputError
-from rodcone.jit import backend
 from rodcone.types import Planes
 
 METER_BANDS = 4  # traced together: as quick as all at once, and a kernel that compiles sooner
@@ -71,17 +70,13 @@ def _measured(scene: Scene, film: Film, seed: int) -> Irradiance:
             of_half = seed_of(seed, loaded.groups[0], half, METER_PIXELS)
             halves[half, list(loaded.groups)] = _half(loaded, film, of_half)
     # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
-    factor = 1.0 if backend() == "numpy" else np.pi
-    even, odd = (half.reshape(-1, METER_PIXELS**2).astype(np.float64) * factor for half in halves)
+    even, odd = (half.reshape(-1, METER_PIXELS**2).astype(np.float64) * np.pi for half in halves)
     error = (even - odd) / 2 / METER_PIXELS**2
     return Irradiance(((even + odd) / 2).mean(axis=1).reshape(shape[1:3]), error @ error.T)
 
 
 def _half(loaded: Loaded, film: Film, seed: int) -> Planes:
     """Irradiance of each of the film's pixels, (group, band, h, w)."""
-    if backend() == "numpy":
-        image = by_stock(loaded.mi_scene, loaded.meter, stock_integrator("path", film), spp=HALF_SPP, seed=seed)
-        return (image / film_width(film))[None]
     parts = []
     for part in np.array_split(np.arange(film.wavelength_nm.size), -(-film.wavelength_nm.size // METER_BANDS)):
         bands = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])

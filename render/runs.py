@@ -18,13 +18,12 @@ from threadpoolctl import ThreadpoolController
 from render.error_estimates import Halves, group_errors, relative_error, shared_paths
 from render.integrator.allocation import rates_of
 from render.integrator.dense import Tracer
-from render.integrator.wavefront import Span, bands_apart, by_stock, film_width, seed_of, traced
+from render.integrator.wavefront import Span, bands_apart, seed_of, traced
 from render.level import SceneMeans
 from render.limits import MOST_POINTS, chunk_from
-from render.loader import PART_BANDS, Film, Loaded, mitsuba_module, stock_integrator
+from render.loader import PART_BANDS, Film, Loaded, mitsuba_module
 from render.scene import Scene
 from render.transport import Transport
-from rodcone.jit import backend
 from rodcone.types import Floats, Planes
 
 MOST_FLOATS = 1 << 24  # of all channels of a launch, 64 MiB: as many threads as that allows
@@ -207,14 +206,11 @@ def _drawn(
         own_seed, parts = seed_of(seed, loaded.groups[0], half), []
         for part in np.array_split(np.arange(film.wavelength_nm.size), -(-film.wavelength_nm.size // PART_BANDS)):
             bands = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
-            if backend() == "numpy":
-                parts.append(_by_mitsuba(loaded, bands, span, own_seed))
-            else:
-                tracer = Tracer(mitsuba_module(), loaded, bands, own_seed, apart=apart)
-                image = traced(partial(tracer.camera, film.size), rates, span, threads, own_seed)
-                scattered, others = bands_apart(image, len(loaded.groups) * (1 + apart), part.size)
-                shares, own = np.split(others, [len(loaded.groups)], axis=1)
-                parts.append((scattered, shares, own[:, : part.size]))
+            tracer = Tracer(mitsuba_module(), loaded, bands, own_seed, apart=apart)
+            image = traced(partial(tracer.camera, film.size), rates, span, threads, own_seed)
+            scattered, others = bands_apart(image, len(loaded.groups) * (1 + apart), part.size)
+            shares, own = np.split(others, [len(loaded.groups)], axis=1)
+            parts.append((scattered, shares, own[:, : part.size]))
         # All parts of the bands see the same paths: what knows no band is taken from the first.
         scattered = parts[0][0] if len(parts) == 1 else np.concatenate([part[0] for part in parts], axis=2)
         scattered, indirect = np.split(scattered, [len(loaded.groups)], axis=1)
@@ -232,23 +228,6 @@ def _drawn(
         coverage=(even[2], odd[2]),
         indirect=(even[3], odd[3]),
     )
-
-
-def _by_mitsuba(loaded: Loaded, film: Film, span: Span, seed: int) -> tuple[Planes, Planes, Planes]:
-    """Bands, shares of lights seen directly and their own bands without Dr.Jit: a chunk is a pass with its own seed."""
-    chunks = []
-    for index in range(span.chunks):
-        of_chunk = seed_of(seed, span.start + index * span.chunk)
-        draw = partial(by_stock, spp=span.chunk, seed=of_chunk)
-        seen_directly = mitsuba_module().load_dict({"type": "path", "max_depth": 1})
-        scattered = draw(loaded.mi_scene, loaded.camera, stock_integrator("scatteredpath", film)) / film_width(film)
-        # Renders of their own show the lights.
-        shares = draw(loaded.covering, loaded.covering.sensors()[0], seen_directly) / film_width(film)[:1]
-        own = scattered[:0]
-        if loaded.coloured:
-            own = draw(loaded.mi_scene, loaded.camera, seen_directly) / film_width(film)
-        chunks.append((scattered[None], shares, own))
-    return tuple(np.stack(arrays_of) for arrays_of in zip(*chunks, strict=True))  # type: ignore[return-value]
 
 
 def let_go(error: BaseException) -> None:

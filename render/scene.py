@@ -32,7 +32,6 @@ COLOURED_EMITTERS = ("envmap", "sunsky")
 OWN_SIDE = 256  # pixels, of a scene that states no size
 HELD_NM = (100.0, 20_000.0)  # as far as held ends go
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
-_SIZELESS_EMITTERS = ("point", "spot", "directional")  # rays can't meet them
 
 
 @dataclass(frozen=True)
@@ -158,15 +157,6 @@ class Scene:
         }
         lights = png_of(lambda axes: draw_curves(curves, axes, x="wavelength, nm", y="emission, per nm"))
         return html_of(f"Scene {self.name}", facts, lights)
-
-    def check_meter(self) -> None:
-        """Raise `InputError` where Mitsuba's own irradiance meter, whose rays have to meet a light, would read 0."""
-        for path, kind in emitter_paths(self.geometry).items():
-            if self.reference_plane and kind in _SIZELESS_EMITTERS:
-                raise InputError(
-                    f"scene {self.name}: without LLVM or CUDA light of {path!r} of type {kind!r} can't be measured; "
-                    "allowed: lights with a size; leave reference_plane out, or see `rodcone doctor`"
-                )
 
     @property
     def description(self) -> Node:

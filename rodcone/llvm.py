@@ -66,8 +66,8 @@ def _loaded_too_early() -> Path | None:
 LIBLLVM = find_llvm()
 if _early := _loaded_too_early():
     warnings.warn(
-        f"Dr.Jit was imported before rodcone and loaded {_early}, which aborts: rendering and reconstruction run their "
-        f"slow forms; import rodcone first, or set DRJIT_LIBLLVM_PATH={LIBLLVM}",
+        f"Dr.Jit was imported before rodcone and loaded {_early}, which aborts: nothing is rendered, reconstruction "
+        f"runs its slow form; import rodcone first, or set DRJIT_LIBLLVM_PATH={LIBLLVM}",
         RuntimeWarning,
         stacklevel=2,
     )

@@ -73,9 +73,9 @@ class Tracer:
         ray = self._camera_ray(size, pixel, points)
         dark = [mi.Spectrum(0.0) for _ in wavelengths]
         start = mi.Ray3f(ray), dr.zeros(mi.SurfaceInteraction3f), mi.Float(1.0), mi.Bool(True), dark
-        result, chosen = self._trace(self.scene, points, start, wavelengths, step, 0)
-        bands = [value for group in result for value in group]
-        return [*bands, *self._seen(ray, wavelengths), dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
+        result, (lamp, sky, first), chosen = self._trace(self.scene, points, start, wavelengths, step, 0)
+        shares = [lamp, sky] if self.environment else [lamp]
+        return [*_flat(result), *map(self.mi.Float, shares), *_flat(first), self.mi.Float(chosen)]
 
     def meter(self, _: Any, points: Points) -> list[Any]:
         """Trace paths from the shape of the scene's irradiance meter: irradiance over pi, as the bands of `camera`.
@@ -84,9 +84,8 @@ class Tracer:
         """
         wavelengths, step = self._wavelengths(points)
         start = self._start_on_meter(points, wavelengths)
-        result, chosen = self._trace(self.scene, points, start, wavelengths, step, 1)
-        bands = [value for group in result for value in group]
-        return [*bands, dr.select(chosen, self.mi.Float(1.0), self.mi.Float(0.0))]
+        result, _, chosen = self._trace(self.scene, points, start, wavelengths, step, 1)
+        return [*_flat(result), self.mi.Float(chosen)]
 
     @dr.syntax
     def first_surface(self, size: tuple[int, int], pixel: Any, points: Points) -> list[Any]:
@@ -122,8 +121,7 @@ class Tracer:
             ray.wavelengths = wavelengths[0]
             depth += 1
             active = go_on & delta
-        bands = [value for group in albedo for value in group]
-        return [*bands, normal.x, normal.y, normal.z, dr.select(chosen, mi.Float(1.0), mi.Float(0.0))]
+        return [*_flat(albedo), normal.x, normal.y, normal.z, self.mi.Float(chosen)]
 
     def _camera_ray(self, size: tuple[int, int], pixel: Any, points: Points) -> Any:
         """Ray through a point of each thread's pixel."""
@@ -182,23 +180,27 @@ class Tracer:
     @dr.syntax
     def _trace(
         self, scene: Any, points: Points, start: tuple[Any, ...], wavelengths: list[Any], step: Any, bounced: int
-    ) -> tuple[list[Any], Any]:
+    ) -> tuple[list[Any], tuple[Any, Any, list[Any]], Any]:
         """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``).
 
         A path that starts on the meter has `bounced` once.
 
         A path that escapes meets the environment, and then carries what that would give it: its throughput. A light
-        that the camera's ray meets first counts for `_seen` alone.
+        that the camera's ray meets first is kept by itself: whether it is a lamp, whether it is the environment, and
+        with ``coloured`` its bands.
 
         Light is direct that reaches the camera from the first surface that scatters it (by a lobe that isn't a delta),
         or from the lamp itself, each perhaps through glass and by mirrors; all else is indirect.
         """
         mi = self.mi
+        # State of the path
         ray, previous, previous_pdf, previous_delta, result = start
         ray.wavelengths = wavelengths[0]
         throughput = [mi.Spectrum(1.0) for _ in wavelengths]
         indirect = [mi.Spectrum(0.0) for _ in wavelengths] if self.apart else []
         direct, unscattered = mi.Bool(True), mi.Bool(True)  # the light met next; the path so far
+        lamp_first, sky_first = mi.Bool(False), mi.Bool(False)
+        first = [mi.Spectrum(0.0) for _ in wavelengths] if self.coloured else []
         eta, depth = mi.Float(1.0), mi.UInt32(0)
         chosen, escaped, active = mi.Bool(False), mi.Bool(False), mi.Bool(True)
         while dr.hint(active, label="dense path"):
@@ -207,6 +209,10 @@ class Tracer:
             share = self._share(scene, si, previous, previous_pdf, previous_delta)
             emitted = self._emitted(scene, si, wavelengths)
             unseen = (depth > 0) | (bounced > 0)
+            for value in _flat(emitted) if self.coloured else emitted[:1]:
+                lamp_first |= ~unseen & (value != 0)
+            sky_first |= ~unseen & ~si.is_valid()
+            first = _either(unseen, first, emitted) if self.coloured else first
             result = _plus(result, throughput, emitted, dr.select(unseen, share, 0.0))
             indirect = self._indirect(indirect, throughput, emitted, dr.select(direct, 0.0, share))
 
@@ -231,26 +237,16 @@ class Tracer:
             scattered, survives = _roulette(scattered, eta, depth >= self.rr_depth, points.roulette(depth))
             throughput = _either(escaped & self.environment, throughput, scattered)
             active = go_on & survives
+        # Environment of the paths that escaped
         dark = [mi.Spectrum(0.0) for _ in wavelengths]
         sky, indirect_sky = _either(escaped, throughput, dark), _either(escaped & ~direct, throughput, dark)
         every = [*result, *(sky if self.environment else [])]
-        return [*every, *indirect, *(indirect_sky if self.environment and self.apart else [])], chosen
+        every = [*every, *indirect, *(indirect_sky if self.environment and self.apart else [])]
+        return every, (lamp_first, sky_first, first), chosen
 
     def _indirect(self, indirect: list[Any], throughput: list[Any], light: list[Any], factor: Any) -> list[Any]:
         """Add indirect light where it is asked for by itself."""
         return _plus(indirect, throughput, light, factor) if self.apart else indirect
-
-    def _seen(self, ray: Any, wavelengths: list[Any]) -> list[Any]:
-        """Channels of what the camera's ray meets first, if that is a light."""
-        mi = self.mi
-        si = self.scene.ray_intersect(mi.Ray3f(ray), mi.RayFlags.All, coherent=True)
-        emitted = self._emitted(self.scene, si, wavelengths)
-        bands = [value for group in emitted for value in group] if self.coloured else []
-        shines = mi.Bool(False)
-        for value in bands or emitted[:1]:
-            shines |= value != 0
-        lights = [shines, ~si.is_valid()] if self.environment else [shines]
-        return [*(dr.select(light, mi.Float(1.0), mi.Float(0.0)) for light in lights), *bands]
 
     def _share(self, scene: Any, si: Any, previous: Any, previous_pdf: Any, previous_delta: Any) -> Any:
         """Weight of the light that a path meets, beside the chance that it had been sampled from the point before."""
@@ -354,6 +350,11 @@ def _emission_towards(emitter: Any, interaction: Any, direction: Any, wavelength
         interaction.wavelengths = group
         values.append(emitter.eval_direction(interaction, direction))
     return values
+
+
+def _flat(groups: list[Any]) -> list[Any]:
+    """All wavelengths one by one."""
+    return [value for group in groups for value in group]
 
 
 def _power_heuristic(a: Any, b: Any) -> Any:

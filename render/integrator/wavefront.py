@@ -1,4 +1,4 @@
-"""Means of paths over spans of their points: by Dr.Jit, or pass by pass by Mitsuba's own integrators."""
+"""Means of paths over spans of their points."""
 
 import re
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from render.integrator.dense import SPECTRUM_SIZE
 from render.integrator.points import Points, pixel_keys
-from render.loader import Film, mitsuba_module, mitsuba_words
+from render.loader import mitsuba_module, mitsuba_words
 from rodcone.errors import InputError
 from rodcone.jit import dr
 from rodcone.types import Planes
@@ -121,20 +121,6 @@ def bands_apart(image: Planes, groups: int, bands: int) -> tuple[Planes, Planes]
     filled = bands + -bands % SPECTRUM_SIZE
     scattered, others = np.split(image[:, :-1], [groups * filled], axis=1)
     return scattered.reshape(len(image), groups, filled, *image.shape[2:])[:, :, :bands], others
-
-
-def by_stock(mi_scene: Any, sensor: Any, integrator: Any, *, spp: int, seed: int) -> Planes:
-    """Render by an integrator of Mitsuba's, shape (channel, h, w)."""
-    try:
-        image = mitsuba_module().render(mi_scene, sensor=sensor, integrator=integrator, spp=spp, seed=seed)
-    except RuntimeError as error:
-        raise _refusal(error) from None
-    return np.ascontiguousarray(np.moveaxis(np.asarray(image, dtype=np.float32), -1, 0))
-
-
-def film_width(film: Film) -> Planes:
-    """Width of each band, for specfilm, which integrates over the band: (band, 1, 1)."""
-    return film.width_nm.astype(np.float32)[:, None, None]
 
 
 def _root_cause(error: BaseException) -> BaseException:

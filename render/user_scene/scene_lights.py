@@ -10,7 +10,7 @@ from render.scene import EMISSION_PARAMETER, Keys, LightGroup, Node, table_of, w
 from render.spectrum import Spectrum, flat
 from render.user_scene.allowed_plugins import ALLOWED, SPECTRA
 from rodcone.errors import InputError
-from rodcone.jit import backend, dr
+from rodcone.jit import dr
 from rodcone.types import Floats
 
 # MI_CIE_MIN to MI_CIE_MAX, outside of which Mitsuba's own spectra (rgb, d65, blackbody) are zero, and one point more,
@@ -116,12 +116,6 @@ def _stated(value: Any) -> Spectrum | None:
 def _evaluate(mi: Any, emitter: Any) -> Floats:
     """Emission on `_GRID_NM`, four wavelengths to an evaluation; all at once where the variant holds arrays."""
     fours = _GRID_NM.reshape(-1, 4)
-    if backend() == "numpy":
-        interaction, rows = mi.SurfaceInteraction3f(), []
-        for row in fours.tolist():
-            interaction.wavelengths = mi.Spectrum(*row)
-            rows.append(np.array(emitter.eval(interaction)))
-        return np.array(rows, dtype=np.float64).ravel()
     interaction = dr.zeros(mi.SurfaceInteraction3f, len(fours))
     interaction.wavelengths = mi.Spectrum(*(mi.Float(column) for column in fours.T))
     return np.array(emitter.eval(interaction), dtype=np.float64).T.ravel()

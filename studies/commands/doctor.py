@@ -30,8 +30,7 @@ EXTRAS = {
 LLVM_WHEEL = "karellen-llvm-core"
 _ABSENT = "not installed"
 FALLBACK = (
-    "numpy: neither CUDA nor LLVM answers, so stock path + specfilm renders in scalar_spectral, "
-    "and capture and reconstruction run their NumPy forms"
+    "numpy: neither CUDA nor LLVM answers, so nothing is rendered, and capture and reconstruction run their NumPy forms"
 )
 
 
@@ -146,7 +145,7 @@ def llvm_finding(library: Path | None, version: int | None, oldest: int) -> Find
 def engine_findings() -> list[Finding]:
     """LLVM library, backend, variant and threads, as the render and the kernels use them."""
     try:
-        from render.loader import integrator_name, variant
+        from render.loader import variant
         from rodcone import jit, llvm
     except (ImportError, NameError) as error:  # Dr.Jit stumbles with a NameError over a failed import of its own
         cause = str(error.__context__ or error)
@@ -158,6 +157,5 @@ def engine_findings() -> list[Finding]:
         llvm_finding(llvm.LIBLLVM, version, llvm.OLDEST_LLVM),
         Finding("backend", FALLBACK if backend == "numpy" else backend),
         Finding("Mitsuba variant", variant()),
-        Finding("integrator", integrator_name()),
         Finding("Dr.Jit threads", str(jit.dr.thread_count())),
     ]

@@ -42,10 +42,7 @@ from studies.sweep.provenance import provenance, versions
 Progress = Callable[[float, float], None]
 # Folders beside the results database; the last is of a plan's renders.
 RENDERS, FRAMES, PICTURES, PILOTS = "renders", "frames", "pictures", "pilots"
-FELL_BACK = (
-    "Neither LLVM nor CUDA answered: stock path + specfilm rendered in scalar_spectral, captures and the "
-    "reconstruction ran their NumPy forms.",
-)
+FELL_BACK = ("Neither LLVM nor CUDA answered: captures and the reconstruction ran their NumPy forms.",)
 
 
 @dataclass(frozen=True)

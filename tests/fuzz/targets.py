@@ -17,7 +17,7 @@ from isp.ple.prior import OWN, load_prior
 from render.cache import load_transport, save_transport
 from render.error_estimates import Halves
 from render.illuminants import illuminant
-from render.loader import Film, integrator_name, variant
+from render.loader import INTEGRATOR, Film, variant
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import read_exr, write_exr
 from render.radiance_files.iset import read_iset_scene
@@ -360,7 +360,7 @@ def _cache_samples() -> list[Sample]:
         irradiance=irradiance,
         light=Halves(planes[0], planes[1]),
         variance=planes[2],
-        integrator=integrator_name(),
+        integrator=INTEGRATOR,
         variant=variant(),
     )
     return [_made(lambda folder: save_transport(folder, _scene(), _film(), 0, made))]

@@ -29,7 +29,7 @@ from render.loader import Film, load_groups, mitsuba_module
 from render.scene import LightGroup, Scene, spectrum_node
 from render.spectrum import Spectrum, flat
 from rodcone.errors import InputError
-from rodcone.jit import backend, dr
+from rodcone.jit import dr
 from scenes.catalog import load
 from scenes.materials import floor, glossy, matte, panel
 from scenes.reflectances import color_checker as patches
@@ -45,8 +45,6 @@ SIZE = (24, 32)
 BLOCK = 8  # pixels each side: the mean of 64 pixels is close to normal
 FALSE_ALARM = 1e-5
 RAMP = spectrum_node(Spectrum(np.array([380.0, 780.0]), np.array([0.0, 1.0])))
-
-only_dense = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba renders")
 
 
 def bound(comparisons):
@@ -617,7 +615,6 @@ def test_a_refused_scene_does_not_spoil_the_next_render_while_its_error_is_kept(
     assert "not implemented" in str(kept.value)
 
 
-@only_dense
 def test_a_material_that_chooses_by_wavelength_is_refused(freed, monkeypatch):
     hair = {"type": "hair", "eumelanin": 1.0}  # picks lobes by the attenuation of the path's first wavelengths
     text = complaint(render, ball_under_the_sky(hair), (6, 6), wavelength_nm=BANDS_NM, spp=16)

@@ -27,8 +27,6 @@ from scenes.reflectances import grey
 FALSE_ALARM = 1e-5
 BANDS_NM = np.arange(430.0, 780.0, 100.0)  # four bands fill 380-780 nm
 
-only_dense = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba renders")
-
 
 def scene_of(camera, light, **things):
     geometry = {"type": "scene", "sensor": {"type": "perspective", **camera}, "lamp": light, **things}
@@ -65,7 +63,6 @@ def firefly():
 
 
 @pytest.mark.thorough
-@only_dense
 def test_fireflies_are_finite_and_a_render_full_of_them_does_not_claim_to_be_done():
     made = render(firefly(), (16, 16), wavelength_nm=BANDS_NM, max_spp=256, noise=0.05, seed=6)
     lit = made.radiance[0, 0] > 0

@@ -12,10 +12,9 @@ from render.engine import render
 from render.integrator.reflectance_table import STEPS, TableReader
 from render.loader import Film, load_groups, mitsuba_module
 from render.scene import Scene
-from rodcone.jit import backend, dr
+from rodcone.jit import dr
 from scenes.catalog import load
 
-pytestmark = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: each group has copies of its own")
 NM = np.arange(420.0, 700.0, 40.0)
 
 

@@ -18,13 +18,10 @@ from render.geometry import look_at, to_world
 from render.loader import mitsuba_module
 from render.scene import LightGroup, Scene
 from render.spectrum import flat
-from rodcone.jit import backend
 from scenes import still_life_outdoor
 from scenes.catalog import load
 from scenes.materials import disk, floor, matte, panel
 from scenes.reflectances import grey
-
-pytestmark = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: Mitsuba's own meter is used")
 
 FALSE_ALARM = 1e-5
 BANDS_NM = np.arange(430.0, 780.0, 100.0)  # four bands fill 380-780 nm

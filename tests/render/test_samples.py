@@ -8,10 +8,7 @@ from path_counter import count_paths
 
 from render.engine import render
 from render.integrator.dense import Tracer
-from rodcone.jit import backend
 from scenes.catalog import load, names
-
-pytestmark = pytest.mark.skipif(backend() == "numpy", reason="counts the wavefronts of Dr.Jit")
 
 SIZE = (3, 4)
 METER_PATHS = 64 * 64 * 2 * 16  # of a light group: its film, in two halves of 16 samples

@@ -2,7 +2,6 @@
 
 import copy
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -127,16 +126,6 @@ def test_a_light_of_its_own_colour_keeps_it_and_goes_out_with_its_group():
     assert tinted.lit({"sky": uniform_node(7.0)})["sky"] == sky
     assert tinted.description["sky"] == sky
     assert "sky" not in tinted.lit({"lamp": uniform_node(1.0)})
-
-
-@loop("kind", ["point", "spot", "directional"])
-def test_a_light_without_size_beside_a_plane_is_refused_where_the_meter_would_miss_it(kind):
-    lamp = {"lamp": {"type": kind}}
-    small = Scene("test", GEOMETRY | {"sky": lamp["lamp"]}, BOTH, reference_plane="ball")
-    with pytest.raises(InputError, match=f"'sky' of type '{kind}' can't be measured"):
-        small.check_meter()
-    replace(small, reference_plane=None).check_meter()
-    Scene("test", GEOMETRY, BOTH, reference_plane="ball").check_meter()
 
 
 def test_a_light_deep_inside_other_nodes_is_found():

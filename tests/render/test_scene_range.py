@@ -19,13 +19,11 @@ from render.scene_range import check_range, warn_of_coloured_lights, warn_of_dar
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, flat
 from render.user_scene.scene_file import load_scene_file
 from rodcone.errors import InputError
-from rodcone.jit import backend
 from scenes.catalog import load
 from scenes.catalog import names as scenes
 
 SHORT = Spectrum(np.array([400.0, 550.0, 700.0]), np.array([0.2, 0.8, 0.4]))
 EVEN, UNEVEN = spectrum_node(SHORT), spectrum_node(Spectrum(np.array([400.0, 500.0, 700.0]), SHORT.values))
-EXACT = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba draws wavelengths too")
 WALL_NM = np.array([385.0, 475.0, 625.0, 775.0])  # of bands 10 nm wide: outside, inside twice, outside
 
 
@@ -123,7 +121,6 @@ def test_a_table_that_only_a_light_refers_to_is_no_surface() -> None:
     check_range(Scene("wall", lit.geometry | {"panel": panel}, groups), 380.0, 780.0)
 
 
-@EXACT
 @loop("reflectance", [EVEN, UNEVEN])
 @loop("rows", [True, False])
 def test_held_ends_go_on_in_the_picture(reflectance: Node, rows: bool) -> None:
@@ -175,7 +172,6 @@ XML = """<scene version="3.0.0">
 <spectrum name="reflectance" value="400:0.2, 550:0.8, 700:0.4"/></bsdf></shape></scene>"""
 
 
-@EXACT
 def test_a_scene_file_is_refused_or_held(tmp_path: Path) -> None:
     path = tmp_path / "scene.xml"
     path.write_text(XML)
@@ -218,7 +214,6 @@ def told(lights: Scene | Spectrum, low: float, high: float) -> list[str]:
     return [str(warning.message) for warning in caught]
 
 
-@EXACT
 def test_a_light_is_dark_outside_its_table_and_a_warning_tells() -> None:
     scene = wall(matte(uniform_node(0.5)), SHORT)
     with pytest.warns(

@@ -1,20 +1,15 @@
-"""Levels belong to the scene: no seed, size or variant moves them by more than their stated errors allow.
+"""Levels belong to the scene: no seed or size moves them by more than their stated errors allow.
 
 The renders of a scene have one expectation. Sum of squares of their levels about the mean, over the variances that they
 state, is compared with the same sum of normal draws, whose variances are estimated from as many passes: two-sided.
 """
 
-import json
-import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from render.engine import render
-from rodcone.jit import backend
 from scenes.catalog import load
 
 FALSE_ALARM, DRAWS = 1e-4, 400_000
@@ -28,35 +23,12 @@ SIZES = {
 }
 BANDS = {"wavelength_nm": np.arange(410.0, 720.0, 60.0), "width_nm": 60.0}  # few: a level is one number
 
-IN_SCALAR = """
-import json, sys
-sys.path[:0] = {path!r}
-from test_render_levels import levels
-print(json.dumps(levels({name!r}, {sizes!r}, {seeds!r})))
-"""
-
 
 def levels(name, sizes, seeds):
     """Level and relative error of each size and seed, shape (size, seed, 2)."""
     scene = replace(load(name), reference_plane=None)
     made = [[render(scene, tuple(size), spp=SPP, seed=seed, **BANDS) for seed in seeds] for size in sizes]
     return [[(x.level().value, x.level().relative_error) for x in row] for row in made]
-
-
-def scalar_levels(name, sizes, seeds):
-    """The same without LLVM, in a process of its own."""
-    code = IN_SCALAR.format(
-        path=[os.path.dirname(__file__), *filter(None, sys.path)], name=name, sizes=sizes, seeds=seeds
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=os.environ | {"DRJIT_LIBLLVM_PATH": "/nonexistent/libLLVM.so"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout.splitlines()[-1])
 
 
 def chi_square(values, variances):
@@ -90,7 +62,5 @@ def test_three_seeds_give_one_level(name):
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", SIZES)
-def test_ten_seeds_three_sizes_and_both_variants_give_one_level(name):
-    if backend() == "numpy":
-        pytest.skip("needs LLVM or CUDA beside the scalar variant")
-    check([*levels(name, SIZES[name], SEEDS), *scalar_levels(name, SIZES[name], SEEDS)])
+def test_ten_seeds_and_three_sizes_give_one_level(name):
+    check(levels(name, SIZES[name], SEEDS))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from render.engine import render
-from rodcone.jit import backend
 from scenes.catalog import load
 
 RUNS, BEYOND, MOST_BEYOND = 200, 1.1, 0.05
@@ -22,7 +21,6 @@ def reference(name):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(backend() == "numpy", reason="slow without Dr.Jit")
 @pytest.mark.parametrize(
     ("name", "goal"),
     [

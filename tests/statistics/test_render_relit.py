@@ -15,15 +15,12 @@ from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant, lines_nm
 from render.scene import LightGroup, Scene, spectrum_node
 from render.spectrum import flat, line_bands
-from rodcone.jit import backend
 from scenes.materials import floor, matte, panel
 from scenes.reflectances import band, edge
 
 FALSE_ALARM = 1e-4
 SIZE, BLOCK = (16, 16), 4
 RANGE_NM = (570.0, 610.0)  # about the sodium lines, where the scene's colours turn
-
-only_dense = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba renders")
 
 
 def stall():
@@ -93,7 +90,6 @@ def finer(name):
     return line_bands((), (587.0, 592.0), width_nm=0.5)
 
 
-@only_dense
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "spp"), [("sodium_low", 1024), ("sodium_high", 512), ("LED-B3", 512)])
 def test_on_fine_bands_relit_is_directly_rendered_within_the_monte_carlo_error(name, spp):
@@ -117,7 +113,6 @@ def test_on_fine_bands_relit_is_directly_rendered_within_the_monte_carlo_error(n
 INSIDE, AT_ENDS = 1.2, 2.0
 
 
-@only_dense
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "range_nm", "draws", "spp"),
@@ -141,7 +136,6 @@ def test_on_10_nm_relit_is_directly_rendered_within_the_error_reported(name, ran
         assert reported[1] < 3 * found[1]
 
 
-@only_dense
 def test_a_line_in_a_coarse_grid_is_off_by_what_is_reported_against_1_nm_bands():
     options = {"spp": 64, "seed": 3}  # the same paths: their noise is in both
     lights = {"lamp": "sodium_low"}

@@ -10,10 +10,8 @@ from render.denoised.denoise import denoised, first_surfaces
 from render.engine import _checked_film
 from render.loader import load_groups
 from rodcone.errors import InputError
-from rodcone.jit import backend
 from scenes.catalog import load
 
-only_dense = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba renders")
 SIZE = (40, 48)
 BANDS_NM = np.arange(400.0, 780.0, 20.0)
 
@@ -121,7 +119,6 @@ def test_without_the_extra_the_line_names_it(monkeypatch: pytest.MonkeyPatch) ->
         module.denoiser()
 
 
-@only_dense
 def test_first_surfaces_of_a_flat_wall() -> None:
     """The flat field's wall has a reflectance of 0.5 and looks at the camera."""
     scene = load("flat_field")
@@ -133,7 +130,6 @@ def test_first_surfaces_of_a_flat_wall() -> None:
 
 
 @pytest.mark.thorough
-@only_dense
 def test_first_surfaces_are_seen_through_glass_and_by_mirrors() -> None:
     """Bands beyond 40 come in parts; the still life's glass ball shows what is behind it, never a black hole."""
     scene = load("still_life")

@@ -5,15 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from render import engine
 from render.denoised.relight import measured_error, relight_denoised
 from render.engine import render
 from rodcone.errors import InputError
-from rodcone.jit import backend
 from scenes.catalog import load
 
 pytest.importorskip("mitsuba_oidn", reason="rodcone[denoise] is not installed")
-pytestmark = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba renders")
 SIZE = (32, 32)
 BANDS_NM = np.arange(420.0, 740.0, 40.0)
 ASKED = {"wavelength_nm": BANDS_NM, "seed": 5}
@@ -130,12 +127,9 @@ def test_the_told_error_is_the_true_one(box) -> None:
     assert np.mean(true) < np.mean(raw)
 
 
-def test_what_is_refused(box, made, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_refused(box, made) -> None:
     plain = replace(made, denoised=None)
     with pytest.raises(InputError, match=r"denoised: the render has none; .*denoise=True"):
         relight_denoised(plain)
     with pytest.raises(InputError, match="resume: it wasn't denoised"):
         render(box, SIZE, spp=64, denoise=True, resume=plain, **ASKED)
-    monkeypatch.setattr(engine, "backend", lambda: "numpy")
-    with pytest.raises(InputError, match=r"denoise: Dr\.Jit has neither LLVM nor CUDA here"):
-        render(box, SIZE, spp=2, denoise=True, **ASKED)

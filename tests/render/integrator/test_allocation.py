@@ -10,7 +10,6 @@ from render import engine
 from render.combine import combine, emission
 from render.engine import render
 from render.integrator.allocation import LEAST_SHARE, POOL, rates_of
-from rodcone.jit import backend
 from scenes.catalog import load
 
 NM = np.arange(450.0, 700.0, 60.0)
@@ -77,7 +76,6 @@ def test_a_lamp_in_view_adds_light_and_no_weight():
 
 
 @pytest.mark.thorough
-@pytest.mark.skipif(backend() == "numpy", reason="without Dr.Jit all pixels are alike")
 @pytest.mark.parametrize("name", ["cornell_box", "night_street"])
 def test_pixels_with_more_samples_are_not_biased(name, monkeypatch):
     """Blocks of 4x4 pixels against uniform samples: one false alarm in a thousand runs, over all of them together."""
@@ -102,7 +100,6 @@ def test_pixels_with_more_samples_are_not_biased(name, monkeypatch):
 
 
 @pytest.mark.thorough
-@pytest.mark.skipif(backend() == "numpy", reason="without Dr.Jit all pixels are alike")
 def test_rates_are_kept_when_a_render_goes_on_from_another(tmp_path):
     """Resumed, and read from a folder: the bits of one go."""
     scene, options = load("cornell_box"), {"wavelength_nm": NM, "seed": 5}
@@ -118,7 +115,6 @@ def test_rates_are_kept_when_a_render_goes_on_from_another(tmp_path):
             assert np.array_equal(attrgetter(name)(on), attrgetter(name)(whole)), name
 
 
-@pytest.mark.skipif(backend() == "numpy", reason="without Dr.Jit all pixels are alike")
 def test_a_short_render_without_a_pilot_is_made_anew_where_more_is_asked_for():
     scene, options = load("cornell_box"), {"wavelength_nm": NM, "seed": 5}
     part = render(scene, (16, 16), spp=64, **options)

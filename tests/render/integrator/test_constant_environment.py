@@ -12,12 +12,9 @@ from render.error_estimates import relative_error
 from render.geometry import look_at, to_world, translate
 from render.scene import LightGroup, Scene
 from render.spectrum import flat
-from rodcone.jit import backend
 from scenes.materials import ball, checks, floor, glass, matte, panel
 from scenes.reflectances import edge, grey
 from studies.budget.bands import merge_transport
-
-pytestmark = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: each light is rendered by itself")
 
 BANDS_NM, WIDTH_NM, SIZE, BLOCK = np.array([430.0, 500.0, 570.0, 640.0]), 30.0, (32, 40), 8
 FALSE_ALARM = 1e-5

@@ -9,12 +9,10 @@ from render.loader import load_groups
 from render.runs import Means, add_run, no_means
 from render.scene import LightGroup, Scene
 from render.spectrum import flat
-from rodcone.jit import backend
 from scenes.catalog import load
 from scenes.materials import floor, matte, panel
 from scenes.reflectances import grey
 
-pytestmark = pytest.mark.skipif(backend() == "numpy", reason="stock Mitsuba doesn't keep indirect light apart")
 SIZE, POINTS = (20, 24), 16
 BANDS_NM = np.arange(405.0, 780.0, 50.0)
 

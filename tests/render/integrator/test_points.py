@@ -10,10 +10,8 @@ from scipy.stats import chi2, norm, qmc
 
 from render.integrator.points import DIMENSIONS, DIRECTIONS, LOG2_POINTS, Points, pixel_keys, sequence
 from render.loader import mitsuba_module
-from rodcone.jit import backend
 
 FALSE_ALARM = 1e-5
-only_jit = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: Mitsuba's own samplers draw")
 
 
 def published() -> np.ndarray:
@@ -35,7 +33,6 @@ def test_the_sequence_is_sobol_s() -> None:
 
 
 @pytest.mark.sample(2)
-@only_jit
 @pytest.mark.parametrize("power", [0, 1, 3, 4, 7])
 def test_a_pixel_has_one_point_in_each_of_as_many_intervals(power: int) -> None:
     """In every dimension, for powers of two; and in the film's plane one in each box of every shape."""
@@ -49,7 +46,6 @@ def test_a_pixel_has_one_point_in_each_of_as_many_intervals(power: int) -> None:
         assert np.array_equal(np.sort(boxes, axis=-1), np.broadcast_to(np.arange(count), boxes.shape))
 
 
-@only_jit
 def test_a_point_is_anywhere_and_pixels_seeds_and_dimensions_are_independent() -> None:
     """Chi-squared over 16 cells of 20 000 pixels' points; correlations of neighbours, seeds and dimensions."""
     dimensions, pixels = DIMENSIONS + 3, 20_000  # three more than the sequence has

@@ -19,9 +19,6 @@ from render.engine import render
 from render.loader import Film, load_groups, mitsuba_module
 from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_paths import search_path
-from rodcone.jit import backend
-
-pytestmark = pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba is all there is")
 
 FALSE_ALARM, CAUGHT = 1e-4, 0.04
 BANDS_NM, WIDTH_NM, DEPTH = np.linspace(400.0, 750.0, 8), 40.0, 4

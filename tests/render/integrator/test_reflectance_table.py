@@ -12,7 +12,6 @@ from render.engine import render
 from render.integrator.reflectance_table import STEPS, band_offsets, reflectance_table, with_rows
 from render.scene import spectrum_node, uniform_node
 from render.spectrum import Spectrum, flat, line_spectrum
-from rodcone.jit import backend
 from scenes.catalog import load
 from scenes.reflectances import edge
 
@@ -101,7 +100,6 @@ def test_other_textures_are_left_as_they_are(reflectance):
     assert curves == ()
 
 
-@pytest.mark.skipif(backend() == "numpy", reason="no LLVM or CUDA here: stock Mitsuba renders")
 def test_a_picture_is_the_same_with_and_without_the_table(monkeypatch):
     options = {"wavelength_nm": np.arange(420.0, 700.0, 40.0), "width_nm": 12.0, "spp": 16, "max_depth": 3, "seed": 4}
     tabulated = render(load("color_checker"), (12, 16), **options)
