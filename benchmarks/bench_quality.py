@@ -51,7 +51,7 @@ from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.response import expected_electrons
 from sensor.variations import vary
-from studies.metrics.confidence import SeedMean, mean_with_confidence
+from studies.metrics.confidence import half_width
 from studies.metrics.quality import Quality, measure
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
@@ -225,16 +225,15 @@ def print_processor(name: str, shots: Sequence[Quality], ours: Sequence[Quality]
     print(f"  {name:14s} {len(shots):2d} seeds {psnr:6.2f} dB  dE {delta_e:6.2f}  SSIM {ssim:.3f}", end="")
     if shots is not ours:
         for label, key, sign in METRICS:
-            lead = lead_over(ours, shots, key, sign)
-            print(f"  {label} {lead.mean:+.2f} [{lead.low:+.2f}, {lead.high:+.2f}]", end="")
+            lead, half = lead_over(ours, shots, key, sign)
+            print(f"  {label} {lead:+.2f} [{lead - half:+.2f}, {lead + half:+.2f}]", end="")
     print(flush=True)
 
 
-def lead_over(ours: Sequence[Quality], others: Sequence[Quality], key: str, sign: int) -> SeedMean:
-    """How much better the interleaved camera is: mean over the seeds that both have, with its 95 % interval."""
-    return mean_with_confidence(
-        [sign * (getattr(a, key) - getattr(b, key)) for a, b in zip(ours, others, strict=False)]
-    )
+def lead_over(ours: Sequence[Quality], others: Sequence[Quality], key: str, sign: int) -> tuple[float, float]:
+    """How much better the interleaved camera is: mean over the seeds that both have, and half its 95 % interval."""
+    leads = np.array([sign * (getattr(a, key) - getattr(b, key)) for a, b in zip(ours, others, strict=False)])
+    return float(leads.mean()), float(half_width(leads))
 
 
 def verdict(found: dict[str, list[Quality]], white_snr_db: float) -> str:
@@ -243,8 +242,8 @@ def verdict(found: dict[str, list[Quality]], white_snr_db: float) -> str:
         return "W's SNR is under 1: not ranked"
     said = []
     for label, key, sign in METRICS:
-        lead = lead_over(found["interleaved"], found["bayer"], key, sign)
-        word = "ahead of" if lead.low > 0 else "behind" if lead.high < 0 else "level with"
+        lead, half = lead_over(found["interleaved"], found["bayer"], key, sign)
+        word = "ahead of" if lead > half else "behind" if lead < -half else "level with"
         best = max(found, key=lambda name: sign * float(np.mean([getattr(q, key) for q in found[name]])))
         said.append(f"{label}: {word} the reference, best is {best}")
     return "; ".join(said)

@@ -84,7 +84,6 @@ _PUBLIC = {
     "sweep": ("studies.sweep.run_sweep", "sweep"),
     "run_in_processes": ("studies.sweep.workers", "run_in_processes"),
     "read_rows": ("studies.sweep.export", "read_rows"),
-    "to_pandas": ("studies.sweep.export", "to_pandas"),
     "report": ("studies.commands.report", "write_report"),
     "explore": ("studies.explore.widget", "explore"),
     "explorer_view": ("studies.explore.views", "explorer_view"),

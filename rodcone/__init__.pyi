@@ -68,7 +68,6 @@ from studies.study.study import SceneChoice as SceneChoice
 from studies.study.study import Study as Study
 from studies.study.study_file import read_study as read_study
 from studies.sweep.export import read_rows as read_rows
-from studies.sweep.export import to_pandas as to_pandas
 from studies.sweep.run_sweep import Runner, Swept
 from studies.sweep.workers import run_in_processes as run_in_processes
 
@@ -137,7 +136,6 @@ __all__ = [
     "snr",
     "sweep",
     "take",
-    "to_pandas",
     "to_world",
     "with_readings",
     "write_exr",
@@ -221,7 +219,6 @@ def sweep(
     runner: Runner | None = None,
     step: Step | None = None,
     *,
-    keep_old: bool = False,
     clock: Clock | None = None,
 ) -> Swept: ...
 def with_readings(sensor: _Sensor, readings: Sequence[Reading], readout: str = ...) -> SensorConfig: ...

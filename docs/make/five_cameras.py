@@ -22,7 +22,7 @@ from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
-from studies.metrics.confidence import mean_with_confidence
+from studies.metrics.confidence import half_width
 from studies.metrics.truth import Light, light_in_bands
 from studies.pages import report_text
 from studies.pages.plots import CHART, COLOURS, INK, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
@@ -307,11 +307,9 @@ def metric_rows(metric: Metric, beside: Sequence[Condition]) -> list[list[str]]:
     """Return means over seeds of one metric with half their intervals: sensors down, light across."""
     rows = []
     for name in beside[0].rows:
-        found = [
-            mean_with_confidence([getattr(row, metric.key) for row in condition.rows[name]]) for condition in beside
-        ]
-        halves = [fixed((x.high - x.low) / 2, metric.digits) for x in found]
-        rows.append([name, *(f"{fixed(x.mean, metric.digits)} ± {y}" for x, y in zip(found, halves, strict=True))])
+        seeds = [np.array([getattr(row, metric.key) for row in condition.rows[name]]) for condition in beside]
+        halves = [fixed(float(half_width(x)), metric.digits) for x in seeds]
+        rows.append([name, *(f"{fixed(x.mean(), metric.digits)} ± {y}" for x, y in zip(seeds, halves, strict=True))])
     return rows
 
 

@@ -24,8 +24,6 @@ EXTRAS = {
     "denoise": ("denoised light", ("mitsuba-oidn",)),
     "photographs": ("raw files of real cameras", ("rawpy",)),
     "cluster": ("sweeps on several machines", ("dask", "distributed")),
-    "pandas": ("results as a table", ("pandas",)),
-    "parquet": ("results as Parquet", ("pyarrow",)),
 }
 LLVM_WHEEL = "karellen-llvm-core"
 _ABSENT = "not installed"

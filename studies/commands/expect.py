@@ -10,15 +10,13 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from rodcone.errors import InputError
-from rodcone.files import check_place, replacing
-from scenes.levels import AVERAGE_REFLECTANCE, DEMO_LEVELS
+from rodcone.files import check_place
+from scenes.levels import AVERAGE_REFLECTANCE
 from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset
-from studies.commands.console import print_table
+from studies.commands.console import print_table, require_ending, write_text
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
-from studies.pages.expect_chart import gain_svg
 from studies.study.levels import NAMED, UNITS, parse_exposure, parse_level
 
 
@@ -28,7 +26,6 @@ def expect(
     *,
     mosaic: list[str] | None = None,
     level: list[str] | None = None,
-    over: str = f"{DEMO_LEVELS[0].name}:{DEMO_LEVELS[-1].name}",
     light: str = "D65",
     exposure: str = AUTO_INFORMATION,
     prior: str = "drawn",
@@ -47,9 +44,7 @@ def expect(
     mosaic
         Mosaics by name, or rows such as RG/BW; the sensor's own by default.
     level
-        Levels of light, such as 25cd/m2, 500lux or moonlight.
-    over
-        Named levels from one to another.
+        Levels of light, such as 25cd/m2, 500lux or moonlight; all that have a name by default.
     light
         Illuminant; the camera knows it.
     exposure
@@ -57,15 +52,14 @@ def expect(
     prior
         Prior over patches: drawn (shapes and photographs) or photographs (alone).
     out
-        Table with every figure (.csv), or plot of the gain over the first camera (.svg).
+        Table with every figure (.csv).
     json
         Print one JSON object: a list of errors by level for each camera.
     """
-    if out is not None and out.suffix.lower() not in (".csv", ".svg"):
-        raise InputError(f"out: {str(out)!r} ends neither in .csv nor in .svg; write {out.stem}.csv")
     if out is not None:
+        require_ending(out, ".csv")
         check_place(out)
-    levels = {text: _luminance(text) for text in level} if level else _levels_between(over)
+    levels = {text: _luminance(text) for text in level or NAMED}
     time_s = parse_exposure(exposure, "exposure")
     by_camera = {
         f"{name} {tile}".strip(): expect_errors(
@@ -79,8 +73,7 @@ def expect(
         for tile in mosaic or [""]
     }
     if out is not None:
-        with replacing(out) as (place,):
-            place.write_text(_csv(by_camera) if out.suffix.lower() == ".csv" else gain_svg(by_camera), "utf-8")
+        write_text(out, _csv(by_camera))
     if json:
         print(notation.dumps({name: [asdict(row) for row in rows] for name, rows in by_camera.items()}))
         return
@@ -102,16 +95,6 @@ def expect(
 def _luminance(text: str) -> float:
     value, unit = parse_level(text)
     return value if unit == UNITS[0] else value * AVERAGE_REFLECTANCE / pi
-
-
-def _levels_between(over: str) -> dict[str, float]:
-    """Named levels from one to another, such as street:classroom."""
-    names = list(NAMED)
-    first, colon, last = over.partition(":")
-    if not colon or first not in names or last not in names or names.index(first) > names.index(last):
-        raise InputError(f"over: {over!r} is not a range of levels; allowed: two of {', '.join(names)}, the darker "
-                         f"first; write {names[0]}:{names[-1]}")  # fmt: skip
-    return {name: NAMED[name].luminance_cd_m2 for name in names[names.index(first) : names.index(last) + 1]}
 
 
 def _csv(by_camera: dict[str, list[ExpectedError]]) -> str:

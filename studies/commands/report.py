@@ -9,9 +9,9 @@ from studies.pages.report import render_report
 from studies.pages.report_compare import CAMERA, first_comparison
 from studies.pages.report_markdown import markdown
 from studies.pages.report_sweep import sweep_report
-from studies.sweep.results import overview, results_json
+from studies.sweep.export import results_json
 
-FILE, RESULTS, OVERVIEW = "report.html", "results.json", "overview.png"
+FILE, RESULTS = "report.html", "results.json"
 
 
 def report(folder: Path, /, *, out: Path | None = None, pictures: int | None = None, camera: str | None = None) -> None:
@@ -55,9 +55,7 @@ def _markdown(folder: Path, out: Path, camera: str | None) -> str:
 
 
 def write_results(folder: Path) -> Path:
-    """Write a sweep's report, its results as JSON and an overview of its pictures into its folder; gives the report.
-
-    All of the three appear or none.
+    """Write a sweep's report and its results as JSON into its folder; gives the report. Both appear or none.
 
     Raises
     ------
@@ -65,7 +63,7 @@ def write_results(folder: Path) -> Path:
         As `write_report`.
     """
     page = render_report(*sweep_report(folder)).encode()
-    files = {FILE: page, RESULTS: results_json(folder), OVERVIEW: overview(folder)}
+    files = {FILE: page, RESULTS: results_json(folder)}
     with replacing(*(folder / name for name in files)) as places:
         for place, content in zip(places, files.values(), strict=True):
             place.write_bytes(content)

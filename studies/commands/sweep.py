@@ -1,4 +1,4 @@
-"""The commands `rodcone sweep`, `rodcone export` and `rodcone table`."""
+"""The commands `rodcone sweep` and `rodcone export`."""
 
 import errno
 import json as notation
@@ -12,7 +12,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from isp.processors.catalogue import require_libraries
-from rodcone.errors import InputError, require_absent, require_whole
+from rodcone.errors import require_absent, require_whole
 from rodcone.memory import Memory, require_memory
 from rodcone.progress import Step, duration, progress
 from studies.budget.ledger import Plan
@@ -28,12 +28,11 @@ from studies.study.study import Study
 from studies.study.study_file import read_study
 from studies.sweep.cluster import on_cluster
 from studies.sweep.database import FILE
-from studies.sweep.export import read_rows, write_table
+from studies.sweep.export import read_rows, write_csv
 from studies.sweep.folder import at_work
 from studies.sweep.prepare import PILOTS
 from studies.sweep.run_sweep import Runner, Swept
 from studies.sweep.run_sweep import sweep as run_sweep
-from studies.sweep.table import lines, markdown
 from studies.sweep.workers import InThisProcess, cores, run, run_in_processes
 
 MOST_WORKERS = 1024
@@ -49,7 +48,6 @@ def sweep(
     cluster: str | None = None,
     reference: bool = False,
     as_stated: bool = False,
-    keep_old: bool = False,
     dry_run: bool = False,
     trust_code: bool = False,
     force: bool = False,
@@ -75,9 +73,6 @@ def sweep(
         Model everything, also what the sensor's noise hides.
     as_stated
         Use bands, samples and lenses as the study and its sensors state them; make no plan.
-    keep_old
-        Keep the rows that other versions or engines made, for rodcone export --all; by default they are replaced when
-        their cells are made anew.
     dry_run
         Print cells, renders, and an estimate of time and memory; compute nothing.
     trust_code
@@ -102,7 +97,7 @@ def sweep(
     check_memory(task, out, reference=reference, workers=0 if cluster else workers or cores(), force=force)
     with nullcontext(_local(workers)) if cluster is None else on_cluster(cluster) as runner:
         planned = partial(_plan, task, out, reference, as_stated)
-        swept, report = make_all(task, out, planned, runner, keep_old=keep_old, clock=clock)
+        swept, report = make_all(task, out, planned, runner, clock)
     say(f"its report is {report}")
     print(notation.dumps(_facts(swept) | {"report": str(report)}) if json else swept.out / FILE)
     return 0
@@ -117,7 +112,7 @@ def check_memory(study: Study, out: Path, *, reference: bool, workers: int, forc
 
 
 def make_all(
-    study: Study, out: Path, planned: Callable[[Step], Plan], runner: Runner, *, keep_old: bool = False, clock: Clock
+    study: Study, out: Path, planned: Callable[[Step], Plan], runner: Runner, clock: Clock
 ) -> tuple[Swept, Path]:
     """Sweep a study into a folder and write its report there; says on stderr how far it is and what it had to assume.
 
@@ -137,7 +132,7 @@ def make_all(
     with at_work(out), _saying_what_is_kept(out), progress(sys.stderr) as step:
         with clock.stage("plan"):
             plan = planned(step)
-        swept = run_sweep(study, out, plan, runner, step, keep_old=keep_old, clock=clock)
+        swept = run_sweep(study, out, plan, runner, step, clock=clock)
         report = write_results(out)
     say(*swept.notes)
     return swept, report
@@ -151,11 +146,11 @@ def export(folder: Path, /, *, out: Path, everything: Annotated[bool, Parameter(
     folder
         Folder of the sweep.
     out
-        File to write: .csv, or .parquet with the extra of that name.
+        File to write, ending in .csv.
     everything
         Also write the cells of earlier runs that the last run didn't ask for.
     """
-    write_table(read_rows(folder, everything), out)
+    write_csv(read_rows(folder, everything), out)
     print(out)
 
 
@@ -204,35 +199,3 @@ def _saying_what_is_kept(out: Path) -> Iterator[None]:
         full = f"{error.filename or out}: {error.strerror}"
         say(f"{full}; make room: {out} keeps what is done, and the same command goes on")
         raise SystemExit(1) from None
-
-
-def table(
-    folder: Path,
-    /,
-    *,
-    by: str = "spectrum,level,processor",
-    show: str = "psnr_db,delta_e_median",
-    where: list[str] | None = None,
-) -> None:
-    """Print figures of a sweep as a Markdown table: means over the seeds, with the half width of their 95 % interval.
-
-    Parameters
-    ----------
-    folder
-        Folder of the sweep.
-    by
-        Axes joined by commas, with a line for each combination: scene, spectrum, level, exposure, sensor, processor.
-    show
-        Figures, joined by commas: the ledger's columns, electrons_W (G, R, B), pair_delta_e and
-        true_pair_delta_e of scene metamers, daylight_delta_e of scene color_checker.
-    where
-        AXIS=VALUE to keep, such as level=10lux; may be given several times.
-    """
-    axes, figures = ([name.strip() for name in text.split(",")] for text in (by, show))
-    chosen = {}
-    for text in where or ():
-        axis, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"where: {text!r} is not allowed; write AXIS=VALUE, such as level=10lux")
-        chosen[axis] = value
-    print(markdown(lines(read_rows(folder), folder, axes, figures, chosen), axes, figures))

@@ -35,24 +35,34 @@ Image = NDArray[np.float64]
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Bench:
     """What is measured, and how large.
 
     Attributes
     ----------
-    scene, sensor : str
+    scene : str
+        Scene by name.
+    sensor : str
+        Sensor preset by name, or a preset file.
     level_cd_m2 : float
+        Mean scene luminance.
     size : int
         Side of the renders in pixels.
     picture : int
         Side of the pictures that lens, readout and reconstruction work on; mirror images of the render fill it.
-    bands, samples : tuple of int
-        Numbers of bands; samples a pixel, increasing; two renders of twice the last are the references.
-    neighbourhoods, patches : tuple of int
+    bands : tuple of int
+        Numbers of bands; may be given several times, as all that follow.
+    samples : tuple of int
+        Samples a pixel, increasing; two renders of twice the last are the references.
+    neighbourhoods : tuple of int
+        Widths of the reconstruction's neighbourhood.
+    patches : tuple of int
+        Widths of its patches.
     repeats : int
         Calls after the first; their median counts.
     seed : int
+        Seed of renders, chip and exposure.
     """
 
     scene: str = "still_life"
@@ -66,18 +76,6 @@ class Bench:
     patches: tuple[int, ...] = (3, 5)
     repeats: int = 1
     seed: int = 0
-
-
-def more(bench: Bench) -> Bench:
-    """Return the bench with more choices of everything, and more repeats."""
-    return replace(
-        bench,
-        bands=(4, 8, 12, 16, 20, 28, MOST_BANDS),
-        samples=(32, 64, 128, 256, 512, 1024, 2048),
-        neighbourhoods=(7, 11, 15, 21, 27),
-        patches=(1, 3, 5, 7),
-        repeats=3,
-    )
 
 
 def stages(bench: Bench, scene: Scene, sensor: SensorConfig) -> Iterator[Stage]:

@@ -1,21 +1,20 @@
-"""A sweep's rows as CSV, Parquet (extra ``parquet``) or a pandas table (extra ``pandas``)."""
+"""A sweep's rows as values, as CSV and as JSON."""
 
 import csv
+import json
 from collections.abc import Sequence
 from dataclasses import asdict
-from importlib.util import find_spec
+from importlib import metadata
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rodcone.errors import InputError, unknown
-from rodcone.files import replacing
-from studies.sweep.database import COLUMNS, read_results, rows
+from rodcone.errors import unknown
+from rodcone.files import finite, replacing
+from studies.sweep.database import COLUMNS, last_run, read_results, rows
 from studies.sweep.row import Row
 
-if TYPE_CHECKING:
-    import pandas as pd
-
+_JSON_COLUMNS = ("render", "lens", "balance", "mean_electrons", "versions")
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what spreadsheets take for the start of a formula (OWASP, CSV injection)
 
 
@@ -40,50 +39,34 @@ def to_csv(table: Sequence[Row]) -> str:
     return text.getvalue()
 
 
-def to_pandas(table: Sequence[Row]) -> "pd.DataFrame":
-    """Rows as a pandas table, a column each.
+def write_csv(table: Sequence[Row], path: Path) -> None:
+    """Write rows to a ``.csv`` file, whole or not at all.
 
     Raises
     ------
     InputError
-        Where pandas is not installed.
-    """
-    _require("pandas", "pandas")
-    import pandas
-
-    return pandas.DataFrame([asdict(row) for row in table], columns=list(COLUMNS))
-
-
-def write_table(table: Sequence[Row], path: str | Path) -> None:
-    """Write rows to a ``.csv`` or ``.parquet`` file, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        For another ending, or Parquet without pyarrow.
+        For another ending.
     OSError
         Where the file can't be written.
     """
-    path = Path(path)
-    if path.suffix not in (".csv", ".parquet"):
-        raise unknown(f"out: {str(path)!r}: ending", path.suffix, (".csv", ".parquet"))
-    if path.suffix == ".parquet":
-        _require("pyarrow", "parquet")
+    if path.suffix != ".csv":
+        raise unknown(f"out: {str(path)!r}: ending", path.suffix, (".csv",))
     with replacing(path) as (place,):
-        if path.suffix == ".csv":
-            place.write_text(to_csv(table), "utf-8", newline="")
-        else:
-            import pyarrow
-            import pyarrow.parquet
+        place.write_text(to_csv(table), "utf-8", newline="")
 
-            columns: dict[str, list[Any]] = {name: [getattr(row, name) for row in table] for name in COLUMNS}
-            pyarrow.parquet.write_table(pyarrow.table(columns), place)
+
+def results_json(folder: Path) -> bytes:
+    """Study, seconds by stage and rows of a sweep's last run, as a JSON file.
+
+    A row has the columns of `studies.sweep.row.Row`, those in JSON as objects; a number that isn't finite is null.
+    """
+    run, cells = last_run(folder), []
+    for row in run.rows:
+        values = finite(vars(row))
+        cells.append(values | {name: json.loads(values[name]) for name in _JSON_COLUMNS})
+    results = {"rodcone": metadata.version("rodcone"), "study": run.study, "stages": run.stages, "rows": cells}
+    return (json.dumps(results, indent=1, allow_nan=False) + "\n").encode()
 
 
 def _harmless(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
-
-
-def _require(module: str, extra: str) -> None:
-    if find_spec(module) is None:
-        raise InputError(f"export: {module} is not installed; install it: pip install 'rodcone[{extra}]'")

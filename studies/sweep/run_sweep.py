@@ -61,7 +61,6 @@ def sweep(
     runner: Runner | None = None,
     step: Step | None = None,
     *,
-    keep_old: bool = False,
     clock: Clock | None = None,
 ) -> Swept:
     """Make the missing cells of a study and store each in the results database of a folder.
@@ -81,8 +80,6 @@ def sweep(
         Takes cells, gives rows as they come; left out, cells are made in this process.
     step : callable, optional
         Called with what is being done and the share that is done; left out, a notebook shows a bar.
-    keep_old : bool
-        Keep what is made anew as rows of their own, instead of removing them.
     clock : Clock, optional
         That began when the work did, where something was done before.
 
@@ -120,8 +117,7 @@ def sweep(
             want(base, chain.from_iterable(keys))
             stored = done(base, out / PICTURES, asked_keys)
             count_made += _run(job, number, [cell for cell in cells if cell.key not in stored], runner, part)
-        if not keep_old:
-            forget_old(base)
+        forget_old(base)
         notes.update(dict.fromkeys(_noise_notes(rows(base))))
         stages = clock.stages()
         note_stages(base, number, stages)

@@ -15,7 +15,7 @@ from sensor.presets import low_noise
 from studies.study import render_noise
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep.database import open_results, rows
-from studies.sweep.results import results_json
+from studies.sweep.export import results_json
 
 
 def test_bands_and_samples_are_those_of_the_stored_render(tmp_path: Path) -> None:

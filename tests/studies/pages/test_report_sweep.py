@@ -30,7 +30,7 @@ from studies.pages.report_sweep import sweep_report
 from studies.photograph.picture_file import write_picture
 from studies.study.study import SceneChoice
 from studies.sweep.database import FILE
-from studies.sweep.export import read_rows, write_table
+from studies.sweep.export import read_rows, write_csv
 
 NAME = "</script><b>study"
 FILES = ("<b>bold.exr", "other.exr")
@@ -255,7 +255,7 @@ def test_paths_may_be_texts_wherever_a_public_function_takes_one(out: Path, tmp_
     rows = read_rows(str(out))
     assert rows == read_rows(out)
     assert write_report(str(out), str(tmp_path / "r.html")).read_text("utf-8").count("<html") == 1
-    write_table(rows, str(tmp_path / "rows.csv"))
+    write_csv(rows, tmp_path / "rows.csv")
     write_picture(np.zeros((2, 2, 3)), str(tmp_path / "black.png"))
     assert {path.name for path in tmp_path.iterdir()} == {"r.html", "rows.csv", "black.png"}
 

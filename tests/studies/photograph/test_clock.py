@@ -23,8 +23,7 @@ from studies.photograph import clock
 from studies.photograph.clock import FIRST, OTHER, Clock, timed
 from studies.sweep import run_cell as cell_run
 from studies.sweep.cells import Cell
-from studies.sweep.export import read_rows
-from studies.sweep.results import results_json
+from studies.sweep.export import read_rows, results_json
 from studies.sweep.row import Row
 
 

@@ -1,7 +1,7 @@
-"""A ledger as a table: CSV that no spreadsheet runs, Parquet and pandas with the same values."""
+"""A ledger as a table: CSV that no spreadsheet runs."""
 
 import csv
-from dataclasses import asdict, replace
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from sweep_sample import ROW
 
 from rodcone.errors import InputError
 from studies.sweep.database import COLUMNS, add, open_results, want
-from studies.sweep.export import read_rows, to_csv, to_pandas, write_table
+from studies.sweep.export import read_rows, to_csv, write_csv
 
 
 @pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
@@ -28,20 +28,6 @@ def test_csv_holds_every_value_and_numbers_as_they_are() -> None:
     assert (found["illuminance_lux"], found["psnr_db"]) == ("", "inf")
 
 
-def test_parquet_and_pandas_hold_the_same_values(tmp_path: Path) -> None:
-    pandas = pytest.importorskip("pandas", reason="rodcone[pandas] is not installed")
-    parquet = pytest.importorskip("pyarrow.parquet", reason="rodcone[parquet] is not installed")
-    table = [ROW, replace(ROW, key="01", illuminance_lux=500.0)]
-    write_table(table, tmp_path / "t.parquet")
-    read = parquet.read_table(tmp_path / "t.parquet").to_pylist()
-    assert read == [asdict(row) for row in table]
-    frame = to_pandas(table)
-    assert list(frame.columns) == list(COLUMNS)
-    assert frame.loc[1, "illuminance_lux"] == 500.0
-    assert pandas.isna(frame.loc[0, "illuminance_lux"])
-    assert frame["exposure_s"].tolist() == [ROW.exposure_s] * 2
-
-
 def test_rows_come_from_the_ledger_in_the_studys_order_or_all(tmp_path: Path) -> None:
     with open_results(tmp_path) as base:
         for key in ("a", "b", "c"):
@@ -54,16 +40,8 @@ def test_rows_come_from_the_ledger_in_the_studys_order_or_all(tmp_path: Path) ->
 def test_wrong_places_are_told_and_nothing_is_left(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"holds no ledger.sqlite"):
         read_rows(tmp_path)
-    with pytest.raises(InputError, match=r"'.txt' is unknown; allowed: .csv, .parquet"):
-        write_table([ROW], tmp_path / "t.txt")
+    with pytest.raises(InputError, match=r"'.txt' is unknown; allowed: .csv"):
+        write_csv([ROW], tmp_path / "t.txt")
     with pytest.raises(OSError, match="absent"):
-        write_table([ROW], tmp_path / "absent" / "t.csv")
+        write_csv([ROW], tmp_path / "absent" / "t.csv")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_library_that_is_absent_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("studies.sweep.export.find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"rodcone\[parquet\]"):
-        write_table([ROW], tmp_path / "t.parquet")
-    with pytest.raises(InputError, match=r"rodcone\[pandas\]"):
-        to_pandas([ROW])
