@@ -11,26 +11,24 @@ from render.illuminants import illuminant
 from rodcone.errors import InputError
 from sensor.raw_files.raw_file import write_raw
 from studies.explore.chain import Exposed, Shot, development_of, expose_scene, photograph, true_picture_of
-from studies.explore.controls import Controls, Lamp, to_json
+from studies.explore.controls import Controls, to_json
 from studies.explore.dropped import write_dropped
 from studies.explore.memo import Memo
 from studies.explore.messages import Header, sensor_terms
 from studies.explore.render_noise import noise_share
 from studies.explore.slow import stand_in
-from studies.explore.source import Rendered, Source
+from studies.explore.source import Rendered
 from studies.explore.views import VIEWS, Bytes, facts, histogram, pixel
-from studies.explore.written import python_of, study_of
+from studies.explore.written import python_of
 from studies.photograph.calibrate import calibrate, iso_speed
 from studies.study.render_noise import noise_note
 
 Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 
 
-def written(message: Header, controls: Controls, rendered: Rendered, source: Source, memo: Memo, drops: Path) -> Answer:
+def written(message: Header, controls: Controls, rendered: Rendered, memo: Memo, drops: Path) -> Answer:
     """Figures and files of one camera."""
     kind = message["kind"]
-    if kind == "study":
-        return {"files": _study(controls, rendered, source, drops)}, ()
     if kind == "dng":
         return {"name": "explored.dng"}, (_dng(rendered, controls, memo),)
     exposed = expose_scene(rendered.transport, controls, memo)
@@ -124,15 +122,3 @@ def _dng(rendered: Rendered, controls: Controls, memo: Memo) -> bytes:
     with TemporaryDirectory() as folder:
         (path,) = write_raw(raw, Path(folder) / "explored.dng")
         return path.read_bytes()
-
-
-def _study(controls: Controls, rendered: Rendered, source: Source, drops: Path) -> dict[str, str]:
-    if source.scene is None:
-        raise InputError("study: a transport has no name that a study could say; allowed: rodcone explore SCENE")
-    judged = next(iter(rendered.transport.groups.values())).coloured
-    lamps = {name: controls.lamps.get(name, Lamp()) for name in rendered.transport.groups}
-    files, path = study_of(source.scene, source.render, replace(controls, lamps=lamps), judged), Path(controls.sensor)
-    if drops in path.parents:
-        files = {name: text.replace(str(path), path.name) for name, text in files.items()}
-        files |= {each.name: each.read_text("utf-8") for each in path.parent.iterdir()}
-    return files

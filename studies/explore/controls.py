@@ -166,18 +166,15 @@ def options_of(controls: Controls) -> dict[str, Any]:
 # From and to JSON
 
 
-def controls_from(content: Any, own: Controls = Controls(), dropped: Iterable[str] = ()) -> Controls:
+def controls_from(content: Any, dropped: Iterable[str] = ()) -> Controls:
     """Check and read the controls of a message.
 
     Parameters
     ----------
     content : decoded JSON
         An object with fields of `Controls`; those that are left out have their defaults.
-    own : Controls
-        What the page began with. The files that it names may be named again: a message may not make the program read
-        others.
     dropped : iterable of str
-        Files of sensors that were dropped on the page.
+        Files of sensors that were dropped on the page: a message may not make the program read others.
 
     Raises
     ------
@@ -190,13 +187,13 @@ def controls_from(content: Any, own: Controls = Controls(), dropped: Iterable[st
     emitters = lamps.values() if isinstance(lamps, dict) else ()
     spectra = [lamp.get("spectrum") for lamp in emitters if isinstance(lamp, dict)]
     for light in (content.get("reference_light"), *spectra):  # before anything reads it
-        if isinstance(light, str) and is_light_file(light) and light not in light_files(own):
+        if isinstance(light, str) and is_light_file(light):
             raise InputError(
-                f"light: {light!r} is a file that the command didn't name; allowed: an illuminant's name; load the "
+                f"light: {light!r} is a file on this machine; allowed: an illuminant's name; load the "
                 "file on the page, as a table"
             )
     controls = controls_of(content, "send what the page is told first")
-    if controls.sensor not in (known := {*names(), own.sensor, *dropped}):
+    if controls.sensor not in (known := (*names(), *dropped)):
         raise unknown("sensor", controls.sensor, known)
     for name, lamp in controls.lamps.items():
         if len(lamp.table) > MOST_POINTS:
@@ -213,12 +210,6 @@ def controls_of(content: Mapping[str, Any], fix: str) -> Controls:
         For an unknown name, a value of another kind, or one that `Controls` refuses.
     """
     return structured(content, Controls, _CONVERTER, fix)
-
-
-def light_files(controls: Controls) -> tuple[str, ...]:
-    """Files among the lights of some controls, each once."""
-    lights = (controls.reference_light, *(lamp.spectrum for lamp in controls.lamps.values()))
-    return tuple(dict.fromkeys(light for light in lights if is_light_file(light)))
 
 
 def to_json(controls: Controls) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from sensor.config import SensorConfig
 from sensor.exposure import RULES
 from sensor.presets import names as sensors
 from sensor.presets import preset
-from studies.explore.controls import ADJUSTABLE, LENS, PIXEL, SETTINGS, TIME, Controls, light_files, mosaics_of, to_json
+from studies.explore.controls import ADJUSTABLE, LENS, PIXEL, SETTINGS, TIME, Controls, mosaics_of, to_json
 from studies.explore.slow import is_slow
 from studies.explore.source import Source
 from studies.explore.views import VIEWS, Bytes
@@ -37,7 +37,6 @@ KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "show": ("cameras", "views"),
         "pixel": ("cameras", "row", "column"),
         "histogram": ("cameras",),
-        "study": ("cameras",),
         "dng": ("cameras",),
     }
 )
@@ -45,13 +44,12 @@ KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 def hello(source: Source, scenes: Iterable[str] = (), dropped: Iterable[str] = ()) -> Header:
     """What the page builds its controls from; `scenes` that it may choose, `dropped` files of sensors."""
-    named = dict.fromkeys((*sensors(), source.controls.sensor, *dropped))
+    named = dict.fromkeys((*sensors(), *dropped))
     return {
         "title": source.title,
-        "controls": to_json(source.controls),
-        "defaults": to_json(Controls()),
+        "controls": to_json(Controls()),
         "groups": source.groups,
-        "illuminants": list(dict.fromkeys((*illuminants(), *light_files(source.controls)))),
+        "illuminants": list(illuminants()),
         "rules": [*RULES, TIME],
         "white_balances": list(WHITE_BALANCES),
         "levels": {level.name: float(f"{level.luminance_cd_m2:.4g}") for level in DEMO_LEVELS},
@@ -69,7 +67,6 @@ def hello(source: Source, scenes: Iterable[str] = (), dropped: Iterable[str] = (
         },
         "views": list(VIEWS),
         "assumed": list(source.notes),
-        "saves": {"study": source.scene is not None},
     }
 
 

@@ -235,10 +235,10 @@ class Session:
             raise InputError(f"scene: {self._failure}; nothing can be shown; mend the scene and start again")
         if kind == "show":
             return self._show(message, self._cameras(message), rendered)
-        return written(message, self._cameras(message)[0], rendered, self._source, self._memo, self._drops)
+        return written(message, self._cameras(message)[0], rendered, self._memo, self._drops)
 
     def _cameras(self, message: Header) -> list[Controls]:
-        return [controls_from(each, self._source.controls, self._dropped) for each in message["cameras"]]
+        return [controls_from(each, self._dropped) for each in message["cameras"]]
 
     def _choose_scene(self, name: Any) -> None:
         if name not in tuple(self._scenes):

@@ -369,7 +369,7 @@ function render({ model, el }) {
           const { mosaics } = hello.processors[value];
           if (!mosaics.includes(camera.mosaic)) camera.mosaic = mosaics[0];
           if ((value === "interleaved_paper") !== (camera.processor === "interleaved_paper")) { // whose method is Gray World
-            camera.white_balance = value === "interleaved_paper" ? "gray-world" : hello.defaults.white_balance;
+            camera.white_balance = value === "interleaved_paper" ? "gray-world" : hello.controls.white_balance;
           }
           camera.settings = {};
           set("processor", value, true);
@@ -379,10 +379,7 @@ function render({ model, el }) {
         ...terms("settings", SETTINGS, hello.processors[camera.processor].settings)),
       group("Save",
         make("div", { class: "buttons" },
-          button("Raw as DNG", () => ask("dng", () => ({ cameras: [controls(edited)] }), ({ name }, [bytes]) => download(name, new Blob([bytes], { type: "image/x-adobe-dng" })))),
-          hello.saves.study && button("Study as TOML", () => ask("study", () => ({ cameras: [controls(edited)] }), ({ files }) => {
-            Object.entries(files).forEach(([name, text]) => download(name, new Blob([text], { type: "text/plain" })));
-          })))),
+          button("Raw as DNG", () => ask("dng", () => ({ cameras: [controls(edited)] }), ({ name }, [bytes]) => download(name, new Blob([bytes], { type: "image/x-adobe-dng" })))))),
     ]);
     if (focused) parts.controls.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
   }

@@ -1,6 +1,5 @@
-"""What the command opens: scenes, files, studies; and what it refuses before anything is rendered."""
+"""What the command opens: scenes and files; and what it refuses before anything is rendered."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ from studies.explore.memo import go_on
 from studies.explore.source import FIRST_SIDE, RenderOptions, open_source
 from studies.explore.written import python_of
 from studies.photograph.png import to_png
-from studies.study.study import SceneChoice
 
 
 def test_a_scene_is_shown_small_first_and_then_whole():
@@ -35,28 +33,22 @@ def test_a_file_of_radiance_is_photographed_as_it_is(tmp_path: Path):
     source = open_source(str(path), RenderOptions())
     (state,) = source.states(go_on)
     assert source.groups == {next(iter(state.transport.groups)): True}
-    assert photograph(state.transport, source.controls).picture.shape == (16, 20, 3)
+    assert photograph(state.transport, Controls()).picture.shape == (16, 20, 3)
     names: dict[str, object] = {}
-    exec(python_of(state.code, source.controls), names)
-    assert np.array_equal(names["picture"], photograph(state.transport, source.controls).picture)  # type: ignore[arg-type]
+    exec(python_of(state.code, Controls()), names)
+    assert np.array_equal(names["picture"], photograph(state.transport, Controls()).picture)  # type: ignore[arg-type]
 
 
-def test_reflectances_take_other_lamps_and_the_copied_python_has_their_light(tmp_path: Path):
-    path, study = tmp_path / "seen.png", tmp_path / "study.toml"
+def test_reflectances_take_other_lamps_and_the_copied_python_opens_them(tmp_path: Path):
+    path = tmp_path / "seen.png"
     rng = np.random.default_rng(1)
     path.write_bytes(to_png(rng.integers(50, 200, (16, 20, 3), np.uint8)))
-    study.write_text(
-        'levels = ["25cd/m2"]\nspectra = ["A"]\nscenes = [{ source = "seen.png", light = "D50" }]\n', "utf-8"
-    )
-    source = open_source(str(study), RenderOptions())
+    source = open_source(str(path), RenderOptions())
     (state,) = source.states(go_on)
     assert source.groups == {"light": False}
-    assert dict(source.controls.lamps) == {"light": Lamp("A")}
-    shot = photograph(state.transport, source.controls)
-    assert np.ptp(shot.picture) > 0
+    shot, own = (photograph(state.transport, Controls(lamps=lamps)) for lamps in ({"light": Lamp("A")}, {}))
     names: dict[str, object] = {}
-    exec(python_of(state.code, replace(source.controls, lamps={})), names)
-    own = photograph(state.transport, replace(source.controls, lamps={}))
+    exec(python_of(state.code, Controls()), names)
     assert np.array_equal(names["picture"], own.picture)  # type: ignore[arg-type]
     assert not np.array_equal(own.exposed.light.spectrum, shot.exposed.light.spectrum)
 
@@ -70,49 +62,11 @@ def test_memory_for_a_photograph_is_that_of_its_pixels(tmp_path: Path, monkeypat
     assert asked == [memory(64 * 48, DEFAULT_WAVELENGTH_NM.size, 1)]
 
 
-def test_the_chart_of_a_scene_is_opened_and_copied(tmp_path: Path):
-    chart, study = tmp_path / "chart.csv", tmp_path / "study.toml"
-    patches = ",".join(f"p{number}" for number in range(24))
-    rows = "".join(f"{nm}," + ",".join(["0.5"] * 24) + "\n" for nm in range(380, 790, 10))
-    chart.write_text(f"wavelength_nm,{patches}\n{rows}", "utf-8")
-    study.write_text(
-        'levels = ["25cd/m2"]\nframes = [4, 1]\nscenes = [{ source = "color_checker", chart = "chart.csv" }]\n'
-        "[render]\nsize = 24\nspp = 2\nband_nm = 100\n",
-        "utf-8",
-    )
-    source = open_source(str(study), RenderOptions())
-    (state,) = source.states(go_on)
-    assert source.controls.frames == 4
-    assert source.scene == SceneChoice("color_checker", chart=str(chart))
-    names: dict[str, object] = {}
-    exec(python_of(state.code, Controls()), names)
-    assert np.array_equal(names["transport"].radiance, state.transport.radiance)  # type: ignore[attr-defined]
-    (colours,) = open_source("color_checker", RenderOptions(size=24, spp=2, band_nm=100.0)).states(go_on)
-    assert not np.array_equal(colours.transport.radiance, state.transport.radiance)
-
-
-def test_a_study_is_where_the_page_begins(tmp_path: Path):
-    path = tmp_path / "study.toml"
-    path.write_text(
-        'scenes = ["still_life"]\nspectra = ["A"]\nlevels = ["3cd/m2", "100cd/m2"]\nexposures = ["5ms"]\n'
-        'sensors = ["table1_output"]\nprocessors = ["bayer"]\nseeds = [3]\n'
-        "[render]\nsize = 32\nspp = 2\nband_nm = 80\n[lens]\nveiling_glare = 0.02\n",
-        "utf-8",
-    )
-    source = open_source(str(path), RenderOptions())
-    own = source.controls
-    assert (own.level_cd_m2, own.exposure, own.exposure_s, own.seed) == (3.0, "time", 0.005, 3)
-    assert (own.sensor, own.mosaic, own.processor) == ("table1_output", "bayer", "bayer")
-    assert dict(own.lens) == {"veiling_glare": 0.02}
-    assert own.lamps["softbox"].spectrum == "A"
-    assert (source.render.size, source.render.spp) == (32, 2)
-
-
 def test_bad_input_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     rows = (
         ("no_such_scene", "scene"), ("still_life --size 4", "size: 4"), ("still_life --size 100000", "size: 100000"),
-        ("nothing.exr", "nothing.exr"), ("nothing.toml", "nothing.toml"), ("nothing.xml", "nothing.xml"),
+        ("nothing.exr", "nothing.exr"), ("study.toml", "study.toml"), ("nothing.xml", "nothing.xml"),
         ("still_life --spp 0", "spp: 0"), ("still_life --band-nm nan", "band"), ("still_life --band-nm 0", "band"),
         ("still_life --seed -1", "seed: -1"), ("still_life --trust-scene --no-browser", "trust-scene"),
         ("still_life --port 70000", "port: 70000"), ("still_life --port -1", "port: -1"),

@@ -42,15 +42,12 @@ def answer(widget: Any, content: dict[str, Any]) -> tuple[dict[str, Any], list[b
 def test_the_widget_shows_what_python_makes(widget):
     header, _ = answer(widget, {"kind": "hello", "number": 1})
     assert header["groups"] == {"sun": False, "sky": False}
-    assert header["saves"] == {"study": False}
     asked = {"level_cd_m2": 3.0, "seed": 4}
     header, (picture,) = answer(widget, {"kind": "show", "number": 2, "cameras": [asked], "views": [[0, "picture"]]})
     assert header["number"] == 2
     shot = photograph(small_transport(), Controls(**asked))
     assert np.array_equal(np.frombuffer(picture, np.uint8).reshape(40, 48, 3), shot.picture)
     assert "transport = ..." in header["python"][0]
-    header, _ = answer(widget, {"kind": "study", "number": 4, "cameras": [asked]})
-    assert header["kind"] == "error"
 
 
 def test_the_widget_brings_the_pages_module_and_style(widget):
