@@ -23,16 +23,11 @@ from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.metrics.confidence import half_width
+from studies.metrics.metric import DELTA_E, FLIP, METRICS, ON_TARGETS, PSNR, Metric
 from studies.metrics.truth import Light, light_in_bands
-from studies.pages import report_text
 from studies.pages.plots import CHART, COLOURS, INK, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
 from studies.pages.report_text import (
-    DELTA_E,
-    FLIP,
     MISSING,
-    ON_TARGETS,
-    PSNR,
-    Metric,
     duration,
     fixed,
     lead_text,
@@ -52,7 +47,7 @@ from studies.sweep.row import Row
 
 PAGE = Path(__file__).resolve().parents[1] / "five_cameras.md"
 RGBW, BAYER = "ple_rgbw", "ple_bayer"
-SHOWN = tuple(metric for metric in report_text.METRICS if metric not in ON_TARGETS)
+SHOWN = tuple(metric for metric in METRICS if metric not in ON_TARGETS)
 LINES = dict(zip((*COLOURS, SOFT, "#9a7d0a", INK), ("-", "-", "-", "-", "-", "--", ":"), strict=True))  # a sensor each
 AT_NM = 530.0  # where the quantum efficiency of a sensor without a report is told
 

@@ -133,7 +133,7 @@ def processors() -> dict[str, str]:
 
 def metrics() -> dict[str, str]:
     """Columns of a sweep that tell cameras apart."""
-    from studies.pages.report_text import METRICS
+    from studies.metrics.metric import METRICS
 
     units = {x.key: f" [{x.unit}]" if x.unit else "" for x in METRICS}
     return {x.key: f"{x.name}{units[x.key]}, {'higher' if x.higher else 'lower'} is better" for x in METRICS}

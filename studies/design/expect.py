@@ -9,9 +9,8 @@ import numpy as np
 
 from isp.design.expected_error import Gaussians, Noise, Samples, expected_error, pooled, sampled
 from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
-from render.illuminants import illuminant
 from render.photometry import tristimulus
-from render.spectrum import VISIBLE_NM, Floats
+from render.spectrum import Floats
 from rodcone.colour_spaces import D65_XY, adapt_to_d65, luminance_of_srgb, xyz_from_xy, xyz_to_srgb
 from rodcone.errors import unknown
 from sensor.cfa import channels, mask
@@ -20,7 +19,7 @@ from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from sensor.optics import camera_equation
 from sensor.readout import spread_charge
 from sensor.response import electrons_per_irradiance
-from studies.metrics.truth import Light, light_in_bands
+from studies.metrics.truth import Light, light_of
 
 MIDDLE = PATCH // 4  # pixels at a patch's sides whose error doesn't count: they lack neighbours
 METERED = 64  # side of the frame, drawn from the prior, that the exposure looks at
@@ -75,9 +74,8 @@ class LitPrior:
 @cache
 def view_of(prior_name: str, light_name: str) -> LitPrior:
     """The prior's coefficients under an illuminant, in bands of 1 nm."""
-    prior, nm = load_prior(prior_name), np.arange(VISIBLE_NM[0] + 0.5, VISIBLE_NM[1])
-    light = light_in_bands(illuminant(light_name), nm, np.ones_like(nm))
-    basis = prior.spectra[np.clip(np.searchsorted(prior.edges_nm, nm) - 1, 0, len(prior.spectra) - 1)]
+    prior, light = load_prior(prior_name), light_of(light_name)
+    basis = prior.spectra[np.clip(np.searchsorted(prior.edges_nm, light.wavelength_nm) - 1, 0, len(prior.spectra) - 1)]
     white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm)
     xyz = tristimulus(light.spectrum * basis.T, light.wavelength_nm, light.width_nm)
     return LitPrior(light, basis, adapt_to_d65(xyz, white).T)

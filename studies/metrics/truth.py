@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from render.illuminants import illuminant
 from render.photometry import tristimulus
 from render.radiance import SpectralRadiance
-from render.spectrum import Floats, Spectrum
+from render.spectrum import VISIBLE_NM, Floats, Spectrum
 from render.transport import Transport
 from rodcone.brief import brief
 from rodcone.colour_spaces import WHITE_AT, WHITE_PERCENTILE, adapt_to_d65, xyz_to_srgb
@@ -39,6 +40,12 @@ def light_in_bands(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) 
     """Average a spectrum over bands and scale it to 1 cd/m^2."""
     values = spectrum.band_average(wavelength_nm, width_nm)
     return Light(wavelength_nm, width_nm, values / tristimulus(values, wavelength_nm, width_nm)[1])
+
+
+def light_of(name: str) -> Light:
+    """Illuminant of 1 cd/m^2 in bands of 1 nm over 380-780 nm."""
+    nm: Floats = np.arange(VISIBLE_NM[0] + 0.5, VISIBLE_NM[1])
+    return light_in_bands(illuminant(name), nm, np.ones_like(nm))
 
 
 def shown_white_cd_m2(transport: Transport, luminance_cd_m2: float | None) -> float:

@@ -7,15 +7,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.pages.report_data import ReportCell
-from studies.pages.report_text import (
+from studies.metrics.metric import (
     CHART,
     DELTA_E,
     DELTA_E_95,
     FLIP,
     METRICS,
     MTF50,
-    NBSP,
     PATCHES,
     PSNR,
     PU21,
@@ -23,12 +21,9 @@ from studies.pages.report_text import (
     S_CIELAB_95,
     SSIM,
     Metric,
-    camera_name,
-    duration,
-    fixed,
-    lead_text,
-    significant,
 )
+from studies.pages.report_data import ReportCell
+from studies.pages.report_text import NBSP, camera_name, duration, fixed, lead_text, significant
 from studies.pages.verdict import AHEAD, BEHIND, LEVEL, UNKNOWN, Figures, Leads, leads, light_ratio
 from studies.study.study import GRAY_WORLD
 

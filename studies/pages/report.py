@@ -18,6 +18,7 @@ import numpy as np
 from markupsafe import Markup
 
 from render.spectrum import VISIBLE_NM
+from studies.metrics.metric import MEANINGS, METRICS, SEEN_BY, Metric
 from studies.pages import report_text as text
 from studies.pages.charts import SNR, snr_svg
 from studies.pages.page import address, own_file, write_out
@@ -55,7 +56,7 @@ def cell_view(cell: ReportCell, level: ReportLevel, group: str) -> dict[str, Any
         "x": cell.luminance_cd_m2,
         "figures": {
             metric.key: [float(f"{mean:.7g}"), float(f"{half:.4g}") if isfinite(half) else None]
-            for metric in text.METRICS
+            for metric in METRICS
             if isfinite(mean := cell.mean(metric.key))
             for half in [cell.half(metric.key)]
         },
@@ -94,7 +95,7 @@ class GroupView:
     title: str
     first: int
     truth: int
-    metrics: list[text.Metric]
+    metrics: list[Metric]
     cells: tuple[ReportCell, ...]
 
 
@@ -234,6 +235,8 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
         groups=groups,
         varying=sum(len(axis.values) > 1 for axis in axes_of(report)),
         metrics=shown_metrics(report.cells),
+        said_by=MEANINGS,
+        seen_by=SEEN_BY,
         alone=alone(report),
         answer=data["comparisons"][of.compared]["answers"].get(f"{of.a} {of.b}", [None])[0],
         over=data["comparisons"][of.compared]["over"].get(f"{of.a} {of.b}", ""),

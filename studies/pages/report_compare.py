@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.metrics.metric import METRICS, Metric
 from studies.pages import report_text as text
 from studies.pages.headline import WHITE_PIXEL, Group, Pair, answer, balance_words, in_light, over_groups, pair_words
 from studies.pages.report_data import ReportCell, ReportData
@@ -127,7 +128,7 @@ def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group
 
 def _figures(cells: Sequence[ReportCell]) -> dict[str, NDArray[np.float64]]:
     """Return (level, seed) by metric, NaN where a figure is unknown."""
-    return {metric.key: np.array([cell.samples(metric.key) for cell in cells]) for metric in text.METRICS}
+    return {metric.key: np.array([cell.samples(metric.key) for cell in cells]) for metric in METRICS}
 
 
 def group_titles(report: ReportData, axis: int) -> list[str]:
@@ -194,6 +195,6 @@ def _flat(lead: Leads) -> list[Any]:
     return ["".join(outcome[0] for outcome in lead.outcome.tolist()), *numbers]
 
 
-def shown_metrics(cells: Sequence[ReportCell]) -> list[text.Metric]:
+def shown_metrics(cells: Sequence[ReportCell]) -> list[Metric]:
     """Return the metrics that are known for some cell: those of targets are so on their own scene alone."""
-    return [metric for metric in text.METRICS if any(isfinite(cell.mean(metric.key)) for cell in cells)]
+    return [metric for metric in METRICS if any(isfinite(cell.mean(metric.key)) for cell in cells)]

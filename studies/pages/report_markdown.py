@@ -2,10 +2,11 @@
 
 from math import isnan
 
+from studies.metrics.metric import Metric
 from studies.pages.headline import answer, balance_words, in_light
 from studies.pages.report_compare import BALANCE, axes_of, first_comparison, groups_of, means_over_scenes, shown_metrics
 from studies.pages.report_data import ReportData
-from studies.pages.report_text import MISSING, Metric, fixed, lead_text, table
+from studies.pages.report_text import MISSING, fixed, lead_text, table
 from studies.pages.verdict import AHEAD, BEHIND, OUTCOMES, Leads, counts
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.metrics.confidence import Floats, half_width
-from studies.pages.report_text import DELTA_E, FLIP, METRICS, PSNR, SSIM, Metric
+from studies.metrics.metric import DELTA_E, FLIP, METRICS, PSNR, SSIM, Metric
 
 AHEAD, LEVEL, BEHIND, UNKNOWN = "ahead", "level", "behind", "unknown"
 OUTCOMES = (AHEAD, LEVEL, BEHIND)

@@ -11,6 +11,7 @@ from scenes.lit_and_shadowed import DARK_CD_M2, LIT_CD_M2
 from sensor.exposure import LONGEST_S
 from sensor.optics import form_image
 from sensor.response import channel_electrons
+from studies.metrics.truth import light_of
 from studies.pages import report_text as text
 from studies.pages.plots import picture_rows
 from studies.paper.claims import Claim, PaperFigure, at_least, at_most, near
@@ -28,7 +29,7 @@ from studies.paper.setup import (
     shot_noise_alone,
     view,
 )
-from studies.photograph.snr import channel_e, light_of, snr
+from studies.photograph.snr import channel_e, snr
 
 LARGE = "table1_output_6um"  # Figure 1(b)'s larger pixel, as cameras of the time had
 VISIBLE_NOISE_DB = 30.0  # the paper's measure: noise on a uniform field is visible below

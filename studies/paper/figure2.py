@@ -13,11 +13,12 @@ from matplotlib.figure import Figure
 from render.spectrum import Floats
 from sensor.curves import rgbw
 from sensor.readout import noise_variance
+from studies.metrics.truth import light_of
 from studies.pages.plots import BLUE, CHART, COLOURS, GREEN, INK, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks
 from studies.paper.claims import Claim, PaperFigure, about, at_least
 from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, TODAY, sensor_of, without_prnu
-from studies.photograph.snr import channel_e, light_of, snr
+from studies.photograph.snr import channel_e, snr
 
 NM: Floats = np.arange(400.0, 701.0, 2.0)  # the paper's range
 CHANNELS = "RGBW"

@@ -11,9 +11,9 @@ from scenes.levels import DEMO_LEVELS
 from sensor.config import LensConfig
 from sensor.device import Device
 from sensor.readout import read_out
+from studies.metrics.truth import light_of
 from studies.paper.claims import Claim, ClaimCheck, about, near
 from studies.paper.setup import READINGS, View, decibels, photons, sensor_of, shot_noise_alone
-from studies.photograph.snr import light_of
 
 MOONLIGHT_CD_M2 = DEMO_LEVELS[0].luminance_cd_m2
 FULL_SUN_LUX = 1e5  # as `DEMO_LEVELS`

@@ -5,14 +5,13 @@ from math import log10, pi
 
 import numpy as np
 
-from render.illuminants import illuminant
-from render.spectrum import VISIBLE_NM, Floats
+from render.spectrum import Floats
 from sensor.capture import expose
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.readout import electrons_at_snr, noise_variance
-from studies.metrics.truth import GREY, Light, light_in_bands, neutral_electrons
+from studies.metrics.truth import GREY, Light, light_of, neutral_electrons
 
 FIELD_SIDE = 512  # pixels of a simulated even field
 
@@ -36,12 +35,6 @@ class LightForSnr:
     electrons: float
     luminance_cd_m2: float
     illuminance_lux: float
-
-
-def light_of(name: str) -> Light:
-    """Illuminant of 1 cd/m^2 in bands of 1 nm over 380-780 nm."""
-    nm: Floats = np.arange(VISIBLE_NM[0] + 0.5, VISIBLE_NM[1])
-    return light_in_bands(illuminant(name), nm, np.ones_like(nm))
 
 
 def channel_e(sensor: SensorConfig, light: Light, luminance_cd_m2: float, exposure_s: float) -> Floats:

@@ -23,7 +23,8 @@ from sensor.readings.noise import (
     whole_share,
 )
 from sensor.readout import electrons_at_snr, noise_sources, noise_variance
-from studies.photograph.snr import even_field, light_of, snr
+from studies.metrics.truth import light_of
+from studies.photograph.snr import even_field, snr
 
 HDR = ("dual_gain", "split_pixel", "staggered")
 REAL = {

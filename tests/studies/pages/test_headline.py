@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import report_sample as SAMPLE
 
+from studies.metrics.metric import METRICS
 from studies.pages.headline import Pair, answer, in_light, over_groups
 from studies.pages.report_compare import CAMERA, SENSOR, comparisons, groups_of
 from studies.pages.report_data import ReportData
-from studies.pages.report_text import METRICS
 from studies.sweep.row import Row
 
 LEVELS, LIGHT = ("moonlight", "street", "office", "day"), (0.1, 1.0, 10.0, 100.0)

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 import report_sample as SAMPLE
 
+from studies.metrics import metric as figures
 from studies.pages import report_text as text
 from studies.pages.report import render_report
 from studies.pages.report_compare import CAMERA
@@ -291,7 +292,7 @@ def test_every_metric_is_compared_by_light_lost_ones_too() -> None:
     of = SAMPLE.sample_report(led, seeds=(0, 1, 2))
     page = unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ")
     found = json.loads(Outline(page_of(of)).scripts[0])["comparisons"][CAMERA]["leads"]["0 1"]
-    assert set(found) == {metric.key for metric in text.METRICS[:8]}
+    assert set(found) == {metric.key for metric in figures.METRICS[:8]}
     assert {key: found[key][0] for key in ("psnr_db", "ssim", "flip_mean")} == {
         "psnr_db": 2 * "aaabbbb",
         "ssim": 2 * "lllllll",
@@ -353,7 +354,7 @@ def test_what_did_not_happen_is_not_explained() -> None:
 
 @pytest.mark.thorough
 def test_every_metric_is_explained() -> None:
-    assert set(text.MEANINGS) == {metric.key for metric in text.METRICS}
+    assert set(figures.MEANINGS) == {metric.key for metric in figures.METRICS}
     page = unescape(page_of(SAMPLE.sample_report()))
     assert "by moonlight it sees so little that even a picture full of noise gets some 45 dB" in page
 

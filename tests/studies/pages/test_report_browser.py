@@ -14,6 +14,7 @@ import report_sample as SAMPLE
 from PIL import Image
 from skimage.color import deltaE_ciede2000, rgb2lab
 
+from studies.metrics import metric as figures
 from studies.metrics.appearance import flip
 from studies.pages import report_text as text
 from studies.pages.report import render_report
@@ -256,7 +257,7 @@ def compared() -> ReportData:
     def moved(made: Any) -> Any:
         at = [ord(letter) for letter in f"{made.sensor}{made.level}{made.processor}"]
         draw = np.random.default_rng([*at, made.seed]).standard_normal
-        known = {metric.key: 20 + metric.seen * (0.4 * (sum(at) % 5) + 0.1 * draw()) for metric in text.METRICS[:8]}
+        known = {metric.key: 20 + metric.seen * (0.4 * (sum(at) % 5) + 0.1 * draw()) for metric in figures.METRICS[:8]}
         return replace(made, **known)
 
     cameras = ("interleaved", "bayer", "ple_rgbw", "ple_bayer")
@@ -279,7 +280,7 @@ def test_the_tables_hold_the_leads_and_signs_turn_with_a_and_b(browser: Any, fou
     page = CHROME.open_page(browser, four)
     written = page.evaluate(read)
     assert len(written) == 2 * 9
-    metrics = text.METRICS[:8]
+    metrics = figures.METRICS[:8]
     for group, start in zip(groups_of(compared(), CAMERA, 2, 3), (0, 9), strict=True):
         for metric, row in zip(metrics, written[start + 1 : start + 9], strict=True):
             lead = group.pair.leads[metric.key]
@@ -303,7 +304,7 @@ def test_a_beside_every_other_has_the_leads_of_every_place_and_counts(browser: A
     found = comparisons(report)[CAMERA]
     for a in (0, 2):
         pick(page, "byId('a')", a)
-        for metric in (text.PSNR, text.FLIP):
+        for metric in (figures.PSNR, figures.FLIP):
             pick(page, "byId('beside-metric')", metric.key)
             read = "[...document.querySelectorAll('#beside tbody tr')].map((row) => [...row.children].map((cell) => cell.textContent))"  # noqa: E501
             rows = page.evaluate(read)
@@ -337,7 +338,7 @@ def test_question_answer_and_first_chart_follow_the_menus(browser: Any, four: Pa
         assert page.evaluate("document.querySelector('.question').textContent").startswith(" beside ".join(names))
         lead = groups_of(compared(), CAMERA, a, b)[sensor].pair.leads["psnr_db"]
         outcome = str(lead.outcome[0])
-        words = text.lead_text(text.PSNR, float(lead.mean[0]))
+        words = text.lead_text(figures.PSNR, float(lead.mean[0]))
         assert page.evaluate(mark) == f"moonlight: {outcome}, {words}"
     assert page.evaluate("document.querySelector('h1').textContent") == "What is seen?"
     # the band of what nobody sees is twice 0.5 dB high
@@ -371,7 +372,7 @@ def test_marks_and_bands_of_the_charts_lie_where_the_rows_say(browser: Any, four
     pick(page, "byId('a')", 0)
     pick(page, "byId('b')", 1)
     light = [cell.luminance_cd_m2 for cell in report.by_group[0][::4]]
-    for metric, sign in ((text.PSNR, 1), (text.FLIP, -1)):
+    for metric, sign in ((figures.PSNR, 1), (figures.FLIP, -1)):
         pick(page, "byId('lead-metric')", metric.key)
         ours, theirs = ([cell.samples(metric.key) for cell in report.by_group[0][side::4]] for side in (0, 1))
         gains = [[sign * (a - b) for a, b in zip(*pair, strict=True)] for pair in zip(ours, theirs, strict=True)]

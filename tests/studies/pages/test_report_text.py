@@ -2,12 +2,13 @@
 
 import pytest
 
+from studies.metrics import metric as figures
 from studies.pages import report_text as text
 
 
 @pytest.mark.parametrize(("lead", "words"), [(0.04, "0.0"), (-0.04, "0.0"), (0.06, "+0.1"), (-11.94, "−11.9")])
 def test_a_lead_that_is_written_as_0_has_no_sign(lead: float, words: str) -> None:
-    assert text.lead_text(text.PSNR, lead) == words
+    assert text.lead_text(figures.PSNR, lead) == words
 
 
 def test_powers_have_their_signs() -> None:

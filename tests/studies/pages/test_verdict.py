@@ -10,7 +10,7 @@ import pytest
 import report_sample as SAMPLE
 from scipy.stats import binom, ttest_rel
 
-from studies.pages import report_text as text
+from studies.metrics import metric as figures
 from studies.pages.report_compare import (
     BRIGHTNESS,
     CAMERA,
@@ -60,8 +60,8 @@ def recount(ours: list[float], theirs: list[float], key: str) -> str:
     return LEVEL if max(abs(interval.low), abs(interval.high)) < SEEN[key] else UNKNOWN
 
 
-@pytest.mark.parametrize("metric", text.METRICS, ids=lambda metric: metric.key)
-def test_direction_and_size_are_those_said_by_hand(metric: text.Metric) -> None:
+@pytest.mark.parametrize("metric", figures.METRICS, ids=lambda metric: metric.key)
+def test_direction_and_size_are_those_said_by_hand(metric: figures.Metric) -> None:
     assert metric.seen == SEEN[metric.key]
     better, worse = (
         np.full(3, 10.0 + 1.1 * sign * SEEN[metric.key] * (-1 if metric.key in LOWER else 1)) for sign in (1, 0)
@@ -87,23 +87,23 @@ def test_direction_and_size_are_those_said_by_hand(metric: text.Metric) -> None:
     ],
 )
 def test_a_verdict_takes_the_interval_and_a_size_that_is_seen(ours: list[float], outcome: str, half: float) -> None:
-    found = leads(text.PSNR, np.array(ours), np.full(len(ours), 20.0))
+    found = leads(figures.PSNR, np.array(ours), np.full(len(ours), 20.0))
     assert str(found.outcome) == outcome
     assert float(found.half) == pytest.approx(half, abs=1e-4, nan_ok=True)
-    levels = leads(text.PSNR, np.array([ours, ours]), np.full((2, len(ours)), 20.0))
+    levels = leads(figures.PSNR, np.array([ours, ours]), np.full((2, len(ours)), 20.0))
     assert (levels.outcome.tolist(), levels.half.shape) == ([outcome] * 2, (2,))
 
 
 def test_seeds_are_compared_as_pairs() -> None:
     """Chips scatter by 2 dB, but each seed's two pictures differ by 0.6: that is a lead."""
     chips = np.array([18.0, 20.0, 22.0])
-    assert leads(text.PSNR, chips + np.array([0.6, 0.601, 0.602]), chips).outcome == AHEAD
+    assert leads(figures.PSNR, chips + np.array([0.6, 0.601, 0.602]), chips).outcome == AHEAD
 
 
 def test_cameras_that_do_not_differ_are_ahead_or_behind_once_in_20_at_most() -> None:
     """1500 comparisons of noise so large that every clear lead is seen: within what 5 % gives but 1 run in 10 000."""
     draws = 100 * np.random.default_rng(1).standard_normal((2, 1500, 3))
-    said = Counter(leads(text.PSNR, *draws).outcome.tolist())
+    said = Counter(leads(figures.PSNR, *draws).outcome.tolist())
     low, high = binom.ppf([0.5e-4, 1 - 0.5e-4], 1500, 0.05)
     assert low * 0.9 <= said[AHEAD] + said[BEHIND] <= high
     assert abs(said[AHEAD] - said[BEHIND]) < 4 * sqrt(75)
@@ -131,7 +131,7 @@ def test_every_verdict_of_the_page_is_recounted_from_the_rows() -> None:
 
 
 def test_levels_that_give_one_picture_count_once_by_the_mean_of_their_leads() -> None:
-    base = {metric.key: np.full((5, 2), 10.0) for metric in text.METRICS}
+    base = {metric.key: np.full((5, 2), 10.0) for metric in figures.METRICS}
     theirs = base | {"psnr_db": np.array([[10.0], [20.0], [29.5], [29.6], [29.9]]) + np.zeros(2)}
     gains = np.array([[1.0], [0.1], [-0.7], [-0.6], [-0.8]])
     ours = theirs | {"psnr_db": theirs["psnr_db"] + gains}
