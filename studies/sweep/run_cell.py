@@ -61,7 +61,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     if most_threads is not None:
         limit_threads(most_threads)
     sensor, engine = cell.sensor, cell.made_by.readout_engine
-    names = labels(cell.condition)
+    names = labels(cell.condition) | {"processor": label(cell.processor)}
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
     light = cell.luminance_cd_m2 * cell.exposure_s
     expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
@@ -103,7 +103,6 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     return Row(
         key=cell.key,
         **names,
-        processor=label(cell.processor),
         seed=cell.seed,
         luminance_cd_m2=cell.luminance_cd_m2,
         illuminance_lux=cell.illuminance_lux,
