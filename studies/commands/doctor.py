@@ -46,10 +46,10 @@ def doctor() -> int:
 
     Exit code 1 where something is wrong.
     """
-    found = findings()
-    wrong = [finding.name for finding in found if not finding.ok]
+    report = findings()
+    wrong = [finding.name for finding in report if not finding.ok]
     verdict = f"wrong: {', '.join(wrong)}; mend what stands beside" if wrong else "all is well"
-    rows = [*found, Finding("verdict", verdict, not wrong)]
+    rows = [*report, Finding("verdict", verdict, not wrong)]
     print_table(
         ("", ""), [(finding.name, Text(finding.value, style="" if finding.ok else "red")) for finding in rows], words=2
     )
@@ -113,8 +113,8 @@ def package_finding(name: str, home: Path, intruder: str | None = None) -> Findi
         return Finding(label, "not found; install rodcone again", False)
     places = [Path(place).resolve() for place in spec.submodule_search_locations or [spec.origin or "built in"]]
     if places != [home.resolve() / name]:
-        found = ", ".join(map(str, places))
-        return Finding(label, f"foreign, {found}; rodcone's lies in {home}: {fix}, or clear PYTHONPATH", False)
+        paths = ", ".join(map(str, places))
+        return Finding(label, f"foreign, {paths}; rodcone's lies in {home}: {fix}, or clear PYTHONPATH", False)
     if intruder:
         return Finding(label, f"shared with {intruder} in {places[0]}: {fix}", False)
     return Finding(label, f"rodcone's own, {places[0]}")

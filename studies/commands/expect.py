@@ -82,13 +82,13 @@ def expect(
         ("PSNR in dB, then gains over it", *levels),
         [(reference[0], *(f"{row.psnr_db:.2f}" for row in reference[1]))]
         + [
-            (name, *(f"{row.psnr_db - beside.psnr_db:+.2f}" for row, beside in zip(held, reference[1], strict=True)))
-            for name, held in others
+            (name, *(f"{row.psnr_db - beside.psnr_db:+.2f}" for row, beside in zip(errors, reference[1], strict=True)))
+            for name, errors in others
         ],
     )
     print_table(
         ("error of a*, b*", *levels),
-        [(name, *(f"{row.colour:.2f}" for row in held)) for name, held in by_camera.items()],
+        [(name, *(f"{row.colour:.2f}" for row in errors)) for name, errors in by_camera.items()],
     )
 
 

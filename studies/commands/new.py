@@ -147,7 +147,7 @@ def study(name: str = "light_levels", /, *, out: Path | None = None) -> None:
         raise InputError(f"out: none is given; allowed: a new .toml file; write rodcone new study{example} -o {file}")
     examples = {path.stem: path for path in sorted(_STUDIES.glob("*.toml"))}
     require_keys("study", [name], examples)
-    beside = {out.parent / each: _STUDIES / each for each in _named(examples[name])}
+    beside = {out.parent / file_name: _STUDIES / file_name for file_name in _named(examples[name])}
     for target, source in beside.items():
         if target.exists() and target.read_bytes() != source.read_bytes():
             raise InputError(

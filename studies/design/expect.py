@@ -105,7 +105,7 @@ def metric_forms(prior: SpectralPrior, view: LitPrior, reflectance: float) -> Fl
     lab = np.stack([116 * root[..., 1, :], 500 * (root[..., 0, :] - root[..., 1, :]),
                     200 * (root[..., 1, :] - root[..., 2, :])], axis=-2)  # fmt: skip
     rows = (srgb / sqrt(3), luminance, lab[..., :1, :], lab[..., 1:, :])
-    return np.stack([each.swapaxes(-1, -2) @ each for each in rows])
+    return np.stack([row.swapaxes(-1, -2) @ row for row in rows])
 
 
 def _curve_slope(linear: Floats) -> Floats:
@@ -156,21 +156,23 @@ def expect(
     """
     if prior not in PRIORS:
         raise unknown("prior", prior, PRIORS)
-    held, seen, forms = load_prior(prior), view_of(prior, light), _forms(prior, light)
-    pooled_forms = np.einsum("k,rmkpce->rmpce", held.patches.weights, forms)[:, :, None]
+    spectral, seen, forms = load_prior(prior), view_of(prior, light), _forms(prior, light)
+    pooled_forms = np.einsum("k,rmkpce->rmpce", spectral.patches.weights, forms)[:, :, None]
     responses = responses_e(sensor, seen)
     sampling, drawn = sampling_of(sensor, responses), _drawn_pixels(prior) @ responses.T
-    known, linear = (sampled(patches, sampling, middle_pixels()) for patches in (held.patches, pooled_patches(prior)))
+    known, linear = (
+        sampled(patches, sampling, middle_pixels()) for patches in (spectral.patches, pooled_patches(prior))
+    )
     result = []
     for level_cd_m2 in levels_cd_m2:
-        white_cd_m2 = float(level_cd_m2) / held.reflectances.mean()
+        white_cd_m2 = float(level_cd_m2) / spectral.reflectances.mean()
         time_s = (
             exposure_of_electrons_s(exposure, np.maximum(drawn, 0.0) * white_cd_m2, sensor)
             if isinstance(exposure, str)
             else exposure
         )
-        noise, scales = noise_of(sensor, time_s), held.reflectances * white_cd_m2 * time_s
-        errors = _mean_error(held.patches.weights, known, scales, noise, forms)
+        noise, scales = noise_of(sensor, time_s), spectral.reflectances * white_cd_m2 * time_s
+        errors = _mean_error(spectral.patches.weights, known, scales, noise, forms)
         linear_error = _mean_error(np.ones(1), linear, scales, noise, pooled_forms)[0]
         result.append(
             ExpectedError(
@@ -189,8 +191,8 @@ def expect(
 @cache
 def _forms(prior: str, light: str) -> Floats:
     """`metric_forms` at each reflectance, shape (reflectance, metric, component, pixel, coefficient, coefficient)."""
-    held, seen = load_prior(prior), view_of(prior, light)
-    return np.stack([metric_forms(held, seen, reflectance) for reflectance in held.reflectances])
+    spectral, seen = load_prior(prior), view_of(prior, light)
+    return np.stack([metric_forms(spectral, seen, reflectance) for reflectance in spectral.reflectances])
 
 
 @cache
@@ -202,13 +204,13 @@ def pooled_patches(prior: str) -> Gaussians:
 @cache
 def _drawn_pixels(prior: str) -> Floats:
     """Coefficients of `METERED` x `METERED` pixels drawn from the prior, which the exposure looks at."""
-    held, rng, count = load_prior(prior), np.random.default_rng(0), METERED**2
-    component, pixel = rng.choice(len(held.patches.weights), count, p=held.patches.weights), middle_pixels()[0]
-    factors = held.patches.factors[component, pixel]
-    coefficients = held.patches.means[component, pixel] + np.einsum(
+    spectral, rng, count = load_prior(prior), np.random.default_rng(0), METERED**2
+    component, pixel = rng.choice(len(spectral.patches.weights), count, p=spectral.patches.weights), middle_pixels()[0]
+    factors = spectral.patches.factors[component, pixel]
+    coefficients = spectral.patches.means[component, pixel] + np.einsum(
         "ncd,nd->nc", factors, rng.standard_normal((count, factors.shape[-1]))
     )
-    reflectances = held.reflectances[rng.integers(len(held.reflectances), size=count)]
+    reflectances = spectral.reflectances[rng.integers(len(spectral.reflectances), size=count)]
     return np.asarray((coefficients * reflectances[:, None]).reshape(METERED, METERED, -1))
 
 

@@ -40,8 +40,8 @@ def written(message: Header, controls: Controls, rendered: Rendered, memo: Memo,
         python = python_text(rendered, controls, kind, drops)
         return {"histogram": histogram(exposed.raw), "python": python, "noise_note": note}, ()
     row, column = message["row"], message["column"]
-    found = pixel(exposed, row, column)
-    return {"pixel": found, "python": python_text(rendered, controls, f"pixel {row} {column}", drops)}, ()
+    budget = pixel(exposed, row, column)
+    return {"pixel": budget, "python": python_text(rendered, controls, f"pixel {row} {column}", drops)}, ()
 
 
 def shown(

@@ -179,8 +179,8 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
         "light", (lamps, controls.reference_light), lit_transport, transport, dict(lamps), controls.reference_light
     )
     scale = controls.level_cd_m2 * scale_1
-    own = memo.of("own camera", (controls.sensor, controls.mosaic), own_camera, controls.sensor, controls.mosaic)
-    sensor = memo.of("camera", camera, camera_of, controls, own)
+    base = memo.of("own camera", (controls.sensor, controls.mosaic), own_camera, controls.sensor, controls.mosaic)
+    sensor = memo.of("camera", camera, camera_of, controls, base)
 
     # Lens and filters
     frames = {}
@@ -191,7 +191,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     powers = tuple(lit.groups[name].power for name in frames)
     lit_so = (spectra, powers, optics)
     white_1 = memo.of("white", (spectra, powers), _white, lit, spectra, memo)
-    per_second_e = memo.of("electrons", lit_so, _weighted, powers, [each.electrons for each in frames.values()])
+    per_second_e = memo.of("electrons", lit_so, _weighted, powers, [frame.electrons for frame in frames.values()])
     mosaicked_e = memo.of("mosaicked", lit_so, behind_filters, per_second_e, sensor)
 
     # Exposure
@@ -268,8 +268,8 @@ def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDA
 
 def _white(lit: Transport, spectra: tuple[tuple[str, Any, Any], ...], memo: Memo) -> float:
     shining = [spectrum for spectrum in spectra if lit.groups[spectrum[0]].power > 0]
-    planes = [memo.of("scattered", each, _scattered_luminance, lit, each[0]) for each in shining]
-    return white_of(_weighted([lit.groups[each[0]].power for each in shining], planes), lit.coverage.mean)
+    planes = [memo.of("scattered", lamp, _scattered_luminance, lit, lamp[0]) for lamp in shining]
+    return white_of(_weighted([lit.groups[lamp[0]].power for lamp in shining], planes), lit.coverage.mean)
 
 
 def _scattered_luminance(lit: Transport, name: str) -> Image:

@@ -51,6 +51,6 @@ def _check_tables(name: str, files: Mapping[str, str]) -> None:
     except ValueError as error:
         raise InputError(f"sensor: {name!r} is no TOML ({error}); correct it") from None
     named = responses.values() if isinstance(responses, dict) else ()
-    missing = [each for each in named if isinstance(each, str) and each not in (*files, "included", "relative")]
+    missing = [table for table in named if isinstance(table, str) and table not in (*files, "included", "relative")]
     if missing:
         raise InputError(f"sensor: {name!r} names {missing[0]!r}; allowed: files beside it; drop both together")

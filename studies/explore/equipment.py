@@ -33,7 +33,7 @@ def lit_transport(transport: Transport, lamps: dict[str, Lamp], reference_light:
 
 def alone(lit: Transport, name: str) -> Transport:
     """Transport of which one light group shines, at power 1."""
-    groups = {each: replace(group, power=float(each == name)) for each, group in lit.groups.items()}
+    groups = {group_name: replace(group, power=float(group_name == name)) for group_name, group in lit.groups.items()}
     return replace(lit, groups=groups)
 
 
@@ -48,15 +48,15 @@ def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:
     power = group.power * lamp.power
     if lamp.spectrum == OWN and not lamp.table:
         return replace(group, power=power)
-    own = spectral_luminance(group.spectrum)
-    if group.coloured or own <= 0:
+    group_luminance = spectral_luminance(group.spectrum)
+    if group.coloured or group_luminance <= 0:
         why = "has colours of its own" if group.coloured else "is dark"
         raise InputError(f"lamps: spectrum {lamp.spectrum!r} for a light group that {why}; allowed: {OWN}; leave it")
     spectrum = Spectrum(*np.transpose(lamp.table)) if lamp.table else illuminant(lamp.spectrum)
     luminance = spectral_luminance(spectrum)
     if luminance <= 0:
         raise InputError("lamps: the table gives no light that an eye sees; allowed: values above 0 within 380-780 nm")
-    return replace(group, spectrum=spectrum * (own / luminance), power=power)
+    return replace(group, spectrum=spectrum * (group_luminance / luminance), power=power)
 
 
 def own_camera(sensor: str, mosaic: str) -> SensorConfig:
@@ -64,7 +64,7 @@ def own_camera(sensor: str, mosaic: str) -> SensorConfig:
     return vary(preset(sensor), mosaic)
 
 
-def camera_of(controls: Controls, own: SensorConfig | None = None) -> SensorConfig:
+def camera_of(controls: Controls, base: SensorConfig | None = None) -> SensorConfig:
     """Sensor with its lens as the controls have it; `own` is that of `own_camera`, where it has been read before.
 
     Raises
@@ -72,24 +72,24 @@ def camera_of(controls: Controls, own: SensorConfig | None = None) -> SensorConf
     InputError
         For a file that describes no camera, or a term out of range.
     """
-    own = own or own_camera(controls.sensor, controls.mosaic)
-    if own.chip.binning:
+    base = base or own_camera(controls.sensor, controls.mosaic)
+    if base.chip.binning:
         raise InputError(
             f"sensor: {controls.sensor!r} bins, which is not explored; allowed: one without binning; take "
             "binning out of its file"
         )
-    if own.chip.readings and (fixed := {"full_well_e", "read_noise_e", "dsnu_e"} & set(controls.pixel)):
+    if base.chip.readings and (fixed := {"full_well_e", "read_noise_e", "dsnu_e"} & set(controls.pixel)):
         raise InputError(
             f"pixel: {', '.join(sorted(fixed))} with {controls.sensor!r}, whose readings have their own; allowed: the "
             "preset's; reset it, or take another sensor"
         )
-    if own.chip.readings and not controls.shot_noise:
+    if base.chip.readings and not controls.shot_noise:
         raise InputError(
             f"shot_noise: False with {controls.sensor!r}, whose readings are merged by it; allowed: True; switch it on"
         )
     return replace(
-        own,
-        lens=replace(own.lens, **controls.lens),
-        pixel=replace(own.pixel, **controls.pixel),
-        bits=own.bits if controls.bits is None else controls.bits,
+        base,
+        lens=replace(base.lens, **controls.lens),
+        pixel=replace(base.pixel, **controls.pixel),
+        bits=base.bits if controls.bits is None else controls.bits,
     )

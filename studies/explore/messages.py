@@ -57,12 +57,12 @@ def hello(source: Source, scenes: Iterable[str] = (), dropped: Iterable[str] = (
         "sensors": {name: sensor_terms(preset(name)) for name in named},
         "processors": {
             name: {
-                "mosaics": list(mosaics_of(each)),
+                "mosaics": list(mosaics_of(processor)),
                 "slow": is_slow(name),
-                "source": each.source,
+                "source": processor.source,
                 "settings": {key: getattr(ADJUSTABLE[name], key) for key in SETTINGS} if name in ADJUSTABLE else {},
             }
-            for name, each in PROCESSORS.items()
+            for name, processor in PROCESSORS.items()
             if not _missing(name)
         },
         "views": list(VIEWS),
@@ -132,10 +132,10 @@ def _refuse(constant: str) -> None:
 def read_views(value: Any, cameras: int) -> list[tuple[int, str]]:
     """Camera and name of each view."""
     pairs = value if isinstance(value, list) and 1 <= len(value) <= 4 else [value]
-    found = []
+    views = []
     for pair in pairs:
         camera, view = pair if isinstance(pair, list) and len(pair) == 2 else (None, None)
         if type(camera) is not int or camera not in range(cameras) or not isinstance(view, str) or view not in VIEWS:
             raise InputError(f"views: {pair!r} is not allowed; give up to four of [camera, view], cameras from 0")
-        found.append((camera, view))
-    return found
+        views.append((camera, view))
+    return views

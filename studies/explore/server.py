@@ -133,7 +133,7 @@ async def _refuse(scope: Scope, receive: Any, send: Any, response: Any) -> None:
 
 def packed(header: Header, buffers: Sequence[bytes]) -> bytes:
     """One message: the header's length as 32 bits, the header with the buffers' lengths as JSON, the buffers."""
-    text = json.dumps(header | {"lengths": [len(each) for each in buffers]}, allow_nan=False).encode()
+    text = json.dumps(header | {"lengths": [len(buffer) for buffer in buffers]}, allow_nan=False).encode()
     return b"".join((struct.pack("<I", len(text)), text, *buffers))
 
 

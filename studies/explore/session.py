@@ -146,7 +146,7 @@ class Session:
                     act()
                 else:
                     header, buffers = self._answer(message)
-                    notes = sorted({cut(str(each.message)) for each in warned})[:MOST_NOTES]
+                    notes = sorted({cut(str(warning.message)) for warning in warned})[:MOST_NOTES]
                     self._send(header | _whose(message) | {"notes": [*notes, *filter(None, [self._failure])]}, buffers)
             except Overtaken:
                 pass
@@ -238,7 +238,7 @@ class Session:
         return written(message, self._cameras(message)[0], rendered, self._memo, self._drops)
 
     def _cameras(self, message: Header) -> list[Controls]:
-        return [controls_from(each, self._dropped) for each in message["cameras"]]
+        return [controls_from(content, self._dropped) for content in message["cameras"]]
 
     def _choose_scene(self, name: Any) -> None:
         if name not in tuple(self._scenes):

@@ -31,7 +31,7 @@ def stand_in(controls: Controls, pixels: int) -> Controls:
     """
     if is_slow(controls.processor):
         mosaic = PROCESSORS[controls.processor].mosaic
-        quick = next(name for name, each in PROCESSORS.items() if each.mosaic == mosaic and not is_slow(name))
+        quick = next(name for name, processor in PROCESSORS.items() if processor.mosaic == mosaic and not is_slow(name))
         return replace(controls, processor=quick, settings={})
     settings = options_of(controls).get("settings")
     if settings and pixels * settings.neighbourhood**2 * settings.patch > MOST_SUMS:

@@ -17,12 +17,12 @@ def python_of(render: str, controls: Controls, view: str = "picture") -> str:
     view : str
         Of `studies.explore.views.VIEWS`, ``histogram``, or ``pixel ROW COLUMN``.
     """
-    settings, own, own_lamp = to_json(controls), to_json(Controls()), vars(Lamp())
+    settings, defaults, default_lamp = to_json(controls), to_json(Controls()), vars(Lamp())
     settings["lamps"] = {
-        group: {name: value for name, value in lamp.items() if value != own_lamp[name] and value != []}
+        group: {name: value for name, value in lamp.items() if value != default_lamp[name] and value != []}
         for group, lamp in settings["lamps"].items()
     }
-    changed = {name: value for name, value in settings.items() if value != own[name]}
+    changed = {name: value for name, value in settings.items() if value != defaults[name]}
     given = "".join(f"    {name}={value!r},\n" for name, value in changed.items())
     made, comment = ("picture", "  # (h, w, 3) uint8") if view in VIEWS else ("figure", "")
     arguments = f"\n    transport,\n    {view!r},\n{given}" if given else f"transport, {view!r}"

@@ -36,8 +36,8 @@ def responses_svg(responses: Mapping[str, Responses]) -> str:
     """Draw electrons per photon by name; relative ones have a greatest of 1."""
     return _svg(
         {
-            name: {channel: (curve.wavelength_nm, curve.values) for channel, curve in each.curves.items()}
-            for name, each in responses.items()
+            name: {channel: (curve.wavelength_nm, curve.values) for channel, curve in response.curves.items()}
+            for name, response in responses.items()
         }
     )
 

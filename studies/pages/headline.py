@@ -81,18 +81,18 @@ def answer(pair: Pair) -> str:
     return " ".join(sentence[0].upper() + sentence[1:] for sentence in sentences)
 
 
-def _word(found: dict[str, tuple[str, float]]) -> tuple[str, tuple[int, ...], tuple[int, ...]]:
+def _word(outcomes: dict[str, tuple[str, float]]) -> tuple[str, tuple[int, ...], tuple[int, ...]]:
     """Verdict of one level from each metric's outcome and lead; where it is mixed, with families gained and lost."""
     gained, lost = (
-        tuple(i for i, family in enumerate(FAMILIES) if any(found[metric.key][0] == outcome for metric in family))
+        tuple(i for i, family in enumerate(FAMILIES) if any(outcomes[metric.key][0] == outcome for metric in family))
         for outcome in (AHEAD, BEHIND)
     )
     if gained and lost:
         return "mixed", gained, lost
     if not gained and not lost:
-        undecided = any(found[metric.key][0] == UNKNOWN for metric in DECIDING)
+        undecided = any(outcomes[metric.key][0] == UNKNOWN for metric in DECIDING)
         return "undecided" if undecided else "level", (), ()
-    cases = [(metric, *found[metric.key]) for metric in METRICS]
+    cases = [(metric, *outcomes[metric.key]) for metric in METRICS]
     largest = max(abs(lead) / metric.seen for metric, outcome, lead in cases if outcome in (AHEAD, BEHIND))
     return f"{'clearly' if largest >= CLEARLY else 'a little'} {'better' if gained else 'worse'}", (), ()
 

@@ -93,7 +93,7 @@ def groups_of(report: ReportData, axis: int, a: int, b: int) -> list[Group]:
     """Return the groups in which two values of an axis other than the light level are compared."""
     axes, levels = axes_of(report), [level.name for level in report.levels]
     cells = np.moveaxis(grid(report), (axis, BRIGHTNESS), (0, -1)).reshape(len(axes[axis].values), -1, len(levels))
-    found = []
+    groups = []
     for title, *both in zip(group_titles(report, axis), cells[a], cells[b], strict=True):
         sides = tuple(both[0]), tuple(both[1])
         pair = Pair(
@@ -103,14 +103,14 @@ def groups_of(report: ReportData, axis: int, a: int, b: int) -> list[Group]:
             levels=levels,
             light_cd_m2=[cell.luminance_cd_m2 for cell in sides[0]],
         )
-        found.append(Group(title, pair, *sides))
-    return found
+        groups.append(Group(title, pair, *sides))
+    return groups
 
 
 def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group]:
     """Return groups whose figures are means over scenes, those that were drawn apart; without cells of their own."""
     drawn = [scene.name.startswith(DRAWN) for scene in report.scenes]
-    rest, found = len(groups) // len(drawn), []
+    rest, means = len(groups) // len(drawn), []
     for words, kind in (("named", False), ("drawn", True)):
         chosen = [scene for scene, is_drawn in enumerate(drawn) if is_drawn == kind]
         for place in range(rest) if len(chosen) > 1 else ():
@@ -120,10 +120,10 @@ def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group
                 for side in ("ours", "theirs")
             )
             after = groups[place].title.removeprefix(report.scenes[0].name)
-            found.append(
+            means.append(
                 Group(f"mean of {len(chosen)} {words} scenes{after}", replace(pairs[0], ours=ours, theirs=theirs))
             )
-    return found
+    return means
 
 
 def _figures(cells: Sequence[ReportCell]) -> dict[str, NDArray[np.float64]]:
@@ -152,7 +152,7 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
         by "a b": ``answers``, for each group the words; ``over``, those over all groups.
     """
     cells, metrics = grid(report), shown_metrics(report.cells)
-    found = []
+    by_axis = []
     for axis, length in enumerate(cells.shape):
         across: dict[str, Any] = {"leads": {}, "counts": {}, "means": {}, "answers": {}, "over": {}}
         sides = [_figures(tuple(part.ravel())) for part in np.moveaxis(cells, axis, 0)]
@@ -183,8 +183,8 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
                     {"title": mean.title} | {metric.key: _flat(mean.pair.leads[metric.key]) for metric in metrics}
                     for mean in means_over_scenes(report, groups)
                 ]
-        found.append(across)
-    return found
+        by_axis.append(across)
+    return by_axis
 
 
 def _flat(lead: Leads) -> list[Any]:

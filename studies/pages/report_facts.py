@@ -63,11 +63,11 @@ def environment() -> dict[str, Any]:
 
 def environment_of(rows: Sequence[Row]) -> dict[str, str]:
     """Return what made the rows, whichever run did: versions, variants and engines, threads, machines."""
-    found: dict[str, dict[str, None]] = {}
+    environment: dict[str, dict[str, None]] = {}
     for row in rows:
         for name, value in {**in_words(made_by(row)), "threads": str(row.threads), "machine": row.machine}.items():
-            found.setdefault(name, {})[value] = None
-    return {name: "; ".join(values) for name, values in found.items()}
+            environment.setdefault(name, {})[value] = None
+    return {name: "; ".join(values) for name, values in environment.items()}
 
 
 def lenses_left_out(rows: Sequence[Row], sensors: Sequence[str]) -> tuple[str, ...]:

@@ -62,12 +62,12 @@ def read_pictures(
     """
     files = {name: as_webp(truth, **LOSSLESS) for name, truth in true.items()}
     maps: dict[str, bytes] = {}
-    held = sum(map(len, files.values()))
+    total_bytes = sum(map(len, files.values()))
     for name, truth in pairs if most is None else pairs[:most]:
         picture = opened(read_whole(folder / PICTURES, name))
         content, errors = as_webp(picture, **LOSSLESS), as_webp(flip_map(picture, true[truth]), **OF_MAPS)
-        held += len(content) + len(errors)
-        if most is None and held > SHOWN_BYTES and len(maps) >= 2:
+        total_bytes += len(content) + len(errors)
+        if most is None and total_bytes > SHOWN_BYTES and len(maps) >= 2:
             break
         files[name], maps[name] = content, errors
     left_out = sum(name not in maps for name, _ in pairs)

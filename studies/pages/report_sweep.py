@@ -94,7 +94,7 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
 
 def _cells(study: Mapping[str, Any], made: Sequence[Row], scenes: Sequence[str]) -> list[ReportCell]:
     """Return a cell for each combination that was asked for; one that isn't made yet has no row."""
-    found = {
+    by_place = {
         (r.scene, r.spectrum, r.sensor, (r.exposure, r.frames), r.white_balance, r.level, r.processor, r.seed): r
         for r in made
     }
@@ -104,7 +104,7 @@ def _cells(study: Mapping[str, Any], made: Sequence[Row], scenes: Sequence[str])
     cells = []
     for place in product(scenes, *axes):
         scene, spectrum, *_, level, camera = place
-        rows = tuple(found.get((*place, seed)) for seed in study["seeds"])
+        rows = tuple(by_place.get((*place, seed)) for seed in study["seeds"])
         picture = rows[0].picture if rows[0] else None
         luminance_cd_m2, illuminance_lux = light.get((scene, spectrum, level), (None, None))
         cells.append(ReportCell(levels.index(level), camera, luminance_cd_m2, illuminance_lux, rows, picture))

@@ -77,7 +77,7 @@ def front(pairs: Sequence[tuple[float, float]]) -> list[bool]:
     Of equal ones the first is.
     """
     flags, least = [False] * len(pairs), np.inf
-    for index in sorted(range(len(pairs)), key=lambda each: pairs[each]):
+    for index in sorted(range(len(pairs)), key=lambda place: pairs[place]):
         flags[index] = pairs[index][1] < least
         least = min(least, pairs[index][1])
     return flags

@@ -114,7 +114,7 @@ def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
     made = timed({f"{spp} samples": call(spp, bench.seed) for spp in bench.samples}, bench.repeats)
     most = 2 * bench.samples[-1]
     (one, reference_times), (other, _) = timed({str(n): call(most, bench.seed + n) for n in (1, 2)}, 0).values()
-    relit = [each.relight(luminance_cd_m2=bench.level_cd_m2) for each in (one, other)]
+    relit = [rendered.relight(luminance_cd_m2=bench.level_cd_m2) for rendered in (one, other)]
     yard = yardstick((relit[0], relit[1]), (one.coverage.mean > 0) | (other.coverage.mean > 0), sensor)
     points = []
     for choice, (transport, times) in made.items():
@@ -138,9 +138,9 @@ def _lens(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposu
         "+ cos^4, glare, diffraction": replace(glare, diffraction=1.0),
     }
     sensors = {name: replace(sensor, lens=lens) for name, lens in lenses.items()}
-    calls = {name: _capture(bench, each, radiance, exposure_s) for name, each in sensors.items()}
+    calls = {name: _capture(bench, lens_sensor, radiance, exposure_s) for name, lens_sensor in sensors.items()}
     times = {name: times for name, (_, times) in timed(calls, bench.repeats + 1).items()}
-    images = {name: _electrons(radiance, each, exposure_s) for name, each in sensors.items()}
+    images = {name: _electrons(radiance, lens_sensor, exposure_s) for name, lens_sensor in sensors.items()}
     truth = list(images.values())[-1]
     made = {name: (image, times[name]) for name, image in images.items()}
     question = f"What does the lens do? Captures, {bench.picture}x{bench.picture}, {MOST_BANDS} bands"

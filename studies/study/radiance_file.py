@@ -33,13 +33,13 @@ def open_radiance_file(path: str | Path, light: str | None) -> tuple[Transport, 
         As `load_picture`, for a picture of fewer than 16 or more than 4096 pixels a side, or an unknown light.
     """
     spectrum = illuminant(light or LIGHT)
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         transport = load_picture(path, spectrum)
     name = Path(path).name
     for side in transport.counts.shape:
         require_range(f"{name}: side", side, 16, 4096, "a study takes such sides in pixels; crop or scale it")
-    assumed = [f"{name}: {warning.message}" for warning in told]
+    assumed = [f"{name}: {warning.message}" for warning in caught]
     if light is None:
         use = "it is lit by" if is_reflectance(path) else "its colours are judged under"
         assumed.append(f"{name}: {use} {LIGHT}; give another light where that isn't so")

@@ -51,14 +51,14 @@ def open_scene(
     return SceneFile(replace(scene, extend=extend), scene.size, ())
 
 
-def asked_size(own: tuple[int, int], height: int | None, width: int | None) -> tuple[int, int]:
+def asked_size(size: tuple[int, int], height: int | None, width: int | None) -> tuple[int, int]:
     """Height and width that were asked for; the one that wasn't keeps the proportions of `own`."""
     for name, pixels in (("height", height), ("width", width)):
         if pixels is not None:
             require_whole(name, pixels, 1, 1 << 15, "give pixels")
     if height is not None:
-        return height, width if width is not None else max(1, round(height * own[1] / own[0]))
-    return (max(1, round(width * own[0] / own[1])), width) if width is not None else own
+        return height, width if width is not None else max(1, round(height * size[1] / size[0]))
+    return (max(1, round(width * size[0] / size[1])), width) if width is not None else size
 
 
 def asked_level(scene: Scene, text: str | None) -> dict[str, float]:

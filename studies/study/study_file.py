@@ -105,7 +105,7 @@ def _axis(kind: Any) -> Callable[[Any, Any], Any]:
     """Hook for a tuple, in which one value stands for a list of one."""
     item = get_args(kind)[0]
     return lambda value, _: tuple(
-        _CONVERTER.structure(each, item) for each in (value if isinstance(value, list) else [value])
+        _CONVERTER.structure(entry, item) for entry in (value if isinstance(value, list) else [value])
     )
 
 

@@ -124,7 +124,7 @@ def require_alike(rows: Sequence[Row]) -> None:
     A scene has one variant, a condition one engine of captures, a processor one of development, and a package one
     version.
     """
-    found: dict[tuple[object, ...], str] = {}
+    values: dict[tuple[object, ...], str] = {}
     for row in rows:
         of = {
             "Mitsuba variant": (row.scene,),
@@ -132,7 +132,7 @@ def require_alike(rows: Sequence[Row]) -> None:
             "engine of development": (row.processor,),
         }
         for name, value in in_words(made_by(row)).items():
-            first = found.setdefault((name, *of.get(name, ())), value)
+            first = values.setdefault((name, *of.get(name, ())), value)
             if first != value:
                 raise InputError(
                     f"cells: {name} {first} and {value} would be in one mean or comparison; allowed: one; run rodcone "

@@ -224,12 +224,12 @@ def test_a_folder_swept_without_a_backend_and_then_with_one_holds_no_mean_of_bot
     in_numpy("sweep", str(study), "-o", str(out), "--workers", "1", "--as-stated")
     (slow,) = read_rows(out)
     assert (slow.development_engine, slow.threads, json.loads(slow.versions)["llvm"]) == ("numpy", 1, "none")
-    command = ["sweep", str(study), "-o", str(out), "--workers", "1", "--as-stated", "--keep-old", "--json"]
+    command = ["sweep", str(study), "-o", str(out), "--workers", "1", "--as-stated", "--json"]
     with pytest.raises(SystemExit):
         main(command)
     (fast,) = read_rows(out)
     assert (fast.development_engine, json.loads(fast.versions)["llvm"]) == ("llvm", versions()["llvm"])
-    assert len(read_rows(out, everything=True)) == 2
+    assert len(read_rows(out, everything=True)) == 1
     environment = sweep_report(out)[0].environment
     assert environment["engine of development"] == "llvm"
     assert environment["threads"] == str(fast.threads)
