@@ -67,7 +67,7 @@ _PUBLIC = {
     "mask": ("sensor.cfa", "mask"),
     "finish": ("isp.picture", "finish"),
     "Picture": ("isp.picture", "Picture"),
-    "calibrate": ("studies.photograph.calibrate", "calibrate"),
+    "calibrate": ("studies.photograph.camera", "calibrate"),
     "develop": ("studies.photograph.develop", "develop"),
     "encode_srgb": ("rodcone.colour_spaces", "encode_srgb"),
     "write_picture": ("studies.photograph.picture_file", "write_picture"),

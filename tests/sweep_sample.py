@@ -17,10 +17,9 @@ from studies.study.lit_scene import open_all
 from studies.study.study import SceneChoice, Study
 from studies.sweep.cells import Cell
 from studies.sweep.database import COLUMNS, FILE, open_results
-from studies.sweep.folder import MARKER
 from studies.sweep.prepare import Job, scene_cells
 from studies.sweep.row import Row
-from studies.sweep.run_sweep import Runner, Swept, sweep
+from studies.sweep.run_sweep import MARKER, Runner, Swept, sweep
 from studies.sweep.workers import InThisProcess, run
 
 RENDER = (

@@ -13,7 +13,7 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths
 from rodcone.colour_spaces import SRGB_TO_XYZ, WHITE_AT, adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from scenes.metamers import pairs
 from scenes.reflectances import color_checker
-from studies.metrics.patches import Masks, patch_labs
+from studies.metrics.target_figures import Masks, patch_labs
 
 WHITE_PATCH = 18  # of the ColorChecker's 24: its 99th percentile of luminance, which pictures show at `WHITE_AT`
 
@@ -26,7 +26,7 @@ def pair_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float6
     linear : (h, w, 3) float64
         Linear sRGB, in which white is 1.
     masks : (patch, h, w) bool
-        Of `studies.metrics.patches.patch_masks`.
+        Of `studies.metrics.target_figures.patch_masks`.
     """
     lab = patch_labs(linear, masks)
     return np.asarray(deltaE_ciede2000(lab[0::2], lab[1::2]))

@@ -22,7 +22,7 @@ from rodcone.errors import InputError, unknown
 from scenes.catalog import load, names
 from scenes.metamers import TWINS_UNDER
 from studies.metrics.confidence import half_width
-from studies.metrics.patches import patch_masks
+from studies.metrics.target_figures import patch_masks
 from studies.study.study import OWN
 from studies.sweep.export import read_rows
 from studies.sweep.prepare import PICTURES

@@ -23,7 +23,7 @@ from studies.budget.terms import LENS_TERMS, effects, horizontal_view_deg
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, level_luminance, lux_per_cd_m2, open_all, under, white_spectrum
 from studies.study.model import ImageModel, RenderModel, unit_exposure_s
-from studies.study.radiance_file import open_radiance_file
+from studies.study.scene_source import open_radiance_file
 from studies.study.study import OWN, Study, conditions, mosaics
 
 PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels a picture is no smoother, so no effect is smaller

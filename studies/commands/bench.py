@@ -13,7 +13,7 @@ from rodcone.progress import progress
 from scenes.catalog import load
 from sensor.presets import preset
 from studies.commands.console import print_table, require_ending, write_text
-from studies.pages.report_facts import environment
+from studies.pages.report_sweep import environment
 from studies.photograph.clock import processor_facts
 from studies.speed.points import stage_json
 from studies.speed.stages import STAGES, Bench, stages

@@ -16,7 +16,7 @@ from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
 from sensor.readings.noise import of_reading
 from studies.commands.console import Time, print_table, require_ending, require_new, say, write_text
-from studies.pages.charts import transfer_svg
+from studies.pages.plots import transfer_svg
 
 HEAD = ("figure", "unit", "configured", "measured", "std. error", "in std. errors")
 FRAMES_HEAD = ("figure", "unit", "measured", "95 % from", "to")

@@ -64,7 +64,7 @@ def _write_gallery(kind: Kind | None, out: Path) -> None:
     from render import illuminants
     from sensor.cameras.library import measured_cameras
     from sensor.presets import low_noise
-    from studies.pages.charts import lights_svg, responses_svg
+    from studies.pages.plots import lights_svg, responses_svg
 
     require_ending(out, ".svg")
     if kind not in ("lights", "sensors"):

@@ -14,7 +14,7 @@ from sensor.config import SensorConfig
 from sensor.presets import preset
 from studies.commands.console import Time, print_table, require_ending, write_text
 from studies.metrics.truth import GREY
-from studies.pages.charts import snr_svg
+from studies.pages.plots import snr_svg
 from studies.pages.report_text import MISSING
 from studies.photograph.snr import light_for_snr
 

@@ -1,4 +1,4 @@
-"""Answers: pictures of one or two cameras; figures, text and files of one."""
+"""Answers: pictures of one or two cameras; figures, files and Python of one."""
 
 import sys
 from collections.abc import Sequence
@@ -7,21 +7,25 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from render.illuminants import illuminant
 from rodcone.errors import InputError
+from sensor.optics import form_image
 from sensor.raw_files.raw_file import write_raw
+from sensor.response import behind_filters, channel_electrons
 from studies.explore.chain import Exposed, Shot, development_of, expose_scene, photograph, true_picture_of
-from studies.explore.controls import Controls, to_json
+from studies.explore.controls import Controls, Lamp, to_json
 from studies.explore.dropped import write_dropped
+from studies.explore.equipment import alone
 from studies.explore.memo import Memo
 from studies.explore.messages import Header, sensor_terms
-from studies.explore.render_noise import noise_share
 from studies.explore.slow import stand_in
 from studies.explore.source import Rendered
 from studies.explore.views import VIEWS, Bytes, facts, histogram, pixel
-from studies.explore.written import python_of
-from studies.photograph.calibrate import calibrate, iso_speed
-from studies.study.render_noise import noise_note
+from studies.photograph.camera import calibrate, iso_speed
+from studies.study.render_noise import monte_carlo_share, noise_note
 
 Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 
@@ -122,3 +126,54 @@ def _dng(rendered: Rendered, controls: Controls, memo: Memo) -> bytes:
     with TemporaryDirectory() as folder:
         (path,) = write_raw(raw, Path(folder) / "explored.dng")
         return path.read_bytes()
+
+
+def python_of(render: str, controls: Controls, view: str = "picture") -> str:
+    """Python that makes a picture of the page again, to the bit.
+
+    Parameters
+    ----------
+    render : str
+        Lines that make `transport` (`studies.explore.source.Rendered`), or `studies.explore.source.GIVEN`.
+    controls : Controls
+    view : str
+        Of `studies.explore.views.VIEWS`, ``histogram``, or ``pixel ROW COLUMN``.
+    """
+    settings, defaults, default_lamp = to_json(controls), to_json(Controls()), vars(Lamp())
+    settings["lamps"] = {
+        group: {name: value for name, value in lamp.items() if value != default_lamp[name] and value != []}
+        for group, lamp in settings["lamps"].items()
+    }
+    changed = {name: value for name, value in settings.items() if value != defaults[name]}
+    given = "".join(f"    {name}={value!r},\n" for name, value in changed.items())
+    made, comment = ("picture", "  # (h, w, 3) uint8") if view in VIEWS else ("figure", "")
+    arguments = f"\n    transport,\n    {view!r},\n{given}" if given else f"transport, {view!r}"
+    lines = f"{render}{made} = rodcone.explorer_view({arguments}){comment}".splitlines()
+    imports = [line for line in lines if line.startswith(("from ", "import "))]
+    code = [line for line in lines if line and line not in imports]
+    return "\n".join([*imports, "import rodcone", "", *code, ""])
+
+
+def noise_share(exposed: Exposed, controls: Controls, memo: Memo) -> float:
+    """Monte Carlo variance of the raw electrons over the sensor's own, as a sweep's `mc_share` of unbiased light.
+
+    One draw of the error, half the difference of the render's halves, goes through lens and filters as the light does.
+    """
+    errors_e = []
+    for name in exposed.frames:
+        lamp = controls.lamps.get(name, Lamp())
+        camera = (controls.sensor, controls.mosaic, tuple(sorted(controls.lens.items())))
+        errors_e.append(memo.of("error", (name, lamp.spectrum, lamp.table, camera), _error_e, exposed, name))
+    powers = [exposed.transport.groups[name].power for name in exposed.frames]
+    error_e = behind_filters(np.tensordot(powers, errors_e, axes=1), exposed.sensor) * exposed.scale
+    share = monte_carlo_share(error_e * exposed.exposure_s, exposed.expected_e, exposed.sensor, exposed.exposure_s)
+    return controls.frames * share
+
+
+def _error_e(exposed: Exposed, name: str) -> NDArray[np.float64]:
+    """Error of one light group at power 1, behind the lens and the filters, in 1 s, (h, w, channel) [e-]."""
+    even, odd = (
+        channel_electrons(form_image(half, exposed.sensor), exposed.sensor, 1.0)
+        for half in alone(exposed.transport, name).relight_halves()
+    )
+    return (even - odd) / 2

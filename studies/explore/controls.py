@@ -16,7 +16,7 @@ from sensor.cfa import OWN as OWN_MOSAIC
 from sensor.exposure import AUTO_INFORMATION, LONGEST_S, RULES
 from sensor.presets import names
 from sensor.variations import VARIATIONS
-from studies.study.radiance_file import LIGHT
+from studies.study.scene_source import LIGHT
 from studies.study.study import AS_SHOT, MOST_FRAMES, OWN, WHITE_BALANCES
 
 TIME = "time"  # as an exposure: the time that `exposure_s` states

@@ -14,10 +14,9 @@ from render.spectrum import VISIBLE_NM, Floats
 from render.transport import Transport
 from rodcone.errors import require_range, require_whole
 from rodcone.memory import memory, require_memory
-from studies.explore.written import GIVEN
-from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
-from studies.study.scene_source import open_scene
+from studies.study.scene_source import LIGHT, check_radiance_file, open_radiance_file, open_scene
 
+GIVEN = "transport = ...  # the one that was given to rodcone.explore\n"
 FIRST_SIDE, FIRST_SPP = 64, 16  # of the first picture, which is there at once
 _LEAST_BANDS, _MOST_SIDE = 4, 2048
 

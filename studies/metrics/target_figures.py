@@ -1,16 +1,107 @@
-"""Figures of test targets: sharpness of the slanted edge, colour and noise of the ColorChecker."""
+"""Figures of test targets: where the patches of a chart lie, their colour and noise; sharpness of the slanted edge."""
 
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from skimage.color import deltaE_ciede2000, xyz2lab
 
-from rodcone.colour_spaces import luminance_of_srgb
-from rodcone.errors import InputError
+from render.scene import Scene
+from rodcone.colour_spaces import SRGB_TO_XYZ, luminance_of_srgb
+from rodcone.errors import InputError, require_range
 from scenes.catalog import load
 from studies.metrics.mtf import edge_response
-from studies.metrics.patches import Masks, patch_colour_errors, patch_masks, patch_snr_db
+
+Masks = NDArray[np.bool_]
+
+
+def patch_masks(scene: Scene, shape: tuple[int, int], inner: float = 0.6) -> Masks:
+    """Pixels of each patch of a scene's chart, shape (patch, h, w), in the chart's order.
+
+    The chart's own placement is projected through the scene's own camera; nothing is searched for in a picture.
+
+    Parameters
+    ----------
+    scene : Scene
+        With rectangles ``patch00``, ``patch01``, ...: `scenes.color_checker`, or a scene that holds its chart.
+    shape : (int, int)
+        Height and width of the picture.
+    inner : float
+        Share of a patch's width and height that counts: its border holds the neighbours' light, blurred and mosaicked.
+
+    Raises
+    ------
+    InputError
+        For a scene without patches, or a picture so small that a patch has less than four pixels.
+    """
+    require_range("inner", inner, 0.01, 1.0, "give a share of the patch's side: 0.6")
+    nodes = [scene.geometry[name] for name in sorted(scene.geometry) if name.startswith("patch")]
+    if not nodes:
+        raise InputError(f"scene: {scene.name!r} has no patches; give one with a chart, such as 'color_checker'")
+    camera = scene.geometry["sensor"]
+    if camera.get("fov_axis") != "smaller":
+        raise InputError(f"scene: its camera's fov_axis is {camera.get('fov_axis')!r}; allowed: 'smaller'")
+    to_camera = np.linalg.inv(np.array(camera["to_world"]))
+    focal_px = min(shape) / 2 / np.tan(np.radians(camera["fov"] / 2))
+    masks = np.stack([_inside(to_camera @ np.array(node["to_world"]), inner, focal_px, shape) for node in nodes])
+    least = int(masks.sum(axis=(1, 2)).min())
+    if least < 4:
+        raise InputError(f"shape: {shape} leaves {least} pixels to a patch; allowed: 4 or more; give a larger picture")
+    return masks
+
+
+def _inside(place: NDArray[np.float64], inner: float, focal_px: float, shape: tuple[int, int]) -> Masks:
+    """Pixels whose centre sees the inner part of a rectangle of side 2 at `place` in the camera's space (h, w).
+
+    The camera looks along +z, +x to its left and +y up: pixel (row, column) looks at ((w / 2 - column - 0.5),
+    (h / 2 - row - 0.5), focal_px).
+    """
+    rows, columns = np.indices(shape) + 0.5
+    rays = np.stack([shape[1] / 2 - columns, shape[0] / 2 - rows, np.full(shape, focal_px)], axis=-1)
+    # A ray t (x, y, z) meets the rectangle's plane where t ray = centre + u right + v up: solve for (u, v, t).
+    right, up, centre = place[:3, 0], place[:3, 1], place[:3, 3]
+    matrices = np.stack([np.broadcast_to(right, rays.shape), np.broadcast_to(up, rays.shape), -rays], axis=-1)
+    u, v, distance = np.moveaxis(np.linalg.solve(matrices, np.broadcast_to(-centre, rays.shape)[..., None]), -2, 0)
+    return np.asarray(((np.abs(u) <= inner) & (np.abs(v) <= inner) & (distance > 0))[..., 0])
+
+
+def patch_means(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
+    """Mean of each patch, shape (patch, channel), of a picture (h, w, channel)."""
+    return np.stack([picture[mask].mean(axis=0) for mask in masks])
+
+
+def patch_labs(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
+    """CIELAB of each patch's mean colour, shape (patch, 3), of linear sRGB (h, w, 3)."""
+    return np.asarray(xyz2lab(patch_means(linear, masks) @ SRGB_TO_XYZ.T))
+
+
+def patch_snr_db(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
+    """SNR 20 log10(mean / standard deviation) of each patch and channel [dB], shape (patch, channel).
+
+    Of a linear picture (h, w, channel), as ISO 15739 has it. Patches are taken as evenly lit. A mean that isn't above 0
+    gives -inf, without noise too; a patch above 0 without noise gives inf.
+    """
+    mean = patch_means(picture, masks)
+    # About each patch's first pixel: an even patch has no deviation then, in whatever order a processor adds.
+    deviation = np.stack([(picture[mask] - picture[mask][0]).std(axis=0, ddof=1) for mask in masks])
+    lit = mean > 0
+    with np.errstate(divide="ignore"):  # no noise at all
+        return np.where(lit, 20 * (np.log10(np.where(lit, mean, 1.0)) - np.log10(deviation)), -np.inf)
+
+
+def patch_colour_errors(picture: NDArray[np.float64], truth: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
+    """CIEDE2000 between the mean colours of each patch, shape (patch,).
+
+    Parameters
+    ----------
+    picture, truth : (h, w, 3) float64
+        Linear sRGB, not clipped, in which white is 1: in linear light noise averages out, so that colour alone is
+        left; clipping or encoding first would turn noise into a shift.
+    masks : (patch, h, w) bool
+    """
+    return np.asarray(deltaE_ciede2000(patch_labs(picture, masks), patch_labs(truth, masks)))
+
 
 EDGE, CHART = "slanted_edge", "color_checker"  # names in `scenes.catalog`
 

@@ -20,8 +20,8 @@ from markupsafe import Markup
 from render.spectrum import VISIBLE_NM
 from studies.metrics.metric import MEANINGS, METRICS, SEEN_BY, Metric
 from studies.pages import report_text as text
-from studies.pages.charts import SNR, snr_svg
 from studies.pages.page import address, own_file, write_out
+from studies.pages.plots import SNR, snr_svg
 from studies.pages.report_compare import (
     CAMERA,
     axes_of,

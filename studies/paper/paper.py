@@ -10,7 +10,7 @@ from typing import Any
 from rodcone.files import finite, replacing
 from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import png_bytes, svg_text
-from studies.pages.report_facts import environment
+from studies.pages.report_sweep import environment
 from studies.paper.claims import VERDICTS, Claim, PaperFigure, default_text, range_text, value_text
 from studies.paper.figure1 import figure_1a, figure_1b
 from studies.paper.figure2 import figure_2

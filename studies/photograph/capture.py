@@ -15,7 +15,7 @@ from sensor.exposure import AUTO_INFORMATION, exposure_by_rule_s
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.raw import RawImage
-from studies.photograph.calibrate import calibrate, iso_speed
+from studies.photograph.camera import calibrate, iso_speed
 
 
 def capture(

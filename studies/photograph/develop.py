@@ -64,7 +64,7 @@ def develop(
     ----------
     raw : RawImage
     calibration : ColourCalibration, optional
-        Colours of the camera, as `studies.photograph.calibrate.calibrate` fits them; the raw image's own by default.
+        Colours of the camera, as `studies.photograph.camera.calibrate` fits them; the raw image's own by default.
     processor : str, optional
         Of `isp.processors.catalogue.PROCESSORS`, or ``mine.py:develop`` (`isp.processors.own.processor_of`); ``bayer``,
         ``interleaved``, ``ple`` or ``any_mosaic``, by the mosaic, where left out.

@@ -29,12 +29,18 @@ from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending, write_raw
 from sensor.response import expected_electrons
-from studies.photograph.calibrate import calibrate, iso_speed
+from studies.photograph.camera import calibrate, iso_speed
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra
-from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.study.render_noise import monte_carlo_share, noise_note, speckle_sizes
-from studies.study.scene_source import asked_level, asked_size, open_scene
+from studies.study.scene_source import (
+    LIGHT,
+    asked_level,
+    asked_size,
+    check_radiance_file,
+    open_radiance_file,
+    open_scene,
+)
 from studies.study.study import AS_SHOT, GRAY_WORLD, MOST_FRAMES
 
 MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant

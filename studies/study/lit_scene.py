@@ -25,9 +25,8 @@ from sensor.presets import preset
 from studies.study.equal_area import require_pixels
 from studies.study.levels import parse_level
 from studies.study.model import RenderModel
-from studies.study.radiance_file import LIGHT, check_radiance_file, open_radiance_file
 from studies.study.render_noise import render_quietly
-from studies.study.scene_source import asked_level, open_scene
+from studies.study.scene_source import LIGHT, asked_level, check_radiance_file, open_radiance_file, open_scene
 from studies.study.study import OWN, SceneChoice, Study
 
 Progress = Callable[[float, float], None]

@@ -27,7 +27,7 @@ from studies.metrics.target_figures import target_figures
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import balance_delta_e, develop_to_scale, mean_electrons
 from studies.photograph.clock import machine, timed
-from studies.photograph.png import to_png
+from studies.photograph.picture_file import to_png
 from studies.study.equal_area import area_average
 from studies.study.render_noise import charged_share
 from studies.study.study import AS_SHOT, label

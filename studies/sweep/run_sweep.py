@@ -1,10 +1,12 @@
-"""A sweep: makes every cell of a study that the results database lacks, and stores it there."""
+"""A sweep: makes every cell of a study that the results database lacks, and stores it in a folder of sweeps."""
 
+import fcntl
 import json
+import os
 import platform
 from collections import defaultdict
-from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from itertools import chain
@@ -12,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from isp.processors.catalogue import require_libraries
+from rodcone.errors import InputError
+from rodcone.files import is_half_written
 from rodcone.progress import Step, render_words, told
 from studies.budget.ledger import Plan
 from studies.budget.plan import plan as plan_of
@@ -20,11 +24,54 @@ from studies.study.lit_scene import open_all
 from studies.study.render_noise import noise_note
 from studies.study.study import Study, conditions, label
 from studies.sweep.cells import Cell
-from studies.sweep.database import add, done, forget_old, note_run, note_stages, open_results, rows, want
-from studies.sweep.folder import at_work
-from studies.sweep.prepare import PICTURES, PILOTS, Job, known_cells, scene_cells
+from studies.sweep.database import FILE, add, done, forget_old, note_run, note_stages, open_results, rows, want
+from studies.sweep.prepare import FRAMES, PICTURES, PILOTS, RENDERS, Job, known_cells, scene_cells
 from studies.sweep.row import Row
 from studies.sweep.workers import InThisProcess, run
+
+MARKER = ".rodcone-sweep"  # locked by each sweep at work: the lock ends with its process, however that ends
+
+
+@contextmanager
+def at_work(out: Path) -> Iterator[None]:
+    """Make a folder that of sweeps, and hold its lock; where no other does, remove what killed ones left half written.
+
+    A new or an empty folder is marked; hidden files don't count.
+
+    Raises
+    ------
+    InputError
+        For a folder that holds other files and no sweep.
+    OSError
+        Where it can't be written.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    if not any((out / name).is_file() for name in (MARKER, FILE)):
+        others = sorted(path.name for path in out.iterdir() if not path.name.startswith("."))
+        if others:
+            raise InputError(
+                f"out: {out} holds other files, such as {others[0]!r}; allowed: a new or an empty folder, or that of "
+                f"a sweep; write --out {out / 'sweep'}"
+            )
+    (out / MARKER).touch()
+    with (out / MARKER).open("rb") as marker:
+        with suppress(OSError):  # another sweep is at work, or this file system has no locks
+            fcntl.flock(marker, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _remove_half_written(out)
+        with suppress(OSError):
+            fcntl.flock(marker, fcntl.LOCK_SH)
+        yield
+
+
+def _remove_half_written(out: Path) -> None:
+    for top in (out / name for name in (RENDERS, FRAMES, PICTURES, PILOTS)):
+        # of a linked folder, which others may share, no lock of this one tells who is at work in it
+        for folder, _, files in os.walk(top) if not top.is_symlink() else ():
+            for file in files:
+                path = Path(folder) / file
+                if is_half_written(path):
+                    path.unlink(missing_ok=True)
+
 
 # Such as `partial(studies.sweep.workers.run_in_processes, workers=4)`.
 Runner = Callable[[Sequence[Cell]], Generator[Row, None, None]]

@@ -31,7 +31,7 @@ from sensor.raw import RawImage
 from sensor.raw_files.raw_file import write_raw
 from sensor.readout import read_out
 from sensor.response import electrons_per_irradiance
-from studies.photograph.calibrate import calibrate
+from studies.photograph.camera import calibrate
 
 rawpy = pytest.importorskip("rawpy", reason="rawpy (LibRaw) is not installed")
 

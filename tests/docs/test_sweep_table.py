@@ -14,8 +14,8 @@ from isp.colour.encoding import quantise
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
-from studies.metrics.patches import patch_masks
-from studies.photograph.png import to_png
+from studies.metrics.target_figures import patch_masks
+from studies.photograph.picture_file import to_png
 from studies.sweep.prepare import PICTURES
 from studies.sweep.row import Row
 from studies.sweep.stored import keep

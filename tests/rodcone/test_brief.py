@@ -16,7 +16,7 @@ from sensor.burst import merge
 from sensor.curves import rgbw
 from sensor.device import draw_device
 from sensor.presets import low_noise
-from studies.photograph.calibrate import calibrate
+from studies.photograph.camera import calibrate
 from studies.study.study import SceneChoice, Study
 
 

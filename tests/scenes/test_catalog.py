@@ -12,7 +12,7 @@ from scenes.catalog import load, names
 from scenes.levels import DEMO_LEVELS
 from scenes.materials import metal
 from scenes.reflectances import band, color_checker, edge, grey
-from studies.metrics.patches import patch_masks
+from studies.metrics.target_figures import patch_masks
 
 BANDS_NM = np.arange(405.0, 780.0, 50.0)
 

@@ -23,7 +23,7 @@ from sensor.response import expected_electrons
 from studies.budget.bands import counts, fine_bands, groups_of
 from studies.budget.ledger import as_stated
 from studies.commands import new as new_command
-from studies.metrics.patches import patch_masks
+from studies.metrics.target_figures import patch_masks
 from studies.metrics.truth import light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import mean_electrons
 from studies.study.lit_scene import level_luminance, open_choice, under

@@ -9,7 +9,7 @@ from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from scenes.reflectances import color_checker
 from sensor.presets import preset
-from studies.photograph.calibrate import calibrate
+from studies.photograph.camera import calibrate
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)

@@ -18,8 +18,7 @@ from sensor.cfa import channel_map, channels, unit_channel
 from sensor.presets import preset
 from sensor.raw import RawImage
 from studies.metrics.truth import light_in_bands, neutral_electrons
-from studies.photograph.calibrate import calibrate
-from studies.photograph.camera import colour_fit
+from studies.photograph.camera import calibrate, colour_fit
 
 D65 = light_in_bands(illuminant("D65"), DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM))
 MOSAICS = ("rccb", "rccc", "ryyb", "mono")

@@ -15,7 +15,7 @@ from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files.dng import OPCODES, is_own, read_dng, write_dng
 from sensor.readout import as_raw
-from studies.photograph.calibrate import calibrate
+from studies.photograph.camera import calibrate
 
 PLACES = np.array([(1, 2), (7, 0)])
 

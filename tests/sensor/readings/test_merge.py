@@ -17,7 +17,7 @@ from sensor.random import poisson
 from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.readings.noise import covariances, of_reading, seams, shares, whole_share
 from sensor.readout import draw_frame, noise_variance
-from studies.photograph.calibrate import calibrate
+from studies.photograph.camera import calibrate
 
 HDR = ("dual_gain", "split_pixel", "staggered")
 SHAPE, TIME_S = (256, 256), 0.01

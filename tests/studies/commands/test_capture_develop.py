@@ -24,7 +24,7 @@ from sensor.presets import preset, preset_file
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.response import expected_electrons
-from studies.photograph.calibrate import calibrate, iso_speed
+from studies.photograph.camera import calibrate, iso_speed
 from studies.photograph.develop import develop_file
 from studies.photograph.picture_file import write_picture
 from studies.photograph.shot import Order, take

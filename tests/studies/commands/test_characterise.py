@@ -10,7 +10,7 @@ from command_line import call, check_refusals
 
 from sensor.emva1288.characterise import characterise, configured
 from sensor.presets import low_noise, preset_file
-from studies.pages.charts import transfer_svg
+from studies.pages.plots import transfer_svg
 
 SPACE = "{http://www.w3.org/2000/svg}"
 SMALL = ["--height", "32", "--width", "48"]

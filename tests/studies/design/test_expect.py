@@ -16,7 +16,7 @@ from sensor.config import SensorConfig
 from sensor.presets import low_noise, preset
 from studies.design.expect import expect, metric_forms, middle_pixels, responses_e, sampling_of, view_of
 from studies.metrics.truth import neutral_electrons
-from studies.photograph.calibrate import calibrate
+from studies.photograph.camera import calibrate
 
 LEVELS = (0.036, 2.0, 25.0)
 BAYER, RGBW = low_noise("bayer"), low_noise("rgbw")

@@ -19,10 +19,10 @@ from sensor.presets import preset_file
 from sensor.readout import noise_variance
 from studies.explore import chain
 from studies.explore import session as SESSION
+from studies.explore.answers import noise_share
 from studies.explore.chain import expose_scene
 from studies.explore.controls import Controls
 from studies.explore.memo import Memo
-from studies.explore.render_noise import noise_share
 from studies.explore.session import MOST_NOTES, Session
 from studies.explore.slow import stand_in
 from studies.explore.source import Rendered, RenderOptions, of_transport, open_source

@@ -9,12 +9,12 @@ from command_line import check_refusals
 import rodcone as public
 from render.spectrum import DEFAULT_WAVELENGTH_NM
 from rodcone.memory import memory
+from studies.explore.answers import python_of
 from studies.explore.chain import photograph
 from studies.explore.controls import Controls, Lamp
 from studies.explore.memo import go_on
 from studies.explore.source import FIRST_SIDE, RenderOptions, open_source
-from studies.explore.written import python_of
-from studies.photograph.png import to_png
+from studies.photograph.picture_file import to_png
 
 
 def test_a_scene_is_shown_small_first_and_then_whole():

@@ -11,12 +11,12 @@ from explore_sample import GAUSSIAN, RENDER, random_controls, small_transport
 
 import rodcone as public
 from rodcone.errors import InputError
+from studies.explore.answers import python_of
 from studies.explore.chain import photograph
 from studies.explore.controls import Controls, Lamp
 from studies.explore.memo import go_on
-from studies.explore.source import RenderOptions, of_transport, open_source
+from studies.explore.source import GIVEN, RenderOptions, of_transport, open_source
 from studies.explore.views import VIEWS, histogram, pixel
-from studies.explore.written import GIVEN, python_of
 
 ROOM = """<scene version="3.0.0">
   <sensor type="perspective"/><shape type="sphere"><transform name="to_world"><translate z="4"/></transform></shape>

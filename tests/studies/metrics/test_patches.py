@@ -9,7 +9,7 @@ from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
 from scenes.reflectances import color_checker
-from studies.metrics.patches import patch_colour_errors, patch_masks, patch_means, patch_snr_db
+from studies.metrics.target_figures import patch_colour_errors, patch_masks, patch_means, patch_snr_db
 
 SHAPE = (96, 128)
 MASKS = patch_masks(load("color_checker"), SHAPE)

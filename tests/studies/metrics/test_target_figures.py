@@ -6,8 +6,7 @@ import pytest
 from rodcone.colour_spaces import luminance_of_srgb
 from scenes.catalog import load
 from studies.metrics.mtf import edge_response
-from studies.metrics.patches import patch_masks
-from studies.metrics.target_figures import TargetFigures, target_figures
+from studies.metrics.target_figures import TargetFigures, patch_masks, target_figures
 
 SHAPE = (96, 96)
 

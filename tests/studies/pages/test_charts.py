@@ -1,7 +1,7 @@
 """The plot of SNR over light: names as they are, and it stands in the report."""
 
 from sensor.presets import preset
-from studies.pages.charts import snr_svg
+from studies.pages.plots import snr_svg
 
 
 def test_a_sensors_name_is_no_formula():

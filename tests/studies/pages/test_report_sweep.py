@@ -24,9 +24,8 @@ from studies.commands.report import write_report
 from studies.pages.report import group_views, render_report
 from studies.pages.report_compare import Comparison
 from studies.pages.report_data import ReportSensor
-from studies.pages.report_facts import sensor_of
 from studies.pages.report_pictures import busiest, flip_map, opened, view_order
-from studies.pages.report_sweep import sweep_report
+from studies.pages.report_sweep import sensor_of, sweep_report
 from studies.photograph.picture_file import write_picture
 from studies.study.study import SceneChoice
 from studies.sweep.database import FILE

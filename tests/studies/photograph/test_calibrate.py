@@ -15,7 +15,7 @@ from scenes.reflectances import color_checker
 from sensor.config import SensorConfig
 from sensor.curves import Responses
 from sensor.presets import low_noise
-from studies.photograph.calibrate import calibrate, iso_speed
+from studies.photograph.camera import calibrate, iso_speed
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)

@@ -14,7 +14,7 @@ from sensor.device import draw_device
 from sensor.presets import low_noise
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import write_raw
-from studies.photograph.calibrate import calibrate
+from studies.photograph.camera import calibrate
 from studies.photograph.develop import develop, develop_file, mosaic_processor
 
 

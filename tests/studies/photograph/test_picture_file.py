@@ -10,8 +10,7 @@ from PIL import Image, ImageCms
 
 from isp.colour.encoding import ENCODINGS, encode, quantise
 from rodcone.errors import InputError
-from studies.photograph.picture_file import to_tiff, write_picture
-from studies.photograph.png import icc_profile, to_png
+from studies.photograph.picture_file import icc_profile, to_png, to_tiff, write_picture
 
 LINEAR = np.random.default_rng(5).uniform(0.05, 0.7, (7, 90, 3))
 

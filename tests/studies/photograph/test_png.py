@@ -7,7 +7,7 @@ from PIL import Image
 
 from isp.colour.encoding import quantise
 from render.loader import mitsuba_module
-from studies.photograph.png import to_png
+from studies.photograph.picture_file import to_png
 
 RAMP = np.random.default_rng(5).random((7, 300, 3))
 RAMP[0, 0], RAMP[0, 1] = 0.0, 1.0

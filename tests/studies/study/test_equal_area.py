@@ -9,7 +9,7 @@ from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from studies.budget.ledger import as_stated
 from studies.budget.plan import plan
-from studies.commands.estimate import estimate
+from studies.commands.sweep import estimate
 from studies.study.equal_area import EqualArea, area_average
 from studies.study.lit_scene import open_all
 from studies.study.study import RenderLimits, SceneChoice, Study

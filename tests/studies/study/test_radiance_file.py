@@ -8,7 +8,7 @@ import pytest
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from rodcone.errors import InputError
-from studies.study.radiance_file import open_radiance_file
+from studies.study.scene_source import open_radiance_file
 
 NM = 385.0 + 10 * np.arange(40)
 

@@ -33,8 +33,8 @@ from studies.sweep import run_cell as cell_run
 from studies.sweep import run_sweep as sweep_run
 from studies.sweep.cells import Cell
 from studies.sweep.database import last_run, open_results, rows
-from studies.sweep.folder import at_work
 from studies.sweep.row import Row
+from studies.sweep.run_sweep import at_work
 from studies.sweep.workers import run, run_in_processes
 
 content, half_pictures, here, parts_left, small_study, swept = (
