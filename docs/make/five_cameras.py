@@ -18,8 +18,10 @@ from rodcone.errors import InputError
 from rodcone.files import replacing
 from scenes.catalog import load
 from sensor.cameras.emva_report import read_report
+from sensor.capture import expose
 from sensor.cfa import channels
 from sensor.config import SensorConfig
+from sensor.device import draw_device
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.metrics.confidence import half_width
@@ -38,7 +40,7 @@ from studies.pages.report_text import (
     table,
 )
 from studies.pages.verdict import Floats, Leads, leads
-from studies.photograph.snr import FIELD_SIDE, even_field
+from studies.photograph.snr import channel_e, snr
 from studies.study.equal_area import EqualArea
 from studies.study.study import label
 from studies.sweep.database import LastRun, last_run
@@ -49,7 +51,44 @@ PAGE = Path(__file__).resolve().parents[1] / "five_cameras.md"
 RGBW, BAYER = "ple_rgbw", "ple_bayer"
 SHOWN = tuple(metric for metric in METRICS if metric not in ON_TARGETS)
 LINES = dict(zip((*COLOURS, SOFT, "#9a7d0a", INK), ("-", "-", "-", "-", "-", "--", ":"), strict=True))  # a sensor each
+FIELD_SIDE = 512  # pixels of a simulated even field
 AT_NM = 530.0  # where the quantum efficiency of a sensor without a report is told
+
+
+@dataclass(frozen=True)
+class EvenField:
+    """An even neutral field on the pixels of one channel.
+
+    Attributes
+    ----------
+    electrons : float
+        Expected photo-electrons of a pixel.
+    snr_db : float
+        In closed form (`snr`).
+    simulated_db : float
+        Mean over standard deviation of `FIELD_SIDE` squared pixels of one simulated chip, from one frame; NaN where the
+        mean is not above the dark's.
+    """
+
+    electrons: float
+    snr_db: float
+    simulated_db: float
+
+
+def even_field(
+    sensor: SensorConfig, channel: str, light: Light, luminance_cd_m2: float, exposure_s: float
+) -> EvenField:
+    """Electrons and SNR of a channel's pixels in an even neutral field: closed form, and one simulated frame."""
+    alone = replace(sensor, cfa=(channel,))
+    electrons, shape = float(channel_e(alone, light, luminance_cd_m2, exposure_s)[0]), (FIELD_SIDE, FIELD_SIDE)
+    rng = np.random.default_rng(0)
+    device = draw_device(alone, shape, rng)
+    raw = expose(np.full(shape, electrons / alone.chip.sites**2), alone, exposure_s, device, rng)
+    pixel = alone.pixel
+    dark_e_per_s = pixel.dark_current_e_per_s + pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s
+    mean_e = float(raw.electrons.mean()) - dark_e_per_s * raw.exposure_s
+    simulated_db = 20 * log10(mean_e / float(raw.electrons.std())) if mean_e > 0 else float("nan")
+    return EvenField(electrons, 20 * log10(float(snr(np.array(electrons), alone, exposure_s))), simulated_db)
 
 
 @dataclass(frozen=True)

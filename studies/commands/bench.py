@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from rodcone.errors import require_range, require_whole
+from rodcone.errors import InputError, require_whole
 from rodcone.progress import progress
 from scenes.catalog import load
 from sensor.presets import preset
@@ -17,6 +17,7 @@ from studies.pages.report_sweep import environment
 from studies.photograph.clock import processor_facts
 from studies.speed.points import stage_json
 from studies.speed.stages import STAGES, Bench, stages
+from studies.study.levels import parse_level
 
 DEFAULT = Bench()
 HEAD = (" choice", "seconds", "ratio", "processor", "ratio", "error, e-", "share")
@@ -35,7 +36,8 @@ def bench(
         Print the JSON instead of the tables.
     """
     require_ending(out, ".json")
-    require_range("level_cd_m2", task.level_cd_m2, 1e-9, 1e12, "give a mean luminance such as 25")
+    if parse_level(task.level)[1] != "cd/m2":
+        raise InputError(f"level: {task.level!r} is not allowed; give a mean luminance such as 25cd/m2")
     for name in ("size", "picture"):
         require_whole(name, getattr(task, name), 16, 4096, "give pixels")
     work = stages(task, load(task.scene), preset(task.sensor))

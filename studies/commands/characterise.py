@@ -1,6 +1,5 @@
 """The command `rodcone characterise`."""
 
-import json as notation
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,14 +7,14 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from rodcone.errors import InputError, require_absent, require_whole
-from rodcone.files import check_place, finite
+from rodcone.files import check_place
 from sensor.cameras.frames import frame_numbers, measure_files
 from sensor.cameras.numbers import preset_text
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
 from sensor.readings.noise import of_reading
-from studies.commands.console import Time, print_table, require_ending, require_new, say, write_text
+from studies.commands.console import Time, print_json, print_table, require_new, require_place, say, write_text
 from studies.pages.plots import transfer_svg
 
 HEAD = ("figure", "unit", "configured", "measured", "std. error", "in std. errors")
@@ -79,14 +78,12 @@ def characterise(
             raise InputError(f"reading: {reading} of {preset!r}, whose pixels are read once; leave it out")
         require_whole("reading", reading, 1, len(sensor.chip.readings), f"{preset!r} has so many")
         sensor = of_reading(sensor, reading - 1)
-    if out is not None:
-        require_ending(out, ".svg")
-        check_place(out)
+    require_place(out, ".svg")
     chip = measure(sensor, (height, width), seed, exposure)
     if out is not None:
         write_text(out, transfer_svg(chip, f"{preset}, characterised after EMVA 1288"))
     if json:
-        print(notation.dumps(finite(_facts(chip)), allow_nan=False))
+        print_json(_facts(chip))
         return
     # The last column is measured less configured in standard errors; a figure without an error has none.
     rows = []
@@ -114,7 +111,7 @@ def _measure_files(flats: list[Path], dark: list[Path], window: int | None, out:
         title = f"A camera measured from {flats[0].name} and others."
         write_text(out, preset_text(title, frame_numbers(camera, flats), None, ""))
     if json:
-        print(notation.dumps({**asdict(camera), "levels_dn": camera.levels_dn.tolist()}))
+        print_json({**asdict(camera), "levels_dn": camera.levels_dn.tolist()})
         return
     print_table(
         FRAMES_HEAD,

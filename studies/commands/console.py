@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rodcone.errors import InputError
-from rodcone.files import replacing
+from rodcone.files import check_place, finite, replacing
 from rodcone.time_text import parse_time
 
 
@@ -44,7 +44,15 @@ def say(*notes: str) -> None:
 
 def print_result(text: object, facts: Mapping[str, Any], *, json: bool) -> None:
     """Print a command's result on stdout: the text, or with --json the facts as one JSON object on one line."""
-    print(notation.dumps(facts) if json else text)
+    if json:
+        print_json(facts)
+    else:
+        print(text)
+
+
+def print_json(facts: Mapping[str, Any]) -> None:
+    """Print facts as one JSON object on one line; a number that isn't finite is null."""
+    print(notation.dumps(finite(facts), allow_nan=False))
 
 
 def print_table(head: Sequence[str], rows: Iterable[Sequence[str | Text]], words: int = 1) -> None:
@@ -74,3 +82,10 @@ def require_ending(out: Path, ending: str) -> None:
     """Raise `InputError` where a file to write has another ending."""
     if out.suffix.lower() != ending:
         raise InputError(f"out: {str(out)!r} doesn't end in {ending}; allowed: {ending}; write {out.stem}{ending}")
+
+
+def require_place(out: Path | None, ending: str) -> None:
+    """Raise `InputError` or `OSError` where a file, if one is asked for, can't be written under its name."""
+    if out is not None:
+        require_ending(out, ending)
+        check_place(out)

@@ -1,6 +1,5 @@
 """The command `rodcone expect`."""
 
-import json as notation
 from csv import DictWriter
 from dataclasses import asdict, fields
 from io import StringIO
@@ -10,11 +9,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from rodcone.files import check_place
 from scenes.levels import AVERAGE_REFLECTANCE
 from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset
-from studies.commands.console import print_table, require_ending, write_text
+from studies.commands.console import print_json, print_table, require_place, write_text
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
 from studies.study.levels import NAMED, UNITS, parse_exposure, parse_level
@@ -56,9 +54,7 @@ def expect(
     json
         Print one JSON object: a list of errors by level for each camera.
     """
-    if out is not None:
-        require_ending(out, ".csv")
-        check_place(out)
+    require_place(out, ".csv")
     levels = {text: _luminance(text) for text in level or NAMED}
     time_s = parse_exposure(exposure, "exposure")
     by_camera = {
@@ -75,7 +71,7 @@ def expect(
     if out is not None:
         write_text(out, _csv(by_camera))
     if json:
-        print(notation.dumps({name: [asdict(row) for row in rows] for name, rows in by_camera.items()}))
+        print_json({name: [asdict(row) for row in rows] for name, rows in by_camera.items()})
         return
     reference, *others = by_camera.items()
     print_table(

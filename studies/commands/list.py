@@ -1,13 +1,12 @@
 """The command `rodcone list`."""
 
-import json as notation
 from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
 from rodcone.errors import InputError
 from rodcone.files import check_place
-from studies.commands.console import print_table, require_ending, write_text
+from studies.commands.console import print_json, print_table, require_ending, write_text
 
 # Each list imports its own catalogue: all of them together take a second to load.
 
@@ -52,7 +51,7 @@ def list_names(kind: Kind | None = None, /, *, out: Path | None = None, json: bo
         _write_gallery(kind, out)
     lists = {name: LISTS[name]() for name in ([kind] if kind else LISTS)}
     if json:
-        print(notation.dumps(lists))
+        print_json(lists)
         return
     for index, (name, lines) in enumerate(lists.items()):
         print(f"{chr(10) * (index > 0)}{name}")

@@ -1,6 +1,5 @@
 """The command `rodcone plan`."""
 
-import json as notation
 import sys
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from rodcone.progress import progress
 from studies.budget.plan import plan as plan_study
 from studies.budget.plan import reference_plan
 from studies.budget.plan_text import plan_json, plan_table, reasons
+from studies.commands.console import print_json
 from studies.study.study_file import read_study
 
 
@@ -42,7 +42,7 @@ def plan(
     with progress(sys.stderr) as step:
         chosen = plan_study(task, cache=cache, step=step)
     if json:
-        print(notation.dumps(plan_json(task, chosen, everything)))
+        print_json(plan_json(task, chosen, everything))
         return
     Console(width=None if sys.stdout.isatty() else 100).print(plan_table(chosen))
     print("\n".join(reasons(task, chosen, everything)))

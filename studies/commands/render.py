@@ -1,10 +1,12 @@
 """The command `rodcone render`."""
 
 import sys
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter
 
 from render.denoised.relight import relight_denoised
 from render.engine import render as render_transport
@@ -24,29 +26,76 @@ from studies.study.scene_source import asked_level, asked_size, open_scene
 MOST_BANDS = 1000
 
 
-def render(
-    source: str,
-    /,
-    *,
-    out: Path = Path("render.exr"),
-    height: int | None = None,
-    width: int | None = None,
-    bands: str | None = None,
-    light: list[str] | None = None,
-    chart: str | None = None,
-    level: str | None = None,
-    spp: int | None = None,
-    noise: float | None = None,
-    max_seconds: Seconds | None = None,
-    max_depth: int | None = None,
-    seed: int = 0,
-    cache: Path | None = None,
-    trust_scene: bool = False,
-    extend: str | None = None,
-    denoise: bool = False,
-    force: bool = False,
-    json: bool = False,
-) -> int:
+@dataclass(frozen=True, kw_only=True)
+class RenderOrder:
+    """What to render and how.
+
+    Attributes
+    ----------
+    source : str
+        Scene by name such as color_checker, or a Mitsuba scene (.xml). Its lights are grouped by their ids up to a
+        colon; its files have to lie in its folder; lux are measured on the shape that has an irradiancemeter. Mitsuba
+        upsamples RGB colours to spectra; lights given as RGB have no unit, so give --level.
+    out : Path
+        File to write, ending in .exr.
+    height : int, optional
+        Pixels; the scene file's film by default, or 256. With one of height and width the other keeps the proportions.
+    width : int, optional
+        Pixels; as height.
+    bands : str, optional
+        Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; 380:780:10 by default.
+    light : tuple of str
+        GROUP=ILLUMINANT, such as lamp=A: another spectrum for a light group, at the same luminance; or ILLUMINANT
+        alone, for all of them; may be given several times. An illuminant is a name or a CSV file: lamp=led.csv.
+    chart : str, optional
+        CSV file with the reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
+    level : str, optional
+        Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
+        by default.
+    spp : int, optional
+        Samples a pixel, at most.
+    noise : float, optional
+        Relative Monte Carlo error to reach, such as 0.02.
+    max_seconds : float, optional
+        Time for the render in seconds, at most.
+    max_depth : int, optional
+        Longest path in segments; 2 is direct light. By default what the scene's file states, 8 where it states none.
+    seed : int
+        Seed of the render.
+    cache : Path, optional
+        Folder of finished renders, to use and to add to.
+    trust_scene : bool
+        Let the scene file load plug-ins of its own, which are native code, and files from anywhere.
+    extend : str, optional
+        hold: surfaces keep their end values outside their tables' wavelengths; by default bands there are refused.
+    denoise : bool
+        Write denoised light; its error is measured against two folds of a quarter of the samples each, whose time
+        counts. Needs rodcone[denoise].
+    force : bool
+        Run even where more memory is needed than is free.
+    """
+
+    source: str = field(kw_only=False)
+    out: Path = field(default=Path("render.exr"), kw_only=False)
+    height: int | None = None
+    width: int | None = None
+    bands: str | None = None
+    light: tuple[str, ...] = ()
+    chart: str | None = None
+    level: str | None = None
+    spp: int | None = None
+    noise: float | None = None
+    max_seconds: Seconds | None = None
+    max_depth: int | None = None
+    seed: int = 0
+    cache: Path | None = None
+    trust_scene: bool = False
+    extend: str | None = None
+    denoise: bool = False
+    force: bool = False
+
+
+def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = False) -> int:
     """Render a scene into a spectral OpenEXR file; prints its path.
 
     Stops at whichever comes first of --spp, --noise and --max-seconds; with none of them after 64 samples a pixel.
@@ -54,60 +103,19 @@ def render(
 
     Parameters
     ----------
-    source
-        Scene by name such as color_checker, or a Mitsuba scene (.xml). Its lights are grouped by their ids up to a
-        colon; its files have to lie in its folder; lux are measured on the shape that has an irradiancemeter. Mitsuba
-        upsamples RGB colours to spectra; lights given as RGB have no unit, so give --level.
-    out
-        File to write, ending in .exr.
-    height
-        Pixels; the scene file's film by default, or 256. With one of height and width the other keeps the proportions.
-    width
-        Pixels; as height.
-    bands
-        Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; 380:780:10 by default.
-    light
-        GROUP=ILLUMINANT, such as lamp=A: another spectrum for a light group, at the same luminance; or ILLUMINANT
-        alone, for all of them; may be given several times. An illuminant is a name or a CSV file: lamp=led.csv.
-    chart
-        CSV file with the reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
-    level
-        Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
-        by default.
-    spp
-        Samples a pixel, at most.
-    noise
-        Relative Monte Carlo error to reach, such as 0.02.
-    max_seconds
-        Time for the render in seconds, at most.
-    max_depth
-        Longest path in segments; 2 is direct light. By default what the scene's file states, 8 where it states none.
-    seed
-        Seed of the render.
-    cache
-        Folder of finished renders, to use and to add to.
-    trust_scene
-        Let the scene file load plug-ins of its own, which are native code, and files from anywhere.
-    extend
-        hold: surfaces keep their end values outside their tables' wavelengths; by default bands there are refused.
-    denoise
-        Write denoised light; its error is measured against two folds of a quarter of the samples each, whose time
-        counts. Needs rodcone[denoise].
-    force
-        Run even where more memory is needed than is free.
     json
         Print one JSON object with the path and facts of the render instead of the path.
     """
     # Check what can be checked before the render
-    require_ending(out, ".exr")
-    wavelength_nm, width_nm = _bands(bands)
-    opened = open_scene(source, trust_scene, extend, chart=chart)
-    scene, size = opened.scene, asked_size(opened.size, height, width)
-    spectra = asked_spectra(scene, light or ())
-    lit_at: dict[str, Any] = asked_level(scene, level)
+    require_ending(order.out, ".exr")
+    wavelength_nm, width_nm = _bands(order.bands)
+    opened = open_scene(order.source, order.trust_scene, order.extend, chart=order.chart)
+    scene, size = opened.scene, asked_size(opened.size, order.height, order.width)
+    spectra = asked_spectra(scene, order.light)
+    lit_at: dict[str, Any] = asked_level(scene, order.level)
     count = DEFAULT_WAVELENGTH_NM.size if wavelength_nm is None else wavelength_nm.size
-    require_memory(memory(size[0] * size[1], count, len(scene.groups), denoised=denoise), force)
-    check_place(out)
+    require_memory(memory(size[0] * size[1], count, len(scene.groups), denoised=order.denoise), order.force)
+    check_place(order.out)
     # Render and write
     with progress(sys.stderr) as step:
         step(render_words(np.inf), 0.0)
@@ -116,25 +124,27 @@ def render(
             size,
             wavelength_nm=wavelength_nm,
             width_nm=width_nm,
-            spp=spp,
-            noise=noise,
-            max_seconds=max_seconds,
-            max_depth=max_depth,
-            seed=seed,
-            cache=cache,
+            spp=order.spp,
+            noise=order.noise,
+            max_seconds=order.max_seconds,
+            max_depth=order.max_depth,
+            seed=order.seed,
+            cache=order.cache,
             progress=lambda share, error: step(render_words(error), share),
-            denoise=denoise,
+            denoise=order.denoise,
         )
-    radiance = relight_denoised(transport, spectra, **lit_at)[0] if denoise else transport.relight(spectra, **lit_at)
-    write_exr(radiance, out, scene=scene.name)
+    radiance = (
+        relight_denoised(transport, spectra, **lit_at)[0] if order.denoise else transport.relight(spectra, **lit_at)
+    )
+    write_exr(radiance, order.out, scene=scene.name)
     # Say what was done
     say(*opened.notes)
     interrupted = transport.stopped_by == "interrupt"
     if interrupted:
-        say(f"stopped; {transport.spp:.0f} samples a pixel are kept in {out}")
-    facts = {"path": str(out), **_facts(opened, transport, radiance)}
+        say(f"stopped; {transport.spp:.0f} samples a pixel are kept in {order.out}")
+    facts = {"path": str(order.out), **_facts(opened, transport, radiance)}
     facts["largest_band_error"] = float(transport.band_error(spectra).max())
-    print_result(out, facts, json=json)
+    print_result(order.out, facts, json=json)
     return INTERRUPTED if interrupted else 0
 
 

@@ -1,6 +1,5 @@
 """The command `rodcone snr`."""
 
-import json as notation
 from dataclasses import asdict, replace
 from math import isinf
 from pathlib import Path
@@ -9,10 +8,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from rodcone.errors import require_range
-from rodcone.files import check_place
 from sensor.config import SensorConfig
 from sensor.presets import preset
-from studies.commands.console import Time, print_table, require_ending, write_text
+from studies.commands.console import Time, print_json, print_table, require_place, write_text
 from studies.metrics.truth import GREY
 from studies.pages.plots import snr_svg
 from studies.pages.report_text import MISSING
@@ -57,21 +55,15 @@ def snr(
     """
     require_range("at", at, 1e-3, 1e4, "give signal over noise, such as 10")
     require_range("exposure", exposure, 1e-9, 1e6, "give a time such as 33ms")
-    if out is not None:
-        require_ending(out, ".svg")
-        check_place(out)
+    require_place(out, ".svg")
     opened = {name: _opened(name, f_number) for name in sensors}
     light_by_sensor = {name: light_for_snr(at, sensor, light, exposure) for name, sensor in opened.items()}
     if out is not None:
         named = {f"{name}{RELATIVE * sensor.responses.relative}": sensor for name, sensor in opened.items()}
         write_text(out, snr_svg(named, light, exposure, at))
     if json:
-        rows = {
-            name: [{k: None if v == float("inf") else v for k, v in asdict(x).items()}
-                   | {"relative": opened[name].responses.relative} for x in of]
-            for name, of in light_by_sensor.items()
-        }  # fmt: skip
-        print(notation.dumps(rows))
+        relative = {name: {"relative": sensor.responses.relative} for name, sensor in opened.items()}
+        print_json({name: [asdict(x) | relative[name] for x in of] for name, of in light_by_sensor.items()})
         return
     print_table(
         HEAD,

@@ -1,7 +1,6 @@
 """The commands `rodcone sweep` and `rodcone export`, and what a run will take, before anything is computed."""
 
 import errno
-import json as notation
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
@@ -22,7 +21,7 @@ from studies.budget.ledger import Plan
 from studies.budget.ledger import as_stated as plan_as_stated
 from studies.budget.plan import plan as plan_study
 from studies.budget.plan import reference_plan
-from studies.commands.console import INTERRUPTED, say
+from studies.commands.console import INTERRUPTED, print_result, say
 from studies.commands.report import write_results
 from studies.photograph.clock import Clock
 from studies.study.equal_area import sensor_shapes
@@ -146,14 +145,16 @@ def sweep(
         require_whole("workers", workers, 1, MOST_WORKERS, "give processes")
     if dry_run:
         sizes = _estimated(task, out, reference, workers or cores())
-        print(notation.dumps(vars(sizes)) if json else _words(sizes))
+        print_result(_words(sizes), vars(sizes), json=json)
         return 0
     check_memory(task, out, reference=reference, workers=0 if cluster else workers or cores(), force=force)
     with nullcontext(_local(workers)) if cluster is None else on_cluster(cluster) as runner:
         planned = partial(_plan, task, out, reference, as_stated)
         swept, report = make_all(task, out, planned, runner, clock)
     say(f"its report is {report}")
-    print(notation.dumps(_facts(swept) | {"report": str(report)}) if json else swept.out / FILE)
+    ledger = swept.out / FILE
+    paths = {"out": str(swept.out), "ledger": str(ledger), "report": str(report)}
+    print_result(ledger, {**vars(swept), **paths}, json=json)
     return 0
 
 
@@ -233,10 +234,6 @@ def _words(sizes: Estimate) -> str:
         f"about {duration(sizes.seconds)} with {sizes.workers} workers, at most {sizes.bytes / 1e9:.1f} GB of memory; "
         "renders and cells that exist already are counted too"
     )
-
-
-def _facts(swept: Swept) -> dict[str, object]:
-    return {**vars(swept), "out": str(swept.out), "ledger": str(swept.out / FILE), "notes": list(swept.notes)}
 
 
 @contextmanager

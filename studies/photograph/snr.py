@@ -1,19 +1,15 @@
 """An even neutral field before a camera in closed form: electrons, SNR, and the light that an SNR takes."""
 
 from dataclasses import dataclass, replace
-from math import log10, pi
+from math import pi
 
 import numpy as np
 
 from render.spectrum import Floats
-from sensor.capture import expose
 from sensor.cfa import channels
 from sensor.config import SensorConfig
-from sensor.device import draw_device
 from sensor.readout import electrons_at_snr, noise_variance
 from studies.metrics.truth import GREY, Light, light_of, neutral_electrons
-
-FIELD_SIDE = 512  # pixels of a simulated even field
 
 
 @dataclass(frozen=True)
@@ -76,39 +72,3 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
     electrons = dict(zip(channels(sensor.cfa), of[:, None] * luminance_cd_m2, strict=True))
     full_e = sensor.pixel.full_well_e - sensor.pixel.dark_current_e_per_s * exposure_s
     return {name: np.where(e < full_e, snr(e, sensor, exposure_s), np.nan) for name, e in electrons.items()}
-
-
-@dataclass(frozen=True)
-class EvenField:
-    """An even neutral field on the pixels of one channel.
-
-    Attributes
-    ----------
-    electrons : float
-        Expected photo-electrons of a pixel.
-    snr_db : float
-        In closed form (`snr`).
-    simulated_db : float
-        Mean over standard deviation of `FIELD_SIDE` squared pixels of one simulated chip, from one frame; NaN where the
-        mean is not above the dark's.
-    """
-
-    electrons: float
-    snr_db: float
-    simulated_db: float
-
-
-def even_field(
-    sensor: SensorConfig, channel: str, light: Light, luminance_cd_m2: float, exposure_s: float
-) -> EvenField:
-    """Electrons and SNR of a channel's pixels in an even neutral field: closed form, and one simulated frame."""
-    alone = replace(sensor, cfa=(channel,))
-    electrons, shape = float(channel_e(alone, light, luminance_cd_m2, exposure_s)[0]), (FIELD_SIDE, FIELD_SIDE)
-    rng = np.random.default_rng(0)
-    device = draw_device(alone, shape, rng)
-    raw = expose(np.full(shape, electrons / alone.chip.sites**2), alone, exposure_s, device, rng)
-    pixel = alone.pixel
-    dark_e_per_s = pixel.dark_current_e_per_s + pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s
-    mean_e = float(raw.electrons.mean()) - dark_e_per_s * raw.exposure_s
-    simulated_db = 20 * log10(mean_e / float(raw.electrons.std())) if mean_e > 0 else float("nan")
-    return EvenField(electrons, 20 * log10(float(snr(np.array(electrons), alone, exposure_s))), simulated_db)

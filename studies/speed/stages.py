@@ -28,6 +28,7 @@ from studies.budget.bands import fine_bands, groups_of
 from studies.budget.terms import horizontal_view_deg
 from studies.speed.points import Measured, Stage, Times, timed
 from studies.speed.share import electrons, mean_error, yardstick
+from studies.study.levels import parse_level
 
 MOST_BANDS = 40
 STAGES = 6
@@ -45,8 +46,8 @@ class Bench:
         Scene by name.
     sensor : str
         Sensor preset by name, or a preset file.
-    level_cd_m2 : float
-        Mean scene luminance.
+    level : str
+        Light level such as 25cd/m2 (mean scene luminance).
     size : int
         Side of the renders in pixels.
     picture : int
@@ -67,7 +68,7 @@ class Bench:
 
     scene: str = "still_life"
     sensor: str = "low_noise"
-    level_cd_m2: float = 25.0
+    level: str = "25cd/m2"
     size: int = 40
     picture: int = 128
     bands: tuple[int, ...] = (4, 8, 20, MOST_BANDS)
@@ -76,6 +77,11 @@ class Bench:
     patches: tuple[int, ...] = (3, 5)
     repeats: int = 1
     seed: int = 0
+
+    @property
+    def level_cd_m2(self) -> float:
+        """Mean scene luminance."""
+        return parse_level(self.level)[0]
 
 
 def stages(bench: Bench, scene: Scene, sensor: SensorConfig) -> Iterator[Stage]:

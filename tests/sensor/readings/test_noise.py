@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from five_cameras import even_field
 from loop import loop
 
 from sensor.burst import merged_raw, merged_sensor
@@ -24,7 +25,7 @@ from sensor.readings.noise import (
 )
 from sensor.readout import electrons_at_snr, noise_sources, noise_variance
 from studies.metrics.truth import light_of
-from studies.photograph.snr import even_field, snr
+from studies.photograph.snr import snr
 
 HDR = ("dual_gain", "split_pixel", "staggered")
 REAL = {

@@ -71,7 +71,7 @@ def test_bad_input_is_refused_before_anything_is_measured(tmp_path: Path) -> Non
     rows = (
         ("--scene still_live", "did you mean 'still_life'?"),
         ("--sensor lownoise", "did you mean 'low_noise'?"),
-        ("--level-cd-m2=-5", "level_cd_m2"),
+        ("--level 500lux", "level"),
         ("--size 8", "size: 8"),
     )
     check_refusals(f"bench -o {tmp_path / 'out' / 'bench.json'}", rows, tmp_path)

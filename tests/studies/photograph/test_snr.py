@@ -5,6 +5,7 @@ from math import inf, pi
 
 import numpy as np
 import pytest
+from five_cameras import even_field
 
 from sensor.capture import expose
 from sensor.device import draw_device
@@ -13,7 +14,7 @@ from sensor.presets import low_noise, table1_output
 from sensor.readout import electrons_at_snr
 from studies.metrics.truth import light_of
 from studies.paper.setup import shot_noise_alone
-from studies.photograph.snr import channel_e, even_field, light_for_snr, snr, snr_at
+from studies.photograph.snr import channel_e, light_for_snr, snr, snr_at
 
 EXPOSURE_S = 0.033
 
