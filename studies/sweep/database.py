@@ -16,9 +16,10 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from cattrs import structure
+
 from rodcone.digests import digest
 from rodcone.errors import InputError, one_line
-from studies.study.lit_scene import RenderFacts
 from studies.sweep.cells import RenderRecord
 from studies.sweep.row import AXES, Row
 from studies.sweep.stored import is_whole
@@ -249,9 +250,7 @@ def render_record(base: sqlite3.Connection, request: str) -> RenderRecord | None
     values = base.execute("SELECT * FROM renders WHERE request = ?", (request,)).fetchone()
     if values is None or not _is_sound(values):
         return None
-    stored = json.loads(values[1])
-    facts = RenderFacts(**stored.pop("facts"))
-    return RenderRecord(facts=facts, notes=tuple(stored.pop("notes")), **stored)
+    return structure(json.loads(values[1]), RenderRecord)
 
 
 def note_render(base: sqlite3.Connection, request: str, record: RenderRecord) -> None:
